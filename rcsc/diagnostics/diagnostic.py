@@ -1,0 +1,77 @@
+"""`Diagnostic` and `Label`: what is wrong, as data; `render` turns it into text."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+from rcsc.diagnostics.codes import Code
+from rcsc.source import Span
+
+
+class Severity(StrEnum):
+    """How much it matters: only errors make `rcsc` exit with 1."""
+
+    ERROR = "error"
+    WARNING = "warning"
+    NOTE = "note"
+
+
+@dataclass(frozen=True, slots=True)
+class Label:
+    """A place and what is said about it."""
+
+    span: Span
+    message: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class MatchedLine:
+    """A table line shown beside a witness: its name and its cells, one a variable."""
+
+    name: str
+    cells: tuple[str, ...]
+    span: Span | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class WitnessColumn:
+    """A witness as a column of the table, with the lines that match it.
+
+    Attributes:
+        table: Name of the table.
+        variables: The variables, in declared order.
+        values: The witness's value of each variable, in the table's words.
+        lines: The lines that match the witness; none for a gap.
+        region: The maximal region around the witness, one condition a variable in the
+            table's words; variables left out are free (`any other`).
+    """
+
+    table: str
+    variables: tuple[str, ...]
+    values: tuple[str, ...]
+    lines: tuple[MatchedLine, ...] = ()
+    region: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnostic:
+    """One problem, stated once; rendering lives in `render`.
+
+    The message stands alone, starts in lower case, quotes names in backticks, ends without
+    a full stop and never says how to fix: `help` does.
+    """
+
+    code: Code
+    message: str
+    primary: Label
+    related: tuple[Label, ...] = ()
+    notes: tuple[str, ...] = ()
+    help: tuple[str, ...] = ()
+    witnesses: tuple[WitnessColumn, ...] = ()
+    more: int = 0  # witnesses of the same cause that are not shown
+    severity: Severity = Severity.ERROR
+
+
+def sort_key(diagnostic: Diagnostic) -> tuple[str, int, int, str, str]:
+    """Position first, so that output is stable."""
+    span = diagnostic.primary.span
+    return (span.file, span.start, span.end, diagnostic.code.value, diagnostic.message)
