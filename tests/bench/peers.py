@@ -1,0 +1,235 @@
+"""Other ways to decide a table: the same question to the same tables, each answer in its own words.
+
+Every peer takes a program and one of its tables (no DEFAULT, no assumptions) and returns whether it is exactly-one.
+A peer whose package is not installed is left out; what each installs as is in `PEERS`.
+"""
+
+import importlib.util
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import combinations
+from math import prod
+from typing import Any
+
+from rcsc.model import Apply, Box, Expr, Line, Literal, Op, Program, Read, Table, key_bounds
+
+Decide = Callable[[Program, Table], bool]
+
+
+@dataclass(frozen=True, slots=True)
+class Peer:
+    """A way to decide, the package that it needs, and whether it takes conditions across variables."""
+
+    name: str
+    package: str
+    relational: bool
+    decide: Decide
+
+
+# --- pairs and volume, no solver -----------------------------------------------------
+
+
+def line_boxes(program: Program, line: Line) -> dict[str, Box]:
+    """The keys that each tested leaf may have for `line` to match."""
+    boxes: dict[str, Box] = {}
+    for test in line.tests:
+        if test is None:
+            continue
+        assert test.box is not None, "a condition across variables"
+        name = test.variables[0]
+        boxes[name] = meet(boxes[name], test.box) if name in boxes else test.box
+    return boxes
+
+
+def meet(one: Box, two: Box) -> Box:
+    """What both sets of intervals contain."""
+    both = ((max(a, c), min(b, d)) for a, b in one for c, d in two)
+    return tuple(sorted((low, high) for low, high in both if low <= high))
+
+
+def python_pairs(program: Program, table: Table) -> bool:
+    """Every pair of lines by intersection of intervals; then the volumes."""
+    boxes = [line_boxes(program, line) for line in table.lines]
+    for one, two in combinations(boxes, 2):
+        if all(meet(one[name], two[name]) for name in one.keys() & two.keys()):
+            return False
+    return sum(_volume(program, table, box) for box in boxes) == _volume(program, table, {})
+
+
+def numpy_pairs(program: Program, table: Table) -> bool:
+    """The same with one lines-by-lines matrix of booleans."""
+    import numpy as np
+
+    boxes = [line_boxes(program, line) for line in table.lines]
+    meets = np.ones((len(boxes), len(boxes)), dtype=bool)
+    for name in table.variables:
+        distinct = {box.get(name): 0 for box in boxes}
+        for place, key in enumerate(distinct):
+            distinct[key] = place
+        keys = list(distinct)
+        matrix = np.array([[a is None or b is None or bool(meet(a, b)) for b in keys] for a in keys])
+        index = np.array([distinct[box.get(name)] for box in boxes])
+        meets &= matrix[index[:, None], index[None, :]]
+    if int(meets.sum()) > len(boxes):
+        return False
+    return sum(_volume(program, table, box) for box in boxes) == _volume(program, table, {})
+
+
+def _volume(program: Program, table: Table, box: dict[str, Box]) -> int:
+    leaves = {variable.name: variable for variable in program.variables}
+    return prod(
+        sum(high - low + 1 for low, high in box.get(name, (key_bounds(leaves[name].type),)))
+        for name in table.variables
+    )
+
+
+# --- Z3, as most people would first ask it -------------------------------------------
+
+_ARITHMETIC: dict[Op, Callable[[Any, Any], Any]] = {
+    Op.ADD: lambda a, b: a + b,
+    Op.SUB: lambda a, b: a - b,
+    Op.MUL: lambda a, b: a * b,
+    Op.EQ: lambda a, b: a == b,
+    Op.NE: lambda a, b: a != b,
+    Op.LT: lambda a, b: a < b,
+    Op.LE: lambda a, b: a <= b,
+    Op.GT: lambda a, b: a > b,
+    Op.GE: lambda a, b: a >= b,
+}
+
+
+def _z3_expr(expr: Expr, numbers: dict[str, Any]) -> Any:
+    import z3
+
+    match expr:
+        case Literal(value=value):
+            return z3.BoolVal(value) if isinstance(value, bool) else z3.IntVal(int(value))
+        case Read(name=name):
+            return numbers[name]
+        case Apply(op=op, args=args):
+            terms = [_z3_expr(arg, numbers) for arg in args]
+            if op is Op.AND:
+                return z3.And(*terms)
+            if op is Op.OR:
+                return z3.Or(*terms)
+            if op is Op.NOT:
+                return z3.Not(terms[0])
+            if op is Op.NEG:
+                return -terms[0]
+            return _ARITHMETIC[op](*terms)
+        case _:
+            raise TypeError(f"not in the benchmark's tables: {expr}")
+
+
+def _z3_lines(program: Program, table: Table) -> tuple[list[Any], list[Any]]:
+    """Each line as a formula over integers, and the domain."""
+    import z3
+
+    leaves = {variable.name: variable for variable in program.variables}
+    numbers = {name: z3.Int(name) for name in table.variables}
+    domain = []
+    for name, number in numbers.items():
+        low, high = key_bounds(leaves[name].type)
+        domain += [number >= low, number <= high]
+    tests: dict[int, Any] = {}
+    lines = []
+    for line in table.lines:
+        terms = []
+        for test in line.tests:
+            if test is None:
+                continue
+            if id(test) not in tests:
+                if test.box is None:
+                    tests[id(test)] = _z3_expr(test.condition, numbers)
+                else:
+                    number = numbers[test.variables[0]]
+                    tests[id(test)] = z3.Or([z3.And(number >= low, number <= high) for low, high in test.box])
+            terms.append(tests[id(test)])
+        lines.append(z3.And(terms))
+    return lines, domain
+
+
+def z3_all_pairs(program: Program, table: Table) -> bool:
+    """One query a pair of lines and one for the gap, in one solver."""
+    import z3
+
+    lines, domain = _z3_lines(program, table)
+    solver = z3.Solver()
+    solver.add(domain)
+    for one, two in combinations(lines, 2):
+        solver.push()
+        solver.add(one, two)
+        answer = solver.check()
+        solver.pop()
+        if answer != z3.unsat:
+            return False
+    solver.add(z3.Not(z3.Or(lines)))
+    return bool(solver.check() == z3.unsat)
+
+
+def z3_two_queries(program: Program, table: Table) -> bool:
+    """The gap, and `at least two lines` as one pseudo-boolean query."""
+    import z3
+
+    lines, domain = _z3_lines(program, table)
+    solver = z3.Solver()
+    solver.add(domain)
+    solver.push()
+    solver.add(z3.Not(z3.Or(lines)))
+    covered = solver.check() == z3.unsat
+    solver.pop()
+    solver.add(z3.AtLeast(*lines, 2))
+    return bool(covered and solver.check() == z3.unsat)
+
+
+def _smt_text(program: Program, table: Table) -> tuple[str, str]:
+    """The two queries as SMT-LIB: the gap, and the overlap by a ladder."""
+    import z3
+
+    lines, domain = _z3_lines(program, table)
+    gap = z3.Solver()
+    gap.add(domain)
+    gap.add(z3.Not(z3.Or(lines)))
+    overlap = z3.Solver()
+    overlap.add(domain)
+    before: Any = z3.BoolVal(False)
+    twice = []
+    for number, line in enumerate(lines):
+        bit, seen = z3.Bool(f"line!{number}"), z3.Bool(f"seen!{number}")
+        overlap.add(bit == line, seen == z3.Or(before, bit))
+        twice.append(z3.And(before, bit))
+        before = seen
+    overlap.add(z3.Or(twice))
+    return gap.to_smt2(), overlap.to_smt2()
+
+
+def cvc5_two_queries(program: Program, table: Table) -> bool:
+    """cvc5 on the same two queries, as SMT-LIB."""
+    import cvc5
+
+    def unsatisfiable(text: str) -> bool:
+        solver = cvc5.Solver()
+        parser = cvc5.InputParser(solver)
+        parser.setStringInput(cvc5.InputLanguage.SMT_LIB_2_6, "(set-logic ALL)\n" + text, "table")
+        answer = ""
+        while not (command := parser.nextCommand()).isNull():
+            answer = str(command.invoke(solver, parser.getSymbolManager())) or answer
+        return "unsat" in answer
+
+    return all(unsatisfiable(text) for text in _smt_text(program, table))
+
+
+PEERS = (
+    Peer("Python, all pairs", "", False, python_pairs),
+    Peer("numpy, all pairs", "numpy", False, numpy_pairs),
+    Peer("Z3, all pairs", "z3", True, z3_all_pairs),
+    Peer("Z3, two queries", "z3", True, z3_two_queries),
+    Peer("cvc5, two queries", "cvc5", True, cvc5_two_queries),
+)
+
+
+def installed() -> tuple[Peer, ...]:
+    """The peers whose packages are here."""
+    return tuple(peer for peer in PEERS if not peer.package or importlib.util.find_spec(peer.package))
+
+
