@@ -1,0 +1,78 @@
+"""What is refused before parsing, and where to go on after an error.
+
+In: a text. Out: diagnostics for a text that no parser should see: too large, too deep, with a NUL.
+"""
+
+import re
+
+from rcsc.diagnostics.codes import Code
+from rcsc.diagnostics.diagnostic import Diagnostic, Label
+from rcsc.source import Source, Span
+
+MOST_CHARACTERS = 16 * 1024 * 1024
+DEEPEST = 100
+
+_TOKEN = re.compile(r'#[^\r\n]*|^[ \t]*\|[^\r\n]*|"[^"\\\n]*"|[(\[{)\]}]|\b(?:not|implies|else)\b|[|;:,]|-', re.MULTILINE)
+_DECLARATION = re.compile(
+    r"^[ \t]*(?:use|unit|const|enum|type|record|input|state|output|assume|invariant|procedure|module|extern"
+    r"|owner|table|level)\b",
+    re.MULTILINE,
+)
+
+
+def refuse(source: Source) -> tuple[Diagnostic, ...]:
+    """A diagnostic where the text must not be parsed."""
+    text = source.text
+    if len(text) > MOST_CHARACTERS:
+        return (_error(Code.TOO_LARGE, f"the file has more than {MOST_CHARACTERS} characters", source, 0, 0),)
+    nul = text.find("\0")
+    if nul >= 0:
+        return (_error(Code.NUL_BYTE, "the text contains a NUL character", source, nul, nul + 1),)
+    deep = _too_deep(text)
+    if deep is not None:
+        return (_error(Code.TOO_DEEP, f"expressions and blocks nest more than {DEEPEST} deep", source, deep, deep + 1),)
+    return ()
+
+
+def _too_deep(text: str) -> int | None:
+    """The offset at which brackets, or a chain of prefix operators, nest too deep."""
+    depth = chain = 0
+    row = re.compile(r"[(\[{)\]}]|\b(?:not|implies)\b|-|[|;,]")
+    for match in _TOKEN.finditer(text):
+        word = match.group()
+        inner = row.finditer(text, match.start(), match.end()) if word.lstrip().startswith("|") else (match,)
+        for part in inner:
+            token = part.group()
+            if token in "([{":
+                depth += 1
+            elif token in ")]}":
+                depth = max(0, depth - 1)
+                chain = 0 if token == "}" and not text[part.end() : part.end() + 8].strip().startswith("else") else chain
+            elif token in ("not", "implies", "-", "else"):
+                chain += 1
+            elif token in ";:,|":
+                chain = 0
+            if depth > DEEPEST or chain > DEEPEST:
+                return part.start()
+    return None
+
+
+def blank_before(text: str, offset: int) -> str:
+    """The text with everything before `offset` made blank, so that offsets stay true."""
+    return text if not offset else re.sub(r"[^\n]", " ", text[:offset]) + text[offset:]
+
+
+def next_declaration(text: str, after: int, begun: int) -> int:
+    """Where the next declaration begins after an error; the length of the text if nowhere."""
+    match = _DECLARATION.search(text, max(after, begun) + 1)
+    return match.start() if match else len(text)
+
+
+def shortened(word: str) -> str:
+    """`word`, cut where it is long, with control characters made visible."""
+    shown = "".join(c if c.isprintable() else f"\\x{ord(c):02x}" for c in word)
+    return shown if len(shown) <= 40 else shown[:37] + "..."
+
+
+def _error(code: Code, message: str, source: Source, start: int, end: int) -> Diagnostic:
+    return Diagnostic(code, message, Label(Span(source.name, start, end)))
