@@ -1,0 +1,170 @@
+"""What earlier runs proved, kept in files that are believed only when nothing about them is in doubt.
+
+In: a key, which is a digest of all that a result depends on, and a JSON value. Out: the same value, or
+nothing. An entry carries a keyed digest (HMAC-SHA-256) over its key and its content; the secret is the user's
+own, outside any project. So an entry that is damaged, cut short, moved to another key or brought along with
+somebody else's project is not believed. A cache that cannot be read or written is no error: it is no cache.
+"""
+
+import hashlib
+import hmac
+import json
+import os
+import secrets
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from rcsc import __version__
+
+FOLDER = ".rcsc-cache"
+MOST_ENTRIES = 4096
+_PROVERS = ("z3", "lark", "numpy", "cvc5", "pysat")
+_TAG = "Signature: 8a477f597d28d172789f06886806bc55\n# Made by rcsc; see https://bford.info/cachedir/\n"
+
+Json = dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Cache:
+    """Entries in one folder, under one user's secret and for one state of rcsc itself.
+
+    Attributes:
+        folder: Where the entries are; made when the first is stored.
+        secret: The user's own; see `secret_of_user`.
+        tool: Digest of rcsc and of what it proves with; part of every key.
+    """
+
+    folder: Path
+    secret: bytes
+    tool: str
+
+    def load(self, *parts: str) -> Json | None:
+        """What was stored under the same parts; None where there is nothing to be believed."""
+        key = self._key(parts)
+        try:
+            seal, _, content = self._path(key).read_bytes().partition(b"\n")
+        except OSError:
+            return None
+        if not hmac.compare_digest(seal, self._seal(key, content)):
+            return None
+        value = json.loads(content)
+        return value if isinstance(value, dict) else None
+
+    def store(self, value: Json, *parts: str) -> None:
+        """Keep `value` under `parts`: the whole entry or nothing."""
+        key = self._key(parts)
+        content = json.dumps(value, separators=(",", ":"), sort_keys=True).encode()
+        path = self._path(key)
+        try:
+            self._prepare(path.parent)
+            write_atomically(path, self._seal(key, content) + b"\n" + content)
+            self._prune()
+        except OSError:
+            return
+
+    def _key(self, parts: tuple[str, ...]) -> str:
+        return hashlib.sha256(json.dumps([self.tool, *parts]).encode()).hexdigest()
+
+    def _seal(self, key: str, content: bytes) -> bytes:
+        return hmac.new(self.secret, key.encode() + b"\n" + content, "sha256").hexdigest().encode()
+
+    def _path(self, key: str) -> Path:
+        return self.folder / key[:2] / f"{key[2:]}.json"
+
+    def _prepare(self, folder: Path) -> None:
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, text in (("CACHEDIR.TAG", _TAG), (".gitignore", "*\n")):
+            if not (self.folder / name).exists():
+                write_atomically(self.folder / name, text.encode())
+
+    def _prune(self) -> None:
+        """Drop the older half of the entries when there are too many."""
+        entries = list(self.folder.glob("??/*.json"))
+        if len(entries) <= MOST_ENTRIES:
+            return
+        entries.sort(key=lambda path: path.stat().st_mtime_ns)
+        for path in entries[: len(entries) // 2]:
+            path.unlink(missing_ok=True)
+
+
+def open_cache(root: Path) -> Cache | None:
+    """The cache of the project at `root`, or in `RCSC_CACHE_DIR`; None where no secret can be kept."""
+    secret = secret_of_user()
+    if secret is None:
+        return None
+    named = os.environ.get("RCSC_CACHE_DIR")
+    return Cache(Path(named) if named else root / FOLDER, secret, digest_of_tool())
+
+
+def secret_of_user() -> bytes | None:
+    """The user's secret, made at first use; `RCSC_CACHE_KEY` may name one that machines share."""
+    shared = os.environ.get("RCSC_CACHE_KEY")
+    if shared:
+        return hashlib.sha256(shared.encode()).digest()
+    home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")  # noqa: PTH111  # cheaper
+    path = Path(home) / "rcsc" / "secret"
+    try:
+        return _secret_at(path)
+    except OSError:
+        return None
+
+
+def _secret_at(path: Path) -> bytes | None:
+    if not path.exists():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_atomically(path, secrets.token_bytes(32), mode=0o600)
+    kept = path.read_bytes()
+    return kept if len(kept) == 32 else None  # noqa: PLR2004  # as written above
+
+
+def digest_of_tool() -> str:
+    """Changes with rcsc's version or files, with Python and with each prover's installation."""
+    hashed = hashlib.sha256(f"{__version__} {sys.version}".encode())
+    package = Path(__file__).parent
+    for name, size, changed in _files(package):
+        hashed.update(f"{name} {size} {changed}\n".encode())
+    for prover in _PROVERS:
+        spec = find_spec(prover)
+        if spec is not None and spec.origin is not None:
+            status = os.stat(spec.origin)  # noqa: PTH116  # one call instead of three
+            hashed.update(f"{spec.origin} {status.st_size} {status.st_mtime_ns}\n".encode())
+    return hashed.hexdigest()
+
+
+def _files(package: Path) -> Iterator[tuple[str, int, int]]:
+    """Name, size and time of change of every file that rcsc is made of, in order."""
+    folders = [package, package.parent / "grammar"]
+    found = []
+    while folders:
+        folder = folders.pop()
+        if not folder.is_dir():
+            continue
+        with os.scandir(folder) as entries:
+            for entry in entries:
+                if entry.is_dir() and entry.name != "__pycache__":
+                    folders.append(Path(entry.path))
+                elif entry.name.endswith((".py", ".lark", ".jinja", ".md")):
+                    status = entry.stat()
+                    found.append((entry.path, status.st_size, status.st_mtime_ns))
+    yield from sorted(found)
+
+
+def write_atomically(path: Path, content: bytes, mode: int = 0o666) -> None:
+    """Write a file so that a reader, or a kill at any time, sees all of it or the one before.
+
+    Raises:
+        OSError: It could not be written; nothing is left behind.
+    """
+    beside = path.with_name(f".{path.name}.{os.getpid()}.{secrets.token_hex(4)}")
+    try:
+        handle = os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode)
+        with os.fdopen(handle, "wb") as file:
+            file.write(content)
+        beside.replace(path)
+    except BaseException:
+        beside.unlink(missing_ok=True)
+        raise

@@ -1,0 +1,159 @@
+"""Diagnostics and reports as JSON values, and back; `schema/report.schema.json` is the contract.
+
+The same form is what the cache keeps. Offsets count characters from 0; lines and columns count from 1.
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+from rcsc import __version__
+from rcsc.diagnostics.codes import Code
+from rcsc.diagnostics.diagnostic import Diagnostic, Label, MatchedLine, Severity, WitnessColumn
+from rcsc.diagnostics.report import Report, TableReport, Verdict
+from rcsc.source import Source, Sources, Span
+
+FORM = 1
+"""Version of this form; it rises when a member changes its meaning or goes away."""
+
+Json = dict[str, Any]
+
+
+def report_to_json(report: Report, command: str) -> Json:
+    """The whole outcome of `command`.
+
+    Raises:
+        ValueError: A value cannot be written as JSON (not for any that rcsc makes).
+    """
+    return {
+        "form": FORM,
+        "tool": {"name": "rcsc", "version": __version__},
+        "command": command,
+        "ok": not report.failed,
+        "counts": {f"{severity.value}s": report.count(severity) for severity in Severity},
+        "diagnostics": [diagnostic_to_json(one, report.sources) for one in report.found],
+        "tables": [table_to_json(table) for table in report.tables],
+    }
+
+
+def table_to_json(table: TableReport) -> Json:
+    """A table's verdict and what backs it."""
+    return {
+        "table": table.table,
+        "file": table.file,
+        "verdict": table.verdict.value,
+        "lines": table.lines,
+        "method": table.method,
+        "confirmed_by_z3": table.confirmed_by_z3,
+        "assumptions": [{"name": name, "standing": standing} for name, standing in table.assumptions],
+        "proof_ms": round(table.proof_ms, 3),
+        "cached": table.cached,
+    }
+
+
+def table_from_json(form: Mapping[str, Any], *, cached: bool) -> TableReport:
+    """The inverse of `table_to_json`, but for `cached`."""
+    return TableReport(
+        form["table"],
+        form["file"],
+        Verdict(form["verdict"]),
+        int(form["lines"]),
+        form["method"],
+        bool(form["confirmed_by_z3"]),
+        tuple((one["name"], one["standing"]) for one in form["assumptions"]),
+        float(form["proof_ms"]),
+        cached,
+    )
+
+
+def diagnostic_to_json(diagnostic: Diagnostic, sources: Sources) -> Json:
+    """One diagnostic, with its places as offsets and as lines and columns."""
+    return {
+        "code": diagnostic.code.value,
+        "severity": diagnostic.severity.value,
+        "message": diagnostic.message,
+        "primary": _label_to_json(diagnostic.primary, sources),
+        "related": [_label_to_json(label, sources) for label in diagnostic.related],
+        "notes": list(diagnostic.notes),
+        "help": list(diagnostic.help),
+        "witnesses": [_witness_to_json(witness, sources) for witness in diagnostic.witnesses],
+        "more": diagnostic.more,
+    }
+
+
+def diagnostic_from_json(form: Mapping[str, Any]) -> Diagnostic:
+    """The inverse of `diagnostic_to_json`.
+
+    Raises:
+        KeyError, TypeError, ValueError: `form` is not of this form.
+    """
+    return Diagnostic(
+        Code(form["code"]),
+        form["message"],
+        _label_from_json(form["primary"]),
+        tuple(_label_from_json(label) for label in form["related"]),
+        tuple(form["notes"]),
+        tuple(form["help"]),
+        tuple(_witness_from_json(witness) for witness in form["witnesses"]),
+        int(form["more"]),
+        Severity(form["severity"]),
+    )
+
+
+def _label_to_json(label: Label, sources: Sources) -> Json:
+    return {"place": _span_to_json(label.span, sources), "message": label.message}
+
+
+def _label_from_json(form: Mapping[str, Any]) -> Label:
+    return Label(_span_from_json(form["place"]), form["message"])
+
+
+def _span_to_json(span: Span, sources: Sources) -> Json:
+    source = sources.get(span.file, Source(span.file, ""))
+    return {
+        "file": span.file,
+        "start": _position_to_json(source, span.start),
+        "end": _position_to_json(source, span.end),
+    }
+
+
+def _position_to_json(source: Source, offset: int) -> Json:
+    position = source.position(offset) if offset <= len(source.text) else source.position(0)
+    return {"offset": offset, "line": position.line, "column": position.column}
+
+
+def _span_from_json(form: Mapping[str, Any]) -> Span:
+    return Span(form["file"], int(form["start"]["offset"]), int(form["end"]["offset"]))
+
+
+def _witness_to_json(witness: WitnessColumn, sources: Sources) -> Json:
+    values = zip(witness.variables, witness.values, strict=True)
+    return {
+        "table": witness.table,
+        "input": [{"variable": variable, "value": value} for variable, value in values],
+        "lines": [
+            {
+                "name": line.name,
+                "cells": list(line.cells),
+                "place": None if line.span is None else _span_to_json(line.span, sources),
+            }
+            for line in witness.lines
+        ],
+        "region": list(witness.region),
+    }
+
+
+def _witness_from_json(form: Mapping[str, Any]) -> WitnessColumn:
+    return WitnessColumn(
+        form["table"],
+        tuple(one["variable"] for one in form["input"]),
+        tuple(one["value"] for one in form["input"]),
+        tuple(
+            MatchedLine(
+                line["name"],
+                tuple(line["cells"]),
+                None if line["place"] is None else _span_from_json(line["place"]),
+            )
+            for line in form["lines"]
+        ),
+        tuple(form["region"]),
+    )

@@ -1,0 +1,68 @@
+"""What a command found and what backs it: the one value that every output form shows."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+from rcsc.diagnostics.diagnostic import Diagnostic, Severity
+from rcsc.source import Source
+
+
+class Verdict(StrEnum):
+    """What is known of a table; anything but `proved` makes `rcsc` exit with 1."""
+
+    PROVED = "proved"
+    REFUTED = "refuted"
+    UNDECIDED = "undecided"
+
+
+@dataclass(frozen=True, slots=True)
+class TableReport:
+    """One table's verdict and what it rests on.
+
+    Attributes:
+        table: Its name.
+        file: Where it stands.
+        lines: How many lines it has, DEFAULT not counted.
+        method: `boxes`, `tree` or `z3`; empty where nothing was decided.
+        confirmed_by_z3: Whether Z3 was asked the same and agreed.
+        assumptions: Each assumption that the proof used, and its standing.
+        proof_ms: What the proof took when it was made.
+        cached: Whether it was made by an earlier run.
+    """
+
+    table: str
+    file: str
+    verdict: Verdict
+    lines: int
+    method: str = ""
+    confirmed_by_z3: bool = False
+    assumptions: tuple[tuple[str, str], ...] = ()
+    proof_ms: float = 0.0
+    cached: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """The outcome of a command.
+
+    Attributes:
+        found: Sorted, each once.
+        tables: In order of file and place.
+        sources: Every text that a diagnostic points into.
+    """
+
+    found: tuple[Diagnostic, ...]
+    tables: tuple[TableReport, ...] = ()
+    sources: Mapping[str, Source] = field(default_factory=dict)
+
+    def count(self, severity: Severity) -> int:
+        """How many diagnostics are of this severity."""
+        return sum(diagnostic.severity is severity for diagnostic in self.found)
+
+    @property
+    def failed(self) -> bool:
+        """Whether there is an error, or a table that is not proved."""
+        return self.count(Severity.ERROR) > 0 or any(
+            table.verdict is not Verdict.PROVED for table in self.tables
+        )
