@@ -1,0 +1,236 @@
+"""Condition cells to tests; where a test looks at one leaf only, to its set of keys."""
+
+from dataclasses import dataclass, field
+
+from rcsc.diagnostics.codes import Code
+from rcsc.model import (
+    COMPARISONS,
+    Among,
+    Apply,
+    Bool,
+    Box,
+    Enum,
+    Expr,
+    Int,
+    Literal,
+    Op,
+    Read,
+    Real,
+    Scalar,
+    Test,
+    Value,
+    Variable,
+    VariableName,
+    key_bounds,
+    key_of,
+    value_of_key,
+)
+from rcsc.resolve.expressions import Typed, among, between, boolean, compared, typed
+from rcsc.resolve.folding import fold
+from rcsc.resolve.leaves import read_by
+from rcsc.resolve.scope import Body, Scope
+from rcsc.source import Span
+from rcsc.syntax import tree
+
+_SMALL = 512
+_FLIPPED = {Op.LT: Op.GT, Op.LE: Op.GE, Op.GT: Op.LT, Op.GE: Op.LE, Op.EQ: Op.EQ, Op.NE: Op.NE}
+
+
+@dataclass(slots=True)
+class Tests:
+    """The tests of one table: one a column and cell text, shared by the lines that state it."""
+
+    scope: Scope
+    order: dict[str, int]
+    known: dict[tuple[int, int], Test | None] = field(default_factory=dict)
+    __test__ = False
+
+    def test(
+        self, column: int, heading: tree.Heading, written: tree.Condition, text: str, span: Span
+    ) -> Test | None:
+        """The test of a cell; None where it is always true, or after an error."""
+        key = (column, id(written))
+        if key not in self.known:
+            self.known[key] = self._test(heading, written, text, span)
+        return self.known[key]
+
+    def _test(self, heading: tree.Heading, written: tree.Condition, text: str, span: Span) -> Test | None:
+        before = len(self.scope.found)
+        condition = _condition(self.scope, heading, written)
+        if condition is None:
+            self._place(before, span)
+            return None
+        value = fold(condition)
+        names = tuple(sorted(set(read_by(condition)), key=self.order.__getitem__))
+        box = box_of(condition, self.scope.leaves[names[0]]) if len(names) == 1 else None
+        if value is False or box == ():
+            self.scope.report(Code.EMPTY_CONDITION, f"no value satisfies `{text}`", span, "the line could never match")
+            return None
+        return None if value is True else Test(text, condition, names, box)
+
+    def _place(self, before: int, span: Span) -> None:
+        """Moves what was reported inside a cell, where spans are relative, to the file."""
+        from dataclasses import replace
+
+        for at in range(before, len(self.scope.found)):
+            diagnostic = self.scope.found[at]
+            inner = diagnostic.primary.span
+            if inner.file == "":
+                there = tree.absolute(inner, span.file, span.start)
+                self.scope.found[at] = replace(diagnostic, primary=replace(diagnostic.primary, span=there))
+
+
+def _condition(scope: Scope, heading: tree.Heading, written: tree.Condition) -> Expr | None:
+    body = Body()
+    if heading.subject is None:
+        assert isinstance(written, tree.Comparison)
+        return boolean(scope, body, written.value)
+    subject = typed(scope, body, heading.subject)
+    if subject is None:
+        return None
+    found: Typed | None
+    match written:
+        case tree.Comparison(op, value, span):
+            other = typed(scope, body, value, subject.expr.type)
+            found = None if other is None else compared(scope, Op(op), (subject, other), span)
+        case tree.OneOf(members, span):
+            found = among(scope, body, subject, members, span)
+        case tree.Between(low, high, span):
+            found = between(scope, body, subject, low, high, span)
+    return None if found is None else found.expr
+
+
+# --- boxes ---------------------------------------------------------------------------
+
+
+def box_of(condition: Expr, leaf: Variable) -> Box | None:
+    """The keys of the one leaf it reads for which the condition holds; None where not a box."""
+    low, high = key_bounds(leaf.type)
+    if high - low < _SMALL and not isinstance(leaf.type, Real):
+        return _tried(condition, leaf.name, leaf.type, range(low, high + 1))
+    return _box(condition, leaf.type, low, high)
+
+
+def _tried(condition: Expr, name: VariableName, kind: Scalar, keys: range) -> Box | None:
+    """By trying every key; None where the condition is undefined for some."""
+    holding = []
+    for key in keys:
+        value = fold(condition, {name: value_of_key(kind, key)})
+        if value is None:
+            return None
+        if value:
+            holding.append((key, key))
+    return joined(holding)
+
+
+def joined(parts: list[tuple[int, int]]) -> Box:
+    """Sorted and merged where they touch."""
+    merged: list[tuple[int, int]] = []
+    for low, high in sorted(part for part in parts if part[0] <= part[1]):
+        if merged and low <= merged[-1][1] + 1:
+            merged[-1] = (merged[-1][0], max(merged[-1][1], high))
+        else:
+            merged.append((low, high))
+    return tuple(merged)
+
+
+def _without(box: Box, low: int, high: int) -> Box:
+    edges, at = [], low
+    for first, last in box:
+        edges.append((at, first - 1))
+        at = last + 1
+    return joined([*edges, (at, high)])
+
+
+def _box(condition: Expr, kind: Scalar, low: int, high: int) -> Box | None:
+    match condition:
+        case Literal(value=value):
+            return ((low, high),) if value else ()
+        case Among(subject=Read(), values=values):
+            keys = [key_of(kind, value) for value in values]
+            return joined([(key, key) for key in keys if low <= key <= high])
+        case Apply(op=Op.NOT, args=(inner,)):
+            box = _box(inner, kind, low, high)
+            return None if box is None else _without(box, low, high)
+        case Apply(op=Op.AND | Op.OR | Op.IMPLIES as op, args=(left, right)):
+            one, two = _box(left, kind, low, high), _box(right, kind, low, high)
+            return None if one is None or two is None else _joined_by(op, one, two, low, high)
+        case Apply(op=op, args=(left, right)) if op in COMPARISONS:
+            return _compared(op, left, right, kind, low, high)
+        case _:
+            return None
+
+
+def _joined_by(op: Op, one: Box, two: Box, low: int, high: int) -> Box:
+    if op is Op.IMPLIES:
+        one = _without(one, low, high)
+    if op is Op.AND:
+        return joined([(max(a, c), min(b, d)) for a, b in one for c, d in two])
+    return joined([*one, *two])
+
+
+def _compared(op: Op, left: Expr, right: Expr, kind: Scalar, low: int, high: int) -> Box | None:
+    if fold(left) is not None:
+        left, right, op = right, left, _FLIPPED[op]
+    value = fold(right)
+    if value is None or isinstance(kind, Bool | Enum):
+        return None
+    if isinstance(left, Read):
+        return _against(op, key_of(kind, value), low, high)
+    line = _affine(left) if isinstance(kind, Int) else None
+    return None if line is None else _affine_box(op, line, int(value), low, high)
+
+
+def _against(op: Op, key: int, low: int, high: int) -> Box:
+    below, above = (low, min(key - 1, high)), (max(key + 1, low), high)
+    at = (key, key) if low <= key <= high else (1, 0)
+    parts = {
+        Op.EQ: [at],
+        Op.NE: [below, above],
+        Op.LT: [below],
+        Op.LE: [below, at],
+        Op.GT: [above],
+        Op.GE: [at, above],
+    }
+    return joined(parts[op])
+
+
+def _affine(expr: Expr) -> tuple[int, int] | None:
+    """`(a, b)` where the expression is a * leaf + b; None where it is not."""
+    value: Value | None = fold(expr)
+    if value is not None:
+        return 0, int(value)
+    match expr:
+        case Read():
+            return 1, 0
+        case Apply(op=Op.NEG, args=(inner,)):
+            line = _affine(inner)
+            return None if line is None else (-line[0], -line[1])
+        case Apply(op=Op.ADD | Op.SUB | Op.MUL as op, args=(left, right)):
+            one, two = _affine(left), _affine(right)
+            return None if one is None or two is None else _combined(op, one, two)
+        case _:
+            return None
+
+
+def _combined(op: Op, one: tuple[int, int], two: tuple[int, int]) -> tuple[int, int] | None:
+    (a, b), (c, d) = one, two
+    if op is Op.MUL:
+        return None if a and c else (a * d + c * b, b * d)
+    sign = 1 if op is Op.ADD else -1
+    return a + sign * c, b + sign * d
+
+
+def _affine_box(op: Op, line: tuple[int, int], value: int, low: int, high: int) -> Box | None:
+    """Keys x with a * x + b `op` value."""
+    a, rest = line[0], value - line[1]
+    if a < 0:
+        a, rest, op = -a, -rest, _FLIPPED[op]
+    if a == 0:
+        return None
+    floor, exact = rest // a, rest % a == 0
+    if op in (Op.EQ, Op.NE):
+        return _against(op, floor, low, high) if exact else (() if op is Op.EQ else ((low, high),))
+    if op in (Op.LE, Op.GT) or exact:
+        return _against(op, floor, low, high)
+    return _against(Op.LE if op is Op.LT else Op.GT, floor, low, high)

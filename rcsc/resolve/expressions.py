@@ -1,0 +1,460 @@
+"""Expressions: names found, kinds and units checked, bounds computed."""
+
+import math
+from dataclasses import dataclass
+from fractions import Fraction
+
+from rcsc.diagnostics.codes import Code
+from rcsc.model import (
+    COMPARISONS,
+    I64_MAX,
+    Among,
+    Apply,
+    Array,
+    Bool,
+    Enum,
+    Expr,
+    Int,
+    Literal,
+    Op,
+    Read,
+    ReadLocal,
+    Real,
+    Record,
+    Scalar,
+    Select,
+    Type,
+    Unit,
+    Value,
+    VariableName,
+)
+from rcsc.resolve import intervals
+from rcsc.resolve.folding import fold
+from rcsc.resolve.scope import Body, Scope, normal, spell_unit
+from rcsc.source import Span
+from rcsc.syntax import tree
+
+
+@dataclass(frozen=True, slots=True)
+class Typed:
+    """An expression, and whether it is made of numbers written without a unit."""
+
+    expr: Expr
+    bare: bool = False
+
+    def unit(self) -> Unit:
+        """Its unit; () for a bare number, a bool or an enumeration."""
+        kind = self.expr.type
+        return kind.unit if isinstance(kind, Int | Real) else ()
+
+    def literal(self) -> Literal:
+        """Itself, of a folded constant."""
+        assert isinstance(self.expr, Literal)
+        return self.expr
+
+
+def kind_word(kind: Scalar) -> str:
+    """The kind, for messages."""
+    match kind:
+        case Bool():
+            return "bool"
+        case Enum(name=name):
+            return f"`{name}`"
+        case Int():
+            return "int"
+        case Real():
+            return "real"
+
+
+def same_kind(one: Scalar, two: Scalar) -> bool:
+    """Whether values of the two can be compared or assigned, units aside."""
+    if isinstance(one, Enum) or isinstance(two, Enum):
+        return one == two
+    return type(one) is type(two)
+
+
+def typed(scope: Scope, body: Body, written: tree.Expr, want: Scalar | None = None) -> Typed | None:
+    """The typed expression; None after an error, which has then been reported."""
+    match written:
+        case tree.BoolLiteral(value, span):
+            return Typed(Literal(value, Bool(), span))
+        case tree.IntLiteral():
+            return _integer(scope, written)
+        case tree.RealLiteral():
+            return _real(scope, written)
+        case tree.Reference(name, span):
+            return _reference(scope, body, name, span, want)
+        case tree.FieldOf() | tree.IndexOf():
+            return _path(scope, body, written, want)
+        case tree.Unary():
+            return _unary(scope, body, written)
+        case tree.Binary():
+            return _binary(scope, body, written)
+        case tree.InSet():
+            return _in_set(scope, body, written)
+        case tree.InRange():
+            return _in_range(scope, body, written)
+        case tree.Apply():
+            return _function(scope, body, written)
+
+
+def boolean(scope: Scope, body: Body, written: tree.Expr) -> Expr | None:
+    """A condition."""
+    found = typed(scope, body, written, Bool())
+    if found is None:
+        return None
+    if not isinstance(found.expr.type, Bool):
+        scope.report(Code.KIND, f"a condition is a bool, this is {kind_word(found.expr.type)}", written.span)
+        return None
+    return found.expr
+
+
+# --- literals and names --------------------------------------------------------------
+
+
+def _integer(scope: Scope, written: tree.IntLiteral) -> Typed:
+    text = written.text.replace("_", "")
+    value = int(text, 16) if text.lower().startswith("0x") else int(text) if len(text) < 400 else 10**400
+    return Typed(Literal(value, Int(value, value, scope.unit(written.unit)), written.span), written.unit is None)
+
+
+def _real(scope: Scope, written: tree.RealLiteral) -> Typed | None:
+    text = written.text.replace("_", "")
+    value = float(text)
+    if not math.isfinite(value):
+        scope.report(Code.NOT_FINITE, f"`{written.text}` is larger than every double", written.span)
+        return None
+    if len(text) < 1000 and abs(int(text.lower().partition("e")[2] or 0)) < 1000:
+        _one_spelling(scope, value, text, written.span)
+    return Typed(Literal(value, Real(value, value, scope.unit(written.unit)), written.span), written.unit is None)
+
+
+def _one_spelling(scope: Scope, value: float, text: str, span: Span) -> None:
+    """Reports two different numbers of the text that are the same double."""
+    first = scope.doubles.setdefault(value, (text, span))
+    if Fraction(first[0]) != Fraction(text):
+        scope.report(Code.SAME_DOUBLE, f"`{text}` and `{first[0]}` are the same double, {value!r}", span)
+
+
+def _reference(scope: Scope, body: Body, name: tree.Name, span: Span, want: Scalar | None) -> Typed | None:
+    local = body.visible.get(name.text)
+    if local is not None:
+        return Typed(ReadLocal(local.name, local.type, span))
+    if isinstance(want, Enum) and name.text in want.members:
+        return Typed(Literal(want.members.index(name.text), want, span))
+    if name.text in scope.declared:
+        return _path(scope, body, tree.Reference(name, span), want)
+    if name.text in scope.constants:
+        constant = scope.constants[name.text]
+        return Typed(Literal(constant.literal.value, constant.literal.type, span), constant.bare)
+    enums = scope.members.get(name.text, [])
+    if len(enums) == 1:
+        return Typed(Literal(enums[0].members.index(name.text), enums[0], span))
+    if enums:
+        names = ", ".join(f"`{enum.name}.{name.text}`" for enum in enums)
+        scope.report(Code.UNKNOWN_NAME, f"`{name.text}` may mean {names}", name.span, "write which enumeration is meant")
+        return None
+    known = [*body.visible, *scope.declared, *scope.constants, *scope.members]
+    scope.unknown("variable, constant or member", name, known)
+    return None
+
+
+# --- paths ---------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Path:
+    """Where a path leads: one leaf or record, or by a computed index one of several.
+
+    Attributes:
+        names: Path names; one, or one an element of the array that `index` selects from.
+        type: The type there.
+        index: The computed index.
+    """
+
+    names: tuple[str, ...]
+    type: Type
+    index: Expr | None = None
+
+
+def path_of(scope: Scope, body: Body, written: tree.Expr) -> Path | None:
+    """Where a variable path leads; None after an error."""
+    match written:
+        case tree.Reference(name):
+            declared = scope.declared.get(name.text)
+            if declared is None:
+                scope.unknown("variable", name, list(scope.declared))
+                return None
+            return Path((declared.name,), declared.type)
+        case tree.FieldOf(base, name):
+            return _field(scope, path_of(scope, body, base), name)
+        case tree.IndexOf(base, index):
+            return _element(scope, body, path_of(scope, body, base), index)
+        case _:
+            scope.report(Code.KIND, "this is not a variable", written.span)
+            return None
+
+
+def _field(scope: Scope, base: Path | None, name: tree.Name) -> Path | None:
+    if base is None:
+        return None
+    if not isinstance(base.type, Record):
+        scope.report(Code.KIND, f"`{base.names[0]}` has no fields", name.span)
+        return None
+    for part in base.type.fields:
+        if part.name == name.text:
+            return Path(tuple(f"{one}.{name.text}" for one in base.names), part.type, base.index)
+    scope.unknown("field", name, [part.name for part in base.type.fields])
+    return None
+
+
+def _element(scope: Scope, body: Body, base: Path | None, written: tree.Expr) -> Path | None:
+    index = typed(scope, body, written)
+    if base is None or index is None:
+        return None
+    if not isinstance(base.type, Array) or not isinstance(index.expr.type, Int):
+        what = "an index is a whole number" if isinstance(base.type, Array) else f"`{base.names[0]}` is not an array"
+        scope.report(Code.KIND, what, written.span)
+        return None
+    at, length = fold(index.expr), base.type.length
+    if at is not None:
+        if not 0 <= at < length:
+            scope.report(Code.OUT_OF_RANGE_CONSTANT, f"the index {at} is not in 0 .. {length - 1}", written.span)
+            return None
+        return Path(tuple(f"{one}[{at}]" for one in base.names), base.type.element, base.index)
+    if base.index is not None:
+        scope.report(Code.KIND, "a path has at most one computed index", written.span)
+        return None
+    names = tuple(f"{base.names[0]}[{at}]" for at in range(length))
+    return Path(names, base.type.element, index.expr)
+
+
+def _path(scope: Scope, body: Body, written: tree.Expr, want: Scalar | None) -> Typed | None:
+    if isinstance(written, tree.FieldOf) and isinstance(written.base, tree.Reference):
+        owner = scope.types.get(written.base.name.text)
+        if isinstance(owner, Enum) and written.base.name.text not in scope.declared:
+            return _member(scope, owner, written)
+    path = path_of(scope, body, written)
+    if path is None:
+        return None
+    if not isinstance(path.type, Bool | Enum | Int | Real):
+        scope.report(Code.KIND, f"`{path.names[0]}` is a whole record or array", written.span)
+        return None
+    leaves = tuple(VariableName(name) for name in path.names)
+    if path.index is None:
+        return Typed(Read(leaves[0], path.type, written.span))
+    return Typed(Select(leaves, path.index, path.type, written.span))
+
+
+def _member(scope: Scope, owner: Enum, written: tree.FieldOf) -> Typed | None:
+    if written.name.text not in owner.members:
+        scope.unknown(f"member of `{owner.name}`", written.name, list(owner.members))
+        return None
+    return Typed(Literal(owner.members.index(written.name.text), owner, written.span))
+
+
+# --- operators -----------------------------------------------------------------------
+
+
+def _unary(scope: Scope, body: Body, written: tree.Unary) -> Typed | None:
+    if written.op == "not":
+        inner = boolean(scope, body, written.operand)
+        return None if inner is None else Typed(Apply(Op.NOT, (inner,), Bool(), written.span))
+    operand = typed(scope, body, written.operand)
+    if operand is None or not _number(scope, operand, written.operand):
+        return None
+    return _applied(scope, Op.NEG, (operand,), operand.unit(), written.span)
+
+
+def _number(scope: Scope, operand: Typed, written: tree.Expr) -> bool:
+    if isinstance(operand.expr.type, Int | Real):
+        return True
+    scope.report(Code.KIND, f"arithmetic takes numbers, this is {kind_word(operand.expr.type)}", written.span)
+    return False
+
+
+def _applied(scope: Scope, op: Op, operands: tuple[Typed, ...], unit: Unit, span: Span) -> Typed:
+    """The operation with its bounds; folded where all operands are constants."""
+    kinds = tuple(o.expr.type for o in operands if isinstance(o.expr.type, Int | Real))
+    args = tuple(o.expr for o in operands)
+    bare = all(o.bare for o in operands)
+    applied = Apply(op, args, intervals.apply(op, kinds, unit), span)
+    value = fold(applied) if all(isinstance(arg, Literal) for arg in args) else None
+    if value is None:
+        return Typed(applied, bare)
+    if isinstance(applied.type, Real) and not math.isfinite(value):
+        scope.report(Code.NOT_FINITE, "this constant is larger than every double", span)
+        value = 0.0
+    point = Int(int(value), int(value), unit) if isinstance(applied.type, Int) else Real(float(value), float(value), unit)
+    return Typed(Literal(value, point, span), bare)
+
+
+def _pair(scope: Scope, body: Body, left: tree.Expr, right: tree.Expr) -> tuple[Typed, Typed] | None:
+    """Both sides; a bare enum member takes the enumeration of the other side."""
+    if _may_be_member(scope, body, left):
+        two = typed(scope, body, right)
+        one = typed(scope, body, left, two.expr.type if two else None)
+    else:
+        one = typed(scope, body, left)
+        two = typed(scope, body, right, one.expr.type if one else None)
+    return None if one is None or two is None else (one, two)
+
+
+def _may_be_member(scope: Scope, body: Body, written: tree.Expr) -> bool:
+    if not isinstance(written, tree.Reference):
+        return False
+    name = written.name.text
+    return name in scope.members and name not in body.visible and name not in scope.declared
+
+
+def _binary(scope: Scope, body: Body, written: tree.Binary) -> Typed | None:
+    op = Op(written.op)
+    if op in (Op.AND, Op.OR, Op.IMPLIES):
+        one, two = boolean(scope, body, written.left), boolean(scope, body, written.right)
+        return None if one is None or two is None else Typed(Apply(op, (one, two), Bool(), written.span))
+    pair = _pair(scope, body, written.left, written.right)
+    if pair is None:
+        return None
+    if op in COMPARISONS:
+        return compared(scope, op, pair, written.span)
+    left, right = pair
+    if not (_number(scope, left, written.left) and _number(scope, right, written.right)):
+        return None
+    if op is Op.MOD and isinstance(left.expr.type, Real):
+        scope.report(Code.KIND, "`mod` takes whole numbers", written.span)
+        return None
+    if op in (Op.MUL, Op.DIV):
+        return _scaled(scope, op, left, right, written.span)
+    return _alike(scope, op, (left, right), written.span)
+
+
+def _scaled(scope: Scope, op: Op, left: Typed, right: Typed, span: Span) -> Typed | None:
+    """A product or quotient: units multiply."""
+    if not _one_kind(scope, left, right, span):
+        return None
+    powers = dict(left.unit())
+    for name, power in right.unit():
+        powers[name] = powers.get(name, 0) + (power if op is Op.MUL else -power)
+    return _applied(scope, op, (left, right), normal(powers), span)
+
+
+def _alike(scope: Scope, op: Op, operands: tuple[Typed, ...], span: Span) -> Typed | None:
+    """A sum, difference, remainder, least or greatest: units agree."""
+    unit = common_unit(scope, operands, span)
+    if unit is None or not _one_kind(scope, operands[0], operands[-1], span):
+        return None
+    return _applied(scope, op, operands, unit, span)
+
+
+def _one_kind(scope: Scope, left: Typed, right: Typed, span: Span) -> bool:
+    if not same_kind(left.expr.type, right.expr.type):
+        one, two = kind_word(left.expr.type), kind_word(right.expr.type)
+        helps = ("convert with `real(n)` or `int(x)`",) if {one, two} == {"int", "real"} else ()
+        scope.report(Code.KIND, f"the two sides are {one} and {two}", span, *helps)
+        return False
+    kinds = [k for k in (left.expr.type, right.expr.type) if isinstance(k, Int)]
+    if kinds and min(k.low for k in kinds) < 0 and max(k.high for k in kinds) > I64_MAX:
+        if all(k.low >= -(2**63) and k.high < 2**64 for k in kinds):
+            scope.report(Code.MIXED_SIGN, "no 64-bit integer type holds both sides", span, "narrow one of the ranges")
+            return False
+    return True
+
+
+def common_unit(scope: Scope, operands: tuple[Typed, ...], span: Span) -> Unit | None:
+    """The unit of all that have one; None (reported) where they differ."""
+    units = [operand.unit() for operand in operands if not operand.bare]
+    if not units:
+        return ()
+    for unit in units:
+        if unit != units[0]:
+            scope.report(Code.UNIT, f"the units differ: {spell_unit(units[0])} and {spell_unit(unit)}", span)
+            return None
+    return units[0]
+
+
+def compared(scope: Scope, op: Op, pair: tuple[Typed, Typed], span: Span) -> Typed | None:
+    """A comparison of the two."""
+    left, right = pair
+    if not _one_kind(scope, left, right, span) or common_unit(scope, pair, span) is None:
+        return None
+    if op not in (Op.EQ, Op.NE) and not isinstance(left.expr.type, Int | Real):
+        scope.report(Code.KIND, f"{kind_word(left.expr.type)} has no order", span, "use `=`, `/=` or a set")
+        return None
+    return Typed(Apply(op, (left.expr, right.expr), Bool(), span))
+
+
+def _in_set(scope: Scope, body: Body, written: tree.InSet) -> Typed | None:
+    subject = typed(scope, body, written.subject)
+    return None if subject is None else among(scope, body, subject, written.members, written.span)
+
+
+def among(scope: Scope, body: Body, subject: Typed, members: tuple[tree.Expr, ...], span: Span) -> Typed | None:
+    """`subject in {members}`; members are constants."""
+    values: list[Value] = []
+    for member in members:
+        one = typed(scope, body, member, subject.expr.type)
+        if one is None:
+            return None
+        value = fold(one.expr)
+        if value is None:
+            scope.report(Code.NOT_CONSTANT, "the members of a set are constants", member.span)
+            return None
+        if not _one_kind(scope, subject, one, member.span) or common_unit(scope, (subject, one), member.span) is None:
+            return None
+        values.append(value)
+    return Typed(Among(subject.expr, tuple(sorted(set(values))), Bool(), span))
+
+
+def _in_range(scope: Scope, body: Body, written: tree.InRange) -> Typed | None:
+    subject = typed(scope, body, written.subject)
+    return None if subject is None else between(scope, body, subject, written.low, written.high, written.span)
+
+
+def between(
+    scope: Scope, body: Body, subject: Typed, low: tree.Expr, high: tree.Expr, span: Span
+) -> Typed | None:
+    """`low <= subject and subject <= high`."""
+    least, most = typed(scope, body, low), typed(scope, body, high)
+    if least is None or most is None:
+        return None
+    ends = fold(least.expr), fold(most.expr)
+    if ends[0] is not None and ends[1] is not None and ends[0] > ends[1]:
+        scope.report(Code.EMPTY_RANGE, f"the range {ends[0]} .. {ends[1]} is empty", span, "write the smaller bound first")
+        return None
+    above, below = compared(scope, Op.GE, (subject, least), span), compared(scope, Op.LE, (subject, most), span)
+    if above is None or below is None:
+        return None
+    return Typed(Apply(Op.AND, (above.expr, below.expr), Bool(), span))
+
+
+def _function(scope: Scope, body: Body, written: tree.Apply) -> Typed | None:
+    op = Op(written.function.text)
+    want = 2 if op in (Op.MIN, Op.MAX) else 1
+    if len(written.args) != want:
+        scope.report(Code.WRONG_ARGUMENTS, f"`{op.value}` takes {want} argument{'s' * (want - 1)}", written.span)
+        return None
+    args = [typed(scope, body, arg) for arg in written.args]
+    operands = tuple(arg for arg in args if arg is not None)
+    if len(operands) != want or not all(_number(scope, o, w) for o, w in zip(operands, written.args, strict=True)):
+        return None
+    if op in (Op.TO_INT, Op.TO_REAL):
+        return _converted(scope, op, operands[0], written.span)
+    return _alike(scope, op, operands, written.span)
+
+
+def _converted(scope: Scope, op: Op, operand: Typed, span: Span) -> Typed | None:
+    kind = operand.expr.type
+    if op is Op.TO_REAL:
+        if not isinstance(kind, Int):
+            scope.report(Code.KIND, "`real` converts a whole number", span)
+            return None
+        converted: Scalar = Real(float(kind.low), float(kind.high), kind.unit)
+    else:
+        if not isinstance(kind, Real):
+            scope.report(Code.KIND, "`int` converts a real number", span)
+            return None
+        wide = not (math.isfinite(kind.low) and math.isfinite(kind.high))
+        converted = Int(*((-(2**1024), 2**1024) if wide else (int(kind.low), int(kind.high))), kind.unit)
+    applied = Apply(op, (operand.expr,), converted, span)
+    value = fold(applied) if isinstance(operand.expr, Literal) else None
+    return Typed(applied if value is None else Literal(value, converted, span), operand.bare)
