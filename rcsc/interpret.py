@@ -1,0 +1,348 @@
+"""The reference meaning of the language; the prover and both executors are held against it.
+
+In: a model and a snapshot. Out: values, matching lines, and the outcome of a step or a cycle. Short
+enough to believe: it follows the manual's "What a cycle does" word for word and optimises nothing.
+"""
+
+import importlib
+import math
+import operator
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any
+
+from rcsc.model import (
+    Action,
+    Admit,
+    Among,
+    Apply,
+    Assign,
+    Call,
+    Case,
+    Expr,
+    For,
+    If,
+    Int,
+    Kind,
+    Level,
+    LineName,
+    Literal,
+    Local,
+    OneTable,
+    Op,
+    Procedure,
+    Program,
+    Read,
+    ReadLocal,
+    Real,
+    Select,
+    Snapshot,
+    Standing,
+    Statement,
+    Table,
+    Test,
+    ToElement,
+    ToLeaf,
+    ToLocal,
+    Value,
+    Variable,
+    key_bounds,
+    pending,
+)
+
+
+class Fault(IntEnum):
+    """Why a cycle ended early; the executors return the same numbers."""
+
+    OK = 0
+    ADMIT = 1
+    NO_LINE = 2
+    SEVERAL_LINES = 3
+    EXTERN = 4
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What a step or cycle did.
+
+    Attributes:
+        snapshot: The complete state afterwards.
+        line: The matched line; None where there was none.
+        line_index: Its position; DEFAULT is behind the last; -1 where there was none.
+        fault: OK, or why it ended early.
+        failed_assumptions: Monitored assumptions that did not hold.
+        fault_at: The leaf that was refused.
+    """
+
+    snapshot: dict[str, Value]
+    line: LineName | None
+    line_index: int
+    fault: Fault
+    failed_assumptions: tuple[str, ...] = ()
+    fault_at: str = ""
+
+
+class ExternError(Exception):
+    """An extern procedure gave a value outside its declared range, for the leaf named."""
+
+
+# --- expressions ---------------------------------------------------------------------
+
+
+def divide(a: int, b: int) -> int:
+    """Quotient rounded toward zero, as in C."""
+    quotient = abs(a) // abs(b)
+    return quotient if (a < 0) == (b < 0) else -quotient
+
+
+_OPERATORS: Mapping[Op, Callable[..., Any]] = {
+    Op.NOT: operator.not_,
+    Op.NEG: operator.neg,
+    Op.EQ: operator.eq,
+    Op.NE: operator.ne,
+    Op.LT: operator.lt,
+    Op.LE: operator.le,
+    Op.GT: operator.gt,
+    Op.GE: operator.ge,
+    Op.ADD: operator.add,
+    Op.SUB: operator.sub,
+    Op.MUL: operator.mul,
+    Op.MOD: lambda a, b: a - b * divide(a, b),
+    Op.ABS: abs,
+    Op.MIN: lambda a, b: a if a <= b else b,
+    Op.MAX: lambda a, b: a if a >= b else b,
+    Op.TO_INT: int,
+    Op.TO_REAL: float,
+}
+
+
+def evaluate(expr: Expr, snapshot: Snapshot, local: Mapping[str, Value] | None = None) -> Value:
+    """The value of `expr`; undefined operations (proved absent) raise."""
+    match expr:
+        case Literal(value=value):
+            return value
+        case Read(name=name):
+            return snapshot[name]
+        case ReadLocal(name=name):
+            return (local or {})[name]
+        case Select(leaves=leaves, index=index):
+            return snapshot[leaves[_index(index, len(leaves), snapshot, local)]]
+        case Among(subject=subject, values=values):
+            return evaluate(subject, snapshot, local) in values
+        case Apply(op=op, args=args):
+            return _applied(op, args, snapshot, local)
+
+
+def _index(expr: Expr, length: int, snapshot: Snapshot, local: Mapping[str, Value] | None) -> int:
+    at = int(evaluate(expr, snapshot, local))
+    if not 0 <= at < length:
+        raise IndexError(at)
+    return at
+
+
+def _applied(op: Op, args: tuple[Expr, ...], snapshot: Snapshot, local: Mapping[str, Value] | None) -> Value:
+    first = evaluate(args[0], snapshot, local)
+    if op is Op.AND:
+        return bool(first) and bool(evaluate(args[1], snapshot, local))
+    if op is Op.OR:
+        return bool(first) or bool(evaluate(args[1], snapshot, local))
+    if op is Op.IMPLIES:
+        return not first or bool(evaluate(args[1], snapshot, local))
+    rest = [evaluate(arg, snapshot, local) for arg in args[1:]]
+    if op is Op.DIV:
+        return divide(int(first), int(rest[0])) if isinstance(args[0].type, Int) else float(first) / float(rest[0])
+    result: Value = _OPERATORS[op](first, *rest)
+    return result
+
+
+def holds(condition: Expr | Test, snapshot: Snapshot) -> bool:
+    """Whether a condition is true of `snapshot`."""
+    return bool(evaluate(condition.condition if isinstance(condition, Test) else condition, snapshot))
+
+
+def matching_lines(table: Table, snapshot: Snapshot) -> list[LineName]:
+    """The lines that match, DEFAULT left out, in order."""
+    return [
+        line.name for line in table.lines if all(test is None or holds(test, snapshot) for test in line.tests)
+    ]
+
+
+# --- statements ----------------------------------------------------------------------
+
+
+def execute(
+    program: Program, body: Iterable[Statement], snapshot: dict[str, Value], local: dict[str, Value]
+) -> None:
+    """Runs statements; `snapshot` and `local` are changed in place."""
+    for statement in body:
+        match statement:
+            case Assign(place=place, value=value):
+                _assign(place, _stored(evaluate(value, snapshot, local)), snapshot, local)
+            case Local(name=name, value=value):
+                local.pop(name, None)
+                if value is not None:
+                    local[name] = _stored(evaluate(value, snapshot, local))
+            case If(condition=condition, then=then, orelse=orelse):
+                execute(program, then if evaluate(condition, snapshot, local) else orelse, snapshot, local)
+            case Case(subject=subject, arms=arms, orelse=orelse):
+                value = evaluate(subject, snapshot, local)
+                chosen = next((arm.body for arm in arms if value in arm.values), orelse)
+                execute(program, chosen, snapshot, local)
+            case For(name=name, low=low, high=high, body=inner):
+                for count in range(low, high + 1):
+                    local[name] = count
+                    execute(program, inner, snapshot, local)
+            case Call(procedure=name, args=args):
+                call(program, name, [_stored(evaluate(arg, snapshot, local)) for arg in args], snapshot)
+
+
+def _stored(value: Value) -> Value:
+    """-0.0 is 0.0 wherever it is kept."""
+    return value + 0.0 if isinstance(value, float) else value
+
+
+def _assign(
+    place: ToLeaf | ToElement | ToLocal, value: Value, snapshot: dict[str, Value], local: dict[str, Value]
+) -> None:
+    match place:
+        case ToLeaf(name=name):
+            snapshot[name] = value
+        case ToLocal(name=name):
+            local[name] = value
+        case ToElement(leaves=leaves, index=index):
+            snapshot[leaves[_index(index, len(leaves), snapshot, local)]] = value
+
+
+def call(program: Program, name: str, args: list[Value], snapshot: dict[str, Value]) -> None:
+    """Runs one procedure; `snapshot` is changed in place."""
+    procedure = next(one for one in program.procedures if one.name == name)
+    if procedure.extern is not None:
+        _call_extern(program, procedure, args, snapshot)
+        return
+    local = {param.name: arg for param, arg in zip(procedure.params, args, strict=True)}
+    execute(program, procedure.body, snapshot, local)
+
+
+def _call_extern(program: Program, procedure: Procedure, args: list[Value], snapshot: dict[str, Value]) -> None:
+    """The user's function takes the reads and the arguments, and gives the writes in order."""
+    assert procedure.extern is not None
+    module, _, function = procedure.extern.python.partition(":")
+    results = getattr(importlib.import_module(module), function)(*[snapshot[name] for name in procedure.reads], *args)
+    given = results if isinstance(results, tuple) else (results,)
+    for name, value in zip(procedure.writes, given, strict=True):
+        admitted = _admitted(program.variable(name), value)
+        if admitted is None:
+            raise ExternError(name)
+        snapshot[name] = admitted
+
+
+# --- cycles --------------------------------------------------------------------------
+
+
+def initial(program: Program) -> dict[str, Value]:
+    """Every leaf's value before the first cycle."""
+    return {variable.name: variable.initial for variable in program.variables}
+
+
+def _admitted(variable: Variable, value: Value) -> Value | None:
+    """The value a table may see; None where it is refused."""
+    if isinstance(variable.type, Real):
+        if math.isnan(value):
+            return None
+        low, high = variable.type.low, variable.type.high
+        value = float(value) + 0.0
+    else:
+        low, high = key_bounds(variable.type)
+    if low <= value <= high:
+        return value
+    if variable.admit is Admit.CLAMP:
+        return low if value < low else high
+    return None
+
+
+def admit(program: Program, snapshot: Snapshot) -> dict[str, Value] | str:
+    """The snapshot with every input admitted, or the first leaf that is refused."""
+    admitted = dict(snapshot)
+    for variable in program.variables:
+        if variable.kind is Kind.INPUT:
+            value = _admitted(variable, snapshot[variable.name])
+            if value is None:
+                return variable.name
+            admitted[variable.name] = value
+    return admitted
+
+
+def settle(program: Program, snapshot: dict[str, Value]) -> None:
+    """Deferred variables whose condition holds take their next value, all at once."""
+    ready = [v.name for v in program.variables if v.deferred_until is not None and holds(v.deferred_until, snapshot)]
+    for name in ready:
+        snapshot[name] = snapshot[pending(name)]
+
+
+def run_table(program: Program, table: Table, snapshot: Snapshot) -> Outcome:
+    """One step of a table outside any level."""
+    return _cycle(program, lambda _: table, (), (), snapshot)
+
+
+def cycle(program: Program, level: Level, snapshot: Snapshot) -> Outcome:
+    """One cycle of a level."""
+    by_name = {table.name: table for table in program.tables}
+
+    def chosen(now: Snapshot) -> Table:
+        if isinstance(level.tables, OneTable):
+            return by_name[level.tables.table]
+        return by_name[dict(level.tables.tables)[evaluate(level.tables.selector, now)]]
+
+    return _cycle(program, chosen, level.preprocess, level.postprocess, snapshot)
+
+
+def _cycle(
+    program: Program,
+    chosen: Callable[[Snapshot], Table],
+    preprocess: tuple[str, ...],
+    postprocess: tuple[str, ...],
+    snapshot: Snapshot,
+) -> Outcome:
+    now = admit(program, snapshot)
+    if isinstance(now, str):
+        return Outcome(dict(snapshot), None, -1, Fault.ADMIT, (), now)
+    settle(program, now)
+    line, index, failed = None, -1, ()
+    try:
+        for name in preprocess:
+            call(program, name, [], now)
+        table = chosen(now)
+        failed = _failed(program, table, now)
+        found = _match(table, now)
+        if isinstance(found, Fault):
+            return Outcome(now, None, -1, found, failed)
+        line, index, actions = found
+        execute(program, [action.statement for action in actions], now, {})
+        for name in postprocess:
+            call(program, name, [], now)
+    except ExternError as error:
+        return Outcome(now, line, index, Fault.EXTERN, failed, str(error))
+    return Outcome(now, line, index, Fault.OK, failed)
+
+
+def _failed(program: Program, table: Table, now: Snapshot) -> tuple[str, ...]:
+    return tuple(
+        assumption.name
+        for assumption in program.assumptions
+        if assumption.name in table.assumptions
+        and assumption.standing is Standing.MONITORED
+        and not holds(assumption.condition, now)
+    )
+
+
+def _match(table: Table, now: Snapshot) -> tuple[LineName, int, tuple[Action, ...]] | Fault:
+    matching = matching_lines(table, now)
+    if len(matching) > 1:
+        return Fault.SEVERAL_LINES
+    if matching:
+        index = next(at for at, line in enumerate(table.lines) if line.name == matching[0])
+        return matching[0], index, table.lines[index].actions
+    if table.default is None:
+        return Fault.NO_LINE
+    return table.default.name, len(table.lines), table.default.actions
