@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from rcsc import __version__
+from rcsc.files import write_atomically
 
 FOLDER = ".rcsc-cache"
 MOST_ENTRIES = 4096
@@ -151,20 +152,3 @@ def _files(package: Path) -> Iterator[tuple[str, int, int]]:
                     status = entry.stat()
                     found.append((entry.path, status.st_size, status.st_mtime_ns))
     yield from sorted(found)
-
-
-def write_atomically(path: Path, content: bytes, mode: int = 0o666) -> None:
-    """Write a file so that a reader, or a kill at any time, sees all of it or the one before.
-
-    Raises:
-        OSError: It could not be written; nothing is left behind.
-    """
-    beside = path.with_name(f".{path.name}.{os.getpid()}.{secrets.token_hex(4)}")
-    try:
-        handle = os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode)
-        with os.fdopen(handle, "wb") as file:
-            file.write(content)
-        beside.replace(path)
-    except BaseException:
-        beside.unlink(missing_ok=True)
-        raise

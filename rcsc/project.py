@@ -50,6 +50,12 @@ def load(paths: Sequence[str], stdin: str | None = None, stdin_name: str = "-") 
     return Loaded(tuple(dict.fromkeys(roots)), loader.files, loader.uses, loader.sources, found)
 
 
+def listed(paths: Sequence[str]) -> tuple[str, ...]:
+    """The files that the paths mean, unread, as `load` takes them for roots."""
+    loader = _Loader(None, "-")
+    return tuple(dict.fromkeys(file for path in paths for file in loader.roots(path)))
+
+
 def project_root(file: str) -> str:
     """The nearest folder upward with an `rcsc.toml`; else the file's own folder."""
     folder = os.path.dirname(file) or "."
@@ -164,7 +170,9 @@ class _Loader:
             if os.path.isfile(place):
                 return place
         places = " and ".join(f"`{place}`" for place in tried)
-        self.report(Code.FILE_NOT_FOUND, f"no file `{use.path}.rcs` is found", use.span, f"looked for {places}")
+        self.report(
+            Code.FILE_NOT_FOUND, f"no file `{use.path}.rcs` is found", use.span, f"looked for {places}"
+        )
         return None
 
     def _text(self, file: str, asked: Span | None) -> str | None:
@@ -182,5 +190,7 @@ class _Loader:
         try:
             return raw.decode("utf-8-sig")
         except UnicodeDecodeError as error:
-            self.report(Code.BAD_ENCODING, f"`{file}` is not UTF-8 at byte {error.start}", span, "save it as UTF-8")
+            self.report(
+                Code.BAD_ENCODING, f"`{file}` is not UTF-8 at byte {error.start}", span, "save it as UTF-8"
+            )
             return None
