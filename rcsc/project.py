@@ -38,7 +38,7 @@ class Loaded:
     found: tuple[Diagnostic, ...]
 
 
-def load(paths: Sequence[str], stdin: str | None = None, stdin_name: str = "-") -> Loaded:
+def load(paths: Sequence[str], stdin: str | bytes | None = None, stdin_name: str = "-") -> Loaded:
     """Reads and parses files, folders and (`-`) the text `stdin`, and all that they use."""
     loader = _Loader(stdin, stdin_name)
     roots = [file for path in paths for file in loader.roots(path)]
@@ -70,7 +70,7 @@ def project_root(file: str) -> str:
 class _Loader:
     """Reads each file once."""
 
-    stdin: str | None
+    stdin: str | bytes | None
     stdin_name: str
     files: dict[str, tree.File] = field(default_factory=dict)
     uses: dict[str, tuple[str, ...]] = field(default_factory=dict)
@@ -176,14 +176,15 @@ class _Loader:
         return None
 
     def _text(self, file: str, asked: Span | None) -> str | None:
-        if file == self.stdin_name and self.stdin is not None:
-            return self.stdin
         span = asked or Span(file, 0, 0)
+        if file == self.stdin_name and isinstance(self.stdin, str):
+            return self.stdin
         try:
-            if os.path.getsize(file) > MOST_BYTES:
+            piped = self.stdin if file == self.stdin_name and isinstance(self.stdin, bytes) else None
+            if (os.path.getsize(file) if piped is None else len(piped)) > MOST_BYTES:
                 self.report(Code.TOO_LARGE, f"`{file}` has more than {MOST_BYTES // 1024**2} MiB", span)
                 return None
-            raw = Path(file).read_bytes()
+            raw = Path(file).read_bytes() if piped is None else piped
         except OSError as error:
             self.report(Code.UNREADABLE, f"`{file}` cannot be read: {error.strerror}", span)
             return None

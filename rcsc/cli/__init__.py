@@ -1,0 +1,65 @@
+"""The command line: arguments in, text and an exit status out.
+
+Exit statuses: 0 proved, 1 findings, 2 usage, 3 a bug in rcsc, 130 interrupted. Only here does anything
+print or end the process. Nothing heavy is imported before a command needs it.
+"""
+
+import os
+import sys
+from collections.abc import Sequence
+
+PROVED, FINDINGS, USAGE, BUG, INTERRUPTED = 0, 1, 2, 3, 130
+
+
+def main() -> None:
+    """Run `rcsc` with the process's arguments and end the process."""
+    sys.exit(run(sys.argv[1:]))
+
+
+def run(args: Sequence[str]) -> int:
+    """Run `rcsc` with `args`; the exit status."""
+    import click
+
+    from rcsc.cli.commands import rcsc
+
+    try:
+        status = rcsc.main(list(args), prog_name="rcsc", standalone_mode=False)
+    except click.ClickException as error:
+        error.show()
+        return USAGE
+    except (click.Abort, KeyboardInterrupt):
+        click.echo("rcsc: interrupted; nothing was half written", err=True)
+        return INTERRUPTED
+    except BrokenPipeError:
+        _forget_stdout()
+        return FINDINGS
+    except Exception as error:  # noqa: BLE001  # whatever it is, it is a bug in rcsc and is reported as one
+        return _bug(error)
+    return status if isinstance(status, int) else PROVED
+
+
+def _forget_stdout() -> None:
+    """Whoever read the output has gone: let the interpreter's last flush go nowhere."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def _bug(error: Exception) -> int:
+    import traceback
+
+    import click
+
+    from rcsc import __version__
+    from rcsc.diagnostics.spelling import escape
+
+    frames = traceback.extract_tb(error.__traceback__)
+    place = f"{os.path.basename(frames[-1].filename)}:{frames[-1].lineno}" if frames else "?"
+    what = escape(f"{type(error).__name__}: {error}")[:300]
+    click.echo(
+        f"error[RCS902]: a bug in rcsc {__version__}: {what} ({place})\n"
+        "  = note: nothing was proved, and nothing was written\n"
+        "  = help: please report it with the tables, if you can, and what RCSC_DEBUG=1 prints",
+        err=True,
+    )
+    if os.environ.get("RCSC_DEBUG") == "1":
+        traceback.print_exception(error)
+    return BUG

@@ -1,0 +1,195 @@
+"""A report in the form that was asked for, on standard output or in a file."""
+
+import json
+import os
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from enum import StrEnum
+from itertools import groupby
+from pathlib import Path
+
+import click
+
+from rcsc.diagnostics.diagnostic import Severity
+from rcsc.diagnostics.render import OF_SEVERITY, Piece, Row, Style, full, one_line, paint, plain
+from rcsc.diagnostics.report import Report, TableReport, Verdict
+from rcsc.diagnostics.spelling import escape, pad, width
+from rcsc.files import write_atomically
+
+
+class Form(StrEnum):
+    """How a report is shown."""
+
+    TEXT = "text"
+    LINE = "line"
+    JSON = "json"
+    SARIF = "sarif"
+    GITHUB = "github"
+
+
+class Color(StrEnum):
+    """When the text is coloured."""
+
+    AUTO = "auto"
+    ALWAYS = "always"
+    NEVER = "never"
+
+
+@dataclass(frozen=True, slots=True)
+class Output:
+    """Where and how a report is shown.
+
+    Attributes:
+        file: Written whole or not at all; None is standard output.
+        quiet: Leave out the summary.
+    """
+
+    form: Form = Form.TEXT
+    file: Path | None = None
+    color: Color = Color.AUTO
+    quiet: bool = False
+
+
+_OF_VERDICT = {
+    Verdict.PROVED: Style.HELP,
+    Verdict.REFUTED: Style.ERROR,
+    Verdict.UNDECIDED: Style.WARNING,
+}
+_METHODS = {"boxes": "boxes", "tree": "a tree of regions", "z3": "Z3"}
+
+
+def show(report: Report, command: str, output: Output, closing: str = "") -> None:
+    """Write the report; `closing` is a last line for people.
+
+    Raises:
+        click.ClickException: The file could not be written.
+    """
+    text = _FORMS[output.form](report, command, output, closing)
+    if output.file is None:
+        click.echo(text, nl=False, color=True)
+        return
+    try:
+        write_atomically(output.file, text.encode())
+    except OSError as error:
+        raise click.FileError(str(output.file), error.strerror) from error
+
+
+def _json(report: Report, command: str, _output: Output, _closing: str) -> str:
+    from rcsc.diagnostics.jsonform import report_to_json
+
+    return json.dumps(report_to_json(report, command), indent=2, ensure_ascii=False) + "\n"
+
+
+def _sarif(report: Report, _command: str, _output: Output, _closing: str) -> str:
+    from rcsc.diagnostics.sarif import sarif
+
+    return json.dumps(sarif(report), indent=2, ensure_ascii=False) + "\n"
+
+
+def _github(report: Report, _command: str, _output: Output, _closing: str) -> str:
+    from rcsc.diagnostics.github import annotations
+
+    return annotations(report)
+
+
+def _lines(report: Report, _command: str, _output: Output, _closing: str) -> str:
+    return "".join(f"{one_line(one, report.sources)}\n" for one in report.found)
+
+
+def _text(report: Report, _command: str, output: Output, closing: str) -> str:
+    coloured = _coloured(output)
+    columns = os.get_terminal_size(1).columns if output.file is None and _is_terminal(1) else 200
+    rows: list[Row] = []
+    for diagnostic in report.found:
+        rows += (*full(diagnostic, report.sources, columns), ())
+    if not output.quiet:
+        rows += summary(report)
+        if closing:
+            rows.append((Piece(closing, Style.STRONG),))
+    return paint(rows) if coloured else plain(rows)
+
+
+_FORMS: dict[Form, Callable[[Report, str, Output, str], str]] = {
+    Form.TEXT: _text,
+    Form.LINE: _lines,
+    Form.JSON: _json,
+    Form.SARIF: _sarif,
+    Form.GITHUB: _github,
+}
+
+
+def _is_terminal(handle: int) -> bool:
+    try:
+        return os.isatty(handle)
+    except OSError:
+        return False
+
+
+def _coloured(output: Output) -> bool:
+    """Source: no-color.org for `NO_COLOR`; `--color` wins over it."""
+    if output.color is not Color.AUTO:
+        return output.color is Color.ALWAYS
+    plain_terminal = os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb"
+    return not plain_terminal and output.file is None and _is_terminal(1)
+
+
+def summary(report: Report) -> Iterator[Row]:
+    """What backs each table's verdict, then the counts."""
+    names = max((width(escape(table.table)) for table in report.tables), default=0)
+    for file, tables in groupby(report.tables, key=lambda table: table.file):
+        yield (Piece(escape(file), Style.STRONG),)
+        for table in tables:
+            yield (
+                Piece(f"  {pad(escape(table.table), names)}  "),
+                Piece(pad(table.verdict.value, 9), _OF_VERDICT[table.verdict]),
+                Piece(f"  {backing(table)}"),
+            )
+    if report.tables or report.found:
+        yield tuple(_counts(report))
+
+
+def backing(table: TableReport) -> str:
+    """`15 lines, by boxes, confirmed by Z3, assuming f_means_paused (monitored), 3.1 ms`."""
+    parts = [f"{table.lines} line{'' if table.lines == 1 else 's'}"]
+    if table.method:
+        parts.append(f"by {_METHODS.get(table.method, table.method)}")
+    if table.confirmed_by_z3:
+        parts.append("confirmed by Z3")
+    if table.assumptions:
+        stated = ", ".join(f"{escape(name)} ({standing})" for name, standing in table.assumptions)
+        parts.append(f"assuming {stated}")
+    parts.append(f"{table.proof_ms:.1f} ms{' (earlier run)' if table.cached else ''}")
+    return ", ".join(parts)
+
+
+def _counts(report: Report) -> Iterator[Piece]:
+    of = {verdict: sum(table.verdict is verdict for table in report.tables) for verdict in Verdict}
+    noun = "table" if len(report.tables) == 1 else "tables"
+    yield Piece(f"{len(report.tables)} {noun}: ")
+    for number, (verdict, count) in enumerate(of.items()):
+        style = _OF_VERDICT[verdict] if count else Style.PLAIN
+        yield Piece(f"{', ' if number else ''}")
+        yield Piece(f"{count} {verdict.value}", style)
+    for number, severity in enumerate(Severity):
+        count = report.count(severity)
+        yield Piece(", " if number else "; ")
+        noun = severity.value if count == 1 else f"{severity.value}s"
+        yield Piece(f"{count} {noun}", OF_SEVERITY[severity] if count else Style.PLAIN)
+
+
+class Progress:
+    """One line on a terminal's standard error that says what is being worked at."""
+
+    def __init__(self, *, wanted: bool = True) -> None:
+        self._shown = wanted and _is_terminal(2)
+        self._width = 0
+
+    def __call__(self, doing: str) -> None:
+        """Say what is being done now; an empty text clears the line."""
+        if not self._shown:
+            return
+        text = escape(doing)[:100]
+        sys.stderr.write(f"\r{pad(text, self._width)}" + ("" if text else "\r"))
+        sys.stderr.flush()
+        self._width = width(text)

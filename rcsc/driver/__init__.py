@@ -1,0 +1,149 @@
+"""The pipeline on one screen: what each command does, stage by stage.
+
+In: paths and settings. Out: a report, and files where the command writes some. A stage runs only when the
+ones before it found nothing wrong; nothing is written unless all that was asked for is proved.
+"""
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rcsc.cache import Cache, open_cache
+from rcsc.diagnostics.codes import Code
+from rcsc.diagnostics.diagnostic import Diagnostic, Label, sort_key
+from rcsc.diagnostics.report import Report
+from rcsc.driver.work import Made, Proof, Settings
+from rcsc.source import Span
+
+if TYPE_CHECKING:
+    from rcsc.model import Program
+    from rcsc.project import Loaded
+
+
+def check(settings: Settings) -> Report:
+    """Prove every table; an unchanged project is recognised without being parsed."""
+    from rcsc.driver.unchanged import recall, remember
+
+    cache = _cache(settings)
+    whole = None if settings.stdin is not None else cache
+    known = recall(whole, settings.paths, settings.options) if whole else None
+    if known is not None:
+        return known
+    loaded = _load(settings)
+    report = _report(loaded, tuple(_proofs(loaded, settings, cache)))
+    if whole is not None:
+        remember(whole, settings.paths, settings.options, loaded, report)
+    return report
+
+
+def compile_(settings: Settings, out: Path, targets: tuple[str, ...], *, only_check: bool) -> Made:
+    """Prove every table anew, then write the executors, or say whether they are fresh."""
+    loaded = _load(settings)
+    proofs = tuple(_proofs(loaded, settings, None))
+    report = _report(loaded, proofs)
+    if report.failed:
+        return Made(report, "nothing was written")
+    from rcsc.emit.write import stale, write
+
+    files, clashes = _executors(proofs, targets)
+    found = clashes or (stale if only_check else write)(files, str(out))
+    report = _report(loaded, proofs, found)
+    if report.failed:
+        return Made(report, "" if only_check else "nothing was written")
+    return Made(report, f"{len(files)} files {'are fresh' if only_check else 'written'} in {out}")
+
+
+def certify(settings: Settings, write: Path | None, against: Path | None) -> Made:
+    """Check a certificate, made now or kept, by the checker alone."""
+    from rcsc.driver.certified import keep, kept, reviewed
+
+    loaded = _load(settings)
+    if against is not None:
+        return reviewed(loaded, kept(against))
+    proofs = tuple(_proofs(loaded, settings, None))
+    report = _report(loaded, proofs)
+    [proof] = proofs or (None,)
+    if report.failed or proof is None or proof.certificate is None:
+        return Made(report, "nothing is certified: not everything is proved")
+    found = keep(proof.certificate, write) if write is not None else ()
+    made = reviewed(loaded, proof.certificate)
+    return Made(_report(loaded, proofs, (*found, *made.report.found)), made.closing)
+
+
+# --- parts -----------------------------------------------------------------------------
+
+
+def _cache(settings: Settings) -> Cache | None:
+    from rcsc.project import project_root
+
+    if not settings.use_cache:
+        return None
+    first = settings.paths[0]
+    inside = os.path.join(first, "-") if os.path.isdir(first) else first
+    return open_cache(Path(project_root(inside)))
+
+
+def _load(settings: Settings) -> "Loaded":
+    from rcsc.project import load
+
+    settings.progress("reading")
+    return load(settings.paths, settings.stdin)
+
+
+def _proofs(loaded: "Loaded", settings: Settings, cache: Cache | None) -> Iterator[Proof]:
+    """Resolve and prove each root; findings of its files where it cannot be resolved."""
+    from rcsc.driver.proofs import prove
+    from rcsc.model import Program
+    from rcsc.resolve import resolve
+
+    for root in loaded.roots:
+        settings.progress(f"proving {root}")
+        program = resolve(root, loaded)
+        if isinstance(program, Program):
+            yield prove(root, program, loaded, settings.options, cache)
+        else:
+            yield Proof(root, program)
+    settings.progress("")
+
+
+def _report(loaded: "Loaded", proofs: tuple[Proof, ...], found: tuple[Diagnostic, ...] = ()) -> Report:
+    """Everything found, each once, and each table once."""
+    every = {*loaded.found, *found, *(one for proof in proofs for one in proof.found)}
+    tables = {(table.file, table.table): table for proof in proofs for table in proof.tables}
+    return Report(tuple(sorted(every, key=sort_key)), tuple(tables.values()), loaded.sources)
+
+
+def _executors(
+    proofs: tuple[Proof, ...], targets: tuple[str, ...]
+) -> tuple[dict[str, str], tuple[Diagnostic, ...]]:
+    """The generated files of every program that declares a table or a level, by path under the folder."""
+    from rcsc.emit import emit_c, emit_python
+    from rcsc.lower import lower
+
+    files: dict[str, str] = {}
+    found = []
+    owner: dict[str, str] = {}
+    for proof in proofs:
+        if proof.proved is None or not _runs(proof.proved.program):
+            continue
+        name = proof.proved.program.name
+        if owner.setdefault(name.casefold(), proof.root) != proof.root:
+            found.append(_same_name(name, proof.root, owner[name.casefold()]))
+            continue
+        plan = lower(proof.proved)
+        made = (emit_python(plan) if "python" in targets else {}) | (emit_c(plan) if "c" in targets else {})
+        files |= made
+    return files, tuple(found)
+
+
+def _runs(program: "Program") -> bool:
+    own_levels = any(level.span.file == program.file for level in program.levels)
+    return own_levels or bool(program.own_tables)
+
+
+def _same_name(name: str, root: str, other: str) -> Diagnostic:
+    message = f"`{root}` and `{other}` would both be compiled to files named `{name}`"
+    return Diagnostic(
+        Code.NAME_COLLISION, message, Label(Span(root, 0, 0)), help=("rename one of the files",)
+    )

@@ -1,0 +1,94 @@
+"""`rcsc fmt`: files laid out anew, each replaced whole, none that would come to say something else."""
+
+import difflib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import takewhile
+from pathlib import Path
+
+from rcsc.diagnostics.codes import Code
+from rcsc.diagnostics.diagnostic import Diagnostic, Label, sort_key
+from rcsc.diagnostics.report import Report
+from rcsc.diagnostics.spelling import escape
+from rcsc.files import write_atomically
+from rcsc.project import load
+from rcsc.source import Source, Span
+from rcsc.syntax import tree
+
+
+@dataclass(frozen=True, slots=True)
+class Formatted:
+    """The outcome.
+
+    Attributes:
+        report: Not formatted files where nothing was to be written; what could not be read or written.
+        texts: Each file's new text.
+        diff: How the files differ from it.
+        changed: How many do.
+    """
+
+    report: Report
+    texts: dict[str, str]
+    diff: str
+    changed: int
+
+
+def reformat(paths: tuple[str, ...], stdin: bytes | None, *, write: bool) -> Formatted:
+    """Format every file that the paths mean; used files that they do not mean are left alone."""
+    loaded = load(paths, stdin)
+    roots = [name for name in loaded.roots if name in loaded.files]
+    mine = tuple(one for one in loaded.found if one.code.value < "RCS2" and _of(one, loaded.roots, paths))
+    texts = {name: _text(name, loaded.files[name]) for name in roots}
+    changed = {name: text for name, text in texts.items() if text != loaded.sources[name].text}
+    found = list(mine)
+    for name, text in changed.items():
+        if not write:
+            found.append(_unformatted(loaded.sources[name], text))
+        elif stdin is None or name != "-":
+            found += _replace(name, text)
+    diff = "".join(line for name in changed for line in _diff(loaded.sources[name], texts[name]))
+    report = Report(tuple(sorted(found, key=sort_key)), (), loaded.sources)
+    return Formatted(report, texts, diff, len(changed))
+
+
+def _of(found: Diagnostic, roots: tuple[str, ...], paths: tuple[str, ...]) -> bool:
+    file = found.primary.span.file
+    return file in roots or file in paths or not file.endswith(".rcs")
+
+
+def _text(name: str, before: tree.File) -> str:
+    """The file's new text, which says the same.
+
+    Raises:
+        RuntimeError: It does not; that is a bug.
+    """
+    from rcsc.syntax.format import format_file
+    from rcsc.syntax.parse import parse
+
+    text = format_file(before)
+    if parse(Source(name, text)) != before:
+        raise RuntimeError(f"formatting would change what {name} says")
+    return text
+
+
+def _unformatted(source: Source, text: str) -> Diagnostic:
+    """At the first place that would change."""
+    start = sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], zip(source.text, text, strict=False)))
+    place = Span(source.name, min(start, len(source.text)), min(start + 1, len(source.text)))
+    return Diagnostic(
+        Code.NOT_FORMATTED, f"`{source.name}` is not formatted", Label(place), help=("run `rcsc fmt` on it",)
+    )
+
+
+def _replace(name: str, text: str) -> Iterator[Diagnostic]:
+    try:
+        write_atomically(Path(name), text.encode())
+    except OSError as error:
+        message = f"`{name}` cannot be written: {error.strerror}"
+        yield Diagnostic(Code.NOT_WRITTEN, message, Label(Span(name, 0, 0)))
+
+
+def _diff(source: Source, text: str) -> Iterator[str]:
+    before, after = source.text.splitlines(), text.splitlines()
+    for line in difflib.unified_diff(before, after, source.name, source.name, lineterm=""):
+        yield f"{escape(line)}\n"

@@ -1,0 +1,105 @@
+"""A whole check remembered, so that an unchanged project is not even parsed again.
+
+In: the paths and options of a check. Out: its report, if everything that it looked at is as it was: every
+file by content, and every place where a file would have been found first is still empty.
+"""
+
+import hashlib
+import os
+from dataclasses import asdict, is_dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rcsc.cache import Cache
+from rcsc.diagnostics.codes import Code
+from rcsc.diagnostics.report import Report
+from rcsc.project import PROJECT_FILE, Loaded, listed
+from rcsc.source import Source
+
+if TYPE_CHECKING:
+    from rcsc.prove.options import Options
+
+_PASSING = {Code.UNDECIDED, Code.FILE_NOT_FOUND, Code.FILE_CYCLE}
+"""Findings that may go away though no file that was read changes; as do all of 1xx and 9xx."""
+
+
+def recall(cache: Cache, paths: tuple[str, ...], options: "Options") -> Report | None:
+    """The report of the same check, if nothing that it depends on has changed."""
+    from rcsc.diagnostics.jsonform import diagnostic_from_json, table_from_json
+
+    kept = cache.load(*_key(paths, options))
+    if kept is None or kept["roots"] != list(listed(paths)):
+        return None
+    texts: dict[str, bytes] = {}
+    for name, digest in kept["looked_at"].items():
+        content = _content(name)
+        if _digest(content) != digest:
+            return None
+        if content is not None:
+            texts[name] = content
+    found = tuple(diagnostic_from_json(one) for one in kept["found"])
+    tables = tuple(table_from_json(one, cached=True) for one in kept["tables"])
+    named = {name for name in texts if name.endswith(".rcs")} if found else set()
+    sources = {name: Source(name, texts[name].decode("utf-8-sig")) for name in sorted(named)}
+    return Report(found, tables, sources)
+
+
+def remember(
+    cache: Cache, paths: tuple[str, ...], options: "Options", loaded: Loaded, report: Report
+) -> None:
+    """Keep the report, unless it may change though no file does."""
+    from rcsc.diagnostics.jsonform import diagnostic_to_json, table_to_json
+
+    if any(one.code in _PASSING or one.code.value[3] in "19" for one in report.found):
+        return
+    contents = {name: _content(name) for name in _looked_at(loaded)}
+    for name, source in loaded.sources.items():
+        if (contents[name] or b"").decode("utf-8-sig", "replace") != source.text:
+            return  # changed while it was checked
+    value: dict[str, Any] = {
+        "roots": list(loaded.roots),
+        "looked_at": {name: _digest(content) for name, content in contents.items()},
+        "found": [diagnostic_to_json(one, report.sources) for one in report.found],
+        "tables": [table_to_json(one) for one in report.tables],
+    }
+    cache.store(value, *_key(paths, options))
+
+
+def _key(paths: tuple[str, ...], options: "Options") -> tuple[str, ...]:
+    stated = asdict(options) if is_dataclass(options) else {}
+    stated.pop("jobs", None)
+    return ("check", os.getcwd(), *paths, "--", *(f"{name}={value}" for name, value in stated.items()))
+
+
+def _looked_at(loaded: Loaded) -> list[str]:
+    """Files read, and the places where a used file or a project file was looked for."""
+    names = set(loaded.sources)
+    for file in loaded.files:
+        folder = os.path.dirname(file)
+        here = Path(folder or ".").resolve()
+        names.update(str(above / PROJECT_FILE) for above in (here, *here.parents))
+    for folder, used in _uses(loaded):
+        names.add(os.path.normpath(os.path.join(folder, used)))
+    return sorted(names)
+
+
+def _uses(loaded: Loaded) -> list[tuple[str, str]]:
+    from rcsc.syntax import tree
+
+    return [
+        (os.path.dirname(name), f"{one.path}.rcs")
+        for name, file in loaded.files.items()
+        for one in file.declarations
+        if isinstance(one, tree.Use)
+    ]
+
+
+def _content(name: str) -> bytes | None:
+    try:
+        return Path(name).read_bytes()
+    except OSError:
+        return None
+
+
+def _digest(content: bytes | None) -> str:
+    return "absent" if content is None else hashlib.sha256(content).hexdigest()
