@@ -17,6 +17,9 @@ def write_atomically(path: Path, content: bytes, mode: int = 0o666) -> None:
         OSError: It could not be written; nothing is left behind.
     """
     target = path.resolve()
+    if target.exists() and not target.is_file():
+        target.write_bytes(content)  # a device or a pipe is not replaced
+        return
     beside = target.with_name(f".{target.name}.{os.getpid()}.{secrets.token_hex(4)}")
     try:
         handle = os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode)

@@ -20,16 +20,21 @@ def run(args: Sequence[str]) -> int:
     """Run `rcsc` with `args`; the exit status."""
     import click
 
-    from rcsc.cli.commands import rcsc
+    from rcsc.cli.commands import commands
+    from rcsc.cli.show import UnwritableError
 
     try:
-        status = rcsc.main(list(args), prog_name="rcsc", standalone_mode=False)
+        status = commands.main(list(args), prog_name="rcsc", standalone_mode=False)
     except click.ClickException as error:
         error.show()
         return USAGE
     except (click.Abort, KeyboardInterrupt):
         click.echo("rcsc: interrupted; nothing was half written", err=True)
         return INTERRUPTED
+    except UnwritableError as error:
+        place, why = error.args
+        click.echo(f"error[RCS502]: {place} cannot be written: {why}", err=True)
+        return FINDINGS
     except BrokenPipeError:
         _forget_stdout()
         return FINDINGS

@@ -1,5 +1,6 @@
 """The commands: each turns arguments into a call of the driver, shows the report, gives the exit status."""
 
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -26,9 +27,9 @@ Examples:
 Exit status: 0 proved, 1 findings, 2 usage, 3 a bug in rcsc."""
 
 
-@click.group(epilog=_EPILOG, context_settings={"help_option_names": ["-h", "--help"]})
+@click.group("rcsc", epilog=_EPILOG, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, "-V", "--version", message="rcsc %(version)s")
-def rcsc() -> None:
+def commands() -> None:
     """Prove robot-control state tables, and compile the proved ones to Python and C.
 
     In every cycle exactly one line of a table must match. `rcsc check` proves that it does, whatever comes
@@ -39,10 +40,12 @@ def rcsc() -> None:
 def _settings(options: "Options", use_cache: bool, output: Output, paths: tuple[str, ...]) -> "Settings":
     from rcsc.driver.work import Settings
 
-    stdin = click.get_binary_stream("stdin").read() if "-" in paths else None
-    return Settings(
-        paths or (".",), options, stdin, use_cache=use_cache, progress=Progress(wanted=not output.quiet)
-    )
+    progress = Progress(wanted=not output.quiet)
+    return Settings(paths or (".",), options, _piped(paths), use_cache=use_cache, progress=progress)
+
+
+def _piped(paths: tuple[str, ...]) -> bytes | None:
+    return sys.stdin.buffer.read() if "-" in paths else None
 
 
 def _finish(report: Report, command: str, output: Output, closing: str = "") -> int:
@@ -50,7 +53,7 @@ def _finish(report: Report, command: str, output: Output, closing: str = "") -> 
     return 1 if report.failed else 0
 
 
-@rcsc.command(
+@commands.command(
     short_help="Prove that exactly one line of each table matches.",
     epilog="""\b
 Examples:
@@ -75,7 +78,7 @@ def check(paths: tuple[str, ...], options: "Options", use_cache: bool, output: O
     return _finish(driver.check(_settings(options, use_cache, output, paths)), "check", output)
 
 
-@rcsc.command(
+@commands.command(
     name="compile",
     short_help="Write the executors of proved tables, in Python and C.",
     epilog="""\b
@@ -112,7 +115,7 @@ def compile_(
     return _finish(made.report, "compile", output, made.closing)
 
 
-@rcsc.command(
+@commands.command(
     short_help="Align tables.",
     epilog="""\b
 Examples:
@@ -132,20 +135,19 @@ def fmt(paths: tuple[str, ...], only_check: bool, diff: bool, output: Output) ->
     """
     from rcsc.driver.reformat import reformat
 
-    stdin = click.get_binary_stream("stdin").read() if "-" in paths else None
     write = not (only_check or diff)
-    made = reformat(paths or (".",), stdin, write=write)
+    made = reformat(paths or (".",), _piped(paths), write=write)
     if diff:
         click.echo(made.diff, nl=False)
         return 1 if made.report.failed else 0
     if write and "-" in made.texts and not made.report.failed:
-        click.get_binary_stream("stdout").write(made.texts["-"].encode())
+        sys.stdout.buffer.write(made.texts["-"].encode())
         return 0
     files = f"{made.changed} of {len(made.texts)} files"
     return _finish(made.report, "fmt", output, f"{files} {'changed' if write else 'would change'}")
 
 
-@rcsc.command(
+@commands.command(
     short_help="Test the generated executors against the tables.",
     epilog="""\b
 Examples:
@@ -155,12 +157,18 @@ Examples:
 @PATHS
 @click.option("--examples", type=click.IntRange(min=1), default=200, show_default=True, metavar="N",
               help="How many inputs and how many sequences of cycles are tried a table.")  # fmt: skip
+@click.option("--mutants", type=click.IntRange(min=-1), default=24, show_default=True, metavar="N",
+              help="How many mutants of each table and of its code must be caught; -1 for all.")  # fmt: skip
+@click.option("--esbmc", type=click.FloatRange(min=0), default=60.0, show_default=True, metavar="SECONDS",
+              help="Time limit of the model checker for one C function; 0 leaves it out.")  # fmt: skip
+@click.option("--cortex/--no-cortex", default=True, show_default=True,
+              help="Run the C on an emulated Cortex-M3, too.")  # fmt: skip
 @click.option("--vectors", type=click.Path(dir_okay=False, path_type=Path), default=None, metavar="FILE",
               help="Write MC/DC vectors to FILE, as JSON or CSV by its ending.")  # fmt: skip
 @proving
 @showing
 def test(
-    paths: tuple[str, ...], examples: int, vectors: Path | None,
+    paths: tuple[str, ...], examples: int, mutants: int, esbmc: float, cortex: bool, vectors: Path | None,
     options: "Options", use_cache: bool, output: Output,
 ) -> int:  # fmt: skip
     """Test what is generated: interpreter = Python = C on the same inputs and over cycles.
@@ -169,12 +177,14 @@ def test(
     against the table for every value of every variable. Needs a C compiler.
     """
     from rcsc import driver
+    from rcsc.driver.work import Effort
 
-    made = driver.test(_settings(options, use_cache, output, paths), examples, vectors)
+    effort = Effort(examples, esbmc_s=esbmc, cortex=cortex, mutants=mutants, vectors=vectors)
+    made = driver.test(_settings(options, use_cache, output, paths), effort)
     return _finish(made.report, "test", output, made.closing)
 
 
-@rcsc.command(
+@commands.command(
     short_help="Re-check a proof without the prover.",
     epilog="""\b
 Examples:
@@ -182,7 +192,7 @@ Examples:
   rcsc certify acquire.rcs --write a.json     and keep the certificate
   rcsc certify acquire.rcs --against a.json   re-check one that was kept; nothing is proved""",
 )
-@click.argument("file", type=click.Path(exists=True, dir_okay=False))
+@click.argument("source", metavar="FILE", type=click.Path(exists=True, dir_okay=False))
 @click.option("--write", type=click.Path(dir_okay=False, path_type=Path), default=None, metavar="CERTIFICATE",
               help="Keep the certificate in this file.")  # fmt: skip
 @click.option("--against", type=click.Path(exists=True, dir_okay=False, path_type=Path), default=None,
@@ -190,7 +200,7 @@ Examples:
 @proving
 @showing
 def certify(
-    file: str, write: Path | None, against: Path | None, options: "Options", use_cache: bool, output: Output
+    source: str, write: Path | None, against: Path | None, options: "Options", use_cache: bool, output: Output
 ) -> int:
     """Re-check the proof of FILE's tables with a small checker that shares no code with the prover.
 
@@ -200,11 +210,11 @@ def certify(
 
     if write is not None and against is not None:
         raise click.UsageError("--write and --against do not go together")
-    made = driver.certify(_settings(options, use_cache, output, (file,)), write, against)
+    made = driver.certify(_settings(options, use_cache, output, (source,)), write, against)
     return _finish(made.report, "certify", output, made.closing)
 
 
-@rcsc.command(
+@commands.command(
     short_help="Say what a code means.",
     epilog="\b\nExamples:\n  rcsc explain           list the codes\n  rcsc explain RCS402",
 )
@@ -224,7 +234,7 @@ def explain(code: str | None) -> int:
     return 0
 
 
-@rcsc.command(
+@commands.command(
     short_help="Make a small project.", epilog="\b\nExample:\n  rcsc new gripper && cd gripper && rcsc check"
 )
 @click.argument("folder", type=click.Path(path_type=Path), metavar="DIR")
@@ -240,7 +250,7 @@ def new(folder: Path, output: Output) -> int:
     return _finish(Report(()), "new", output, closing)
 
 
-@rcsc.command(
+@commands.command(
     short_help="Print a shell's completion script.",
     epilog="""\b
 Examples:
@@ -256,5 +266,5 @@ def completion(shell: str) -> int:
     kind = get_completion_class(shell)
     if kind is None:  # pragma: no cover  # click has all three
         raise click.UsageError(f"no completion for {shell}")
-    click.echo(kind(rcsc, {}, "rcsc", "_RCSC_COMPLETE").source())
+    click.echo(kind(commands, {}, "rcsc", "_RCSC_COMPLETE").source())
     return 0

@@ -4,14 +4,12 @@ import os
 from collections.abc import Callable
 from functools import wraps
 from pathlib import Path
-from typing import Any, ParamSpec, TypeVar
+from typing import Any, Literal
 
 import click
 
 from rcsc.cli.show import Color, Form, Output
 
-P = ParamSpec("P")
-R = TypeVar("R")
 Command = Callable[..., int]
 
 PATHS = click.argument("paths", nargs=-1, type=click.Path(allow_dash=True), metavar="[PATH]...")
@@ -61,7 +59,13 @@ def proving(command: Command) -> Command:
     @click.option("--no-cache", is_flag=True, help="Neither read nor keep what earlier runs proved.")
     @wraps(command)
     def wrapped(
-        *args: Any, timeout: float, memory: int, solver: str, jobs: int, no_cache: bool, **kwargs: Any
+        *args: Any,
+        timeout: float,
+        memory: int,
+        solver: Literal["auto", "both", "boxes"],
+        jobs: int,
+        no_cache: bool,
+        **kwargs: Any,
     ) -> int:
         from rcsc.prove.options import Options
 

@@ -51,6 +51,10 @@ class Output:
     quiet: bool = False
 
 
+class UnwritableError(Exception):
+    """A report could not be written: where, and why."""
+
+
 _OF_VERDICT = {
     Verdict.PROVED: Style.HELP,
     Verdict.REFUTED: Style.ERROR,
@@ -63,16 +67,21 @@ def show(report: Report, command: str, output: Output, closing: str = "") -> Non
     """Write the report; `closing` is a last line for people.
 
     Raises:
-        click.ClickException: The file could not be written.
+        UnwritableError: The file, or standard output, could not be written.
+        BrokenPipeError: Whoever read standard output has gone.
     """
     text = _FORMS[output.form](report, command, output, closing)
-    if output.file is None:
-        click.echo(text, nl=False, color=True)
-        return
     try:
-        write_atomically(output.file, text.encode())
+        if output.file is None:
+            click.echo(text, nl=False, color=True)
+        else:
+            write_atomically(output.file, text.encode())
+    except BrokenPipeError:
+        raise
     except OSError as error:
-        raise click.FileError(str(output.file), error.strerror) from error
+        raise UnwritableError(
+            str(output.file or "standard output"), error.strerror or "no reason given"
+        ) from error
 
 
 def _json(report: Report, command: str, _output: Output, _closing: str) -> str:

@@ -13,12 +13,14 @@ from rcsc.cache import Cache, open_cache
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label, sort_key
 from rcsc.diagnostics.report import Report
-from rcsc.driver.work import Made, Proof, Settings
+from rcsc.driver.work import Effort, Made, Proof, Settings
 from rcsc.source import Span
 
 if TYPE_CHECKING:
-    from rcsc.model import Program
+    from rcsc.model import Program, ProvedProgram
     from rcsc.project import Loaded
+
+TARGETS = ("python", "c")
 
 
 def check(settings: Settings) -> Report:
@@ -52,6 +54,30 @@ def compile_(settings: Settings, out: Path, targets: tuple[str, ...], *, only_ch
     if report.failed:
         return Made(report, "" if only_check else "nothing was written")
     return Made(report, f"{len(files)} files {'are fresh' if only_check else 'written'} in {out}")
+
+
+def test(settings: Settings, effort: Effort) -> Made:
+    """Prove every table, then test its executors against its meaning, and write vectors if asked."""
+    from rcsc.driver.trials import try_out, write_vectors
+
+    loaded = _load(settings)
+    proofs = tuple(_proofs(loaded, settings, None))
+    report = _report(loaded, proofs)
+    if report.failed:
+        return Made(report, "nothing was tested: not everything is proved")
+    found: list[Diagnostic] = []
+    figures = []
+    programs = [proof.proved for proof in proofs if proof.proved is not None and _runs(proof.proved.program)]
+    for proved in programs:
+        one, text = try_out(
+            proved.program, _emitted(proved, TARGETS), settings.options, effort, settings.progress
+        )
+        found += one
+        figures.append(text)
+    if effort.vectors is not None:
+        found += write_vectors([one.program for one in programs], settings.options, effort.vectors)
+    settings.progress("")
+    return Made(_report(loaded, proofs, tuple(found)), "\n".join(figures))
 
 
 def certify(settings: Settings, write: Path | None, against: Path | None) -> Made:
@@ -118,9 +144,6 @@ def _executors(
     proofs: tuple[Proof, ...], targets: tuple[str, ...]
 ) -> tuple[dict[str, str], tuple[Diagnostic, ...]]:
     """The generated files of every program that declares a table or a level, by path under the folder."""
-    from rcsc.emit import emit_c, emit_python
-    from rcsc.lower import lower
-
     files: dict[str, str] = {}
     found = []
     owner: dict[str, str] = {}
@@ -131,10 +154,16 @@ def _executors(
         if owner.setdefault(name.casefold(), proof.root) != proof.root:
             found.append(_same_name(name, proof.root, owner[name.casefold()]))
             continue
-        plan = lower(proof.proved)
-        made = (emit_python(plan) if "python" in targets else {}) | (emit_c(plan) if "c" in targets else {})
-        files |= made
+        files |= _emitted(proof.proved, targets)
     return files, tuple(found)
+
+
+def _emitted(proved: "ProvedProgram", targets: tuple[str, ...]) -> dict[str, str]:
+    from rcsc.emit import emit_c, emit_python
+    from rcsc.lower import lower
+
+    plan = lower(proved)
+    return (emit_python(plan) if "python" in targets else {}) | (emit_c(plan) if "c" in targets else {})
 
 
 def _runs(program: "Program") -> bool:

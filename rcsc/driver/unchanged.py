@@ -6,7 +6,7 @@ file by content, and every place where a file would have been found first is sti
 
 import hashlib
 import os
-from dataclasses import asdict, is_dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -66,8 +66,8 @@ def remember(
 
 
 def _key(paths: tuple[str, ...], options: "Options") -> tuple[str, ...]:
-    stated = asdict(options) if is_dataclass(options) else {}
-    stated.pop("jobs", None)
+    stated = asdict(options)
+    stated.pop("jobs", None)  # how many at once changes nothing
     return ("check", os.getcwd(), *paths, "--", *(f"{name}={value}" for name, value in stated.items()))
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rcsc.diagnostics.diagnostic import Diagnostic
@@ -57,3 +58,24 @@ class Proof:
     tables: tuple[TableReport, ...] = ()
     proved: "ProvedProgram | None" = None
     certificate: Mapping[str, object] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Effort:
+    """How much `rcsc test` tries.
+
+    Attributes:
+        examples: Inputs for each matcher, and sequences for each step and cycle.
+        cycles: Longest sequence.
+        esbmc_s: Time limit of the model checker for one function, in seconds; 0 leaves it out.
+        cortex: Whether an emulated Cortex-M3 is asked.
+        mutants: How many mutants of each table and of its code; 0 for none, -1 for all.
+        vectors: Where to write MC/DC vectors.
+    """
+
+    examples: int = 200
+    cycles: int = 8
+    esbmc_s: float = 60.0
+    cortex: bool = True
+    mutants: int = 24
+    vectors: Path | None = None

@@ -1,0 +1,86 @@
+"""`rcsc test`: the suite of tests over every proved program, and vectors for users.
+
+In: proved programs and their generated files. Out: what the suite found, and its figures as text.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+from rcsc.diagnostics.codes import Code
+from rcsc.diagnostics.diagnostic import Diagnostic, Label
+from rcsc.driver.work import Effort
+from rcsc.files import write_atomically
+from rcsc.model import Expr, Program, Snapshot, Table
+from rcsc.prove.options import Options
+from rcsc.source import Span
+from rcsc.testing.export import vectors_csv, vectors_json
+from rcsc.testing.mutants import Opinion
+from rcsc.testing.search import Missing, search_in
+from rcsc.testing.suite import Proofs, SuiteOptions, run_suite
+from rcsc.testing.vectors import vectors_of
+
+
+def try_out(
+    program: Program,
+    files: Mapping[str, str],
+    options: Options,
+    effort: Effort,
+    progress: Callable[[str], None],
+) -> tuple[tuple[Diagnostic, ...], str]:
+    """Run the suite on one program; what it found, and what it counted."""
+    asked = SuiteOptions(
+        effort.examples,
+        effort.cycles,
+        effort.esbmc_s,
+        effort.cortex,
+        None if effort.mutants < 0 else effort.mutants,
+        progress=progress,
+    )
+    result = run_suite(program, files, asked, _proofs(options))
+    return result.found, result.text()
+
+
+def write_vectors(programs: Sequence[Program], options: Options, file: Path) -> tuple[Diagnostic, ...]:
+    """Write the vectors of the programs' tables, as CSV where the name ends so, else as JSON."""
+    spell = vectors_csv if file.suffix == ".csv" else vectors_json
+    texts = []
+    for program in programs:
+        search = search_in(program, _proofs(options).solver)
+        texts.append(spell(program, [vectors_of(search, table) for table in program.tables]))
+    if len(texts) != 1 and file.suffix == ".csv":
+        return (_unwritten(file, "a CSV file holds the vectors of one program"),)
+    try:
+        write_atomically(file, (texts[0] if len(texts) == 1 else f"[{','.join(texts)}]\n").encode())
+    except OSError as error:
+        return (_unwritten(file, f"cannot be written: {error.strerror}"),)
+    return ()
+
+
+def _unwritten(file: Path, why: str) -> Diagnostic:
+    return Diagnostic(Code.NOT_WRITTEN, f"`{file}`: {why}", Label(Span(str(file), 0, 0)))
+
+
+def _proofs(options: Options) -> Proofs:
+    """The prover and its solver, as far as the suite needs them."""
+    from rcsc.prove.certificate import must_cover
+    from rcsc.prove.encode import declared, encode
+    from rcsc.prove.smt import Answer, Solver
+    from rcsc.prove.table import prove_table
+    from rcsc.prove.verdict import Gap
+
+    def prover(program: Program, table: Table) -> Opinion:
+        verdict = prove_table(program, table, options)
+        falls = [one for one in verdict.found if isinstance(one, Gap)]
+        accepted = len(falls) == len(verdict.found) and (not falls or not must_cover(table))
+        return Opinion(accepted, repr([(gap.count, gap.witnesses) for gap in falls]))
+
+    def solver(program: Program, condition: Expr) -> Snapshot | Missing:
+        frame, ranges = declared(program.variables)
+        asked = Solver(options.timeout_ms, options.memory_mb)
+        asked.add(*ranges, encode(condition, frame))
+        answer = asked.check()
+        if answer is Answer.SATISFIABLE:
+            return {v.name: asked.value(frame.leaves[v.name], v.type) for v in program.variables}
+        return Missing.NONE if answer is Answer.UNSATISFIABLE else Missing.UNKNOWN
+
+    return Proofs(prover, solver)
