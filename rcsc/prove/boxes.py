@@ -1,0 +1,274 @@
+"""Tables whose tests are all sets of keys of one leaf: decided exactly by masks and counting.
+
+In: a table without relational tests. Out: every overlapping pair, the dead lines, and the inputs that no
+line matches, with least witnesses and maximal regions. No solver.
+
+Masks are Python integers, one bit a line. A variable's keys are cut where some line's box begins or ends;
+all keys of a class are alike. Source: `notes/performance.md`, A.3.
+"""
+
+from bisect import bisect_right
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from math import prod
+
+from rcsc.model import Box, Program, Table, key_bounds, value_of_key
+from rcsc.prove.verdict import Gap, Overlap, Region, Witness
+
+MOST_GAPS = 3
+BoxLine = Mapping[str, Box]
+
+
+def applies(table: Table) -> bool:
+    """Whether every test of the table is a box."""
+    return all(test is None or test.box is not None for line in table.lines for test in line.tests)
+
+
+def meet(one: Box, two: Box) -> Box:
+    """The keys in both."""
+    parts = ((max(a, c), min(b, d)) for a, b in one for c, d in two)
+    return tuple(sorted(part for part in parts if part[0] <= part[1]))
+
+
+def size(box: Box) -> int:
+    """How many keys it has."""
+    return sum(high - low + 1 for low, high in box)
+
+
+def lines_of(table: Table) -> list[dict[str, Box]]:
+    """For each line the keys of each leaf that it tests; several tests of one leaf meet."""
+    lines = []
+    for line in table.lines:
+        boxes: dict[str, Box] = {}
+        for test in line.tests:
+            if test is not None:
+                assert test.box is not None
+                name = test.variables[0]
+                boxes[name] = meet(boxes[name], test.box) if name in boxes else test.box
+        lines.append(boxes)
+    return lines
+
+
+@dataclass(slots=True)
+class Boxes:
+    """One table as boxes.
+
+    Attributes:
+        names: The test variables, in declared order.
+        extents: Least and greatest key of each.
+        lines: The lines; dead ones have an empty box somewhere.
+    """
+
+    program: Program
+    names: tuple[str, ...]
+    extents: dict[str, tuple[int, int]]
+    lines: list[dict[str, Box]]
+    _classes: dict[str, "Classes"] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, program: Program, table: Table) -> "Boxes":
+        """The table's boxes; all its tests must be boxes."""
+        wanted = set(table.variables)
+        extents = {v.name: key_bounds(v.type) for v in program.variables if v.name in wanted}
+        return cls(program, tuple(table.variables), {n: extents[n] for n in table.variables}, lines_of(table))
+
+    def dead(self) -> list[int]:
+        """Lines that nothing matches."""
+        return [at for at, boxes in enumerate(self.lines) if any(not box for box in boxes.values())]
+
+    # --- overlaps ---
+
+    def overlaps(self) -> Iterator[tuple[int, int]]:
+        """Every pair of lines that some input matches both of, first line first."""
+        everyone = (1 << len(self.lines)) - 1
+        for at in self.dead():
+            everyone &= ~(1 << at)
+        by_box = self._by_box()
+        meets: dict[tuple[str, Box], int] = {}
+        for at, boxes in enumerate(self.lines):
+            if not everyone >> at & 1:
+                continue
+            others = everyone >> (at + 1) << (at + 1)
+            for name, box in boxes.items():
+                if not others:
+                    break
+                if (name, box) not in meets:
+                    meets[name, box] = self._meeting(name, box, by_box[name])
+                others &= meets[name, box]
+            while others:
+                lowest = others & -others
+                yield at, lowest.bit_length() - 1
+                others ^= lowest
+
+    def _by_box(self) -> dict[str, dict[Box, int]]:
+        """For each variable its distinct boxes, with the lines that state them as bytes, then integers."""
+        width = len(self.lines) // 8 + 1
+        stated: dict[str, dict[Box, bytearray]] = {name: {} for name in self.names}
+        for at, boxes in enumerate(self.lines):
+            for name, box in boxes.items():
+                mask = stated[name].get(box)
+                if mask is None:
+                    mask = stated[name][box] = bytearray(width)
+                mask[at >> 3] |= 1 << (at & 7)
+        return {
+            name: {box: int.from_bytes(mask, "little") for box, mask in by_box.items()}
+            for name, by_box in stated.items()
+        }
+
+    def _meeting(self, name: str, box: Box, by_box: Mapping[Box, int]) -> int:
+        """The lines that `box` can meet, those that do not test the variable among them."""
+        apart = 0
+        for other, mask in by_box.items():
+            if not any(a <= d and c <= b for a, b in box for c, d in other):
+                apart |= mask
+        return ((1 << len(self.lines)) - 1) & ~apart
+
+    def both(self, first: int, second: int) -> Overlap:
+        """The overlap of two lines: its least witness, and the whole region where both match."""
+        one, two = self.lines[first], self.lines[second]
+        region: dict[str, Box] = {}
+        for name in self.names:
+            if name in one or name in two:
+                whole = (self.extents[name],)
+                region[name] = meet(one.get(name, whole), two.get(name, whole))
+        return Overlap(first, second, self.witness({n: box[0][0] for n, box in region.items()}), self.narrowed(region))
+
+    def witness(self, keys: Mapping[str, int]) -> Witness:
+        """The values of these keys; the least of every other variable."""
+        kinds = {v.name: v.type for v in self.program.variables}
+        return {n: value_of_key(kinds[n], keys.get(n, self.extents[n][0])) for n in self.names}  # type: ignore[index]
+
+    def narrowed(self, region: Mapping[str, Box]) -> Region:
+        """Without the variables that may have any key."""
+        return {name: box for name, box in region.items() if box != (self.extents[name],)}
+
+    # --- gaps ---
+
+    def volume(self) -> int:
+        """How many inputs there are."""
+        return prod(high - low + 1 for low, high in self.extents.values())
+
+    def covered(self) -> int:
+        """How many inputs the lines match together, where no two overlap."""
+        full = {name: high - low + 1 for name, (low, high) in self.extents.items()}
+        whole = prod(full.values())
+        sizes: dict[tuple[str, Box], int] = {}
+        total = 0
+        for boxes in self.lines:
+            above = below = 1
+            for name, box in boxes.items():
+                if (name, box) not in sizes:
+                    sizes[name, box] = size(box)
+                above *= sizes[name, box]
+                below *= full[name]
+            total += whole * above // below
+        return total
+
+    def gap(self, disjoint: bool) -> Gap | None:
+        """What no line matches: up to three witnesses with regions, and the count where lines are disjoint."""
+        count = None
+        if disjoint:
+            missing = self.volume() - self.covered()
+            if not missing:
+                return None
+            count = (missing, self.volume())
+        shown: list[dict[str, Box]] = []
+        witnesses = []
+        search = Search(self, disjoint)
+        while len(shown) < MOST_GAPS and (cell := search.least(shown)) is not None:
+            shown.append(search.grown(cell, shown))
+            witnesses.append(self.witness({name: low for name, (low, _) in cell.items()}))
+        if not witnesses:
+            return None
+        return Gap(tuple(witnesses), tuple(self.narrowed(region) for region in shown), count)
+
+    def classes(self, name: str) -> "Classes":
+        """The keys of a variable, cut where some line's box begins or ends."""
+        if name not in self._classes:
+            starts = {self.extents[name][0]}
+            for boxes in self.lines:
+                for low, high in boxes.get(name, ()):
+                    starts.update((low, high + 1))
+            ordered = sorted(start for start in starts if start <= self.extents[name][1])
+            ends = [*(start - 1 for start in ordered[1:]), self.extents[name][1]]
+            self._classes[name] = Classes(ordered, ends)
+        return self._classes[name]
+
+
+@dataclass(frozen=True, slots=True)
+class Classes:
+    """Intervals of keys that no box of the table parts."""
+
+    starts: Sequence[int]
+    ends: Sequence[int]
+
+
+
+Cell = dict[str, tuple[int, int]]
+
+
+@dataclass(slots=True)
+class Search:
+    """Looks for the least input that no line matches."""
+
+    table: Boxes
+    disjoint: bool
+    _without: set[tuple[int, frozenset[int]]] = field(default_factory=set)
+
+    def least(self, shown: Sequence[Mapping[str, Box]]) -> Cell | None:
+        """The least cell of classes outside all lines and outside the regions shown; None where there is none."""
+        lines = [*self.table.lines, *shown]
+        self._without = set()
+        alive = [at for at, boxes in enumerate(lines) if all(boxes.values())]
+        return self._search(0, alive, lines, not shown and self.disjoint)
+
+    def _search(self, depth: int, alive: list[int], lines: Sequence[Mapping[str, Box]], counting: bool) -> Cell | None:
+        names = self.table.names[depth:]
+        if not alive:
+            return {name: (self.table.extents[name][0],) * 2 for name in names}
+        if not names or any(not any(name in lines[at] for name in names) for at in alive):
+            return None
+        if counting and self._filled(alive, lines, names):
+            return None
+        memory = (depth, frozenset(alive))
+        if memory in self._without:
+            return None
+        name, classes = names[0], self.table.classes(names[0])
+        for low, high in zip(classes.starts, classes.ends, strict=True):
+            inside = [at for at in alive if name not in lines[at] or _holds(lines[at][name], low)]
+            found = self._search(depth + 1, inside, lines, counting)
+            if found is not None:
+                return {name: (low, high), **found}
+        self._without.add(memory)
+        return None
+
+    def _filled(self, alive: list[int], lines: Sequence[Mapping[str, Box]], names: Sequence[str]) -> bool:
+        """Whether disjoint lines fill what the variables left span."""
+        full = {name: high - low + 1 for name in names for low, high in (self.table.extents[name],)}
+        sizes = (prod(size(lines[at][n]) if n in lines[at] else full[n] for n in names) for at in alive)
+        return sum(sizes) == prod(full.values())
+
+    def grown(self, cell: Cell, shown: Sequence[Mapping[str, Box]]) -> dict[str, Box]:
+        """A maximal region around the cell that no line and no region shown touches, grown in declared order."""
+        lines = [*self.table.lines, *shown]
+        region: dict[str, Box] = {}
+        for name in self.table.names:
+            classes = self.table.classes(name)
+            at = bisect_right(classes.starts, cell[name][0]) - 1
+            region[name] = ((classes.starts[at], classes.ends[at]),)
+        for name in self.table.names:
+            close = [boxes for boxes in lines if all(meet(box, region[n]) for n, box in boxes.items() if n != name)]
+            free: list[tuple[int, int]] = []
+            classes = self.table.classes(name)
+            for low, high in zip(classes.starts, classes.ends, strict=True):
+                if not any(name not in boxes or _holds(boxes[name], low) for boxes in close):
+                    if free and free[-1][1] + 1 == low:
+                        free[-1] = (free[-1][0], high)
+                    else:
+                        free.append((low, high))
+            region[name] = tuple(free)
+        return region
+
+
+def _holds(box: Box, key: int) -> bool:
+    return any(low <= key <= high for low, high in box)

@@ -1,0 +1,68 @@
+"""Z3 asked what masks, counting and region trees have answered; two queries a table.
+
+In: a table and what was found. Out: whether Z3 agrees. Source: `notes/formal.md`, 1.2.
+"""
+
+import time
+from enum import Enum, auto
+
+from rcsc.model import Program, Table
+from rcsc.prove import smt
+from rcsc.prove.certificate import must_cover
+from rcsc.prove.options import Options
+from rcsc.prove.relational import Asked
+from rcsc.prove.smt import Answer
+from rcsc.prove.verdict import Found, Gap, Overlap, Undecided
+
+_COSTLY = 60_000
+"""Lines times columns above which Z3 takes more than about a second (`tests/bench`)."""
+
+
+class Agreement(Enum):
+    """What Z3 says of the verdict."""
+
+    AGREES = auto()
+    DISAGREES = auto()
+    NOT_ASKED = auto()
+    UNKNOWN = auto()
+
+
+def worth_asking(table: Table, options: Options) -> bool:
+    """Whether Z3 is to be asked, by what it should cost."""
+    if options.solver == "both":
+        return True
+    cells = sum(1 for line in table.lines for test in line.tests if test is not None)
+    return options.solver == "auto" and cells * len(table.lines) <= _COSTLY
+
+
+def confirm(program: Program, table: Table, found: tuple[Found, ...], options: Options) -> Agreement:
+    """Z3's own answer to whether two lines meet and whether there is a gap, against what was found."""
+    if not worth_asking(table, options) or any(isinstance(one, Undecided) for one in found):
+        return Agreement.NOT_ASKED
+    begun = time.monotonic()
+    asked = Asked(program, table, options)
+    overlap = _some_overlap(asked)
+    if options.solver == "auto" and (time.monotonic() - begun) * 1000 > 4 * options.confirm_ms:
+        return Agreement.NOT_ASKED
+    gap = asked.holds(asked.none()) if must_cover(table) or any(isinstance(one, Gap) for one in found) else None
+    said = (overlap, any(isinstance(one, Overlap) for one in found)), (gap, any(isinstance(one, Gap) for one in found))
+    if any(answer is Answer.UNKNOWN for answer, _ in said):
+        return Agreement.UNKNOWN
+    agrees = all(answer is None or (answer is Answer.SATISFIABLE) == wrong for answer, wrong in said)
+    return Agreement.AGREES if agrees else Agreement.DISAGREES
+
+
+def _some_overlap(asked: Asked) -> Answer:
+    """Whether two lines can match at once: each line against all before it."""
+    terms = []
+    seen = smt.truth(False)
+    from rcsc.model import Bool
+
+    for at in range(len(asked.table.lines)):
+        bit = smt.variable(f"line!{at}", Bool())
+        before = seen
+        seen = smt.variable(f"seen!{at}", Bool())
+        asked.solver.add(smt.equal(bit, asked.line(at), Bool()))
+        asked.solver.add(smt.equal(seen, smt.any_of([before, bit]), Bool()))
+        terms.append(smt.all_of([before, bit]))
+    return asked.holds(smt.any_of(terms))

@@ -1,0 +1,191 @@
+"""Z3 behind a small typed face; its only importer, and only when a question is asked.
+
+In: terms built by the functions here. Out: `Answer`s. A time-out, exhausted memory, an exception and
+`unknown` are all `UNKNOWN`: nobody can take them for a proof.
+"""
+
+import struct
+from collections.abc import Sequence
+from enum import Enum, auto
+from functools import cache
+from typing import Any, NewType
+
+from rcsc.model import Bool, Real, Scalar, Value
+
+Term = NewType("Term", object)
+"""A Z3 expression; only this module looks inside."""
+
+
+class Answer(Enum):
+    """What the solver says of the formulas together."""
+
+    SATISFIABLE = auto()
+    UNSATISFIABLE = auto()
+    UNKNOWN = auto()
+
+
+@cache
+def _z3() -> Any:
+    import z3
+
+    return z3
+
+
+def _double_sort() -> Any:
+    return _z3().Float64()
+
+
+def variable(name: str, kind: Scalar) -> Term:
+    """A fresh constant: Bool, IEEE double, or a mathematical integer (also for enumerations)."""
+    z3 = _z3()
+    if isinstance(kind, Bool):
+        return Term(z3.Bool(name))
+    return Term(z3.FP(name, _double_sort()) if isinstance(kind, Real) else z3.Int(name))
+
+
+def literal(kind: Scalar, value: Value) -> Term:
+    """A constant of the kind."""
+    z3 = _z3()
+    if isinstance(kind, Bool):
+        return Term(z3.BoolVal(bool(value)))
+    return Term(z3.FPVal(float(value), _double_sort()) if isinstance(kind, Real) else z3.IntVal(int(value)))
+
+
+def truth(value: bool) -> Term:
+    """The constant true or false."""
+    return Term(_z3().BoolVal(value))
+
+
+def negation(term: Term) -> Term:
+    """Its opposite."""
+    return Term(_z3().Not(term))
+
+
+def all_of(terms: Sequence[Term]) -> Term:
+    """Every one; true when there are none."""
+    return Term(_z3().And(list(terms)))
+
+
+def any_of(terms: Sequence[Term]) -> Term:
+    """At least one; false when there are none."""
+    return Term(_z3().Or(list(terms)))
+
+
+def implication(left: Term, right: Term) -> Term:
+    """Left implies right."""
+    return Term(_z3().Implies(left, right))
+
+
+def choice(condition: Term, then: Term, orelse: Term) -> Term:
+    """`then` where the condition holds, else `orelse`."""
+    return Term(then if then is orelse else _z3().If(condition, then, orelse))
+
+
+def equal(left: Term, right: Term, kind: Scalar) -> Term:
+    """Equality of two values of the kind; 0.0 equals -0.0."""
+    return Term(_z3().fpEQ(left, right) if isinstance(kind, Real) else left == right)
+
+
+def at_most(left: Term, right: Term, kind: Scalar) -> Term:
+    """`left <= right`."""
+    z3: Any = _z3()
+    a: Any = left
+    return Term(z3.fpLEQ(left, right) if isinstance(kind, Real) else a <= right)
+
+
+def below(left: Term, right: Term, kind: Scalar) -> Term:
+    """`left < right`."""
+    z3: Any = _z3()
+    a: Any = left
+    return Term(z3.fpLT(left, right) if isinstance(kind, Real) else a < right)
+
+
+def integer_operation(op: str, left: Term, right: Term) -> Term:
+    """`+ - * / mod` of mathematical integers; `/` rounds toward zero and `mod` goes with it."""
+    z3: Any = _z3()
+    a: Any = left
+    b: Any = right
+    if op in ("+", "-", "*"):
+        return Term({"+": a + b, "-": a - b, "*": a * b}[op])
+    size = z3.If(a >= 0, a, -a) / z3.If(b >= 0, b, -b)
+    quotient = z3.If((a >= 0) == (b > 0), size, -size)
+    return Term(quotient if op == "/" else a - quotient * b)
+
+
+def double_operation(op: str, left: Term, right: Term) -> Term:
+    """`+ - * /` of doubles, rounded to nearest even."""
+    z3: Any = _z3()
+    operation = {"+": z3.fpAdd, "-": z3.fpSub, "*": z3.fpMul, "/": z3.fpDiv}[op]
+    return Term(operation(z3.RNE(), left, right))
+
+
+def minus(term: Term, kind: Scalar) -> Term:
+    """The negative."""
+    a: Any = term
+    return Term(_z3().fpNeg(a) if isinstance(kind, Real) else -a)
+
+
+def to_double(term: Term) -> Term:
+    """The nearest double of an integer."""
+    z3: Any = _z3()
+    return Term(z3.fpRealToFP(z3.RNE(), z3.ToReal(term), _double_sort()))
+
+
+def to_integer(term: Term) -> Term:
+    """A finite double without its fraction."""
+    z3: Any = _z3()
+    return Term(z3.ToInt(z3.fpToReal(z3.fpRoundToIntegral(z3.RTZ(), term))))
+
+
+def is_finite(term: Term) -> Term:
+    """Neither infinite nor NaN."""
+    z3: Any = _z3()
+    return Term(z3.Not(z3.Or(z3.fpIsInf(term), z3.fpIsNaN(term))))
+
+
+class Solver:
+    """One incremental solver."""
+
+    def __init__(self, timeout_ms: int, memory_mb: int = 4_096) -> None:
+        z3 = _z3()
+        z3.set_param("memory_max_size", memory_mb)
+        self._solver: Any = z3.Solver()
+        self._solver.set("timeout", timeout_ms)
+        self._solver.set("random_seed", 0)
+        self.queries = 0
+
+    def add(self, *terms: Term) -> None:
+        """Asserts the terms."""
+        self._solver.add(*terms)
+
+    def push(self) -> None:
+        """Remembers what is asserted."""
+        self._solver.push()
+
+    def pop(self) -> None:
+        """Goes back to what was remembered."""
+        self._solver.pop()
+
+    def check(self, *assuming: Term) -> Answer:
+        """Whether all asserted terms, and these, hold together for some values."""
+        z3 = _z3()
+        self.queries += 1
+        try:
+            answer = self._solver.check(*assuming)
+        except z3.Z3Exception:
+            return Answer.UNKNOWN
+        if answer == z3.sat:
+            return Answer.SATISFIABLE
+        return Answer.UNSATISFIABLE if answer == z3.unsat else Answer.UNKNOWN
+
+    def value(self, term: Term, kind: Scalar) -> Value:
+        """The value of a constant in the model of the last satisfiable answer."""
+        z3 = _z3()
+        found = self._solver.model().eval(term, model_completion=True)
+        if isinstance(kind, Bool):
+            return bool(z3.is_true(found))
+        if isinstance(kind, Real):
+            bits = z3.simplify(z3.fpToIEEEBV(found)).as_long()
+            double: float = struct.unpack("<d", struct.pack("<Q", bits))[0]
+            return double + 0.0
+        return int(found.as_long())
