@@ -1,0 +1,212 @@
+"""Interpreter, Python executor and C executor on the same inputs: line, fault, failed assumptions, state.
+
+In: a program, its executors, sessions. Out: the first disagreement of a session, and what was compared. The
+complete state is compared after every cycle, and each executor carries its own from cycle to cycle. Where a
+table's assumptions do not hold, nothing is claimed of its procedures and the session ends before that cycle;
+its matcher is compared there all the same (`Lines`).
+"""
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from rcsc.interpret import Fault, Outcome, cycle, holds, matching_lines, run_table
+from rcsc.model import LineName, Program, Snapshot, Table
+from rcsc.testing.native import Native, Result
+from rcsc.testing.reference_file import all_lines, monitored
+from rcsc.testing.sessions import Seen, Session, differences
+from rcsc.testing.targets import Target
+from rcsc.testing.tools import Absent, BuildFailed
+
+NONE, SEVERAL = -1, -2
+
+
+@dataclass(frozen=True, slots=True)
+class Disagreement:
+    """An executor that does not do what the interpreter does.
+
+    Attributes:
+        executor: `Python` or `C`, or `C with sanitizers`.
+        function: Name of the emitted function.
+        cycle: Number of the cycle in the session, from 1.
+    """
+
+    executor: str
+    function: str
+    cycle: int
+    session: Session
+    words: tuple[str, ...]
+
+
+@dataclass(slots=True)
+class Compared:
+    """What was compared so far.
+
+    Attributes:
+        lines: By table, how often each line was taken by a step or cycle that all executors agreed on.
+        kept: Sessions that ran, for the sanitized program.
+    """
+
+    sessions: int = 0
+    cycles: int = 0
+    matches: int = 0
+    faults: Counter[int] = field(default_factory=Counter)
+    lines: dict[str, Counter[str]] = field(default_factory=dict)
+    kept: list[tuple[int, Session, list[Seen]]] = field(default_factory=list)
+
+
+class PythonRuns(Protocol):
+    """What the emitted Python does; see `python_executor`."""
+
+    def run(self, target: Target, session: Session) -> list[Seen]:
+        """Runs a session."""
+
+    def line(self, target: Target, snapshot: Snapshot) -> int:
+        """What the emitted `line` function gives."""
+
+
+@dataclass(frozen=True, slots=True)
+class Executors:
+    """The executors of one program."""
+
+    program: Program
+    native: Native
+    python: PythonRuns
+    targets: tuple[Target, ...]
+
+    def number(self, target: Target) -> int:
+        """Number of the target's function in the shim; the reference's is one more."""
+        return 2 * self.targets.index(target)
+
+
+def interpreter(program: Program, target: Target) -> Callable[[Snapshot], Outcome]:
+    """The interpreter's meaning of a step or a cycle."""
+    if target.kind == "step":
+        table = program.tables[target.number]
+        return lambda snapshot: run_table(program, table, snapshot)
+    level = program.levels[target.number]
+    return lambda snapshot: cycle(program, level, snapshot)
+
+
+def seen_by_interpreter(outcome: Outcome) -> Seen:
+    """An outcome in the common words."""
+    took = outcome.fault in (Fault.OK, Fault.EXTERN) and outcome.line is not None
+    line = outcome.line_index if took else NONE
+    at = str(outcome.fault_at or "") if outcome.fault is Fault.ADMIT else ""
+    failed = tuple(str(name) for name in outcome.failed_assumptions)
+    return Seen(int(outcome.fault), at, line, failed, outcome.snapshot)
+
+
+def seen_in_c(program: Program, native: Native, result: Result) -> Seen:
+    """A row of the C executor in the common words."""
+    names = monitored(program)
+    at = native.symbols.leaf_at(result.fault_at) if result.fault == Fault.ADMIT else ""
+    line = result.line if result.fault in (Fault.OK, Fault.EXTERN) else NONE
+    failed = tuple(names[number] for number in result.failed)
+    return Seen(result.fault, at, line, failed, result.snapshot)
+
+
+def rows_of(session: Session) -> list[Snapshot]:
+    """One row a cycle for the shim: the start with that cycle's readings."""
+    return [{**session.start, **readings} for readings in session.readings]
+
+
+def within(executors: Executors, target: Target, session: Session) -> Session:
+    """The session up to the first cycle in which the table's assumptions do not hold."""
+    rows = executors.native.run(executors.number(target) + 1, False, rows_of(session))
+    good = next((at for at, row in enumerate(rows) if row.outside), len(rows))
+    return Session(session.start, session.readings[:good])
+
+
+def keeps_invariants(program: Program, session: Session) -> bool:
+    """Whether the start can be a state of the program as far as its invariants say."""
+    return all(holds(invariant.condition, session.start) for invariant in program.invariants)
+
+
+def run_session(
+    executors: Executors, target: Target, session: Session, compared: Compared
+) -> Disagreement | None:
+    """Runs one session in all executors.
+
+    Args:
+        executors: Of the program.
+        target: A step or a cycle.
+        session: Start and readings; see `within` and `keeps_invariants`.
+        compared: Counts what was compared.
+    """
+    program = executors.program
+    meaning, state = interpreter(program, target), session.start
+    in_c = executors.native.run(executors.number(target), False, rows_of(session))
+    in_python = executors.python.run(target, session)
+    expected: list[Seen] = []
+    for number, readings in enumerate(session.readings):
+        right = seen_by_interpreter(meaning({**state, **readings}))
+        expected.append(right)
+        others = {"C": seen_in_c(program, executors.native, in_c[number]), "Python": in_python[number]}
+        for name, seen in others.items():
+            words = differences(program, right, seen)
+            if words:
+                return Disagreement(name, target.function, number + 1, session, words)
+        state = right.snapshot
+        _count(program, target, compared, right)
+    compared.sessions += 1
+    compared.kept.append((executors.number(target), session, expected))
+    return None
+
+
+def _count(program: Program, target: Target, compared: Compared, seen: Seen) -> None:
+    compared.cycles += 1
+    compared.faults[seen.fault] += 1
+    if target.kind == "step" and seen.line >= 0:
+        table = program.tables[target.number]
+        name = all_lines(table)[seen.line][0]
+        compared.lines.setdefault(table.name, Counter())[name] += 1
+
+
+def line_number(table: Table, names: Sequence[LineName]) -> int:
+    """What the emitted `line` function gives where these lines match."""
+    if not names:
+        return NONE if table.default is None else len(table.lines)
+    if len(names) > 1:
+        return SEVERAL
+    return next(at for at, line in enumerate(table.lines) if line.name == names[0])
+
+
+def run_lines(
+    executors: Executors, target: Target, snapshots: Sequence[Snapshot], compared: Compared
+) -> Disagreement | None:
+    """Compares the matchers on snapshots, whether or not assumptions hold in them."""
+    table = executors.program.tables[target.number]
+    number = executors.number(target)
+    in_c = executors.native.run(number, True, snapshots)
+    reference = executors.native.run(number + 1, True, snapshots)
+    for snapshot, row, plain in zip(snapshots, in_c, reference, strict=True):
+        right = line_number(table, matching_lines(table, snapshot))
+        others = {
+            "C": row.result,
+            "C reference": plain.result,
+            "Python": executors.python.line(target, snapshot),
+        }
+        for name, seen in others.items():
+            if seen != right:
+                words = (f"line {seen} where {right} is right",)
+                return Disagreement(name, target.function, 1, Session(snapshot, ()), words)
+        compared.matches += 1
+    return None
+
+
+def run_sanitized(executors: Executors, compared: Compared) -> Disagreement | BuildFailed | Absent | None:
+    """All sessions again in the program with sanitizers, which stop it at the first finding."""
+    sessions = [(which, False, rows_of(session)) for which, session, _ in compared.kept]
+    made = executors.native.run_checked(sessions)
+    if not isinstance(made, list):
+        return made
+    for (which, session, expected), rows in zip(compared.kept, made, strict=True):
+        for at, (right, row) in enumerate(zip(expected, rows, strict=True)):
+            seen = seen_in_c(executors.program, executors.native, row)
+            words = differences(executors.program, right, seen)
+            if words:
+                function = executors.targets[which // 2].function
+                return Disagreement("C with sanitizers", function, at + 1, session, words)
+    return None

