@@ -12,6 +12,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TypeAlias
 
+from rcsc.meaning import spelled
 from rcsc.model import (
     COMPARISONS,
     Among,
@@ -260,21 +261,6 @@ def meet(left: Box, right: Box) -> Box:
     """The keys in both."""
     found = ((max(a, c), min(b, d)) for a, b in left for c, d in right)
     return tuple(sorted((low, high) for low, high in found if low <= high))
-
-
-def spelled(term: Expr) -> str:
-    """A name for `term` that says what it is: two terms with one name are one term."""
-    match term:
-        case Literal(value=value, type=kind):
-            return f"{type(kind).__name__.lower()}:{value!r}"
-        case Read(name=name):
-            return name
-        case Apply(op=op, args=args):
-            return f"({op.value} {' '.join(map(spelled, args))})"
-        case Among(subject=subject, values=values):
-            return f"(in {spelled(subject)} {' '.join(map(repr, values))})"
-        case _:
-            return f"({type(term).__name__} {term!r})"
 
 
 def lines_of(universe: Universe, table: Table) -> list[Clauses]:

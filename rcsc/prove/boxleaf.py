@@ -7,9 +7,13 @@ Source: `notes/performance.md`, A.3 point 1.
 """
 
 from collections.abc import Mapping, Sequence
+from itertools import combinations
 from math import prod
 
 from rcsc.model import Box
+
+MANY = 256
+"""Above so many lines a certificate leaves the parting form of each pair to the checker."""
 
 Cell = dict[int, tuple[int, int]]
 
@@ -49,11 +53,28 @@ def first_overlap(lines: Sequence[Mapping[int, Box]]) -> tuple[int, int] | None:
     return None
 
 
+def parting(lines: Sequence[Mapping[int, Box]]) -> tuple[int, ...] | None:
+    """For each pair of disjoint lines, first with second and on, a form that parts them.
+
+    None where there are more than `MANY` lines: then a checker looks for it.
+    """
+    if len(lines) > MANY:
+        return None
+    return tuple(
+        next(form for form, box in left.items() if form in right and not _touch(box, right[form]))
+        for left, right in combinations(lines, 2)
+    )
+
+
+def _touch(left: Box, right: Box) -> bool:
+    return any(a <= d and c <= b for a, b in left for c, d in right)
+
+
 def _meeting(box: Box, by_box: Mapping[Box, int], everyone: int) -> int:
     """The lines that `box` can meet; a line without a box on the form meets all."""
     found = everyone
     for other, mask in by_box.items():
-        if not any(a <= d and c <= b for a, b in box for c, d in other):
+        if not _touch(box, other):
             found &= ~mask
     return found
 

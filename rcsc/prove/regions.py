@@ -49,9 +49,16 @@ class Only:
 
 @dataclass(frozen=True, slots=True)
 class Counted:
-    """The lines left are disjoint boxes; `count` (of keys) is the region's own, None under DEFAULT."""
+    """The lines left are disjoint boxes.
+
+    Attributes:
+        count: How many keys of the forms they test the region has, all of them filled; None
+            under DEFAULT, where they need not be.
+        parts: For each pair of the lines, in order, the form that parts them; None for many.
+    """
 
     count: int | None
+    parts: tuple[int, ...] | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +99,7 @@ class Search:
     Attributes:
         nodes: The tree in preorder; a proof when there is no `Open`.
         overlaps: Each overlapping pair of lines with a point in both.
-        gap: A point that no line matches.
+        gaps: Regions (bounds by form) that no line matches, each with a point of it.
         witnesses: Inputs a solver gave at which not exactly one line holds, not yet told apart.
         undecided: How many regions stayed undecided.
         used: Assumptions that some leaf rests on, by position.
@@ -100,7 +107,7 @@ class Search:
 
     nodes: list[Node] = field(default_factory=list)
     overlaps: dict[tuple[int, int], Point] = field(default_factory=dict)
-    gap: Point | None = None
+    gaps: list[tuple[dict[int, Bounds], Point]] = field(default_factory=list)
     witnesses: list[Snapshot] = field(default_factory=list)
     undecided: int = 0
     used: set[int] = field(default_factory=set)
@@ -108,7 +115,7 @@ class Search:
     @property
     def refuted(self) -> bool:
         """Whether there is a finding."""
-        return bool(self.overlaps or self.witnesses) or self.gap is not None
+        return bool(self.overlaps or self.witnesses or self.gaps)
 
     @property
     def proved(self) -> bool:

@@ -16,7 +16,7 @@ from itertools import combinations
 from math import prod
 
 from rcsc.prove.atoms import Clauses, Universe
-from rcsc.prove.boxleaf import defect
+from rcsc.prove.boxleaf import defect, parting
 from rcsc.prove.linear import Multipliers, Simplex
 from rcsc.prove.regions import (
     Answer,
@@ -110,9 +110,9 @@ class Tree:
             return self._ask(region), []
         holding = [line.index for line in region.lines if line.holds]
         fresh = [pair for pair in combinations(holding, 2) if pair not in self.search.overlaps]
-        if fresh or (not region.lines and self.search.gap is None):
+        if fresh or not region.lines:
             return self._probe(region, fresh)
-        if not region.lines or (len(holding) > 1 and self._all_known(region)):
+        if len(holding) > 1 and self._all_known(region):
             return Open(), []
         return self._narrow(region)
 
@@ -140,7 +140,7 @@ class Tree:
         point = self._point(region)
         self.search.overlaps.update(dict.fromkeys(pairs, point))
         if not region.lines:
-            self.search.gap = point
+            self.search.gaps.append((region.bounds, point))
         settled = all(line.holds for line in region.lines)
         return (Open(), []) if settled else self._narrow(region)
 
@@ -185,10 +185,11 @@ class Tree:
             return self._carve(region)
         if all(not line.rest and self._singles.issuperset(line.boxes) for line in region.lines):
             extents = {form: self._range(region, form) for line in region.lines for form in line.boxes}
-            wrong = defect([line.boxes for line in region.lines], extents, cover=not self.default)
+            boxes = [line.boxes for line in region.lines]
+            wrong = defect(boxes, extents, cover=not self.default)
             if wrong is None:
                 sizes = (high - low + 1 for low, high in extents.values())
-                return Counted(None if self.default else prod(sizes)), []
+                return Counted(None if self.default else prod(sizes), parting(boxes)), []
             region.carve = tuple((form, bounds) for form, bounds in wrong.items() if bounds != extents[form])
             if region.carve:
                 return self._carve(region)
@@ -198,7 +199,7 @@ class Tree:
         """One split toward the part that is to be cut out."""
         (form, (low, high)), *later = region.carve
         least, greatest = self._range(region, form)
-        if low <= least and high >= greatest or high < least or low > greatest:
+        if (low <= least and high >= greatest) or high < least or low > greatest:
             region.carve = tuple(later)
             return self._narrow(region)
         at_low = low > least

@@ -137,10 +137,32 @@ def to_integer(term: Term) -> Term:
     return Term(z3.ToInt(z3.fpToReal(z3.fpRoundToIntegral(z3.RTZ(), term))))
 
 
+def admitted(term: Term, inside: Term, other: Term) -> Term:
+    """`term` where it is inside its range, else `other`: any value of the range."""
+    return choice(inside, term, other)
+
+
 def is_finite(term: Term) -> Term:
     """Neither infinite nor NaN."""
     z3: Any = _z3()
     return Term(z3.Not(z3.Or(z3.fpIsInf(term), z3.fpIsNaN(term))))
+
+
+def constants(term: Term) -> frozenset[str]:
+    """Names of the constants in the term."""
+    z3: Any = _z3()
+    names: set[str] = set()
+    waiting: list[Any] = [term]
+    seen: set[int] = set()
+    while waiting:
+        one = waiting.pop()
+        if one.get_id() in seen:
+            continue
+        seen.add(one.get_id())
+        if z3.is_const(one) and one.decl().kind() == z3.Z3_OP_UNINTERPRETED:
+            names.add(str(one.decl().name()))
+        waiting.extend(one.children())
+    return frozenset(names)
 
 
 class Solver:

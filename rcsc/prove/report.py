@@ -1,0 +1,146 @@
+"""What was found of a table, as diagnostics."""
+
+from collections.abc import Iterator
+
+from rcsc.diagnostics.codes import Code
+from rcsc.diagnostics.diagnostic import Diagnostic, Label, MatchedLine, Severity, WitnessColumn
+from rcsc.model import Program, Scalar, Table, spell
+from rcsc.prove import words
+from rcsc.prove.certificate import must_cover
+from rcsc.prove.repair import closing_line, parting_cell
+from rcsc.prove.verdict import (
+    ContradictoryAssumptions,
+    DeadLine,
+    Gap,
+    Overlap,
+    Region,
+    SolversDisagree,
+    TableVerdict,
+    Undecided,
+    Witness,
+)
+
+MOST_PAIRS = 20
+"""Overlapping pairs shown of one table; then how many more."""
+
+
+def diagnostics(program: Program, verdict: TableVerdict) -> list[Diagnostic]:
+    """The verdict's findings, ready to show."""
+    table = verdict.table
+    overlaps = [one for one in verdict.found if isinstance(one, Overlap)]
+    shown = [_overlap(program, table, one) for one in overlaps[:MOST_PAIRS]]
+    if len(overlaps) > MOST_PAIRS:
+        message = f"and {len(overlaps) - MOST_PAIRS} more pairs of lines of table `{table.name}` overlap"
+        shown.append(Diagnostic(Code.OVERLAP, message, Label(table.span)))
+    return shown + list(_others(program, verdict))
+
+
+def _others(program: Program, verdict: TableVerdict) -> Iterator[Diagnostic]:
+    table = verdict.table
+    for one in verdict.found:
+        match one:
+            case Gap():
+                yield _gap(program, table, one)
+            case DeadLine(line):
+                name = table.lines[line].name
+                helps = ("delete the line, or correct its conditions",)
+                message = f"line `{name}` of table `{table.name}` can never match"
+                yield Diagnostic(Code.DEAD_LINE, message, Label(table.lines[line].cell_span(-1)), help=helps)
+            case ContradictoryAssumptions():
+                message = f"the assumptions of table `{table.name}` contradict each other or the declared ranges"
+                yield Diagnostic(Code.CONTRADICTORY_ASSUMPTIONS, message, Label(table.span))
+            case Undecided(what):
+                helps = ("give each query more time with `--timeout`, or simplify the conditions",)
+                message = f"table `{table.name}` could not be decided: {what}"
+                yield Diagnostic(Code.UNDECIDED, message, Label(table.span), help=helps)
+            case SolversDisagree(what):
+                message = f"Z3 disagrees about table `{table.name}`: {what}; this is a bug in rcsc"
+                yield Diagnostic(Code.SOLVERS_DISAGREE, message, Label(table.span))
+            case Overlap():
+                pass
+    if table.default is not None and not table.default.unreachable and not verdict.undecided:
+        if not any(isinstance(one, Gap) for one in verdict.found):
+            message = f"the DEFAULT line of table `{table.name}` is never reached"
+            span = table.default.span
+            helps = ("declare it: `DEFAULT unreachable`; that is then proved",)
+            yield Diagnostic(Code.DEFAULT_DEAD, message, Label(span), help=helps, severity=Severity.WARNING)
+
+
+# --- overlaps ------------------------------------------------------------------------
+
+
+def _overlap(program: Program, table: Table, found: Overlap) -> Diagnostic:
+    one, two = table.lines[found.first], table.lines[found.second]
+    column = _column(program, table, found.witness, (found.first, found.second), found.region)
+    repair = parting_cell(program, table, found)
+    return Diagnostic(
+        Code.OVERLAP,
+        f"lines `{one.name}` and `{two.name}` of table `{table.name}` both match some input",
+        Label(two.cell_span(-1), "this line"),
+        related=(Label(one.cell_span(-1), "and this one"),),
+        help=(repair,) if repair else (),
+        witnesses=(column,),
+    )
+
+
+# --- gaps ----------------------------------------------------------------------------
+
+
+def _gap(program: Program, table: Table, found: Gap) -> Diagnostic:
+    columns = tuple(
+        _column(program, table, witness, (), region)
+        for witness, region in zip(found.witnesses, found.regions, strict=True)
+    )
+    share = f"{_share(*found.count)} of the inputs" if found.count else "some inputs"
+    if must_cover(table) and table.default is None:
+        repair = closing_line(program, table, found)
+        message = f"no line of table `{table.name}` matches {share}"
+        return Diagnostic(
+            Code.GAP, message, Label(table.span), help=(repair,) if repair else (), witnesses=columns, more=_more(found)
+        )
+    assert table.default is not None
+    label = Label(table.default.span)
+    if table.default.unreachable:
+        message = f"the DEFAULT line of table `{table.name}` is declared unreachable, but {share} fall to it"
+        return Diagnostic(Code.DEFAULT_REACHED, message, label, witnesses=columns, more=_more(found))
+    message = f"{share} fall to the DEFAULT line of table `{table.name}`"
+    return Diagnostic(
+        Code.DEFAULT_COVERS, message, label, witnesses=columns, more=_more(found), severity=Severity.NOTE
+    )
+
+
+def _more(found: Gap) -> int:
+    """Inputs that the shown regions leave out, where they were counted; regions shown count as their witness."""
+    return 0 if found.count is None else max(0, found.count[0] - len(found.witnesses))
+
+
+def _share(count: int, total: int) -> str:
+    percent = 100 * count / total
+    shown = f"{percent:.3g} %" if percent >= 0.001 else "less than 0.001 %"
+    return f"{count:,} of {total:,} ({shown})"
+
+
+# --- witnesses -----------------------------------------------------------------------
+
+
+def _column(
+    program: Program, table: Table, witness: Witness, lines: tuple[int, ...], region: Region | None
+) -> WitnessColumn:
+    kinds: dict[str, Scalar] = {v.name: v.type for v in program.variables}
+    names = tuple(name for name in kinds if name in witness)
+    matched = tuple(
+        MatchedLine(table.lines[at].name, tuple(_cells(table, at, name) for name in names), table.lines[at].span)
+        for at in lines
+    )
+    values = tuple(spell(kinds[name], witness[name]) for name in names)
+    return WitnessColumn(table.name, names, values, matched, words.region(kinds, region))
+
+
+def _cells(table: Table, line: int, name: str) -> str:
+    """What a line says of a variable; conditions over several stand with the first of them."""
+    said = []
+    for test, column in zip(table.lines[line].tests, table.columns, strict=True):
+        if test is not None and test.variables and test.variables[0] == name:
+            said.append(test.text if column.variable == name or column.subject is None else f"{column.heading} {test.text}")
+    return "; ".join(said)
+
