@@ -90,7 +90,6 @@ def test_a_gap_shows_the_witness_alone_and_what_is_free() -> None:
     shown = plain(full(gap, SOURCES))
     assert "| | hand  | failed  |\n" in shown
     assert "= region: hand = failed, any other\n" in shown
-    assert "no line of `grip` matches this input" in shown
 
 
 def test_places_in_other_files_and_gaps_between_lines_are_marked() -> None:
@@ -249,3 +248,9 @@ def test_an_annotation_is_one_escaped_command() -> None:
     assert "file=a%2Cb%3Ac.rcs," in annotation(odd, source)
     note = replace(overlap(), severity=Severity.NOTE)
     assert annotation(note, source).startswith("::notice ")
+
+
+def test_a_note_shows_its_regions_alone() -> None:
+    shown = plain(full(replace(overlap(), severity=Severity.NOTE), SOURCES))
+    assert "witness" not in shown
+    assert "= region: cmd = 1, hand = done\n" in shown

@@ -58,7 +58,8 @@ def full(diagnostic: Diagnostic, sources: Sources, columns: int = WIDEST_LINE) -
     gutter = max(len(str(_line_number(label, sources))) for label in labels)
     rows += _snippets(diagnostic, sources, gutter, columns, style)
     for witness in diagnostic.witnesses:
-        rows += _witness(witness, gutter)
+        whole = diagnostic.severity is not Severity.NOTE or not witness.region
+        rows += _witness(witness, gutter) if whole else (_region(witness, gutter),)
     if diagnostic.more:
         inputs = "input" if diagnostic.more == 1 else "inputs"
         rows.append(_attached(gutter, "more", f"and {diagnostic.more} more {inputs}", Style.NOTE))
@@ -211,10 +212,12 @@ def _witness(witness: WitnessColumn, gutter: int) -> Iterator[Row]:
             Piece(" " + _joined(row[2:], widths[2:]) if row[2:] else " |"),
         )
     yield (Piece(f"{' ' * gutter} |", Style.GUTTER),)
-    if not witness.lines:
-        yield _attached(gutter, "note", f"no line of `{witness.table}` matches this input", Style.NOTE)
     if witness.region:
-        yield _attached(gutter, "region", region(witness), Style.WITNESS)
+        yield _region(witness, gutter)
+
+
+def _region(witness: WitnessColumn, gutter: int) -> Row:
+    return _attached(gutter, "region", region(witness), Style.WITNESS)
 
 
 def region(witness: WitnessColumn) -> str:

@@ -1,26 +1,152 @@
 """Proofs of one program, those that an earlier run made taken from the cache.
 
-In: a program. Out: a `Proof`. What the cache holds of a table counts only while everything its proof depends
-on is the same, and while the files that its findings point into are.
+In: a program. Out: a `Proof`. A table is kept only from a program in which nothing was wrong, under a key
+of its own text and meaning and of all the rest of the program but the other tables: procedures, variables,
+assumptions, invariants, levels. So when one table changes, its neighbours are not proved again.
 """
 
+import hashlib
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
 from rcsc.cache import Cache
+from rcsc.diagnostics.diagnostic import Diagnostic, Label, Severity, sort_key
+from rcsc.diagnostics.jsonform import diagnostic_from_json, diagnostic_to_json, table_from_json, table_to_json
 from rcsc.diagnostics.report import TableReport, Verdict
 from rcsc.driver.work import Proof
-from rcsc.model import Program
+from rcsc.meaning import digest
+from rcsc.model import Program, Table
 from rcsc.project import Loaded
 from rcsc.prove.certificate import must_cover
+from rcsc.prove.obligations import called_by_lines
 from rcsc.prove.options import Options
 from rcsc.prove.verdict import Gap, SolversDisagree, TableVerdict, Undecided
+from rcsc.source import Span
+
+WORTH_A_PROCESS = 20_000
+"""Cells of a program's tables from which several processes are quicker than one."""
 
 
 def prove(root: str, program: Program, loaded: Loaded, options: Options, cache: Cache | None) -> Proof:
-    """Prove a program's tables, procedures and invariants."""
+    """Prove a program's tables, procedures and invariants; with a cache only what is not known."""
     from rcsc.prove.program import prove_program
 
-    verdict = prove_program(program, options)
-    tables = tuple(table_report(one) for one in verdict.tables)
-    return Proof(root, verdict.findings, program, tables, verdict.proved, verdict.certificate)
+    cells = sum(len(table.lines) * len(table.columns) for table in program.tables)
+    options = options if cells >= WORTH_A_PROCESS else replace(options, jobs=1)
+    if cache is None:
+        verdict = prove_program(program, options)
+        tables = tuple(table_report(one) for one in verdict.tables)
+        return Proof(root, verdict.findings, program, tables, verdict.proved, verdict.certificate)
+    memory = _Memory(program, loaded, options, cache)
+    known = {table.name: one for table in program.tables if (one := memory.table(table)) is not None}
+    missing = [table for table in program.tables if table.name not in known]
+    if not missing and memory.rest():
+        return _proof(root, program, (), known)
+    verdict = prove_program(program, options, only=[table.name for table in missing])
+    if not any(one.severity is Severity.ERROR for one in verdict.findings):
+        memory.keep(verdict.findings, verdict.tables)
+    new = {one.table.name: _Kept(table_report(one), ()) for one in verdict.tables}
+    return _proof(root, program, verdict.findings, {**known, **new})
+
+
+@dataclass(frozen=True, slots=True)
+class _Kept:
+    """What is known of a table: its report and the notes on it."""
+
+    report: TableReport
+    notes: tuple[Diagnostic, ...]
+
+
+def _proof(root: str, program: Program, found: Sequence[Diagnostic], known: dict[Any, _Kept]) -> Proof:
+    tables = [known[table.name] for table in program.tables]
+    every = {*found, *(note for one in tables for note in one.notes)}
+    return Proof(root, tuple(sorted(every, key=sort_key)), program, tuple(one.report for one in tables))
+
+
+class _Memory:
+    """The cache as seen by one program."""
+
+    def __init__(self, program: Program, loaded: Loaded, options: Options, cache: Cache) -> None:
+        self.program, self.loaded, self.cache = program, loaded, cache
+        limits = {name: value for name, value in asdict(options).items() if name != "jobs"}
+        parts = (
+            program.variables, program.procedures, program.assumptions, program.invariants, program.owners,
+            program.levels, sorted(called_by_lines(program)), sorted(limits.items()),
+        )  # fmt: skip
+        # (a procedure that no line calls is proved by itself, so which are called is part of it)
+        self.common = hashlib.sha256("\n".join(map(repr, parts)).encode()).hexdigest()
+
+    def rest(self) -> bool:
+        """Whether all but the tables is known to be right."""
+        return self.cache.load("rest", self.common) is not None
+
+    def table(self, table: Table) -> _Kept | None:
+        """What is known of the table."""
+        kept = self.cache.load(*self._key(table))
+        if kept is None:
+            return None
+        place = _extent(table)
+        notes = (_moved(diagnostic_from_json(one), place.start, place.file) for one in kept["notes"])
+        return _Kept(table_from_json(kept["report"] | {"file": table.file}, cached=True), tuple(notes))
+
+    def keep(self, found: Sequence[Diagnostic], verdicts: Sequence[TableVerdict]) -> None:
+        """Keep the tables just proved, and that the rest is right if nothing was said of it."""
+        rest = set(found)
+        for verdict in verdicts:
+            place = _extent(verdict.table)
+            notes = [one for one in found if all(_inside(span, place) for span in _spans(one))]
+            touching = [one for one in found if any(_inside(span, place) for span in _spans(one))]
+            rest -= set(notes)
+            report = table_report(verdict)
+            if report.verdict is Verdict.PROVED and touching == notes:
+                forms = [diagnostic_to_json(_moved(one, -place.start, ""), {}) for one in notes]
+                self.cache.store({"report": table_to_json(report), "notes": forms}, *self._key(verdict.table))
+        if not rest:
+            self.cache.store({}, "rest", self.common)
+
+    def _key(self, table: Table) -> tuple[str, ...]:
+        place = _extent(table)
+        text = self.loaded.sources[place.file].slice(place)
+        own = next(one for one in self.program.tables if one.name == table.name)
+        actions = [[action.statement for action in line.actions] for line in own.lines]
+        return ("table", self.common, digest(self.program, own), text, repr(actions), repr(own.default))
+
+
+def _extent(table: Table) -> Span:
+    """From the table's name to the end of its last line."""
+    spans = [line.span for line in table.lines] + ([table.default.span] if table.default else [])
+    return Span(table.span.file, table.span.start, max([table.span.end, *(span.end for span in spans)]))
+
+
+def _inside(span: Span, place: Span) -> bool:
+    return span.file == place.file and place.start <= span.start and span.end <= place.end
+
+
+def _spans(diagnostic: Diagnostic) -> list[Span]:
+    labels = [diagnostic.primary, *diagnostic.related]
+    shown = [line.span for witness in diagnostic.witnesses for line in witness.lines if line.span is not None]
+    return [label.span for label in labels] + shown
+
+
+def _moved(diagnostic: Diagnostic, by: int, file: str) -> Diagnostic:
+    """The same said of a text that starts elsewhere."""
+
+    def span(old: Span) -> Span:
+        return Span(file, old.start + by, old.end + by)
+
+    def label(old: Label) -> Label:
+        return Label(span(old.span), old.message)
+
+    witnesses = tuple(
+        replace(
+            one,
+            lines=tuple(replace(line, span=span(line.span) if line.span else None) for line in one.lines),
+        )
+        for one in diagnostic.witnesses
+    )
+    related = tuple(map(label, diagnostic.related))
+    return replace(diagnostic, primary=label(diagnostic.primary), related=related, witnesses=witnesses)
 
 
 def table_report(verdict: TableVerdict) -> TableReport:

@@ -29,6 +29,13 @@ from rcsc.prove.smt import Answer, Solver, Term
 from rcsc.prove.symbolic import Obligation, Run, ghost
 
 
+def called_by_lines(program: Program) -> set[str]:
+    """Procedures that some line of some table calls itself."""
+    lines = [line for table in program.tables for line in (*table.lines, table.default) if line is not None]
+    actions = [action.statement for line in lines for action in line.actions]
+    return {str(statement.procedure) for statement in actions if isinstance(statement, Call)}
+
+
 @dataclass(slots=True)
 class Tally:
     """How obligations were settled, for the report and the tests."""
@@ -70,17 +77,17 @@ class Obligations:
     found: list[Diagnostic] = field(default_factory=list)
 
     def prove(self, tables: Iterable[Table]) -> list[Diagnostic]:
-        """What is wrong with the tables' lines, the conditions, and the procedures that no line calls."""
-        called: set[str] = set()
+        """What is wrong with the tables' lines, the conditions, and the procedures that run outside lines."""
         self._conditions()
         for table in tables:
             for context, actions in self._lines(table):
                 self._actions(context, actions)
-                called |= {a.statement.procedure for a in actions if isinstance(a.statement, Call)}
             self._tests(table)
-        inside = self._closure(called)
+        inside = self._closure(called_by_lines(self.program))
+        levels = self.program.levels
+        outside = {name for level in levels for name in (*level.preprocess, *level.postprocess)}
         for procedure in self.program.procedures:
-            if procedure.name not in inside:
+            if procedure.name not in inside or procedure.name in outside:
                 self._alone(procedure)
         return list(dict.fromkeys(self.found))
 

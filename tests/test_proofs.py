@@ -1,0 +1,118 @@
+"""What the cache keeps of proofs: never more than was proved, and as much as is the same."""
+
+from pathlib import Path
+
+import pytest
+
+from rcsc.cache import Cache
+from rcsc.driver.proofs import prove
+from rcsc.driver.work import Proof
+from rcsc.model import Program
+from rcsc.project import load
+from rcsc.prove import program as proving
+from rcsc.prove.options import Options
+from rcsc.resolve import compile_text, resolve
+
+HEAD = """\
+input n : int 0 .. 9
+state s : int 0 .. 9
+output go : bool
+procedure bump { s := s + 1 }
+procedure rest { s := 0 }
+"""
+TABLES = """\
+table one {
+  | line | n       | s   || procedures | go    |
+  | a    | < 5     | < 9 || bump       | true  |
+  | rest | DEFAULT |     ||            | false |
+}
+table two {
+  | line | n    || procedures | go    |
+  | low  | < 5  || rest       | true  |
+  | high | >= 5 ||            | false |
+}
+"""
+
+
+@pytest.fixture
+def cache(tmp_path: Path) -> Cache:
+    return Cache(tmp_path / "cache", b"secret", "tool")
+
+
+@pytest.fixture
+def proved(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Names of the tables that the prover is asked about, in order."""
+    asked: list[str] = []
+    real = proving.prove_table
+
+    def watched(program: Program, table: object, options: Options) -> object:
+        asked.append(table.name)  # type: ignore[attr-defined]
+        return real(program, table, options)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(proving, "prove_table", watched)
+    return asked
+
+
+def run(text: str, cache: Cache | None) -> Proof:
+    loaded = load(["-"], stdin=text, stdin_name="case.rcs")
+    program = resolve(loaded.roots[0], loaded)
+    assert isinstance(program, Program), program
+    return prove("case.rcs", program, loaded, Options(), cache)
+
+
+def seen(proof: Proof) -> list[tuple[object, ...]]:
+    tables = [(one.table, one.verdict, one.method, one.assumptions) for one in proof.tables]
+    return [*tables, *proof.found]
+
+
+def test_only_the_table_that_changed_is_proved_again(cache: Cache, proved: list[str]) -> None:
+    run(HEAD + TABLES, cache)
+    assert proved == ["one", "two"]
+    run(HEAD + TABLES, cache)
+    assert proved == ["one", "two"]
+    run(HEAD + TABLES.replace("< 5  ||", "< 6  ||").replace(">= 5", ">= 6"), cache)
+    assert proved == ["one", "two", "two"]
+
+
+@pytest.mark.parametrize(
+    "change", [("s + 1", "s + 1 + 0"), ("0 .. 9\nstate", "0 .. 8\nstate"), ("{ s := 0 }", "{ s := 1 }")]
+)
+def test_what_all_tables_share_is_part_of_each(
+    cache: Cache, proved: list[str], change: tuple[str, str]
+) -> None:
+    run(HEAD + TABLES, cache)
+    run((HEAD + TABLES).replace(*change), cache)
+    assert proved == ["one", "two", "one", "two"]
+
+
+def test_notes_move_with_their_table(cache: Cache, proved: list[str]) -> None:
+    run(HEAD + TABLES, cache)
+    moved = "# a comment more\n\n" + HEAD + "\n\n" + TABLES
+    again = run(moved, cache)
+    assert proved == ["one", "two"]
+    fresh = run(moved, None)
+    assert seen(again) == seen(fresh)
+    assert any(one.code.value == "RCS407" for one in again.found)
+
+
+def test_nothing_is_kept_of_a_program_with_errors(cache: Cache, proved: list[str]) -> None:
+    broken = HEAD + TABLES.replace("| >= 5 ||", "| >= 6 ||")
+    first = run(broken, cache)
+    assert {one.code.value for one in first.found} == {"RCS401", "RCS407"}
+    assert seen(run(broken, cache)) == seen(first)
+    assert proved == ["one", "two"] * 2
+
+
+def test_a_procedure_that_lines_guard_is_proved_by_itself_once_no_line_calls_it(cache: Cache) -> None:
+    calling, silent = HEAD + TABLES, HEAD + TABLES.replace("|| bump       |", "||            |")
+    assert run(calling, cache).proved is None
+    assert not [one for one in run(calling, cache).found if one.severity.value == "error"]
+    assert [one.code.value for one in run(silent, cache).found if one.severity.value == "error"] == ["RCS413"]
+
+
+def test_a_procedure_run_by_a_level_is_not_excused_by_the_lines_that_guard_it() -> None:
+    text = HEAD + TABLES + "level l { period 40 [ms] preprocess bump table one }\n"
+    program = compile_text(text)
+    assert isinstance(program, Program)
+    found = proving.prove_program(program, Options()).findings
+    assert [one.code.value for one in found if one.severity.value == "error"] == ["RCS413"]
