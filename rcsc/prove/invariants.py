@@ -6,9 +6,9 @@ In: a program. Out: diagnostics, and the conditions that may be relied on.
 from collections.abc import Callable, Iterator
 
 from rcsc.diagnostics.codes import Code
-from rcsc.diagnostics.diagnostic import Diagnostic, Label, WitnessColumn
+from rcsc.diagnostics.diagnostic import Diagnostic, Label, Severity, WitnessColumn
 from rcsc.interpret import holds, initial
-from rcsc.model import Invariant, Procedure, Program, Standing, pending, spell
+from rcsc.model import Expr, Invariant, Kind, Procedure, Program, Snapshot, Standing, pending, spell
 from rcsc.prove import smt
 from rcsc.prove.encode import Frame, declared, encode, least_witness
 from rcsc.prove.options import Options
@@ -23,11 +23,7 @@ def prove_invariants(program: Program, options: Options) -> list[Diagnostic]:
     found: list[Diagnostic] = []
     start = initial(program)
     for invariant in program.invariants:
-        try:
-            right = holds(invariant.condition, start)
-        except ArithmeticError:
-            right = False
-        if not right:
+        if not _holds_at_first(invariant.condition, start):
             message = f"the initial values do not satisfy invariant `{invariant.name}`"
             found.append(Diagnostic(Code.INVARIANT_INITIAL, message, Label(invariant.span)))
     if not found and program.invariants:
@@ -126,3 +122,30 @@ def prove_assumptions(program: Program, options: Options) -> list[Diagnostic]:
             helps = ("declare it `assumed` or `monitored`",)
             found.append(Diagnostic(Code.ASSUMPTION_NOT_PROVED, message, Label(assumption.span), help=helps))
     return found
+
+
+def assumptions_at_first(program: Program) -> list[Diagnostic]:
+    """Warnings: assumptions about states and outputs alone that the initial values already break."""
+    from rcsc.resolve.leaves import read_by
+
+    inputs = {variable.name for variable in program.variables if variable.kind is Kind.INPUT}
+    start = initial(program)
+    found = []
+    for assumption in program.assumptions:
+        if inputs & set(read_by(assumption.condition)) or _holds_at_first(assumption.condition, start):
+            continue
+        message = f"assumption `{assumption.name}` does not hold of the initial values"
+        helps = ("give a variable another initial value, or weaken the assumption",)
+        found.append(
+            Diagnostic(
+                Code.ASSUMPTION_INITIAL, message, Label(assumption.span), help=helps, severity=Severity.WARNING
+            )
+        )
+    return found
+
+
+def _holds_at_first(condition: Expr, start: Snapshot) -> bool:
+    try:
+        return holds(condition, start)
+    except (ArithmeticError, IndexError):
+        return False

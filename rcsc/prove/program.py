@@ -11,7 +11,7 @@ from multiprocessing import get_context
 from rcsc.diagnostics.diagnostic import Diagnostic, Severity, sort_key
 from rcsc.model import Assumption, AssumptionName, Program, ProvedProgram, Standing, Table, TableName, seal_of_proof
 from rcsc.prove.certificate import program_certificate
-from rcsc.prove.invariants import prove_assumptions, prove_invariants
+from rcsc.prove.invariants import assumptions_at_first, prove_assumptions, prove_invariants
 from rcsc.prove.obligations import Obligations, Tally
 from rcsc.prove.options import Options
 from rcsc.prove.report import diagnostics
@@ -46,6 +46,7 @@ def prove_program(
     if not any(one.severity is Severity.ERROR for one in found):
         found += prove_assumptions(program, options)
     sound = not found
+    found += assumptions_at_first(program)
     invariants = [one.condition for one in program.invariants] if sound else []
     relying = _with_invariants(program) if sound else program
     wanted = [table for table in relying.tables if only is None or table.name in only]
