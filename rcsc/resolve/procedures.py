@@ -4,7 +4,6 @@ from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Label
 from rcsc.model import (
     Call,
-    Extern,
     Kind,
     Owner,
     Parameter,
@@ -14,6 +13,7 @@ from rcsc.model import (
     VariableName,
 )
 from rcsc.resolve.expressions import path_of
+from rcsc.resolve.externs import extern
 from rcsc.resolve.leaves import everything, expressions, read_by, written_by
 from rcsc.resolve.scope import Body, Scope
 from rcsc.resolve.statements import MOST_STATEMENTS, Statements, cost
@@ -87,14 +87,14 @@ def _procedure(
         if written.kind == "module":
             _check_declared(scope, body[1], known, declared_reads, declared_writes)
         reads, writes = declared_reads, declared_writes
-    extern = Extern(written.python, written.c) if written.kind == "extern" else None
+    named = extern(scope, written) if written.kind == "extern" else None
     return Procedure(
         ProcedureName(written.name.text),
         body[0],
         body[1],
         tuple(sorted(reads)),
         tuple(sorted(writes)),
-        extern,
+        named,
         " ".join(written.doc),
         written.name.span,
     )

@@ -1,0 +1,32 @@
+"""The names that an extern procedure gives of the user's functions: nothing else can come into generated code."""
+
+import keyword
+import re
+
+from rcsc.diagnostics.codes import Code
+from rcsc.model import Extern
+from rcsc.resolve.scope import Scope
+from rcsc.syntax import tree
+
+_PYTHON = re.compile(r"[a-z_]\w*(\.[a-z_]\w*)*:[a-z_]\w*", re.ASCII | re.IGNORECASE)
+_C = re.compile(r"[a-z]\w{0,62}", re.ASCII | re.IGNORECASE)
+_C_WORDS = frozenset(
+    """auto break case char const continue default do double else enum extern float for goto if inline int long
+    register restrict return short signed sizeof static struct switch typedef union unsigned void volatile while
+    bool true false main""".split()
+)
+
+
+def extern(scope: Scope, written: tree.ProcedureDecl) -> Extern:
+    """The names, after a report of each that does not fit.
+
+    Source: ISO C99, 6.4.1 (keywords) and 5.2.4.1 (63 significant characters of an internal name).
+    """
+    python, c = written.python, written.c
+    if not _PYTHON.fullmatch(python) or any(map(keyword.iskeyword, re.split("[.:]", python))):
+        message = f"`{python}` does not name a Python function"
+        scope.report(Code.EXTERN_NAME, message, written.name.span, "write `package.module:function`")
+    if not _C.fullmatch(c) or c in _C_WORDS:
+        message = f"`{c}` does not name a C function"
+        scope.report(Code.EXTERN_NAME, message, written.name.span, "write a C identifier of at most 63 characters")
+    return Extern(python, c)
