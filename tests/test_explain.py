@@ -37,7 +37,7 @@ def test_every_code_is_explained_and_most_by_example() -> None:
     for found in explanations().values():
         assert not found.title[0].isupper() or found.title.split()[0].isupper()
         assert not found.title.endswith(".")
-        assert len(found.text) > 40
+        assert len(found.text) > 30
     without = {code for code, found in explanations().items() if not found.wrong}
     assert len(without) <= 20
     assert {code.value[3] for code in without} >= {"9"}

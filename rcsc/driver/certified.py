@@ -57,7 +57,8 @@ def reviewed(loaded: Loaded, certificate: Mapping[str, object] | Diagnostic) -> 
     if found:
         return Made(report, "not certified")
     resting = "".join(f"\n  it rests on {one}" for one in rests_on)
-    return Made(report, f"certified: {len(program.tables)} tables of `{program.name}`{resting}")
+    count = f"{len(program.tables)} table{'' if len(program.tables) == 1 else 's'}"
+    return Made(report, f"certified: {count} of `{program.name}`{resting}")
 
 
 def _checked(
