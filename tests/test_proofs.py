@@ -43,7 +43,7 @@ def cache(tmp_path: Path) -> Cache:
 def proved(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Names of the tables that the prover is asked about, in order."""
     asked: list[str] = []
-    real = proving.prove_table
+    real = proving.prove_table  # type: ignore[attr-defined]  # watched where it is used
 
     def watched(program: Program, table: object, options: Options) -> object:
         asked.append(table.name)  # type: ignore[attr-defined]
@@ -62,7 +62,7 @@ def run(text: str, cache: Cache | None) -> Proof:
 
 def seen(proof: Proof) -> list[tuple[object, ...]]:
     tables = [(one.table, one.verdict, one.method, one.assumptions) for one in proof.tables]
-    return [*tables, *proof.found]
+    return [*tables, *((one,) for one in proof.found)]
 
 
 def test_only_the_table_that_changed_is_proved_again(cache: Cache, proved: list[str]) -> None:

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Mapping
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,9 +15,11 @@ from rcsc.project import Loaded
 from rcsc.source import Span
 
 if TYPE_CHECKING:
-    from rcsc.model import Program
+    from rcsc.certify import Form
+    from rcsc.model import Program, Table
 
 MOST_PROBLEMS = 10
+REFUTING_MS = 10_000
 
 
 def kept(path: Path) -> Mapping[str, object] | Diagnostic:
@@ -66,12 +69,38 @@ def _checked(
 ) -> tuple[tuple[Diagnostic, ...], tuple[str, ...]]:
     from rcsc.certify import certify
 
-    outcome = certify(program, certificate)
+    outcome = certify(program, certificate, refuter)
     found = tuple(
         _refused(program.file, f"the certificate is refused: {problem}")
         for problem in outcome.problems[:MOST_PROBLEMS]
     )
     return found, outcome.rests_on
+
+
+def refuter(
+    program: "Program",
+    table: "Table",
+    assumptions: tuple[str, ...],
+    bounds: Mapping["Form", tuple[int, int]],
+    lines: tuple[int, ...],
+) -> str:
+    """The solver that finds no fault in the region; "" where none does.
+
+    cvc5 is asked first, which has no part in the proof; Z3, which has, only where cvc5 is not installed.
+    """
+    from rcsc.questions import question
+    from rcsc.smtlib import cvc5_refutes, script
+
+    asked = question(program, table, assumptions, bounds, lines)
+    if find_spec("cvc5") is not None:
+        return "cvc5" if cvc5_refutes(script(program, asked)) else ""
+    from rcsc.prove.encode import declared, encode
+    from rcsc.prove.smt import Answer, Solver
+
+    frame, ranges = declared(program.variables)
+    solver = Solver(REFUTING_MS)
+    solver.add(*ranges, *(encode(condition, frame) for condition in asked))
+    return "z3 alone (cvc5 is not installed)" if solver.check() is Answer.UNSATISFIABLE else ""
 
 
 def _refused(file: str, message: str, code: Code = Code.CERTIFICATE) -> Diagnostic:

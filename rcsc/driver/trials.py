@@ -36,7 +36,7 @@ def try_out(
         None if effort.mutants < 0 else effort.mutants,
         progress=progress,
     )
-    result = run_suite(program, files, asked, _proofs(options))
+    result = run_suite(program, files, asked, proofs(options))
     return result.found, result.text()
 
 
@@ -45,7 +45,7 @@ def write_vectors(programs: Sequence[Program], options: Options, file: Path) -> 
     spell = vectors_csv if file.suffix == ".csv" else vectors_json
     texts = []
     for program in programs:
-        search = search_in(program, _proofs(options).solver)
+        search = search_in(program, proofs(options).solver)
         texts.append(spell(program, [vectors_of(search, table) for table in program.tables]))
     if len(texts) != 1 and file.suffix == ".csv":
         return (_unwritten(file, "a CSV file holds the vectors of one program"),)
@@ -60,7 +60,7 @@ def _unwritten(file: Path, why: str) -> Diagnostic:
     return Diagnostic(Code.NOT_WRITTEN, f"`{file}`: {why}", Label(Span(str(file), 0, 0)))
 
 
-def _proofs(options: Options) -> Proofs:
+def proofs(options: Options) -> Proofs:
     """The prover and its solver, as far as the suite needs them."""
     from rcsc.prove.certificate import must_cover
     from rcsc.prove.encode import declared, encode
