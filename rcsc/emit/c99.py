@@ -1,0 +1,631 @@
+"""A plan to C99: `<program>.h`, `<program>.c`, the symbol file, CMake and pkg-config files."""
+
+import json
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from rcsc.emit.ctext import CText, c_type, constant, integer, locals_of, wide_type
+from rcsc.emit.environment import render
+from rcsc.emit.names import Names, c_word, comment, names_of
+from rcsc.model import (
+    Admit,
+    Array,
+    Bool,
+    Call,
+    Enum,
+    Int,
+    Kind,
+    Level,
+    OneTable,
+    Procedure,
+    Program,
+    Real,
+    Record,
+    Type,
+    Variable,
+    key_bounds,
+    pending,
+)
+from rcsc.resolve.leaves import everything
+from rcsc.plan import WORD, Cuts, Direct, Index, Matcher, Plan, PlanTable, Probe, Truth
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    """A member of a struct: its declaration and its doc."""
+
+    declaration: str
+    doc: str
+
+
+@dataclass(frozen=True, slots=True)
+class Struct:
+    """A record's struct."""
+
+    name: str
+    fields: tuple[Field, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Function:
+    """A function: what is said of it, its head, its lines."""
+
+    doc: str
+    head: str
+    lines: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class CFile:
+    """What the templates lay out."""
+
+    program: str
+    guard: str
+    source: str
+    enums: tuple[Struct, ...]
+    structs: tuple[Struct, ...]
+    fields: tuple[Field, ...]
+    externs: tuple[str, ...]
+    helpers: tuple[Function, ...]
+    privates: tuple[Function, ...]
+    publics: tuple[Function, ...]
+    lines: tuple[tuple[str, tuple[str, ...]], ...]
+
+
+def emit_c(plan: Plan) -> dict[str, str]:
+    """The C files of the plan, by path below the generated folder."""
+    maker = _Maker(plan)
+    made = maker.file()
+    name = made.program
+    return {
+        f"c/{name}.h": render("header.h.jinja", made),
+        f"c/{name}.c": render("source.c.jinja", made),
+        f"c/{name}.json": _symbols(plan, maker.names),
+        f"c/{name}.cmake": render("target.cmake.jinja", made),
+        f"c/{name}.pc": render("package.pc.jinja", made),
+    }
+
+
+class _Maker:
+    """Builds the view of one plan."""
+
+    def __init__(self, plan: Plan) -> None:
+        self.plan = plan
+        self.program = plan.program
+        self.names = names_of(plan.program)
+        self.text = CText(self.names, _failing(plan.program))
+        self.p = self.names.program
+        self.cuts: list[Function] = []
+
+    def file(self) -> CFile:
+        """The whole view."""
+        procedures = tuple(self._procedure(one) for one in _callees_first(self.program))
+        tables = [function for table in self.plan.tables for function in self._table(table)]
+        levels = [self._level(level) for level in self.program.levels]
+        shared = [self._admit(), self._settle(), *self._actions()]
+        publics = [self._init(), *tables, *self._steps(), *levels]
+        return CFile(
+            self.p,
+            f"{self.p.upper()}_H",
+            comment(self.plan.source),
+            tuple(self._enum(enum) for enum in self.program.enums),
+            tuple(self._record(record) for record in self.program.records),
+            tuple(self._fields()),
+            tuple(self._externs()),
+            tuple(self._helpers()),
+            (*procedures, *shared),
+            tuple(publics),
+            tuple((self.names.tables[t.table.name], tuple(line.name for line in t.lines)) for t in self.plan.tables),
+        )
+
+    # --- declarations ---
+
+    def _enum(self, enum: Enum) -> Struct:
+        prefix = f"{self.p}_{enum.name}".upper()
+        seen: set[str] = set()
+        short = []
+        for at, member in enumerate(enum.members):
+            plain = f"{prefix}_{member.upper()}"
+            unique = plain if plain not in seen else f"{plain}_{at}"
+            seen.add(unique)
+            short.append(Field(f"{unique} = {at}", comment(member)))
+        return Struct(f"{self.p}_{enum.name}_t", tuple(short))
+
+    def _record(self, record: Record) -> Struct:
+        fields = tuple(Field(self._declare(c_word(f.name), f.type), comment(f.doc)) for f in record.fields)
+        return Struct(f"{self.p}_{record.name}_t", fields)
+
+    def _declare(self, name: str, kind: Type) -> str:
+        match kind:
+            case Array(length, element):
+                inner = self._declare(name, element)
+                head, _, rest = inner.partition(name)
+                return f"{head}{name}[{length}]{rest}"
+            case Record(name=record):
+                return f"{self.p}_{record}_t {name}"
+            case _:
+                return f"{c_type(kind)} {name}"
+
+    def _fields(self) -> Iterator[Field]:
+        variables = {v.name: v for v in self.program.variables}
+        for one in self.program.declared:
+            root = re.match(r"[A-Za-z0-9_]+", self.names.paths[one.leaves[0]])
+            assert root is not None
+            words = [one.kind.value, _range(one.type), comment(one.doc)]
+            yield Field(self._declare(root[0], one.type), "; ".join(word for word in words if word))
+            later = pending(one.name)
+            if later in variables:
+                doc = f"state; the deferred next value of {root[0]}"
+                yield Field(f"{c_type(variables[later].type)} {self.names.paths[later]}", doc)
+
+    def _externs(self) -> Iterator[str]:
+        kinds = {v.name: v.type for v in self.program.variables}
+        for one in self.program.procedures:
+            if one.extern is not None:
+                ins = [f"{c_type(kinds[name])} {_plain(name)}" for name in one.reads]
+                ins += [f"{wide_type(p.type)} {p.name}" for p in one.params]
+                outs = [f"{c_type(kinds[name])} *{_plain(name)}_out" for name in one.writes]
+                yield f"extern void {one.extern.c}({', '.join([*ins, *outs]) or 'void'});"
+
+    # --- helpers ---
+
+    def _helpers(self) -> Iterator[Function]:
+        types = {"i64": "int64_t", "u64": "uint64_t", "f64": "double"}
+        for name in sorted(self.text.helpers):
+            op, short = name.split("_")
+            kind = types[short]
+            if op == "abs":
+                zero = "0.0" if kind == "double" else "INT64_C(0)"
+                body = "    return a;" if kind == "uint64_t" else f"    return (a < {zero}) ? (-a) : a;"
+                yield Function("The absolute value.", f"{kind} {self.p}_{name}({kind} a)", (body,))
+            else:
+                sign = "<=" if op == "min" else ">="
+                word = "lesser" if op == "min" else "greater"
+                body = f"    return (a {sign} b) ? a : b;"
+                yield Function(f"The {word} of two.", f"{kind} {self.p}_{name}({kind} a, {kind} b)", (body,))
+        yield from self.cuts
+
+    # --- procedures ---
+
+    def _procedure(self, procedure: Procedure) -> Function:
+        params = [f"{self.p}_t *s", *(f"{wide_type(p.type)} v_{p.name}" for p in procedure.params)]
+        head = f"void {self.p}_do_{self.names.procedures[procedure.name]}({', '.join(params)})"
+        lines = list(self._extern_body(procedure)) if procedure.extern else list(self._body(procedure))
+        return Function(comment(procedure.doc) or f"Procedure {procedure.name}.", head, tuple(lines))
+
+    def _body(self, procedure: Procedure) -> Iterator[str]:
+        for name, kind in dict(locals_of(procedure)).items():
+            yield f"    {wide_type(kind)} v_{name} = {constant(kind, 0)};"
+        body = list(self.text.block(procedure.body, 1))
+        text = "\n".join(body)
+        for name, _ in dict(locals_of(procedure)).items():
+            if text.count(f"v_{name}") < 2:
+                yield f"    (void)v_{name};"
+        for param in procedure.params:
+            if f"v_{param.name}" not in text:
+                yield f"    (void)v_{param.name};"
+        yield from body
+        if not re.search(r"\bs\b", text):
+            yield "    (void)s;"
+
+    def _extern_body(self, procedure: Procedure) -> Iterator[str]:
+        assert procedure.extern is not None
+        variables = {v.name: v for v in self.program.variables}
+        for at, name in enumerate(procedure.writes):
+            yield f"    {c_type(variables[name].type)} w{at} = {self.text.place(name)};"
+        given = [self.text.place(name) for name in procedure.reads] + [f"v_{p.name}" for p in procedure.params]
+        outs = [f"&w{at}" for at, _ in enumerate(procedure.writes)]
+        yield f"    {procedure.extern.c}({', '.join([*given, *outs])});"
+        for at, name in enumerate(procedure.writes):
+            yield "    if (s->fault == 0) {"
+            yield from self._admitted(variables[name], f"w{at}", self._position(name), "4", 2)
+            yield "    }"
+            yield "    if (s->fault == 0) {"
+            yield f"        {self.text.place(name)} = w{at};"
+            yield "    }"
+
+    def _position(self, name: str) -> int:
+        return next(at for at, v in enumerate(self.program.variables) if v.name == name)
+
+    # --- admission ---
+
+    def _admitted(self, variable: Variable, place: str, position: int, fault: str, indent: int) -> Iterator[str]:
+        """Lines that clamp `place`, or record the fault; a NaN satisfies no comparison."""
+        pad, kind = "    " * indent, variable.type
+        if isinstance(kind, Bool):
+            return
+        low, high = (kind.low, kind.high) if isinstance(kind, Int | Real) else key_bounds(kind)
+        ends = [constant(kind, low), constant(kind, high)]
+        wide = place if isinstance(kind, Real) else f"({wide_type(kind)}){place}"
+        own = c_type(kind)
+        bounds = _type_bounds(own)
+        below = None if bounds and bounds[0] >= low else f"{wide} < {ends[0]}"
+        above = None if bounds and bounds[1] <= high else f"{wide} > {ends[1]}"
+        if isinstance(kind, Real):
+            reject = f"!(({place} >= {ends[0]}) && ({place} <= {ends[1]}))"
+            if variable.admit is Admit.CLAMP:
+                yield f"{pad}if ({place} < {ends[0]}) {{"
+                yield f"{pad}    {place} = {ends[0]};"
+                yield f"{pad}}} else if ({place} > {ends[1]}) {{"
+                yield f"{pad}    {place} = {ends[1]};"
+                yield f"{pad}}} else {{"
+                yield f"{pad}    /* in range, or not a number */"
+                yield f"{pad}}}"
+            yield f"{pad}if ({reject}) {{"
+            yield from self._refuse(position, fault, indent + 1)
+            yield f"{pad}}} else {{"
+            yield f"{pad}    {place} = {place} + 0.0;"
+            yield f"{pad}}}"
+        elif variable.admit is Admit.CLAMP:
+            for test, end in ((below, ends[0]), (above, ends[1])):
+                if test:
+                    yield f"{pad}if ({test}) {{"
+                    yield f"{pad}    {place} = ({own}){end};"
+                    yield f"{pad}}}"
+        else:
+            tests = [f"({test})" for test in (below, above) if test]
+            if tests:
+                yield f"{pad}if ({' || '.join(tests)}) {{"
+                yield from self._refuse(position, fault, indent + 1)
+                yield f"{pad}}}"
+
+    @staticmethod
+    def _refuse(position: int, fault: str, indent: int) -> Iterator[str]:
+        pad = "    " * indent
+        yield f"{pad}if (s->fault == 0) {{"
+        yield f"{pad}    s->fault = {fault};"
+        yield f"{pad}    s->fault_at = {position};"
+        yield f"{pad}}}"
+
+    def _admit(self) -> Function:
+        """Admits into a copy, so that a refused cycle changes nothing."""
+        lines = [f"    {self.p}_t before = *s;", "    s->line = -1;", "    s->fault = 0;", "    s->fault_at = -1;",
+                 "    s->assumptions_failed = 0;"]  # fmt: skip
+        body = [
+            line
+            for at, variable in enumerate(self.program.variables)
+            if variable.kind is Kind.INPUT
+            for line in self._admitted(variable, self.text.place(variable.name), at, "1", 1)
+        ]
+        lines += body
+        lines += ["    if (s->fault != 0) {", "        before.line = -1;", "        before.fault = s->fault;",
+                  "        before.fault_at = s->fault_at;", "        before.assumptions_failed = 0;", "        *s = before;",
+                  "    }"]  # fmt: skip
+        return Function("Admits every input; a refused one leaves everything else as it was.",
+                        f"void {self.p}_admit({self.p}_t *s)", tuple(lines))  # fmt: skip
+
+    def _settle(self) -> Function:
+        deferred = [v for v in self.program.variables if v.deferred_until is not None]
+        lines = []
+        for at, one in enumerate(deferred):
+            assert one.deferred_until is not None
+            lines.append(f"    const bool ready{at} = {self.text.expr(one.deferred_until)};")
+        for at, one in enumerate(deferred):
+            lines.append(f"    if (ready{at}) {{")
+            lines.append(f"        {self.text.place(one.name)} = {self.text.place(pending(one.name))};")
+            lines.append("    }")
+        return Function("Deferred variables take their next values, all at once.", f"void {self.p}_settle({self.p}_t *s)",
+                        tuple(lines) or ("    (void)s;",))  # fmt: skip
+
+    # --- tables ---
+
+    def _table(self, table: PlanTable) -> Iterator[Function]:
+        name = self.names.tables[table.table.name]
+        head = f"int32_t {self.p}_{name}_line(const {self.p}_t *s)"
+        doc = f"The line of table {table.table.name} that matches admitted inputs: its position; -1 none, -2 several."
+        yield Function(doc, head, tuple(self._match(table, name)))
+        lines = (
+            "    uint32_t i;",
+            "    for (i = 0u; i < n; i = i + 1u) {",
+            f"        out[i] = {self.p}_{name}_line(&in[i]);",
+            "    }",
+        )
+        doc = f"The same for n inputs at once, table {table.table.name}."
+        yield Function(doc, f"void {self.p}_{name}_lines(const {self.p}_t *in, int32_t *out, uint32_t n)", lines)
+
+    def _match(self, table: PlanTable, name: str) -> Iterator[str]:
+        matcher = table.matcher
+        yield "    /* The masks: bit k of an entry is set where line k does not exclude that class. */"
+        for at, probe in enumerate(matcher.probes):
+            yield from self._masks(matcher, at, probe)
+        indices = [self._index(probe, f"{name}_{at}") for at, probe in enumerate(matcher.probes)]
+        if matcher.words <= 1:
+            yield from self._one_word(matcher, indices)
+        else:
+            yield from self._many_words(matcher, indices)
+
+    def _masks(self, matcher: Matcher, at: int, probe: Probe) -> Iterator[str]:
+        bits = _width(matcher.lines)
+        if matcher.words <= 1:
+            yield f"    static const uint{bits}_t t{at}[{len(probe.masks)}] = {{"
+            yield from _wrapped([_word(mask, bits) for mask in probe.masks])
+            yield "    };"
+            return
+        yield f"    static const uint64_t t{at}[{len(probe.masks)}][{matcher.words}] = {{"
+        for mask in probe.masks:
+            words = [_word(mask >> (WORD * w) & (2**WORD - 1), 64) for w in range(matcher.words)]
+            yield f"        {{ {', '.join(words)} }},"
+        yield "    };"
+
+    def _index(self, probe: Probe, name: str) -> str:
+        text = ""
+        for number, index in enumerate(probe.indices):
+            one = self._class(index, f"{name}_{number}")
+            text = one if not text else f"((({text}) * {index.count}u) + {one})"
+        return text
+
+    def _class(self, index: Index, name: str) -> str:
+        match index:
+            case Direct(leaf=leaf, type=kind, low=low):
+                place = self.text.place(leaf)
+                if isinstance(kind, Bool):
+                    return f"({place} ? 1u : 0u)"
+                return place if low == 0 else f"(uint32_t)((int64_t){place} - {integer(low)})"
+            case Truth(condition=condition):
+                return f"({self.text.expr(condition)} ? 1u : 0u)"
+            case Cuts():
+                return self._cut(index, name)
+
+    def _cut(self, index: Cuts, name: str) -> str:
+        """How many cuts are at most the value: a sum of comparisons, or a search of fixed length."""
+        kind, place = index.type, self.text.place(index.leaf)
+        wide = c_type(kind) if isinstance(kind, Real) else wide_type(kind)
+        value = place if isinstance(kind, Real) else f"({wide}){place}"
+        if not index.cuts:
+            return "0u"
+        if len(index.cuts) <= 6:
+            tests = [f"(({value} >= {constant(kind, cut)}) ? 1u : 0u)" for cut in index.cuts]
+            return "(" + " + ".join(tests) + ")"
+        self.cuts.append(self._search(index, name, wide))
+        return f"{self.p}_class_{name}({value})"
+
+    def _search(self, index: Cuts, name: str, wide: str) -> Function:
+        count = len(index.cuts)
+        size = 1 << (count.bit_length())
+        shown = [constant(index.type, cut) for cut in index.cuts]
+        lines = [f"    static const {wide} cuts[{count}] = {{", *_wrapped(shown), "    };", "    uint32_t at = 0u;"]
+        step = size >> 1
+        while step:
+            lines.append(f"    at = at + ((((at + {step}u) <= {count}u) && (value >= cuts[(at + {step - 1}u) % {count}u])) ? {step}u : 0u);")
+            step >>= 1
+        lines.append("    return at;")
+        return Function("How many cuts are at most the value.", f"uint32_t {self.p}_class_{name}({wide} value)", tuple(lines))
+
+    def _one_word(self, matcher: Matcher, indices: list[str]) -> Iterator[str]:
+        bits = max(_width(matcher.lines), 32)
+        every = f"({2**matcher.lines - 1:#x}{'ull' if bits == 64 else 'u'})"
+        loads = [f"(uint{bits}_t)t{at}[{index}]" for at, index in enumerate(indices)]
+        yield f"    const uint{bits}_t m = {' & '.join(loads) if loads else every};"
+        yield f"    const bool several = (m & (m - {_word(1, bits)})) != {_word(0, bits)};"
+        short = matcher.lines < bits
+        if not indices:
+            yield "    (void)s;"
+        if short:
+            yield f"    int32_t line = {self.p}_bit{bits}(m | {_word(1 << matcher.lines, bits)});"
+        else:
+            yield f"    int32_t line = (m == {_word(0, bits)}) ? {matcher.lines} : {self.p}_bit{bits}(m);"
+        if not matcher.default:
+            yield f"    line = (m == {_word(0, bits)}) ? (-1) : line;"
+        yield "    line = several ? (-2) : line;"
+        yield "    return line;"
+
+    def _many_words(self, matcher: Matcher, indices: list[str]) -> Iterator[str]:
+        for at, index in enumerate(indices):
+            yield f"    const uint64_t * const r{at} = t{at}[{index}];"
+        yield "    uint64_t several = 0u;"
+        yield "    uint64_t seen = 0u;"
+        yield "    int32_t line = 0;"
+        yield "    int32_t none;"
+        yield "    uint32_t w;"
+        yield f"    for (w = 0u; w < {matcher.words}u; w = w + 1u) {{"
+        ands = " & ".join(f"r{at}[w]" for at in range(len(indices)))
+        yield f"        const uint64_t m = {ands};"
+        yield "        const uint64_t some = (m != 0u) ? UINT64_C(1) : UINT64_C(0);"
+        yield "        several = several | (m & (m - UINT64_C(1))) | (some & seen);"
+        yield "        seen = seen | some;"
+        yield f"        line = (m != 0u) ? ((int32_t)w * 64 + {self.p}_bit64(m)) : line;"
+        yield "    }"
+        yield f"    none = {matcher.lines if matcher.default else '(-1)'};"
+        yield "    line = (seen == 0u) ? none : line;"
+        yield "    line = (several != 0u) ? (-2) : line;"
+        yield "    return line;"
+
+    def _actions(self) -> Iterator[Function]:
+        """One function a table: a match that runs the line's actions."""
+        for table in self.plan.tables:
+            name = self.names.tables[table.table.name]
+            yield Function(
+                f"Matches table {table.table.name} and runs the line.",
+                f"void {self.p}_run_{name}({self.p}_t *s)",
+                tuple(self._run(table, name)),
+            )
+
+    def _run(self, table: PlanTable, name: str) -> Iterator[str]:
+        for place in table.monitored:
+            assumption = self.program.assumptions[self.plan.monitored[place]]
+            yield f"    /* {comment(assumption.name)} */"
+            yield f"    if (!({self.text.expr(assumption.condition)})) {{"
+            yield f"        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << {place}u);"
+            yield "    }"
+        yield f"    s->line = {self.p}_{name}_line(s);"
+        yield "    switch (s->line) {"
+        for number, line in enumerate(table.lines):
+            yield f"    case {number}: /* {comment(line.source)} */"
+            yield from self.text.block(tuple(action.statement for action in line.actions), 2)
+            yield "        break;"
+        yield "    case (-1):"
+        yield "        s->fault = 2;"
+        yield "        break;"
+        yield "    default:"
+        yield "        s->line = -1;"
+        yield "        s->fault = 3;"
+        yield "        break;"
+        yield "    }"
+
+    # --- steps and cycles ---
+
+    def _steps(self) -> Iterator[Function]:
+        for table in self.plan.tables:
+            name = self.names.tables[table.table.name]
+            lines = (
+                f"    {self.p}_admit(s);",
+                "    if (s->fault == 0) {",
+                f"        {self.p}_settle(s);",
+                f"        {self.p}_run_{name}(s);",
+                "    }",
+                "    return s->fault;",
+            )
+            doc = f"One step of table {table.table.name}: admits, settles, matches, acts; returns the fault, 0 for none."
+            yield Function(doc, f"int32_t {self.p}_{name}_step({self.p}_t *s)", lines)
+
+    def _level(self, level: Level) -> Function:
+        lines = [f"    {self.p}_admit(s);", "    if (s->fault == 0) {", f"        {self.p}_settle(s);"]
+        for name in level.preprocess:
+            lines += self._guarded(self.text.call(name))
+        chosen = self._chosen(level)
+        lines += ["        if (s->fault == 0) {", *chosen, "        }"]
+        for name in level.postprocess:
+            lines += self._guarded(self.text.call(name))
+        lines += ["    }", "    return s->fault;"]
+        doc = f"One cycle of level {level.name}, every {level.period_ms} ms: returns the fault, 0 for none."
+        return Function(doc, f"int32_t {self.p}_{self.names.levels[level.name]}_cycle({self.p}_t *s)", tuple(lines))
+
+    @staticmethod
+    def _guarded(call: str) -> list[str]:
+        return ["        if (s->fault == 0) {", f"            {call}", "        }"]
+
+    def _chosen(self, level: Level) -> list[str]:
+        pad = "            "
+        if isinstance(level.tables, OneTable):
+            return [f"{pad}{self.p}_run_{self.names.tables[level.tables.table]}(s);"]
+        kind = level.tables.selector.type
+        lines = [f"{pad}const {wide_type(kind)} chosen = {self.text.expr(level.tables.selector)};"]
+        word = "if"
+        for value, table in level.tables.tables:
+            lines.append(f"{pad}{word} (chosen == {constant(kind, value)}) {{")
+            lines.append(f"{pad}    {self.p}_run_{self.names.tables[table]}(s);")
+            word = "} else if"
+        return [*lines, f"{pad}}} else {{", f"{pad}    s->fault = 2; /* no table for it: proved impossible */", f"{pad}}}"]
+
+    def _init(self) -> Function:
+        lines = ["    s->line = -1;", "    s->fault = 0;", "    s->fault_at = -1;", "    s->assumptions_failed = 0;"]
+        for variable in self.program.variables:
+            value = constant(variable.type, variable.initial)
+            cast = "" if isinstance(variable.type, Bool | Real) else f"({c_type(variable.type)})"
+            lines.append(f"    {self.text.place(variable.name)} = {cast}{value};")
+        return Function("Every variable's initial value.", f"void {self.p}_init({self.p}_t *s)", tuple(lines))
+
+
+# --- small things --------------------------------------------------------------------
+
+
+def _failing(program: Program) -> frozenset[str]:
+    """Procedures that call an extern one, directly or not."""
+    failing = {str(p.name) for p in program.procedures if p.extern is not None}
+    while True:
+        more = {
+            str(p.name)
+            for p in program.procedures
+            if any(isinstance(one, Call) and one.procedure in failing for one in everything(p.body))
+        } - failing
+        if not more:
+            return frozenset(failing)
+        failing |= more
+
+
+def _callees_first(program: Program) -> list[Procedure]:
+    by_name = {p.name: p for p in program.procedures}
+    order: dict[str, Procedure] = {}
+
+    def visit(procedure: Procedure) -> None:
+        if procedure.name in order:
+            return
+        for one in everything(procedure.body):
+            if isinstance(one, Call):
+                visit(by_name[one.procedure])
+        order[procedure.name] = procedure
+
+    for procedure in program.procedures:
+        visit(procedure)
+    return list(order.values())
+
+
+def _width(lines: int) -> int:
+    return next(bits for bits in (8, 16, 32, 64) if lines < bits or bits == 64)
+
+
+def _word(value: int, bits: int) -> str:
+    return f"{value:#x}{'ull' if bits == 64 else 'u'}"
+
+
+def _wrapped(words: list[str], width: int = 96) -> list[str]:
+    lines, now = [], "        "
+    for word in words:
+        if len(now) + len(word) > width:
+            lines.append(now.rstrip())
+            now = "        "
+        now += word + ", "
+    return [*lines, now.rstrip().rstrip(",")]
+
+
+def _type_bounds(name: str) -> tuple[int, int] | None:
+    found = re.match(r"(u?)int(\d+)_t", name)
+    if found is None:
+        return None
+    bits = int(found[2])
+    return (0, 2**bits - 1) if found[1] else (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
+
+
+def _range(kind: Type) -> str:
+    match kind:
+        case Int(low, high, unit) | Real(low, high, unit):
+            units = "*".join(name if power == 1 else f"{name}^{power}" for name, power in unit)
+            return f"{low} .. {high}" + (f" {units}" if units else "")
+        case Enum(name=name):
+            return name
+        case _:
+            return ""
+
+
+def _plain(name: str) -> str:
+    return re.sub(r"\W+", "_", name).strip("_")
+
+
+def _symbols(plan: Plan, names: Names) -> str:
+    """What everything is called, for tools."""
+    p = names.program
+    document = {
+        "program": p,
+        "struct": f"{p}_t",
+        "header": f"{p}.h",
+        "source": f"{p}.c",
+        "init": f"{p}_init",
+        "python": {"module": f"{p}.py", "class": "State"},
+        "leaves": [
+            {
+                "name": v.name,
+                "kind": v.kind.value,
+                "path": names.paths[v.name],
+                "c_type": c_type(v.type),
+                "attribute": names.attributes[v.name],
+            }
+            for v in plan.program.variables
+        ],
+        "monitored": [plan.program.assumptions[at].name for at in plan.monitored],
+        "tables": [
+            {
+                "name": t.table.name,
+                "line": f"{p}_{names.tables[t.table.name]}_line",
+                "lines_of_many": f"{p}_{names.tables[t.table.name]}_lines",
+                "step": f"{p}_{names.tables[t.table.name]}_step",
+                "lines": [line.name for line in t.lines],
+            }
+            for t in plan.tables
+        ],
+        "levels": [
+            {"name": level.name, "cycle": f"{p}_{names.levels[level.name]}_cycle", "period_ms": level.period_ms}
+            for level in plan.program.levels
+        ],
+    }
+    return json.dumps(document, indent=1) + "\n"

@@ -1,0 +1,291 @@
+"""Types, constants, expressions and statements in C99.
+
+Integers are computed in `int64_t`; where bounds exceed it, in `uint64_t`, whose wrap-around gives the right bits once cast back, since
+the result was proved to fit. Doubles are IEEE binary64 (`FLT_EVAL_METHOD` 0); what is stored has no -0.0.
+"""
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from rcsc.emit.names import Names
+from rcsc.model import (
+    I64_MAX,
+    I64_MIN,
+    Among,
+    Apply,
+    Assign,
+    Bool,
+    Call,
+    Case,
+    Enum,
+    Expr,
+    For,
+    If,
+    Int,
+    Literal,
+    Local,
+    Op,
+    Procedure,
+    Read,
+    ReadLocal,
+    Real,
+    Scalar,
+    Select,
+    Statement,
+    ToElement,
+    ToLeaf,
+    Value,
+)
+
+_INFIX = {
+    Op.AND: "&&", Op.OR: "||", Op.EQ: "==", Op.NE: "!=", Op.LT: "<", Op.LE: "<=", Op.GT: ">", Op.GE: ">=",
+    Op.ADD: "+", Op.SUB: "-", Op.MUL: "*", Op.DIV: "/", Op.MOD: "%",
+}  # fmt: skip
+_COMPARE = frozenset({Op.EQ, Op.NE, Op.LT, Op.LE, Op.GT, Op.GE})
+
+
+def c_type(kind: Scalar) -> str:
+    """The type of a leaf: the smallest that holds its range."""
+    match kind:
+        case Bool():
+            return "bool"
+        case Real():
+            return "double"
+        case Enum(members=members):
+            return "uint8_t" if len(members) <= 256 else "uint16_t"
+        case Int(low, high):
+            for bits in (8, 16, 32, 64):
+                if low >= 0 and high < 1 << bits:
+                    return f"uint{bits}_t"
+                if low >= -(1 << bits - 1) and high < 1 << bits - 1:
+                    return f"int{bits}_t"
+    raise ValueError(kind)  # resolve keeps ranges within 64 bits
+
+
+def wide_type(kind: Scalar) -> str:
+    """The type that expressions of the kind are computed in."""
+    if isinstance(kind, Int):
+        return "uint64_t" if kind.low >= 0 and kind.high > I64_MAX else "int64_t"
+    return "int64_t" if isinstance(kind, Enum) else c_type(kind)
+
+
+def constant(kind: Scalar, value: Value) -> str:
+    """A constant in the wide type of its kind."""
+    match kind:
+        case Bool():
+            return "true" if value else "false"
+        case Real():
+            text = repr(abs(float(value)))
+            text = text if any(c in text for c in ".e") else f"{text}.0"
+            return f"(-{text})" if float(value) < 0 else text
+        case Enum():
+            return f"INT64_C({int(value)})"
+        case Int():
+            return integer(int(value))
+
+
+def integer(value: int) -> str:
+    """An integer constant of 64 bits."""
+    if value > I64_MAX:
+        return f"UINT64_C({value})"
+    if value == I64_MIN:
+        return f"(-INT64_C({I64_MAX}) - INT64_C(1))"
+    return f"INT64_C({value})" if value >= 0 else f"(-INT64_C({-value}))"
+
+
+def element_path(paths: list[str], index: str) -> str:
+    """The place of an array element by a computed index, from the places of all its elements."""
+    if len(paths) == 1:
+        return paths[0]
+    first, second = paths[0], paths[1]
+    at = next(i for i, (a, b) in enumerate(zip(first, second, strict=False)) if a != b)
+    head = first[: first.rindex("[", 0, at + 1)]
+    return head + f"[{index}]" + re.sub(r"^\[\d+\]", "", first[len(head) :])
+
+
+@dataclass(slots=True)
+class CText:
+    """Spells for one program.
+
+    Attributes:
+        state: How the struct is reached: `s->`.
+        helpers: Helper functions that were used.
+    """
+
+    names: Names
+    failing: frozenset[str] = frozenset()
+    state: str = "s->"
+    helpers: set[str] = field(default_factory=set)
+    _cases: int = 0
+
+    def place(self, leaf: str) -> str:
+        """A leaf."""
+        return self.state + self.names.paths[leaf]
+
+    def expr(self, expr: Expr) -> str:
+        """An expression in the wide type of its kind, parenthesised where needed."""
+        match expr:
+            case Literal(value=value, type=kind):
+                return constant(kind, value)
+            case Read(name=name, type=kind):
+                return self._widened(kind, self.place(name))
+            case ReadLocal(name=name):
+                return f"v_{name}"
+            case Select(leaves=leaves, index=index, type=kind):
+                paths = [self.names.paths[leaf] for leaf in leaves]
+                return self._widened(kind, self.state + element_path(paths, self.expr(index)))
+            case Among(subject=subject, values=values):
+                text, kind = self.expr(subject), subject.type
+                return "(" + " || ".join(f"({text} == {constant(kind, v)})" for v in values) + ")"
+            case Apply(op=op, args=args, type=kind):
+                return self._applied(op, args, kind)
+
+    @staticmethod
+    def _widened(kind: Scalar, text: str) -> str:
+        return text if isinstance(kind, Bool | Real) else f"({wide_type(kind)}){text}"
+
+    def _applied(self, op: Op, args: tuple[Expr, ...], kind: Scalar) -> str:
+        texts = [self.expr(arg) for arg in args]
+        if op is Op.NOT:
+            return f"(!{texts[0]})"
+        if op is Op.IMPLIES:
+            return f"((!{texts[0]}) || {texts[1]})"
+        if op in (Op.TO_INT, Op.TO_REAL):
+            return f"(({wide_type(kind)}){texts[0]})"
+        if op in (Op.ABS, Op.MIN, Op.MAX):
+            return self._helper(op, args, texts)
+        if isinstance(args[0].type, Int) and (op in _COMPARE or isinstance(kind, Int)):
+            return self._integers(op, args, texts, kind)
+        if op is Op.NEG:
+            return f"(-{texts[0]})"
+        if op in _COMPARE and isinstance(args[0].type, Bool):
+            return f"({texts[0]} {_INFIX[op]} {texts[1]})"
+        return f"({texts[0]} {_INFIX[op]} {texts[1]})"
+
+    def _integers(self, op: Op, args: tuple[Expr, ...], texts: list[str], kind: Scalar) -> str:
+        """In `int64_t`, unless an operand or the result needs `uint64_t`."""
+        wide = any(wide_type(arg.type) == "uint64_t" for arg in args) or wide_type(kind) == "uint64_t"
+        if op is Op.NEG:
+            return f"((int64_t)(UINT64_C(0) - (uint64_t){texts[0]}))" if wide else f"(-{texts[0]})"
+        if not wide:
+            return f"({texts[0]} {_INFIX[op]} {texts[1]})"
+        inner = f"((uint64_t){texts[0]} {_INFIX[op]} (uint64_t){texts[1]})"
+        return inner if op in _COMPARE or wide_type(kind) == "uint64_t" else f"((int64_t){inner})"
+
+    def _helper(self, op: Op, args: tuple[Expr, ...], texts: list[str]) -> str:
+        kind = {"int64_t": "i64", "uint64_t": "u64", "double": "f64"}
+        wide = [wide_type(arg.type) for arg in args]
+        shared = "uint64_t" if "uint64_t" in wide else wide[0]
+        name = f"{op.value}_{kind[shared]}"
+        self.helpers.add(name)
+        cast = [text if own == shared else f"({shared}){text}" for text, own in zip(texts, wide, strict=True)]
+        return f"{self.names.program}_{name}({', '.join(cast)})"
+
+    def stored(self, kind: Scalar, value: Expr, target: str) -> str:
+        """A value for a place of C type `target`."""
+        text = self.expr(value)
+        if isinstance(kind, Real):
+            return f"{text} + 0.0"
+        return text if isinstance(kind, Bool) else f"({target}){text}"
+
+    # --- statements ---
+
+    def block(self, body: tuple[Statement, ...], indent: int) -> Iterator[str]:
+        """Lines of C; behind a call that may fail the rest is guarded."""
+        pad = "    " * indent
+        for at, statement in enumerate(body):
+            yield from self._statement(statement, indent)
+            if self._may_fail(statement) and at + 1 < len(body):
+                yield f"{pad}if (s->fault == 0) {{"
+                yield from self.block(body[at + 1 :], indent + 1)
+                yield f"{pad}}}"
+                return
+
+    def _may_fail(self, statement: Statement) -> bool:
+        match statement:
+            case Call(procedure=name):
+                return name in self.failing
+            case If(then=then, orelse=orelse):
+                return any(self._may_fail(one) for one in (*then, *orelse))
+            case Case(arms=arms, orelse=orelse):
+                inner = [one for arm in arms for one in arm.body]
+                return any(self._may_fail(one) for one in (*inner, *orelse))
+            case For(body=body):
+                return any(self._may_fail(one) for one in body)
+            case _:
+                return False
+
+    def _statement(self, statement: Statement, indent: int) -> Iterator[str]:
+        pad = "    " * indent
+        match statement:
+            case Assign():
+                yield pad + self._assign(statement)
+            case Local(name=name, type=kind, value=value):
+                start = constant(kind, 0) if value is None else self.stored(kind, value, wide_type(kind))
+                yield f"{pad}v_{name} = {start};"
+            case If(condition=condition, then=then, orelse=orelse):
+                yield f"{pad}if ({self.expr(condition)}) {{"
+                yield from self.block(then, indent + 1)
+                if orelse:
+                    yield f"{pad}}} else {{"
+                    yield from self.block(orelse, indent + 1)
+                yield f"{pad}}}"
+            case Case():
+                yield from self._case(statement, indent)
+            case For(name=name, low=low, high=high, body=body):
+                if low <= high:
+                    guard = " && (s->fault == 0)" if self._may_fail(statement) else ""
+                    begin = f"v_{name} = {integer(low)}"
+                    yield f"{pad}for ({begin}; (v_{name} <= {integer(high)}){guard}; v_{name} = v_{name} + INT64_C(1)) {{"
+                    yield from self.block(body, indent + 1)
+                    yield f"{pad}}}"
+            case Call(procedure=name, args=args):
+                yield pad + self.call(name, args)
+
+    def call(self, name: str, args: tuple[Expr, ...] = ()) -> str:
+        """A call of a procedure."""
+        given = ["s", *(self.expr(arg) + (" + 0.0" if isinstance(arg.type, Real) else "") for arg in args)]
+        return f"{self.names.program}_do_{self.names.procedures[name]}({', '.join(given)});"
+
+    def _assign(self, statement: Assign) -> str:
+        place, value = statement.place, statement.value
+        if isinstance(place, ToLeaf):
+            return f"{self.place(place.name)} = {self.stored(place.type, value, c_type(place.type))};"
+        if isinstance(place, ToElement):
+            paths = [self.names.paths[leaf] for leaf in place.leaves]
+            target = self.state + element_path(paths, self.expr(place.index))
+            return f"{target} = {self.stored(place.type, value, c_type(place.type))};"
+        return f"v_{place.name} = {self.stored(place.type, value, wide_type(place.type))};"
+
+    def _case(self, statement: Case, indent: int) -> Iterator[str]:
+        pad, subject = "    " * indent, statement.subject
+        if not statement.arms:
+            yield from self.block(statement.orelse, indent)
+            return
+        word = "if"
+        yield f"{pad}{{"
+        inner = pad + "    "
+        yield f"{inner}const {wide_type(subject.type)} subject = {self.expr(subject)};"
+        for arm in statement.arms:
+            tests = " || ".join(f"(subject == {constant(subject.type, v)})" for v in arm.values) or "false"
+            yield f"{inner}{word} ({tests}) {{"
+            yield from self.block(arm.body, indent + 2)
+            word = "} else if"
+        yield f"{inner}}} else {{"
+        yield from self.block(statement.orelse, indent + 2)
+        if not statement.orelse:
+            yield f"{inner}    /* nothing */"
+        yield f"{inner}}}"
+        yield f"{pad}}}"
+
+
+def locals_of(procedure: Procedure) -> Iterator[tuple[str, Scalar]]:
+    """Locals and loop variables, declared at the top of the function."""
+    from rcsc.resolve.leaves import everything
+
+    for statement in everything(procedure.body):
+        if isinstance(statement, Local):
+            yield statement.name, statement.type
+        elif isinstance(statement, For):
+            yield statement.name, Int(statement.low, statement.high)

@@ -1,0 +1,248 @@
+"""A plan to Python: one module, standard library only."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import prod
+
+from rcsc.emit.environment import render
+from rcsc.emit.names import comment, names_of, python_word
+from rcsc.emit.pytext import PyText, constant
+from rcsc.model import Admit, Int, Kind, Level, OneTable, Procedure, Real, Variable, key_bounds, pending
+from rcsc.plan import Cuts, Direct, Index, Plan, PlanTable, Probe, Truth
+
+MOST_KEYS = 4096
+"""Up to so many combinations of classes the line of each is looked up at once."""
+
+
+@dataclass(frozen=True, slots=True)
+class PyEnum:
+    """An enumeration's class."""
+
+    name: str
+    members: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class PyFunction:
+    """A function: its name, parameters, doc and lines."""
+
+    name: str
+    params: str
+    doc: str
+    lines: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class PyFile:
+    """What the template lays out."""
+
+    source: str
+    enums: tuple[PyEnum, ...]
+    attributes: tuple[tuple[str, str, str], ...]  # name, initial value, doc
+    imports: tuple[str, ...]
+    constants: tuple[tuple[str, tuple[str, ...]], ...]
+    functions: tuple[PyFunction, ...]
+    lines: tuple[tuple[str, tuple[str, ...]], ...]
+
+
+def emit_python(plan: Plan) -> dict[str, str]:
+    """The Python module of the plan, by path below the generated folder."""
+    maker = _Maker(plan)
+    return {f"python/{maker.names.program}.py": render("module.py.jinja", maker.file())}
+
+
+class _Maker:
+    """Builds the view of one plan."""
+
+    def __init__(self, plan: Plan) -> None:
+        self.plan = plan
+        self.program = plan.program
+        self.names = names_of(plan.program)
+        self.text = PyText(self.names)
+        self.constants: list[tuple[str, tuple[str, ...]]] = []
+
+    def file(self) -> PyFile:
+        """The whole view."""
+        functions = [self._procedure(p) for p in self.program.procedures]
+        functions += [self._admit(), self._settle()]
+        for table in self.plan.tables:
+            functions += self._table(table)
+        functions += [self._level(level) for level in self.program.levels]
+        attributes = tuple(
+            (self.names.attributes[v.name], constant(v.type, v.initial), comment(v.doc)) for v in self.program.variables
+        )
+        lines = tuple((self.names.tables[t.table.name], tuple(line.name for line in t.lines)) for t in self.plan.tables)
+        enums = tuple(PyEnum(python_word(e.name), tuple(python_word(m) for m in e.members)) for e in self.program.enums)
+        source = comment(self.plan.source)
+        return PyFile(source, enums, attributes, self._imports(), tuple(self.constants), tuple(functions), lines)
+
+    def _imports(self) -> tuple[str, ...]:
+        externs = [p.extern.python for p in self.program.procedures if p.extern is not None]
+        return tuple(dict.fromkeys(one.partition(":")[0] for one in externs))
+
+    # --- procedures ---
+
+    def _procedure(self, procedure: Procedure) -> PyFunction:
+        params = ", ".join(["s", *(f"v_{p.name}" for p in procedure.params)])
+        if procedure.extern is not None:
+            lines = list(self._extern(procedure))
+        else:
+            lines = list(self.text.block(procedure.body, 1))
+        name = f"_do_{self.names.procedures[procedure.name]}"
+        return PyFunction(name, params, comment(procedure.doc) or f"Procedure {procedure.name}.", tuple(lines))
+
+    def _extern(self, procedure: Procedure) -> Iterator[str]:
+        assert procedure.extern is not None
+        variables = {v.name: v for v in self.program.variables}
+        module, _, function = procedure.extern.python.partition(":")
+        given = [self.text.place(name) for name in procedure.reads] + [f"v_{p.name}" for p in procedure.params]
+        yield f"    given = {module}.{function}({', '.join(given)})"
+        if len(procedure.writes) != 1:
+            yield f"    if len(given) != {len(procedure.writes)}:"
+            yield "        raise ValueError(given)"
+        for at, name in enumerate(procedure.writes):
+            position = next(i for i, v in enumerate(self.program.variables) if v.name == name)
+            value = "given" if len(procedure.writes) == 1 else f"given[{at}]"
+            yield f"    w{at} = {value}"
+            yield from self._admitted(variables[name], f"w{at}", f"raise _Refused({position})", 1)
+            yield f"    {self.text.place(name)} = w{at}"
+
+    # --- admission ---
+
+    def _admitted(self, variable: Variable, place: str, refuse: str, indent: int) -> Iterator[str]:
+        pad, kind = "    " * indent, variable.type
+        low, high = (kind.low, kind.high) if isinstance(kind, Int | Real) else key_bounds(kind)
+        ends = [repr(low), repr(high)]
+        if variable.admit is Admit.CLAMP:
+            yield f"{pad}if {place} < {ends[0]}:"
+            yield f"{pad}    {place} = {ends[0]}"
+            yield f"{pad}elif {place} > {ends[1]}:"
+            yield f"{pad}    {place} = {ends[1]}"
+        if variable.admit is Admit.REJECT or isinstance(kind, Real):
+            yield f"{pad}if not {ends[0]} <= {place} <= {ends[1]}:"
+            yield f"{pad}    {refuse}"
+        if isinstance(kind, Real):
+            yield f"{pad}{place} = {place} + 0.0"
+
+    def _admit(self) -> PyFunction:
+        """Looks at every input before it changes any."""
+        lines = ["    s.line = -1", "    s.fault_at = -1", "    s.assumptions_failed = 0"]
+        inputs = [(at, v) for at, v in enumerate(self.program.variables) if v.kind is Kind.INPUT]
+        stores = []
+        for number, (at, variable) in enumerate(inputs):
+            value = f"i{number}"
+            lines.append(f"    {value} = {self.text.place(variable.name)}")
+            lines += self._admitted(variable, value, f"return _refused(s, {at})", 1)
+            if variable.admit is Admit.CLAMP or isinstance(variable.type, Real):
+                stores.append(f"    {self.text.place(variable.name)} = {value}")
+        return PyFunction("_admit", "s", "Admits every input; the fault.", (*lines, *stores, "    return 0"))
+
+    def _settle(self) -> PyFunction:
+        deferred = [v for v in self.program.variables if v.deferred_until is not None]
+        lines = []
+        for at, one in enumerate(deferred):
+            assert one.deferred_until is not None
+            lines.append(f"    ready{at} = {self.text.expr(one.deferred_until)}")
+        for at, one in enumerate(deferred):
+            lines.append(f"    if ready{at}:")
+            lines.append(f"        {self.text.place(one.name)} = {self.text.place(pending(one.name))}")
+        doc = "Deferred variables take their next values, all at once."
+        return PyFunction("_settle", "s", doc, tuple(lines) or ("    pass",))
+
+    # --- tables ---
+
+    def _table(self, table: PlanTable) -> Iterator[PyFunction]:
+        name = self.names.tables[table.table.name]
+        upper = f"_{name.upper()}"
+        masks = []
+        for at, probe in enumerate(table.matcher.probes):
+            masks.append(f"{upper}_{at}")
+            self.constants.append((f"{upper}_{at}", tuple(f"{mask:#x}," for mask in probe.masks)))
+        doc = f"The line of table {table.table.name} that matches admitted inputs: its position; -1 none, -2 several."
+        yield PyFunction(f"{name}_line", "s", doc, tuple(self._match(table, masks, upper)))
+        doc = f"The same for many inputs, table {table.table.name}."
+        yield PyFunction(f"{name}_lines", "states", doc, (f"    return [{name}_line(s) for s in states]",))
+        yield PyFunction(f"_run_{name}", "s", f"Matches table {table.table.name} and runs the line.", tuple(self._run(table, name)))
+        for number, line in enumerate(table.lines):
+            body = tuple(action.statement for action in line.actions)
+            yield PyFunction(f"_{name}_{number}", "s", comment(line.source), tuple(self.text.block(body, 1)))
+        step = (
+            "    s.fault = _admit(s)",
+            "    if s.fault == 0:",
+            "        try:",
+            "            _settle(s)",
+            f"            _run_{name}(s)",
+            "        except _Refused as refused:",
+            "            s.fault, s.fault_at = 4, refused.position",
+            "    return s.fault",
+        )
+        doc = f"One step of table {table.table.name}: admits, settles, matches, acts; the fault, 0 for none."
+        yield PyFunction(f"{name}_step", "s", doc, step)
+
+    def _match(self, table: PlanTable, masks: list[str], upper: str) -> Iterator[str]:
+        matcher = table.matcher
+        tail = f"{matcher.lines}, {matcher.default}"
+        everything = 2**matcher.lines - 1
+        count = prod(len(probe.masks) for probe in matcher.probes)
+        plain = all(isinstance(i, Direct) and i.low == 0 for probe in matcher.probes for i in probe.indices)
+        if masks and plain and count <= MOST_KEYS and all(len(p.indices) == 1 for p in matcher.probes):
+            self.constants.append((f"{upper}_LINE", (f"*_lines_of(({', '.join(masks)},), {tail}),",)))
+            index = ""
+            for probe in matcher.probes:
+                one = self._index(probe)
+                index = one if not index else f"({index}) * {len(probe.masks)} + {one}"
+            yield f"    return {upper}_LINE[{index}]"
+            return
+        ands = " & ".join(f"{mask}[{self._index(probe)}]" for mask, probe in zip(masks, matcher.probes, strict=True))
+        yield f"    m = {ands or everything}"
+        yield f"    return m.bit_length() - 1 if m and not m & (m - 1) else _line_of(m, {tail})"
+
+    def _index(self, probe: Probe) -> str:
+        text = ""
+        for index in probe.indices:
+            one = self._class(index)
+            text = one if not text else f"({text}) * {index.count} + {one}"
+        return text
+
+    def _class(self, index: Index) -> str:
+        match index:
+            case Direct(leaf=leaf, low=low):
+                place = self.text.place(leaf)
+                return place if low == 0 else f"{place} - {low}" if low > 0 else f"{place} + {-low}"
+            case Truth(condition=condition):
+                return self.text.expr(condition)
+            case Cuts(leaf=leaf, cuts=cuts):
+                return f"_bisect({tuple(cuts)!r}, {self.text.place(leaf)})"
+
+    def _run(self, table: PlanTable, name: str) -> Iterator[str]:
+        for place in table.monitored:
+            assumption = self.program.assumptions[self.plan.monitored[place]]
+            yield f"    if not {self.text.expr(assumption.condition)}:  # {comment(assumption.name)}"
+            yield f"        s.assumptions_failed |= 1 << {place}"
+        yield f"    line = {name}_line(s)"
+        yield "    if line < 0:"
+        yield "        s.fault = 2 if line == -1 else 3"
+        yield "        return"
+        yield "    s.line = line"
+        yield f"    _{name.upper()}_ACTIONS[line](s)"
+
+    # --- levels ---
+
+    def _level(self, level: Level) -> PyFunction:
+        lines = ["    s.fault = _admit(s)", "    if s.fault == 0:", "        try:", "            _settle(s)"]
+        lines += [f"            {self.text.call(name)}" for name in level.preprocess]
+        if isinstance(level.tables, OneTable):
+            lines.append(f"            _run_{self.names.tables[level.tables.table]}(s)")
+        else:
+            kind = level.tables.selector.type
+            pairs = [f"{constant(kind, v)}: _run_{self.names.tables[t]}" for v, t in level.tables.tables]
+            lines.append(f"            {{{', '.join(pairs)}}}[{self.text.expr(level.tables.selector)}](s)")
+        if level.postprocess:
+            lines.append("            if s.fault == 0:")
+            lines += [f"                {self.text.call(name)}" for name in level.postprocess]
+        lines += ["        except _Refused as refused:", "            s.fault, s.fault_at = 4, refused.position",
+                  "    return s.fault"]  # fmt: skip
+        doc = f"One cycle of level {level.name}, every {level.period_ms} ms; the fault, 0 for none."
+        return PyFunction(f"{self.names.levels[level.name]}_cycle", "s", doc, tuple(lines))
+
+

@@ -1,0 +1,116 @@
+"""A proved program to a `Plan`: classes, masks and their grouping."""
+
+from math import prod
+
+from rcsc.model import (
+    Bool,
+    Box,
+    Enum,
+    Program,
+    ProvedProgram,
+    Real,
+    Standing,
+    Table,
+    Test,
+    Variable,
+    key_bounds,
+    value_of_key,
+)
+from rcsc.plan import WORD, Cuts, Direct, Index, Matcher, Plan, PlanLine, PlanTable, Probe, Truth
+
+MOST_DIRECT = 256
+MOST_GROUPED = 512
+
+
+def lower(proved: ProvedProgram) -> Plan:
+    """The plan of a proved program; there is no other way to one."""
+    program = proved.program
+    monitored = tuple(at for at, a in enumerate(program.assumptions) if a.standing is Standing.MONITORED)
+    tables = tuple(_table(program, table, monitored) for table in program.tables)
+    return Plan(program, program.file.replace("\\", "/"), tables, monitored)
+
+
+def _table(program: Program, table: Table, monitored: tuple[int, ...]) -> PlanTable:
+    lines = [PlanLine(line.name, line.actions, f"{table.file} line {line.name}") for line in table.lines]
+    if table.default is not None:
+        name = table.default.name
+        lines.append(PlanLine(name, table.default.actions, f"{table.file} line {name}"))
+    relied = tuple(
+        place for place, at in enumerate(monitored) if program.assumptions[at].name in table.assumptions
+    )
+    return PlanTable(table, _matcher(program, table), tuple(lines), relied)
+
+
+def _matcher(program: Program, table: Table) -> Matcher:
+    variables = {v.name: v for v in program.variables}
+    by_leaf: dict[str, list[tuple[int, Box]]] = {}
+    relational: dict[int, tuple[Test, list[int]]] = {}
+    for at, line in enumerate(table.lines):
+        for test in line.tests:
+            if test is None:
+                continue
+            if test.box is None:
+                relational.setdefault(id(test), (test, []))[1].append(at)
+            else:
+                by_leaf.setdefault(test.variables[0], []).append((at, test.box))
+    everyone = (1 << len(table.lines)) - 1
+    probes = [_leaf_probe(variables[name], stated, everyone) for name, stated in _declared(table, by_leaf)]
+    probes += [_test_probe(test, lines, everyone) for test, lines in relational.values()]
+    if len(table.lines) > WORD:
+        probes = _grouped(probes)
+    return Matcher(len(table.lines), table.default is not None, tuple(probes))
+
+
+def _declared(
+    table: Table, by_leaf: dict[str, list[tuple[int, Box]]]
+) -> list[tuple[str, list[tuple[int, Box]]]]:
+    return [(name, by_leaf[name]) for name in table.variables if name in by_leaf]  # type: ignore[misc]  # names
+
+
+def _leaf_probe(variable: Variable, stated: list[tuple[int, Box]], everyone: int) -> Probe:
+    """The masks of one leaf: for each class the lines whose boxes contain it."""
+    low, high = key_bounds(variable.type)
+    small = isinstance(variable.type, Bool | Enum) or high - low < MOST_DIRECT
+    index: Index
+    if small and not isinstance(variable.type, Real):
+        starts = list(range(low, high + 1))
+        index = Direct(variable.name, variable.type, low, len(starts))
+    else:
+        edges = {edge for _, box in stated for first, last in box for edge in (first, last + 1)}
+        cuts = sorted(edge for edge in edges if low < edge <= high)
+        starts = [low, *cuts]
+        values = tuple(value_of_key(variable.type, cut) for cut in cuts)
+        index = Cuts(variable.name, variable.type, values)
+    excluded = [0] * len(starts)
+    for at, box in stated:
+        bit = 1 << at
+        for place, start in enumerate(starts):
+            if not any(first <= start <= last for first, last in box):
+                excluded[place] |= bit
+    return Probe((index,), tuple(everyone & ~mask for mask in excluded))
+
+
+def _test_probe(test: Test, lines: list[int], everyone: int) -> Probe:
+    """The masks of one test: without it, the lines that do not state it."""
+    stating = sum(1 << at for at in set(lines))
+    return Probe((Truth(test.condition, test.text),), (everyone & ~stating, everyone))
+
+
+def _grouped(probes: list[Probe]) -> list[Probe]:
+    """Probes joined while their classes together stay few: fewer masks to load, larger tables."""
+    bins: list[list[Probe]] = []
+    for probe in sorted(probes, key=lambda one: -len(one.masks)):
+        for group in bins:
+            if prod(len(one.masks) for one in group) * len(probe.masks) <= MOST_GROUPED:
+                group.append(probe)
+                break
+        else:
+            bins.append([probe])
+    return [_joined(group) for group in bins]
+
+
+def _joined(group: list[Probe]) -> Probe:
+    masks = group[0].masks
+    for probe in group[1:]:
+        masks = tuple(one & two for one in masks for two in probe.masks)
+    return Probe(tuple(index for probe in group for index in probe.indices), masks)

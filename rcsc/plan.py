@@ -1,0 +1,117 @@
+"""The shape of the executors, in no language: what `lower` makes and `emit` spells.
+
+A matcher is a conjunction of look-ups: each *probe* finds the class of one leaf (or the truth of one test, or both of
+several leaves together), and the class's mask has a bit for each line that it does not exclude.
+"""
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from rcsc.model import Action, Expr, LineName, Program, Scalar, Table, VariableName
+
+WORD = 64
+
+
+@dataclass(frozen=True, slots=True)
+class Direct:
+    """The class of a leaf is its key less `low`; one class a key."""
+
+    leaf: VariableName
+    type: Scalar
+    low: int
+    count: int
+
+
+@dataclass(frozen=True, slots=True)
+class Cuts:
+    """The class of a leaf is how many of `cuts` (values, ascending) are at most its value."""
+
+    leaf: VariableName
+    type: Scalar
+    cuts: tuple[int | float, ...]
+
+    @property
+    def count(self) -> int:
+        """How many classes there are."""
+        return len(self.cuts) + 1
+
+
+@dataclass(frozen=True, slots=True)
+class Truth:
+    """The class is 1 where the condition holds, else 0."""
+
+    condition: Expr
+    text: str
+    count: int = 2
+
+
+Index: TypeAlias = Direct | Cuts | Truth
+
+
+@dataclass(frozen=True, slots=True)
+class Probe:
+    """Several indices taken together, in mixed radix, the last one fastest.
+
+    Attributes:
+        masks: One mask (an integer, bit k for line k) for each combination of classes.
+    """
+
+    indices: tuple[Index, ...]
+    masks: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Matcher:
+    """The matcher of one table.
+
+    Attributes:
+        lines: How many lines, DEFAULT left out.
+        default: Whether there is a DEFAULT line: it is taken where no other matches.
+    """
+
+    lines: int
+    default: bool
+    probes: tuple[Probe, ...]
+
+    @property
+    def words(self) -> int:
+        """Machine words of 64 lines in a mask."""
+        return (self.lines + WORD - 1) // WORD
+
+
+@dataclass(frozen=True, slots=True)
+class PlanLine:
+    """A line and what it does, for DEFAULT too."""
+
+    name: LineName
+    actions: tuple[Action, ...]
+    source: str  # file:line
+
+
+@dataclass(frozen=True, slots=True)
+class PlanTable:
+    """A table to be emitted.
+
+    Attributes:
+        monitored: Positions in `Plan.monitored` of the assumptions that it relies on.
+    """
+
+    table: Table
+    matcher: Matcher
+    lines: tuple[PlanLine, ...]
+    monitored: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """A proved program, ready to be spelled.
+
+    Attributes:
+        source: The root file, relative, with `/`.
+        monitored: Positions in `program.assumptions` of those that the executors check.
+    """
+
+    program: Program
+    source: str
+    tables: tuple[PlanTable, ...]
+    monitored: tuple[int, ...]
