@@ -64,7 +64,9 @@ class Tests:
         names = tuple(sorted(set(read_by(condition)), key=self.order.__getitem__))
         box = box_of(condition, self.scope.leaves[names[0]]) if len(names) == 1 else None
         if value is False or box == ():
-            self.scope.report(Code.EMPTY_CONDITION, f"no value satisfies `{text}`", span, "the line could never match")
+            self.scope.report(
+                Code.EMPTY_CONDITION, f"no value satisfies `{text}`", span, "the line could never match"
+            )
             return None
         return None if value is True else Test(text, condition, names, box)
 

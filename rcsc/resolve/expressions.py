@@ -85,7 +85,7 @@ def typed(scope: Scope, body: Body, written: tree.Expr, want: Scalar | None = No
         case tree.Reference(name, span):
             return _reference(scope, body, name, span, want)
         case tree.FieldOf() | tree.IndexOf():
-            return _path(scope, body, written, want)
+            return _path(scope, body, written)
         case tree.Unary():
             return _unary(scope, body, written)
         case tree.Binary():
@@ -115,7 +115,9 @@ def boolean(scope: Scope, body: Body, written: tree.Expr) -> Expr | None:
 def _integer(scope: Scope, written: tree.IntLiteral) -> Typed:
     text = written.text.replace("_", "")
     value = int(text, 16) if text.lower().startswith("0x") else int(text) if len(text) < 400 else 10**400
-    return Typed(Literal(value, Int(value, value, scope.unit(written.unit)), written.span), written.unit is None)
+    return Typed(
+        Literal(value, Int(value, value, scope.unit(written.unit)), written.span), written.unit is None
+    )
 
 
 def _real(scope: Scope, written: tree.RealLiteral) -> Typed | None:
@@ -126,7 +128,9 @@ def _real(scope: Scope, written: tree.RealLiteral) -> Typed | None:
         return None
     if len(text) < 1000 and abs(int(text.lower().partition("e")[2] or 0)) < 1000:
         _one_spelling(scope, value, text, written.span)
-    return Typed(Literal(value, Real(value, value, scope.unit(written.unit)), written.span), written.unit is None)
+    return Typed(
+        Literal(value, Real(value, value, scope.unit(written.unit)), written.span), written.unit is None
+    )
 
 
 def _one_spelling(scope: Scope, value: float, text: str, span: Span) -> None:
@@ -143,7 +147,7 @@ def _reference(scope: Scope, body: Body, name: tree.Name, span: Span, want: Scal
     if isinstance(want, Enum) and name.text in want.members:
         return Typed(Literal(want.members.index(name.text), want, span))
     if name.text in scope.declared:
-        return _path(scope, body, tree.Reference(name, span), want)
+        return _path(scope, body, tree.Reference(name, span))
     if name.text in scope.constants:
         constant = scope.constants[name.text]
         return Typed(Literal(constant.literal.value, constant.literal.type, span), constant.bare)
@@ -152,7 +156,12 @@ def _reference(scope: Scope, body: Body, name: tree.Name, span: Span, want: Scal
         return Typed(Literal(enums[0].members.index(name.text), enums[0], span))
     if enums:
         names = ", ".join(f"`{enum.name}.{name.text}`" for enum in enums)
-        scope.report(Code.UNKNOWN_NAME, f"`{name.text}` may mean {names}", name.span, "write which enumeration is meant")
+        scope.report(
+            Code.UNKNOWN_NAME,
+            f"`{name.text}` may mean {names}",
+            name.span,
+            "write which enumeration is meant",
+        )
         return None
     known = [*body.visible, *scope.declared, *scope.constants, *scope.members]
     scope.unknown("variable, constant or member", name, known)
@@ -213,13 +222,19 @@ def _element(scope: Scope, body: Body, base: Path | None, written: tree.Expr) ->
     if base is None or index is None:
         return None
     if not isinstance(base.type, Array) or not isinstance(index.expr.type, Int):
-        what = "an index is a whole number" if isinstance(base.type, Array) else f"`{base.names[0]}` is not an array"
+        what = (
+            "an index is a whole number"
+            if isinstance(base.type, Array)
+            else f"`{base.names[0]}` is not an array"
+        )
         scope.report(Code.KIND, what, written.span)
         return None
     at, length = fold(index.expr), base.type.length
     if at is not None:
         if not 0 <= at < length:
-            scope.report(Code.OUT_OF_RANGE_CONSTANT, f"the index {at} is not in 0 .. {length - 1}", written.span)
+            scope.report(
+                Code.OUT_OF_RANGE_CONSTANT, f"the index {at} is not in 0 .. {length - 1}", written.span
+            )
             return None
         return Path(tuple(f"{one}[{at}]" for one in base.names), base.type.element, base.index)
     if base.index is not None:
@@ -229,7 +244,7 @@ def _element(scope: Scope, body: Body, base: Path | None, written: tree.Expr) ->
     return Path(names, base.type.element, index.expr)
 
 
-def _path(scope: Scope, body: Body, written: tree.Expr, want: Scalar | None) -> Typed | None:
+def _path(scope: Scope, body: Body, written: tree.Expr) -> Typed | None:
     if isinstance(written, tree.FieldOf) and isinstance(written.base, tree.Reference):
         owner = scope.types.get(written.base.name.text)
         if isinstance(owner, Enum) and written.base.name.text not in scope.declared:
@@ -285,7 +300,11 @@ def _applied(scope: Scope, op: Op, operands: tuple[Typed, ...], unit: Unit, span
     if isinstance(applied.type, Real) and not math.isfinite(value):
         scope.report(Code.NOT_FINITE, "this constant is larger than every double", span)
         value = 0.0
-    point = Int(int(value), int(value), unit) if isinstance(applied.type, Int) else Real(float(value), float(value), unit)
+    point = (
+        Int(int(value), int(value), unit)
+        if isinstance(applied.type, Int)
+        else Real(float(value), float(value), unit)
+    )
     return Typed(Literal(value, point, span), bare)
 
 
@@ -353,10 +372,12 @@ def _one_kind(scope: Scope, left: Typed, right: Typed, span: Span) -> bool:
         scope.report(Code.KIND, f"the two sides are {one} and {two}", span, *helps)
         return False
     kinds = [k for k in (left.expr.type, right.expr.type) if isinstance(k, Int)]
-    if kinds and min(k.low for k in kinds) < 0 and max(k.high for k in kinds) > I64_MAX:
-        if all(k.low >= -(2**63) and k.high < 2**64 for k in kinds):
-            scope.report(Code.MIXED_SIGN, "no 64-bit integer type holds both sides", span, "narrow one of the ranges")
-            return False
+    mixed = bool(kinds) and min(k.low for k in kinds) < 0 and max(k.high for k in kinds) > I64_MAX
+    if mixed and all(k.low >= -(2**63) and k.high < 2**64 for k in kinds):
+        scope.report(
+            Code.MIXED_SIGN, "no 64-bit integer type holds both sides", span, "narrow one of the ranges"
+        )
+        return False
     return True
 
 
@@ -388,7 +409,9 @@ def _in_set(scope: Scope, body: Body, written: tree.InSet) -> Typed | None:
     return None if subject is None else among(scope, body, subject, written.members, written.span)
 
 
-def among(scope: Scope, body: Body, subject: Typed, members: tuple[tree.Expr, ...], span: Span) -> Typed | None:
+def among(
+    scope: Scope, body: Body, subject: Typed, members: tuple[tree.Expr, ...], span: Span
+) -> Typed | None:
     """`subject in {members}`; members are constants."""
     values: list[Value] = []
     for member in members:
@@ -399,7 +422,10 @@ def among(scope: Scope, body: Body, subject: Typed, members: tuple[tree.Expr, ..
         if value is None:
             scope.report(Code.NOT_CONSTANT, "the members of a set are constants", member.span)
             return None
-        if not _one_kind(scope, subject, one, member.span) or common_unit(scope, (subject, one), member.span) is None:
+        if (
+            not _one_kind(scope, subject, one, member.span)
+            or common_unit(scope, (subject, one), member.span) is None
+        ):
             return None
         values.append(value)
     return Typed(Among(subject.expr, tuple(sorted(set(values))), Bool(), span))
@@ -419,9 +445,17 @@ def between(
         return None
     ends = fold(least.expr), fold(most.expr)
     if ends[0] is not None and ends[1] is not None and ends[0] > ends[1]:
-        scope.report(Code.EMPTY_RANGE, f"the range {ends[0]} .. {ends[1]} is empty", span, "write the smaller bound first")
+        scope.report(
+            Code.EMPTY_RANGE,
+            f"the range {ends[0]} .. {ends[1]} is empty",
+            span,
+            "write the smaller bound first",
+        )
         return None
-    above, below = compared(scope, Op.GE, (subject, least), span), compared(scope, Op.LE, (subject, most), span)
+    above, below = (
+        compared(scope, Op.GE, (subject, least), span),
+        compared(scope, Op.LE, (subject, most), span),
+    )
     if above is None or below is None:
         return None
     return Typed(Apply(Op.AND, (above.expr, below.expr), Bool(), span))
@@ -431,11 +465,15 @@ def _function(scope: Scope, body: Body, written: tree.Apply) -> Typed | None:
     op = Op(written.function.text)
     want = 2 if op in (Op.MIN, Op.MAX) else 1
     if len(written.args) != want:
-        scope.report(Code.WRONG_ARGUMENTS, f"`{op.value}` takes {want} argument{'s' * (want - 1)}", written.span)
+        scope.report(
+            Code.WRONG_ARGUMENTS, f"`{op.value}` takes {want} argument{'s' * (want - 1)}", written.span
+        )
         return None
     args = [typed(scope, body, arg) for arg in written.args]
     operands = tuple(arg for arg in args if arg is not None)
-    if len(operands) != want or not all(_number(scope, o, w) for o, w in zip(operands, written.args, strict=True)):
+    if len(operands) != want or not all(
+        _number(scope, o, w) for o, w in zip(operands, written.args, strict=True)
+    ):
         return None
     if op in (Op.TO_INT, Op.TO_REAL):
         return _converted(scope, op, operands[0], written.span)

@@ -1,4 +1,4 @@
-"""The names that an extern procedure gives of the user's functions: nothing else can come into generated code."""
+"""The names that extern procedures give of the user's functions: nothing else comes into generated code."""
 
 import keyword
 import re
@@ -11,9 +11,9 @@ from rcsc.syntax import tree
 _PYTHON = re.compile(r"[a-z_]\w*(\.[a-z_]\w*)*:[a-z_]\w*", re.ASCII | re.IGNORECASE)
 _C = re.compile(r"[a-z]\w{0,62}", re.ASCII | re.IGNORECASE)
 _C_WORDS = frozenset(
-    """auto break case char const continue default do double else enum extern float for goto if inline int long
-    register restrict return short signed sizeof static struct switch typedef union unsigned void volatile while
-    bool true false main""".split()
+    """auto break case char const continue default do double else enum extern float for goto if inline int
+    long register restrict return short signed sizeof static struct switch typedef union unsigned
+    void volatile while bool true false main""".split()
 )
 
 
@@ -28,5 +28,7 @@ def extern(scope: Scope, written: tree.ProcedureDecl) -> Extern:
         scope.report(Code.EXTERN_NAME, message, written.name.span, "write `package.module:function`")
     if not _C.fullmatch(c) or c in _C_WORDS:
         message = f"`{c}` does not name a C function"
-        scope.report(Code.EXTERN_NAME, message, written.name.span, "write a C identifier of at most 63 characters")
+        scope.report(
+            Code.EXTERN_NAME, message, written.name.span, "write a C identifier of at most 63 characters"
+        )
     return Extern(python, c)

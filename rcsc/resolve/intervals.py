@@ -1,7 +1,7 @@
 """Interval arithmetic: bounds that enclose every value an operation can take.
 
-Integers exactly; doubles by the monotonicity of IEEE operations rounded to nearest: the extreme results are those of the extreme
-operands, computed in the same arithmetic.
+Integers exactly; doubles by the monotonicity of IEEE operations rounded to nearest: the extreme results are
+those of the extreme operands, computed in the same arithmetic.
 """
 
 import math

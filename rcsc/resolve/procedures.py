@@ -33,7 +33,11 @@ def procedures(scope: Scope, written: list[tree.ProcedureDecl]) -> tuple[Procedu
         known[name] = _procedure(scope, by_name[name], bodies[name], known)
         costs[name] = cost(bodies[name][1], costs)
         if costs[name] > MOST_STATEMENTS:
-            scope.report(Code.LOOP_TOO_LONG, f"`{name}` runs more than {MOST_STATEMENTS} statements", by_name[name].name.span)
+            scope.report(
+                Code.LOOP_TOO_LONG,
+                f"`{name}` runs more than {MOST_STATEMENTS} statements",
+                by_name[name].name.span,
+            )
     return tuple(known[one.name.text] for one in written if one.name.text in known)
 
 
@@ -49,7 +53,9 @@ def _body(scope: Scope, written: tree.ProcedureDecl) -> tuple[tuple[Parameter, .
     return tuple(params), Statements(scope, body).block(written.body)
 
 
-def _call_order(scope: Scope, bodies: dict[str, tuple[tuple[Parameter, ...], tuple[Statement, ...]]]) -> list[str]:
+def _call_order(
+    scope: Scope, bodies: dict[str, tuple[tuple[Parameter, ...], tuple[Statement, ...]]]
+) -> list[str]:
     """Callees before callers; a cycle is reported with its path and left out."""
     order: list[str] = []
     state: dict[str, int] = {}
@@ -62,7 +68,9 @@ def _call_order(scope: Scope, bodies: dict[str, tuple[tuple[Parameter, ...], tup
             callee = statement.procedure
             if state.get(callee) == 1:
                 cycle = " -> ".join((*path[path.index(callee) :], callee))
-                scope.report(Code.CALL_CYCLE, f"procedures call each other in a circle: {cycle}", statement.span)
+                scope.report(
+                    Code.CALL_CYCLE, f"procedures call each other in a circle: {cycle}", statement.span
+                )
             elif callee in bodies and callee not in state:
                 visit(callee, (*path, callee))
         state[name] = 2
@@ -100,7 +108,9 @@ def _procedure(
     )
 
 
-def _touched(body: tuple[Statement, ...], known: dict[str, Procedure]) -> tuple[set[VariableName], set[VariableName]]:
+def _touched(
+    body: tuple[Statement, ...], known: dict[str, Procedure]
+) -> tuple[set[VariableName], set[VariableName]]:
     reads: set[VariableName] = set()
     writes: set[VariableName] = set()
     for statement in everything(body):
@@ -164,7 +174,8 @@ def owners(scope: Scope, written: list[tree.OwnerDecl]) -> tuple[Owner, ...]:
             if member.text not in names:
                 _check_member(scope, member)
     return tuple(
-        Owner(one.name.text, tuple(m.text for m in one.members), " ".join(one.doc), one.name.span) for one in written
+        Owner(one.name.text, tuple(m.text for m in one.members), " ".join(one.doc), one.name.span)
+        for one in written
     )
 
 
@@ -173,7 +184,9 @@ def _check_member(scope: Scope, member: tree.Name) -> None:
     if procedure is None:
         scope.unknown("module or owner", member, list(scope.procedures))
     elif procedure.params:
-        scope.report(Code.WRONG_ARGUMENTS, f"`{member.text}` takes arguments; an owner gives none", member.span)
+        scope.report(
+            Code.WRONG_ARGUMENTS, f"`{member.text}` takes arguments; an owner gives none", member.span
+        )
 
 
 def flattened(scope: Scope, names: tuple[tree.Name, ...], known: tuple[Owner, ...]) -> tuple[str, ...]:
@@ -184,7 +197,9 @@ def flattened(scope: Scope, names: tuple[tree.Name, ...], known: tuple[Owner, ..
         if name in path:
             first = Label(by_name[name].span, "this owner")
             cycle = " -> ".join((*path[path.index(name) :], name))
-            scope.report(Code.OWNER_CYCLE, f"owners contain each other in a circle: {cycle}", span, related=(first,))
+            scope.report(
+                Code.OWNER_CYCLE, f"owners contain each other in a circle: {cycle}", span, related=(first,)
+            )
             return []
         if name not in by_name:
             return [name] if name in scope.procedures else []

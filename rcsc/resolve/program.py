@@ -43,14 +43,13 @@ def resolve(root: str, loaded: Loaded) -> Program | tuple[Diagnostic, ...]:
     if wrong:
         return wrong
     declarations = [d for file in files for d in loaded.files[file].declarations]
-    program = _Resolver(root, loaded.sources).program(declarations, loaded.files[root])
-    return program
+    return _Resolver(root, loaded.sources).program(declarations, loaded.files[root])
 
 
 def compile_text(text: str, file: str = "case.rcs") -> Program | tuple[Diagnostic, ...]:
     """The program of a text that uses no other file."""
     loaded = load(["-"], stdin=text, stdin_name=file)
-    return loaded.found if loaded.found else resolve(loaded.roots[0], loaded)
+    return loaded.found or resolve(loaded.roots[0], loaded)
 
 
 def _closure(file: str, loaded: Loaded, seen: set[str]) -> Iterator[str]:
@@ -78,7 +77,9 @@ class _Resolver:
         written = [d for d in all_ if isinstance(d, tree.ProcedureDecl) and scope.claim(d.name, "call")]
         scope.procedures.update({d.name.text: d for d in written})
         procedures = calls.procedures(scope, written)
-        owners = calls.owners(scope, [d for d in all_ if isinstance(d, tree.OwnerDecl) and scope.claim(d.name, "call")])
+        owners = calls.owners(
+            scope, [d for d in all_ if isinstance(d, tree.OwnerDecl) and scope.claim(d.name, "call")]
+        )
         assumptions = self._assumptions(all_)
         invariants = self._invariants(all_)
         tables = self._tables(all_, {a.name for a in assumptions})
@@ -168,14 +169,17 @@ class _Resolver:
                 bare = table(self.scope, one, self.sources)
                 text = self.sources[one.span.file].text
                 columns = tuple(
-                    replace(column, heading=text[column.span.start : column.span.end]) for column in bare.columns
+                    replace(column, heading=text[column.span.start : column.span.end])
+                    for column in bare.columns
                 )
                 made.append(replace(bare, columns=columns))
         return tuple(made)
 
     # --- levels ---
 
-    def _levels(self, all_: list[tree.Declaration], tables: tuple[Table, ...], owners: tuple[Owner, ...]) -> tuple[Level, ...]:
+    def _levels(
+        self, all_: list[tree.Declaration], tables: tuple[Table, ...], owners: tuple[Owner, ...]
+    ) -> tuple[Level, ...]:
         names = {t.name for t in tables}
         made = []
         for one in all_:
@@ -185,7 +189,9 @@ class _Resolver:
                 after = calls.flattened(self.scope, one.postprocess, owners)
                 if chosen is not None:
                     doc = " ".join(one.doc)
-                    made.append(Level(one.name.text, self._period(one), before, chosen, after, doc, one.name.span))
+                    made.append(
+                        Level(one.name.text, self._period(one), before, chosen, after, doc, one.name.span)
+                    )
         return tuple(made)
 
     def _period(self, written: tree.LevelDecl) -> int:
@@ -227,12 +233,14 @@ class _Resolver:
                 self.scope.report(Code.DUPLICATE_ARM, "this command has a table already", one.value.span)
             pairs.setdefault(found, TableName(one.table.text))
         low, high = key_bounds(selector.expr.type)
-        missing = [k for k in range(low, min(high, low + 4096) + 1) if value_of_key(selector.expr.type, k) not in pairs]
+        missing = [
+            k
+            for k in range(low, min(high, low + 4096) + 1)
+            if value_of_key(selector.expr.type, k) not in pairs
+        ]
         if missing and not self.scope.found:
             from rcsc.model import spell
 
             words = spell(selector.expr.type, value_of_key(selector.expr.type, missing[0]))
             self.scope.report(Code.MISSING_TABLE, f"`{words}` has no table", written.selector.span)
         return TableByCommand(selector.expr, tuple(sorted(pairs.items())))
-
-

@@ -37,7 +37,9 @@ class Scope:
     doubles: dict[float, tuple[str, Span]] = field(default_factory=dict)
     records: list[Record] = field(default_factory=list)
 
-    def report(self, code: Code, message: str, span: Span, *helps: str, related: tuple[Label, ...] = ()) -> None:
+    def report(
+        self, code: Code, message: str, span: Span, *helps: str, related: tuple[Label, ...] = ()
+    ) -> None:
         """Adds an error."""
         self.found.append(Diagnostic(code, message, Label(span), related=related, help=helps))
 

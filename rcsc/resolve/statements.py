@@ -4,8 +4,8 @@ from dataclasses import dataclass, field
 
 from rcsc.diagnostics.codes import Code
 from rcsc.model import (
-    Array,
     Arm,
+    Array,
     Assign,
     Bool,
     Call,
@@ -77,9 +77,7 @@ class Statements:
 
     # --- assignment ---
 
-    def assign(
-        self, place: tree.Expr, value: tree.Expr, deferred: bool, span: Span
-    ) -> tuple[Statement, ...]:
+    def assign(self, place: tree.Expr, value: tree.Expr, deferred: bool, span: Span) -> tuple[Statement, ...]:
         """One assignment a leaf."""
         if isinstance(place, tree.Reference) and place.name.text in self.body.visible:
             return self._assign_local(place, value, deferred, span)
@@ -96,13 +94,19 @@ class Statements:
             return (Assign(ToElement(names, target.index, target.type), found.expr, span),)
         return self._copy(target, value, span)
 
-    def _assign_local(self, place: tree.Reference, value: tree.Expr, deferred: bool, span: Span) -> tuple[Statement, ...]:
+    def _assign_local(
+        self, place: tree.Reference, value: tree.Expr, deferred: bool, span: Span
+    ) -> tuple[Statement, ...]:
         local = self.body.visible[place.name.text]
         if deferred:
-            self.scope.report(Code.NOT_DEFERRED, f"`{place.name.text}` is a local, not a deferred variable", place.span)
+            self.scope.report(
+                Code.NOT_DEFERRED, f"`{place.name.text}` is a local, not a deferred variable", place.span
+            )
             return ()
         if local.name in self.loops:
-            self.scope.report(Code.NOT_WRITABLE, f"`{place.name.text}` counts a loop and is not assigned", place.span)
+            self.scope.report(
+                Code.NOT_WRITABLE, f"`{place.name.text}` counts a loop and is not assigned", place.span
+            )
             return ()
         found = typed(self.scope, self.body, value, local.type)
         if found is None or not self._assignable(local.type, found, value.span):
@@ -129,7 +133,9 @@ class Statements:
         if isinstance(value.expr, Literal):
             return fits(self.scope, kind, value, span)
         if not same_kind(kind, value.expr.type):
-            self.scope.report(Code.KIND, f"expected {kind_word(kind)}, this is {kind_word(value.expr.type)}", span)
+            self.scope.report(
+                Code.KIND, f"expected {kind_word(kind)}, this is {kind_word(value.expr.type)}", span
+            )
             return False
         if isinstance(kind, Int | Real):
             least = Literal(kind.low, kind)
@@ -147,7 +153,11 @@ class Statements:
         copies: list[Statement] = []
         for suffix, kind in _suffixes(target.type):
             to, came = self._leaf(target, suffix), self._leaf(origin, suffix)
-            read = Read(came[0], kind, value.span) if origin.index is None else Select(came, origin.index, kind, value.span)
+            read = (
+                Read(came[0], kind, value.span)
+                if origin.index is None
+                else Select(came, origin.index, kind, value.span)
+            )
             place = ToLeaf(to[0], kind) if target.index is None else ToElement(to, target.index, kind)
             copies.append(Assign(place, read, span))
         return tuple(copies)
@@ -166,7 +176,9 @@ class Statements:
             if found is not None and self._assignable(kind, found, written.value.span):
                 value = found.expr
         if written.name.text in self.body.visible:
-            self.scope.report(Code.DUPLICATE_NAME, f"`{written.name.text}` is declared twice", written.name.span)
+            self.scope.report(
+                Code.DUPLICATE_NAME, f"`{written.name.text}` is declared twice", written.name.span
+            )
         local = Local(self.body.fresh(written.name.text), kind, value, written.span)
         self.body.visible[written.name.text] = local
         return (local,)
@@ -213,7 +225,9 @@ class Statements:
             return ()
         name = self.body.fresh(written.name.text)
         before = dict(self.body.visible)
-        self.body.visible[written.name.text] = Local(name, Int(first, max(first, last)), None, written.name.span)
+        self.body.visible[written.name.text] = Local(
+            name, Int(first, max(first, last)), None, written.name.span
+        )
         self.loops.add(name)
         body = self.block(written.body)
         self.body.visible = before
@@ -227,7 +241,9 @@ class Statements:
         if len(procedure.params) != len(written.args):
             want, got = len(procedure.params), len(written.args)
             self.scope.report(
-                Code.WRONG_ARGUMENTS, f"`{written.name.text}` takes {want} arguments, here are {got}", written.span
+                Code.WRONG_ARGUMENTS,
+                f"`{written.name.text}` takes {want} arguments, here are {got}",
+                written.span,
             )
             return ()
         args = []

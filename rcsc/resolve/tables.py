@@ -100,7 +100,8 @@ class _Cells:
 
     def tests(self, row: tree.Row) -> tuple[Test | None, ...]:
         """One test a condition column."""
-        known, headings, result = self.known, self.written.conditions, []
+        known, headings = self.known, self.written.conditions
+        result: list[Test | None] = []
         for column, written in enumerate(row.conditions):
             if written is None:
                 result.append(None)
@@ -140,7 +141,7 @@ class _Cells:
             made = statements.assign(heading.subject, written.value, False, span)
             return tuple(Action(name, text, placed(one, span)) for one in made)
         pieces = [piece.strip() for piece in text.split(";")]
-        result = []
+        result: list[Action] = []
         for at, one in enumerate(written):
             piece = pieces[at] if len(pieces) == len(written) else text
             result.extend(Action(name, piece, placed(made, span)) for made in statements.block((one,)))

@@ -106,7 +106,12 @@ def _int(scope: Scope, written: tree.IntType) -> Int:
         return Int(0, 0)
     least, most = int(low.literal().value), int(high.literal().value)
     if least > most:
-        scope.report(Code.EMPTY_RANGE, f"the range {least} .. {most} is empty", written.span, "write the smaller bound first")
+        scope.report(
+            Code.EMPTY_RANGE,
+            f"the range {least} .. {most} is empty",
+            written.span,
+            "write the smaller bound first",
+        )
         return Int(most, most, unit)
     if least < I64_MIN or most > U64_MAX or (least < 0 and most > I64_MAX):
         scope.report(Code.TOO_WIDE, f"no 64-bit integer holds {least} .. {most}", written.span)
@@ -121,7 +126,12 @@ def _real(scope: Scope, written: tree.RealType) -> Real:
     low, high, unit = bounds
     least, most = _double(scope, low, written.low.span), _double(scope, high, written.high.span)
     if least > most:
-        scope.report(Code.EMPTY_RANGE, f"the range {least!r} .. {most!r} is empty", written.span, "write the smaller bound first")
+        scope.report(
+            Code.EMPTY_RANGE,
+            f"the range {least!r} .. {most!r} is empty",
+            written.span,
+            "write the smaller bound first",
+        )
         return Real(most, most, unit)
     return Real(least, most, unit)
 

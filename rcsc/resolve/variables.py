@@ -1,7 +1,7 @@
 """Types, constants and variables declared; records and arrays flattened into leaves."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from rcsc.diagnostics.codes import Code
 from rcsc.model import (
@@ -83,7 +83,9 @@ def declare_variable(scope: Scope, written: tree.VariableDecl) -> None:
     if not scope.claim(written.name, "value"):
         return
     if _size(kind) + len(scope.leaves) > MOST_LEAVES:
-        scope.report(Code.TOO_MANY_LEAVES, f"a program has at most {MOST_LEAVES} scalar variables", written.name.span)
+        scope.report(
+            Code.TOO_MANY_LEAVES, f"a program has at most {MOST_LEAVES} scalar variables", written.name.span
+        )
         return
     flat = list(_leaves(written.name.text, kind))
     initial = _initial(scope, written, kind)
@@ -179,7 +181,9 @@ def _admit(scope: Scope, written: tree.VariableDecl, leaf: Scalar) -> Admit:
     if not written.admit:
         return Admit.REJECT
     if written.kind != "input":
-        scope.report(Code.KIND, f"only an input is admitted, `{written.name.text}` is not one", written.name.span)
+        scope.report(
+            Code.KIND, f"only an input is admitted, `{written.name.text}` is not one", written.name.span
+        )
         return Admit.REJECT
     if written.admit == "clamp" and not isinstance(leaf, Int | Real):
         scope.report(Code.KIND, "only a number can be clamped", written.name.span, "leave `clamp` out")
@@ -189,6 +193,10 @@ def _admit(scope: Scope, written: tree.VariableDecl, leaf: Scalar) -> Admit:
 
 def _may_be_deferred(scope: Scope, written: tree.VariableDecl, kind: Type) -> bool:
     if written.kind != "state" or not isinstance(kind, Bool | Enum | Int | Real):
-        scope.report(Code.NOT_DEFERRED, "only a state variable that is a single value can be deferred", written.name.span)
+        scope.report(
+            Code.NOT_DEFERRED,
+            "only a state variable that is a single value can be deferred",
+            written.name.span,
+        )
         return False
     return True
