@@ -1,10 +1,11 @@
 """Parse trees to syntax trees: one method a grammar rule, in grammar order."""
 
+from dataclasses import replace
 from typing import Any, Protocol
 
 from rcsc.source import Span
 from rcsc.syntax import tree
-from rcsc.syntax.comments import Comments, split
+from rcsc.syntax.comments import Comments, split, words
 
 
 class Meta(Protocol):
@@ -60,7 +61,7 @@ class Build:
     def _above(self, node: Node) -> dict[str, Any]:
         """Span and comments of a statement or an arm."""
         comments = self.comments.take(node.meta.start_pos)
-        return {"span": self._span(node), "comments": tuple(text.lstrip("#").strip() for text in comments)}
+        return {"span": self._span(node), "comments": tuple(words(text) for text in comments)}
 
     @staticmethod
     def _rule(item: Any) -> str:
@@ -212,7 +213,11 @@ class Build:
             case rule:
                 low, high, *unit = node.children
                 built = tree.IntType if rule == "int_type" else tree.RealType
-                return built(self.expr(low), self.expr(high), self._unit(unit), span)
+                most, own = self.expr(high), self._unit(unit)
+                if own is None and isinstance(most, tree.IntLiteral | tree.RealLiteral) and most.unit is not None:
+                    # the parser reads `0 .. 9 [mm]` with the unit at the 9; it is the type's
+                    most, own = replace(most, unit=None), most.unit
+                return built(self.expr(low), most, own, span)
 
     def _unit(self, items: list[Any]) -> tree.Unit | None:
         node = self._find(items, "unit")

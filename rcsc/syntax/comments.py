@@ -43,8 +43,13 @@ class Comments:
         return self.take(1 << 62)
 
 
+def words(comment: str) -> str:
+    """The text of a comment, without its marks and the space behind them."""
+    return comment.lstrip("#").removeprefix(" ").rstrip()
+
+
 def split(comments: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Plain comments and the texts of doc lines (`##`), of comments that stand before a declaration."""
-    plain = tuple(text[1:].strip() for text in comments if not text.startswith("##"))
-    doc = tuple(text[2:].strip() for text in comments if text.startswith("##"))
+    plain = tuple(words(text) for text in comments if not text.startswith("##"))
+    doc = tuple(words(text) for text in comments if text.startswith("##"))
     return plain, doc

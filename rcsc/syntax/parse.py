@@ -17,7 +17,7 @@ from rcsc.diagnostics.diagnostic import Diagnostic, Label
 from rcsc.source import Source, Span
 from rcsc.syntax import screen, tree
 from rcsc.syntax.build import Build
-from rcsc.syntax.comments import Comments
+from rcsc.syntax.comments import Comments, words
 from rcsc.syntax.rows import ACTION_WORDS, NAME, Cell, Cells, cut, is_separator
 from rcsc.syntax.words import expected
 
@@ -51,7 +51,7 @@ def parse(source: Source) -> tree.File | tuple[Diagnostic, ...]:
     declarations = tuple(build.declaration(node) for node in pieces.nodes)
     if found:
         return tuple(found[:MOST_ERRORS])
-    return tree.File(declarations, comments.rest(), source.name)
+    return tree.File(declarations, tuple(words(text) for text in comments.rest()), source.name)
 
 
 @dataclass(slots=True)
@@ -168,7 +168,7 @@ class _Rows:
             default and tests[0].text.endswith("unreachable"),
             Span(self.source.name, start, everything[-1].end),
             tuple(bound for cell in everything for bound in (cell.start, cell.end)),
-            self.comments.take(start),
+            tuple(words(text) for text in self.comments.take(start)),
         )
 
     def _even(self, row: Token, cells: Cells, head: Cells) -> bool:
