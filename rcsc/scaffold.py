@@ -16,7 +16,6 @@ exclude = []
 
 _VOCABULARY = """\
 # Names that the tables share.
-
 enum command { hold, open, close }
 enum status { executing, done, failed }
 """

@@ -173,6 +173,16 @@ def backing(table: TableReport) -> str:
 
 
 def _counts(report: Report) -> Iterator[Piece]:
+    if report.tables:
+        yield from _verdicts(report)
+    for number, severity in enumerate(Severity):
+        count = report.count(severity)
+        noun = severity.value if count == 1 else f"{severity.value}s"
+        yield Piece(", " if number else "")
+        yield Piece(f"{count} {noun}", OF_SEVERITY[severity] if count else Style.PLAIN)
+
+
+def _verdicts(report: Report) -> Iterator[Piece]:
     of = {verdict: sum(table.verdict is verdict for table in report.tables) for verdict in Verdict}
     noun = "table" if len(report.tables) == 1 else "tables"
     yield Piece(f"{len(report.tables)} {noun}: ")
@@ -180,11 +190,7 @@ def _counts(report: Report) -> Iterator[Piece]:
         style = _OF_VERDICT[verdict] if count else Style.PLAIN
         yield Piece(f"{', ' if number else ''}")
         yield Piece(f"{count} {verdict.value}", style)
-    for number, severity in enumerate(Severity):
-        count = report.count(severity)
-        yield Piece(", " if number else "; ")
-        noun = severity.value if count == 1 else f"{severity.value}s"
-        yield Piece(f"{count} {noun}", OF_SEVERITY[severity] if count else Style.PLAIN)
+    yield Piece("; ")
 
 
 class Progress:
