@@ -151,7 +151,11 @@ def _applied(op: Op, args: tuple[Expr, ...], snapshot: Snapshot, local: Mapping[
         return not first or bool(evaluate(args[1], snapshot, local))
     rest = [evaluate(arg, snapshot, local) for arg in args[1:]]
     if op is Op.DIV:
-        return divide(int(first), int(rest[0])) if isinstance(args[0].type, Int) else float(first) / float(rest[0])
+        return (
+            divide(int(first), int(rest[0]))
+            if isinstance(args[0].type, Int)
+            else float(first) / float(rest[0])
+        )
     result: Value = _OPERATORS[op](first, *rest)
     return result
 
@@ -224,11 +228,15 @@ def call(program: Program, name: str, args: list[Value], snapshot: dict[str, Val
     execute(program, procedure.body, snapshot, local)
 
 
-def _call_extern(program: Program, procedure: Procedure, args: list[Value], snapshot: dict[str, Value]) -> None:
+def _call_extern(
+    program: Program, procedure: Procedure, args: list[Value], snapshot: dict[str, Value]
+) -> None:
     """The user's function takes the reads and the arguments, and gives the writes in order."""
     assert procedure.extern is not None
     module, _, function = procedure.extern.python.partition(":")
-    results = getattr(importlib.import_module(module), function)(*[snapshot[name] for name in procedure.reads], *args)
+    results = getattr(importlib.import_module(module), function)(
+        *[snapshot[name] for name in procedure.reads], *args
+    )
     given = results if isinstance(results, tuple) else (results,)
     for name, value in zip(procedure.writes, given, strict=True):
         admitted = _admitted(program.variable(name), value)
@@ -275,7 +283,11 @@ def admit(program: Program, snapshot: Snapshot) -> dict[str, Value] | str:
 
 def settle(program: Program, snapshot: dict[str, Value]) -> None:
     """Deferred variables whose condition holds take their next value, all at once."""
-    ready = [v.name for v in program.variables if v.deferred_until is not None and holds(v.deferred_until, snapshot)]
+    ready = [
+        v.name
+        for v in program.variables
+        if v.deferred_until is not None and holds(v.deferred_until, snapshot)
+    ]
     for name in ready:
         snapshot[name] = snapshot[pending(name)]
 

@@ -37,6 +37,12 @@ _ORDER: Mapping[Op, Callable[[Term, Term, Scalar], Term]] = {
     Op.GT: lambda a, b, kind: smt.below(b, a, kind),
     Op.GE: lambda a, b, kind: smt.at_most(b, a, kind),
 }
+_LOGIC: Mapping[Op, Callable[[list[Term]], Term]] = {
+    Op.NOT: lambda terms: smt.negation(terms[0]),
+    Op.AND: smt.all_of,
+    Op.OR: smt.any_of,
+    Op.IMPLIES: lambda terms: smt.implication(terms[0], terms[1]),
+}
 
 
 @dataclass(slots=True)
@@ -72,37 +78,32 @@ def encode(expr: Expr, frame: Frame) -> Term:
             kind = subject.type
             return smt.any_of([smt.equal(term, smt.literal(kind, value), kind) for value in values])
         case Apply(op=op, args=args):
-            return _applied(op, args, [encode(arg, frame) for arg in args])
+            return operation(op, args[0].type, [encode(arg, frame) for arg in args])
 
 
-def _applied(op: Op, args: tuple[Expr, ...], terms: list[Term]) -> Term:
-    kind = args[0].type
+def operation(op: Op, kind: Scalar, terms: list[Term]) -> Term:
+    """The term of an operator over operands, the first of which is of type `kind`."""
+    if op in _LOGIC:
+        return _LOGIC[op](terms)
+    if op in _ORDER:
+        return _ORDER[op](terms[0], terms[1], kind)
     match op:
-        case Op.NOT:
-            return smt.negation(terms[0])
-        case Op.AND:
-            return smt.all_of(terms)
-        case Op.OR:
-            return smt.any_of(terms)
-        case Op.IMPLIES:
-            return smt.implication(terms[0], terms[1])
         case Op.NEG:
             return smt.minus(terms[0], kind)
         case Op.ABS:
             negative = smt.below(terms[0], _zero(kind), kind)
             return smt.choice(negative, smt.minus(terms[0], kind), terms[0])
-        case Op.MIN | Op.MAX:
-            low = smt.at_most(terms[0], terms[1], kind)
-            return smt.choice(low, *(terms if op is Op.MIN else reversed(terms)))
+        case Op.MIN:
+            return smt.choice(smt.at_most(terms[0], terms[1], kind), terms[0], terms[1])
+        case Op.MAX:
+            return smt.choice(smt.at_most(terms[1], terms[0], kind), terms[0], terms[1])
         case Op.TO_REAL:
             return smt.to_double(terms[0])
         case Op.TO_INT:
             return smt.to_integer(terms[0])
-        case Op.ADD | Op.SUB | Op.MUL | Op.DIV | Op.MOD:
-            operation = smt.double_operation if isinstance(kind, Real) else smt.integer_operation
-            return operation(op.value, terms[0], terms[1])
         case _:
-            return _ORDER[op](terms[0], terms[1], kind)
+            arithmetic = smt.double_operation if isinstance(kind, Real) else smt.integer_operation
+            return arithmetic(op.value, terms[0], terms[1])
 
 
 def _zero(kind: Scalar) -> Term:
@@ -114,8 +115,8 @@ def within(term: Term, kind: Scalar) -> Term:
     if isinstance(kind, Bool):
         return smt.truth(True)
     low, high = (kind.low, kind.high) if isinstance(kind, Int | Real) else key_bounds(kind)
-    bounds = [smt.at_most(smt.literal(kind, low), term, kind), smt.at_most(term, smt.literal(kind, high), kind)]
-    return smt.all_of(bounds)
+    least, greatest = smt.literal(kind, low), smt.literal(kind, high)
+    return smt.all_of([smt.at_most(least, term, kind), smt.at_most(term, greatest, kind)])
 
 
 def declared(variables: Iterable[Variable]) -> tuple[Frame, list[Term]]:
@@ -130,31 +131,37 @@ def declared(variables: Iterable[Variable]) -> tuple[Frame, list[Term]]:
 
 
 def least_witness(solver: Solver, variables: Iterable[Variable], frame: Frame) -> dict[str, Value] | None:
-    """The least values, in declared order, for which what is asserted holds; None where the solver gives up.
+    """The least values, in declared order, for which what is asserted holds; None where the solver finds none.
 
-    Any model of Z3's may change with its version; the least one depends on the question alone. The solver is
-    left with the witness asserted.
+    Any model of Z3's may change with its version; the least one depends on the question alone. Where the solver
+    gives up on the way, the values found last stand: a witness still, but not the least. The solver is left with
+    the witness asserted.
     """
+    shown = list(variables)
     if solver.check() is not Answer.SATISFIABLE:
         return None
-    witness: dict[str, Value] = {}
-    for variable in variables:
+    last = _model(solver, shown, frame)
+    for variable in shown:
         term, kind = frame.leaves[variable.name], variable.type
-        low, high = key_bounds(kind)[0], key_of(kind, solver.value(term, kind))
+        low, high = key_bounds(kind)[0], last[variable.name]
+        middle = low  # most are at their least
         while low < high:
-            middle = (low + high) // 2
             answer = solver.check(at_most_key(term, kind, middle))
-            if answer is Answer.UNKNOWN:
-                return None
             if answer is Answer.SATISFIABLE:
-                high = min(middle, key_of(kind, solver.value(term, kind)))
-            else:
+                last = _model(solver, shown, frame)
+                high = last[variable.name]
+            elif answer is Answer.UNSATISFIABLE:
                 low = middle + 1
-        witness[variable.name] = value_of_key(kind, low)
-        solver.add(smt.equal(term, smt.literal(kind, witness[variable.name]), kind))
-        if solver.check() is not Answer.SATISFIABLE:
-            return None
-    return witness
+            else:
+                break
+            middle = (low + high) // 2
+        solver.add(smt.equal(term, smt.literal(kind, value_of_key(kind, high)), kind))
+    return {variable.name: value_of_key(variable.type, last[variable.name]) for variable in shown}
+
+
+def _model(solver: Solver, variables: Iterable[Variable], frame: Frame) -> dict[str, int]:
+    """The keys of the last model."""
+    return {v.name: key_of(v.type, solver.value(frame.leaves[v.name], v.type)) for v in variables}
 
 
 def at_most_key(term: Term, kind: Scalar, key: int) -> Term:

@@ -1,32 +1,53 @@
 """Nothing in a program can overflow, divide by zero, leave an array or a declared range, or write an output twice.
 
-In: a program. Out: diagnostics with least witnesses. Each line's actions are shown right where they run: under the table's
-assumptions, the proved invariants and the line's conditions; what no line calls under the declared ranges alone.
+In: a program. Out: diagnostics with least witnesses. Each line's actions are shown right where they run: under the
+table's assumptions, the invariants and the line's conditions; procedures of levels under the invariants; what nothing
+calls under the declared ranges alone. Conditions are shown to be defined for every input: so the executors can
+evaluate each of them (a monitored assumption too) whatever the others say. Every run also owes the invariants.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
 
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label, WitnessColumn
 from rcsc.model import (
+    COMPARISONS,
+    NOWHERE,
     Action,
-    Bool,
+    Among,
+    Apply,
+    Assign,
     Call,
+    Default,
     Expr,
+    Invariant,
     Kind,
+    Line,
+    Literal,
+    Op,
     Procedure,
     Program,
+    Scalar,
+    Select,
+    Standing,
+    Statement,
     Table,
-    Variable,
-    VariableName,
+    TableByCommand,
+    ToLeaf,
+    pending,
     spell,
 )
-from rcsc.prove import smt
-from rcsc.prove.encode import Frame, declared, encode, least_witness, within
+from rcsc.prove import values
+from rcsc.prove.discharge import Asker, Failure, Outcome, Tally
 from rcsc.prove.options import Options
-from rcsc.prove.smt import Answer, Solver, Term
-from rcsc.prove.symbolic import Obligation, Run, ghost
+from rcsc.prove.symbolic import Obligation, Run, State, TooLongError
+from rcsc.prove.values import FALSE, Node
+from rcsc.resolve.leaves import everything, read_by
+from rcsc.source import Span
+
+MOST_WITNESSES = 3
+_DEFINED = COMPARISONS | {Op.AND, Op.OR, Op.NOT, Op.IMPLIES}
 
 
 def called_by_lines(program: Program) -> set[str]:
@@ -37,29 +58,11 @@ def called_by_lines(program: Program) -> set[str]:
 
 
 @dataclass(slots=True)
-class Tally:
-    """How obligations were settled, for the report and the tests."""
+class _Cause:
+    """One place and what can go wrong there, in every context where it can."""
 
-    by_intervals: int = 0
-    by_solver: int = 0
-    queries: int = 0
-
-
-@dataclass(frozen=True, slots=True)
-class Context:
-    """Where statements run: what is known before them, and how to speak of it.
-
-    Attributes:
-        known: Terms over the frame.
-        where: `in line 5 of table acquire`, for notes; "" for a procedure by itself.
-        extra: Variables beside the program's leaves: parameters.
-    """
-
-    frame: Frame
-    known: tuple[Term, ...]
-    where: str
-    table: str = ""
-    extra: tuple[Variable, ...] = ()
+    failures: list[Failure] = field(default_factory=list)
+    where: list[tuple[str, str]] = field(default_factory=list)  # note, table
 
 
 @dataclass(slots=True)
@@ -67,213 +70,352 @@ class Obligations:
     """Proves what one program owes.
 
     Attributes:
-        invariants: Conditions already proved to hold at every cycle.
+        tally: How it was settled.
+        undefined: Tables with a condition, or an assumption, that is not defined for every input.
     """
 
     program: Program
     options: Options
-    invariants: Sequence[Expr] = ()
     tally: Tally = field(default_factory=Tally)
-    found: list[Diagnostic] = field(default_factory=list)
+    undefined: set[str] = field(default_factory=set)
+    _causes: dict[tuple[Code, Span, str], _Cause] = field(default_factory=dict)
+    _start: dict[str, Node] = field(default_factory=dict)
+    _clean: dict[str, bool] = field(default_factory=dict)
+    _too_long: list[Diagnostic] = field(default_factory=list)
+    _asker: Asker = field(init=False)
+    _procedures: dict[str, Procedure] = field(init=False)
+    _outputs: set[str] = field(init=False)
+    _kinds: dict[str, Scalar] = field(init=False)
+    _kept: list[tuple[Invariant, set[str]]] = field(init=False)
+
+    def __post_init__(self) -> None:
+        leaves = self.program.variables
+        self._asker = Asker(self.options, {v.name: at for at, v in enumerate(leaves)}, self.tally)
+        self._procedures = {procedure.name: procedure for procedure in self.program.procedures}
+        self._kinds = {v.name: v.type for v in leaves}
+        self._outputs = {v.name for v in leaves if v.kind is Kind.OUTPUT}
+        self._kept = [(one, set(read_by(one.condition))) for one in self.program.invariants]
 
     def prove(self, tables: Iterable[Table]) -> list[Diagnostic]:
-        """What is wrong with the tables' lines, the conditions, and the procedures that run outside lines."""
+        """What is wrong with conditions, deferred values, procedures, levels, and the lines of `tables`."""
         self._conditions()
+        self._deferred()
+        self._levels()
+        self._uncalled()
         for table in tables:
-            for context, actions in self._lines(table):
-                self._actions(context, actions)
             self._tests(table)
-        inside = self._closure(called_by_lines(self.program))
+            for line in (*table.lines, *((table.default,) if table.default else ())):
+                if not self._plain(line.actions):
+                    self._line(table, line)
+        return [*self._too_long, *(_diagnostic(*key, cause) for key, cause in self._causes.items())]
+
+    # --- what is known ---
+
+    def _run(self) -> Run:
+        return Run(self._procedures, self._kinds, self._start)
+
+    def _known(self, conditions: Iterable[Expr]) -> list[Node]:
+        """The conditions before a run; what they owe themselves is owed elsewhere."""
+        run = self._run()
+        return [run.evaluate(condition) for condition in conditions]
+
+    def _invariants(self) -> list[Node]:
+        return self._known(one.condition for one in self.program.invariants)
+
+    # --- conditions ---
+
+    def _conditions(self) -> None:
+        """Assumptions, invariants, `deferred until` and selectors."""
+        deferred = [v.deferred_until for v in self.program.variables if v.deferred_until is not None]
+        selectors = [
+            level.tables.selector for level in self.program.levels if isinstance(level.tables, TableByCommand)
+        ]
+        for one in self.program.invariants:
+            self._defined(one.condition, [], "")
+        for condition in (*deferred, *selectors):
+            self._defined(condition, self._invariants(), "")
+        for assumption in self.program.assumptions:
+            if not self._defined(assumption.condition, self._invariants(), ""):
+                users = (table.name for table in self.program.tables if assumption.name in table.assumptions)
+                self.undefined.update(users)
+            if assumption.standing is Standing.PROVED:
+                self._follows(assumption.name, assumption.condition, assumption.span)
+
+    def _defined(
+        self, condition: Expr, base: list[Node], where: str, cell: Span = NOWHERE, table: str = ""
+    ) -> bool:
+        """Whether evaluating the condition cannot go wrong."""
+        run = self._run()
+        run.cell = cell
+        for node in base:
+            run.assume(node)
+        run.evaluate(condition)
+        return self._settle(run, lambda: base, where, table)
+
+    def _follows(self, name: str, condition: Expr, span: Span) -> None:
+        """An assumption that claims to be proved follows from ranges and invariants."""
+        run = self._run()
+        [good] = self._known([condition])
+        message = f"assumption `{name}` does not follow from the declared ranges and the invariants"
+        run.owe(Code.ASSUMPTION_NOT_PROVED, message, span, good)
+        self._settle(run, self._invariants, "", "")
+
+    def _tests(self, table: Table) -> None:
+        """Every condition of the table is evaluated in every cycle, whatever the others say."""
+        seen: dict[int, tuple[Expr, Span]] = {}
+        for line in table.lines:
+            for at, test in enumerate(line.tests):
+                if test is not None and id(test) not in seen:
+                    seen[id(test)] = test.condition, line.cell_span(at)
+        where = f"in a condition of table `{table.name}`"
+        owing = [(condition, span) for condition, span in seen.values() if _computes(condition)]
+        base = [*self._assumed(table), *self._invariants()] if owing else []
+        for condition, span in owing:
+            if not self._defined(condition, base, where, span, table.name):
+                self.undefined.add(table.name)
+
+    def _assumed(self, table: Table) -> list[Node]:
+        return self._known(a.condition for a in self.program.assumptions if a.name in table.assumptions)
+
+    # --- runs outside lines ---
+
+    def _deferred(self) -> None:
+        """All deferred values whose condition holds are taken at once."""
+        deferred = [v for v in self.program.variables if v.deferred_until is not None]
+        if not deferred or not self._kept:
+            return
+        run = self._run()
+        ready = self._known(v.deferred_until for v in deferred if v.deferred_until is not None)
+        later = [run.leaf(pending(v.name)) for v in deferred]
+        for variable, when, value in zip(deferred, ready, later, strict=True):
+            run.write(variable.name, value, when)
+        self._keep(run, "taking the deferred values", deferred[0].span)
+        self._settle(run, self._invariants, "", "")
+
+    def _levels(self) -> None:
+        """What a level runs before its table and behind it, each list in one run."""
+        for level in self.program.levels:
+            for words, names in (("preprocess", level.preprocess), ("postprocess", level.postprocess)):
+                calls = [Call(self._procedures[name].name) for name in names]
+                where = f"in `{words}` of level `{level.name}`"
+                self._sequence(calls, where, level.span)
+
+    def _sequence(self, calls: Sequence[Call], where: str, span: Span) -> None:
+        base = self._invariants()
+        run = self._running(base, f"what runs {where}", span)
+        try:
+            run.execute(calls)
+        except (TooLongError, RecursionError):
+            self._give_up(where, span)
+            return
+        self._keep(run, f"what runs {where}", span)
+        self._settle(run, lambda: base, where, "")
+
+    def _running(self, base: Iterable[Node], who: str, span: Span) -> Run:
+        run = self._run()
+        for node in base:
+            run.assume(node)
+        if self._kept:
+            run.stops = lambda at, extern: self._keep(at, f"{who}, where `{extern}` fails,", span)
+        return run
+
+    def _uncalled(self) -> None:
+        """Procedures that no line and no level runs, for all values of their parameters."""
         levels = self.program.levels
-        outside = {name for level in levels for name in (*level.preprocess, *level.postprocess)}
+        outside = {str(name) for level in levels for name in (*level.preprocess, *level.postprocess)}
+        inside = self._closure(called_by_lines(self.program) | outside)
         for procedure in self.program.procedures:
-            if procedure.name not in inside or procedure.name in outside:
-                self._alone(procedure)
-        return list(dict.fromkeys(self.found))
+            run = self._alone(procedure)
+            self._clean[procedure.name] = run is not None and not run.obligations
+            if procedure.name not in inside:
+                if run is None:
+                    self._give_up(f"in procedure `{procedure.name}`", procedure.span)
+                else:
+                    self._settle(run, list, "", "")
 
     def _closure(self, called: set[str]) -> set[str]:
-        """Procedures that run in some line: shown right there."""
-        from rcsc.resolve.leaves import everything
-
-        by_name = {procedure.name: procedure for procedure in self.program.procedures}
+        """The procedures that run when these do."""
         waiting, seen = list(called), set(called)
         while waiting:
-            for statement in everything(by_name[waiting.pop()].body):  # type: ignore[index]
+            for statement in everything(self._procedures[waiting.pop()].body):
                 if isinstance(statement, Call) and statement.procedure not in seen:
                     seen.add(statement.procedure)
                     waiting.append(statement.procedure)
         return seen
 
-    # --- contexts ---
+    def _alone(self, procedure: Procedure) -> Run | None:
+        """The procedure for all values of its parameters; None where it runs too long to follow."""
+        run = self._run()
+        try:
+            run.call(
+                procedure,
+                [(param.span, values.variable(param.name, param.type)) for param in procedure.params],
+            )
+        except (TooLongError, RecursionError):
+            return None
+        return run
 
-    def _start(self) -> tuple[Frame, tuple[Term, ...]]:
-        frame, domain = declared(self.program.variables)
-        return frame, (*domain, *(encode(invariant, frame) for invariant in self.invariants))
+    # --- lines ---
 
-    def _lines(self, table: Table) -> Iterator[tuple[Context, tuple[Action, ...]]]:
-        """Each line that does anything, and DEFAULT."""
-        frame, known = self._start()
-        assumed = [a.condition for a in self.program.assumptions if a.name in table.assumptions]
-        known = (*known, *(encode(condition, frame) for condition in assumed))
-        tests: dict[int, Term] = {}
+    def _plain(self, actions: tuple[Action, ...]) -> bool:
+        """Whether it is plain that the line's actions owe nothing that a run could not show without asking."""
+        written: set[str] = set()
+        for action in actions:
+            names = self._plainly_written(action.statement)
+            if names is None or names & written & self._outputs:
+                return False
+            written |= names
+        return not any(written & reads for _, reads in self._kept)
 
-        def matches(at: int) -> Term:
-            terms = []
-            for test in table.lines[at].tests:
-                if test is not None:
-                    if id(test) not in tests:
-                        tests[id(test)] = encode(test.condition, frame)
-                    terms.append(tests[id(test)])
-            return smt.all_of(terms)
+    def _plainly_written(self, statement: Statement) -> set[str] | None:
+        """What the statement writes; None where it may owe something."""
+        match statement:
+            case Assign(place=ToLeaf(name=name, type=kind), value=Literal(value=value)):
+                low, high = values.bounds(kind)
+                return {name} if low <= value <= high else None
+            case Call(procedure=name, args=args) if self._clean[name]:
+                procedure = self._procedures[name]
+                for param, arg in zip(procedure.params, args, strict=True):
+                    low, high = values.bounds(param.type)
+                    if not isinstance(arg, Literal) or not low <= arg.value <= high:
+                        return None
+                return set(map(str, procedure.writes))
+            case _:
+                return None
 
-        for at, line in enumerate(table.lines):
-            if line.actions:
-                where = f"in line `{line.name}` of table `{table.name}`"
-                yield Context(frame, (*known, matches(at)), where, table.name), line.actions
-        if table.default is not None and table.default.actions:
-            none = smt.negation(smt.any_of([matches(at) for at in range(len(table.lines))]))
-            where = f"in line `{table.default.name}` of table `{table.name}`"
-            yield Context(frame, (*known, none), where, table.name), table.default.actions
+    def _line(self, table: Table, line: Line | Default) -> None:
+        where = f"in line `{line.name}` of table `{table.name}`"
+        base = [*self._assumed(table), *self._invariants()]
+        if isinstance(line, Line):
+            base += self._known(test.condition for test in line.tests if test is not None)
+        name = line.cell_span(-1) if isinstance(line, Line) else line.span
+        run = self._running(base, f"line `{line.name}` of table `{table.name}`", name)
+        try:
+            self._actions(run, line.actions)
+        except (TooLongError, RecursionError):
+            self._give_up(where, name)
+            return
+        self._keep(run, f"line `{line.name}` of table `{table.name}`", name)
 
-    # --- what is owed ---
+        def known() -> list[Node]:
+            return [*base, self._none(table)] if isinstance(line, Default) else base
 
-    def _actions(self, context: Context, actions: tuple[Action, ...]) -> None:
-        run = Run(self.program)
-        frame = context.frame.copy()
-        outputs = run.outputs()
-        wrote: dict[str, list[tuple[int, Term, Term]]] = {}
-        for number, action in enumerate(actions):
-            for name in outputs:
-                frame.leaves[ghost(name)] = smt.truth(False)
-            run.execute((action.statement,), frame, ())
-            for name in self._written(action, outputs):
-                wrote.setdefault(name, []).append((number, frame.leaves[ghost(name)], frame.leaves[name]))
-        run.obligations.extend(self._two_writers(wrote, actions))
-        self._settle(context, run)
+        self._settle(run, known, where, table.name)
 
-    def _written(self, action: Action, outputs: list[str]) -> list[str]:
-        """Outputs that the action may write."""
-        from rcsc.resolve.leaves import written_by
-
-        if isinstance(action.statement, Call):
-            procedure = next(p for p in self.program.procedures if p.name == action.statement.procedure)
-            names: Sequence[str] = procedure.writes
-        else:
-            names = written_by(action.statement)
-        return [name for name in outputs if name in names]
-
-    def _two_writers(
-        self, wrote: dict[str, list[tuple[int, Term, Term]]], actions: tuple[Action, ...]
-    ) -> Iterator[Obligation]:
-        kinds = {variable.name: variable.type for variable in self.program.variables}
-        for name, times in wrote.items():
-            for (one, did, value), (two, did_too, other) in zip(times, times[1:], strict=False):
-                differ = smt.negation(smt.equal(value, other, kinds[VariableName(name)]))
-                message = f"`{actions[one].text}` and `{actions[two].text}` may write different values to `{name}`"
-                span = actions[two].statement.span
-                yield Obligation(Code.TWO_WRITERS, message, span, smt.all_of([did, did_too, differ]))
-
-    def _tests(self, table: Table) -> None:
-        """Every condition of the table is evaluated in every cycle, whatever the others say."""
-        relational = {id(t): (t, line.cell_span(at)) for line in table.lines for at, t in enumerate(line.tests) if t is not None}
-        frame, known = self._start()
-        assumed = [a.condition for a in self.program.assumptions if a.name in table.assumptions]
-        known = (*known, *(encode(condition, frame) for condition in assumed))
-        for test, span in relational.values():
-            run = Run(self.program)
-            run.owe(test.condition, frame, ())
-            run.obligations = [replace(one, span=span) for one in run.obligations]
-            self._settle(Context(frame, known, f"in table `{table.name}`", table.name), run)
-
-    def _conditions(self) -> None:
-        """Assumptions, invariants and `deferred until`."""
-        frame, known = self._start()
-        conditions = [a.condition for a in self.program.assumptions]
-        conditions += [i.condition for i in self.program.invariants]
-        conditions += [v.deferred_until for v in self.program.variables if v.deferred_until is not None]
-        for condition in conditions:
-            run = Run(self.program)
-            run.owe(condition, frame, ())
-            self._settle(Context(frame, known, ""), run)
-        for level in self.program.levels:
-            from rcsc.model import TableByCommand
-
-            if isinstance(level.tables, TableByCommand):
-                run = Run(self.program)
-                run.owe(level.tables.selector, frame, ())
-                self._settle(Context(frame, known, ""), run)
-
-    def _alone(self, procedure: Procedure) -> None:
-        """A procedure that no line calls, for all values of its parameters."""
-        frame, known = self._start()
-        run = Run(self.program)
-        extra = tuple(
-            Variable(VariableName(p.name), Kind.INPUT, p.type, False) for p in procedure.params
+    def _none(self, table: Table) -> Node:
+        """That no line matches."""
+        return values.all_of(
+            values.negation(
+                values.all_of(self._known(test.condition for test in line.tests if test is not None))
+            )
+            for line in table.lines
         )
-        for variable in extra:
-            frame.local[variable.name] = smt.variable(variable.name + "!", variable.type)
-        ranges = [within(frame.local[v.name], v.type) for v in extra if not isinstance(v.type, Bool)]
-        context = Context(Frame({**frame.leaves, **frame.local}), (*known, *ranges), "", "", extra)
-        run.execute(procedure.body, frame, ())
-        self._settle(context, run)
+
+    def _actions(self, run: Run, actions: tuple[Action, ...]) -> None:
+        """Runs them left to right; an output that two of them write gets one value."""
+        written: dict[str, tuple[Node, str]] = {}
+        for action in actions:
+            before = run.state
+            run.state = State(dict(before.leaves))
+            run.cell = action.statement.span
+            run.execute((action.statement,))
+            for name, now in run.state.wrote.items():
+                if name not in self._outputs:
+                    continue
+                if name in written:
+                    self._one_writer(
+                        run, name, values.both(written[name][0], now), before, (written[name][1], action)
+                    )
+                written[name] = (
+                    values.either(written[name][0] if name in written else FALSE, now),
+                    action.text,
+                )
+
+    def _one_writer(self, run: Run, name: str, twice: Node, before: State, who: tuple[str, Action]) -> None:
+        same = values.equal(before.leaves[name], run.state.leaves[name])
+        message = f"`{who[0]}` and `{who[1].text}` can write different values to `{name}`"
+        run.owe(Code.TWO_WRITERS, message, who[1].statement.span, values.follows(twice, same))
 
     # --- settling ---
 
-    def _settle(self, context: Context, run: Run) -> None:
-        """Asks whether anything owed can go wrong; one query where nothing can."""
-        self.tally.by_intervals += run.discharged
-        if not run.obligations:
-            return
-        self.tally.by_solver += len(run.obligations)
-        solver = Solver(self.options.timeout_ms, self.options.memory_mb)
-        solver.add(*context.known)
-        wrong = [one.wrong for one in run.obligations]
-        if len(wrong) > 1 and solver.check(smt.any_of(wrong)) is Answer.UNSATISFIABLE:
-            self.tally.queries += solver.queries
-            return
-        for obligation in run.obligations:
-            answer = solver.check(obligation.wrong)
-            if answer is Answer.SATISFIABLE:
-                self._report(solver, context, obligation)
-            elif answer is Answer.UNKNOWN:
-                message = f"could not be decided: {obligation.message}"
-                self.found.append(Diagnostic(Code.UNDECIDED, message, Label(obligation.span), help=_PATIENCE))
-        self.tally.queries += solver.queries
+    def _keep(self, run: Run, who: str, span: Span) -> None:
+        """Owes every invariant that the run may have touched."""
+        for invariant, reads in self._kept:
+            if not reads.isdisjoint(run.state.leaves):
+                after = self._run()
+                after.state = State(run.state.leaves)
+                good = after.evaluate(invariant.condition)
+                run.owe(Code.INVARIANT_BROKEN, f"{who} can break invariant `{invariant.name}`", span, good)
 
-    def _report(self, solver: Solver, context: Context, obligation: Obligation) -> None:
-        if any(d.code is obligation.code and d.primary.span == obligation.span for d in self.found):
-            return
-        solver.push()
-        solver.add(obligation.wrong)
-        variables = [*self._of_interest(obligation), *context.extra]
-        witness = least_witness(solver, variables, context.frame)
-        solver.pop()
-        columns: tuple[WitnessColumn, ...] = ()
-        if witness is not None:
-            names = [v.name for v in variables]
-            kinds = {v.name: v.type for v in variables}
-            columns = (WitnessColumn(context.table, tuple(names), tuple(spell(kinds[n], witness[n]) for n in names)),)
-        notes = (context.where,) if context.where else ()
-        self.found.append(
-            Diagnostic(
-                obligation.code, obligation.message, Label(obligation.span), notes=notes, help=_HELP.get(obligation.code, ()),
-                witnesses=columns,
-            )  # fmt: skip
+    def _settle(self, run: Run, base: Callable[[], list[Node]], where: str, table: str) -> bool:
+        """Asks what bounds did not settle; whether all is shown."""
+        self.tally.by_intervals += run.settled
+        failures = self._asker.unshown(run.obligations, base, self._shown)
+        for failure in failures:
+            owed = failure.obligation
+            cause = self._causes.setdefault((owed.code, owed.span, owed.message), _Cause())
+            cause.failures.append(failure)
+            cause.where.append((where, table))
+        return not failures
+
+    def _shown(self, owed: Obligation) -> bool:
+        """Whether a witness is wanted, too."""
+        cause = self._causes.get((owed.code, owed.span, owed.message))
+        return cause is None or len(cause.failures) < MOST_WITNESSES
+
+    def _give_up(self, where: str, span: Span) -> None:
+        message = f"what runs {where} has more steps than can be followed"
+        self._too_long.append(
+            Diagnostic(Code.UNDECIDED, message, Label(span), help=("make its loops shorter",))
         )
 
-    def _of_interest(self, obligation: Obligation) -> list[Variable]:
-        """Leaves that the obligation speaks of."""
-        names = smt.constants(obligation.wrong)
-        return [variable for variable in self.program.variables if variable.name in names]
 
+def _computes(expr: Expr) -> bool:
+    """Whether evaluating the condition can owe anything: more than comparisons of leaves and constants."""
+    match expr:
+        case Select():
+            return True
+        case Among(subject=subject):
+            return _computes(subject)
+        case Apply(op=op, args=args):
+            return op not in _DEFINED or any(_computes(arg) for arg in args)
+        case _:
+            return False
+
+
+# --- diagnostics -------------------------------------------------------------------------
 
 _PATIENCE = ("give each query more time with `--timeout`, or narrow the declared ranges",)
 _HELP: dict[Code, tuple[str, ...]] = {
     Code.OVERFLOW: ("narrow the declared ranges, or guard the operation with `if`",),
     Code.DIVISION_BY_ZERO: ("guard the division with `if`, or exclude zero from the divisor's range",),
     Code.INDEX: ("guard the access with `if`, or narrow the index's range",),
-    Code.ASSIGNED_RANGE: ("guard the assignment with `if`, use `min` or `max`, or widen the variable's range",),
+    Code.ASSIGNED_RANGE: (
+        "guard the assignment with `if`, use `min` or `max`, or widen the variable's range",
+    ),
     Code.USE_BEFORE_ASSIGNMENT: ("give the local a first value where it is declared",),
     Code.TWO_WRITERS: ("let one action of the line write the output",),
+    Code.ASSUMPTION_NOT_PROVED: ("declare it `assumed` or `monitored`",),
+    Code.INVARIANT_BROKEN: ("mend what runs there, or strengthen the invariant if that state cannot occur",),
 }
 
+
+def _diagnostic(code: Code, span: Span, message: str, cause: _Cause) -> Diagnostic:
+    failing = [
+        one for one in zip(cause.failures, cause.where, strict=True) if one[0].outcome is Outcome.FAILS
+    ]
+    if not failing:
+        said = f"could not be decided whether this holds: {message}"
+        return Diagnostic(Code.UNDECIDED, said, Label(span), help=_PATIENCE)
+    columns = tuple(
+        WitnessColumn(
+            table,
+            tuple(variable.name for variable, _ in failure.witness),
+            tuple(spell(variable.type, value) for variable, value in failure.witness),
+        )
+        for failure, (_, table) in failing[:MOST_WITNESSES]
+        if failure.witness
+    )
+    notes = tuple(dict.fromkeys(where for _, (where, _) in failing if where))[:MOST_WITNESSES]
+    more = max(0, len(failing) - MOST_WITNESSES)
+    return Diagnostic(code, message, Label(span), (), notes, _HELP.get(code, ()), columns, more)

@@ -3,20 +3,26 @@
 The only place where a `ProvedProgram` is made, and only when nothing is wrong and nothing undecided.
 """
 
+import signal
 from collections.abc import Collection, Mapping
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, replace
-from multiprocessing import get_context
+from multiprocessing import active_children, get_context
 
 from rcsc.diagnostics.diagnostic import Diagnostic, Severity, sort_key
-from rcsc.model import Assumption, AssumptionName, Program, ProvedProgram, Standing, Table, TableName, seal_of_proof
+from rcsc.meaning import relying
+from rcsc.model import Backing, Program, ProvedProgram, Table, TableName, seal_of_proof
+from rcsc.prove import smt
 from rcsc.prove.certificate import program_certificate
-from rcsc.prove.invariants import assumptions_at_first, prove_assumptions, prove_invariants
-from rcsc.prove.obligations import Obligations, Tally
+from rcsc.prove.discharge import Tally
+from rcsc.prove.invariants import assumptions_satisfiable, at_first
+from rcsc.prove.obligations import Obligations
 from rcsc.prove.options import Options
 from rcsc.prove.report import diagnostics
+from rcsc.prove.smt import Answer
 from rcsc.prove.table import prove_table
-from rcsc.prove.verdict import TableVerdict
+from rcsc.prove.verdict import ContradictoryAssumptions, TableVerdict, Undecided
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,66 +47,98 @@ class ProgramVerdict:
 def prove_program(
     program: Program, options: Options, only: Collection[TableName] | None = None
 ) -> ProgramVerdict:
-    """Prove the program's tables (or `only` these) and everything that its procedures owe."""
-    found = prove_invariants(program, options)
-    if not any(one.severity is Severity.ERROR for one in found):
-        found += prove_assumptions(program, options)
-    sound = not found
-    found += assumptions_at_first(program)
-    invariants = [one.condition for one in program.invariants] if sound else []
-    relying = _with_invariants(program) if sound else program
-    wanted = [table for table in relying.tables if only is None or table.name in only]
-    verdicts = _tables(relying, wanted, options)
+    """Prove the program's tables (or `only` these) and everything that its procedures owe.
+
+    Tables may rely on the invariants: they are shown in the same step, by induction over cycles.
+    """
+    found = list(at_first(program))
+    owed = Obligations(program, options)
+    wanted = [table for table in program.tables if only is None or table.name in only]
+    found += owed.prove(wanted)
+    assuming = relying(program)
+    known = {table.name for table in wanted}
+    tables = [table for table in assuming.tables if table.name in known]
+    verdicts = _verdicts(assuming, tables, options, owed.undefined)
     for verdict in verdicts:
-        found += diagnostics(relying, verdict)
-    owed = Obligations(program, options, invariants)
-    found += owed.prove([table for table in program.tables if only is None or table.name in only])
+        if verdict.table.name not in owed.undefined:
+            found += diagnostics(assuming, verdict)
     findings = tuple(sorted(dict.fromkeys(found), key=sort_key))
-    right = only is None and not any(one.severity is Severity.ERROR for one in findings)
-    proved = None
-    certificate = None
-    if right:
-        backings = tuple((verdict.table.name, verdict.backing) for verdict in verdicts)
-        proved = ProvedProgram(program, backings, seal_of_proof())
-        certificate = _certificate(relying, verdicts, owed.tally)
-    return ProgramVerdict(findings, proved, tuple(verdicts), certificate, owed.tally)
+    wrong = any(one.severity is Severity.ERROR for one in findings)
+    if wrong or only is not None:
+        return ProgramVerdict(findings, None, verdicts, None, owed.tally)
+    backings = tuple((verdict.table.name, verdict.backing) for verdict in verdicts)
+    proved = ProvedProgram(program, backings, seal_of_proof())
+    return ProgramVerdict(findings, proved, verdicts, _certificate(program, verdicts, owed.tally), owed.tally)
 
 
-def _with_invariants(program: Program) -> Program:
-    """Proved invariants as assumptions that tables reading their variables may rely on."""
-    from rcsc.resolve.leaves import read_by
-
-    if not program.invariants:
-        return program
-    made = [Assumption(AssumptionName(i.name), Standing.PROVED, i.condition, i.doc, i.span) for i in program.invariants]
-    reads = {one.name: set(read_by(one.condition)) for one in made}
-    tables = tuple(
-        replace(
-            table,
-            assumptions=(
-                *table.assumptions,
-                *(one.name for one in made if reads[one.name] & set(table.variables)),
-            ),
-        )
-        for table in program.tables
-    )
-    return replace(program, assumptions=(*program.assumptions, *made), tables=tables)
-
-
-def _tables(program: Program, tables: list[Table], options: Options) -> list[TableVerdict]:
+def _verdicts(
+    program: Program, tables: list[Table], options: Options, undefined: Collection[str]
+) -> tuple[TableVerdict, ...]:
     """Each table's verdict, in order; in processes where there are several tables and jobs."""
-    if options.jobs <= 1 or len(tables) <= 1:
-        return [prove_table(program, table, options) for table in tables]
-    with ProcessPoolExecutor(min(options.jobs, len(tables)), mp_context=get_context("spawn")) as pool:
-        waiting = [pool.submit(prove_table, program, table, options) for table in tables]
-        return [one.result() for one in waiting]
+    defined = [table for table in tables if table.name not in undefined]
+    if options.jobs > 1 and len(defined) > 1:
+        made = _in_processes(program, defined, options)
+    else:
+        made = [_verdict(program, table, options) for table in defined]
+    by_name = {one.table.name: one for one in made}
+    why = Undecided("a condition is not defined for every input")
+    return tuple(by_name.get(table.name) or _left_open(table, why) for table in tables)
 
 
-def _certificate(program: Program, verdicts: list[TableVerdict], tally: Tally) -> Mapping[str, object]:
+def _verdict(program: Program, table: Table, options: Options) -> TableVerdict:
+    """One table, its assumptions not contradictory; exhausted memory leaves it open."""
+    try:
+        verdict = prove_table(program, table, options)
+        if not table.assumptions or any(isinstance(one, ContradictoryAssumptions) for one in verdict.found):
+            return verdict
+        possible = assumptions_satisfiable(program, table, options)
+    except smt.troubles() as trouble:
+        return _left_open(table, Undecided(f"{type(trouble).__name__}: {trouble}"))
+    if possible is Answer.SATISFIABLE:
+        return verdict
+    wrong = ContradictoryAssumptions() if possible is Answer.UNSATISFIABLE else Undecided("its assumptions")
+    return replace(verdict, found=(wrong,), certificate=None)
+
+
+def _left_open(table: Table, why: Undecided) -> TableVerdict:
+    return TableVerdict(table, (why,), Backing("none", confirmed_by_z3=False), None, 0.0)
+
+
+def _in_processes(program: Program, tables: list[Table], options: Options) -> list[TableVerdict]:
+    """Each table in a process of a pool; none outlives this call, also when it is interrupted."""
+    one_each = replace(options, jobs=1)
+    pool = ProcessPoolExecutor(
+        min(options.jobs, len(tables)), mp_context=get_context("spawn"), initializer=_leave_interrupts
+    )
+    try:
+        waiting = [pool.submit(_verdict, program, table, one_each) for table in tables]
+        return [_result(one, table) for one, table in zip(waiting, tables, strict=True)]
+    except BaseException:
+        for child in active_children():
+            child.terminate()
+        raise
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _leave_interrupts() -> None:
+    """Ctrl-C is the parent's business."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _result(waiting: Future[TableVerdict], table: Table) -> TableVerdict:
+    try:
+        return replace(waiting.result(), table=table)
+    except BrokenProcessPool:
+        return _left_open(table, Undecided("the process that proved it has ended early"))
+
+
+def _certificate(program: Program, verdicts: tuple[TableVerdict, ...], tally: Tally) -> Mapping[str, object]:
     tables = [verdict.certificate for verdict in verdicts if verdict.certificate is not None]
-    owed = [{"name": f"{tally.by_intervals} obligations", "method": "intervals"}] if tally.by_intervals else []
+    owed = (
+        [{"name": f"{tally.by_intervals} obligations", "method": "intervals"}] if tally.by_intervals else []
+    )
     if tally.by_solver:
-        owed.append({"name": f"{tally.by_solver} obligations of procedures and conditions", "method": "z3"})
-    if program.invariants:
-        owed.append({"name": f"{len(program.invariants)} invariants", "method": "z3"})
+        what = "obligations of procedures, conditions and invariants"
+        owed.append({"name": f"{tally.by_solver} {what}", "method": "z3"})
     return program_certificate(program, tables, owed)

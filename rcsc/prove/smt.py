@@ -5,6 +5,7 @@ In: terms built by the functions here. Out: `Answer`s. A time-out, exhausted mem
 """
 
 import struct
+import sys
 from collections.abc import Sequence
 from enum import Enum, auto
 from functools import cache
@@ -29,6 +30,12 @@ def _z3() -> Any:
     import z3
 
     return z3
+
+
+def troubles() -> tuple[type[BaseException], ...]:
+    """What Z3 and exhausted memory raise, also outside a check: nothing is proved then."""
+    loaded = sys.modules.get("z3")
+    return (MemoryError,) if loaded is None else (MemoryError, loaded.Z3Exception)
 
 
 def _double_sort() -> Any:
@@ -194,8 +201,11 @@ class Solver:
         self.queries += 1
         try:
             answer = self._solver.check(*assuming)
-        except z3.Z3Exception:
+            why = self._solver.reason_unknown() if answer == z3.unknown else ""
+        except (z3.Z3Exception, MemoryError):
             return Answer.UNKNOWN
+        if "interrupted" in why:  # Z3 takes Ctrl-C for itself
+            raise KeyboardInterrupt
         if answer == z3.sat:
             return Answer.SATISFIABLE
         return Answer.UNSATISFIABLE if answer == z3.unsat else Answer.UNKNOWN

@@ -1,35 +1,35 @@
-"""Symbolic runs of statements, and what must be shown of them.
+"""Symbolic runs of expressions and statements, and what they owe.
 
-In: statements and a frame of terms. Out: the frame behind them, and a list of obligations: at which place, under what
-path, what must not happen. What interval arithmetic already excludes is only counted.
+In: statements and a state. Out: the state behind them, and obligations: at which place, on which path, what must
+hold there. A value that owes something is taken to have paid from there on: later values rest on it, and the
+first that does not is reported. Every way through `if` and `case` is followed once; states are merged behind.
 """
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 from rcsc.diagnostics.codes import Code
 from rcsc.model import (
+    COMPARISONS,
     I64_MAX,
     I64_MIN,
+    NOWHERE,
     U64_MAX,
     Among,
     Apply,
-    Arm,
     Assign,
-    Bool,
     Call,
     Case,
     Expr,
     For,
     If,
     Int,
-    Kind,
     Literal,
     Local,
     Op,
     Place,
     Procedure,
-    Program,
     Read,
     ReadLocal,
     Real,
@@ -38,41 +38,73 @@ from rcsc.model import (
     Statement,
     ToElement,
     ToLeaf,
-    key_bounds,
+    spell,
 )
-from rcsc.prove import smt
-from rcsc.prove.encode import Frame, encode, within
-from rcsc.prove.smt import Term
+from rcsc.prove import values
+from rcsc.prove.values import FALSE, TRUE, Fact, Node
 from rcsc.source import Span
 
-_ARITHMETIC = frozenset({Op.ADD, Op.SUB, Op.MUL, Op.DIV, Op.MOD, Op.NEG, Op.ABS, Op.TO_INT})
+MOST_STEPS = 2_000_000
+"""Statements and array elements that one run follows."""
+
+_RESULTS = {
+    Op.ADD: "sum",
+    Op.SUB: "difference",
+    Op.MUL: "product",
+    Op.DIV: "quotient",
+    Op.MOD: "remainder",
+    Op.NEG: "negative",
+    Op.ABS: "absolute value",
+    Op.MIN: "least",
+    Op.MAX: "greatest",
+}
+_LEAVES = "can leave 64 bits"
 
 
-@dataclass(frozen=True, slots=True)
+class TooLongError(Exception):
+    """A run has more steps than are followed."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Obligation:
-    """Something that must not happen.
+    """Something that must hold at a place.
 
     Attributes:
-        wrong: True of the inputs for which it happens, path included.
+        path: When the place is reached.
+        good: What must hold there.
     """
 
     code: Code
     message: str
     span: Span
-    wrong: Term
+    path: Node
+    good: Node
 
 
-def ghost(leaf: str) -> str:
-    """The frame entry that says whether the present action has written the leaf."""
-    return f"wrote!{leaf}"
+@dataclass(slots=True)
+class State:
+    """Values at one point of a run.
+
+    Attributes:
+        leaves: Of the leaves written so far; the others are as they were.
+        local: Of parameters, locals and loop variables.
+        assigned: For a local declared without a value, when it has one.
+        wrote: For each leaf that the present action may have written, when it has.
+    """
+
+    leaves: dict[str, Node] = field(default_factory=dict)
+    local: dict[str, Node] = field(default_factory=dict)
+    assigned: dict[str, Node] = field(default_factory=dict)
+    wrote: dict[str, Node] = field(default_factory=dict)
+
+    def copy(self) -> "State":
+        """A state that can go its own way."""
+        return State(dict(self.leaves), dict(self.local), dict(self.assigned), dict(self.wrote))
 
 
-def fits(kind: Scalar, expr: Expr) -> bool:
-    """Whether interval arithmetic shows that the value of `expr` is one of `kind`."""
-    found = expr.type
-    if isinstance(kind, Int) and isinstance(found, Int) or isinstance(kind, Real) and isinstance(found, Real):
-        return kind.low <= found.low and found.high <= kind.high
-    return isinstance(found, Bool) or key_bounds(found) == key_bounds(kind)
+def word(kinds: Iterable[Int]) -> tuple[int, int]:
+    """The 64-bit integers in which an operation on values of these types is done: unsigned where none is negative."""
+    return (0, U64_MAX) if min(kind.low for kind in kinds) >= 0 else (I64_MIN, I64_MAX)
 
 
 @dataclass(slots=True)
@@ -80,203 +112,333 @@ class Run:
     """One symbolic run.
 
     Attributes:
-        obligations: What is owed, in order met.
-        discharged: How many obligations intervals settled.
+        procedures: All of the program's, by name.
+        kinds: The type of every leaf.
+        start: The leaves before the run, made as they are met; runs may share it.
+        obligations: What is owed and bounds do not settle, in the order met.
+        settled: How many obligations bounds settled.
+        stops: Called where a cycle may end early (an extern procedure's result is refused).
+        cell: Where the present action or condition is written.
+        fresh: Values that the run has made up: results of extern procedures, locals without a value.
     """
 
-    program: Program
+    procedures: Mapping[str, Procedure]
+    kinds: Mapping[str, Scalar]
+    start: dict[str, Node]
+    state: State = field(default_factory=State)
+    path: Node = TRUE
+    facts: dict[Node, Fact] = field(default_factory=dict)
     obligations: list[Obligation] = field(default_factory=list)
-    discharged: int = 0
-    _fresh: int = 0
-    _procedures: dict[str, Procedure] = field(default_factory=dict)
+    settled: int = 0
+    stops: Callable[["Run", str], None] | None = None
+    cell: Span = NOWHERE
+    fresh: list[Node] = field(default_factory=list)
+    steps: int = 0
 
-    def __post_init__(self) -> None:
-        self._procedures = {procedure.name: procedure for procedure in self.program.procedures}
+    # --- owing ---
 
-    # --- what expressions owe ---
+    def owe(self, code: Code, message: str, span: Span, good: Node) -> None:
+        """Adds an obligation, unless the bounds settle it."""
+        if self.path is FALSE or (good.known and good.low):
+            self.settled += 1
+        else:
+            self.obligations.append(Obligation(code, message, self._written_at(span), self.path, good))
 
-    def owe(self, expr: Expr, frame: Frame, path: tuple[Term, ...]) -> None:
-        """Adds what evaluating `expr` on this path must not do."""
+    def owe_inside(
+        self, code: Code, node: Node, ends: tuple[int | float, int | float], message: str, span: Span
+    ) -> Node:
+        """Owes that the node lies within the ends; from then on it does."""
+        low, high = ends
+        if node.ordered and low <= node.low and node.high <= high:
+            self.settled += 1
+            return node
+        self.owe(code, message, span, values.inside(node, low, high))
+        return values.narrowed(node, low, high)
+
+    def _written_at(self, span: Span) -> Span:
+        """Expressions in a table's cell are found by the cell."""
+        return span if span.file else self.cell
+
+    def assume(self, condition: Node) -> None:
+        """What is known from the start: its bounds are used; asserting it is the asker's business."""
+        values.learn(condition, self.facts)
+
+    @contextmanager
+    def where(self, condition: Node, *, holds: bool = True) -> Iterator[None]:
+        """Inside, the path is the one on which the condition holds (or does not)."""
+        path, facts = self.path, self.facts
+        self.path = values.both(path, condition if holds else values.negation(condition))
+        self.facts = dict(facts)
+        values.learn(condition, self.facts, holds=holds)
+        yield
+        self.path, self.facts = path, facts
+
+    def _step(self, many: int = 1) -> None:
+        self.steps += many
+        if self.steps > MOST_STEPS:
+            raise TooLongError
+
+    # --- expressions ---
+
+    def evaluate(self, expr: Expr) -> Node:
+        """The value of an expression; what it owes is added."""
         match expr:
-            case Literal() | Read():
-                return
-            case ReadLocal(name=name):
-                self._assigned(expr, name, frame)
+            case Literal(value=value, type=kind):
+                return values.constant(kind, value)
+            case Read(name=name):
+                return self.leaf(name)
+            case ReadLocal(name=name, type=kind, span=span):
+                return self._local(name, kind, span)
             case Select(leaves=leaves, index=index):
-                self.owe(index, frame, path)
-                self._index(index, len(leaves), frame, path)
-            case Among(subject=subject):
-                self.owe(subject, frame, path)
+                return self._selected(leaves, self._index(index, len(leaves)))
+            case Among(subject=subject, values=members):
+                return values.among(self.evaluate(subject), members)
+            case Apply(op=Op.AND | Op.OR | Op.IMPLIES):
+                return self._logic(expr)
+            case Apply(op=Op.NOT, args=(inner,)):
+                return values.negation(self.evaluate(inner))
             case Apply(op=op, args=args):
-                self.owe(args[0], frame, path)
-                if len(args) == 2:
-                    self.owe(args[1], frame, (*path, *_reached(op, args[0], frame)))
-                if op in (Op.DIV, Op.MOD):
-                    self._divisor(expr, args[1], frame, path)
-                if op in _ARITHMETIC and isinstance(expr.type, Int):
-                    self._in_64_bits(expr, op, args, frame, path)
+                return self._applied(expr, op, tuple(self.evaluate(arg) for arg in args))
 
-    def _assigned(self, expr: ReadLocal, name: str, frame: Frame) -> None:
-        if name not in frame.local:
-            message = f"`{name}` may be read before it is assigned"
-            self.obligations.append(Obligation(Code.USE_BEFORE_ASSIGNMENT, message, expr.span, smt.truth(True)))
-            frame.local[name] = self.fresh(name, expr.type)
+    def leaf(self, name: str) -> Node:
+        """The value of a leaf, within what is known of it here."""
+        node = self.state.leaves.get(name)
+        if node is None:
+            if name not in self.start:
+                self.start[name] = values.variable(name, self.kinds[name])
+            node = self.start[name]
+        return self._sharpened(node)
 
-    def _index(self, index: Expr, length: int, frame: Frame, path: tuple[Term, ...]) -> None:
-        if isinstance(index.type, Int) and 0 <= index.type.low and index.type.high < length:
-            self.discharged += 1
-            return
-        inside = within(encode(index, frame), Int(0, length - 1))
-        self._add(Code.INDEX, f"the index may lie outside 0 .. {length - 1}", index.span, inside, path)
+    def _sharpened(self, node: Node) -> Node:
+        fact = self.facts.get(values.root(node))
+        return node if fact is None else values.narrowed(node, *fact)
 
-    def _divisor(self, whole: Expr, divisor: Expr, frame: Frame, path: tuple[Term, ...]) -> None:
-        kind = divisor.type
-        assert isinstance(kind, Int | Real)
-        if not kind.low <= 0 <= kind.high:
-            self.discharged += 1
-            return
-        zero = smt.equal(encode(divisor, frame), smt.literal(kind, 0.0 if isinstance(kind, Real) else 0), kind)
-        self._add(Code.DIVISION_BY_ZERO, "the divisor may be zero", divisor.span, smt.negation(zero), path)
+    def _local(self, name: str, kind: Scalar, span: Span) -> Node:
+        good = self.state.assigned.get(name, TRUE)
+        message = f"`{name}` can be read before it is assigned"
+        self.owe(Code.USE_BEFORE_ASSIGNMENT, message, span, good)
+        if name not in self.state.local:
+            self.state.local[name] = self.any_value(name, kind)
+        return self._sharpened(self.state.local[name])
 
-    def _in_64_bits(self, expr: Expr, op: Op, args: tuple[Expr, ...], frame: Frame, path: tuple[Term, ...]) -> None:
-        kind = expr.type
-        assert isinstance(kind, Int)
-        if I64_MIN <= kind.low and kind.high <= (U64_MAX if kind.low >= 0 else I64_MAX):
-            self.discharged += 1
-            return
-        low, high = (0, U64_MAX) if kind.low >= 0 else (I64_MIN, I64_MAX)
-        inside = within(encode(expr, frame), Int(low, high))
-        if op is Op.TO_INT:
-            inside = smt.all_of([smt.is_finite(encode(args[0], frame)), inside])
-        self._add(Code.OVERFLOW, "the result may not fit in 64 bits", expr.span, inside, path)
+    def any_value(self, name: str, kind: Scalar) -> Node:
+        """A value of the type that nothing else is known of."""
+        self.fresh.append(values.variable(f"{name}!{len(self.fresh) + 1}", kind))
+        return self.fresh[-1]
 
-    def _add(self, code: Code, message: str, span: Span, right: Term, path: Iterable[Term]) -> None:
-        self.obligations.append(Obligation(code, message, span, smt.all_of([*path, smt.negation(right)])))
+    def _index(self, expr: Expr, length: int) -> Node:
+        message = f"the index can lie outside 0 .. {length - 1}"
+        return self.owe_inside(Code.INDEX, self.evaluate(expr), (0, length - 1), message, expr.span)
 
-    def fresh(self, name: str, kind: Scalar) -> Term:
-        """A new constant."""
-        self._fresh += 1
-        return smt.variable(f"{name}!{self._fresh}", kind)
+    def _selected(self, leaves: tuple[str, ...], index: Node) -> Node:
+        low, high = max(int(index.low), 0), min(int(index.high), len(leaves) - 1)
+        low = min(low, high)
+        self._step(high - low)
+        found = self.leaf(leaves[high])
+        for at in range(high - 1, low - 1, -1):
+            here = values.equal(index, values.constant(index.kind, at))
+            found = values.choice(here, self.leaf(leaves[at]), found)
+        return found
+
+    def _logic(self, expr: Apply) -> Node:
+        """The right operand is looked at only where the left one does not decide."""
+        left = self.evaluate(expr.args[0])
+        with self.where(left, holds=expr.op is not Op.OR):
+            right = self.evaluate(expr.args[1])
+        join = {Op.AND: values.both, Op.OR: values.either, Op.IMPLIES: values.follows}
+        return join[expr.op](left, right)
+
+    def _applied(self, expr: Apply, op: Op, args: tuple[Node, ...]) -> Node:
+        kinds = [arg.type for arg in expr.args]
+        if op in (Op.DIV, Op.MOD):
+            args = self._divisor(expr, args)
+        if isinstance(kinds[0], Int) and op is not Op.TO_REAL:
+            return self._whole(expr, op, args, [kind for kind in kinds if isinstance(kind, Int)])
+        if op in COMPARISONS:
+            return values.compare(op, *args)
+        if op is Op.TO_INT and isinstance(expr.type, Int):
+            return self._truncated(expr, args[0], expr.type)
+        return values.arithmetic(op, args, expr.type)
+
+    def _divisor(self, expr: Apply, args: tuple[Node, ...]) -> tuple[Node, ...]:
+        divisor = args[1]
+        nonzero = values.negation(values.equal(divisor, values.constant(divisor.kind, 0)))
+        self.owe(Code.DIVISION_BY_ZERO, "the divisor can be zero", expr.args[1].span, nonzero)
+        facts: dict[Node, Fact] = {}
+        values.learn(nonzero, facts)
+        fact = facts.get(values.root(divisor))
+        return args[0], divisor if fact is None else values.narrowed(divisor, *fact)
+
+    def _whole(self, expr: Apply, op: Op, args: tuple[Node, ...], kinds: list[Int]) -> Node:
+        """An operation on integers; operands and result share one 64-bit type."""
+        if isinstance(expr.type, Int):
+            kinds = [*kinds, expr.type]
+        ends = word(kinds)
+        message = "this value can lie outside the 64 bits in which it is used"
+        args = tuple(
+            self.owe_inside(Code.OVERFLOW, arg, ends, message, written.span)
+            for arg, written in zip(args, expr.args, strict=True)
+        )
+        if op in COMPARISONS:
+            return values.compare(op, *args)
+        if op is Op.MOD:  # the machine divides first
+            quotient = values.arithmetic(Op.DIV, args, expr.type)
+            self.owe_inside(Code.OVERFLOW, quotient, ends, f"the {_RESULTS[Op.DIV]} {_LEAVES}", expr.span)
+        found = values.arithmetic(op, args, expr.type)
+        return self.owe_inside(Code.OVERFLOW, found, ends, f"the {_RESULTS[op]} {_LEAVES}", expr.span)
+
+    def _truncated(self, expr: Apply, arg: Node, kind: Int) -> Node:
+        """A double without its fraction, where that is in 64 bits; never so of a NaN."""
+        low, high = word([kind])
+        least = values.constant(arg.kind, -1.0 if low == 0 else float(low))
+        above = values.compare(Op.LT if low == 0 else Op.LE, least, arg)
+        below = values.compare(Op.LT, arg, values.constant(arg.kind, float(high)))
+        self.owe(Code.OVERFLOW, f"the whole number {_LEAVES}", expr.span, values.both(above, below))
+        return values.narrowed(values.arithmetic(Op.TO_INT, (arg,), kind), low, high)
 
     # --- statements ---
 
-    def execute(self, body: Iterable[Statement], frame: Frame, path: tuple[Term, ...]) -> None:
-        """Runs statements; the frame is changed in place."""
+    def execute(self, body: Iterable[Statement]) -> None:
+        """Runs statements; the state is changed."""
         for statement in body:
+            if self.path is FALSE:
+                return
+            self._step()
             match statement:
-                case Assign(place=place, value=value, span=span):
-                    self._assign(place, value, frame, path, span)
-                case Local(name=name, type=kind, value=value, span=span):
-                    frame.local.pop(name, None)
-                    if value is not None:
-                        frame.local[name] = self._stored(kind, value, frame, path, f"`{name}`")
+                case Assign(place=place, value=value):
+                    self._assign(place, value)
+                case Local(name=name, type=kind, value=value):
+                    self._declare(name, kind, value)
                 case If(condition=condition, then=then, orelse=orelse):
-                    self.owe(condition, frame, path)
-                    self._branch(encode(condition, frame), then, orelse, frame, path)
-                case Case(subject=subject, arms=arms, orelse=orelse):
-                    self.owe(subject, frame, path)
-                    self._case(subject, arms, orelse, frame, path)
+                    self._branch(self.evaluate(condition), then, orelse)
+                case Case():
+                    self._case(statement)
                 case For(name=name, low=low, high=high, body=inner):
                     for count in range(low, high + 1):
-                        frame.local[name] = smt.literal(Int(low, high), count)
-                        self.execute(inner, frame, path)
+                        self.state.local[name] = values.constant(Int(low, high), count)
+                        self.execute(inner)
                 case Call(procedure=name, args=args):
-                    self.call(self._procedures[name], args, frame, path)
+                    self.call(self.procedures[name], [(arg.span, self.evaluate(arg)) for arg in args])
 
-    def _stored(self, kind: Scalar, value: Expr, frame: Frame, path: tuple[Term, ...], what: str) -> Term:
-        """The value, which must be one of `kind`; behind a failed check some value of it."""
-        self.owe(value, frame, path)
-        term = encode(value, frame)
-        if fits(kind, value):
-            self.discharged += 1
-            return term
-        low, high = key_bounds(kind) if not isinstance(kind, Int | Real) else (kind.low, kind.high)
-        self._add(Code.ASSIGNED_RANGE, f"the value may lie outside {low} .. {high}, the range of {what}", value.span,
-                  within(term, kind), path)  # fmt: skip
-        return term
+    def _stored(self, kind: Scalar, value: Node, what: str, span: Span) -> Node:
+        """The value as kept in a place of this type."""
+        if not isinstance(kind, Int | Real):
+            return value
+        ends = f"{spell(kind, kind.low)} .. {spell(kind, kind.high)}"
+        message = f"the value can lie outside {ends}, the range of `{what}`"
+        return self.owe_inside(Code.ASSIGNED_RANGE, value, (kind.low, kind.high), message, span)
 
-    def _assign(self, place: Place, value: Expr, frame: Frame, path: tuple[Term, ...], span: Span) -> None:
-        what = place.leaves[0].partition("[")[0] if isinstance(place, ToElement) else place.name
-        term = self._stored(place.type, value, frame, path, f"`{what}`")
-        if isinstance(place, ToLeaf):
-            frame.leaves[place.name] = term
-            frame.leaves[ghost(place.name)] = smt.truth(True)
-        elif isinstance(place, ToElement):
-            self.owe(place.index, frame, path)
-            self._index(place.index, len(place.leaves), frame, path)
-            at = encode(place.index, frame)
-            for number, leaf in enumerate(place.leaves):
-                here = smt.equal(at, smt.literal(place.index.type, number), place.index.type)
-                frame.leaves[leaf] = smt.choice(here, term, frame.leaves[leaf])
-                before = frame.leaves.get(ghost(leaf), smt.truth(False))
-                frame.leaves[ghost(leaf)] = smt.any_of([before, here])
+    def _assign(self, place: Place, value: Expr) -> None:
+        found = self.evaluate(value)
+        if isinstance(place, ToElement):
+            what = place.leaves[0].rpartition("[")[0] or place.leaves[0]
+            self._set_element(place, self._stored(place.type, found, what, value.span))
+        elif isinstance(place, ToLeaf):
+            self.write(place.name, self._stored(place.type, found, place.name, value.span), TRUE)
         else:
-            frame.local[place.name] = term
+            self.state.local[place.name] = self._stored(place.type, found, place.name, value.span)
+            self.state.assigned.pop(place.name, None)
 
-    def _branch(
-        self,
-        condition: Term,
-        then: tuple[Statement, ...],
-        orelse: tuple[Statement, ...],
-        frame: Frame,
-        path: tuple[Term, ...],
-    ) -> None:
-        other = frame.copy()
-        self.execute(then, frame, (*path, condition))
-        self.execute(orelse, other, (*path, smt.negation(condition)))
-        false = smt.truth(False)
-        for name in frame.leaves.keys() | other.leaves.keys():
-            one, two = frame.leaves.get(name, false), other.leaves.get(name, false)
-            frame.leaves[name] = smt.choice(condition, one, two)
-        frame.local = {
-            name: smt.choice(condition, term, other.local[name]) for name, term in frame.local.items() if name in other.local
-        }
+    def write(self, leaf: str, value: Node, when: Node) -> None:
+        """Writes a leaf, where `when` holds."""
+        if when is not TRUE:
+            value = values.choice(when, value, self.leaf(leaf))
+        self.state.leaves[leaf] = value
+        self.state.wrote[leaf] = values.either(self.state.wrote.get(leaf, FALSE), when)
 
-    def _case(
-        self, subject: Expr, arms: tuple[Arm, ...], orelse: tuple[Statement, ...], frame: Frame, path: tuple[Term, ...]
-    ) -> None:
-        if not arms:
-            self.execute(orelse, frame, path)
+    def _set_element(self, place: ToElement, value: Node) -> None:
+        index = self._index(place.index, len(place.leaves))
+        low, high = max(int(index.low), 0), min(int(index.high), len(place.leaves) - 1)
+        self._step(max(high - low, 0))
+        for at in range(low, high + 1):
+            self.write(place.leaves[at], value, values.equal(index, values.constant(index.kind, at)))
+
+    def _declare(self, name: str, kind: Scalar, value: Expr | None) -> None:
+        self.state.local.pop(name, None)
+        self.state.assigned[name] = FALSE
+        if value is not None:
+            self.state.local[name] = self._stored(kind, self.evaluate(value), name, value.span)
+            del self.state.assigned[name]
+
+    def _branch(self, condition: Node, then: tuple[Statement, ...], orelse: tuple[Statement, ...]) -> None:
+        if condition.known:
+            self.execute(then if condition.low else orelse)
             return
-        first, rest = arms[0], arms[1:]
-        chosen = encode(Among(subject, first.values), frame)
-        other = Case(subject, rest, orelse) if rest else None
-        # the subject is evaluated once, before any arm: later arms see it through their own copy of the frame
-        self._branch(chosen, first.body, (other,) if other else orelse, frame, path)
+        before = self.state
+        self.state = before.copy()
+        with self.where(condition):
+            self.execute(then)
+        one, self.state = self.state, before.copy()
+        with self.where(condition, holds=False):
+            self.execute(orelse)
+        self.state = self._merged(condition, one, self.state)
 
-    def call(self, procedure: Procedure, args: tuple[Expr, ...], frame: Frame, path: tuple[Term, ...]) -> None:
-        """Runs a procedure inlined; an extern one gives any values in range."""
+    def _case(self, statement: Case) -> None:
+        """The arms are disjoint, so that their order does not matter."""
+        subject = self.evaluate(statement.subject)
+        before, outer, facts = self.state, self.path, self.facts
+        arms: list[tuple[Node, State]] = []
+        left = TRUE
+        for arm in statement.arms:
+            chosen = values.among(subject, arm.values)
+            if chosen is not FALSE:
+                self.state = before.copy()
+                with self.where(chosen):
+                    self.execute(arm.body)
+                arms.append((chosen, self.state))
+            left = values.both(left, values.negation(chosen))
+        self.state, self.path, self.facts = before.copy(), values.both(outer, left), dict(facts)
+        values.learn(left, self.facts)
+        self.execute(statement.orelse)
+        self.path, self.facts = outer, facts
+        for chosen, state in reversed(arms):
+            self.state = self._merged(chosen, state, self.state)
+
+    def _merged(self, condition: Node, one: State, two: State) -> State:
+        """One state where the condition holds, the other elsewhere."""
+        self._step(len(one.leaves) + len(two.leaves))
+        self.state = State()
+
+        def leaf(state: State, name: str) -> Node:
+            return state.leaves[name] if name in state.leaves else self.leaf(name)
+
+        leaves = {
+            name: values.choice(condition, leaf(one, name), leaf(two, name))
+            for name in {**one.leaves, **two.leaves}
+        }
+        local = {**two.local, **one.local}  # a local that only one of the two has is that one's
+        for name in one.local.keys() & two.local.keys():
+            local[name] = values.choice(condition, one.local[name], two.local[name])
+        assigned = _joined(condition, one.assigned, two.assigned, TRUE)
+        wrote = _joined(condition, one.wrote, two.wrote, FALSE)
+        return State(leaves, local, assigned, wrote)
+
+    # --- calls ---
+
+    def call(self, procedure: Procedure, args: list[tuple[Span, Node]]) -> None:
+        """Runs a procedure in place; an extern one gives any values in range."""
         given = {
-            param.name: self._stored(param.type, arg, frame, path, f"`{param.name}`")
-            for param, arg in zip(procedure.params, args, strict=True)
+            param.name: self._stored(param.type, value, param.name, span)
+            for param, (span, value) in zip(procedure.params, args, strict=True)
         }
         if procedure.extern is not None:
-            self._extern(procedure, frame)
+            self._extern(procedure)
             return
-        outer, frame.local = frame.local, given
-        self.execute(procedure.body, frame, path)
-        frame.local = outer
+        outer = self.state.local, self.state.assigned
+        self.state.local, self.state.assigned = given, {}
+        self.execute(procedure.body)
+        self.state.local, self.state.assigned = outer
 
-    def _extern(self, procedure: Procedure, frame: Frame) -> None:
-        kinds = {variable.name: variable.type for variable in self.program.variables}
+    def _extern(self, procedure: Procedure) -> None:
+        """Its results are admitted one after the other; the cycle ends at the first that is refused."""
         for name in procedure.writes:
-            term = self.fresh(name, kinds[name])
-            frame.leaves[name] = smt.admitted(term, within(term, kinds[name]), smt.literal(kinds[name], _some(kinds[name])))
-            frame.leaves[ghost(name)] = smt.truth(True)
-
-    def outputs(self) -> list[str]:
-        """Leaves of output variables."""
-        return [variable.name for variable in self.program.variables if variable.kind is Kind.OUTPUT]
+            if self.stops is not None:
+                self.stops(self, procedure.name)
+            self.write(name, self.any_value(f"{name} from {procedure.name}", self.kinds[name]), TRUE)
 
 
-def _some(kind: Scalar) -> bool | int | float:
-    if isinstance(kind, Bool):
-        return False
-    return kind.low if isinstance(kind, Int | Real) else 0
-
-
-def _reached(op: Op, left: Expr, frame: Frame) -> tuple[Term, ...]:
-    """What must hold for the right operand to be looked at."""
-    if op in (Op.AND, Op.IMPLIES):
-        return (encode(left, frame),)
-    return (smt.negation(encode(left, frame)),) if op is Op.OR else ()
+def _joined(condition: Node, one: dict[str, Node], two: dict[str, Node], otherwise: Node) -> dict[str, Node]:
+    return {
+        name: values.choice(condition, one.get(name, otherwise), two.get(name, otherwise))
+        for name in {**one, **two}
+    }

@@ -93,7 +93,7 @@ def seen_by_interpreter(outcome: Outcome) -> Seen:
     """An outcome in the common words."""
     took = outcome.fault in (Fault.OK, Fault.EXTERN) and outcome.line is not None
     line = outcome.line_index if took else NONE
-    at = str(outcome.fault_at or "") if outcome.fault is Fault.ADMIT else ""
+    at = str(outcome.fault_at) if outcome.fault in (Fault.ADMIT, Fault.EXTERN) else ""
     failed = tuple(str(name) for name in outcome.failed_assumptions)
     return Seen(int(outcome.fault), at, line, failed, outcome.snapshot)
 
@@ -101,7 +101,8 @@ def seen_by_interpreter(outcome: Outcome) -> Seen:
 def seen_in_c(program: Program, native: Native, result: Result) -> Seen:
     """A row of the C executor in the common words."""
     names = monitored(program)
-    at = native.symbols.leaf_at(result.fault_at) if result.fault == Fault.ADMIT else ""
+    refused = result.fault in (Fault.ADMIT, Fault.EXTERN)
+    at = native.symbols.leaf_at(result.fault_at) if refused else ""
     line = result.line if result.fault in (Fault.OK, Fault.EXTERN) else NONE
     failed = tuple(names[number] for number in result.failed)
     return Seen(result.fault, at, line, failed, result.snapshot)

@@ -10,6 +10,7 @@ from rcsc.model import (
     Among,
     Apply,
     Assign,
+    Bool,
     Call,
     Case,
     Enum,
@@ -190,12 +191,9 @@ def outside(kind: Scalar) -> tuple[Value, ...]:
         low, high = key_bounds(kind)
         beyond = [float(value_of_key(kind, key)) for key in (low - 1, high + 1)]
         return (nan, inf, -inf, *(value for value in beyond if abs(value) != inf))
+    if isinstance(kind, Bool):
+        return ()
     low, high = key_bounds(kind)
     least, greatest = representable(kind)
-    return tuple(
-        sorted(
-            {k for k in (least, low - 1, high + 1, greatest) if least <= k <= greatest}
-            - {low, high}
-            - ({0, 1} if high == 1 and low == 0 else set())
-        )
-    )
+    beyond = {k for k in (least, low - 1, high + 1, greatest) if not low <= k <= high}
+    return tuple(sorted(k for k in beyond if least <= k <= greatest))

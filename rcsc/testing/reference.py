@@ -225,7 +225,7 @@ class Writer:
     def call(self, procedure: str, args: list[str]) -> str:
         """A call that stops the caller where an extern's results are refused."""
         number = self.number(procedure)
-        return f"if (ref_p{number}({', '.join(['s', *args])}) != 0) {{ return 1; }}"
+        return f"{{ const int at = ref_p{number}({', '.join(['s', *args])}); if (at != 0) {{ return at; }} }}"
 
     def number(self, procedure: str) -> int:
         """Position of the procedure in the program."""
@@ -248,7 +248,7 @@ class Writer:
                 return f"ref_set{which}(s, (int64_t){self.expr(index)}, {text});"
 
     def procedure(self, number: int, procedure: Procedure) -> Iterator[str]:
-        """One procedure; 0 when it ran to its end."""
+        """One procedure: 0 when it ran to its end, else 1 and the position of the leaf refused."""
         params = "".join(f", {c_type(p.type)} v_{p.name}" for p in procedure.params)
         yield f"static int ref_p{number}({self.symbols.struct} *s{params}) {{"
         yield "".join(f"(void)v_{p.name};" for p in procedure.params) + "(void)s;"
@@ -264,8 +264,8 @@ class Writer:
             yield f"{self.symbols.c_type(name)} w{at} = {self.place(name)};"
         yield f"{function}({', '.join([*given, *(f'&w{at}' for at, _ in enumerate(procedure.writes))])});"
         for at, name in enumerate(procedure.writes):
-            variable = self.program.variable(name)
-            yield from admission(variable, f"w{at}", self.symbols.c_type(name), "1")
+            variable, refused = self.program.variable(name), str(1 + self.symbols.fault_at(name))
+            yield from admission(variable, f"w{at}", self.symbols.c_type(name), refused)
             yield f"{self.place(name)} = w{at};"
 
     def accessors(self) -> Iterator[str]:

@@ -34,6 +34,9 @@ typedef int64_t ref_wide; /* programs that need more are not tested on this targ
 typedef struct {
   int32_t fault; int32_t fault_at; int32_t line; int32_t outside; uint8_t failed[REF_ASSUMPTIONS];
 } ref_trace_t;
+static void ref_refused(ref_trace_t *r, int at) {
+  if (at != 0) { r->fault = 4; r->fault_at = at - 1; }
+}
 static double ref_zero(double x) { return (x == 0.0) ? 0.0 : x; }
 static int ref_sign(double x) {
   union { double d; uint64_t u; } bits; bits.d = x; return (int)(bits.u >> 63);
@@ -98,7 +101,7 @@ def line_function(writer: Writer, number: int, table: Table) -> Iterator[str]:
 
 
 def _actions(writer: Writer, number: int, table: Table) -> Iterator[str]:
-    """What each line does; 1 where an extern's results are refused."""
+    """What each line does; not 0 where an extern's results are refused (see `Writer.procedure`)."""
     yield f"static int ref_t{number}_act({writer.symbols.struct} *s, int32_t line) {{"
     yield "(void)s; switch (line) {"
     for index, (_, actions) in enumerate(all_lines(table)):
@@ -165,7 +168,7 @@ def _body(writer: Writer, number: int) -> Iterator[str]:
     yield f"if (!ref_t{number}_given(s)) {{ r->outside = 1; return; }}"
     yield f"ref_t{number}_monitors(s, r); const int32_t line = ref_t{number}_line(s);"
     yield "if (line == -1) { r->fault = 2; } else if (line == -2) { r->fault = 3; } else {"
-    yield f"r->line = line; if (ref_t{number}_act(s, line) != 0) {{ r->fault = 4; }} }} }}"
+    yield f"r->line = line; ref_refused(r, ref_t{number}_act(s, line)); }} }}"
 
 
 FRESH = "ref_trace_t r = {0}; r.line = -1; r.fault_at = REF_NONE; const int32_t refused = ref_admit(s);"
@@ -181,7 +184,7 @@ def _step(writer: Writer, number: int) -> Iterator[str]:
 def _runs(writer: Writer, names: Iterable[str]) -> Iterator[str]:
     """Procedures of a pre- or postprocess, in order."""
     for name in names:
-        yield f"if (r.fault == 0 && ref_p{writer.number(name)}(s) != 0) {{ r.fault = 4; }}"
+        yield f"if (r.fault == 0) {{ ref_refused(&r, ref_p{writer.number(name)}(s)); }}"
 
 
 def _cycle(writer: Writer, number: int, level: Level) -> Iterator[str]:

@@ -54,7 +54,7 @@ def words(program: Program) -> int:
     return TRACE_WORDS + len(monitored(program)) + len(program.variables)
 
 
-def _set(program: Program, symbols: Symbols) -> Iterator[str]:
+def set_leaves_c(program: Program, symbols: Symbols) -> Iterator[str]:
     yield f"static void set_leaves({symbols.struct} *s, const int64_t *in, int whole) {{"
     for at, variable in enumerate(program.variables):
         value = f"of_word(in[{at}])" if isinstance(variable.type, Real) else f"in[{at}]"
@@ -77,7 +77,7 @@ def _executor(program: Program, symbols: Symbols, target: Target) -> Iterator[st
     yield from call_of(symbols, target, "s")
     yield "out[0] = result; out[1] = result;"
     if target.kind in ("step", "cycle"):
-        yield f"out[2] = (out[1] == 1) ? (int64_t){trace.fault_at('(*s)')} : -1;"
+        yield f"out[2] = (out[1] == 1 || out[1] == 4) ? (int64_t){trace.fault_at('(*s)')} : -1;"
         yield f"out[3] = {trace.line('(*s)')};"
         for at, _ in enumerate(monitored(program)):
             yield f"out[{TRACE_WORDS + at}] = {trace.failed('(*s)', at)} ? 1 : 0;"
@@ -121,5 +121,5 @@ def shim_c(program: Program, symbols: Symbols) -> str:
         f'#include "{symbols.header}"',
     ]
     parts = [*head, reference_c(program, symbols), WORDS]
-    parts += [*_set(program, symbols), *_copy(program, symbols), *_run(program, symbols)]
+    parts += [*set_leaves_c(program, symbols), *_copy(program, symbols), *_run(program, symbols)]
     return "\n".join([*parts, SESSION.format(**shape), MAIN.format(**shape)]) + "\n"

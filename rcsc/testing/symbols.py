@@ -3,8 +3,12 @@
 In: the text of `<program>.json`. Out: names of files, functions and leaves, in C and in Python.
 """
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
+
+from rcsc.model import I64_MAX, Bool, Int, Program, Real, Scalar
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +57,9 @@ class Symbols:
         steps: By table: function of one step.
         batches: By table: function for many inputs.
         cycles: By level: function of one cycle.
+        positions: Of each leaf; what `fault_at` says when it is refused.
+        module: File name of the Python executor.
+        state_class: Its class.
     """
 
     program: str
@@ -67,6 +74,8 @@ class Symbols:
     cycles: Mapping[str, str]
     positions: Mapping[str, int] = field(default_factory=dict)
     trace: Trace = Trace()
+    module: str = ""
+    state_class: str = ""
 
     def path(self, name: str) -> str:
         """Place of a leaf in the struct."""
@@ -80,6 +89,51 @@ class Symbols:
         """What `fault_at` says when this leaf is refused."""
         return self.positions[name]
 
+    def value_type(self, kind: Scalar) -> str:
+        """C type of a parameter of this kind."""
+        if isinstance(kind, Bool | Real):
+            return "bool" if isinstance(kind, Bool) else "double"
+        wide = isinstance(kind, Int) and kind.low >= 0 and kind.high > I64_MAX
+        return "uint64_t" if wide else "int64_t"
+
     def leaf_at(self, number: int) -> str:
         """The leaf that `fault_at` means."""
         return next((name for name, at in self.positions.items() if at == number), f"leaf {number}")
+
+
+def symbols_of(program: Program, files: Mapping[str, str]) -> Symbols:
+    """The names in the symbol file of a program.
+
+    Args:
+        program: The program.
+        files: Its generated files, text by path.
+
+    Raises:
+        KeyError: The symbol file is missing, or is another program's.
+    """
+    found = [json.loads(text) for path, text in files.items() if path.endswith(".json")]
+    names = [str(v.name) for v in program.variables]
+    for document in found:
+        if [leaf["name"] for leaf in document["leaves"]] == names:
+            return _symbols(document)
+    raise KeyError(program.name)
+
+
+def _symbols(document: Mapping[str, Any]) -> Symbols:
+    leaves = {x["name"]: LeafSymbol(x["path"], x["c_type"], x["attribute"]) for x in document["leaves"]}
+    tables = document["tables"]
+    return Symbols(
+        program=document["program"],
+        struct=document["struct"],
+        header=document["header"],
+        source=document["source"],
+        init=document["init"],
+        leaves=leaves,
+        lines={x["name"]: x["line"] for x in tables},
+        steps={x["name"]: x["step"] for x in tables},
+        batches={x["name"]: x["lines_of_many"] for x in tables},
+        cycles={x["name"]: x["cycle"] for x in document["levels"]},
+        positions={name: at for at, name in enumerate(leaves)},
+        module=document["python"]["module"],
+        state_class=document["python"]["class"],
+    )

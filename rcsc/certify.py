@@ -1,0 +1,422 @@
+"""The checker: whether a certificate shows what it claims, from the source's meaning alone.
+
+In: a `Program` (resolved anew from the text) and a certificate (JSON). Out: problems, none when
+certified, and what the proof rests on. None of the prover's code is used: conditions are read, canonical
+forms made, boxes counted and multipliers added up here. Trusted besides this file: Python, numpy,
+the parser and `resolve`; a solver only where a leaf says so.
+
+Idea: a node of the tree is a region, given by bounds on forms (integer combinations of leaves).
+At each leaf the lines are judged under these bounds alone: true, false or open all over the region.
+"""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from math import gcd, prod
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from rcsc.meaning import digest, relying, spelled
+from rcsc.model import (
+    COMPARISONS, Among, Apply, Bool, Box, Expr, Int, Literal, Op, Program, Read, Real, Table, key_bounds, key_of,
+)  # fmt: skip
+
+Form: TypeAlias = tuple[tuple[str, int], ...]
+"""Terms by name and their coefficients; sorted by name, the first positive, no common divisor."""
+Bounds: TypeAlias = dict[Form, tuple[int, int]]
+Atom: TypeAlias = tuple[Form, Box]
+Formula: TypeAlias = "Atom | All | Any_"
+Refuter: TypeAlias = Callable[[Program, Table, tuple[str, ...], Bounds, tuple[int, ...]], str]
+"""Names the solver that finds the region without fault; "" when it does not."""
+
+
+@dataclass(frozen=True, slots=True)
+class All:
+    """Every part holds."""
+
+    parts: tuple[Formula, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Any_:
+    """Some part holds."""
+
+    parts: tuple[Formula, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Certified:
+    """What became of the check: certified when there are no problems."""
+
+    problems: tuple[str, ...]
+    rests_on: tuple[str, ...]
+
+
+class Rejected(Exception):
+    """The certificate does not show what it should."""
+
+
+def check_certificate(program: Program, certificate: Mapping[str, object]) -> tuple[str, ...]:
+    """Problems of the certificate; none when it shows every table of `program` right."""
+    return certify(program, certificate).problems
+
+
+def certify(program: Program, certificate: Mapping[str, Any], refuter: Refuter | None = None) -> Certified:
+    """Check every table's certificate; `refuter` is asked where a leaf rests on a solver."""
+    problems: list[str] = []
+    rests: list[str] = []
+    try:
+        if certificate["format"] != "rcsc-certificate" or certificate["version"] != 1:
+            raise Rejected("not a certificate of this version")
+        by_name = {str(entry["table"]): entry for entry in certificate["tables"]}
+        for obligation in certificate["obligations"]:
+            if obligation["method"] != "intervals":
+                rests.append(f"{obligation['name']}: {obligation['method']}")
+    except (Rejected, KeyError, TypeError, ValueError, AttributeError) as error:
+        return Certified((f"malformed certificate: {error}",), ())
+    program = relying(program)  # an obligation says what the invariants rest on
+    for table in program.tables:
+        try:
+            if table.name in by_name:
+                rests += _Checker(program, table, by_name[table.name], refuter).check()
+            elif table.name in program.own_tables:
+                raise Rejected("no certificate")
+        except Rejected as error:
+            problems.append(f"table `{table.name}`: {error}")
+        except (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError) as error:
+            problems.append(f"table `{table.name}`: malformed ({type(error).__name__}: {error})")
+    return Certified(tuple(problems), tuple(dict.fromkeys(rests)))
+
+
+class _Terms:
+    """Conditions of the model as formulas over forms; knows the range of every term met."""
+
+    def __init__(self, program: Program) -> None:
+        self.range = {str(v.name): key_bounds(v.type) for v in program.variables}
+
+    def span(self, form: Form) -> tuple[int, int]:
+        """Least and greatest value of the form over the declared ranges."""
+        ends = [sorted((k * self.range[name][0], k * self.range[name][1])) for name, k in form]
+        return sum(low for low, _ in ends), sum(high for _, high in ends)
+
+    def name(self, term: Expr) -> str:
+        name = spelled(term)
+        self.range.setdefault(name, key_bounds(term.type))
+        return name
+
+    def formula(self, expr: Expr, yes: bool = True) -> Formula:
+        """`expr = yes`, negations pushed inward."""
+        match expr:
+            case Literal(value=value):
+                return All(()) if bool(value) == yes else Any_(())
+            case Apply(op=Op.NOT, args=(part,)):
+                return self.formula(part, not yes)
+            case Apply(op=Op.IMPLIES, args=(left, right)):
+                parts = (self.formula(left, not yes), self.formula(right, yes))
+                return Any_(parts) if yes else All(parts)
+            case Apply(op=Op.AND | Op.OR as op, args=args):
+                both = tuple(self.formula(part, yes) for part in args)
+                return All(both) if (op is Op.AND) == yes else Any_(both)
+            case Apply(op=op, args=(left, right)) if op in COMPARISONS and _ordered(left) and _ordered(right):
+                if isinstance(left.type, Bool) and any(
+                    isinstance(side, Apply | Among) for side in (left, right)
+                ):
+                    same = yes == (op is Op.EQ)
+                    cases = ((left_, left_ == same) for left_ in (True, False))
+                    return Any_(tuple(All((self.formula(left, a), self.formula(right, b))) for a, b in cases))
+                return self.compare(op, left, right, yes)
+            case Among(subject=subject, values=values) if _ordered(subject):
+                tests = (self.compare(Op.EQ, subject, Literal(v, subject.type), yes) for v in values)
+                return Any_(tuple(tests)) if yes else All(tuple(tests))
+            case _:
+                return ((self.name(expr), 1),), ((int(yes), int(yes)),)
+
+    def compare(self, op: Op, left: Expr, right: Expr, yes: bool) -> Formula:
+        total: dict[str, int] = {}
+        constant = self.add(total, left, 1) + self.add(total, right, -1)
+        terms = sorted((name, k) for name, k in total.items() if k)
+        g = gcd(*(k for _, k in terms)) * (-1 if terms and terms[0][1] < 0 else 1)
+        form = tuple((name, k // g) for name, k in terms)  # left - right = g * form + constant
+        low, high = self.span(form)
+        if g < 0:
+            op = {Op.LT: Op.GT, Op.GT: Op.LT, Op.LE: Op.GE, Op.GE: Op.LE}.get(op, op)
+        if not form:
+            low = high = constant
+        first, last = (0, 0) if not form else (-(constant // g), -constant // g)  # where it is >= 0, <= 0
+        below, above = (low, first - 1), (last + 1, high)
+        box = {
+            Op.LT: (below,), Op.LE: ((low, last),), Op.EQ: ((first, last),), Op.NE: (below, above),
+            Op.GE: ((first, high),), Op.GT: (above,),
+        }[op]  # fmt: skip
+        inside = tuple((max(a, low), min(b, high)) for a, b in box if max(a, low) <= min(b, high))
+        if not form:
+            return All(()) if bool(inside) == yes else Any_(())
+        return form, inside if yes else _complement(inside, low, high)
+
+    def add(self, total: dict[str, int], expr: Expr, factor: int) -> int:
+        """Add `factor * expr` to the total; the constant part is returned."""
+        match expr:
+            case Literal(value=value, type=kind):
+                return factor * key_of(kind, value)
+            case Apply(op=Op.NEG, args=(part,)):
+                return self.add(total, part, -factor)
+            case Apply(op=Op.ADD | Op.SUB as op, args=(left, right), type=Int()):
+                return self.add(total, left, factor) + self.add(
+                    total, right, factor if op is Op.ADD else -factor
+                )
+            case Apply(op=Op.MUL, args=(left, right), type=Int()):
+                for one, other in ((left, right), (right, left)):
+                    trial: dict[str, int] = {}
+                    constant = self.add(trial, one, 1)
+                    if not any(trial.values()):
+                        return self.add(total, other, factor * constant)
+        name = self.name(expr)
+        total[name] = total.get(name, 0) + factor
+        return 0
+
+
+@dataclass(frozen=True, slots=True)
+class _Line:
+    """A line in a region: the boxes and other formulas that are still open; none: it holds."""
+
+    index: int
+    boxes: dict[Form, Box]
+    rest: tuple[Formula, ...]
+
+
+class _Checker:
+    """Walks one table's tree."""
+
+    def __init__(
+        self, program: Program, table: Table, entry: Mapping[str, Any], refuter: Refuter | None
+    ) -> None:
+        self.program, self.table, self.refuter, self.terms = program, table, refuter, _Terms(program)
+        if entry["meaning"] != digest(program, table):
+            raise Rejected("it is of another table")
+        known: dict[int, Formula] = {}
+        lines = []
+        for index, line in enumerate(table.lines):
+            tests = [test for test in line.tests if test is not None]
+            for test in tests:
+                if id(test) not in known:
+                    name, box = (
+                        (((str(test.variables[0]), 1),), test.box) if test.box is not None else ((), None)
+                    )
+                    whole = self.terms.formula(test.condition) if box is None else (name, box)
+                    known[id(test)] = self.judge(whole, {})
+            lines.append(self.line(index, (known[id(test)] for test in tests)))
+        self.lines = [line for line in lines if line is not None]
+        self.names = tuple(str(name) for name in entry["assumptions"])
+        conditions = {str(a.name): a for a in program.assumptions if a.name in table.assumptions}
+        self.assumed = [self.terms.formula(conditions[name].condition) for name in self.names]
+        self.rests = [f"assumption `{name}` ({conditions[name].standing.value})" for name in self.names]
+        columns = [str(name) for name in entry["columns"]]
+        self.forms = [self.read_form([(columns[c], k) for c, k in form]) for form in entry["forms"]]
+        self.tree: list[list[Any]] = list(entry["tree"])
+        self.cover = table.default is None or table.default.unreachable
+
+    def read_form(self, terms: list[tuple[str, int]]) -> tuple[Form, int]:
+        """The canonical form, and -1 where the certificate has it with the opposite sign."""
+        terms.sort()
+        sign = 1 if terms[0][1] > 0 else -1
+        form = tuple((name, sign * k) for name, k in terms)
+        if (
+            any(type(k) is not int for _, k in form)
+            or len(dict(form)) < len(form)
+            or gcd(*dict(form).values()) != 1
+        ):
+            raise Rejected("a form is not in canonical shape")
+        return form, sign
+
+    def range(self, form: Form, bounds: Bounds) -> tuple[int, int]:
+        return bounds.get(form) or self.terms.span(form)
+
+    def judge(self, formula: Formula, bounds: Bounds) -> Formula:
+        """What is left of the formula within the bounds; `All(())` and `Any_(())` are true and false."""
+        if isinstance(formula, tuple):
+            form, box = formula
+            low, high = self.range(form, bounds)
+            inside = _meet(box, ((low, high),))
+            return (form, inside) if inside and inside != ((low, high),) else All(()) if inside else Any_(())
+        kind, other = (All, Any_) if isinstance(formula, All) else (Any_, All)
+        parts: list[Formula] = []
+        for part in (self.judge(part, bounds) for part in formula.parts):
+            if part == other(()):
+                return other(())
+            parts += part.parts if isinstance(part, kind) else (part,)
+        if kind is Any_ and parts and all(isinstance(p, tuple) and p[0] == parts[0][0] for p in parts):  # type: ignore[index]  # the first is a tuple then
+            joined = parts[0][0], _union(p[1] for p in parts if isinstance(p, tuple))  # type: ignore[index]  # as above
+            return joined if len(parts) == 1 else self.judge(joined, bounds)
+        return parts[0] if len(parts) == 1 else kind(tuple(parts))
+
+    def line(self, index: int, parts: Iterator[Formula]) -> _Line | None:
+        """The conjunction of judged formulas; None when it is false."""
+        boxes: dict[Form, Box] = {}
+        rest: list[Formula] = []
+        for whole in parts:
+            for part in whole.parts if isinstance(whole, All) else (whole,):
+                if isinstance(part, tuple):
+                    boxes[part[0]] = _meet(boxes[part[0]], part[1]) if part[0] in boxes else part[1]
+                else:
+                    rest.append(part)
+        return None if Any_(()) in rest or not all(boxes.values()) else _Line(index, boxes, tuple(rest))
+
+    def within(self, line: _Line, form: Form, bounds: Bounds) -> _Line | None:
+        """The line in a region whose bounds on `form` have narrowed."""
+        if form not in line.boxes and not line.rest:
+            return line
+        kept = [(other, box) for other, box in line.boxes.items() if other != form]
+        old = [(form, line.boxes[form])] if form in line.boxes else []
+        return self.line(
+            line.index, iter([*kept, *(self.judge(part, bounds) for part in (*old, *line.rest))])
+        )
+
+    def check(self) -> list[str]:
+        """Every node, in preorder; what the proof rests on."""
+        stack: list[tuple[Bounds, list[_Line]]] = [({}, self.lines)]
+        for node in self.tree:
+            if not stack:
+                raise Rejected("the tree has more nodes than regions")
+            bounds, lines = stack.pop()
+            if node[0] == "s":
+                stack += self.split(bounds, lines, *node[1:])
+            elif not self.leaf(bounds, lines, *node):
+                raise Rejected(f"a leaf does not hold: {node}"[:200])
+        if stack:
+            raise Rejected("the tree leaves a region out")
+        return self.rests
+
+    def split(
+        self, bounds: Bounds, lines: list[_Line], number: int, cut: int
+    ) -> list[tuple[Bounds, list[_Line]]]:
+        form, sign = self.forms[number]
+        low, high = self.range(form, bounds)
+        first, second = ((low, cut), (cut + 1, high)) if sign > 0 else ((-cut, high), (low, -cut - 1))
+        if type(cut) is not int or number < 0 or first[0] > first[1] or second[0] > second[1]:
+            raise Rejected("a split is out of its region")
+        sides = []
+        for side in (second, first):  # the first is on top of the stack
+            inner = {**bounds, form: side}
+            sides.append(
+                (inner, [kept for line in lines if (kept := self.within(line, form, inner)) is not None])
+            )
+        return sides
+
+    def leaf(self, bounds: Bounds, lines: list[_Line], kind: str, *rest: Any) -> bool:
+        """Whether exactly one line (with DEFAULT: at most one) holds all over the region."""
+        if kind == "a":
+            return (
+                type(rest[0]) is int
+                and rest[0] >= 0
+                and self.judge(self.assumed[rest[0]], bounds) == Any_(())
+            )
+        if kind == "e":
+            return self.is_empty(bounds, *rest)
+        if kind == "l" and rest[0] == -1:
+            return not self.cover and len(lines) <= 1
+        if kind == "l":
+            return [(line.index, line.boxes, line.rest) for line in lines] == [(rest[0], {}, ())]
+        if kind == "b":
+            return self.counts(bounds, lines, *rest)
+        solver = self.refuter and self.refuter(
+            self.program, self.table, self.names, bounds, tuple(line.index for line in lines)
+        )
+        self.rests.append(f"table `{self.table.name}`: {solver}")
+        return kind == "z" and bool(solver)
+
+    def is_empty(self, bounds: Bounds, multipliers: list[list[int]]) -> bool:
+        """Whether the bounds, times the multipliers, add up to 0 <= a negative number."""
+        total: dict[str, int] = {}
+        bound = 0
+        for number, k in multipliers:
+            form, sign = self.forms[number]
+            if type(k) is not int or number < 0:
+                return False
+            low, high = self.range(form, bounds)
+            bound += sign * k * (high if sign * k > 0 else low)
+            for name, factor in form:
+                total[name] = total.get(name, 0) + sign * k * factor
+        return bound < 0 and not any(total.values())
+
+    def counts(self, bounds: Bounds, lines: list[_Line], count: int | None, parts: list[int] | None) -> bool:
+        """Whether the lines are disjoint boxes and, where they must, fill the region."""
+        forms = sorted({form for line in lines for form in line.boxes})
+        if any(line.rest for line in lines) or any(len(form) > 1 for form in forms):
+            return False
+        size = {form: high - low + 1 for form in forms for low, high in [self.range(form, bounds)]}
+        if self.cover:
+            filled = sum(
+                prod(_size(line.boxes[f]) if f in line.boxes else size[f] for f in forms) for line in lines
+            )
+            if not count == filled == prod(size.values()):
+                return False
+        boxes = [line.boxes for line in lines]
+        if parts is None:
+            return (self.cover or count is None) and all(_disjoint(boxes, forms))
+        pairs = [(a, b) for i, a in enumerate(boxes) for b in boxes[i + 1 :]]
+        named = [self.forms[number][0] for number in parts if number >= 0]
+        return len(named) == len(pairs) == len(parts) and not any(
+            _meet(a[form], b[form]) for (a, b), form in zip(pairs, named, strict=True)
+        )
+
+
+def _disjoint(lines: list[dict[Form, Box]], forms: list[Form]) -> Iterator[bool]:
+    """For each line, whether every later line is parted from it by some form."""
+    owner: dict[Form, Any] = {}  # for each line the number of its box, 0 where it has none
+    ends: dict[Form, tuple[Any, Any, Any]] = {}  # low and high rank of every interval; where each box starts
+    rank: dict[Form, dict[int, int]] = {}
+    for form in forms:
+        number = {
+            box: i + 1 for i, box in enumerate(dict.fromkeys(line[form] for line in lines if form in line))
+        }
+        rank[form] = {
+            end: i for i, end in enumerate(sorted({end for box in number for pair in box for end in pair}))
+        }
+        flat = [(rank[form][low], rank[form][high]) for box in number for low, high in box]
+        lows, highs = np.array([(-1, len(rank[form])), *flat]).T
+        starts = np.cumsum([0, 1, *(len(box) for box in number)])[:-1]
+        owner[form], ends[form] = (
+            np.array([number[line[form]] if form in line else 0 for line in lines]),
+            (lows, highs, starts),
+        )
+    for i, line in enumerate(lines):
+        left = np.arange(i + 1, len(lines))
+        for form, box in line.items():
+            lows, highs, starts = ends[form]
+            meets = np.zeros(len(lows), dtype=bool)
+            for low, high in box:
+                meets |= (lows <= rank[form][high]) & (highs >= rank[form][low])
+            left = left[np.logical_or.reduceat(meets, starts)[owner[form][left]]]
+            if not len(left):
+                break
+        yield not len(left)
+
+
+def _ordered(expr: Expr) -> bool:
+    """Whether keys order the values: no infinity or NaN can be among them."""
+    return not isinstance(expr.type, Real) or abs(expr.type.low) + abs(expr.type.high) < float("inf")
+
+
+def _meet(left: Box, right: Box) -> Box:
+    return tuple((max(a, c), min(b, d)) for a, b in left for c, d in right if max(a, c) <= min(b, d))
+
+
+def _size(box: Box) -> int:
+    return sum(high - low + 1 for low, high in box)
+
+
+def _complement(box: Box, low: int, high: int) -> Box:
+    """What of `low .. high` is not in the box (sorted, disjoint)."""
+    edges = [low - 1, *(end for pair in box for end in pair), high + 1]
+    return tuple((a + 1, b - 1) for a, b in zip(edges[::2], edges[1::2], strict=True) if a + 1 <= b - 1)
+
+
+def _union(boxes: Iterator[Box]) -> Box:
+    """The intervals of all boxes, sorted, those that overlap or touch joined."""
+    found: list[tuple[int, int]] = []
+    for low, high in sorted(pair for box in boxes for pair in box):
+        if found and low <= found[-1][1] + 1:
+            found[-1] = (found[-1][0], max(high, found[-1][1]))
+        else:
+            found.append((low, high))
+    return tuple(found)

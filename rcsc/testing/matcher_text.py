@@ -1,0 +1,199 @@
+"""The parts of an emitted C matcher, read from its text: mask tables, index expressions, and what follows them.
+
+In: the emitted C and the name of a `line` function. Out: its parts, verbatim, for a self-test to compile. A text
+that is not of the shape described here is refused: the per-variable check claims nothing about it.
+
+The shape: tables `t0`, `t1`, ..; one look-up in each, `tK[INDEX]`; the look-ups joined with `&` (in words of 64
+lines where there are more); then a tail that reads nothing but the joined mask. An INDEX is one component, or
+several in mixed radix, `(((A) * nu) + B)`. A component reads one leaf and compares it with constants only, or is
+the truth of a condition.
+"""
+
+import re
+from dataclasses import dataclass
+
+TABLE = re.compile(r"static const uint(\d+)_t t(\d+)\[(\d+)\](?:\[(\d+)\])? = \{.*?\n    \};", re.DOTALL)
+CONSTANT = r"(?:\(-INT64_C\(\d+\)(?: - INT64_C\(1\))?\)|U?INT64_C\(\d+\)|\(?-?\d+(?:\.\d+)?(?:e[+-]?\d+)?\)?)"
+PLACE = r"s->(?P<path>[A-Za-z_]\w*(?:\.\w+|\[\d+\])*)"
+AGAIN = r"(?:\((?:u?int64_t)\))?s->[A-Za-z_]\w*(?:\.\w+|\[\d+\])*"
+UNARY = (
+    re.compile(rf"^{PLACE}$"),
+    re.compile(rf"^\({PLACE} \? 1u : 0u\)$"),
+    re.compile(rf"^\(uint32_t\)\(\((?:u?int64_t)\){PLACE} - {CONSTANT}\)$"),
+    re.compile(
+        rf"^\(\(\((?:\((?:u?int64_t)\))?{PLACE} >= {CONSTANT}\) \? 1u : 0u\)"
+        rf"(?: \+ \(\({AGAIN} >= {CONSTANT}\) \? 1u : 0u\))*\)$"
+    ),
+    re.compile(rf"^(?P<search>[A-Za-z_]\w*_class_\w+)\((?:\((?:u?int64_t)\))?{PLACE}\)$"),
+)
+TRUTH = re.compile(r"^\((?P<condition>.*) \? 1u : 0u\)$", re.DOTALL)
+LOAD = re.compile(r"\bt(\d+)\[")
+NUMBER = re.compile(r"(?<![\w.])(\d+(?:\.\d+)?(?:e[+-]?\d+)?)(?![\w.])")
+
+
+@dataclass(frozen=True, slots=True)
+class Component:
+    """One part of an index.
+
+    Attributes:
+        text: The C expression, verbatim.
+        path: The leaf's place in the struct; empty for the truth of a condition.
+        constants: Every number it compares the leaf with, without sign.
+        count: How many classes; 0 for the first of several, whose count the table's length gives.
+    """
+
+    text: str
+    path: str
+    constants: tuple[str, ...]
+    count: int
+
+
+@dataclass(frozen=True, slots=True)
+class Lookup:
+    """One table with its index.
+
+    Attributes:
+        declaration: The table, verbatim.
+        entries: How many masks it has.
+        words: Words a mask.
+    """
+
+    declaration: str
+    index: str
+    entries: int
+    words: int
+    components: tuple[Component, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class MatcherText:
+    """A matcher's parts.
+
+    Attributes:
+        word_bits: Bits of the type in which one-word masks are joined.
+        tail: What follows the look-ups, verbatim.
+    """
+
+    lookups: tuple[Lookup, ...]
+    word_bits: int
+    tail: str
+
+
+class ShapeError(Exception):
+    """The text is not of the shape that the check is about."""
+
+
+def function_body(source: str, head: str) -> str:
+    """The lines between the braces of the function with this head."""
+    start = source.find(f"\n{head}\n{{\n")
+    end = source.find("\n}\n", start)
+    if start < 0 or end < 0:
+        raise ShapeError(f"no function `{head}`")
+    return source[start + len(head) + 4 : end + 1]
+
+
+def closing(text: str, start: int, pair: str) -> int:
+    """Position of the bracket that closes the one at `start`."""
+    depth = 0
+    for at in range(start, len(text)):
+        depth += (text[at] == pair[0]) - (text[at] == pair[1])
+        if depth == 0:
+            return at
+    raise ShapeError("brackets do not match")
+
+
+def parted(index: str) -> list[tuple[str, int]]:
+    """The components of an index with their counts; 0 for the first."""
+    if index.startswith("((("):
+        end = closing(index, 2, "()")
+        rest = re.match(r"\) \* (\d+)u\) \+ ", index[end:])
+        if rest and index.endswith(")"):
+            last = index[end + rest.end() : -1]
+            return [*parted(index[3:end]), (last, int(rest[1]))]
+    return [(index, 0)]
+
+
+def component(source: str, text: str, count: int) -> Component:
+    """A component with what it reads; a search function's constants are taken from its own text."""
+    for shape in UNARY:
+        found = shape.match(text)
+        if found is None:
+            continue
+        path = found["path"]
+        if any(place != path for place in re.findall(r"s->([\w.\[\]]+)", text)):
+            break
+        name = found.groupdict().get("search")
+        constants = NUMBER.findall(_search_text(source, name) if name else text.replace(f"s->{path}", ""))
+        return Component(text, path, tuple(dict.fromkeys(constants)), count)
+    if text == "0u":
+        return Component(text, "", (), 1)
+    if TRUTH.match(text) is None:
+        raise ShapeError(f"index `{text}`")
+    return Component(text, "", (), 2)
+
+
+def _search_text(source: str, name: str) -> str:
+    """The body of a search function, which must use its argument only against its own constants."""
+    head = re.search(rf"static inline uint32_t {name}\((?:u?int64_t|double) value\)", source)
+    if head is None:
+        raise ShapeError(f"no function `{name}`")
+    body = function_body(source, head[0])
+    if re.sub(r"\(value >= cuts\[[^\]]*\]\)", "", body).count("value"):
+        raise ShapeError(f"`{name}` uses its argument in another way")
+    return body.split("};")[0].split("{", 1)[1]
+
+
+def matcher_text(source: str, function: str, struct: str) -> MatcherText:
+    """The parts of the matcher called `function`.
+
+    Args:
+        source: The emitted C.
+        function: Its name.
+        struct: Name of the program's struct.
+
+    Raises:
+        ShapeError: The text has another shape.
+    """
+    body = function_body(source, f"int32_t {function}(const {struct} *s)")
+    tables = list(TABLE.finditer(body))
+    rest = TABLE.sub("", body)
+    joined = re.search(r"const uint(\d+)_t m = (?P<loads>.*?);\n", rest, re.DOTALL)
+    if joined is None or [int(table[2]) for table in tables] != list(range(len(tables))):
+        raise ShapeError("no joined mask")
+    many = "const uint64_t * const r0" in rest
+    loads = _loads(rest[: joined.start()] if many else joined["loads"])
+    if [number for number, _ in loads] != list(range(len(tables))):
+        raise ShapeError("not one look-up a table")
+    shape = r"\(uint\d+_t\)t\d+\[\](?: & \(uint\d+_t\)t\d+\[\])*"
+    if not many and tables and not re.fullmatch(shape, _without_indices(joined["loads"])):
+        raise ShapeError("look-ups are not joined with &")
+    lookups = tuple(_lookup(source, table, index) for table, (_, index) in zip(tables, loads, strict=True))
+    begin = max((rest.rindex(f"const r{number} =") for number, _ in loads), default=0) if many else 0
+    tail = rest[rest.index(";", begin) + 1 :] if many else rest[joined.end() :]
+    if re.search(r"s->|\bt\d+\[", tail):
+        raise ShapeError("the tail reads more than the mask")
+    return MatcherText(lookups, int(joined[1]), tail)
+
+
+def _loads(text: str) -> list[tuple[int, str]]:
+    """Each look-up's table number and index, in order."""
+    found, at = [], 0
+    while (match := LOAD.search(text, at)) is not None:
+        end = closing(text, match.end() - 1, "[]")
+        found.append((int(match[1]), text[match.end() : end]))
+        at = end
+    return found
+
+
+def _without_indices(text: str) -> str:
+    """The joined look-ups with their indices left out."""
+    for _, index in _loads(text):
+        text = text.replace(f"[{index}]", "[]", 1)
+    return " ".join(text.split())
+
+
+def _lookup(source: str, table: re.Match[str], index: str) -> Lookup:
+    pieces = parted(index)
+    components = [component(source, text, count) for text, count in pieces]
+    entries, words = int(table[3]), int(table[4] or 1)
+    return Lookup(table[0], index, entries, words, tuple(components))

@@ -1,0 +1,350 @@
+"""Relational tables: the tree of regions against brute force, on the families, and its limits."""
+
+import itertools
+import random
+from collections.abc import Sequence
+from fractions import Fraction
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rcsc.model import (
+    Among,
+    Apply,
+    Assumption,
+    AssumptionName,
+    Bool,
+    Column,
+    Default,
+    Enum,
+    Expr,
+    Int,
+    Kind,
+    Line,
+    LineName,
+    Literal,
+    Op,
+    Program,
+    Read,
+    Real,
+    Scalar,
+    Snapshot,
+    Standing,
+    Table,
+    TableName,
+    Test,
+    Value,
+    Variable,
+    VariableName,
+    key_bounds,
+    value_of_key,
+)
+from rcsc.prove.atoms import Universe, assumptions_of, lines_of
+from rcsc.prove.least import find, least, negated, whole, widest
+from rcsc.prove.linear import Simplex
+from rcsc.prove.regions import Answer, Open, Search
+from rcsc.prove.search import Tree
+from rcsc.questions import parts
+
+BOOL = Bool()
+SMALL = Int(0, 4)
+WIDE = Int(-(10**6), 10**6)
+COLOUR = Enum("colour", ("red", "green", "blue"))
+LEAVES: dict[str, Scalar] = {"b": BOOL, "c": COLOUR, "d": COLOUR, "x": SMALL, "y": SMALL, "z": Int(-2, 2)}
+
+
+def read(name: str, kind: Scalar | None = None) -> Read:
+    return Read(VariableName(name), LEAVES[name] if kind is None else kind)
+
+
+def number(value: int) -> Literal:
+    return Literal(value, Int(value, value))
+
+
+def compare(op: Op, left: Expr, right: Expr) -> Expr:
+    return Apply(op, (left, right), BOOL)
+
+
+def total(coefficients: Sequence[int], names: Sequence[str], kind: Scalar | None = None) -> Expr:
+    """The sum of coefficients times leaves."""
+    whole_: Expr = number(0)
+    for k, name in zip(coefficients, names, strict=True):
+        if k:
+            term = Apply(Op.MUL, (number(k), read(name, kind)), WIDE)
+            whole_ = Apply(Op.ADD, (whole_, term), WIDE)
+    return whole_
+
+
+def program_of(
+    lines: Sequence[Sequence[Expr]], default: Default | None = None, assumed: Sequence[Expr] = ()
+) -> Program:
+    """A program of one table, whose cells all stand under `when`."""
+    kinds: dict[str, Scalar] = {}
+    for condition in (*itertools.chain.from_iterable(lines), *assumed):
+        kinds |= {part.name: part.type for part in parts(condition) if isinstance(part, Read)}
+    names = sorted(kinds)
+    variables = tuple(
+        Variable(VariableName(n), Kind.INPUT, kinds[n], value_of_key(kinds[n], key_bounds(kinds[n])[0]))
+        for n in names
+    )
+    tests: dict[Expr, Test] = {}
+    for condition in itertools.chain.from_iterable(lines):
+        used = {part.name for part in parts(condition) if isinstance(part, Read)}
+        tests.setdefault(condition, Test("", condition, tuple(VariableName(n) for n in names if n in used), None))
+    width = max([1, *map(len, lines)])
+    rows = tuple(
+        Line(LineName(str(i + 1)), (*(tests[c] for c in row), *[None] * (width - len(row))), ())
+        for i, row in enumerate(lines)
+    )
+    assumptions = tuple(
+        Assumption(AssumptionName(f"a{i}"), Standing.ASSUMED, condition) for i, condition in enumerate(assumed)
+    )
+    table = Table(
+        TableName("t"),
+        tuple(Column("when", None, None) for _ in range(width)),
+        rows,
+        default,
+        tuple(v.name for v in variables),
+        tuple(a.name for a in assumptions),
+    )
+    return Program("p", "p.rcs", (), (), (), variables, (), assumptions, (), (table,), (table.name,), (), ())
+
+
+def searched(program: Program) -> tuple[Universe, Search]:
+    """The search of the program's only table, without a solver."""
+    table = program.tables[0]
+    universe = Universe()
+    lines = lines_of(universe, table)
+    assumptions = assumptions_of(universe, program, table)
+    default = table.default is not None and not table.default.unreachable
+    return universe, Tree(universe, lines, assumptions, lambda _: Answer.UNKNOWN, default=default).run()
+
+
+def value_of(expr: Expr, at: Snapshot) -> Value:
+    """A reference meaning of its own, for what these tests write."""
+    match expr:
+        case Literal(value=value):
+            return value
+        case Read(name=name):
+            return at[name]
+        case Among(subject=subject, values=values):
+            return value_of(subject, at) in values
+        case Apply(op=op, args=args):
+            a, *rest = [value_of(arg, at) for arg in args]
+            if op is Op.NOT:
+                return not a
+            b = rest[0]
+            return {
+                Op.AND: lambda: a and b, Op.OR: lambda: a or b, Op.IMPLIES: lambda: b if a else True,
+                Op.EQ: lambda: a == b, Op.NE: lambda: a != b, Op.LT: lambda: a < b, Op.LE: lambda: a <= b,
+                Op.GT: lambda: a > b, Op.GE: lambda: a >= b, Op.ADD: lambda: a + b, Op.SUB: lambda: a - b,
+                Op.MUL: lambda: a * b,
+            }[op]()  # fmt: skip
+    raise AssertionError(expr)
+
+
+def inputs(program: Program) -> list[dict[str, Value]]:
+    """Every input that the assumptions admit, least first in declared order."""
+    ranges = [
+        [value_of_key(v.type, k) for k in range(key_bounds(v.type)[0], key_bounds(v.type)[1] + 1)]
+        for v in program.variables
+    ]
+    names = [v.name for v in program.variables]
+    points = (dict(zip(names, values, strict=True)) for values in itertools.product(*ranges))
+    return [p for p in points if all(value_of(a.condition, p) for a in program.assumptions)]
+
+
+def matching(program: Program, at: Snapshot) -> list[int]:
+    return [
+        i
+        for i, line in enumerate(program.tables[0].lines)
+        if all(value_of(test.condition, at) for test in line.tests if test is not None)
+    ]
+
+
+INTS = st.sampled_from(["x", "y", "z"])
+ORDER = st.sampled_from([Op.LT, Op.LE, Op.GT, Op.GE, Op.EQ, Op.NE])
+ATOMS: st.SearchStrategy[Expr] = st.one_of(
+    st.builds(compare, ORDER, st.builds(read, INTS), st.builds(read, INTS)),
+    st.builds(compare, ORDER, st.builds(read, INTS), st.integers(-3, 5).map(number)),
+    st.builds(
+        lambda op, ks, n: compare(op, total(ks, ["x", "y", "z"]), number(n)),
+        ORDER, st.tuples(*[st.integers(-3, 3)] * 3), st.integers(-6, 9),
+    ),
+    st.builds(lambda vs: Among(read("x"), tuple(vs)), st.sets(st.integers(0, 4), min_size=1)),
+    st.builds(lambda v: Among(read("c"), (v,)), st.integers(0, 2)),
+    st.builds(lambda op: compare(op, read("c"), read("d")), st.sampled_from([Op.EQ, Op.NE])),
+    st.just(read("b")),
+    st.builds(lambda a: compare(Op.EQ, read("b"), a), st.builds(compare, ORDER, st.just(read("x")), st.just(read("y")))),
+)  # fmt: skip
+CONDITIONS = st.recursive(
+    ATOMS,
+    lambda inner: st.one_of(
+        st.builds(lambda a: Apply(Op.NOT, (a,), BOOL), inner),
+        st.builds(lambda op, a, b: Apply(op, (a, b), BOOL), st.sampled_from([Op.AND, Op.OR, Op.IMPLIES]), inner, inner),
+    ),
+    max_leaves=3,
+)
+
+
+@st.composite
+def cuts(draw: st.DrawFn) -> list[list[Expr]]:
+    """Lines by cutting the space again and again: right by construction, unless one is then changed."""
+    lines: list[list[Expr]] = [[]]
+    for _ in range(draw(st.integers(1, 6))):
+        line = lines.pop(draw(st.integers(0, len(lines) - 1)))
+        condition = draw(CONDITIONS)
+        lines += [[*line, condition], [*line, Apply(Op.NOT, (condition,), BOOL)]]
+    if draw(st.booleans()):
+        at = draw(st.integers(0, len(lines) - 1))
+        lines[at] = [draw(CONDITIONS), *lines[at][1:]]
+    return lines
+
+
+DEFAULTS = st.sampled_from([None, Default(LineName("d"), (), unreachable=True), Default(LineName("d"), (), unreachable=False)])
+
+
+@given(cuts(), DEFAULTS, st.lists(CONDITIONS, max_size=2))
+def test_verdict_pairs_and_gap_are_those_of_brute_force(
+    lines: list[list[Expr]], default: Default | None, assumed: list[Expr]
+) -> None:
+    program = program_of(lines, default, assumed)
+    _, search = searched(program)
+    found = [(point, matching(program, point)) for point in inputs(program)]
+    pairs = {pair for _, lines_ in found for pair in itertools.combinations(lines_, 2)}
+    covers = default is None or default.unreachable
+    assert set(search.overlaps) == pairs
+    assert bool(search.gaps) == (covers and any(not lines_ for _, lines_ in found))
+    assert search.undecided == 0
+    assert search.proved == (Open() not in search.nodes)
+
+
+@given(cuts(), st.lists(CONDITIONS, max_size=1))
+def test_least_point_is_the_first_of_brute_force(lines: list[list[Expr]], assumed: list[Expr]) -> None:
+    program = program_of(lines, None, assumed)
+    universe = Universe()
+    table = program.tables[0]
+    wanted = [whole(c) for c in (lines_of(universe, table)[0], *assumptions_of(universe, program, table))]
+    columns = [universe.column(Read(v.name, v.type)) for v in program.variables]
+    point = least(universe, wanted, columns)
+    expected = next((p for p in inputs(program) if 0 in matching(program, p)), None)
+    if expected is None:
+        assert point is Answer.NONE
+    else:
+        assert not isinstance(point, Answer)
+        assert [point[c] for c in columns] == [int(v) for v in expected.values()]
+        refuted = negated(universe, whole(lines_of(universe, table)[0]))
+        box = widest(universe, point, columns, lambda atoms: find(universe, [*atoms, refuted]) is Answer.NONE)
+        inside = [
+            dict(zip(expected, values, strict=True))
+            for values in itertools.product(*(range(box[c][0], box[c][1] + 1) for c in columns))
+        ]
+        assert expected in inside
+        assert all(0 in matching(program, p) for p in inside)
+
+
+def planes(count: int, seed: int, names: Sequence[str] = ("p", "q", "r", "s")) -> list[list[Expr]]:
+    """Lines from recursive cuts by random planes; the two sides spell the plane differently."""
+    rng = random.Random(seed)
+    kind = Int(-1000, 1000)
+    regions: list[tuple[list[Expr], list[tuple[int, ...]]]] = [
+        ([], [tuple(rng.randint(-1000, 1000) for _ in names) for _ in range(3 * count)])
+    ]
+    while len(regions) < count:
+        regions.sort(key=lambda region: len(region[1]))
+        path, points = regions.pop()
+        ks = [rng.randint(-3, 3) for _ in names]
+        values = sorted(sum(k * v for k, v in zip(ks, p, strict=True)) for p in points)
+        cut = values[len(values) // 2]
+        if values[0] <= cut < values[-1]:
+            low = compare(Op.LE, total([2 * k for k in ks], names, kind), number(2 * cut + 1))
+            high = compare(Op.LT, number(cut), total(ks, names, kind))
+            sides = [[p for p in points if (sum(map(int.__mul__, ks, p)) <= cut) == side] for side in (True, False)]
+            regions += [([*path, low], sides[0]), ([*path, high], sides[1])]
+        else:
+            regions.append((path, points))
+    return [path for path, _ in regions]
+
+
+def orders(size: int) -> list[list[Expr]]:
+    """One line an order of `size` integers, stated by neighbours only."""
+    kind = Int(0, 100)
+    return [
+        [
+            compare(Op.LT if a > b else Op.LE, read(f"v{a}", kind), read(f"v{b}", kind))
+            for a, b in itertools.pairwise(order)
+        ]
+        for order in itertools.permutations(range(size))
+    ]
+
+
+@pytest.mark.parametrize("lines", [planes(300, 1), orders(5)], ids=["planes", "orders"])
+def test_families_are_proved_and_each_planted_fault_is_found(lines: list[list[Expr]]) -> None:
+    assert searched(program_of(lines))[1].proved
+    gap = searched(program_of(lines[:7] + lines[8:]))[1]
+    assert gap.gaps
+    assert not gap.overlaps
+    doubled = searched(program_of([*lines, lines[3]]))[1]
+    assert set(doubled.overlaps) == {(3, len(lines))}
+    wider = searched(program_of([*lines[:5], lines[5][:-1], *lines[6:]]))[1]
+    assert wider.overlaps
+    assert not wider.gaps
+
+
+def test_respelt_conditions_meet_in_one_form() -> None:
+    universe = Universe()
+    x, y = read("x"), read("y")
+    first = universe.of(compare(Op.LE, total([2, -2], ["x", "y"]), number(3)))
+    second = universe.of(Apply(Op.NOT, (compare(Op.GT, x, Apply(Op.ADD, (y, number(1)), WIDE)),), BOOL))
+    third = universe.of(compare(Op.GE, total([-6, 6], ["x", "y"]), number(-11)))
+    assert first == second == third
+    assert len([form for form in universe.forms if len(form) > 1]) == 1
+
+
+def test_doubles_compare_by_their_rank() -> None:
+    kind = Real(-1.0, 1.0)
+    f, g = read("f", kind), read("g", kind)
+    right = [[compare(Op.LT, f, g)], [compare(Op.EQ, f, g)], [compare(Op.GT, f, g)]]
+    assert searched(program_of(right))[1].proved
+    assert searched(program_of([[compare(Op.LE, f, g)], [compare(Op.GE, f, g)]]))[1].overlaps
+
+
+def test_a_term_that_is_not_linear_is_left_to_the_solver() -> None:
+    square = Apply(Op.MUL, (read("x"), read("x")), Int(0, 16))
+    shared = [[compare(Op.LT, square, number(5))], [compare(Op.GE, square, number(5))]]
+    assert searched(program_of(shared))[1].proved  # whatever the product is
+    odd = searched(program_of([[compare(Op.LT, square, number(5))], [compare(Op.GE, square, number(8))]]))[1]
+    assert odd.undecided == 1
+    assert not odd.proved
+
+
+def test_past_the_budget_nothing_is_proved() -> None:
+    program = program_of(orders(5))
+    universe = Universe()
+    lines = lines_of(universe, program.tables[0])
+    search = Tree(universe, lines, (), lambda _: Answer.UNKNOWN, default=False, budget=50).run()
+    assert search.undecided
+    assert not search.proved
+
+
+@given(st.lists(st.tuples(st.tuples(*[st.integers(-3, 3)] * 3), st.integers(-9, 9), st.integers(0, 5)), max_size=6))
+def test_simplex_gives_a_point_or_a_sum_that_cannot_be(rows: list[tuple[tuple[int, ...], int, int]]) -> None:
+    simplex = Simplex()
+    coefficients = {form: tuple(int(i == form) for i in range(3)) for form in range(3)}
+    for form in range(3):
+        simplex.add_column(form, -2, 3)
+    for form, (ks, low, width) in enumerate(rows, start=3):
+        coefficients[form] = ks
+        simplex.add_form(form, [(c, k) for c, k in enumerate(ks) if k], low, low + width)
+    multipliers = simplex.refute()
+    if multipliers is None:
+        values = [simplex.value(form) for form in range(3)]
+        for form, ks in coefficients.items():
+            at = sum((k * v for k, v in zip(ks, values, strict=True)), Fraction(0))
+            assert simplex.low[form] <= at <= simplex.high[form]
+    else:
+        summed = [sum(k * coefficients[form][c] for form, k in multipliers) for c in range(3)]
+        bound = sum(k * (simplex.high if k > 0 else simplex.low)[form] for form, k in multipliers)
+        assert summed == [0, 0, 0]
+        assert bound < 0
