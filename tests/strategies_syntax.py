@@ -1,0 +1,221 @@
+"""Arbitrary programs as trees: every kind of node, in the form that the parser gives."""
+
+from hypothesis import strategies as st
+from hypothesis.strategies import SearchStrategy
+
+from rcsc.syntax import tree
+from rcsc.syntax.tree import Name
+
+NAMES = st.sampled_from(["a", "b", "long_name", "x1", "status", "done", "Z"]).map(Name)
+WORDS = st.lists(st.sampled_from(["why", "a note", "  indented", "x := 3", "|"]), max_size=2).map(tuple)
+DOCS = st.lists(st.sampled_from(["what it is", "in mm"]), max_size=2).map(tuple)
+FACTORS = st.builds(tree.UnitFactor, st.sampled_from(["mm", "s", "N"]).map(Name), st.sampled_from([1, 1, 2, -1, -2]))
+
+
+def _sorted(factors: list[tree.UnitFactor]) -> tree.Unit:
+    """Numerator first, as it is written."""
+    return tree.Unit(tuple(sorted(factors, key=lambda factor: factor.power < 0)))
+
+
+UNITS = st.lists(FACTORS, min_size=1, max_size=3).map(_sorted)
+LITERALS: SearchStrategy[tree.Expr] = st.one_of(
+    st.builds(tree.BoolLiteral, st.booleans()),
+    st.builds(tree.IntLiteral, st.sampled_from(["0", "7", "1_000", "0x2F", "18446744073709551615"]), st.none() | UNITS),
+    st.builds(tree.RealLiteral, st.sampled_from(["0.5", "1e-3", "2.5E7"]), st.none() | UNITS),
+)
+REFERENCES: SearchStrategy[tree.Expr] = NAMES.map(tree.Reference)
+BINARY = st.sampled_from(["implies", "and", "or", "=", "/=", "<", "<=", ">", ">=", "+", "-", "*", "/", "mod"])
+
+
+def _deeper(inner: SearchStrategy[tree.Expr]) -> SearchStrategy[tree.Expr]:
+    several = st.lists(inner, min_size=1, max_size=3).map(tuple)
+    two = st.tuples(inner, inner)
+    return st.one_of(
+        st.builds(tree.Unary, st.sampled_from(["not", "-"]), inner),
+        st.builds(tree.Binary, BINARY, inner, inner),
+        st.builds(tree.InSet, inner, several),
+        st.builds(tree.InRange, inner, inner, inner),
+        st.builds(tree.Apply, st.sampled_from(["abs", "int", "real"]).map(Name), inner.map(lambda one: (one,))),
+        st.builds(tree.Apply, st.sampled_from(["min", "max"]).map(Name), two),
+        st.builds(tree.FieldOf, REFERENCES, NAMES),
+        st.builds(tree.IndexOf, REFERENCES, inner),
+    )
+
+
+def expressions() -> SearchStrategy[tree.Expr]:
+    """Any expression."""
+    return st.recursive(st.one_of(LITERALS, REFERENCES), _deeper, max_leaves=8)
+
+
+def places() -> SearchStrategy[tree.Expr]:
+    """Anything that can be assigned."""
+    fields = st.builds(tree.FieldOf, REFERENCES, NAMES)
+    return st.one_of(REFERENCES, fields, st.builds(tree.IndexOf, fields, expressions()))
+
+
+BARE: SearchStrategy[tree.Expr] = st.one_of(
+    st.builds(tree.IntLiteral, st.sampled_from(["0", "9"]), st.none()), REFERENCES
+)
+
+
+def types() -> SearchStrategy[tree.TypeExpr]:
+    """Any type; a bound does not carry the unit, which is the type's."""
+    simple: SearchStrategy[tree.TypeExpr] = st.one_of(
+        st.just(tree.BoolType()),
+        NAMES.map(tree.NamedType),
+        st.builds(tree.IntType, BARE, BARE, st.none()),
+        st.builds(tree.IntType, BARE, st.builds(tree.IntLiteral, st.just("5"), st.none()), UNITS),
+        st.builds(tree.RealType, BARE, st.builds(tree.RealLiteral, st.just("5.0"), st.none()), UNITS),
+    )
+    return st.recursive(simple, lambda inner: st.builds(tree.ArrayType, BARE, inner), max_leaves=2)
+
+
+def calls() -> SearchStrategy[tree.Statement]:
+    """A call."""
+    return st.builds(tree.Call, NAMES, st.lists(expressions(), max_size=2).map(tuple), comments=WORDS)
+
+
+def assignments() -> SearchStrategy[tree.Statement]:
+    """An assignment, deferred or not."""
+    return st.builds(tree.Assign, places(), expressions(), st.booleans(), comments=WORDS)
+
+
+def _blocks(inner: SearchStrategy[tree.Statement]) -> SearchStrategy[tree.Statement]:
+    body = st.lists(inner, max_size=2).map(tuple)
+    some = st.lists(inner, min_size=1, max_size=2).map(tuple)
+    values = st.lists(expressions(), min_size=1, max_size=2).map(tuple)
+    arms = st.lists(st.builds(tree.Arm, values, some, comments=WORDS), min_size=1, max_size=2).map(tuple)
+    return st.one_of(
+        st.builds(tree.If, expressions(), body, some | st.just(()), comments=WORDS),
+        st.builds(tree.Case, expressions(), arms, st.none() | some, comments=WORDS),
+        st.builds(tree.For, NAMES, expressions(), expressions(), body, comments=WORDS),
+    )
+
+
+def statements() -> SearchStrategy[tree.Statement]:
+    """Any statement."""
+    local = st.builds(tree.Local, NAMES, types(), st.none() | expressions(), comments=WORDS)
+    return st.recursive(st.one_of(calls(), assignments(), local), _blocks, max_leaves=4)
+
+
+COMPARISONS = st.sampled_from(["=", "/=", "<", "<=", ">", ">="])
+
+
+def conditions() -> SearchStrategy[tree.Condition]:
+    """A condition cell."""
+    several = st.lists(expressions(), min_size=1, max_size=3).map(tuple)
+    return st.one_of(
+        st.builds(tree.Comparison, COMPARISONS, expressions()),
+        several.map(tree.OneOf),
+        st.builds(tree.Between, expressions(), expressions()),
+    )
+
+
+@st.composite
+def tables(draw: st.DrawFn) -> tree.TableDecl:
+    """A table with even rows."""
+    columns = draw(st.lists(st.one_of(st.just(None), expressions()), min_size=1, max_size=3))
+    words = draw(st.lists(st.sampled_from(["procedures", "command_out", "status_out", "place"]), max_size=3))
+    headings = tuple(tree.Heading(one, "when" if one is None else "") for one in columns)
+    actions = tuple(tree.Heading(draw(places()), "") if w == "place" else tree.Heading(None, w) for w in words)
+    cell = st.lists(calls() | assignments(), max_size=2).map(lambda found: tuple(_bare(one) for one in found))
+    rows = []
+    for number in range(draw(st.integers(0, 3))):
+        default = number == 2 and draw(st.booleans())
+        conditions_ = tuple(
+            None if default or draw(st.booleans()) else _condition(draw, heading) for heading in headings
+        )
+        done = tuple(draw(cell) if h.subject is None else _value(draw) for h in actions)
+        unreachable = default and draw(st.booleans())
+        rows.append(tree.Row(f"l{number}", conditions_, done, default, unreachable, comments=draw(WORDS)))
+    assuming = draw(st.lists(NAMES, max_size=2).map(tuple))
+    return tree.TableDecl(draw(NAMES), assuming, headings, actions, tuple(rows), comments=draw(WORDS), doc=draw(DOCS))
+
+
+def _bare(one: tree.Statement) -> tree.Statement:
+    """Without comments: a cell has none."""
+    if isinstance(one, tree.Call):
+        return tree.Call(one.name, one.args)
+    assert isinstance(one, tree.Assign)
+    return tree.Assign(one.place, one.value, one.deferred)
+
+
+def _condition(draw: st.DrawFn, heading: tree.Heading) -> tree.Condition:
+    if heading.subject is None:
+        return tree.Comparison("=", draw(expressions()))
+    return draw(conditions())
+
+
+def _value(draw: st.DrawFn) -> tuple[tree.Statement, ...] | tree.Comparison:
+    return tree.Comparison("=", draw(expressions())) if draw(st.booleans()) else ()
+
+
+@st.composite
+def levels(draw: st.DrawFn) -> tree.LevelDecl:
+    """A level of either kind."""
+    many = draw(st.booleans())
+    dispatch = st.lists(st.builds(tree.Dispatch, expressions(), NAMES), min_size=1, max_size=2).map(tuple)
+    return tree.LevelDecl(
+        draw(NAMES),
+        draw(st.none() | LITERALS),
+        draw(st.lists(NAMES, max_size=2).map(tuple)),
+        None if many else draw(NAMES),
+        draw(places()) if many else None,
+        draw(dispatch) if many else (),
+        draw(st.lists(NAMES, max_size=2).map(tuple)),
+        comments=draw(WORDS),
+        doc=draw(DOCS),
+    )
+
+
+def declarations() -> SearchStrategy[tree.Declaration]:
+    """Any declaration."""
+    some_names = st.lists(NAMES, min_size=1, max_size=3).map(tuple)
+    params = st.lists(st.builds(tree.Parameter, NAMES, types()), max_size=2).map(tuple)
+    body = st.lists(statements(), max_size=3).map(tuple)
+    touched = st.lists(places(), max_size=2).map(tuple)
+    head = {"comments": WORDS, "doc": DOCS}
+    field = st.builds(tree.FieldDecl, NAMES, types(), **head)
+    return st.one_of(
+        st.builds(tree.Use, st.sampled_from(["types", "task/vars"]), comments=WORDS),
+        st.builds(tree.UnitDecl, NAMES, **head),
+        st.builds(tree.ConstDecl, NAMES, expressions(), **head),
+        st.builds(tree.EnumDecl, NAMES, some_names, **head),
+        st.builds(tree.TypeDecl, NAMES, types(), **head),
+        st.builds(tree.RecordDecl, NAMES, st.lists(field, min_size=1, max_size=2).map(tuple), **head),
+        st.builds(
+            tree.VariableDecl,
+            st.sampled_from(["input", "state", "output"]),
+            NAMES,
+            types(),
+            st.none() | expressions(),
+            st.sampled_from(["", "clamp", "reject"]),
+            st.none() | expressions(),
+            **head,
+        ),
+        st.builds(
+            tree.AssumeDecl, NAMES, expressions(), st.sampled_from(["", "assumed", "monitored", "proved"]), **head
+        ),
+        st.builds(tree.InvariantDecl, NAMES, expressions(), **head),
+        st.builds(tree.ProcedureDecl, st.just("procedure"), NAMES, params, body=body, **head),
+        st.builds(tree.ProcedureDecl, st.just("module"), NAMES, reads=touched, writes=touched, body=body, **head),
+        st.builds(
+            tree.ProcedureDecl,
+            st.just("extern"),
+            NAMES,
+            params,
+            touched,
+            touched,
+            st.sampled_from(["", "pkg.mod:fn"]),
+            st.sampled_from(["", "c_fn"]),
+            **head,
+        ),
+        st.builds(tree.OwnerDecl, NAMES, some_names | st.just(()), **head),
+        tables(),
+        levels(),
+    )
+
+
+def files() -> SearchStrategy[tree.File]:
+    """A file of a few declarations."""
+    return st.builds(tree.File, st.lists(declarations(), max_size=3).map(tuple), WORDS)

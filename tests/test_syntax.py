@@ -1,0 +1,149 @@
+"""Text to tree and back: round trips, errors with a place, nothing that makes the parser raise."""
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rcsc.diagnostics.codes import Code
+from rcsc.source import Source, Span
+from rcsc.syntax import tree
+from rcsc.syntax.format import format_file
+from rcsc.syntax.parse import MOST_ERRORS, parse
+from rcsc.syntax.spell import spell_expr
+from tests.strategies_syntax import expressions, files
+
+REPO = Path(__file__).parents[1]
+SHIPPED = sorted((REPO / "tables").rglob("*.rcs"))
+
+
+def errors(text: str) -> list[tuple[str, int]]:
+    """Codes and lines of the diagnostics of a text."""
+    source = Source("case.rcs", text)
+    parsed = parse(source)
+    assert not isinstance(parsed, tree.File)
+    return [(d.code.value, source.position(d.primary.span.start).line) for d in parsed]
+
+
+@settings(max_examples=300)
+@given(files())
+def test_formatted_trees_parse_to_themselves(file: tree.File) -> None:
+    text = format_file(file)
+    assert parse(Source("case.rcs", text)) == file, text
+    assert format_file(file) == text
+
+
+@settings(max_examples=500)
+@given(expressions())
+def test_expressions_keep_their_shape_without_needless_parentheses(expr: tree.Expr) -> None:
+    text = spell_expr(expr)
+    parsed = parse(Source("case.rcs", f"invariant i : {text}"))
+    assert isinstance(parsed, tree.File), text
+    [invariant] = parsed.declarations
+    assert isinstance(invariant, tree.InvariantDecl)
+    assert invariant.condition == expr, text
+
+
+@pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
+def test_shipped_tables_are_formatted_and_keep_their_comments(path: Path) -> None:
+    text = path.read_text(encoding="utf-8")
+    parsed = parse(Source(path.name, text))
+    assert isinstance(parsed, tree.File)
+    assert format_file(parsed) == text
+
+
+def test_comments_go_with_what_they_stand_by() -> None:
+    text = """# the file
+use a # same line
+## doc of x
+# about x
+input x : bool
+procedure p {
+  # before
+  y := x # behind
+  if x { # inside
+    z := 1
+  }
+}
+# the end
+"""
+    parsed = parse(Source("case.rcs", text))
+    assert isinstance(parsed, tree.File)
+    use, variable, procedure = parsed.declarations
+    assert isinstance(use, tree.Use) and use.comments == ("the file", "same line")
+    assert isinstance(variable, tree.VariableDecl)
+    assert variable.doc == ("doc of x",) and variable.comments == ("about x",)
+    assert isinstance(procedure, tree.ProcedureDecl)
+    assert [one.comments for one in procedure.body] == [("before", "behind"), ("inside",)]
+    assert parsed.trailing == ("the end",)
+
+
+def test_cell_spans_point_into_the_file() -> None:
+    text = "input x : int 0 .. 9\ntable t {\n  | line | x   ||\n  | a    | <= 4 ||\n}\n"
+    parsed = parse(Source("case.rcs", text))
+    assert isinstance(parsed, tree.File)
+    table = parsed.declarations[1]
+    assert isinstance(table, tree.TableDecl)
+    [row] = table.rows
+    start, end = row.bounds[2:4]
+    assert text[start:end] == "<= 4"
+    assert tree.absolute(Span("", 3, 4), "case.rcs", start) == Span("case.rcs", text.index("4 ||"), text.index("4 ||") + 1)
+
+
+CASES = [
+    ("input x : = 3", [("RCS101", 1)]),
+    ("enum a {", [("RCS101", 1)]),
+    ("table t {\n | line | x ||\n | a | 1 | 2 ||\n}", [("RCS102", 3)]),
+    ("table t {\n | line | x |\n}", [("RCS102", 2)]),
+    ("table t {\n | line | x || || y |\n}", [("RCS102", 2)]),
+    ("table t {\n | line | x | y ||\n | a | DEFAULT | 3 ||\n}", [("RCS108", 3)]),
+    ("table t {\n | line | x ||\n | a | < ||\n | b | = = ||\n}", [("RCS101", 3), ("RCS101", 4)]),
+    ("table t {\n | name | x ||\n}", [("RCS101", 2)]),
+    ("input \u0430 : bool", [("RCS109", 1)]),
+    ("input x : bool\0", [("RCS106", 1)]),
+    ('extern procedure p python "a', [("RCS101", 1)]),
+    ("invariant i : " + "(" * 200 + "a" + ")" * 200, [("RCS103", 1)]),
+    ("invariant i : " + "not " * 5000 + "a", [("RCS103", 1)]),
+    ("invariant i : " + "-" * 5000 + "a", [("RCS103", 1)]),
+    ("invariant i : " + "a implies " * 5000 + "a", [("RCS103", 1)]),
+    ("procedure p { " + "if a { " * 500 + "} " * 500 + "}", [("RCS103", 1)]),
+    ("procedure p { if a {} " + "else if a {} " * 5000 + "}", [("RCS103", 1)]),
+    ("input x : = 3\n\ninput y : bool\n\nowner 3 {}\n", [("RCS101", 1), ("RCS101", 5)]),
+]
+
+
+@pytest.mark.parametrize(("text", "expected"), CASES, ids=lambda value: repr(value)[:40])
+def test_syntax_errors_have_a_code_and_a_line(text: str, expected: list[tuple[str, int]]) -> None:
+    assert errors(text) == expected
+
+
+def test_expectations_are_words_and_few() -> None:
+    parsed = parse(Source("case.rcs", "procedure p { if }"))
+    assert not isinstance(parsed, tree.File)
+    assert parsed[0].message == "expected an expression, found `}`"
+
+
+def test_at_most_twenty_errors_are_reported() -> None:
+    assert len(errors("input x : =\n" * 100)) <= MOST_ERRORS
+
+
+@pytest.mark.parametrize("ending", ["\r\n", "\n"])
+def test_line_ends_of_both_kinds(ending: str) -> None:
+    text = "input x : bool\ntable t {\n | line | x ||\n | a | true ||\n | b | false ||\n}\n".replace("\n", ending)
+    assert isinstance(parse(Source("case.rcs", text)), tree.File)
+
+
+GARBAGE = st.text(alphabet=st.sampled_from("|{}()[]=<>/.:;,+-*#\"\n\r\t ab19_\u00e9\0") | st.characters(), max_size=200)
+
+
+@settings(max_examples=400)
+@given(GARBAGE)
+def test_garbage_is_a_tree_or_diagnostics_inside_the_text(text: str) -> None:
+    parsed = parse(Source("case.rcs", text))
+    if isinstance(parsed, tree.File):
+        return
+    assert parsed
+    for diagnostic in parsed:
+        assert 0 <= diagnostic.primary.span.start <= diagnostic.primary.span.end <= len(text)
+        assert diagnostic.code is not Code.INTERNAL
