@@ -1,7 +1,7 @@
 """Types, constants, expressions and statements in C99.
 
-Integers are computed in `int64_t`; where bounds exceed it, in `uint64_t`, whose wrap-around gives the right bits once cast back, since
-the result was proved to fit. Doubles are IEEE binary64 (`FLT_EVAL_METHOD` 0); what is stored has no -0.0.
+Integers are computed in `int64_t`, or in `uint64_t` where the bounds of operands and result need it and none is negative; that all of
+them fit there was proved (`prove.symbolic.word`). Doubles are IEEE binary64 (`FLT_EVAL_METHOD` 0); what is stored has no -0.0.
 """
 
 import re
@@ -42,6 +42,7 @@ _INFIX = {
     Op.AND: "&&", Op.OR: "||", Op.EQ: "==", Op.NE: "!=", Op.LT: "<", Op.LE: "<=", Op.GT: ">", Op.GE: ">=",
     Op.ADD: "+", Op.SUB: "-", Op.MUL: "*", Op.DIV: "/", Op.MOD: "%",
 }  # fmt: skip
+_HELPER = {"int64_t": "i64", "uint64_t": "u64", "double": "f64"}
 _COMPARE = frozenset({Op.EQ, Op.NE, Op.LT, Op.LE, Op.GT, Op.GE})
 
 
@@ -104,6 +105,19 @@ def element_path(paths: list[str], index: str) -> str:
     return head + f"[{index}]" + re.sub(r"^\[\d+\]", "", first[len(head) :])
 
 
+def _shared(kinds: tuple[Scalar, ...]) -> str:
+    """The type in which an operation on these is done: signed as soon as one of them can be negative."""
+    if any(isinstance(kind, Int) and kind.low < 0 for kind in kinds):
+        return "int64_t"
+    wide = [wide_type(kind) for kind in kinds]
+    return "uint64_t" if "uint64_t" in wide else wide[0]
+
+
+def _cast(args: tuple[Expr, ...], texts: list[str], shared: str) -> list[str]:
+    pairs = zip(args, texts, strict=True)
+    return [text if wide_type(arg.type) == shared else f"({shared}){text}" for arg, text in pairs]
+
+
 @dataclass(slots=True)
 class CText:
     """Spells for one program.
@@ -154,7 +168,7 @@ class CText:
         if op in (Op.TO_INT, Op.TO_REAL):
             return f"(({wide_type(kind)}){texts[0]})"
         if op in (Op.ABS, Op.MIN, Op.MAX):
-            return self._helper(op, args, texts)
+            return self._helper(op, args, texts, kind)
         if isinstance(args[0].type, Int) and (op in _COMPARE or isinstance(kind, Int)):
             return self._integers(op, args, texts, kind)
         if op is Op.NEG:
@@ -164,23 +178,20 @@ class CText:
         return f"({texts[0]} {_INFIX[op]} {texts[1]})"
 
     def _integers(self, op: Op, args: tuple[Expr, ...], texts: list[str], kind: Scalar) -> str:
-        """In `int64_t`, unless an operand or the result needs `uint64_t`."""
-        wide = any(wide_type(arg.type) == "uint64_t" for arg in args) or wide_type(kind) == "uint64_t"
+        """In the one 64-bit type that the prover shows operands and result to fit in."""
+        shared = _shared((*(arg.type for arg in args), kind))
+        cast = _cast(args, texts, shared)
         if op is Op.NEG:
-            return f"((int64_t)(UINT64_C(0) - (uint64_t){texts[0]}))" if wide else f"(-{texts[0]})"
-        if not wide:
-            return f"({texts[0]} {_INFIX[op]} {texts[1]})"
-        inner = f"((uint64_t){texts[0]} {_INFIX[op]} (uint64_t){texts[1]})"
-        return inner if op in _COMPARE or wide_type(kind) == "uint64_t" else f"((int64_t){inner})"
+            return f"(-{cast[0]})"
+        found = f"({cast[0]} {_INFIX[op]} {cast[1]})"
+        return found if op in _COMPARE or wide_type(kind) == shared else f"(({wide_type(kind)}){found})"
 
-    def _helper(self, op: Op, args: tuple[Expr, ...], texts: list[str]) -> str:
-        kind = {"int64_t": "i64", "uint64_t": "u64", "double": "f64"}
-        wide = [wide_type(arg.type) for arg in args]
-        shared = "uint64_t" if "uint64_t" in wide else wide[0]
-        name = f"{op.value}_{kind[shared]}"
+    def _helper(self, op: Op, args: tuple[Expr, ...], texts: list[str], kind: Scalar) -> str:
+        shared = _shared((*(arg.type for arg in args), kind))
+        name = f"{op.value}_{_HELPER[shared]}"
         self.helpers.add(name)
-        cast = [text if own == shared else f"({shared}){text}" for text, own in zip(texts, wide, strict=True)]
-        return f"{self.names.program}_{name}({', '.join(cast)})"
+        found = f"{self.names.program}_{name}({', '.join(_cast(args, texts, shared))})"
+        return found if wide_type(kind) == shared else f"(({wide_type(kind)}){found})"
 
     def stored(self, kind: Scalar, value: Expr, target: str) -> str:
         """A value for a place of C type `target`."""
