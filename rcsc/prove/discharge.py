@@ -1,7 +1,7 @@
 """Obligations put to Z3: one question where all hold, else halves until those that fail are found.
 
-In: obligations and what may be assumed. Out: those that can fail, each with its least witness, and those left open.
-Domains of the variables are asserted here. Z3 is loaded only when something is asked.
+In: obligations and what may be assumed. Out: those that can fail, each with its least witness, and those left
+open. Domains of the variables are asserted here. Z3 is loaded only when something is asked.
 """
 
 from collections.abc import Callable, Sequence
@@ -11,9 +11,9 @@ from enum import Enum, auto
 from rcsc.model import Kind, Real, Value, Variable, VariableName, value_of_key
 from rcsc.prove import smt, values
 from rcsc.prove.encode import Frame, least_witness
+from rcsc.prove.evaluation import Obligation
 from rcsc.prove.options import Options
 from rcsc.prove.smt import Answer, Solver, Term
-from rcsc.prove.symbolic import Obligation
 from rcsc.prove.values import Node
 
 MOST_UNKNOWN = 2

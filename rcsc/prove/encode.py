@@ -131,11 +131,11 @@ def declared(variables: Iterable[Variable]) -> tuple[Frame, list[Term]]:
 
 
 def least_witness(solver: Solver, variables: Iterable[Variable], frame: Frame) -> dict[str, Value] | None:
-    """The least values, in declared order, for which what is asserted holds; None where the solver finds none.
+    """The least values, in declared order, for which what is asserted holds; None where none is found.
 
-    Any model of Z3's may change with its version; the least one depends on the question alone. Where the solver
-    gives up on the way, the values found last stand: a witness still, but not the least. The solver is left with
-    the witness asserted.
+    Any model of Z3's may change with its version; the least one depends on the question alone. Where the
+    solver gives up on the way, the values found last stand: a witness still, but not the least. The solver is
+    left with the witness asserted.
     """
     shown = list(variables)
     if solver.check() is not Answer.SATISFIABLE:

@@ -1,16 +1,17 @@
-"""Nothing in a program can overflow, divide by zero, leave an array or a declared range, or write an output twice.
+"""Nothing can overflow, divide by zero, leave an array or a declared range, or write an output twice.
 
-In: a program. Out: diagnostics with least witnesses. Each line's actions are shown right where they run: under the
-table's assumptions, the invariants and the line's conditions; procedures of levels under the invariants; what nothing
-calls under the declared ranges alone. Conditions are shown to be defined for every input: so the executors can
-evaluate each of them (a monitored assumption too) whatever the others say. Every run also owes the invariants.
+In: a program. Out: diagnostics with least witnesses. Each line's actions are shown right where they run:
+under the table's assumptions, the invariants and the line's conditions; procedures of levels under the
+invariants; what nothing calls under the declared ranges alone. Conditions are shown to be defined for every
+input: the executors can evaluate each (a monitored assumption too) whatever the others say. Every run also owes
+the invariants.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 
 from rcsc.diagnostics.codes import Code
-from rcsc.diagnostics.diagnostic import Diagnostic, Label, WitnessColumn
+from rcsc.diagnostics.diagnostic import Diagnostic, Label
 from rcsc.model import (
     COMPARISONS,
     NOWHERE,
@@ -36,17 +37,17 @@ from rcsc.model import (
     TableByCommand,
     ToLeaf,
     pending,
-    spell,
 )
 from rcsc.prove import values
-from rcsc.prove.discharge import Asker, Failure, Outcome, Tally
+from rcsc.prove.causes import MOST_WITNESSES, Cause, diagnostic
+from rcsc.prove.discharge import Asker, Tally
+from rcsc.prove.evaluation import Evaluation, Obligation, State, TooLongError
 from rcsc.prove.options import Options
-from rcsc.prove.symbolic import Obligation, Run, State, TooLongError
+from rcsc.prove.symbolic import Run
 from rcsc.prove.values import FALSE, Node
 from rcsc.resolve.leaves import everything, read_by
 from rcsc.source import Span
 
-MOST_WITNESSES = 3
 _DEFINED = COMPARISONS | {Op.AND, Op.OR, Op.NOT, Op.IMPLIES}
 
 
@@ -55,14 +56,6 @@ def called_by_lines(program: Program) -> set[str]:
     lines = [line for table in program.tables for line in (*table.lines, table.default) if line is not None]
     actions = [action.statement for line in lines for action in line.actions]
     return {str(statement.procedure) for statement in actions if isinstance(statement, Call)}
-
-
-@dataclass(slots=True)
-class _Cause:
-    """One place and what can go wrong there, in every context where it can."""
-
-    failures: list[Failure] = field(default_factory=list)
-    where: list[tuple[str, str]] = field(default_factory=list)  # note, table
 
 
 @dataclass(slots=True)
@@ -78,7 +71,7 @@ class Obligations:
     options: Options
     tally: Tally = field(default_factory=Tally)
     undefined: set[str] = field(default_factory=set)
-    _causes: dict[tuple[Code, Span, str], _Cause] = field(default_factory=dict)
+    _causes: dict[tuple[Code, Span, str], Cause] = field(default_factory=dict)
     _start: dict[str, Node] = field(default_factory=dict)
     _clean: dict[str, bool] = field(default_factory=dict)
     _too_long: list[Diagnostic] = field(default_factory=list)
@@ -107,7 +100,7 @@ class Obligations:
             for line in (*table.lines, *((table.default,) if table.default else ())):
                 if not self._plain(line.actions):
                     self._line(table, line)
-        return [*self._too_long, *(_diagnostic(*key, cause) for key, cause in self._causes.items())]
+        return [*self._too_long, *(diagnostic(*key, cause) for key, cause in self._causes.items())]
 
     # --- what is known ---
 
@@ -258,7 +251,7 @@ class Obligations:
     # --- lines ---
 
     def _plain(self, actions: tuple[Action, ...]) -> bool:
-        """Whether it is plain that the line's actions owe nothing that a run could not show without asking."""
+        """Whether it is plain, without a run, that the line's actions owe nothing."""
         written: set[str] = set()
         for action in actions:
             names = self._plainly_written(action.statement)
@@ -338,7 +331,7 @@ class Obligations:
 
     # --- settling ---
 
-    def _keep(self, run: Run, who: str, span: Span) -> None:
+    def _keep(self, run: Evaluation, who: str, span: Span) -> None:
         """Owes every invariant that the run may have touched."""
         for invariant, reads in self._kept:
             if not reads.isdisjoint(run.state.leaves):
@@ -353,7 +346,7 @@ class Obligations:
         failures = self._asker.unshown(run.obligations, base, self._shown)
         for failure in failures:
             owed = failure.obligation
-            cause = self._causes.setdefault((owed.code, owed.span, owed.message), _Cause())
+            cause = self._causes.setdefault((owed.code, owed.span, owed.message), Cause())
             cause.failures.append(failure)
             cause.where.append((where, table))
         return not failures
@@ -381,41 +374,3 @@ def _computes(expr: Expr) -> bool:
             return op not in _DEFINED or any(_computes(arg) for arg in args)
         case _:
             return False
-
-
-# --- diagnostics -------------------------------------------------------------------------
-
-_PATIENCE = ("give each query more time with `--timeout`, or narrow the declared ranges",)
-_HELP: dict[Code, tuple[str, ...]] = {
-    Code.OVERFLOW: ("narrow the declared ranges, or guard the operation with `if`",),
-    Code.DIVISION_BY_ZERO: ("guard the division with `if`, or exclude zero from the divisor's range",),
-    Code.INDEX: ("guard the access with `if`, or narrow the index's range",),
-    Code.ASSIGNED_RANGE: (
-        "guard the assignment with `if`, use `min` or `max`, or widen the variable's range",
-    ),
-    Code.USE_BEFORE_ASSIGNMENT: ("give the local a first value where it is declared",),
-    Code.TWO_WRITERS: ("let one action of the line write the output",),
-    Code.ASSUMPTION_NOT_PROVED: ("declare it `assumed` or `monitored`",),
-    Code.INVARIANT_BROKEN: ("mend what runs there, or strengthen the invariant if that state cannot occur",),
-}
-
-
-def _diagnostic(code: Code, span: Span, message: str, cause: _Cause) -> Diagnostic:
-    failing = [
-        one for one in zip(cause.failures, cause.where, strict=True) if one[0].outcome is Outcome.FAILS
-    ]
-    if not failing:
-        said = f"could not be decided whether this holds: {message}"
-        return Diagnostic(Code.UNDECIDED, said, Label(span), help=_PATIENCE)
-    columns = tuple(
-        WitnessColumn(
-            table,
-            tuple(variable.name for variable, _ in failure.witness),
-            tuple(spell(variable.type, value) for variable, value in failure.witness),
-        )
-        for failure, (_, table) in failing[:MOST_WITNESSES]
-        if failure.witness
-    )
-    notes = tuple(dict.fromkeys(where for _, (where, _) in failing if where))[:MOST_WITNESSES]
-    more = max(0, len(failing) - MOST_WITNESSES)
-    return Diagnostic(code, message, Label(span), (), notes, _HELP.get(code, ()), columns, more)
