@@ -9,7 +9,6 @@ from rcsc.model import (
     Apply,
     Bool,
     Box,
-    Enum,
     Expr,
     Int,
     Literal,
@@ -25,9 +24,11 @@ from rcsc.model import (
     key_of,
     value_of_key,
 )
-from rcsc.resolve.expressions import Typed, among, between, boolean, compared, typed
+from rcsc.resolve.expressions import among, between, boolean, typed
 from rcsc.resolve.folding import fold
 from rcsc.resolve.leaves import read_by
+from rcsc.resolve.operators import Typed, compared
+from rcsc.resolve.placing import placed
 from rcsc.resolve.scope import Body, Scope
 from rcsc.source import Span
 from rcsc.syntax import tree
@@ -38,68 +39,63 @@ _FLIPPED = {Op.LT: Op.GT, Op.LE: Op.GE, Op.GT: Op.LT, Op.GE: Op.LE, Op.EQ: Op.EQ
 
 @dataclass(slots=True)
 class Tests:
-    """The tests of one table: one a column and cell text, shared by the lines that state it."""
+    """The tests of one table: one a column and meaning, shared by the lines that state it.
+
+    Attributes:
+        subjects: What each column's heading means; None under `when`, and after an error.
+        order: The place of each leaf in declared order.
+    """
 
     scope: Scope
+    headings: tuple[tree.Heading, ...]
+    subjects: tuple[Typed | None, ...]
     order: dict[str, int]
     known: dict[tuple[int, int], Test | None] = field(default_factory=dict)
+    meant: dict[tuple[int, tree.Condition], Test | None] = field(default_factory=dict)
     __test__ = False
 
-    def test(
-        self, column: int, heading: tree.Heading, written: tree.Condition, text: str, span: Span
-    ) -> Test | None:
+    def test(self, column: int, written: tree.Condition, text: str, span: Span) -> Test | None:
         """The test of a cell; None where it is always true, or after an error."""
-        key = (column, id(written))
-        if key not in self.known:
-            self.known[key] = self._test(heading, written, text, span)
-        return self.known[key]
+        meaning = (column, written)
+        if meaning not in self.meant:
+            self.scope.cell = span
+            self.meant[meaning] = self._test(column, written, text, span)
+            self.scope.cell = None
+        self.known[column, id(written)] = self.meant[meaning]
+        return self.meant[meaning]
 
-    def _test(self, heading: tree.Heading, written: tree.Condition, text: str, span: Span) -> Test | None:
-        before = len(self.scope.found)
-        condition = _condition(self.scope, heading, written)
+    def _test(self, column: int, written: tree.Condition, text: str, span: Span) -> Test | None:
+        condition = self._condition(column, written)
         if condition is None:
-            self._place(before, span)
             return None
         value = fold(condition)
         names = tuple(sorted(set(read_by(condition)), key=self.order.__getitem__))
         box = box_of(condition, self.scope.leaves[names[0]]) if len(names) == 1 else None
+        text = " ".join(text.split())
         if value is False or box == ():
-            self.scope.report(
-                Code.EMPTY_CONDITION, f"no value satisfies `{text}`", span, "the line could never match"
-            )
+            helps = "the line could never match: mend the condition, or take the line out"
+            self.scope.report(Code.EMPTY_CONDITION, f"no value satisfies `{text}`", span, helps)
             return None
-        return None if value is True else Test(text, condition, names, box)
+        return None if value is True else Test(text, placed(condition, span), names, box)
 
-    def _place(self, before: int, span: Span) -> None:
-        """Moves what was reported inside a cell, where spans are relative, to the file."""
-        from dataclasses import replace
-
-        for at in range(before, len(self.scope.found)):
-            diagnostic = self.scope.found[at]
-            inner = diagnostic.primary.span
-            if inner.file == "":
-                there = tree.absolute(inner, span.file, span.start)
-                self.scope.found[at] = replace(diagnostic, primary=replace(diagnostic.primary, span=there))
-
-
-def _condition(scope: Scope, heading: tree.Heading, written: tree.Condition) -> Expr | None:
-    body = Body()
-    if heading.subject is None:
-        assert isinstance(written, tree.Comparison)
-        return boolean(scope, body, written.value)
-    subject = typed(scope, body, heading.subject)
-    if subject is None:
-        return None
-    found: Typed | None
-    match written:
-        case tree.Comparison(op, value, span):
-            other = typed(scope, body, value, subject.expr.type)
-            found = None if other is None else compared(scope, Op(op), (subject, other), span)
-        case tree.OneOf(members, span):
-            found = among(scope, body, subject, members, span)
-        case tree.Between(low, high, span):
-            found = between(scope, body, subject, low, high, span)
-    return None if found is None else found.expr
+    def _condition(self, column: int, written: tree.Condition) -> Expr | None:
+        scope, body = self.scope, Body()
+        if self.headings[column].subject is None:
+            assert isinstance(written, tree.Comparison)
+            return boolean(scope, body, written.value)
+        subject = self.subjects[column]
+        if subject is None:
+            return None
+        found: Typed | None
+        match written:
+            case tree.Comparison(op, value, span):
+                other = typed(scope, body, value, subject.expr.type)
+                found = None if other is None else compared(scope, Op(op), (subject, other), span)
+            case tree.OneOf(members, span):
+                found = among(scope, body, subject, members, span)
+            case tree.Between(low, high, span):
+                found = between(scope, body, subject, low, high, span)
+        return None if found is None else found.expr
 
 
 # --- boxes ---------------------------------------------------------------------------
@@ -108,9 +104,10 @@ def _condition(scope: Scope, heading: tree.Heading, written: tree.Condition) -> 
 def box_of(condition: Expr, leaf: Variable) -> Box | None:
     """The keys of the one leaf it reads for which the condition holds; None where not a box."""
     low, high = key_bounds(leaf.type)
-    if high - low < _SMALL and not isinstance(leaf.type, Real):
+    box = _box(condition, leaf.type, low, high)
+    if box is None and high - low < _SMALL and not isinstance(leaf.type, Real):
         return _tried(condition, leaf.name, leaf.type, range(low, high + 1))
-    return _box(condition, leaf.type, low, high)
+    return box
 
 
 def _tried(condition: Expr, name: VariableName, kind: Scalar, keys: range) -> Box | None:
@@ -148,6 +145,8 @@ def _box(condition: Expr, kind: Scalar, low: int, high: int) -> Box | None:
     match condition:
         case Literal(value=value):
             return ((low, high),) if value else ()
+        case Read():
+            return ((1, 1),)
         case Among(subject=Read(), values=values):
             keys = [key_of(kind, value) for value in values]
             return joined([(key, key) for key in keys if low <= key <= high])
@@ -175,7 +174,7 @@ def _compared(op: Op, left: Expr, right: Expr, kind: Scalar, low: int, high: int
     if fold(left) is not None:
         left, right, op = right, left, _FLIPPED[op]
     value = fold(right)
-    if value is None or isinstance(kind, Bool | Enum):
+    if value is None or isinstance(right.type, Bool) is not isinstance(kind, Bool):
         return None
     if isinstance(left, Read):
         return _against(op, key_of(kind, value), low, high)

@@ -1,13 +1,10 @@
-"""Expressions: names found, kinds and units checked, bounds computed."""
+"""Expressions: names found, sub-expressions typed, paths followed to their leaves."""
 
-import math
 from dataclasses import dataclass
-from fractions import Fraction
 
 from rcsc.diagnostics.codes import Code
 from rcsc.model import (
     COMPARISONS,
-    I64_MAX,
     Among,
     Apply,
     Array,
@@ -24,64 +21,49 @@ from rcsc.model import (
     Scalar,
     Select,
     Type,
-    Unit,
     Value,
     VariableName,
 )
-from rcsc.resolve import intervals
 from rcsc.resolve.folding import fold
-from rcsc.resolve.scope import Body, Scope, normal, spell_unit
+from rcsc.resolve.literals import integer, real
+from rcsc.resolve.operators import (
+    Typed,
+    alike,
+    applied,
+    common_unit,
+    compared,
+    converted,
+    kind_word,
+    one_kind,
+    scaled,
+)
+from rcsc.resolve.scope import Body, Scope
 from rcsc.source import Span
 from rcsc.syntax import tree
 
-
-@dataclass(frozen=True, slots=True)
-class Typed:
-    """An expression, and whether it is made of numbers written without a unit."""
-
-    expr: Expr
-    bare: bool = False
-
-    def unit(self) -> Unit:
-        """Its unit; () for a bare number, a bool or an enumeration."""
-        kind = self.expr.type
-        return kind.unit if isinstance(kind, Int | Real) else ()
-
-    def literal(self) -> Literal:
-        """Itself, of a folded constant."""
-        assert isinstance(self.expr, Literal)
-        return self.expr
-
-
-def kind_word(kind: Scalar) -> str:
-    """The kind, for messages."""
-    match kind:
-        case Bool():
-            return "bool"
-        case Enum(name=name):
-            return f"`{name}`"
-        case Int():
-            return "int"
-        case Real():
-            return "real"
-
-
-def same_kind(one: Scalar, two: Scalar) -> bool:
-    """Whether values of the two can be compared or assigned, units aside."""
-    if isinstance(one, Enum) or isinstance(two, Enum):
-        return one == two
-    return type(one) is type(two)
+DEEPEST = 200
 
 
 def typed(scope: Scope, body: Body, written: tree.Expr, want: Scalar | None = None) -> Typed | None:
     """The typed expression; None after an error, which has then been reported."""
+    if scope.depth == DEEPEST:
+        scope.report(Code.TOO_DEEP, f"expressions nest more than {DEEPEST} deep", written.span)
+        return None
+    scope.depth += 1
+    try:
+        return _typed(scope, body, written, want)
+    finally:
+        scope.depth -= 1
+
+
+def _typed(scope: Scope, body: Body, written: tree.Expr, want: Scalar | None) -> Typed | None:
     match written:
         case tree.BoolLiteral(value, span):
             return Typed(Literal(value, Bool(), span))
         case tree.IntLiteral():
-            return _integer(scope, written)
+            return integer(scope, written)
         case tree.RealLiteral():
-            return _real(scope, written)
+            return real(scope, written)
         case tree.Reference(name, span):
             return _reference(scope, body, name, span, want)
         case tree.FieldOf() | tree.IndexOf():
@@ -109,45 +91,21 @@ def boolean(scope: Scope, body: Body, written: tree.Expr) -> Expr | None:
     return found.expr
 
 
-# --- literals and names --------------------------------------------------------------
-
-
-def _integer(scope: Scope, written: tree.IntLiteral) -> Typed:
-    text = written.text.replace("_", "")
-    value = int(text, 16) if text.lower().startswith("0x") else int(text) if len(text) < 400 else 10**400
-    return Typed(
-        Literal(value, Int(value, value, scope.unit(written.unit)), written.span), written.unit is None
-    )
-
-
-def _real(scope: Scope, written: tree.RealLiteral) -> Typed | None:
-    text = written.text.replace("_", "")
-    value = float(text)
-    if not math.isfinite(value):
-        scope.report(Code.NOT_FINITE, f"`{written.text}` is larger than every double", written.span)
-        return None
-    if len(text) < 1000 and abs(int(text.lower().partition("e")[2] or 0)) < 1000:
-        _one_spelling(scope, value, text, written.span)
-    return Typed(
-        Literal(value, Real(value, value, scope.unit(written.unit)), written.span), written.unit is None
-    )
-
-
-def _one_spelling(scope: Scope, value: float, text: str, span: Span) -> None:
-    """Reports two different numbers of the text that are the same double."""
-    first = scope.doubles.setdefault(value, (text, span))
-    if Fraction(first[0]) != Fraction(text):
-        scope.report(Code.SAME_DOUBLE, f"`{text}` and `{first[0]}` are the same double, {value!r}", span)
-
-
 def _reference(scope: Scope, body: Body, name: tree.Name, span: Span, want: Scalar | None) -> Typed | None:
     local = body.visible.get(name.text)
     if local is not None:
         return Typed(ReadLocal(local.name, local.type, span))
     if isinstance(want, Enum) and name.text in want.members:
+        if _is_also(scope, name.text, want):
+            message = f"`{name.text}` may mean the variable or `{want.name}.{name.text}`"
+            helps = f"write `{want.name}.{name.text}`, or rename the variable"
+            scope.report(Code.UNKNOWN_NAME, message, name.span, helps)
+            return None
         return Typed(Literal(want.members.index(name.text), want, span))
     if name.text in scope.declared:
         return _path(scope, body, tree.Reference(name, span))
+    if not scope.demand("value", name):
+        return None
     if name.text in scope.constants:
         constant = scope.constants[name.text]
         return Typed(Literal(constant.literal.value, constant.literal.type, span), constant.bare)
@@ -168,7 +126,11 @@ def _reference(scope: Scope, body: Body, name: tree.Name, span: Span, want: Scal
     return None
 
 
-# --- paths ---------------------------------------------------------------------------
+def _is_also(scope: Scope, name: str, want: Enum) -> bool:
+    """Whether a variable or constant of that name has the type wanted, too."""
+    declared, constant = scope.declared.get(name), scope.constants.get(name)
+    kind = declared.type if declared else constant.literal.type if constant else None
+    return kind == want
 
 
 @dataclass(frozen=True, slots=True)
@@ -240,8 +202,7 @@ def _element(scope: Scope, body: Body, base: Path | None, written: tree.Expr) ->
     if base.index is not None:
         scope.report(Code.KIND, "a path has at most one computed index", written.span)
         return None
-    names = tuple(f"{base.names[0]}[{at}]" for at in range(length))
-    return Path(names, base.type.element, index.expr)
+    return Path(scope.names(base.names[0], length), base.type.element, index.expr)
 
 
 def _path(scope: Scope, body: Body, written: tree.Expr) -> Typed | None:
@@ -268,9 +229,6 @@ def _member(scope: Scope, owner: Enum, written: tree.FieldOf) -> Typed | None:
     return Typed(Literal(owner.members.index(written.name.text), owner, written.span))
 
 
-# --- operators -----------------------------------------------------------------------
-
-
 def _unary(scope: Scope, body: Body, written: tree.Unary) -> Typed | None:
     if written.op == "not":
         inner = boolean(scope, body, written.operand)
@@ -278,7 +236,7 @@ def _unary(scope: Scope, body: Body, written: tree.Unary) -> Typed | None:
     operand = typed(scope, body, written.operand)
     if operand is None or not _number(scope, operand, written.operand):
         return None
-    return _applied(scope, Op.NEG, (operand,), operand.unit(), written.span)
+    return applied(scope, Op.NEG, (operand,), operand.unit(), written.span)
 
 
 def _number(scope: Scope, operand: Typed, written: tree.Expr) -> bool:
@@ -286,26 +244,6 @@ def _number(scope: Scope, operand: Typed, written: tree.Expr) -> bool:
         return True
     scope.report(Code.KIND, f"arithmetic takes numbers, this is {kind_word(operand.expr.type)}", written.span)
     return False
-
-
-def _applied(scope: Scope, op: Op, operands: tuple[Typed, ...], unit: Unit, span: Span) -> Typed:
-    """The operation with its bounds; folded where all operands are constants."""
-    kinds = tuple(o.expr.type for o in operands if isinstance(o.expr.type, Int | Real))
-    args = tuple(o.expr for o in operands)
-    bare = all(o.bare for o in operands)
-    applied = Apply(op, args, intervals.apply(op, kinds, unit), span)
-    value = fold(applied) if all(isinstance(arg, Literal) for arg in args) else None
-    if value is None:
-        return Typed(applied, bare)
-    if isinstance(applied.type, Real) and not math.isfinite(value):
-        scope.report(Code.NOT_FINITE, "this constant is larger than every double", span)
-        value = 0.0
-    point = (
-        Int(int(value), int(value), unit)
-        if isinstance(applied.type, Int)
-        else Real(float(value), float(value), unit)
-    )
-    return Typed(Literal(value, point, span), bare)
 
 
 def _pair(scope: Scope, body: Body, left: tree.Expr, right: tree.Expr) -> tuple[Typed, Typed] | None:
@@ -343,65 +281,8 @@ def _binary(scope: Scope, body: Body, written: tree.Binary) -> Typed | None:
         scope.report(Code.KIND, "`mod` takes whole numbers", written.span)
         return None
     if op in (Op.MUL, Op.DIV):
-        return _scaled(scope, op, left, right, written.span)
-    return _alike(scope, op, (left, right), written.span)
-
-
-def _scaled(scope: Scope, op: Op, left: Typed, right: Typed, span: Span) -> Typed | None:
-    """A product or quotient: units multiply."""
-    if not _one_kind(scope, left, right, span):
-        return None
-    powers = dict(left.unit())
-    for name, power in right.unit():
-        powers[name] = powers.get(name, 0) + (power if op is Op.MUL else -power)
-    return _applied(scope, op, (left, right), normal(powers), span)
-
-
-def _alike(scope: Scope, op: Op, operands: tuple[Typed, ...], span: Span) -> Typed | None:
-    """A sum, difference, remainder, least or greatest: units agree."""
-    unit = common_unit(scope, operands, span)
-    if unit is None or not _one_kind(scope, operands[0], operands[-1], span):
-        return None
-    return _applied(scope, op, operands, unit, span)
-
-
-def _one_kind(scope: Scope, left: Typed, right: Typed, span: Span) -> bool:
-    if not same_kind(left.expr.type, right.expr.type):
-        one, two = kind_word(left.expr.type), kind_word(right.expr.type)
-        helps = ("convert with `real(n)` or `int(x)`",) if {one, two} == {"int", "real"} else ()
-        scope.report(Code.KIND, f"the two sides are {one} and {two}", span, *helps)
-        return False
-    kinds = [k for k in (left.expr.type, right.expr.type) if isinstance(k, Int)]
-    mixed = bool(kinds) and min(k.low for k in kinds) < 0 and max(k.high for k in kinds) > I64_MAX
-    if mixed and all(k.low >= -(2**63) and k.high < 2**64 for k in kinds):
-        scope.report(
-            Code.MIXED_SIGN, "no 64-bit integer type holds both sides", span, "narrow one of the ranges"
-        )
-        return False
-    return True
-
-
-def common_unit(scope: Scope, operands: tuple[Typed, ...], span: Span) -> Unit | None:
-    """The unit of all that have one; None (reported) where they differ."""
-    units = [operand.unit() for operand in operands if not operand.bare]
-    if not units:
-        return ()
-    for unit in units:
-        if unit != units[0]:
-            scope.report(Code.UNIT, f"the units differ: {spell_unit(units[0])} and {spell_unit(unit)}", span)
-            return None
-    return units[0]
-
-
-def compared(scope: Scope, op: Op, pair: tuple[Typed, Typed], span: Span) -> Typed | None:
-    """A comparison of the two."""
-    left, right = pair
-    if not _one_kind(scope, left, right, span) or common_unit(scope, pair, span) is None:
-        return None
-    if op not in (Op.EQ, Op.NE) and not isinstance(left.expr.type, Int | Real):
-        scope.report(Code.KIND, f"{kind_word(left.expr.type)} has no order", span, "use `=`, `/=` or a set")
-        return None
-    return Typed(Apply(op, (left.expr, right.expr), Bool(), span))
+        return scaled(scope, op, left, right, written.span)
+    return alike(scope, op, (left, right), written.span)
 
 
 def _in_set(scope: Scope, body: Body, written: tree.InSet) -> Typed | None:
@@ -423,7 +304,7 @@ def among(
             scope.report(Code.NOT_CONSTANT, "the members of a set are constants", member.span)
             return None
         if (
-            not _one_kind(scope, subject, one, member.span)
+            not one_kind(scope, subject, one, member.span)
             or common_unit(scope, (subject, one), member.span) is None
         ):
             return None
@@ -440,7 +321,8 @@ def between(
     scope: Scope, body: Body, subject: Typed, low: tree.Expr, high: tree.Expr, span: Span
 ) -> Typed | None:
     """`low <= subject and subject <= high`."""
-    least, most = typed(scope, body, low), typed(scope, body, high)
+    least = typed(scope, body, low, subject.expr.type)
+    most = typed(scope, body, high, subject.expr.type)
     if least is None or most is None:
         return None
     ends = fold(least.expr), fold(most.expr)
@@ -476,23 +358,5 @@ def _function(scope: Scope, body: Body, written: tree.Apply) -> Typed | None:
     ):
         return None
     if op in (Op.TO_INT, Op.TO_REAL):
-        return _converted(scope, op, operands[0], written.span)
-    return _alike(scope, op, operands, written.span)
-
-
-def _converted(scope: Scope, op: Op, operand: Typed, span: Span) -> Typed | None:
-    kind = operand.expr.type
-    if op is Op.TO_REAL:
-        if not isinstance(kind, Int):
-            scope.report(Code.KIND, "`real` converts a whole number", span)
-            return None
-        converted: Scalar = Real(float(kind.low), float(kind.high), kind.unit)
-    else:
-        if not isinstance(kind, Real):
-            scope.report(Code.KIND, "`int` converts a real number", span)
-            return None
-        wide = not (math.isfinite(kind.low) and math.isfinite(kind.high))
-        converted = Int(*((-(2**1024), 2**1024) if wide else (int(kind.low), int(kind.high))), kind.unit)
-    applied = Apply(op, (operand.expr,), converted, span)
-    value = fold(applied) if isinstance(operand.expr, Literal) else None
-    return Typed(applied if value is None else Literal(value, converted, span), operand.bare)
+        return converted(scope, op, operands[0], written.span)
+    return alike(scope, op, operands, written.span)

@@ -9,15 +9,17 @@ from itertools import product
 
 from rcsc.model import Int, Op, Real, Scalar, Unit
 
+WIDEST = 2**200
+"""Integer bounds stop here: a result beyond 64 bits is refused by its own proof obligation."""
+
 
 def apply(op: Op, kinds: tuple[Int | Real, ...], unit: Unit) -> Scalar:
     """The type of `op` over operands of these types."""
     if isinstance(kinds[0], Int):
         low, high = _integers(op, [k for k in kinds if isinstance(k, Int)])
-        return Int(low, high, unit)
-    first, *_ = kinds
+        return Int(max(low, -WIDEST), min(high, WIDEST), unit)
     bounds = _reals(op, [k for k in kinds if isinstance(k, Real)])
-    return Real(*bounds, unit) if bounds else Real(-math.inf, math.inf, first.unit)
+    return Real(*bounds, unit) if bounds else Real(-math.inf, math.inf, unit)
 
 
 def truncated(a: int, b: int) -> int:

@@ -1,29 +1,42 @@
 """Procedures, modules and extern procedures; owners; what calls what."""
 
+from collections.abc import Iterator
+from typing import TypeAlias
+
 from rcsc.diagnostics.codes import Code
-from rcsc.diagnostics.diagnostic import Label
 from rcsc.model import (
+    Among,
+    Apply,
     Call,
+    Expr,
     Kind,
-    Owner,
     Parameter,
     Procedure,
     ProcedureName,
+    Read,
+    Select,
     Statement,
     VariableName,
+    pending,
 )
 from rcsc.resolve.expressions import path_of
 from rcsc.resolve.externs import extern
 from rcsc.resolve.leaves import everything, expressions, read_by, written_by
-from rcsc.resolve.scope import Body, Scope
-from rcsc.resolve.statements import MOST_STATEMENTS, Statements, cost
+from rcsc.resolve.scope import Body, Scope, root_of
+from rcsc.resolve.statements import MOST_STATEMENTS, Statements, below, cost
 from rcsc.resolve.types import scalar_of
 from rcsc.source import Span
 from rcsc.syntax import tree
 
+MOST_CALLS = 100
+
+_Body: TypeAlias = tuple[tuple[Parameter, ...], tuple[Statement, ...]]
+
 
 def procedures(scope: Scope, written: list[tree.ProcedureDecl]) -> tuple[Procedure, ...]:
     """All procedures, with what they read and write, calls included."""
+    for one in written:
+        scope.signatures[one.name.text] = tuple(scalar_of(scope, param.type) for param in one.params)
     bodies = {one.name.text: _body(scope, one) for one in written}
     order = _call_order(scope, bodies)
     known: dict[str, Procedure] = {}
@@ -41,11 +54,11 @@ def procedures(scope: Scope, written: list[tree.ProcedureDecl]) -> tuple[Procedu
     return tuple(known[one.name.text] for one in written if one.name.text in known)
 
 
-def _body(scope: Scope, written: tree.ProcedureDecl) -> tuple[tuple[Parameter, ...], tuple[Statement, ...]]:
+def _body(scope: Scope, written: tree.ProcedureDecl) -> _Body:
     body = Body()
     params = []
-    for param in written.params:
-        made = Parameter(body.fresh(param.name.text), scalar_of(scope, param.type), param.span)
+    for param, kind in zip(written.params, scope.signatures[written.name.text], strict=True):
+        made = Parameter(body.fresh(param.name.text), kind, param.span)
         if param.name.text in body.visible:
             scope.report(Code.DUPLICATE_NAME, f"`{param.name.text}` is a parameter twice", param.name.span)
         body.visible[param.name.text] = made
@@ -53,39 +66,44 @@ def _body(scope: Scope, written: tree.ProcedureDecl) -> tuple[tuple[Parameter, .
     return tuple(params), Statements(scope, body).block(written.body)
 
 
-def _call_order(
-    scope: Scope, bodies: dict[str, tuple[tuple[Parameter, ...], tuple[Statement, ...]]]
-) -> list[str]:
-    """Callees before callers; a cycle is reported with its path and left out."""
-    order: list[str] = []
-    state: dict[str, int] = {}
-
-    def visit(name: str, path: tuple[str, ...]) -> None:
-        state[name] = 1
-        for statement in everything(bodies[name][1]):
-            if not isinstance(statement, Call):
-                continue
-            callee = statement.procedure
-            if state.get(callee) == 1:
-                cycle = " -> ".join((*path[path.index(callee) :], callee))
-                scope.report(
-                    Code.CALL_CYCLE, f"procedures call each other in a circle: {cycle}", statement.span
-                )
-            elif callee in bodies and callee not in state:
-                visit(callee, (*path, callee))
-        state[name] = 2
-        order.append(name)
-
+def _call_order(scope: Scope, bodies: dict[str, _Body]) -> list[str]:
+    """Callees before callers; a cycle is reported with its path, and so are calls that nest too deep."""
+    calls = {name: [s for s in everything(body[1]) if isinstance(s, Call)] for name, body in bodies.items()}
+    deep: dict[str, int] = {}
     for name in bodies:
-        if name not in state:
-            visit(name, (name,))
-    return order
+        if name not in deep:
+            _visit(scope, name, calls, deep)
+    return list(deep)
+
+
+def _visit(scope: Scope, start: str, calls: dict[str, list[Call]], deep: dict[str, int]) -> None:
+    """Goes through all that `start` calls; in `deep`, callees first, how deep the calls of each nest."""
+    path: dict[str, Iterator[Call]] = {start: iter(calls[start])}
+    while path:
+        name = next(reversed(path))
+        call = next(path[name], None)
+        if call is None:
+            del path[name]
+            deep[name] = 1 + max((deep.get(one.procedure, 0) for one in calls[name]), default=0)
+            continue
+        callee = call.procedure
+        if callee in path:
+            names = list(path)
+            cycle = " -> ".join((*names[names.index(callee) :], callee))
+            message = f"procedures call each other in a circle: {cycle}"
+            scope.report(
+                Code.CALL_CYCLE, message, call.span, "a procedure cannot be called again before it ends"
+            )
+        elif callee not in deep:
+            path[callee] = iter(calls[callee])
+        elif deep[callee] == MOST_CALLS:
+            scope.report(Code.TOO_DEEP, f"calls nest more than {MOST_CALLS} deep here", call.span)
 
 
 def _procedure(
     scope: Scope,
     written: tree.ProcedureDecl,
-    body: tuple[tuple[Parameter, ...], tuple[Statement, ...]],
+    body: _Body,
     known: dict[str, Procedure],
 ) -> Procedure:
     reads, writes = _touched(body[1], known)
@@ -100,8 +118,8 @@ def _procedure(
         ProcedureName(written.name.text),
         body[0],
         body[1],
-        tuple(sorted(reads)),
-        tuple(sorted(writes)),
+        tuple(sorted(reads, key=scope.order)),
+        tuple(sorted(writes, key=scope.order)),
         named,
         " ".join(written.doc),
         written.name.span,
@@ -130,16 +148,15 @@ def _places(scope: Scope, written: tuple[tree.Expr, ...], writing: bool) -> set[
         path = path_of(scope, Body(), one)
         if path is None:
             continue
-        root = path.names[0].partition(".")[0].partition("[")[0]
+        root = root_of(path.names[0])
         if writing and scope.declared[root].kind is Kind.INPUT:
             scope.report(Code.NOT_WRITABLE, f"`{root}` is an input; only the world writes it", one.span)
-        under = [name for name in scope.leaves if _below(name, path.names[0])]
-        leaves.update(VariableName(name) for name in under)
+        if path.index is not None:
+            scope.report(Code.NOT_CONSTANT, "the index of a declared path is a constant", one.span)
+        own = scope.declared[root].leaves
+        every = (*own, *(pending(name) for name in own if name in scope.deferred))
+        leaves.update(name for name in every if below(name, path.names[0]))
     return leaves
-
-
-def _below(leaf: str, path: str) -> bool:
-    return leaf == path or leaf.startswith((f"{path}.", f"{path}["))
 
 
 def _check_declared(
@@ -149,65 +166,40 @@ def _check_declared(
     reads: set[VariableName],
     writes: set[VariableName],
 ) -> None:
-    """Reports each statement of a module that touches what the module does not name."""
+    """Reports each place where a module touches what it does not name."""
     for statement in everything(body):
-        seen = {name for expr in expressions(statement) for name in read_by(expr)}
-        made = set(written_by(statement))
+        for expr in expressions(statement):
+            for names, span in _reading(expr):
+                _undeclared(scope, "reads", set(names) - reads, span)
+        _undeclared(scope, "writes", set(written_by(statement)) - writes, statement.span)
         if isinstance(statement, Call) and statement.procedure in known:
-            seen |= set(known[statement.procedure].reads)
-            made |= set(known[statement.procedure].writes)
-        for verb, extra in (("reads", seen - reads), ("writes", made - writes)):
-            for name in sorted(extra):
-                scope.report(
-                    Code.UNDECLARED_ACCESS,
-                    f"the module {verb} `{name}`, which it does not name",
-                    statement.span,
-                    f"add `{name}` to its `{verb}`",
-                )
+            callee = known[statement.procedure]
+            _undeclared(scope, "reads", set(callee.reads) - reads, statement.span)
+            _undeclared(scope, "writes", set(callee.writes) - writes, statement.span)
 
 
-def owners(scope: Scope, written: list[tree.OwnerDecl]) -> tuple[Owner, ...]:
-    """The owners; members that are not procedures without parameters, or owners, are reported."""
-    names = {one.name.text for one in written}
-    for one in written:
-        for member in one.members:
-            if member.text not in names:
-                _check_member(scope, member)
-    return tuple(
-        Owner(one.name.text, tuple(m.text for m in one.members), " ".join(one.doc), one.name.span)
-        for one in written
-    )
+def _reading(expr: Expr) -> Iterator[tuple[tuple[VariableName, ...], Span]]:
+    match expr:
+        case Read(name=name, span=span):
+            yield (name,), span
+        case Select(leaves=leaves, index=index, span=span):
+            yield leaves, span
+            yield from _reading(index)
+        case Apply(args=args):
+            for arg in args:
+                yield from _reading(arg)
+        case Among(subject=subject):
+            yield from _reading(subject)
+        case _:
+            return
 
 
-def _check_member(scope: Scope, member: tree.Name) -> None:
-    procedure = scope.procedures.get(member.text)
-    if procedure is None:
-        scope.unknown("module or owner", member, list(scope.procedures))
-    elif procedure.params:
-        scope.report(
-            Code.WRONG_ARGUMENTS, f"`{member.text}` takes arguments; an owner gives none", member.span
-        )
-
-
-def flattened(scope: Scope, names: tuple[tree.Name, ...], known: tuple[Owner, ...]) -> tuple[str, ...]:
-    """The procedures that the named owners and procedures come to, in order."""
-    by_name = {owner.name: owner for owner in known}
-
-    def visit(name: str, span: Span, path: tuple[str, ...]) -> list[str]:
-        if name in path:
-            first = Label(by_name[name].span, "this owner")
-            cycle = " -> ".join((*path[path.index(name) :], name))
-            scope.report(
-                Code.OWNER_CYCLE, f"owners contain each other in a circle: {cycle}", span, related=(first,)
-            )
-            return []
-        if name not in by_name:
-            return [name] if name in scope.procedures else []
-        return [leaf for member in by_name[name].members for leaf in visit(member, span, (*path, name))]
-
-    result: list[str] = []
-    for name in names:
-        if name.text not in by_name:
-            _check_member(scope, name)
-        result.extend(visit(name.text, name.span, ()))
-    return tuple(result)
+def _undeclared(scope: Scope, verb: str, extra: set[VariableName], span: Span) -> None:
+    """One report a variable: by its leaf where only one is touched."""
+    leaves: dict[str, list[VariableName]] = {}
+    for name in sorted(extra, key=scope.order):
+        leaves.setdefault(root_of(name), []).append(name)
+    for root, names in leaves.items():
+        shown = root if len(names) > 1 else names[0].removesuffix(".next")
+        message = f"the module {verb} `{shown}`, which it does not name"
+        scope.report(Code.UNDECLARED_ACCESS, message, span, f"add `{shown}` to its `{verb}`")

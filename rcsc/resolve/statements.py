@@ -32,8 +32,10 @@ from rcsc.model import (
     VariableName,
     pending,
 )
-from rcsc.resolve.expressions import Path, Typed, boolean, common_unit, kind_word, path_of, same_kind, typed
-from rcsc.resolve.scope import Body, Scope
+from rcsc.resolve.expressions import Path, boolean, path_of, typed
+from rcsc.resolve.leaves import read_by
+from rcsc.resolve.operators import Typed, common_unit, kind_word, same_kind
+from rcsc.resolve.scope import Body, Scope, root_of, spell_number
 from rcsc.resolve.types import constant, scalar_of
 from rcsc.resolve.variables import fits
 from rcsc.source import Span
@@ -81,18 +83,30 @@ class Statements:
         """One assignment a leaf."""
         if isinstance(place, tree.Reference) and place.name.text in self.body.visible:
             return self._assign_local(place, value, deferred, span)
+        target = self.place(place, deferred)
+        return () if target is None else self.store(target, value, deferred, span)
+
+    def place(self, place: tree.Expr, deferred: bool) -> Path | None:
+        """Where an assignment outside the locals goes; None after an error."""
+        constants = self.scope.constants
+        name = place.name.text if isinstance(place, tree.Reference) else ""
+        if name not in self.scope.declared and (name in constants or name in self.scope.members):
+            self.scope.report(Code.NOT_WRITABLE, f"`{name}` is a constant", place.span)
+            return None
         target = path_of(self.scope, self.body, place)
-        if target is None or not self._writable(target, deferred, place.span):
+        return target if target is not None and self._writable(target, deferred, place.span) else None
+
+    def store(self, target: Path, value: tree.Expr, deferred: bool, span: Span) -> tuple[Statement, ...]:
+        """One assignment a leaf of the place."""
+        if not isinstance(target.type, Bool | Enum | Int | Real):
+            return self._copy(target, value, span)
+        found = typed(self.scope, self.body, value, target.type)
+        if found is None or not self._assignable(target.type, found, value.span):
             return ()
-        if isinstance(target.type, Bool | Enum | Int | Real):
-            found = typed(self.scope, self.body, value, target.type)
-            if found is None or not self._assignable(target.type, found, value.span):
-                return ()
-            names = tuple(pending(name) if deferred else VariableName(name) for name in target.names)
-            if target.index is None:
-                return (Assign(ToLeaf(names[0], target.type), found.expr, span),)
-            return (Assign(ToElement(names, target.index, target.type), found.expr, span),)
-        return self._copy(target, value, span)
+        names = tuple(pending(name) if deferred else VariableName(name) for name in target.names)
+        if target.index is None:
+            return (Assign(ToLeaf(names[0], target.type), found.expr, span),)
+        return (Assign(ToElement(names, target.index, target.type), found.expr, span),)
 
     def _assign_local(
         self, place: tree.Reference, value: tree.Expr, deferred: bool, span: Span
@@ -114,7 +128,7 @@ class Statements:
         return (Assign(ToLocal(local.name, local.type), found.expr, span),)
 
     def _writable(self, target: Path, deferred: bool, span: Span) -> bool:
-        root = target.names[0].partition(".")[0].partition("[")[0]
+        root = root_of(target.names[0])
         declared = self.scope.declared[root]
         if declared.kind is Kind.INPUT:
             self.scope.report(Code.NOT_WRITABLE, f"`{root}` is an input; only the world writes it", span)
@@ -150,8 +164,11 @@ class Statements:
         if origin.type != target.type:
             self.scope.report(Code.KIND, "a record or array is assigned from one of the same type", span)
             return ()
+        suffixes = _suffixes(target.type)
+        if self._refused(target, origin, len(suffixes), span):
+            return ()
         copies: list[Statement] = []
-        for suffix, kind in _suffixes(target.type):
+        for suffix, kind in suffixes:
             to, came = self._leaf(target, suffix), self._leaf(origin, suffix)
             read = (
                 Read(came[0], kind, value.span)
@@ -161,6 +178,20 @@ class Statements:
             place = ToLeaf(to[0], kind) if target.index is None else ToElement(to, target.index, kind)
             copies.append(Assign(place, read, span))
         return tuple(copies)
+
+    def _refused(self, target: Path, origin: Path, count: int, span: Span) -> bool:
+        """Whether a copy is too much, or would change an index that its later parts use."""
+        self.scope.made += count * len(target.names) * len(origin.names)
+        if self.scope.made > MOST_STATEMENTS:
+            message = f"copies of records and arrays come to more than {MOST_STATEMENTS} statements"
+            self.scope.report(Code.LOOP_TOO_LONG, message, span)
+            return True
+        used = {name for path in (target, origin) if path.index for name in read_by(path.index)}
+        own = [name for name in used if any(below(name, one) for one in target.names)]
+        if own:
+            message = f"the index reads `{min(own)}`, which this assignment changes"
+            self.scope.report(Code.KIND, message, span, "keep the index in a local first")
+        return bool(own)
 
     @staticmethod
     def _leaf(path: Path, suffix: str) -> tuple[VariableName, ...]:
@@ -209,6 +240,12 @@ class Statements:
             words = kind_word(subject.expr.type), kind_word(value.expr.type)
             self.scope.report(Code.KIND, f"expected {words[0]}, this is {words[1]}", span)
             return False
+        kind, found = subject.expr.type, value.literal().value
+        if isinstance(kind, Int | Real) and not kind.low <= found <= kind.high:
+            low, high = spell_number(kind.low), spell_number(kind.high)
+            message = f"{spell_number(found)} is never taken: the subject lies in {low} .. {high}"
+            self.scope.report(Code.OUT_OF_RANGE_CONSTANT, message, span)
+            return False
         return common_unit(self.scope, (subject, value), span) is not None
 
     def _for(self, written: tree.For) -> tuple[Statement, ...]:
@@ -242,13 +279,12 @@ class Statements:
             want, got = len(procedure.params), len(written.args)
             self.scope.report(
                 Code.WRONG_ARGUMENTS,
-                f"`{written.name.text}` takes {want} arguments, here are {got}",
+                f"`{written.name.text}` takes {want} argument{'s' * (want != 1)}, not {got}",
                 written.span,
             )
             return ()
         args = []
-        for param, arg in zip(procedure.params, written.args, strict=True):
-            kind = scalar_of(self.scope, param.type)
+        for kind, arg in zip(self.scope.signatures[written.name.text], written.args, strict=True):
             found = typed(self.scope, self.body, arg, kind)
             if found is None or not self._assignable(kind, found, arg.span):
                 return ()
@@ -264,6 +300,11 @@ def _suffixes(kind: Type, prefix: str = "") -> list[tuple[str, Scalar]]:
             return [pair for part in fields for pair in _suffixes(part.type, f"{prefix}.{part.name}")]
         case _:
             return [(prefix, kind)]
+
+
+def below(leaf: str, path: str) -> bool:
+    """Whether the leaf is the path or a part of it."""
+    return leaf == path or leaf.startswith((f"{path}.", f"{path}["))
 
 
 def cost(body: tuple[Statement, ...], known: dict[str, int]) -> int:

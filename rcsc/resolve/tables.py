@@ -1,7 +1,7 @@
 """Tables: columns, lines, tests and actions."""
 
 from rcsc.diagnostics.codes import Code
-from rcsc.diagnostics.diagnostic import Diagnostic, Label
+from rcsc.diagnostics.diagnostic import Label
 from rcsc.model import (
     Action,
     AssumptionName,
@@ -17,7 +17,9 @@ from rcsc.model import (
     VariableName,
 )
 from rcsc.resolve.conditions import Tests
-from rcsc.resolve.expressions import typed
+from rcsc.resolve.expressions import Path, typed
+from rcsc.resolve.operators import Typed
+from rcsc.resolve.placing import placed, placed_statement
 from rcsc.resolve.scope import Body, Scope
 from rcsc.resolve.statements import Statements
 from rcsc.source import Sources, Span
@@ -27,8 +29,12 @@ from rcsc.syntax import tree
 def table(scope: Scope, written: tree.TableDecl, sources: Sources) -> Table:
     """The table; what is wrong with it has been reported."""
     order = {name: at for at, name in enumerate(scope.leaves)}
-    columns = tuple(_column(scope, heading) for heading in written.conditions)
-    cells = _Cells(scope, written, sources[written.span.file].text, Tests(scope, order))
+    text = sources[written.span.file].text
+    subjects = tuple(_subject(scope, heading) for heading in written.conditions)
+    columns = tuple(
+        _column(heading, subject, text) for heading, subject in zip(written.conditions, subjects, strict=True)
+    )
+    cells = _Cells(scope, written, text, Tests(scope, written.conditions, subjects, order))
     lines: list[Line] = []
     default: Default | None = None
     names: dict[str, Span] = {}
@@ -62,37 +68,41 @@ def table(scope: Scope, written: tree.TableDecl, sources: Sources) -> Table:
     )
 
 
-def _column(scope: Scope, heading: tree.Heading) -> Column:
+def _subject(scope: Scope, heading: tree.Heading) -> Typed | None:
+    """What the lines of a column are about; None under `when`, and after an error."""
     if heading.subject is None:
-        return Column("when", None, None, heading.span)
-    before = len(scope.found)
+        return None
+    scope.cell = heading.span
     subject = typed(scope, Body(), heading.subject)
-    mend(scope.found, before, heading.span)
-    leaf = subject.expr.name if subject is not None and isinstance(subject.expr, Read) else None
-    return Column("", None if subject is None else subject.expr, leaf, heading.span)
+    scope.cell = None
+    return None if subject is None else Typed(placed(subject.expr, heading.span), subject.bare)
 
 
-def mend(found: list[Diagnostic], before: int, cell: Span) -> None:
-    """Moves what was reported inside a cell, where spans are relative, to the file."""
-    from dataclasses import replace
-
-    for at in range(before, len(found)):
-        inner = found[at].primary.span
-        if inner.file == "":
-            there = tree.absolute(inner, cell.file, cell.start)
-            found[at] = replace(found[at], primary=Label(there, found[at].primary.message))
+def _column(heading: tree.Heading, subject: Typed | None, text: str) -> Column:
+    expr = None if subject is None else subject.expr
+    leaf = expr.name if isinstance(expr, Read) else None
+    return Column(" ".join(text[heading.span.start : heading.span.end].split()), expr, leaf, heading.span)
 
 
 class _Cells:
-    """Reads the cells of one table's rows."""
+    """Reads the cells of one table's rows; each distinct cell once."""
 
     def __init__(self, scope: Scope, written: tree.TableDecl, text: str, tests: Tests) -> None:
         self.scope = scope
-        self.written = written
         self.text = text
         self.known = tests
-        self.broken: set[int] = set()
-        self.made: dict[tuple[int, int], tuple[Action, ...]] = {}
+        self.headings = [text[h.span.start : h.span.end] for h in written.actions]
+        self.places = [self._place(heading) for heading in written.actions]
+        self.made: dict[tuple[int, int], list[tuple[str, Statement]]] = {}
+
+    def _place(self, heading: tree.Heading) -> tuple[Path, Span] | None:
+        """Where a column of values assigns; None for a column of actions, and after an error."""
+        if heading.subject is None:
+            return None
+        self.scope.cell = heading.span
+        path = Statements(self.scope).place(heading.subject, False)
+        self.scope.cell = None
+        return None if path is None else (path, heading.span)
 
     def span(self, row: tree.Row, cell: int) -> Span:
         """The span of a cell, counted from the line's name."""
@@ -100,21 +110,18 @@ class _Cells:
 
     def tests(self, row: tree.Row) -> tuple[Test | None, ...]:
         """One test a condition column."""
-        known, headings = self.known, self.written.conditions
+        known = self.known.known
         result: list[Test | None] = []
         for column, written in enumerate(row.conditions):
             if written is None:
                 result.append(None)
                 continue
             key = (column, id(written))
-            if key in known.known:
-                result.append(known.known[key])
+            if key in known:
+                result.append(known[key])
                 continue
             span = self.span(row, column + 1)
-            text = self.text[span.start : span.end]
-            before = len(self.scope.found)
-            result.append(known.test(column, headings[column], written, text, span))
-            mend(self.scope.found, before, span)
+            result.append(self.known.test(column, written, self.text[span.start : span.end], span))
         return tuple(result)
 
     def actions(self, row: tree.Row) -> tuple[Action, ...]:
@@ -124,35 +131,34 @@ class _Cells:
             if not written:
                 continue
             span = self.span(row, 1 + len(row.conditions) + column)
-            before = len(self.scope.found)
-            result.extend(self._actions(column, written, span))
-            mend(self.scope.found, before, span)
+            key = (column, id(written))
+            if key not in self.made:
+                self.scope.cell = span
+                self.made[key] = self._actions(column, written, self.text[span.start : span.end])
+                self.scope.cell = None
+            heading = self.headings[column]
+            for text, statement in self.made[key]:
+                result.append(Action(heading, text, placed_statement(statement, span)))
         return tuple(result)
 
     def _actions(
-        self, column: int, written: tuple[tree.Statement, ...] | tree.Comparison, span: Span
-    ) -> tuple[Action, ...]:
-        heading = self.written.actions[column]
+        self, column: int, written: tuple[tree.Statement, ...] | tree.Comparison, text: str
+    ) -> list[tuple[str, Statement]]:
         statements = Statements(self.scope)
-        text = self.text[span.start : span.end]
-        name = self.text[heading.span.start : heading.span.end]
         if isinstance(written, tree.Comparison):
-            assert heading.subject is not None
-            made = statements.assign(heading.subject, written.value, False, span)
-            return tuple(Action(name, text, placed(one, span)) for one in made)
+            target = self.places[column]
+            if target is None:
+                return []
+            path = replaced(target[0], target[1])
+            return [(text, one) for one in statements.store(path, written.value, False, written.span)]
         pieces = [piece.strip() for piece in text.split(";")]
-        result: list[Action] = []
+        made: list[tuple[str, Statement]] = []
         for at, one in enumerate(written):
             piece = pieces[at] if len(pieces) == len(written) else text
-            result.extend(Action(name, piece, placed(made, span)) for made in statements.block((one,)))
-        return tuple(result)
+            made.extend((piece, statement) for statement in statements.block((one,)))
+        return made
 
 
-def placed(statement: Statement, cell: Span) -> Statement:
-    """The statement with its span in the file."""
-    from dataclasses import replace
-
-    inner = statement.span
-    if inner.file:
-        return statement
-    return replace(statement, span=tree.absolute(inner, cell.file, cell.start))
+def replaced(path: Path, heading: Span) -> Path:
+    """The path with the spans of its index in the file."""
+    return path if path.index is None else Path(path.names, path.type, placed(path.index, heading))

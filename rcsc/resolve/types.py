@@ -13,18 +13,21 @@ from rcsc.model import (
     Int,
     Literal,
     Real,
+    Record,
     Scalar,
     Type,
     Unit,
     Value,
 )
-from rcsc.resolve.expressions import Typed, typed
+from rcsc.resolve.expressions import typed
 from rcsc.resolve.folding import fold
+from rcsc.resolve.operators import Typed
 from rcsc.resolve.scope import Body, Scope
 from rcsc.source import Span
 from rcsc.syntax import tree
 
 MOST_ELEMENTS = 4096
+MOST_LEAVES = 10_000
 
 
 def type_of(scope: Scope, written: tree.TypeExpr) -> Type:
@@ -33,16 +36,36 @@ def type_of(scope: Scope, written: tree.TypeExpr) -> Type:
         case tree.BoolType():
             return Bool()
         case tree.NamedType(name):
+            if not scope.demand("type", name):
+                return Bool()
             if name.text not in scope.types:
                 scope.unknown("type", name, [*scope.types, "bool"])
                 return Bool()
             return scope.types[name.text]
-        case tree.ArrayType(length, element):
-            return Array(_length(scope, length), type_of(scope, element))
+        case tree.ArrayType(length, element, span):
+            return _small(scope, Array(_length(scope, length), type_of(scope, element)), span)
         case tree.IntType():
             return _int(scope, written)
         case tree.RealType():
             return _real(scope, written)
+
+
+def size(kind: Type) -> int:
+    """Scalars in a value of the type."""
+    match kind:
+        case Array(length, element):
+            return length * size(element)
+        case Record(fields=fields):
+            return sum(size(part.type) for part in fields)
+        case _:
+            return 1
+
+
+def _small(scope: Scope, kind: Array, span: Span) -> Type:
+    if size(kind) <= MOST_LEAVES:
+        return kind
+    scope.report(Code.TOO_MANY_LEAVES, f"a type has at most {MOST_LEAVES} scalar parts", span)
+    return Bool()
 
 
 def scalar_of(scope: Scope, written: tree.TypeExpr) -> Scalar:

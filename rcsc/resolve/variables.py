@@ -25,13 +25,12 @@ from rcsc.model import (
     pending,
     value_of_key,
 )
-from rcsc.resolve.expressions import Typed, boolean, common_unit, kind_word, same_kind
+from rcsc.resolve.expressions import boolean
+from rcsc.resolve.operators import Typed, common_unit, kind_word, same_kind
 from rcsc.resolve.scope import Body, Constant, Scope
-from rcsc.resolve.types import constant, type_of
+from rcsc.resolve.types import MOST_LEAVES, constant, size, type_of
 from rcsc.source import Span
 from rcsc.syntax import tree
-
-MOST_LEAVES = 10_000
 
 
 def declare_enum(scope: Scope, written: tree.EnumDecl) -> Enum:
@@ -51,9 +50,7 @@ def declare_enum(scope: Scope, written: tree.EnumDecl) -> Enum:
 
 def declare_type(scope: Scope, written: tree.TypeDecl) -> None:
     """Adds a named type."""
-    kind = type_of(scope, written.type)
-    if scope.claim(written.name, "type"):
-        scope.types[written.name.text] = kind
+    scope.types[written.name.text] = type_of(scope, written.type)
 
 
 def declare_record(scope: Scope, written: tree.RecordDecl) -> None:
@@ -65,15 +62,18 @@ def declare_record(scope: Scope, written: tree.RecordDecl) -> None:
             scope.report(Code.DUPLICATE_NAME, f"`{part.name.text}` is a field twice", part.name.span)
         parts.setdefault(part.name.text, RecordField(part.name.text, kind, " ".join(part.doc)))
     record = Record(written.name.text, tuple(parts.values()))
-    if scope.claim(written.name, "type"):
-        scope.types[record.name] = record
-        scope.records.append(record)
+    if size(record) > MOST_LEAVES:
+        message = f"a type has at most {MOST_LEAVES} scalar parts"
+        scope.report(Code.TOO_MANY_LEAVES, message, written.name.span)
+        record = Record(written.name.text, ())
+    scope.types[record.name] = record
+    scope.records.append(record)
 
 
 def declare_constant(scope: Scope, written: tree.ConstDecl) -> None:
     """Adds a constant."""
     value = constant(scope, written.value)
-    if scope.claim(written.name, "value") and value is not None:
+    if value is not None:
         scope.constants[written.name.text] = Constant(value.literal(), value.bare)
 
 
@@ -82,7 +82,7 @@ def declare_variable(scope: Scope, written: tree.VariableDecl) -> None:
     kind = type_of(scope, written.type)
     if not scope.claim(written.name, "value"):
         return
-    if _size(kind) + len(scope.leaves) > MOST_LEAVES:
+    if size(kind) + len(scope.leaves) > MOST_LEAVES:
         scope.report(
             Code.TOO_MANY_LEAVES, f"a program has at most {MOST_LEAVES} scalar variables", written.name.span
         )
@@ -124,16 +124,6 @@ def settle_deferred(scope: Scope, written: tree.VariableDecl) -> None:
     until = boolean(scope, Body(), written.deferred_until)
     if until is not None:
         scope.leaves[name] = replace(scope.leaves[name], deferred_until=until)
-
-
-def _size(kind: Type) -> int:
-    match kind:
-        case Array(length, element):
-            return length * _size(element)
-        case Record(fields=fields):
-            return sum(_size(part.type) for part in fields)
-        case _:
-            return 1
 
 
 def _leaves(name: str, kind: Type) -> Iterator[tuple[str, Scalar]]:
