@@ -96,7 +96,7 @@ def divide(a: int, b: int) -> int:
     return quotient if (a < 0) == (b < 0) else -quotient
 
 
-_OPERATORS: Mapping[Op, Callable[..., Any]] = {
+OPERATORS: Mapping[Op, Callable[..., Any]] = {
     Op.NOT: operator.not_,
     Op.NEG: operator.neg,
     Op.EQ: operator.eq,
@@ -110,8 +110,8 @@ _OPERATORS: Mapping[Op, Callable[..., Any]] = {
     Op.MUL: operator.mul,
     Op.MOD: lambda a, b: a - b * divide(a, b),
     Op.ABS: abs,
-    Op.MIN: lambda a, b: a if a <= b else b,
-    Op.MAX: lambda a, b: a if a >= b else b,
+    Op.MIN: lambda a, b: min(a, b),
+    Op.MAX: lambda a, b: max(a, b),
     Op.TO_INT: int,
     Op.TO_REAL: float,
 }
@@ -156,7 +156,7 @@ def _applied(op: Op, args: tuple[Expr, ...], snapshot: Snapshot, local: Mapping[
             if isinstance(args[0].type, Int)
             else float(first) / float(rest[0])
         )
-    result: Value = _OPERATORS[op](first, *rest)
+    result: Value = OPERATORS[op](first, *rest)
     return result
 
 
@@ -190,8 +190,8 @@ def execute(
             case If(condition=condition, then=then, orelse=orelse):
                 execute(program, then if evaluate(condition, snapshot, local) else orelse, snapshot, local)
             case Case(subject=subject, arms=arms, orelse=orelse):
-                value = evaluate(subject, snapshot, local)
-                chosen = next((arm.body for arm in arms if value in arm.values), orelse)
+                given = evaluate(subject, snapshot, local)
+                chosen = next((arm.body for arm in arms if given in arm.values), orelse)
                 execute(program, chosen, snapshot, local)
             case For(name=name, low=low, high=high, body=inner):
                 for count in range(low, high + 1):
@@ -320,7 +320,8 @@ def _cycle(
     if isinstance(now, str):
         return Outcome(dict(snapshot), None, -1, Fault.ADMIT, (), now)
     settle(program, now)
-    line, index, failed = None, -1, ()
+    line: LineName | None = None
+    index, failed = -1, tuple[str, ...]()
     try:
         for name in preprocess:
             call(program, name, [], now)

@@ -121,6 +121,11 @@ def _reference(scope: Scope, body: Body, name: tree.Name, span: Span, want: Scal
             "write which enumeration is meant",
         )
         return None
+    if name.text in scope.variables:
+        scope.report(Code.NOT_CONSTANT, f"this must be a constant, `{name.text}` is a variable", name.span)
+        return None
+    if f"value {name.text}" in scope.places:
+        return None  # what is wrong with it has been reported where it is declared
     known = [*body.visible, *scope.declared, *scope.constants, *scope.members]
     scope.unknown("variable, constant or member", name, known)
     return None

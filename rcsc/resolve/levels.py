@@ -99,10 +99,9 @@ def _complete(scope: Scope, kind: Scalar, pairs: dict[Value, TableName], span: S
     low, high = key_bounds(kind)
     if len(pairs) == high - low + 1:
         return True
-    missing = [
-        key for key in range(low, min(high, low + len(pairs)) + 1) if value_of_key(kind, key) not in pairs
-    ]
-    words = spell(kind, value_of_key(kind, missing[0]))
+    first = range(low, min(high, low + len(pairs)) + 1)
+    missing = next(key for key in first if value_of_key(kind, key) not in pairs)
+    words = spell(kind, value_of_key(kind, missing))
     count = high - low - len(pairs)
     more = f" and {spell_number(count)} more have" if count else " has"
     scope.report(Code.MISSING_TABLE, f"`{words}`{more} no table", span, f"add `{words} : TABLE`")

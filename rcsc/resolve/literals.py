@@ -15,6 +15,7 @@ LONGEST = 1_000
 
 
 def integer(scope: Scope, written: tree.IntLiteral) -> Typed | None:
+    """A whole number that fits in 64 bits."""
     text = written.text.replace("_", "")
     digits = text[2:] if text[:2] in ("0x", "0X") else text
     value = int(digits.lstrip("0")[:40] or "0", 10 if digits is text else 16)
@@ -27,6 +28,10 @@ def integer(scope: Scope, written: tree.IntLiteral) -> Typed | None:
 
 
 def real(scope: Scope, written: tree.RealLiteral) -> Typed | None:
+    """The double nearest to the number written.
+
+    Source: IEEE 754-2019, 5.12 (correctly rounded conversion from decimal).
+    """
     text = written.text.replace("_", "")
     value = float(text)
     if not math.isfinite(value):

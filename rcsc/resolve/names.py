@@ -41,18 +41,18 @@ class Names:
                     self.waiting[f"type {name.text}"] = one
                 case _:
                     pass
+        declared = [d for d in self.all if isinstance(d, tree.VariableDecl)]
+        mine = [one for one in declared if scope.claim(one.name, "value")]
+        scope.variables.update(one.name.text for one in mine)
         scope.demand = self._demand
         for key in list(self.waiting):
             if key in self.waiting:
                 self._resolve(key)
-        self._variables([d for d in self.all if isinstance(d, tree.VariableDecl)])
+        for variable in mine:
+            variables.declare_variable(scope, variable)
+        for variable in mine:
+            variables.settle_deferred(scope, variable)
         return enums
-
-    def _variables(self, written: list[tree.VariableDecl]) -> None:
-        for one in written:
-            variables.declare_variable(self.scope, one)
-        for one in written:
-            variables.settle_deferred(self.scope, one)
 
     def _demand(self, space: str, name: tree.Name) -> bool:
         """Resolves a name asked for before its turn; False where it asks for itself, which is reported."""

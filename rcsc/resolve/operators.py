@@ -105,6 +105,7 @@ def alike(scope: Scope, op: Op, operands: tuple[Typed, ...], span: Span) -> Type
 
 
 def one_kind(scope: Scope, left: Typed, right: Typed, span: Span) -> bool:
+    """Whether both sides are of one kind, and one 64-bit integer type holds both."""
     if not same_kind(left.expr.type, right.expr.type):
         one, two = kind_word(left.expr.type), kind_word(right.expr.type)
         helps = ("convert with `real(n)` or `int(x)`",) if {one, two} == {"int", "real"} else ()
@@ -144,6 +145,7 @@ def compared(scope: Scope, op: Op, pair: tuple[Typed, Typed], span: Span) -> Typ
 
 
 def converted(scope: Scope, op: Op, operand: Typed, span: Span) -> Typed | None:
+    """`int(x)` toward zero, or `real(n)` to the nearest double; the unit stays."""
     kind = operand.expr.type
     if op is Op.TO_REAL:
         if not isinstance(kind, Int):

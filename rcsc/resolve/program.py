@@ -11,6 +11,7 @@ from rcsc.model import (
     AssumptionName,
     Invariant,
     Kind,
+    Level,
     Program,
     Standing,
     Table,
@@ -94,11 +95,7 @@ class _Resolver:
         assumptions = self._assumptions(all_)
         invariants = self._invariants(all_)
         tables = self._tables(all_, {a.name for a in assumptions})
-        names = {table.name for table in tables}
-        written_levels = [d for d in all_ if isinstance(d, tree.LevelDecl) and scope.claim(d.name, "table")]
-        levels = tuple(
-            made for one in written_levels if (made := level(scope, one, names, owners)) is not None
-        )
+        levels = self._levels(all_, {table.name for table in tables}, owners)
         if scope.found:
             return tuple(sorted(set(scope.found), key=sort_key))
         own = tuple(TableName(d.name.text) for d in root.declarations if isinstance(d, tree.TableDecl))
@@ -148,6 +145,13 @@ class _Resolver:
                 )
             made.append(Invariant(one.name.text, condition, " ".join(one.doc), one.name.span))
         return tuple(made)
+
+    def _levels(
+        self, all_: list[tree.Declaration], tables: set[TableName], owners: Owners
+    ) -> tuple[Level, ...]:
+        written = [d for d in all_ if isinstance(d, tree.LevelDecl) and self.scope.claim(d.name, "table")]
+        made = (level(self.scope, one, tables, owners) for one in written)
+        return tuple(one for one in made if one is not None)
 
     def _tables(self, all_: list[tree.Declaration], assumptions: set[AssumptionName]) -> tuple[Table, ...]:
         made = []

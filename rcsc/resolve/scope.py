@@ -30,7 +30,8 @@ class Scope:
         signatures: The types of each procedure's parameters.
         places_of: The place of each leaf in declared order; made when it is asked for.
         doubles: The first spelling of each double of the text, and where it stands.
-        demand: Resolves a constant (`value`) or `type` that is asked for before its turn; False after an error.
+        demand: Resolves a constant (`value`) or `type` asked for before its turn; False after an error.
+        variables: Names of variables, declared or not yet.
         cell: The table cell that is being resolved.
         depth: How deep the expression that is being resolved nests.
         made: Statements made so far; a copy of a record or an array is one a scalar.
@@ -52,6 +53,7 @@ class Scope:
     records: list[Record] = field(default_factory=list)
     elements: dict[tuple[str, int], tuple[str, ...]] = field(default_factory=dict)
     demand: Callable[[str, tree.Name], bool] = lambda _space, _name: True
+    variables: set[str] = field(default_factory=set)
     cell: Span | None = None
     depth: int = 0
     made: int = 0

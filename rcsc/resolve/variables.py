@@ -80,8 +80,6 @@ def declare_constant(scope: Scope, written: tree.ConstDecl) -> None:
 def declare_variable(scope: Scope, written: tree.VariableDecl) -> None:
     """Adds a variable and its leaves; the pending leaf of a deferred one directly behind it."""
     kind = type_of(scope, written.type)
-    if not scope.claim(written.name, "value"):
-        return
     if size(kind) + len(scope.leaves) > MOST_LEAVES:
         scope.report(
             Code.TOO_MANY_LEAVES, f"a program has at most {MOST_LEAVES} scalar variables", written.name.span
