@@ -7,8 +7,8 @@ Masks are Python integers, one bit a line. A variable's keys are cut where some 
 all keys of a class are alike. Source: `notes/performance.md`, A.3.
 """
 
-from bisect import bisect_right
-from collections.abc import Iterator, Mapping, Sequence
+from bisect import bisect_left, bisect_right
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import prod
 
@@ -85,6 +85,9 @@ class Boxes:
             everyone &= ~(1 << at)
         by_box = self._by_box()
         meets: dict[tuple[str, Box], int] = {}
+        for name, stated in by_box.items():
+            for box, mask in self._meetings(name, stated):
+                meets[name, box] = mask
         for at, boxes in enumerate(self.lines):
             if not everyone >> at & 1:
                 continue
@@ -92,8 +95,6 @@ class Boxes:
             for name, box in boxes.items():
                 if not others:
                     break
-                if (name, box) not in meets:
-                    meets[name, box] = self._meeting(name, box, by_box[name])
                 others &= meets[name, box]
             while others:
                 lowest = others & -others
@@ -115,13 +116,17 @@ class Boxes:
             for name, by_box in stated.items()
         }
 
-    def _meeting(self, name: str, box: Box, by_box: Mapping[Box, int]) -> int:
-        """The lines that `box` can meet, those that do not test the variable among them."""
-        apart = 0
-        for other, mask in by_box.items():
-            if not any(a <= d and c <= b for a, b in box for c, d in other):
-                apart |= mask
-        return ((1 << len(self.lines)) - 1) & ~apart
+    def _meetings(self, name: str, stated: Mapping[Box, int]) -> Iterator[tuple[Box, int]]:
+        """For each box on the variable the lines that it can meet, those that do not test it among them."""
+        everyone = (1 << len(self.lines)) - 1
+        idle = everyone & ~_any(stated.values())
+        if all(len(box) == 1 for box in stated):
+            yield from _intervals_meeting(stated, idle)
+            return
+        classes = self.classes(name)
+        inside = [_any(mask for box, mask in stated.items() if _holds(box, low)) for low in classes.starts]
+        for box in stated:
+            yield box, idle | _any(mask for low, mask in zip(classes.starts, inside, strict=True) if _holds(box, low))
 
     def both(self, first: int, second: int) -> Overlap:
         """The overlap of two lines: its least witness, and the whole region where both match."""
@@ -174,13 +179,18 @@ class Boxes:
             count = (missing, self.volume())
         shown: list[dict[str, Box]] = []
         witnesses = []
-        search = Search(self, disjoint)
+        search = Search(self, self.apart(disjoint))
         while len(shown) < MOST_GAPS and (cell := search.least(shown)) is not None:
             shown.append(search.grown(cell, shown))
             witnesses.append(self.witness({name: low for name, (low, _) in cell.items()}))
         if not witnesses:
             return None
         return Gap(tuple(witnesses), tuple(self.narrowed(region) for region in shown), count)
+
+    def apart(self, disjoint: bool) -> frozenset[int]:
+        """Lines no two of which overlap: all but the later one of each overlapping pair."""
+        everyone = frozenset(range(len(self.lines)))
+        return everyone if disjoint else everyone - {second for _, second in self.overlaps()}
 
     def classes(self, name: str) -> "Classes":
         """The keys of a variable, cut where some line's box begins or ends."""
@@ -209,10 +219,15 @@ Cell = dict[str, tuple[int, int]]
 
 @dataclass(slots=True)
 class Search:
-    """Looks for the least input that no line matches."""
+    """Looks for the least input that no line matches.
+
+    Attributes:
+        apart: Lines no two of which overlap. Where they, and regions shown before, already add up to a whole
+            slice, there is nothing to look for in it: that is what keeps the search short.
+    """
 
     table: Boxes
-    disjoint: bool
+    apart: frozenset[int]
     _without: set[tuple[int, frozenset[int]]] = field(default_factory=set)
 
     def least(self, shown: Sequence[Mapping[str, Box]]) -> Cell | None:
@@ -220,15 +235,15 @@ class Search:
         lines = [*self.table.lines, *shown]
         self._without = set()
         alive = [at for at, boxes in enumerate(lines) if all(boxes.values())]
-        return self._search(0, alive, lines, not shown and self.disjoint)
+        return self._search(0, alive, lines)
 
-    def _search(self, depth: int, alive: list[int], lines: Sequence[Mapping[str, Box]], counting: bool) -> Cell | None:
+    def _search(self, depth: int, alive: list[int], lines: Sequence[Mapping[str, Box]]) -> Cell | None:
         names = self.table.names[depth:]
         if not alive:
             return {name: (self.table.extents[name][0],) * 2 for name in names}
         if not names or any(not any(name in lines[at] for name in names) for at in alive):
             return None
-        if counting and self._filled(alive, lines, names):
+        if self._filled(alive, lines, names):
             return None
         memory = (depth, frozenset(alive))
         if memory in self._without:
@@ -236,17 +251,20 @@ class Search:
         name, classes = names[0], self.table.classes(names[0])
         for low, high in zip(classes.starts, classes.ends, strict=True):
             inside = [at for at in alive if name not in lines[at] or _holds(lines[at][name], low)]
-            found = self._search(depth + 1, inside, lines, counting)
+            found = self._search(depth + 1, inside, lines)
             if found is not None:
                 return {name: (low, high), **found}
         self._without.add(memory)
         return None
 
     def _filled(self, alive: list[int], lines: Sequence[Mapping[str, Box]], names: Sequence[str]) -> bool:
-        """Whether disjoint lines fill what the variables left span."""
+        """Whether the lines that are apart fill what the variables left span."""
         full = {name: high - low + 1 for name in names for low, high in (self.table.extents[name],)}
-        sizes = (prod(size(lines[at][n]) if n in lines[at] else full[n] for n in names) for at in alive)
+        sizes = (prod(size(lines[at][n]) if n in lines[at] else full[n] for n in names) for at in alive if self._is_apart(at))
         return sum(sizes) == prod(full.values())
+
+    def _is_apart(self, at: int) -> bool:
+        return at in self.apart or at >= len(self.table.lines)  # regions shown meet no line and not each other
 
     def grown(self, cell: Cell, shown: Sequence[Mapping[str, Box]]) -> dict[str, Box]:
         """A maximal region around the cell that no line and no region shown touches, grown in declared order."""
@@ -272,3 +290,29 @@ class Search:
 
 def _holds(box: Box, key: int) -> bool:
     return any(low <= key <= high for low, high in box)
+
+
+def _any(masks: Iterable[int]) -> int:
+    """The union."""
+    found = 0
+    for mask in masks:
+        found |= mask
+    return found
+
+
+def _intervals_meeting(stated: Mapping[Box, int], idle: int) -> Iterator[tuple[Box, int]]:
+    """For each single interval the lines whose intervals it meets: those that neither end before it nor begin behind it."""
+    lows = sorted({box[0][0] for box in stated})
+    highs = sorted({box[0][1] for box in stated})
+    begin, end = dict.fromkeys(lows, 0), dict.fromkeys(highs, 0)
+    for (interval,), mask in stated.items():
+        begin[interval[0]] |= mask
+        end[interval[1]] |= mask
+    ended, begun = [0], [0]
+    for high in highs:
+        ended.append(ended[-1] | end[high])  # entry k: lines whose interval ends at one of the k lowest ends
+    for low in lows:
+        begun.append(begun[-1] | begin[low])
+    for box in stated:
+        low, high = box[0]
+        yield box, idle | begun[bisect_right(lows, high)] & ~ended[bisect_left(highs, low)]
