@@ -106,7 +106,7 @@ def secret_of_user() -> bytes | None:
     shared = os.environ.get("RCSC_CACHE_KEY")
     if shared:
         return hashlib.sha256(shared.encode()).digest()
-    home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")  # noqa: PTH111  # cheaper
+    home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")  # cheaper
     path = Path(home) / "rcsc" / "secret"
     try:
         return _secret_at(path)
@@ -119,7 +119,7 @@ def _secret_at(path: Path) -> bytes | None:
         path.parent.mkdir(parents=True, exist_ok=True)
         write_atomically(path, secrets.token_bytes(32), mode=0o600)
     kept = path.read_bytes()
-    return kept if len(kept) == 32 else None  # noqa: PLR2004  # as written above
+    return kept if len(kept) == 32 else None  # as written above
 
 
 def digest_of_tool() -> str:
@@ -131,7 +131,7 @@ def digest_of_tool() -> str:
     for prover in _PROVERS:
         spec = find_spec(prover)
         if spec is not None and spec.origin is not None:
-            status = os.stat(spec.origin)  # noqa: PTH116  # one call instead of three
+            status = os.stat(spec.origin)  # one call instead of three
             hashed.update(f"{spec.origin} {status.st_size} {status.st_mtime_ns}\n".encode())
     return hashed.hexdigest()
 

@@ -18,14 +18,27 @@ import numpy as np
 
 from rcsc.meaning import digest, relying, spelled
 from rcsc.model import (
-    COMPARISONS, Among, Apply, Bool, Box, Expr, Int, Literal, Op, Program, Read, Real, Table, key_bounds, key_of,
+    COMPARISONS,
+    Among,
+    Apply,
+    Bool,
+    Box,
+    Expr,
+    Int,
+    Literal,
+    Op,
+    Program,
+    Real,
+    Table,
+    key_bounds,
+    key_of,
 )  # fmt: skip
 
 Form: TypeAlias = tuple[tuple[str, int], ...]
 """Terms by name and their coefficients; sorted by name, the first positive, no common divisor."""
 Bounds: TypeAlias = dict[Form, tuple[int, int]]
 Atom: TypeAlias = tuple[Form, Box]
-Formula: TypeAlias = "Atom | All | Any_"
+Formula: TypeAlias = "Atom | All | AnyOf"
 Refuter: TypeAlias = Callable[[Program, Table, tuple[str, ...], Bounds, tuple[int, ...]], str]
 """Names the solver that finds the region without fault; "" when it does not."""
 
@@ -38,7 +51,7 @@ class All:
 
 
 @dataclass(frozen=True, slots=True)
-class Any_:
+class AnyOf:
     """Some part holds."""
 
     parts: tuple[Formula, ...]
@@ -52,7 +65,7 @@ class Certified:
     rests_on: tuple[str, ...]
 
 
-class Rejected(Exception):
+class RejectedError(Exception):
     """The certificate does not show what it should."""
 
 
@@ -67,12 +80,11 @@ def certify(program: Program, certificate: Mapping[str, Any], refuter: Refuter |
     rests: list[str] = []
     try:
         if certificate["format"] != "rcsc-certificate" or certificate["version"] != 1:
-            raise Rejected("not a certificate of this version")
+            raise RejectedError("not a certificate of this version")  # noqa: TRY301 - one place tells what is malformed
         by_name = {str(entry["table"]): entry for entry in certificate["tables"]}
-        for obligation in certificate["obligations"]:
-            if obligation["method"] != "intervals":
-                rests.append(f"{obligation['name']}: {obligation['method']}")
-    except (Rejected, KeyError, TypeError, ValueError, AttributeError) as error:
+        owed = [one for one in certificate["obligations"] if one["method"] != "intervals"]
+        rests += [f"{one['name']}: {one['method']}" for one in owed]
+    except (RejectedError, KeyError, TypeError, ValueError, AttributeError) as error:
         return Certified((f"malformed certificate: {error}",), ())
     program = relying(program)  # an obligation says what the invariants rest on
     for table in program.tables:
@@ -80,8 +92,8 @@ def certify(program: Program, certificate: Mapping[str, Any], refuter: Refuter |
             if table.name in by_name:
                 rests += _Checker(program, table, by_name[table.name], refuter).check()
             elif table.name in program.own_tables:
-                raise Rejected("no certificate")
-        except Rejected as error:
+                raise RejectedError("no certificate")  # noqa: TRY301 - as any other rejection
+        except RejectedError as error:
             problems.append(f"table `{table.name}`: {error}")
         except (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError) as error:
             problems.append(f"table `{table.name}`: malformed ({type(error).__name__}: {error})")
@@ -108,26 +120,28 @@ class _Terms:
         """`expr = yes`, negations pushed inward."""
         match expr:
             case Literal(value=value):
-                return All(()) if bool(value) == yes else Any_(())
+                return All(()) if bool(value) == yes else AnyOf(())
             case Apply(op=Op.NOT, args=(part,)):
                 return self.formula(part, not yes)
             case Apply(op=Op.IMPLIES, args=(left, right)):
                 parts = (self.formula(left, not yes), self.formula(right, yes))
-                return Any_(parts) if yes else All(parts)
+                return AnyOf(parts) if yes else All(parts)
             case Apply(op=Op.AND | Op.OR as op, args=args):
                 both = tuple(self.formula(part, yes) for part in args)
-                return All(both) if (op is Op.AND) == yes else Any_(both)
+                return All(both) if (op is Op.AND) == yes else AnyOf(both)
             case Apply(op=op, args=(left, right)) if op in COMPARISONS and _ordered(left) and _ordered(right):
                 if isinstance(left.type, Bool) and any(
                     isinstance(side, Apply | Among) for side in (left, right)
                 ):
                     same = yes == (op is Op.EQ)
                     cases = ((left_, left_ == same) for left_ in (True, False))
-                    return Any_(tuple(All((self.formula(left, a), self.formula(right, b))) for a, b in cases))
+                    return AnyOf(
+                        tuple(All((self.formula(left, a), self.formula(right, b))) for a, b in cases)
+                    )
                 return self.compare(op, left, right, yes)
             case Among(subject=subject, values=values) if _ordered(subject):
                 tests = (self.compare(Op.EQ, subject, Literal(v, subject.type), yes) for v in values)
-                return Any_(tuple(tests)) if yes else All(tuple(tests))
+                return AnyOf(tuple(tests)) if yes else All(tuple(tests))
             case _:
                 return ((self.name(expr), 1),), ((int(yes), int(yes)),)
 
@@ -150,7 +164,7 @@ class _Terms:
         }[op]  # fmt: skip
         inside = tuple((max(a, low), min(b, high)) for a, b in box if max(a, low) <= min(b, high))
         if not form:
-            return All(()) if bool(inside) == yes else Any_(())
+            return All(()) if bool(inside) == yes else AnyOf(())
         return form, inside if yes else _complement(inside, low, high)
 
     def add(self, total: dict[str, int], expr: Expr, factor: int) -> int:
@@ -192,7 +206,7 @@ class _Checker:
     ) -> None:
         self.program, self.table, self.refuter, self.terms = program, table, refuter, _Terms(program)
         if entry["meaning"] != digest(program, table):
-            raise Rejected("it is of another table")
+            raise RejectedError("it is of another table")
         known: dict[int, Formula] = {}
         lines = []
         for index, line in enumerate(table.lines):
@@ -225,26 +239,26 @@ class _Checker:
             or len(dict(form)) < len(form)
             or gcd(*dict(form).values()) != 1
         ):
-            raise Rejected("a form is not in canonical shape")
+            raise RejectedError("a form is not in canonical shape")
         return form, sign
 
     def range(self, form: Form, bounds: Bounds) -> tuple[int, int]:
         return bounds.get(form) or self.terms.span(form)
 
     def judge(self, formula: Formula, bounds: Bounds) -> Formula:
-        """What is left of the formula within the bounds; `All(())` and `Any_(())` are true and false."""
+        """What is left of the formula within the bounds; `All(())` and `AnyOf(())` are true and false."""
         if isinstance(formula, tuple):
             form, box = formula
             low, high = self.range(form, bounds)
             inside = _meet(box, ((low, high),))
-            return (form, inside) if inside and inside != ((low, high),) else All(()) if inside else Any_(())
-        kind, other = (All, Any_) if isinstance(formula, All) else (Any_, All)
+            return (form, inside) if inside and inside != ((low, high),) else All(()) if inside else AnyOf(())
+        kind, other = (All, AnyOf) if isinstance(formula, All) else (AnyOf, All)
         parts: list[Formula] = []
         for part in (self.judge(part, bounds) for part in formula.parts):
             if part == other(()):
                 return other(())
             parts += part.parts if isinstance(part, kind) else (part,)
-        if kind is Any_ and parts and all(isinstance(p, tuple) and p[0] == parts[0][0] for p in parts):  # type: ignore[index]  # the first is a tuple then
+        if kind is AnyOf and parts and all(isinstance(p, tuple) and p[0] == parts[0][0] for p in parts):  # type: ignore[index]  # the first is a tuple then
             joined = parts[0][0], _union(p[1] for p in parts if isinstance(p, tuple))  # type: ignore[index]  # as above
             return joined if len(parts) == 1 else self.judge(joined, bounds)
         return parts[0] if len(parts) == 1 else kind(tuple(parts))
@@ -259,7 +273,7 @@ class _Checker:
                     boxes[part[0]] = _meet(boxes[part[0]], part[1]) if part[0] in boxes else part[1]
                 else:
                     rest.append(part)
-        return None if Any_(()) in rest or not all(boxes.values()) else _Line(index, boxes, tuple(rest))
+        return None if AnyOf(()) in rest or not all(boxes.values()) else _Line(index, boxes, tuple(rest))
 
     def within(self, line: _Line, form: Form, bounds: Bounds) -> _Line | None:
         """The line in a region whose bounds on `form` have narrowed."""
@@ -276,14 +290,14 @@ class _Checker:
         stack: list[tuple[Bounds, list[_Line]]] = [({}, self.lines)]
         for node in self.tree:
             if not stack:
-                raise Rejected("the tree has more nodes than regions")
+                raise RejectedError("the tree has more nodes than regions")
             bounds, lines = stack.pop()
             if node[0] == "s":
                 stack += self.split(bounds, lines, *node[1:])
             elif not self.leaf(bounds, lines, *node):
-                raise Rejected(f"a leaf does not hold: {node}"[:200])
+                raise RejectedError(f"a leaf does not hold: {node}"[:200])
         if stack:
-            raise Rejected("the tree leaves a region out")
+            raise RejectedError("the tree leaves a region out")
         return self.rests
 
     def split(
@@ -293,7 +307,7 @@ class _Checker:
         low, high = self.range(form, bounds)
         first, second = ((low, cut), (cut + 1, high)) if sign > 0 else ((-cut, high), (low, -cut - 1))
         if type(cut) is not int or number < 0 or first[0] > first[1] or second[0] > second[1]:
-            raise Rejected("a split is out of its region")
+            raise RejectedError("a split is out of its region")
         sides = []
         for side in (second, first):  # the first is on top of the stack
             inner = {**bounds, form: side}
@@ -308,7 +322,7 @@ class _Checker:
             return (
                 type(rest[0]) is int
                 and rest[0] >= 0
-                and self.judge(self.assumed[rest[0]], bounds) == Any_(())
+                and self.judge(self.assumed[rest[0]], bounds) == AnyOf(())
             )
         if kind == "e":
             return self.is_empty(bounds, *rest)

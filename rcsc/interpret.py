@@ -110,8 +110,8 @@ OPERATORS: Mapping[Op, Callable[..., Any]] = {
     Op.MUL: operator.mul,
     Op.MOD: lambda a, b: a - b * divide(a, b),
     Op.ABS: abs,
-    Op.MIN: lambda a, b: min(a, b),
-    Op.MAX: lambda a, b: max(a, b),
+    Op.MIN: min,
+    Op.MAX: max,
     Op.TO_INT: int,
     Op.TO_REAL: float,
 }

@@ -42,7 +42,7 @@ def _table(program: Program, table: Table, monitored: tuple[int, ...]) -> PlanTa
 
 
 def _matcher(program: Program, table: Table) -> Matcher:
-    variables = {v.name: v for v in program.variables}
+    variables: dict[str, Variable] = {v.name: v for v in program.variables}
     by_leaf: dict[str, list[tuple[int, Box]]] = {}
     relational: dict[int, tuple[Test, list[int]]] = {}
     for at, line in enumerate(table.lines):
@@ -64,7 +64,7 @@ def _matcher(program: Program, table: Table) -> Matcher:
 def _declared(
     table: Table, by_leaf: dict[str, list[tuple[int, Box]]]
 ) -> list[tuple[str, list[tuple[int, Box]]]]:
-    return [(name, by_leaf[name]) for name in table.variables if name in by_leaf]  # type: ignore[misc]  # names
+    return [(name, by_leaf[name]) for name in table.variables if name in by_leaf]
 
 
 def _leaf_probe(variable: Variable, stated: list[tuple[int, Box]], everyone: int) -> Probe:

@@ -23,8 +23,9 @@ from rcsc.model import (
     Scalar,
     Select,
     Value,
+    key_bounds,
+    real_of_key,
 )
-from rcsc.model import key_bounds, real_of_key
 from rcsc.questions import parts
 
 _COMMON = {Op.NOT: "not", Op.AND: "and", Op.OR: "or", Op.IMPLIES: "=>"}
@@ -56,10 +57,7 @@ def script(program: Program, conditions: Sequence[Expr]) -> str:
         for leaf in part.leaves
     }
     names = {str(v.name): f"v{i}" for i, v in enumerate(program.variables)}
-    text = [_PRELUDE]
-    for variable in program.variables:
-        if variable.name in read:
-            text.append(_declared(names[variable.name], variable.type))
+    text = [_PRELUDE, *(_declared(names[v.name], v.type) for v in program.variables if v.name in read)]
     text += [f"(assert {term(condition, names)})\n" for condition in conditions]
     return "".join([*text, "(check-sat)\n"])
 
@@ -139,7 +137,7 @@ def _declared(name: str, kind: Scalar) -> str:
     if not isinstance(kind, Real):
         return f"(declare-const {name} Int)\n(assert (and (<= {constant(kind, low)} {name}) (<= {name} {constant(kind, high)})))\n"
     ends = constant(kind, real_of_key(low)), constant(kind, real_of_key(high))
-    minus_zero = "(fp.isNegative {0}) (fp.isZero {0})".format(name)
+    minus_zero = f"(fp.isNegative {name}) (fp.isZero {name})"
     return (
         f"(declare-const {name} (_ FloatingPoint 11 53))\n"
         f"(assert (and (fp.leq {ends[0]} {name}) (fp.leq {name} {ends[1]}) (not (and {minus_zero}))))\n"

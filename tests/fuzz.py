@@ -28,7 +28,7 @@ OPTIONS = Options(timeout_ms=500, solver="boxes")
 
 WORDS = (
     "table level state input output enum record array of int real bool .. | || := ( ) { } [ ] in and or not implies "
-    "= /= <= >= < > + - * / mod 0 1 -1 18446744073709551616 1e400 0.1 \"x\" # ## \x00 \r ; , : when DEFAULT "
+    '= /= <= >= < > + - * / mod 0 1 -1 18446744073709551616 1e400 0.1 "x" # ## \x00 \r ; , : when DEFAULT '
     "unreachable next case else for if local true false abs min max é \u202e \u0430 use extern python"
 ).split(" ")
 
@@ -138,7 +138,9 @@ def main() -> None:
     count, slowest = campaign(given.runs, given.seed)
     peak_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024
     assert peak_mb < MEMORY_MB, f"{peak_mb} MB"
-    print(f"{given.runs} texts, seed {given.seed}: no uncoded failure; slowest {slowest:.2f} s; peak {peak_mb} MB")
+    print(
+        f"{given.runs} texts, seed {given.seed}: no uncoded failure; slowest {slowest:.2f} s; peak {peak_mb} MB"
+    )
     for code, number in count.most_common():
         print(f"  {code:8} {number:7}")
 

@@ -9,7 +9,9 @@ from rcsc.syntax.tree import Name
 NAMES = st.sampled_from(["a", "b", "long_name", "x1", "status", "done", "Z"]).map(Name)
 WORDS = st.lists(st.sampled_from(["why", "a note", "  indented", "x := 3", "|"]), max_size=2).map(tuple)
 DOCS = st.lists(st.sampled_from(["what it is", "in mm"]), max_size=2).map(tuple)
-FACTORS = st.builds(tree.UnitFactor, st.sampled_from(["mm", "s", "N"]).map(Name), st.sampled_from([1, 1, 2, -1, -2]))
+FACTORS = st.builds(
+    tree.UnitFactor, st.sampled_from(["mm", "s", "N"]).map(Name), st.sampled_from([1, 1, 2, -1, -2])
+)
 
 
 def _sorted(factors: list[tree.UnitFactor]) -> tree.Unit:
@@ -20,7 +22,11 @@ def _sorted(factors: list[tree.UnitFactor]) -> tree.Unit:
 UNITS = st.lists(FACTORS, min_size=1, max_size=3).map(_sorted)
 LITERALS: SearchStrategy[tree.Expr] = st.one_of(
     st.builds(tree.BoolLiteral, st.booleans()),
-    st.builds(tree.IntLiteral, st.sampled_from(["0", "7", "1_000", "0x2F", "18446744073709551615"]), st.none() | UNITS),
+    st.builds(
+        tree.IntLiteral,
+        st.sampled_from(["0", "7", "1_000", "0x2F", "18446744073709551615"]),
+        st.none() | UNITS,
+    ),
     st.builds(tree.RealLiteral, st.sampled_from(["0.5", "1e-3", "2.5E7"]), st.none() | UNITS),
 )
 REFERENCES: SearchStrategy[tree.Expr] = NAMES.map(tree.Reference)
@@ -35,7 +41,9 @@ def _deeper(inner: SearchStrategy[tree.Expr]) -> SearchStrategy[tree.Expr]:
         st.builds(tree.Binary, BINARY, inner, inner),
         st.builds(tree.InSet, inner, several),
         st.builds(tree.InRange, inner, inner, inner),
-        st.builds(tree.Apply, st.sampled_from(["abs", "int", "real"]).map(Name), inner.map(lambda one: (one,))),
+        st.builds(
+            tree.Apply, st.sampled_from(["abs", "int", "real"]).map(Name), inner.map(lambda one: (one,))
+        ),
         st.builds(tree.Apply, st.sampled_from(["min", "max"]).map(Name), two),
         st.builds(tree.FieldOf, REFERENCES, NAMES),
         st.builds(tree.IndexOf, REFERENCES, inner),
@@ -117,7 +125,9 @@ def tables(draw: st.DrawFn) -> tree.TableDecl:
     columns = draw(st.lists(st.one_of(st.just(None), expressions()), min_size=1, max_size=3))
     words = draw(st.lists(st.sampled_from(["procedures", "command_out", "status_out", "place"]), max_size=3))
     headings = tuple(tree.Heading(one, "when" if one is None else "") for one in columns)
-    actions = tuple(tree.Heading(draw(places()), "") if w == "place" else tree.Heading(None, w) for w in words)
+    actions = tuple(
+        tree.Heading(draw(places()), "") if w == "place" else tree.Heading(None, w) for w in words
+    )
     cell = st.lists(calls() | assignments(), max_size=2).map(lambda found: tuple(_bare(one) for one in found))
     rows = []
     for number in range(draw(st.integers(0, 3))):
@@ -129,7 +139,9 @@ def tables(draw: st.DrawFn) -> tree.TableDecl:
         unreachable = default and draw(st.booleans())
         rows.append(tree.Row(f"l{number}", conditions_, done, default, unreachable, comments=draw(WORDS)))
     assuming = draw(st.lists(NAMES, max_size=2).map(tuple))
-    return tree.TableDecl(draw(NAMES), assuming, headings, actions, tuple(rows), comments=draw(WORDS), doc=draw(DOCS))
+    return tree.TableDecl(
+        draw(NAMES), assuming, headings, actions, tuple(rows), comments=draw(WORDS), doc=draw(DOCS)
+    )
 
 
 def _bare(one: tree.Statement) -> tree.Statement:
@@ -194,11 +206,17 @@ def declarations() -> SearchStrategy[tree.Declaration]:
             **head,
         ),
         st.builds(
-            tree.AssumeDecl, NAMES, expressions(), st.sampled_from(["", "assumed", "monitored", "proved"]), **head
+            tree.AssumeDecl,
+            NAMES,
+            expressions(),
+            st.sampled_from(["", "assumed", "monitored", "proved"]),
+            **head,
         ),
         st.builds(tree.InvariantDecl, NAMES, expressions(), **head),
         st.builds(tree.ProcedureDecl, st.just("procedure"), NAMES, params, body=body, **head),
-        st.builds(tree.ProcedureDecl, st.just("module"), NAMES, reads=touched, writes=touched, body=body, **head),
+        st.builds(
+            tree.ProcedureDecl, st.just("module"), NAMES, reads=touched, writes=touched, body=body, **head
+        ),
         st.builds(
             tree.ProcedureDecl,
             st.just("extern"),

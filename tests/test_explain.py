@@ -2,7 +2,6 @@
 
 import pytest
 from click.testing import CliRunner
-from rcsc.prove.program import prove_program
 
 from rcsc.cli.commands import commands
 from rcsc.diagnostics.codes import Code
@@ -10,6 +9,7 @@ from rcsc.diagnostics.diagnostic import Severity
 from rcsc.diagnostics.explanations import explain, explanations
 from rcsc.model import Program
 from rcsc.prove.options import Options
+from rcsc.prove.program import prove_program
 from rcsc.resolve import compile_text
 
 NOTES = {Code.DEFAULT_COVERS}

@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 
 import pytest
+from _pytest.mark import ParameterSet
 
 from rcsc.diagnostics.diagnostic import Severity
 from rcsc.model import Program
@@ -17,7 +18,7 @@ CASE = re.compile(r"^```rcs\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL)
 EXPECTED = re.compile(r"# error: \[(\w+)\]")
 
 
-def _cases(folder: Path) -> list[object]:
+def _cases(folder: Path) -> list[ParameterSet]:
     found = []
     for path in sorted(folder.glob("*.md")):
         page = path.read_text(encoding="utf-8")

@@ -2,7 +2,7 @@
 
 import itertools
 import random
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 
 import pytest
@@ -91,14 +91,17 @@ def program_of(
     tests: dict[Expr, Test] = {}
     for condition in itertools.chain.from_iterable(lines):
         used = {part.name for part in parts(condition) if isinstance(part, Read)}
-        tests.setdefault(condition, Test("", condition, tuple(VariableName(n) for n in names if n in used), None))
+        tests.setdefault(
+            condition, Test("", condition, tuple(VariableName(n) for n in names if n in used), None)
+        )
     width = max([1, *map(len, lines)])
     rows = tuple(
         Line(LineName(str(i + 1)), (*(tests[c] for c in row), *[None] * (width - len(row))), ())
         for i, row in enumerate(lines)
     )
     assumptions = tuple(
-        Assumption(AssumptionName(f"a{i}"), Standing.ASSUMED, condition) for i, condition in enumerate(assumed)
+        Assumption(AssumptionName(f"a{i}"), Standing.ASSUMED, condition)
+        for i, condition in enumerate(assumed)
     )
     table = Table(
         TableName("t"),
@@ -135,12 +138,13 @@ def value_of(expr: Expr, at: Snapshot) -> Value:
             if op is Op.NOT:
                 return not a
             b = rest[0]
-            return {
+            meaning: dict[Op, Callable[[], Value]] = {
                 Op.AND: lambda: a and b, Op.OR: lambda: a or b, Op.IMPLIES: lambda: b if a else True,
                 Op.EQ: lambda: a == b, Op.NE: lambda: a != b, Op.LT: lambda: a < b, Op.LE: lambda: a <= b,
                 Op.GT: lambda: a > b, Op.GE: lambda: a >= b, Op.ADD: lambda: a + b, Op.SUB: lambda: a - b,
                 Op.MUL: lambda: a * b,
-            }[op]()  # fmt: skip
+            }  # fmt: skip
+            return meaning[op]()
     raise AssertionError(expr)
 
 
@@ -150,7 +154,7 @@ def inputs(program: Program) -> list[dict[str, Value]]:
         [value_of_key(v.type, k) for k in range(key_bounds(v.type)[0], key_bounds(v.type)[1] + 1)]
         for v in program.variables
     ]
-    names = [v.name for v in program.variables]
+    names = [str(v.name) for v in program.variables]
     points = (dict(zip(names, values, strict=True)) for values in itertools.product(*ranges))
     return [p for p in points if all(value_of(a.condition, p) for a in program.assumptions)]
 
@@ -182,7 +186,12 @@ CONDITIONS = st.recursive(
     ATOMS,
     lambda inner: st.one_of(
         st.builds(lambda a: Apply(Op.NOT, (a,), BOOL), inner),
-        st.builds(lambda op, a, b: Apply(op, (a, b), BOOL), st.sampled_from([Op.AND, Op.OR, Op.IMPLIES]), inner, inner),
+        st.builds(
+            lambda op, a, b: Apply(op, (a, b), BOOL),
+            st.sampled_from([Op.AND, Op.OR, Op.IMPLIES]),
+            inner,
+            inner,
+        ),
     ),
     max_leaves=3,
 )
@@ -202,7 +211,9 @@ def cuts(draw: st.DrawFn) -> list[list[Expr]]:
     return lines
 
 
-DEFAULTS = st.sampled_from([None, Default(LineName("d"), (), unreachable=True), Default(LineName("d"), (), unreachable=False)])
+DEFAULTS = st.sampled_from(
+    [None, Default(LineName("d"), (), unreachable=True), Default(LineName("d"), (), unreachable=False)]
+)
 
 
 @given(cuts(), DEFAULTS, st.lists(CONDITIONS, max_size=2))
@@ -246,7 +257,7 @@ def test_least_point_is_the_first_of_brute_force(lines: list[list[Expr]], assume
 
 def planes(count: int, seed: int, names: Sequence[str] = ("p", "q", "r", "s")) -> list[list[Expr]]:
     """Lines from recursive cuts by random planes; the two sides spell the plane differently."""
-    rng = random.Random(seed)
+    rng = random.Random(seed)  # noqa: S311 - tables by seed
     kind = Int(-1000, 1000)
     regions: list[tuple[list[Expr], list[tuple[int, ...]]]] = [
         ([], [tuple(rng.randint(-1000, 1000) for _ in names) for _ in range(3 * count)])
@@ -260,7 +271,9 @@ def planes(count: int, seed: int, names: Sequence[str] = ("p", "q", "r", "s")) -
         if values[0] <= cut < values[-1]:
             low = compare(Op.LE, total([2 * k for k in ks], names, kind), number(2 * cut + 1))
             high = compare(Op.LT, number(cut), total(ks, names, kind))
-            sides = [[p for p in points if (sum(map(int.__mul__, ks, p)) <= cut) == side] for side in (True, False)]
+            sides = [
+                [p for p in points if (sum(map(int.__mul__, ks, p)) <= cut) == side] for side in (True, False)
+            ]
             regions += [([*path, low], sides[0]), ([*path, high], sides[1])]
         else:
             regions.append((path, points))
@@ -328,7 +341,11 @@ def test_past_the_budget_nothing_is_proved() -> None:
     assert not search.proved
 
 
-@given(st.lists(st.tuples(st.tuples(*[st.integers(-3, 3)] * 3), st.integers(-9, 9), st.integers(0, 5)), max_size=6))
+@given(
+    st.lists(
+        st.tuples(st.tuples(*[st.integers(-3, 3)] * 3), st.integers(-9, 9), st.integers(0, 5)), max_size=6
+    )
+)
 def test_simplex_gives_a_point_or_a_sum_that_cannot_be(rows: list[tuple[tuple[int, ...], int, int]]) -> None:
     simplex = Simplex()
     coefficients = {form: tuple(int(i == form) for i in range(3)) for form in range(3)}

@@ -71,9 +71,11 @@ procedure p {
     parsed = parse(Source("case.rcs", text))
     assert isinstance(parsed, tree.File)
     use, variable, procedure = parsed.declarations
-    assert isinstance(use, tree.Use) and use.comments == ("the file", "same line")
+    assert isinstance(use, tree.Use)
+    assert use.comments == ("the file", "same line")
     assert isinstance(variable, tree.VariableDecl)
-    assert variable.doc == ("doc of x",) and variable.comments == ("about x",)
+    assert variable.doc == ("doc of x",)
+    assert variable.comments == ("about x",)
     assert isinstance(procedure, tree.ProcedureDecl)
     assert [one.comments for one in procedure.body] == [("before", "behind"), ("inside",)]
     assert parsed.trailing == ("the end",)
@@ -88,7 +90,9 @@ def test_cell_spans_point_into_the_file() -> None:
     [row] = table.rows
     start, end = row.bounds[2:4]
     assert text[start:end] == "<= 4"
-    assert tree.absolute(Span("", 3, 4), "case.rcs", start) == Span("case.rcs", text.index("4 ||"), text.index("4 ||") + 1)
+    assert tree.absolute(Span("", 3, 4), "case.rcs", start) == Span(
+        "case.rcs", text.index("4 ||"), text.index("4 ||") + 1
+    )
 
 
 CASES = [
@@ -130,11 +134,15 @@ def test_at_most_twenty_errors_are_reported() -> None:
 
 @pytest.mark.parametrize("ending", ["\r\n", "\n"])
 def test_line_ends_of_both_kinds(ending: str) -> None:
-    text = "input x : bool\ntable t {\n | line | x ||\n | a | true ||\n | b | false ||\n}\n".replace("\n", ending)
+    text = "input x : bool\ntable t {\n | line | x ||\n | a | true ||\n | b | false ||\n}\n".replace(
+        "\n", ending
+    )
     assert isinstance(parse(Source("case.rcs", text)), tree.File)
 
 
-GARBAGE = st.text(alphabet=st.sampled_from("|{}()[]=<>/.:;,+-*#\"\n\r\t ab19_\u00e9\0") | st.characters(), max_size=200)
+GARBAGE = st.text(
+    alphabet=st.sampled_from('|{}()[]=<>/.:;,+-*#"\n\r\t ab19_\u00e9\0') | st.characters(), max_size=200
+)
 
 
 @settings(max_examples=400)

@@ -27,8 +27,8 @@ from rcsc.model import (
     key_bounds,
     pending,
 )
-from rcsc.resolve.leaves import everything
 from rcsc.plan import WORD, Cuts, Direct, Index, Matcher, Plan, PlanTable, Probe, Truth
+from rcsc.resolve.leaves import everything
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,7 +116,10 @@ class _Maker:
             tuple(self._helpers()),
             (*procedures, *shared),
             tuple(publics),
-            tuple((self.names.tables[t.table.name], tuple(line.name for line in t.lines)) for t in self.plan.tables),
+            tuple(
+                (self.names.tables[t.table.name], tuple(line.name for line in t.lines))
+                for t in self.plan.tables
+            ),
         )
 
     # --- declarations ---
@@ -199,7 +202,7 @@ class _Maker:
             yield f"    {wide_type(kind)} v_{name} = {constant(kind, 0)};"
         body = list(self.text.block(procedure.body, 1))
         text = "\n".join(body)
-        for name, _ in dict(locals_of(procedure)).items():
+        for name in dict(locals_of(procedure)):
             if text.count(f"v_{name}") < 2:
                 yield f"    (void)v_{name};"
         for param in procedure.params:
@@ -214,7 +217,9 @@ class _Maker:
         variables = {v.name: v for v in self.program.variables}
         for at, name in enumerate(procedure.writes):
             yield f"    {c_type(variables[name].type)} w{at} = {self.text.place(name)};"
-        given = [self.text.place(name) for name in procedure.reads] + [f"v_{p.name}" for p in procedure.params]
+        given = [self.text.place(name) for name in procedure.reads] + [
+            f"v_{p.name}" for p in procedure.params
+        ]
         outs = [f"&w{at}" for at, _ in enumerate(procedure.writes)]
         yield f"    {procedure.extern.c}({', '.join([*given, *outs])});"
         for at, name in enumerate(procedure.writes):
@@ -230,7 +235,9 @@ class _Maker:
 
     # --- admission ---
 
-    def _admitted(self, variable: Variable, place: str, position: int, fault: str, indent: int) -> Iterator[str]:
+    def _admitted(
+        self, variable: Variable, place: str, position: int, fault: str, indent: int
+    ) -> Iterator[str]:
         """Lines that clamp `place`, or record the fault; a NaN satisfies no comparison."""
         pad, kind = "    " * indent, variable.type
         if isinstance(kind, Bool):
@@ -322,7 +329,9 @@ class _Maker:
             "    }",
         )
         doc = f"The same for n inputs at once, table {table.table.name}."
-        yield Function(doc, f"void {self.p}_{name}_lines(const {self.p}_t *in, int32_t *out, uint32_t n)", lines)
+        yield Function(
+            doc, f"void {self.p}_{name}_lines(const {self.p}_t *in, int32_t *out, uint32_t n)", lines
+        )
 
     def _match(self, table: PlanTable, name: str) -> Iterator[str]:
         matcher = table.matcher
@@ -384,13 +393,24 @@ class _Maker:
         count = len(index.cuts)
         size = 1 << (count.bit_length())
         shown = [constant(index.type, cut) for cut in index.cuts]
-        lines = [f"    static const {wide} cuts[{count}] = {{", *_wrapped(shown), "    };", "    uint32_t at = 0u;"]
+        lines = [
+            f"    static const {wide} cuts[{count}] = {{",
+            *_wrapped(shown),
+            "    };",
+            "    uint32_t at = 0u;",
+        ]
         step = size >> 1
         while step:
-            lines.append(f"    at = at + ((((at + {step}u) <= {count}u) && (value >= cuts[(at + {step - 1}u) % {count}u])) ? {step}u : 0u);")
+            lines.append(
+                f"    at = at + ((((at + {step}u) <= {count}u) && (value >= cuts[(at + {step - 1}u) % {count}u])) ? {step}u : 0u);"
+            )
             step >>= 1
         lines.append("    return at;")
-        return Function("How many cuts are at most the value.", f"uint32_t {self.p}_class_{name}({wide} value)", tuple(lines))
+        return Function(
+            "How many cuts are at most the value.",
+            f"uint32_t {self.p}_class_{name}({wide} value)",
+            tuple(lines),
+        )
 
     def _one_word(self, matcher: Matcher, indices: list[str]) -> Iterator[str]:
         bits = max(_width(matcher.lines), 32)
@@ -489,7 +509,9 @@ class _Maker:
             lines += self._guarded(self.text.call(name))
         lines += ["    }", "    return s->fault;"]
         doc = f"One cycle of level {level.name}, every {level.period_ms} ms: returns the fault, 0 for none."
-        return Function(doc, f"int32_t {self.p}_{self.names.levels[level.name]}_cycle({self.p}_t *s)", tuple(lines))
+        return Function(
+            doc, f"int32_t {self.p}_{self.names.levels[level.name]}_cycle({self.p}_t *s)", tuple(lines)
+        )
 
     @staticmethod
     def _guarded(call: str) -> list[str]:
@@ -506,10 +528,20 @@ class _Maker:
             lines.append(f"{pad}{word} (chosen == {constant(kind, value)}) {{")
             lines.append(f"{pad}    {self.p}_run_{self.names.tables[table]}(s);")
             word = "} else if"
-        return [*lines, f"{pad}}} else {{", f"{pad}    s->fault = 2; /* no table for it: proved impossible */", f"{pad}}}"]
+        return [
+            *lines,
+            f"{pad}}} else {{",
+            f"{pad}    s->fault = 2; /* no table for it: proved impossible */",
+            f"{pad}}}",
+        ]
 
     def _init(self) -> Function:
-        lines = ["    s->line = -1;", "    s->fault = 0;", "    s->fault_at = -1;", "    s->assumptions_failed = 0;"]
+        lines = [
+            "    s->line = -1;",
+            "    s->fault = 0;",
+            "    s->fault_at = -1;",
+            "    s->assumptions_failed = 0;",
+        ]
         for variable in self.program.variables:
             value = constant(variable.type, variable.initial)
             cast = "" if isinstance(variable.type, Bool | Real) else f"({c_type(variable.type)})"
@@ -624,7 +656,11 @@ def _symbols(plan: Plan, names: Names) -> str:
             for t in plan.tables
         ],
         "levels": [
-            {"name": level.name, "cycle": f"{p}_{names.levels[level.name]}_cycle", "period_ms": level.period_ms}
+            {
+                "name": level.name,
+                "cycle": f"{p}_{names.levels[level.name]}_cycle",
+                "period_ms": level.period_ms,
+            }
             for level in plan.program.levels
         ],
     }

@@ -46,7 +46,11 @@ def python_word(name: str) -> str:
 def comment(text: str) -> str:
     """A text that can stand in a comment of either language and end neither."""
     clean = "".join(c if c.isprintable() and c.isascii() else "?" for c in text)
-    return re.sub(r"\?\?|\\", "?", clean.replace("*/", "* /").replace("/*", "/ *").replace("//", "/ /").replace('"', "'"))
+    return re.sub(
+        r"\?\?|\\",
+        "?",
+        clean.replace("*/", "* /").replace("/*", "/ *").replace("//", "/ /").replace('"', "'"),
+    )
 
 
 @dataclass(slots=True)

@@ -87,7 +87,11 @@ class PyText:
             case Op.MIN | Op.MAX:
                 return f"_{op.value}({texts[0]}, {texts[1]})"
             case Op.DIV:
-                return f"_div({texts[0]}, {texts[1]})" if isinstance(args[0].type, Int) else f"({texts[0]} / {texts[1]})"
+                return (
+                    f"_div({texts[0]}, {texts[1]})"
+                    if isinstance(args[0].type, Int)
+                    else f"({texts[0]} / {texts[1]})"
+                )
             case Op.MOD:
                 return f"_mod({texts[0]}, {texts[1]})"
             case _:
@@ -126,7 +130,9 @@ class PyText:
 
     def call(self, name: str, args: tuple[Expr, ...] = ()) -> str:
         """A call of a procedure."""
-        return f"_do_{self.names.procedures[name]}({', '.join(['s', *(self.stored(a.type, a) for a in args)])})"
+        return (
+            f"_do_{self.names.procedures[name]}({', '.join(['s', *(self.stored(a.type, a) for a in args)])})"
+        )
 
     def _assign(self, statement: Assign, pad: str) -> Iterator[str]:
         place, text = statement.place, self.stored(statement.place.type, statement.value)

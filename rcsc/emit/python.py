@@ -69,12 +69,19 @@ class _Maker:
             functions += self._table(table)
         functions += [self._level(level) for level in self.program.levels]
         attributes = tuple(
-            (self.names.attributes[v.name], constant(v.type, v.initial), comment(v.doc)) for v in self.program.variables
+            (self.names.attributes[v.name], constant(v.type, v.initial), comment(v.doc))
+            for v in self.program.variables
         )
-        lines = tuple((self.names.tables[t.table.name], tuple(line.name for line in t.lines)) for t in self.plan.tables)
-        enums = tuple(PyEnum(python_word(e.name), tuple(python_word(m) for m in e.members)) for e in self.program.enums)
+        lines = tuple(
+            (self.names.tables[t.table.name], tuple(line.name for line in t.lines)) for t in self.plan.tables
+        )
+        enums = tuple(
+            PyEnum(python_word(e.name), tuple(python_word(m) for m in e.members)) for e in self.program.enums
+        )
         source = comment(self.plan.source)
-        return PyFile(source, enums, attributes, self._imports(), tuple(self.constants), tuple(functions), lines)
+        return PyFile(
+            source, enums, attributes, self._imports(), tuple(self.constants), tuple(functions), lines
+        )
 
     def _imports(self) -> tuple[str, ...]:
         externs = [p.extern.python for p in self.program.procedures if p.extern is not None]
@@ -84,18 +91,23 @@ class _Maker:
 
     def _procedure(self, procedure: Procedure) -> PyFunction:
         params = ", ".join(["s", *(f"v_{p.name}" for p in procedure.params)])
-        if procedure.extern is not None:
-            lines = list(self._extern(procedure))
-        else:
-            lines = list(self.text.block(procedure.body, 1))
+        lines = (
+            list(self._extern(procedure))
+            if procedure.extern is not None
+            else list(self.text.block(procedure.body, 1))
+        )
         name = f"_do_{self.names.procedures[procedure.name]}"
-        return PyFunction(name, params, comment(procedure.doc) or f"Procedure {procedure.name}.", tuple(lines))
+        return PyFunction(
+            name, params, comment(procedure.doc) or f"Procedure {procedure.name}.", tuple(lines)
+        )
 
     def _extern(self, procedure: Procedure) -> Iterator[str]:
         assert procedure.extern is not None
         variables = {v.name: v for v in self.program.variables}
         module, _, function = procedure.extern.python.partition(":")
-        given = [self.text.place(name) for name in procedure.reads] + [f"v_{p.name}" for p in procedure.params]
+        given = [self.text.place(name) for name in procedure.reads] + [
+            f"v_{p.name}" for p in procedure.params
+        ]
         yield f"    given = {module}.{function}({', '.join(given)})"
         if len(procedure.writes) != 1:
             yield f"    if len(given) != {len(procedure.writes)}:"
@@ -162,7 +174,12 @@ class _Maker:
         yield PyFunction(f"{name}_line", "s", doc, tuple(self._match(table, masks, upper)))
         doc = f"The same for many inputs, table {table.table.name}."
         yield PyFunction(f"{name}_lines", "states", doc, (f"    return [{name}_line(s) for s in states]",))
-        yield PyFunction(f"_run_{name}", "s", f"Matches table {table.table.name} and runs the line.", tuple(self._run(table, name)))
+        yield PyFunction(
+            f"_run_{name}",
+            "s",
+            f"Matches table {table.table.name} and runs the line.",
+            tuple(self._run(table, name)),
+        )
         for number, line in enumerate(table.lines):
             body = tuple(action.statement for action in line.actions)
             yield PyFunction(f"_{name}_{number}", "s", comment(line.source), tuple(self.text.block(body, 1)))
@@ -193,7 +210,9 @@ class _Maker:
                 index = one if not index else f"({index}) * {len(probe.masks)} + {one}"
             yield f"    return {upper}_LINE[{index}]"
             return
-        ands = " & ".join(f"{mask}[{self._index(probe)}]" for mask, probe in zip(masks, matcher.probes, strict=True))
+        ands = " & ".join(
+            f"{mask}[{self._index(probe)}]" for mask, probe in zip(masks, matcher.probes, strict=True)
+        )
         yield f"    m = {ands or everything}"
         yield f"    return m.bit_length() - 1 if m and not m & (m - 1) else _line_of(m, {tail})"
 
@@ -244,5 +263,3 @@ class _Maker:
                   "    return s.fault"]  # fmt: skip
         doc = f"One cycle of level {level.name}, every {level.period_ms} ms; the fault, 0 for none."
         return PyFunction(f"{self.names.levels[level.name]}_cycle", "s", doc, tuple(lines))
-
-

@@ -172,8 +172,12 @@ class Universe:
 
     def _comparison(self, whole: Expr, left: Expr, right: Expr, op: Op, wanted: bool) -> Formula:
         if isinstance(left.type, Bool) and not (_is_plain(left) and _is_plain(right)):
-            same = some((every((self.of(left), self.of(right))), every((self.of(left, False), self.of(right, False)))))
-            differ = some((every((self.of(left), self.of(right, False))), every((self.of(left, False), self.of(right)))))
+            same = some(
+                (every((self.of(left), self.of(right))), every((self.of(left, False), self.of(right, False))))
+            )
+            differ = some(
+                (every((self.of(left), self.of(right, False))), every((self.of(left, False), self.of(right))))
+            )
             return same if op is Op.EQ else differ
         if not (_is_finite(left) and _is_finite(right)):
             return self._truth(whole, wanted)
@@ -187,7 +191,9 @@ class Universe:
         if not _is_finite(subject):
             return self._truth(whole, wanted)
         coefficients, constant = self.linear(subject)
-        parts = [self._against(dict(coefficients), Op.EQ if wanted else Op.NE, key - constant) for key in keys]
+        parts = [
+            self._against(dict(coefficients), Op.EQ if wanted else Op.NE, key - constant) for key in keys
+        ]
         return some(parts) if wanted else every(parts)
 
     def _against(self, coefficients: dict[int, int], op: Op, bound: int) -> Formula:

@@ -126,7 +126,11 @@ class Boxes:
         classes = self.classes(name)
         inside = [_any(mask for box, mask in stated.items() if _holds(box, low)) for low in classes.starts]
         for box in stated:
-            yield box, idle | _any(mask for low, mask in zip(classes.starts, inside, strict=True) if _holds(box, low))
+            yield (
+                box,
+                idle
+                | _any(mask for low, mask in zip(classes.starts, inside, strict=True) if _holds(box, low)),
+            )
 
     def both(self, first: int, second: int) -> Overlap:
         """The overlap of two lines: its least witness, and the whole region where both match."""
@@ -136,7 +140,9 @@ class Boxes:
             if name in one or name in two:
                 whole = (self.extents[name],)
                 region[name] = meet(one.get(name, whole), two.get(name, whole))
-        return Overlap(first, second, self.witness({n: box[0][0] for n, box in region.items()}), self.narrowed(region))
+        return Overlap(
+            first, second, self.witness({n: box[0][0] for n, box in region.items()}), self.narrowed(region)
+        )
 
     def witness(self, keys: Mapping[str, int]) -> Witness:
         """The values of these keys; the least of every other variable."""
@@ -213,7 +219,6 @@ class Classes:
     ends: Sequence[int]
 
 
-
 Cell = dict[str, tuple[int, int]]
 
 
@@ -260,11 +265,17 @@ class Search:
     def _filled(self, alive: list[int], lines: Sequence[Mapping[str, Box]], names: Sequence[str]) -> bool:
         """Whether the lines that are apart fill what the variables left span."""
         full = {name: high - low + 1 for name in names for low, high in (self.table.extents[name],)}
-        sizes = (prod(size(lines[at][n]) if n in lines[at] else full[n] for n in names) for at in alive if self._is_apart(at))
+        sizes = (
+            prod(size(lines[at][n]) if n in lines[at] else full[n] for n in names)
+            for at in alive
+            if self._is_apart(at)
+        )
         return sum(sizes) == prod(full.values())
 
     def _is_apart(self, at: int) -> bool:
-        return at in self.apart or at >= len(self.table.lines)  # regions shown meet no line and not each other
+        return at in self.apart or at >= len(
+            self.table.lines
+        )  # regions shown meet no line and not each other
 
     def grown(self, cell: Cell, shown: Sequence[Mapping[str, Box]]) -> dict[str, Box]:
         """A maximal region around the cell that no line and no region shown touches, grown in declared order."""
@@ -275,7 +286,9 @@ class Search:
             at = bisect_right(classes.starts, cell[name][0]) - 1
             region[name] = ((classes.starts[at], classes.ends[at]),)
         for name in self.table.names:
-            close = [boxes for boxes in lines if all(meet(box, region[n]) for n, box in boxes.items() if n != name)]
+            close = [
+                boxes for boxes in lines if all(meet(box, region[n]) for n, box in boxes.items() if n != name)
+            ]
             free: list[tuple[int, int]] = []
             classes = self.table.classes(name)
             for low, high in zip(classes.starts, classes.ends, strict=True):

@@ -26,7 +26,9 @@ def defect(lines: Sequence[Mapping[int, Box]], extents: Cell, *, cover: bool) ->
         cell = {}
         for form, extent in extents.items():
             boxes = left.get(form, (extent,)), right.get(form, (extent,))
-            cell[form] = next((max(a, c), min(b, d)) for a, b in boxes[0] for c, d in boxes[1] if a <= d and c <= b)
+            cell[form] = next(
+                (max(a, c), min(b, d)) for a, b in boxes[0] for c, d in boxes[1] if a <= d and c <= b
+            )
         return cell
     return short_cell(lines, extents) if cover else None
 
@@ -98,7 +100,11 @@ def short_cell(lines: Sequence[Mapping[int, Box]], extents: Cell) -> Cell | None
         later = forms[at + 1 :]
         whole = prod(extents[other][1] - extents[other][0] + 1 for other in later)
         for low, high in _slices(left, form, extents[form]):
-            inside = [line for line in left if form not in line or any(a <= low and high <= b for a, b in line[form])]
+            inside = [
+                line
+                for line in left
+                if form not in line or any(a <= low and high <= b for a, b in line[form])
+            ]
             if _filled(inside, later, extents) != whole:
                 cell[form], left = (low, high), inside
                 break

@@ -44,8 +44,13 @@ def confirm(program: Program, table: Table, found: tuple[Found, ...], options: O
     overlap = _some_overlap(asked)
     if options.solver == "auto" and (time.monotonic() - begun) * 1000 > 4 * options.confirm_ms:
         return Agreement.NOT_ASKED
-    gap = asked.holds(asked.none()) if must_cover(table) or any(isinstance(one, Gap) for one in found) else None
-    said = (overlap, any(isinstance(one, Overlap) for one in found)), (gap, any(isinstance(one, Gap) for one in found))
+    gap = (
+        asked.holds(asked.none()) if must_cover(table) or any(isinstance(one, Gap) for one in found) else None
+    )
+    said = (
+        (overlap, any(isinstance(one, Overlap) for one in found)),
+        (gap, any(isinstance(one, Gap) for one in found)),
+    )
     if any(answer is Answer.UNKNOWN for answer, _ in said):
         return Agreement.UNKNOWN
     agrees = all(answer is None or (answer is Answer.SATISFIABLE) == wrong for answer, wrong in said)

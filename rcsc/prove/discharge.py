@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from enum import Enum, auto
 
 from rcsc.model import Kind, Real, Value, Variable, VariableName, value_of_key
-from rcsc.prove import smt, values
+from rcsc.prove import smt, trial, values
 from rcsc.prove.encode import Frame, least_witness
 from rcsc.prove.evaluation import Obligation
 from rcsc.prove.options import Options
@@ -92,6 +92,7 @@ class _Question:
         found = values.variables([*base, *self.bad])
         self.variables = sorted(found.values(), key=lambda node: self._place(node.name))
         self.reals = any(isinstance(node.kind, Real) for node in self.variables)
+        self.known = list(base)
         self.base = [*values.domain(self.variables), *map(values.term_of, base)]
         self.failures: list[Failure] = []
         self.unknown = 0
@@ -110,7 +111,9 @@ class _Question:
         if self.unknown > MOST_UNKNOWN:
             self.failures += [Failure(one, Outcome.OPEN) for one in self.owed[first:last]]
             return
-        answer = self._ask(smt.any_of([values.term_of(bad) for bad in self.bad[first:last]]))
+        bad = values.any_of(self.bad[first:last])
+        tried = trial.found([*self.known, bad], self.variables) if self.reals else None
+        answer = self._ask(values.term_of(bad)) if tried is None else Answer.SATISFIABLE
         if answer is Answer.UNSATISFIABLE:
             return
         if last - first > 1:
@@ -118,11 +121,11 @@ class _Question:
             self._search(first, middle)
             self._search(middle, last)
             return
-        self._found(first, answer)
-        holds = smt.negation(values.term_of(self.bad[first]))
-        self.base.append(holds)
+        self._found(first, answer, tried)
+        self.known.append(values.negation(self.bad[first]))
+        self.base.append(values.term_of(self.known[-1]))
         if self.solver is not None:
-            self.solver.add(holds)
+            self.solver.add(self.base[-1])
 
     def _ask(self, bad: Term) -> Answer:
         """Whether it can be; doubles are quicker in a solver of their own."""
@@ -147,22 +150,26 @@ class _Question:
         solver.add(*self.base)
         return solver
 
-    def _found(self, at: int, answer: Answer) -> None:
+    def _found(self, at: int, answer: Answer, tried: trial.Point | None) -> None:
         if answer is Answer.UNKNOWN:
             self.unknown += 1
             self.failures.append(Failure(self.owed[at], Outcome.OPEN))
             return
-        witness = self._witness(self.bad[at]) if self.wanted(self.owed[at]) else ()
+        witness = self._witness(self.bad[at], tried) if self.wanted(self.owed[at]) else ()
         self.failures.append(Failure(self.owed[at], Outcome.FAILS, witness))
 
-    def _witness(self, bad: Node) -> tuple[tuple[Variable, Value], ...]:
-        solver = self._fresh()
-        solver.add(values.term_of(bad))
+    def _witness(self, bad: Node, tried: trial.Point | None) -> tuple[tuple[Variable, Value], ...]:
         shown = [
             Variable(VariableName(node.name), Kind.STATE, node.kind, value_of_key(node.kind, 0))
             for node in self.variables
         ]
+        found = self._least(bad, shown) if tried is None else tried
+        return () if found is None else tuple((one, found[one.name]) for one in shown)
+
+    def _least(self, bad: Node, shown: list[Variable]) -> dict[str, Value] | None:
+        solver = self._fresh()
+        solver.add(values.term_of(bad))
         frame = Frame({node.name: values.term_of(node) for node in self.variables})
         found = least_witness(solver, shown, frame)
         self.asker.tally.queries += solver.queries
-        return () if found is None else tuple((one, found[one.name]) for one in shown)
+        return found

@@ -18,7 +18,13 @@ from rcsc.prove.search import Tree
 def find(universe: Universe, parts: Sequence[Formula], budget: int = 2_000) -> Point | Answer:
     """A point at which all parts hold; `NONE` when there is none, `UNKNOWN` past the budget."""
     tree = Tree(
-        universe, (), (clauses(parts),), lambda _: Answer.UNKNOWN, default=False, budget=budget, first_only=True
+        universe,
+        (),
+        (clauses(parts),),
+        lambda _: Answer.UNKNOWN,
+        default=False,
+        budget=budget,
+        first_only=True,
     )
     found = tree.run()
     if found.gaps:
@@ -49,7 +55,10 @@ def least(universe: Universe, parts: Sequence[Formula], columns: Sequence[int]) 
 
 
 def widest(
-    universe: Universe, point: Mapping[int, int], columns: Sequence[int], holds: Callable[[list[Formula]], bool]
+    universe: Universe,
+    point: Mapping[int, int],
+    columns: Sequence[int],
+    holds: Callable[[list[Formula]], bool],
 ) -> dict[int, Bounds]:
     """The box around `point` that is grown in the order of `columns` as far as `holds` is true of it.
 

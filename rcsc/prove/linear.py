@@ -113,7 +113,9 @@ class Simplex:
         for j, a in enumerate(row):
             if a:
                 form = self._columns[j]
-                free = self._values[j] < self.high[form] if (a > 0) == up else self._values[j] > self.low[form]
+                free = (
+                    self._values[j] < self.high[form] if (a > 0) == up else self._values[j] > self.low[form]
+                )
                 if free and (found is None or form < self._columns[found]):
                     found = j
         return found

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from rcsc.interpret import evaluate, matching_lines
-from rcsc.model import AssumptionName, Expr, Line, Program, Snapshot, Table
+from rcsc.model import AssumptionName, Expr, Line, Program, Read, Select, Snapshot, Table, Value, value_of_key
 from rcsc.prove import smt
 from rcsc.prove.atoms import Universe, assumptions_of, lines_of
 from rcsc.prove.certificate import must_cover, tree_certificate
@@ -19,7 +19,7 @@ from rcsc.prove.regions import Question
 from rcsc.prove.search import Tree
 from rcsc.prove.smt import Answer, Solver, Term
 from rcsc.prove.verdict import ContradictoryAssumptions, DeadLine, Found, Gap, Overlap, Undecided
-from rcsc.questions import question
+from rcsc.questions import parts, question
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +48,9 @@ class Asked:
     def line(self, at: int) -> Term:
         """That a line matches."""
         if at not in self._lines:
-            self._lines[at] = smt.all_of([self._test(test.condition, id(test)) for test in self.table.lines[at].tests if test])
+            self._lines[at] = smt.all_of(
+                [self._test(test.condition, id(test)) for test in self.table.lines[at].tests if test]
+            )
         return self._lines[at]
 
     def _test(self, condition: Expr, key: int) -> Term:
@@ -63,7 +65,10 @@ class Asked:
     def witness(self, *terms: Term) -> Snapshot | None:
         """The least input for which the terms hold; None where the solver gives up."""
         wanted = set(self.table.variables) | {
-            name for a in self.program.assumptions if a.name in self.table.assumptions for name in _reads(a.condition)
+            name
+            for a in self.program.assumptions
+            if a.name in self.table.assumptions
+            for name in _reads(a.condition)
         }
         variables = [v for v in self.program.variables if v.name in wanted]
         self.solver.push()
@@ -78,13 +83,13 @@ class Asked:
 
 
 def _reads(expr: Expr) -> list[str]:
-    from rcsc.model import Read, Select
-    from rcsc.questions import parts
 
     return [
         name
         for part in parts(expr)
-        for name in ((part.name,) if isinstance(part, Read) else part.leaves if isinstance(part, Select) else ())
+        for name in (
+            (part.name,) if isinstance(part, Read) else part.leaves if isinstance(part, Select) else ()
+        )
     ]
 
 
@@ -94,7 +99,11 @@ def decide(program: Program, table: Table, options: Options) -> Decided:
     if table.assumptions:
         possible = asked.holds()
         if possible is not Answer.SATISFIABLE:
-            wrong: Found = ContradictoryAssumptions() if possible is Answer.UNSATISFIABLE else Undecided("the assumptions")
+            wrong: Found = (
+                ContradictoryAssumptions()
+                if possible is Answer.UNSATISFIABLE
+                else Undecided("the assumptions")
+            )
             return Decided((wrong,), None, (), asked.solver.queries)
     universe = Universe()
     lines = lines_of(universe, table)
@@ -109,7 +118,9 @@ def decide(program: Program, table: Table, options: Options) -> Decided:
         found = (*found, *_default(asked))
     found = (*found, *_dead(asked))
     used = tuple(table.assumptions[at] for at in sorted(search.used))
-    certificate = tree_certificate(program, table, universe, search.nodes, table.assumptions) if search.proved else None
+    certificate = (
+        tree_certificate(program, table, universe, search.nodes, table.assumptions) if search.proved else None
+    )
     return Decided(found, certificate, used, asked.solver.queries)
 
 
@@ -133,9 +144,7 @@ def _model(asked: Asked, frame: Frame) -> Snapshot:
     return {v.name: asked.solver.value(frame.leaves[v.name], v.type) for v in asked.program.variables}
 
 
-def _findings(
-    asked: Asked, pairs: object, witnesses: list[Snapshot], gap: bool
-) -> tuple[Found, ...]:
+def _findings(asked: Asked, pairs: object, witnesses: list[Snapshot], gap: bool) -> tuple[Found, ...]:
     """Overlaps with their least witnesses, and the gap."""
     assert isinstance(pairs, type({}.keys()))
     table = asked.table
@@ -186,8 +195,7 @@ def _plainly_alive(asked: Asked, line: Line) -> bool:
     """Whether the least values that its boxes allow match it: no need to ask."""
     if asked.table.assumptions:
         return False
-    values = {v.name: v.initial for v in asked.program.variables}
-    from rcsc.model import value_of_key
+    values: dict[str, Value] = {v.name: v.initial for v in asked.program.variables}
 
     kinds = {v.name: v.type for v in asked.program.variables}
     for test in line.tests:

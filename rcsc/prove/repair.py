@@ -96,7 +96,7 @@ def closing_line(program: Program, table: Table, found: Gap) -> str | None:
     if any(name not in {c.variable for c in table.columns} for name in region):
         return None
     decided = boxes.Boxes.of(program, table)
-    decided.lines.append({name: box for name, box in region.items()})
+    decided.lines.append(dict(region.items()))
     if any(len(decided.lines) - 1 in pair for pair in decided.overlaps()):
         return None
     row = " | ".join(["new", *cells])

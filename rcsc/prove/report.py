@@ -47,7 +47,9 @@ def _others(program: Program, verdict: TableVerdict) -> Iterator[Diagnostic]:
                 message = f"line `{name}` of table `{table.name}` can never match"
                 yield Diagnostic(Code.DEAD_LINE, message, Label(table.lines[line].cell_span(-1)), help=helps)
             case ContradictoryAssumptions():
-                message = f"the assumptions of table `{table.name}` contradict each other or the declared ranges"
+                message = (
+                    f"the assumptions of table `{table.name}` contradict each other or the declared ranges"
+                )
                 yield Diagnostic(Code.CONTRADICTORY_ASSUMPTIONS, message, Label(table.span))
             case Undecided(what):
                 helps = ("give each query more time with `--timeout`, or simplify the conditions",)
@@ -58,12 +60,13 @@ def _others(program: Program, verdict: TableVerdict) -> Iterator[Diagnostic]:
                 yield Diagnostic(Code.SOLVERS_DISAGREE, message, Label(table.span))
             case Overlap():
                 pass
-    if table.default is not None and not table.default.unreachable and not verdict.undecided:
-        if not any(isinstance(one, Gap) for one in verdict.found):
-            message = f"the DEFAULT line of table `{table.name}` is never reached"
-            span = table.default.span
-            helps = ("declare it: `DEFAULT unreachable`; that is then proved",)
-            yield Diagnostic(Code.DEFAULT_DEAD, message, Label(span), help=helps, severity=Severity.WARNING)
+    if table.default is None or table.default.unreachable or verdict.undecided:
+        return
+    if not any(isinstance(one, Gap) for one in verdict.found):
+        message = f"the DEFAULT line of table `{table.name}` is never reached"
+        helps = ("declare it: `DEFAULT unreachable`; that is then proved",)
+        label = Label(table.default.span)
+        yield Diagnostic(Code.DEFAULT_DEAD, message, label, help=helps, severity=Severity.WARNING)
 
 
 # --- overlaps ------------------------------------------------------------------------
@@ -96,7 +99,12 @@ def _gap(program: Program, table: Table, found: Gap) -> Diagnostic:
         repair = closing_line(program, table, found)
         message = f"no line of table `{table.name}` matches {share}"
         return Diagnostic(
-            Code.GAP, message, Label(table.span), help=(repair,) if repair else (), witnesses=columns, more=_more(found)
+            Code.GAP,
+            message,
+            Label(table.span),
+            help=(repair,) if repair else (),
+            witnesses=columns,
+            more=_more(found),
         )
     assert table.default is not None
     label = Label(table.default.span)
@@ -129,7 +137,9 @@ def _column(
     kinds: dict[str, Scalar] = {v.name: v.type for v in program.variables}
     names = tuple(name for name in kinds if name in witness)
     matched = tuple(
-        MatchedLine(table.lines[at].name, tuple(_cells(table, at, name) for name in names), table.lines[at].span)
+        MatchedLine(
+            table.lines[at].name, tuple(_cells(table, at, name) for name in names), table.lines[at].span
+        )
         for at in lines
     )
     values = tuple(spell(kinds[name], witness[name]) for name in names)
@@ -141,6 +151,9 @@ def _cells(table: Table, line: int, name: str) -> str:
     said = []
     for test, column in zip(table.lines[line].tests, table.columns, strict=True):
         if test is not None and test.variables and test.variables[0] == name:
-            said.append(test.text if column.variable == name or column.subject is None else f"{column.heading} {test.text}")
+            said.append(
+                test.text
+                if column.variable == name or column.subject is None
+                else f"{column.heading} {test.text}"
+            )
     return "; ".join(said)
-

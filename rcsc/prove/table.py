@@ -1,13 +1,16 @@
 """One table, decided by whatever suits it, confirmed by Z3, certified."""
 
 import time
-from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 from rcsc.model import AssumptionName, Backing, Program, Table
 from rcsc.prove import boxes
 from rcsc.prove.certificate import box_certificate, must_cover
 from rcsc.prove.options import Options
 from rcsc.prove.verdict import DeadLine, Found, Gap, Overlap, SolversDisagree, TableVerdict, Undecided
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
 
 
 def prove_table(program: Program, table: Table, options: Options) -> TableVerdict:
@@ -68,5 +71,3 @@ def _confirmed(
             return False, (*found, left) if options.solver == "both" else found
         case Agreement.NOT_ASKED:
             return False, found
-
-

@@ -221,7 +221,7 @@ def inside(node: Node, low: int | float, high: int | float) -> Node:
 
 def term_of(node: Node) -> Term:
     """The solver's term of the node; parts first, without recursion."""
-    for one in _parts_first(node):
+    for one in parts_first(node):
         if one.term is None:
             one.term = _term(one, [part.term for part in one.args if part.term is not None])
     assert node.term is not None
@@ -240,7 +240,7 @@ def _term(node: Node, parts: list[Term]) -> Term:
 
 def variables(nodes: Iterable[Node]) -> dict[str, Node]:
     """The variables below the nodes, by name."""
-    return {one.name: one for one in _parts_first(*nodes) if one.op == VARIABLE}
+    return {one.name: one for one in parts_first(*nodes) if one.op == VARIABLE}
 
 
 def domain(found: Iterable[Node]) -> list[Term]:
@@ -248,7 +248,7 @@ def domain(found: Iterable[Node]) -> list[Term]:
     return [within(term_of(one), one.kind) for one in found if not isinstance(one.kind, Bool)]
 
 
-def _parts_first(*nodes: Node) -> Iterator[Node]:
+def parts_first(*nodes: Node) -> Iterator[Node]:
     """Every node once, parts before wholes."""
     seen: set[Node] = set()
     stack = [(node, False) for node in reversed(nodes)]

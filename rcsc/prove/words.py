@@ -11,7 +11,11 @@ def cell(kind: Scalar, box: Box) -> str | None:
     low, high = key_bounds(kind)
     if box == ((low, high),):
         return ""
-    words = [spell(kind, value_of_key(kind, key)) for first, last in box for key in range(first, min(last, first + 64) + 1)]
+    words = [
+        spell(kind, value_of_key(kind, key))
+        for first, last in box
+        for key in range(first, min(last, first + 64) + 1)
+    ]
     if isinstance(kind, Bool | Enum):
         outside = [key for key in range(low, high + 1) if not any(a <= key <= b for a, b in box)]
         if len(words) == 1:

@@ -1,27 +1,24 @@
 """Parse trees to syntax trees: one method a grammar rule, in grammar order."""
 
 from dataclasses import replace
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 from rcsc.source import Span
 from rcsc.syntax import tree
 from rcsc.syntax.comments import Comments, split, words
 
 
-class Meta(Protocol):
-    """Where a rule matched."""
-
-    empty: bool
-    start_pos: int
-    end_pos: int
-
-
 class Node(Protocol):
     """A parse-tree node: the rule's name and what it matched (nodes and tokens)."""
 
-    data: Any
-    children: list[Any]
-    meta: Any
+    @property
+    def data(self) -> Any: ...
+
+    @property
+    def children(self) -> list[Any]: ...
+
+    @property
+    def meta(self) -> Any: ...
 
 
 class Rows(Protocol):
@@ -168,7 +165,9 @@ class Build:
 
     def _owner_decl(self, node: Node) -> tree.OwnerDecl:
         head = self._head(node)
-        return tree.OwnerDecl(self._name(node.children[0]), self._names(self._find(node.children, "names")), **head)
+        return tree.OwnerDecl(
+            self._name(node.children[0]), self._names(self._find(node.children, "names")), **head
+        )
 
     def _table_decl(self, node: Node) -> tree.TableDecl:
         head = self._head(node)
@@ -214,7 +213,11 @@ class Build:
                 low, high, *unit = node.children
                 built = tree.IntType if rule == "int_type" else tree.RealType
                 most, own = self.expr(high), self._unit(unit)
-                if own is None and isinstance(most, tree.IntLiteral | tree.RealLiteral) and most.unit is not None:
+                if (
+                    own is None
+                    and isinstance(most, tree.IntLiteral | tree.RealLiteral)
+                    and most.unit is not None
+                ):
                     # the parser reads `0 .. 9 [mm]` with the unit at the 9; it is the type's
                     most, own = replace(most, unit=None), most.unit
                 return built(self.expr(low), most, own, span)
@@ -237,7 +240,7 @@ class Build:
 
     # --- expressions ---
 
-    _BINARY = {"implies": "implies", "disjoin": "or", "conjoin": "and"}
+    _BINARY: ClassVar[dict[str, str]] = {"implies": "implies", "disjoin": "or", "conjoin": "and"}
 
     def expr(self, node: Node) -> tree.Expr:
         """Any expression."""

@@ -41,7 +41,11 @@ def _together(one: tree.Declaration, two: tree.Declaration) -> bool:
     """Whether two declarations stand without a line between them."""
     if not isinstance(one, _LONE) or type(one) is not type(two) or two.comments:
         return False
-    return not isinstance(one, tree.VariableDecl) or not isinstance(two, tree.VariableDecl) or one.kind == two.kind
+    return (
+        not isinstance(one, tree.VariableDecl)
+        or not isinstance(two, tree.VariableDecl)
+        or one.kind == two.kind
+    )
 
 
 def _above(comments: tuple[str, ...], doc: tuple[str, ...], pad: str = "") -> Iterator[str]:
@@ -93,7 +97,9 @@ def _variable(one: tree.VariableDecl) -> str:
     text = f"{one.kind} {one.name.text} : {spell_type(one.type)}"
     text += f" = {spell_expr(one.initial)}" if one.initial is not None else ""
     text += f" {one.admit}" if one.admit else ""
-    return text + (f" deferred until {spell_expr(one.deferred_until)}" if one.deferred_until is not None else "")
+    return text + (
+        f" deferred until {spell_expr(one.deferred_until)}" if one.deferred_until is not None else ""
+    )
 
 
 def _procedure(one: tree.ProcedureDecl) -> Iterator[str]:
@@ -123,7 +129,9 @@ def _statement(one: tree.Statement, depth: int) -> Iterator[str]:
         case tree.Assign() | tree.Call():
             yield pad + _simple(one)
         case tree.Local(name, kind, value):
-            yield f"{pad}local {name.text} : {spell_type(kind)}" + (f" := {spell_expr(value)}" if value else "")
+            yield f"{pad}local {name.text} : {spell_type(kind)}" + (
+                f" := {spell_expr(value)}" if value else ""
+            )
         case tree.If():
             yield from _if(one, depth, pad)
         case tree.Case(subject, arms, orelse):
@@ -183,7 +191,7 @@ def _table(one: tree.TableDecl) -> Iterator[str]:
         yield "  " + _row(conditions, actions, widths)
         if not number:
             dashes = [["-" * width for width in side] for side in widths]
-            yield "  " + _row(*dashes, widths).replace(" ", "-")
+            yield "  " + _row(dashes[0], dashes[1], widths).replace(" ", "-")
     yield "}"
 
 
@@ -193,7 +201,10 @@ def _heading(heading: tree.Heading) -> str:
 
 def _conditions(row: tree.Row, table: tree.TableDecl) -> list[str]:
     if row.default:
-        return ["DEFAULT unreachable" if row.unreachable else "DEFAULT", *([""] * (len(table.conditions) - 1))]
+        return [
+            "DEFAULT unreachable" if row.unreachable else "DEFAULT",
+            *([""] * (len(table.conditions) - 1)),
+        ]
     return [
         "" if cell is None else spell_condition(cell, heading.subject is None)
         for cell, heading in zip(row.conditions, table.conditions, strict=True)

@@ -63,7 +63,8 @@ class _Pieces:
 
     def parse(self) -> list[Diagnostic]:
         """Fills `nodes`; what was wrong."""
-        text, offset, found = self.source.text, 0, []
+        text, offset = self.source.text, 0
+        found: list[Diagnostic] = []
         while len(found) < MOST_ERRORS:
             blank = screen.blank_before(text, offset)
             try:
@@ -79,17 +80,18 @@ class _Pieces:
 
 def _syntax_error(error: lark.UnexpectedInput, file: str, start: int, end: int, text: str) -> Diagnostic:
     """What stands there and what was expected; `start` is where the parsed text begins in the file."""
-    position, word = start + (error.pos_in_stream or 0), ""
+    at = cast("int | None", error.pos_in_stream) or 0
+    position, word = start + at, ""
     wanted: set[str] = set()
     if isinstance(error, lark.UnexpectedToken):
-        wanted = set(error.accepts or error.expected)
+        wanted = set(cast("set[str] | None", error.accepts) or error.expected)
         if error.token.type == "$END":
             position = end
         else:
             position, word = start + (error.token.start_pos or 0), str(error.token)
     elif isinstance(error, lark.UnexpectedCharacters):
         wanted = set(error.allowed or ())
-        word = text[error.pos_in_stream] if error.pos_in_stream < len(text) else ""
+        word = text[at] if at < len(text) else ""
     if word and not word.isascii():
         message = f"`{word}` is not allowed here: names are made of ASCII letters, digits and `_`"
         return _error(Code.NON_ASCII_NAME, message, Span(file, position, position + len(word)))
@@ -112,7 +114,9 @@ class _Rows:
     found: list[Diagnostic]
     memory: dict[tuple[str, str], Any] = field(default_factory=dict)
 
-    def table(self, rows: list[Token]) -> tuple[tuple[tree.Heading, ...], tuple[tree.Heading, ...], tuple[tree.Row, ...]]:
+    def table(
+        self, rows: list[Token]
+    ) -> tuple[tuple[tree.Heading, ...], tuple[tree.Heading, ...], tuple[tree.Row, ...]]:
         """Condition headings, action headings and lines of a table."""
         head = self._cut(rows[0])
         if head is None:
@@ -128,7 +132,9 @@ class _Rows:
         start = cast(int, row.start_pos)
         cells = cut(str(row), start)
         if isinstance(cells, str):
-            self.found.append(_error(Code.RAGGED_ROW, cells, Span(self.source.name, start, start + len(row.rstrip()))))
+            self.found.append(
+                _error(Code.RAGGED_ROW, cells, Span(self.source.name, start, start + len(row.rstrip())))
+            )
             return None
         return cells
 
@@ -156,7 +162,8 @@ class _Rows:
                 if cell.text:
                     self._report(Code.DEFAULT_WITH_CONDITIONS, "a DEFAULT line has no conditions", cell)
         parsed = tuple(
-            None if default else self._condition(cell, heading) for cell, heading in zip(tests, conditions, strict=True)
+            None if default else self._condition(cell, heading)
+            for cell, heading in zip(tests, conditions, strict=True)
         )
         everything = (*cells.conditions, *cells.actions)
         start = cast(int, row.start_pos)
@@ -210,9 +217,7 @@ class _Rows:
         if (start, cell.text) in self.memory:
             return self.memory[start, cell.text]
         try:
-            if not cell.text:
-                raise lark.UnexpectedToken(Token.new_borrow_pos("$END", "", Token("$END", "")), {"NAME"})
-            node = cast("Tree[Token]", _parser().parse(cell.text, start=start))
+            node = _parser().parse(cell.text, start=start)
             parsed = Build("", Comments(Source("", "")), None).cell(node)
         except lark.UnexpectedInput as error:
             self.found.append(_syntax_error(error, self.source.name, cell.start, cell.end, cell.text))
@@ -222,5 +227,3 @@ class _Rows:
 
     def _report(self, code: Code, message: str, cell: Cell) -> None:
         self.found.append(_error(code, message, Span(self.source.name, cell.start, cell.end)))
-
-

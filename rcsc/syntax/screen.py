@@ -12,7 +12,9 @@ from rcsc.source import Source, Span
 MOST_CHARACTERS = 16 * 1024 * 1024
 DEEPEST = 100
 
-_TOKEN = re.compile(r'#[^\r\n]*|^[ \t]*\|[^\r\n]*|"[^"\\\n]*"|[(\[{)\]}]|\b(?:not|implies|else)\b|[|;:,]|-', re.MULTILINE)
+_TOKEN = re.compile(
+    r'#[^\r\n]*|^[ \t]*\|[^\r\n]*|"[^"\\\n]*"|[(\[{)\]}]|\b(?:not|implies|else)\b|[|;:,]|-', re.MULTILINE
+)
 _DECLARATION = re.compile(
     r"^[ \t]*(?:use|unit|const|enum|type|record|input|state|output|assume|invariant|procedure|module|extern"
     r"|owner|table|level)\b",
@@ -30,7 +32,11 @@ def refuse(source: Source) -> tuple[Diagnostic, ...]:
         return (_error(Code.NUL_BYTE, "the text contains a NUL character", source, nul, nul + 1),)
     deep = _too_deep(text)
     if deep is not None:
-        return (_error(Code.TOO_DEEP, f"expressions and blocks nest more than {DEEPEST} deep", source, deep, deep + 1),)
+        return (
+            _error(
+                Code.TOO_DEEP, f"expressions and blocks nest more than {DEEPEST} deep", source, deep, deep + 1
+            ),
+        )
     return ()
 
 
@@ -47,7 +53,11 @@ def _too_deep(text: str) -> int | None:
                 depth += 1
             elif token in ")]}":
                 depth = max(0, depth - 1)
-                chain = 0 if token == "}" and not text[part.end() : part.end() + 8].strip().startswith("else") else chain
+                chain = (
+                    0
+                    if token == "}" and not text[part.end() : part.end() + 8].strip().startswith("else")
+                    else chain
+                )
             elif token in ("not", "implies", "-", "else"):
                 chain += 1
             elif token in ";:,|":

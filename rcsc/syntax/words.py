@@ -60,4 +60,3 @@ def expected(terminals: Iterable[str]) -> str:
     single = sorted(_WORDS.get(name, f"`{name.lower()}`") for name in names)
     words = (parts + single)[:_MOST]
     return " or ".join(words) if len(words) < 3 else ", ".join(words[:-1]) + " or " + words[-1]
-

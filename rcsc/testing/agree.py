@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from rcsc.interpret import Fault, Outcome, cycle, holds, matching_lines, run_table
-from rcsc.model import LineName, Program, Snapshot, Table
+from rcsc.model import LineName, Program, Snapshot, Table, Value
 from rcsc.testing.native import Native, Result
 from rcsc.testing.reference_file import all_lines, monitored
 from rcsc.testing.sessions import Seen, Session, differences
@@ -46,6 +46,7 @@ class Compared:
     Attributes:
         lines: By table, how often each line was taken by a step or cycle that all executors agreed on.
         kept: Sessions that ran, for the sanitized program.
+        matched: Snapshots that the matchers were given.
     """
 
     sessions: int = 0
@@ -54,6 +55,13 @@ class Compared:
     faults: Counter[int] = field(default_factory=Counter)
     lines: dict[str, Counter[str]] = field(default_factory=dict)
     kept: list[tuple[int, Session, list[Seen]]] = field(default_factory=list)
+    matched: list[tuple[int, list[Snapshot]]] = field(default_factory=list)
+
+    @property
+    def replays(self) -> list[tuple[int, bool, list[Snapshot]]]:
+        """All of it again, for `code_mutants`: function, whether rows set every leaf, rows."""
+        sessions = [(which, False, rows_of(session)) for which, session, _ in self.kept]
+        return [*sessions, *((which, True, snapshots) for which, snapshots in self.matched)]
 
 
 class PythonRuns(Protocol):
@@ -61,6 +69,9 @@ class PythonRuns(Protocol):
 
     def run(self, target: Target, session: Session) -> list[Seen]:
         """Runs a session."""
+
+    def initial(self) -> dict[str, Value]:
+        """A new state's leaves."""
 
     def line(self, target: Target, snapshot: Snapshot) -> int:
         """What the emitted `line` function gives."""
@@ -156,6 +167,18 @@ def run_session(
     return None
 
 
+def run_init(executors: Executors, target: Target) -> Disagreement | None:
+    """Compares the initial states."""
+    start = {str(v.name): v.initial for v in executors.program.variables}
+    [row] = executors.native.run(executors.number(target), True, [start])
+    for name, snapshot in (("C", row.snapshot), ("Python", executors.python.initial())):
+        right, seen = (Seen(0, "", NONE, (), values) for values in (start, snapshot))
+        words = differences(executors.program, right, seen)
+        if words:
+            return Disagreement(name, target.function, 1, Session(start, ()), words)
+    return None
+
+
 def _count(program: Program, target: Target, compared: Compared, seen: Seen) -> None:
     compared.cycles += 1
     compared.faults[seen.fault] += 1
@@ -194,6 +217,7 @@ def run_lines(
                 words = (f"line {seen} where {right} is right",)
                 return Disagreement(name, target.function, 1, Session(snapshot, ()), words)
         compared.matches += 1
+    compared.matched.append((number, list(snapshots)))
     return None
 
 

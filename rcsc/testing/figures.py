@@ -24,7 +24,6 @@ class TableFigures:
         impossible: Conditions for which that is shown impossible within ranges and assumptions.
         cells: Cells of the matcher compared with the table, complete; 0 where it was not done.
         mutants: Mutants of the table by who caught them.
-        code_mutants: Mutants of the emitted code by who caught them.
         cortex: What the emulated target said, or why it was not asked.
     """
 
@@ -36,7 +35,6 @@ class TableFigures:
     impossible: int = 0
     cells: int = 0
     mutants: Mapping[str, int] = field(default_factory=dict, hash=False)
-    code_mutants: Mapping[str, int] = field(default_factory=dict, hash=False)
     cortex: CortexRun | str = ""
 
 
@@ -51,6 +49,7 @@ class ProgramFigures:
         faults: Cycles by fault code.
         sanitized: How the sessions went under the sanitizers, in words.
         esbmc: A verdict a function.
+        code_mutants: Mutants of the emitted C by who noticed them.
     """
 
     program: str
@@ -61,6 +60,7 @@ class ProgramFigures:
     faults: Mapping[int, int] = field(default_factory=dict, hash=False)
     sanitized: str = ""
     esbmc: tuple[EsbmcVerdict, ...] = ()
+    code_mutants: Mapping[str, int] = field(default_factory=dict, hash=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,6 +100,8 @@ def _program_text(program: ProgramFigures) -> Iterator[str]:
         yield f"  ESBMC {verdict.function}: {verdict.said}{shown} ({verdict.seconds:.1f} s){detail}"
     for table in program.tables:
         yield from _table_text(table)
+    if program.code_mutants:
+        yield f"  {_mutants_text('mutants of the C', program.code_mutants)}"
 
 
 def _table_text(table: TableFigures) -> Iterator[str]:
@@ -117,13 +119,13 @@ def _table_text(table: TableFigures) -> Iterator[str]:
         yield f"    Cortex-M3: {whole}{run.inputs} inputs and {run.steps} steps, {run.differ} differ"
     elif table.cortex:
         yield f"    Cortex-M3: {table.cortex}"
-    for name, mutants in (
-        ("mutants of the table", table.mutants),
-        ("mutants of the code", table.code_mutants),
-    ):
-        if mutants:
-            parts = ", ".join(f"{count} {caught}" for caught, count in sorted(mutants.items()))
-            yield f"    {name}: {sum(mutants.values())}: {parts}"
+    if table.mutants:
+        yield f"    {_mutants_text('mutants of the table', table.mutants)}"
+
+
+def _mutants_text(name: str, mutants: Mapping[str, int]) -> str:
+    parts = ", ".join(f"{count} {caught}" for caught, count in sorted(mutants.items()))
+    return f"{name}: {sum(mutants.values())}: {parts}"
 
 
 def tally(caught: list[str]) -> dict[str, int]:

@@ -3,11 +3,11 @@
 In: the parts of a matcher. Out: a C text that includes the emitted C itself and gives its parts to a caller.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
-from rcsc.model import Program, Real, Table, Test
+from rcsc.model import Program, Real, Table
+from rcsc.testing.edges import relational_tests
 from rcsc.testing.matcher_text import Component, Lookup, MatcherText
-from rcsc.testing.reference import Writer
 from rcsc.testing.reference_file import reference_c
 from rcsc.testing.shim import WORDS, set_leaves_c
 from rcsc.testing.symbols import Symbols
@@ -35,16 +35,6 @@ uint64_t rcsc_tail_test(uint64_t *wrong) {{
   return tried;
 }}
 """
-
-
-def relational_tests(table: Table) -> list[Test]:
-    """The tests that are no box, each once, in order of the lines."""
-    found: dict[tuple[str, object], Test] = {}
-    for line in table.lines:
-        for test in line.tests:
-            if test is not None and test.box is None:
-                found.setdefault((test.text, test.condition), test)
-    return list(found.values())
 
 
 def _masks(number: int, lookup: Lookup) -> Iterator[str]:
@@ -78,7 +68,8 @@ def _tail(symbols: Symbols, parts: MatcherText, words: int) -> Iterator[str]:
     if words == 1 and not any(lookup.words > 1 for lookup in parts.lookups):
         yield f"const uint{parts.word_bits}_t m = (uint{parts.word_bits}_t)given[0];"
     else:
-        yield f"static uint64_t full[{words}]; for (uint32_t i = 0; i < {words}u; i++) {{ full[i] = ~UINT64_C(0); }}"
+        yield f"static uint64_t full[{words}]; for (uint32_t i = 0; i < {words}u; i++)"
+        yield "{ full[i] = ~UINT64_C(0); }"
         for number, _ in enumerate(parts.lookups):
             yield f"const uint64_t * const r{number} = {'given' if number == 0 else 'full'};"
     yield parts.tail
@@ -89,19 +80,19 @@ def self_test_c(program: Program, symbols: Symbols, table: Table, parts: Matcher
     """The whole self-test."""
     lines = len(table.lines)
     words = max(1, (lines + 63) // 64)
-    writer = Writer(program, symbols)
-    tests = [(f"rcsc_test_{at}", writer.expr(test.condition)) for at, test in enumerate(relational_tests(table))]
+    number_of = program.tables.index(table)
     text = [f'#include "{symbols.source}"', "#include <string.h>", reference_c(program, symbols), WORDS]
     text += list(set_leaves_c(program, symbols))
-    text += [line for line in writer.accessors() if writer.selects] if _own_accessors(program, symbols, writer) else []
     for number, lookup in enumerate(parts.lookups):
         text += _masks(number, lookup)
         text += _rows(program, symbols, f"rcsc_index_{number}", lookup.index)
         for at, part in enumerate(lookup.components):
             name = f"rcsc_class_{number}_{at}"
-            text += _walk(program, symbols, name, part) if part.path else _rows(program, symbols, name, part.text)
-    for name, expression in tests:
-        text += _rows(program, symbols, name, expression)
+            text += (
+                _walk(program, symbols, name, part) if part.path else _rows(program, symbols, name, part.text)
+            )
+    for at, _ in enumerate(relational_tests(table)):
+        text += _rows(program, symbols, f"rcsc_test_{at}", f"ref_t{number_of}_test{at}(s)")
     text += _tail(symbols, parts, words)
     shape = {"words": words, "lines": lines, "none": -1 if table.default is None else lines}
     text.append(TAIL_TEST.format(**shape, step=1 if lines <= MOST_PAIRED else lines // 61))

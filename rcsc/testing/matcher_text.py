@@ -1,12 +1,12 @@
-"""The parts of an emitted C matcher, read from its text: mask tables, index expressions, and what follows them.
+"""The parts of an emitted C matcher, read from its text: mask tables, index expressions, what follows them.
 
-In: the emitted C and the name of a `line` function. Out: its parts, verbatim, for a self-test to compile. A text
-that is not of the shape described here is refused: the per-variable check claims nothing about it.
+In: the emitted C and the name of a `line` function. Out: its parts, verbatim, for a self-test to compile. A
+text that is not of the shape described here is refused: the per-variable check claims nothing about it.
 
-The shape: tables `t0`, `t1`, ..; one look-up in each, `tK[INDEX]`; the look-ups joined with `&` (in words of 64
-lines where there are more); then a tail that reads nothing but the joined mask. An INDEX is one component, or
-several in mixed radix, `(((A) * nu) + B)`. A component reads one leaf and compares it with constants only, or is
-the truth of a condition.
+The shape: tables `t0`, `t1`, ..; one look-up in each, `tK[INDEX]`; the look-ups joined with `&` (in words of
+64 lines where there are more); then a tail that reads nothing but the joined mask. An INDEX is one component,
+or several in mixed radix, `(((A) * nu) + B)`. A component reads one leaf and compares it with constants only,
+or is the truth of a condition.
 """
 
 import re
@@ -167,6 +167,9 @@ def matcher_text(source: str, function: str, struct: str) -> MatcherText:
     shape = r"\(uint\d+_t\)t\d+\[\](?: & \(uint\d+_t\)t\d+\[\])*"
     if not many and tables and not re.fullmatch(shape, _without_indices(joined["loads"])):
         raise ShapeError("look-ups are not joined with &")
+    rows = " & ".join(f"r{number}[w]" for number, _ in loads)
+    if many and " ".join(joined["loads"].split()) != rows:
+        raise ShapeError("rows are not joined with &")
     lookups = tuple(_lookup(source, table, index) for table, (_, index) in zip(tables, loads, strict=True))
     begin = max((rest.rindex(f"const r{number} =") for number, _ in loads), default=0) if many else 0
     tail = rest[rest.index(";", begin) + 1 :] if many else rest[joined.end() :]

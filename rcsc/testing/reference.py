@@ -2,8 +2,8 @@
 
 In: a program and the symbols of the emitted C. Out: one C text that works on the emitted struct. It is
 kept apart from the emitter on purpose: no masks, no plan; a scan over the lines as they are written,
-and each statement as C has it. Integers are computed in the least of 32, 64 and 128 bits that holds the
-declared bounds of operands and result.
+and each statement as C has it. Integers are computed in 64 bits, or in 128 where the bounds of operands or
+result need them.
 """
 
 from collections.abc import Iterable, Iterator
@@ -58,7 +58,7 @@ INFIX = {
     Op.OR: "||",
 }
 
-WIDTHS = (("int32_t", 31), ("int64_t", 63), ("ref_wide", 127))
+WIDTHS = (("int64_t", 63), ("ref_wide", 127))
 
 
 def c_type(*kinds: Scalar) -> str:

@@ -20,7 +20,7 @@ from rcsc.model import (
     Variable,
     pending,
 )
-from rcsc.testing.edges import tests_of
+from rcsc.testing.edges import relational_tests, tests_of
 from rcsc.testing.reference import Writer, constant, outside_tests, refusal, settling
 from rcsc.testing.symbols import Symbols
 
@@ -87,6 +87,9 @@ def line_function(writer: Writer, number: int, table: Table) -> Iterator[str]:
     struct = writer.symbols.struct
     tests = {id(test): i for i, test in enumerate(tests_of(table))}
     same = {(t.text, t.condition): i for i, t in enumerate(tests_of(table))}
+    for at, test in enumerate(relational_tests(table)):
+        yield f"static int32_t ref_t{number}_test{at}(const {struct} *s) {{"
+        yield f"return {writer.expr(test.condition)}; }}"
     yield f"static int32_t ref_t{number}_line(const {struct} *s) {{"
     yield "(void)s; int32_t found = -1; int32_t many = 0;"
     for i, test in enumerate(tests_of(table)):

@@ -55,6 +55,7 @@ def words(program: Program) -> int:
 
 
 def set_leaves_c(program: Program, symbols: Symbols) -> Iterator[str]:
+    """A C function that sets the inputs of a struct, or every leaf, from words."""
     yield f"static void set_leaves({symbols.struct} *s, const int64_t *in, int whole) {{"
     for at, variable in enumerate(program.variables):
         value = f"of_word(in[{at}])" if isinstance(variable.type, Real) else f"in[{at}]"

@@ -4,28 +4,31 @@ In: a program, its generated files, the prover and its solver as functions. Out:
 could not be checked is said in the figures; a missing tool is never a pass.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from random import Random
 
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label, sort_key
-from rcsc.model import Line, Program, Table
+from rcsc.model import Line, Program, Snapshot, Table
 from rcsc.source import Span
 from rcsc.testing.agree import (
     Compared,
     Disagreement,
     Executors,
     keeps_invariants,
+    run_init,
     run_lines,
     run_sanitized,
     run_session,
     within,
 )
-from rcsc.testing.cortex import run_cortex
+from rcsc.testing.code_mutants import Noticed, judge_code
+from rcsc.testing.cortex import CortexRun, run_cortex
 from rcsc.testing.esbmc import EsbmcVerdict, Said, prove_function
-from rcsc.testing.figures import ProgramFigures, SuiteResult, TableFigures, tally
-from rcsc.testing.matcher import check_matcher
+from rcsc.testing.externs import c_stand_ins, python_stand_ins
+from rcsc.testing.figures import ProgramFigures, SuiteResult, TableFigures, counted, tally
+from rcsc.testing.matcher import Checked, check_matcher
 from rcsc.testing.mutants import Caught, Prover, judge_table
 from rcsc.testing.native import Native, build
 from rcsc.testing.python_executor import python_executor
@@ -33,12 +36,13 @@ from rcsc.testing.reference_file import all_lines, inputs
 from rcsc.testing.search import Solver, search_in
 from rcsc.testing.sessions import Session, described
 from rcsc.testing.symbols import Symbols, symbols_of
-from rcsc.testing.targets import Target, targets
+from rcsc.testing.targets import Target, is_matcher, targets
 from rcsc.testing.tools import Absent, BuildFailed
 from rcsc.testing.vectors import Vectors, vectors_of
 
 LARGE = 128  # lines; of a larger table so many, by seed, are given vectors in an ordinary run
 MOST_ESBMC_LINES = 64
+MOST_SHOWN = 5
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,31 +110,39 @@ class Suite:
 
     def table(self, target: Target) -> Table | None:
         """The table of a matcher or step."""
-        return None if target.kind == "cycle" else self.program.tables[target.number]
-
-    def note(self, disagreement: Disagreement | None, target: Target) -> None:
-        """Keeps a disagreement as a diagnostic."""
-        if disagreement is not None:
-            self.found.append(_disagreement(self.program, disagreement, self.table(target)))
+        return None if target.kind in ("cycle", "init") else self.program.tables[target.number]
 
     def agreement(self, vectors: Mapping[str, Vectors]) -> None:
         """Vectors, drawn snapshots and drawn sessions in every executor."""
-        from rcsc.testing.hunt import hunt_lines, hunt_sessions
-
         for target in self.executors.targets:
             self.options.progress(f"running {target.function}")
             table = self.table(target)
             snapshots = [] if table is None else [v.snapshot for v in vectors[table.name].vectors]
-            if target.kind == "line":
-                found = run_lines(self.executors, target, snapshots, self.compared)
-                found = found or hunt_lines(self.executors, target, self.compared, self.options.examples)
+            if target.kind == "init":
+                found = run_init(self.executors, target)
+            elif is_matcher(target):
+                found = self.lines(target, snapshots)
             else:
-                found = next(filter(None, (self.one_step(target, s) for s in snapshots)), None)
-                examples, cycles = self.options.examples, self.options.cycles
-                found = found or hunt_sessions(self.executors, target, self.compared, examples, cycles)
-            self.note(found, target)
+                found = self.steps(target, snapshots)
+            if found is not None:
+                self.found.append(_disagreement(self.program, found, table))
 
-    def one_step(self, target: Target, snapshot: Mapping[str, bool | int | float]) -> Disagreement | None:
+    def lines(self, target: Target, snapshots: Sequence[Snapshot]) -> Disagreement | None:
+        """A matcher on the vectors and on drawn snapshots."""
+        from rcsc.testing.hunt import hunt_lines
+
+        found = run_lines(self.executors, target, snapshots, self.compared)
+        return found or hunt_lines(self.executors, target, self.compared, self.options.examples)
+
+    def steps(self, target: Target, snapshots: Sequence[Snapshot]) -> Disagreement | None:
+        """A step from the vectors, a step or cycle in drawn sessions."""
+        from rcsc.testing.hunt import hunt_sessions
+
+        found = next(filter(None, (self.one_step(target, snapshot) for snapshot in snapshots)), None)
+        options = self.options
+        return found or hunt_sessions(self.executors, target, self.compared, options.examples, options.cycles)
+
+    def one_step(self, target: Target, snapshot: Snapshot) -> Disagreement | None:
         """One step from a vector."""
         readings = {str(v.name): snapshot[v.name] for v in inputs(self.program)}
         session = within(self.executors, target, Session(snapshot, (readings,)))
@@ -154,115 +166,119 @@ class Suite:
         return f"the same {len(self.compared.kept)} sequences, no finding of AddressSanitizer or UBSan"
 
     def reached(self, table: Table, vectors: Vectors) -> int:
-        """Reports lines that no step took."""
-        taken = self.compared.lines.get(table.name, {})
+        """Reports lines that no step took; how many were taken."""
+        taken: Mapping[str, int] = self.compared.lines.get(table.name, {})
         spans = {str(line.name): line.span for line in table.lines}
-        named = [name for name, _ in all_lines(table)]
         reasons = {u.line: u.reason for u in vectors.unshown if not u.condition}
-        looked_at = {v.line for v in vectors.vectors} | set(reasons)
+        looked_at = {v.line for v in vectors.vectors} | {n for n, r in reasons.items() if r == "not found"}
+        named = [name for name, _ in all_lines(table)]
         for name in named:
-            dead = name in reasons and reasons[name] != "not found"
-            if taken.get(name, 0) or dead or name not in looked_at:
-                continue
-            label = Label(spans.get(name, table.default.span if table.default else table.span))
-            message = f"no step of the tests took line `{name}` of table `{table.name}`"
-            self.found.append(Diagnostic(Code.LINE_NOT_REACHED, message, label))
+            if name in looked_at and not taken.get(name, 0):
+                label = Label(spans.get(name, table.default.span if table.default else table.span))
+                message = f"no step of the tests took line `{name}` of table `{table.name}`"
+                self.found.append(Diagnostic(Code.LINE_NOT_REACHED, message, label))
         return sum(1 for name in named if taken.get(name, 0))
 
-    def matcher(self, table: Table) -> int:
+    def differs(self, message: str, table: Table | None, notes: Sequence[str]) -> None:
+        """The C is not the table."""
+        place = _place(self.program, table)
+        self.found.append(Diagnostic(Code.MATCHER_DIFFERS, message, place, notes=tuple(notes)))
+
+    def matcher(self, table: Table) -> Checked | None:
         """The complete per-variable check of the emitted masks."""
+        self.options.progress(f"comparing the masks of table {table.name}")
         checked = check_matcher(self.program, self.symbols, self.files, table)
-        if isinstance(checked, int):
-            return checked
-        message = f"the C matcher of table `{table.name}` is not the table"
-        self.found.append(
-            Diagnostic(Code.MATCHER_DIFFERS, message, _place(self.program, table), notes=checked)
-        )
-        return 0
+        if isinstance(checked, tuple):
+            self.differs(f"the C matcher of table `{table.name}` is not the table", table, checked)
+        return checked if isinstance(checked, Checked) else None
 
     def esbmc(self) -> Iterator[EsbmcVerdict]:
         """ESBMC on every function of a table that is not too large for it."""
         for target in self.executors.targets if self.options.esbmc_s else ():
             self.options.progress(f"proving {target.function} with ESBMC")
             table = self.table(target)
-            if (
-                max((len(t.lines) for t in ([table] if table else self.program.tables)), default=0)
-                > MOST_ESBMC_LINES
-            ):
+            lines = max((len(t.lines) for t in ((table,) if table else self.program.tables)), default=0)
+            if lines > MOST_ESBMC_LINES and target.kind != "init":
                 reason = "complete per-variable check used"
                 yield EsbmcVerdict(target.function, Said.TOO_LARGE, 0, 0.0, reason)
                 continue
             verdict = prove_function(self.program, self.symbols, self.files, target, self.options.esbmc_s)
             if verdict.said in (Said.REFUTED, Said.FAILED):
-                message = f"ESBMC does not prove the C function `{target.function}` equal to the table"
-                notes = (f"{verdict.said}: {verdict.detail}",)
-                self.found.append(
-                    Diagnostic(Code.MATCHER_DIFFERS, message, _place(self.program, table), notes=notes)
-                )
+                message = f"ESBMC does not prove the C function `{target.function}` equal to the tables"
+                self.differs(message, table, (f"{verdict.said}: {verdict.detail}",))
             yield verdict
+
+    def cortex(self, number: int, table: Table) -> CortexRun | str:
+        """What the emulated target says, or why it was not asked."""
+        if not self.options.cortex:
+            return "not asked"
+        self.options.progress(f"running table {table.name} on the emulated Cortex-M3")
+        ran = run_cortex(self.program, self.symbols, self.files, number)
+        if isinstance(ran, Absent):
+            return ran.reason
+        if isinstance(ran, BuildFailed) or ran.differ:
+            notes = ran.text.splitlines() if isinstance(ran, BuildFailed) else [f"{ran.differ} differ"]
+            message = f"the C executor of table `{table.name}` differs from it on the emulated Cortex-M3"
+            self.differs(message, table, notes)
+        return "failed" if isinstance(ran, BuildFailed) else ran
+
+    def mutants(self, table: Table) -> dict[str, int]:
+        """Mutants of a table, by who caught them."""
+        if self.options.mutants == 0 or self.proofs.prover is None:
+            return {}
+        self.options.progress(f"mutating table {table.name}")
+        search = search_in(self.program, self.proofs.solver)
+        judged = judge_table(search, table, self.proofs.prover, self.options.mutants, self.options.seed)
+        alive = [one for one in judged if one.caught is Caught.SURVIVED]
+        if alive:
+            message = f"{counted(len(alive), 'mutant')} of table `{table.name}` noticed by nobody"
+            self.differs(message, table, [f"{one.change}: {one.where}" for one in alive[:MOST_SHOWN]])
+        return tally([one.caught.value for one in judged])
+
+    def code_mutants(self) -> dict[str, int]:
+        """Mutants of the emitted C, by who noticed them."""
+        if self.options.mutants == 0:
+            return {}
+        self.options.progress(f"mutating the C of {self.program.name}")
+        judged = judge_code(self.executors.native, self.files, self.compared.replays, self.options.mutants)
+        alive = [mutant for mutant, noticed in judged if noticed is Noticed.SURVIVED]
+        if alive:
+            message = f"{counted(len(alive), 'mutant')} of the C of `{self.program.name}` noticed by nobody"
+            self.differs(message, None, [mutant.where for mutant in alive[:MOST_SHOWN]])
+        return tally([noticed.value for _, noticed in judged])
 
     def figures(self, number: int, table: Table, vectors: Vectors) -> TableFigures:
         """What is checked table by table."""
-        from rcsc.testing.code_mutants import judge_code
-
-        self.options.progress(f"testing table {table.name}")
-        impossible = sum(1 for u in vectors.unshown if u.condition and u.reason != "not found")
-        cortex = (
-            run_cortex(self.program, self.symbols, self.files, number) if self.options.cortex else "not asked"
-        )
-        if isinstance(cortex, BuildFailed) or (not isinstance(cortex, str | Absent) and cortex.differ):
-            message = f"the C executor of table `{table.name}` differs from it on the emulated Cortex-M3"
-            notes = (
-                tuple(cortex.text.splitlines())
-                if isinstance(cortex, BuildFailed)
-                else (f"{cortex.differ} differ",)
-            )
-            self.found.append(
-                Diagnostic(Code.MATCHER_DIFFERS, message, _place(self.program, table), notes=notes)
-            )
-        said = (
-            cortex.reason
-            if isinstance(cortex, Absent)
-            else "failed"
-            if isinstance(cortex, BuildFailed)
-            else cortex
-        )
-        mutants: dict[str, int] = {}
-        code: dict[str, int] = {}
-        if self.options.mutants != 0:
-            code = judge_code(self.executors, self.files, number, self.options.mutants, self.options.seed)
-            if self.proofs.prover is not None:
-                search = search_in(self.program, self.proofs.solver)
-                judged = judge_table(
-                    search, table, self.proofs.prover, self.options.mutants, self.options.seed
-                )
-                mutants = tally([one.caught.value for one in judged])
-        self.survivors(table, mutants, code)
-        cells, reached = self.matcher(table), self.reached(table, vectors)
+        checked = self.matcher(table)
         return TableFigures(
-            table.name, len(all_lines(table)), reached, vectors.conditions, vectors.shown, impossible, cells,
-            mutants, code, said,
-        )  # fmt: skip
-
-    def survivors(self, table: Table, *counts: Mapping[str, int]) -> None:
-        """A mutant that nobody notices is a hole in the tests."""
-        alive = sum(count.get(Caught.SURVIVED.value, 0) for count in counts)
-        if alive:
-            message = f"{alive} mutants of table `{table.name}` are noticed by nobody"
-            self.found.append(Diagnostic(Code.MATCHER_DIFFERS, message, _place(self.program, table)))
+            table.name,
+            len(all_lines(table)),
+            self.reached(table, vectors),
+            vectors.conditions,
+            vectors.shown,
+            sum(1 for u in vectors.unshown if u.condition and u.reason != "not found"),
+            checked.cells if checked else 0,
+            self.mutants(table),
+            self.cortex(number, table),
+        )
 
     def run(self) -> ProgramFigures:
         """Everything, in order."""
         search = search_in(self.program, self.proofs.solver)
-        vectors = {t.name: vectors_of(search, t, _samples(t, self.options)) for t in self.program.tables}
+        tables = self.program.tables
+        vectors = {str(t.name): vectors_of(search, t, _samples(t, self.options)) for t in tables}
         self.agreement(vectors)
-        sanitized = self.sanitized()
-        tables = tuple(self.figures(at, t, vectors[t.name]) for at, t in enumerate(self.program.tables))
-        compared = self.compared
         return ProgramFigures(
-            self.program.name, tables, compared.sessions, compared.cycles, compared.matches,
-            dict(compared.faults), sanitized, tuple(self.esbmc()),
-        )  # fmt: skip
+            self.program.name,
+            tuple(self.figures(at, table, vectors[table.name]) for at, table in enumerate(tables)),
+            self.compared.sessions,
+            self.compared.cycles,
+            self.compared.matches,
+            dict(self.compared.faults),
+            self.sanitized(),
+            tuple(self.esbmc()),
+            self.code_mutants(),
+        )
 
 
 def run_suite(
@@ -281,7 +297,8 @@ def run_suite(
             several variables may stay without a vector.
     """
     symbols = symbols_of(program, files)
-    native = build(program, symbols, files)
+    stand_ins = c_stand_ins(program, symbols)
+    native = build(program, symbols, {**files, "rcsc_stand_ins.c": stand_ins} if stand_ins else files)
     if isinstance(native, Absent):
         return SuiteResult((), (Diagnostic(Code.NO_C_COMPILER, native.reason, _place(program)),))
     if isinstance(native, BuildFailed):
@@ -290,7 +307,7 @@ def run_suite(
             Code.EXECUTORS_DISAGREE, message, _place(program), notes=tuple(native.text.splitlines())
         )
         return SuiteResult((), (found,))
-    with native:
+    with native, python_stand_ins(program):
         return _run(program, files, options or SuiteOptions(), proofs or Proofs(), native)
 
 

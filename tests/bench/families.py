@@ -81,7 +81,9 @@ def box(lines: int, variables: int, seed: int, fault: Fault = "ok") -> str:
     if fault == "overlap":
         regions.append(dict(rng.choice(regions)))
     rows = [
-        f"| {at} | " + " | ".join(_cell(axis, *region.get(i, (0, axis.most))) for i, axis in enumerate(over)) + " ||"
+        f"| {at} | "
+        + " | ".join(_cell(axis, *region.get(i, (0, axis.most))) for i, axis in enumerate(over))
+        + " ||"
         for at, region in enumerate(regions)
     ]
     head = "| line | " + " | ".join(axis.name for axis in over) + " ||"
@@ -119,7 +121,9 @@ def linear(lines: int, variables: int, seed: int, fault: Fault = "ok") -> str:
     conditions = [" and ".join(said) or "true" for said, _ in leaves]
     if fault == "gap":
         hole = leaves[0][1][0]
-        conditions[0] += " and not (" + " and ".join(f"{n} = {v}" for n, v in zip(names, hole, strict=True)) + ")"
+        conditions[0] += (
+            " and not (" + " and ".join(f"{n} = {v}" for n, v in zip(names, hole, strict=True)) + ")"
+        )
     if fault == "overlap":
         conditions.append(conditions[0])
     rows = [f"| {at} | {condition} ||" for at, condition in enumerate(conditions)]

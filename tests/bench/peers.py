@@ -63,10 +63,8 @@ def numpy_pairs(program: Program, table: Table) -> bool:
     boxes = [line_boxes(program, line) for line in table.lines]
     meets = np.ones((len(boxes), len(boxes)), dtype=bool)
     for name in table.variables:
-        distinct = {box.get(name): 0 for box in boxes}
-        for place, key in enumerate(distinct):
-            distinct[key] = place
-        keys = list(distinct)
+        keys = list(dict.fromkeys(box.get(name) for box in boxes))
+        distinct = {key: place for place, key in enumerate(keys)}
         matrix = np.array([[a is None or b is None or bool(meet(a, b)) for b in keys] for a in keys])
         index = np.array([distinct[box.get(name)] for box in boxes])
         meets &= matrix[index[:, None], index[None, :]]
@@ -125,8 +123,8 @@ def _z3_lines(program: Program, table: Table) -> tuple[list[Any], list[Any]]:
     """Each line as a formula over integers, and the domain."""
     import z3
 
-    leaves = {variable.name: variable for variable in program.variables}
-    numbers = {name: z3.Int(name) for name in table.variables}
+    leaves = {str(variable.name): variable for variable in program.variables}
+    numbers: dict[str, Any] = {name: z3.Int(name) for name in table.variables}
     domain = []
     for name, number in numbers.items():
         low, high = key_bounds(leaves[name].type)
@@ -231,5 +229,3 @@ PEERS = (
 def installed() -> tuple[Peer, ...]:
     """The peers whose packages are here."""
     return tuple(peer for peer in PEERS if not peer.package or importlib.util.find_spec(peer.package))
-
-

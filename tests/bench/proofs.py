@@ -103,7 +103,10 @@ def main() -> None:
     if given.no_peers:
         return
     peers = installed()
-    print("\nproof times in s; - is over the limit\n" + f"{'family':7}{'lines':>7}{'vars':>5}" + "".join(f"{p.name:>20}" for p in peers))
+    print(
+        "\nproof times in s; - is over the limit\n"
+        f"{'family':7}{'lines':>7}{'vars':>5}" + "".join(f"{p.name:>20}" for p in peers)
+    )
     for family, sizes in (("box", SIZES), ("linear", LINEAR)):
         for lines, variables in sizes:
             cells = [

@@ -1,0 +1,90 @@
+"""The emitted Python, driven as the interpreter and the C are.
+
+In: a program, its symbols, its emitted files. Out: what each cycle left behind. The module's text is run as
+it is, from memory, under a name of its own.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from rcsc.interpret import Fault
+from rcsc.model import Program, Snapshot, Value
+from rcsc.testing.reference_file import monitored
+from rcsc.testing.sessions import Seen, Session
+from rcsc.testing.symbols import Symbols
+from rcsc.testing.targets import Target
+
+
+@dataclass(frozen=True, slots=True)
+class PythonExecutor:
+    """The emitted module of one program."""
+
+    program: Program
+    symbols: Symbols
+    module: ModuleType
+
+    def function(self, target: Target) -> Any:
+        """The Python function of a target: the C name without the program's."""
+        return getattr(self.module, target.function.removeprefix(f"{self.symbols.program}_"))
+
+    def state(self, snapshot: Snapshot) -> Any:
+        """A state with these values."""
+        made = getattr(self.module, self.symbols.state_class)()
+        self.put(made, snapshot)
+        return made
+
+    def put(self, state: Any, values: Snapshot) -> None:
+        """Sets leaves of a state."""
+        for name, value in values.items():
+            setattr(state, self.symbols.leaves[name].attribute, value)
+
+    def leaves(self, state: Any) -> dict[str, Value]:
+        """Every leaf of a state."""
+        return {name: getattr(state, leaf.attribute) for name, leaf in self.symbols.leaves.items()}
+
+    def initial(self) -> dict[str, Value]:
+        """A new state's leaves."""
+        return self.leaves(getattr(self.module, self.symbols.state_class)())
+
+    def run(self, target: Target, session: Session) -> list[Seen]:
+        """Runs a session; the state is carried from cycle to cycle."""
+        function, state = self.function(target), self.state(session.start)
+        found = []
+        for readings in session.readings:
+            self.put(state, readings)
+            found.append(self.seen(function(state), state))
+        return found
+
+    def seen(self, fault: int, state: Any) -> Seen:
+        """The state after a cycle in the common words."""
+        names = monitored(self.program)
+        failed = tuple(name for at, name in enumerate(names) if state.assumptions_failed >> at & 1)
+        at = self.symbols.leaf_at(state.fault_at) if fault in (Fault.ADMIT, Fault.EXTERN) else ""
+        line = state.line if fault in (Fault.OK, Fault.EXTERN) else -1
+        if fault != state.fault:
+            at = f"returned {fault}, kept {state.fault}"
+        return Seen(fault, at, line, failed, self.leaves(state))
+
+    def line(self, target: Target, snapshot: Snapshot) -> int:
+        """What the emitted `line` or `lines` function gives."""
+        if target.kind == "batch":
+            one, other = self.function(target)([self.state(snapshot), self.state(snapshot)])
+            return int(one) if one == other else -7
+        return int(self.function(target)(self.state(snapshot)))
+
+
+def python_executor(program: Program, symbols: Symbols, files: Mapping[str, str]) -> PythonExecutor:
+    """The emitted Python of a program, ready to run.
+
+    Args:
+        program: The program.
+        symbols: Names in its emitted files.
+        files: The emitted files, text by path.
+    """
+    text = next(text for path, text in files.items() if Path(path).name == symbols.module)
+    module = ModuleType(f"rcsc_tested_{symbols.program}")
+    exec(compile(text, symbols.module, "exec"), module.__dict__)  # noqa: S102  # it is what is tested
+    return PythonExecutor(program, symbols, module)

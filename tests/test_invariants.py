@@ -1,0 +1,204 @@
+"""Invariants hold at first and at every point where a cycle can end; assumptions can hold, and are shown if claimed."""
+
+import pytest
+
+from rcsc.certify import certify
+from rcsc.diagnostics.diagnostic import Diagnostic
+from rcsc.model import Program
+from rcsc.prove.invariants import assumptions_satisfiable
+from rcsc.prove.options import Options
+from rcsc.prove.program import ProgramVerdict, prove_program
+from rcsc.prove.smt import Answer
+from rcsc.resolve import compile_text
+
+OPTIONS = Options(solver="boxes")
+
+
+def program_of(text: str) -> Program:
+    program = compile_text(text)
+    assert isinstance(program, Program), program
+    return program
+
+
+def proved(text: str) -> ProgramVerdict:
+    return prove_program(program_of(text), OPTIONS)
+
+
+def codes(found: tuple[Diagnostic, ...]) -> list[str]:
+    return [one.code.value for one in found if one.severity.value == "error"]
+
+
+COUNTER = """
+input up : bool
+input a : int 0 .. 9
+state n : int 0 .. 9 = 1
+state m : int 0 .. 9 = 2
+output go : bool
+invariant order : n < m
+procedure step { if n < 7 { n := n + 1 m := n + 1 } }
+table t {
+  | line | up    || procedures | go   |
+  | one  | true  || step       | true |
+  | two  | false ||            |      |
+}
+"""
+
+
+def test_an_invariant_is_kept_by_every_line() -> None:
+    assert codes(proved(COUNTER).findings) == []
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "code"),
+    [
+        ("= 2", "= 1", "RCS416"),
+        ("m := n + 1", "m := n", "RCS417"),
+        ("m := n + 1 }", "} m := 3", "RCS417"),
+        ("n < 7", "n < 7 and m > 3 or up", "RCS413"),
+    ],
+)
+def test_a_mutant_is_caught(old: str, new: str, code: str) -> None:
+    assert code in codes(proved(COUNTER.replace(old, new)).findings)
+
+
+def test_the_state_before_the_line_is_the_witness() -> None:
+    [found] = proved(COUNTER.replace("} }", "} m := max(m - 1, 1) }").replace("n < 7", "n < 0")).findings
+    assert found.code.value == "RCS417"
+    values = dict(zip(found.witnesses[0].variables, found.witnesses[0].values, strict=True))
+    assert values == {"up": "true", "n": "0", "m": "1"}
+    assert "line `one` of table `t`" in found.message
+
+
+def test_a_default_line_owes_the_invariant_too() -> None:
+    text = COUNTER.replace("| two  | false ||            |      |", "| two | DEFAULT || n := 5 | |")
+    assert codes(proved(text).findings) == ["RCS417"]
+
+
+def test_procedures_of_levels_keep_invariants_as_a_whole() -> None:
+    level = (
+        "procedure first { n := 5 } procedure second { m := 6 } level l { preprocess first, second table t }"
+    )
+    assert codes(proved(COUNTER + level).findings) == []
+    assert codes(proved(COUNTER + level.replace("first, second", "first")).findings) == ["RCS417"]
+    assert codes(
+        proved(
+            COUNTER + level.replace("preprocess first", "postprocess first").replace("m := 6", "m := 5")
+        ).findings
+    )
+
+
+def test_deferred_values_keep_invariants() -> None:
+    text = """
+input ack : bool
+state x : int 0 .. 9 deferred until ack
+output go : bool
+invariant small : x < 5
+procedure p { next x := 3 }
+table t {
+  | line | ack || procedures |
+  | yes  | true  || p |
+  | no   | false ||   |
+}
+"""
+    assert codes(proved(text).findings) == ["RCS417"]
+    more = text.replace("invariant", "invariant soon : x.next < 5 invariant") if ".next" in text else text
+    assert more.count("invariant") == 1
+    assert codes(proved(text.replace("until ack", "until false")).findings) == []
+
+
+EXTERN = """
+input up : bool
+state n : int 0 .. 9 = 1
+state m : int 0 .. 9 = 2
+output go : int 0 .. 9
+invariant order : n < m
+extern procedure look reads up writes go python "m:f" c "f"
+procedure step {{ {before} look {after} }}
+table t {{
+  | line | up || procedures |
+  | all  | in {{true, false}} || step |
+}}
+"""
+
+
+def test_a_cycle_that_a_refused_extern_result_ends_leaves_the_invariant_true() -> None:
+    assert codes(proved(EXTERN.format(before="", after="n := 5 m := 6")).findings) == []
+    assert codes(proved(EXTERN.format(before="n := 5", after="m := 6")).findings) == ["RCS417"]
+    assert codes(proved(EXTERN.format(before="m := 6 n := 5", after="")).findings) == []
+
+
+RELYING = """
+input a : int 0 .. 9
+state n : int 0 .. 9 = 1
+output go : bool
+invariant small : n < 5
+table t {
+  | line | n      | a      || go    |
+  | one  | 0 .. 2 |        || true  |
+  | two  | 3 .. 4 | <= n + 9 || false |
+}
+"""
+
+
+def test_tables_rely_on_invariants_and_so_does_the_checker() -> None:
+    program = program_of(RELYING)
+    verdict = prove_program(program, OPTIONS)
+    assert codes(verdict.findings) == []
+    assert verdict.certificate is not None
+    assert certify(program, verdict.certificate).problems == ()
+    assert codes(proved(RELYING.replace("invariant small : n < 5", "")).findings) == ["RCS401"]
+    assert codes(proved(RELYING.replace("n < 5", "n < 6")).findings) == ["RCS401"]
+
+
+ASSUMING = """
+input a : int 0 .. 9
+input x : real 0.0 .. 1.0
+output go : bool
+assume one {standing} : {one}
+assume two : {two}
+table t assuming one, two {{
+  | line | a    || go    |
+  | low  | < 5  || true  |
+  | high | >= 5 || false |
+}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("one", "two", "contradictory"),
+    [
+        ("a < 3", "a > 6", True),
+        ("a < 3", "a > 1", False),
+        ("a + a = 7", "a >= 0", True),
+        ("x > 0.25", "x < 0.2500000000000001", False),
+        ("x > 0.25", "x < 0.25", True),
+    ],
+)
+def test_contradictory_assumptions_are_found_where_boxes_decide(
+    one: str, two: str, contradictory: bool
+) -> None:
+    text = ASSUMING.format(standing="", one=one, two=two)
+    assert codes(proved(text).findings) == (["RCS405"] if contradictory else [])
+    program = program_of(text)
+    answer = assumptions_satisfiable(program, program.tables[0], OPTIONS)
+    assert (answer is Answer.UNSATISFIABLE) == contradictory
+
+
+@pytest.mark.parametrize(("one", "wrong"), [("a < 10", []), ("a < 9", ["RCS406"]), ("a * a <= 81", [])])
+def test_an_assumption_that_claims_to_be_proved_is(one: str, wrong: list[str]) -> None:
+    assert codes(proved(ASSUMING.format(standing="proved", one=one, two="a >= 0")).findings) == wrong
+
+
+def test_a_monitor_is_defined_for_every_input() -> None:
+    monitored = ASSUMING.format(standing="monitored", one="a = 0 or 9 / a > 0", two="a >= 0")
+    assert codes(proved(monitored).findings) == []
+    assert codes(proved(monitored.replace("a = 0 or ", "")).findings) == ["RCS411"]
+
+
+def test_an_unknown_answer_leaves_assumptions_undecided(monkeypatch: pytest.MonkeyPatch) -> None:
+    import z3
+
+    monkeypatch.setattr(z3.Solver, "check", lambda *_: z3.unknown)
+    verdict = proved(ASSUMING.format(standing="", one="a < 3 and a > 1", two="a >= 0"))
+    assert verdict.proved is None
+    assert codes(verdict.findings) == ["RCS409"]
