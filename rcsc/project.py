@@ -4,6 +4,8 @@ In: paths as the user gave them. Out: `Loaded`; what cannot be read or found is 
 """
 
 import os
+import re
+import stat
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -41,13 +43,12 @@ class Loaded:
 def load(paths: Sequence[str], stdin: str | bytes | None = None, stdin_name: str = "-") -> Loaded:
     """Reads and parses files, folders and (`-`) the text `stdin`, and all that they use."""
     loader = _Loader(stdin, stdin_name)
-    roots = [file for path in paths for file in loader.roots(path)]
-    for file in dict.fromkeys(roots):
-        loader.reach(file, (), None)
-    if not roots and not loader.found:
-        loader.report(Code.NO_TABLES, "there is no `.rcs` file here", Span(paths[0] if paths else ".", 0, 0))
+    roots = tuple(dict.fromkeys(file for path in paths for file in loader.roots(path)))
+    for file in roots:
+        loader.reach(file)
     found = tuple(sorted(set(loader.found), key=sort_key))
-    return Loaded(tuple(dict.fromkeys(roots)), loader.files, loader.uses, loader.sources, found)
+    uses = {file: tuple(used) for file, used in loader.uses.items()}
+    return Loaded(roots, loader.files, uses, loader.sources, found)
 
 
 def listed(paths: Sequence[str]) -> tuple[str, ...]:
@@ -62,23 +63,45 @@ def project_root(file: str) -> str:
     here = Path(folder).resolve()
     for up, above in enumerate((here, *here.parents)):
         if (above / PROJECT_FILE).is_file():
-            return os.path.normpath(os.path.join(folder, *[".."] * up))
+            root = os.path.normpath(os.path.join(folder, *[".."] * up))
+            same = os.path.realpath(root) == str(above)
+            return root if same else str(above)  # a linked folder's parents are not its name's
     return folder
+
+
+@dataclass(frozen=True, slots=True)
+class _Unread:
+    """Why a file was not read; told again at every `use` of it."""
+
+    code: Code
+    message: str
+    helps: tuple[str, ...] = ()
 
 
 @dataclass(slots=True)
 class _Loader:
-    """Reads each file once."""
+    """Reads each file once.
+
+    Attributes:
+        named: The name of each file by its real path: the one it was first reached by.
+        unread: Files that could not be read.
+        excluded: The patterns of each project, by its root.
+        root_of: The project root of each folder.
+    """
 
     stdin: str | bytes | None
     stdin_name: str
     files: dict[str, tree.File] = field(default_factory=dict)
-    uses: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    uses: dict[str, list[str]] = field(default_factory=dict)
     sources: dict[str, Source] = field(default_factory=dict)
     found: list[Diagnostic] = field(default_factory=list)
-    broken: set[str] = field(default_factory=set)
+    named: dict[str, str] = field(default_factory=dict)
+    unread: dict[str, _Unread] = field(default_factory=dict)
+    excluded: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    root_of: dict[str, str] = field(default_factory=dict)
 
     def report(self, code: Code, message: str, span: Span, *helps: str) -> None:
+        """Adds an error."""
         self.found.append(Diagnostic(code, message, Label(span), help=helps))
 
     # --- which files ---
@@ -88,14 +111,19 @@ class _Loader:
         if path == "-":
             yield self.stdin_name
         elif os.path.isdir(path):
-            yield from self._inside(path)
-        elif os.path.exists(path):
-            yield os.path.normpath(path)
+            inside = list(self._inside(path))
+            if not inside:
+                helps = f"give a folder with `*.rcs` files; `{PROJECT_FILE}` may exclude some"
+                self.report(Code.NO_TABLES, "there is no `.rcs` file here to check", Span(path, 0, 0), helps)
+            yield from inside
+        elif os.path.lexists(path):
+            self._exclude(self._root(os.path.dirname(path)))
+            yield self._name(path)
         else:
             self.report(Code.UNREADABLE, "there is no such file or folder", Span(path, 0, 0))
 
     def _inside(self, folder: str) -> Iterator[str]:
-        exclude = self._exclude(folder)
+        """Files of a folder and the folders in it, each folder once whatever links lead to it."""
         seen: set[str] = set()
         for here, folders, names in os.walk(folder, followlinks=True):
             real = os.path.realpath(here)
@@ -104,94 +132,153 @@ class _Loader:
                 continue
             seen.add(real)
             folders[:] = sorted(name for name in folders if not name.startswith("."))
+            root = self._root(here)
+            exclude = self._exclude(root)
             for name in sorted(names):
                 path = os.path.normpath(os.path.join(here, name))
-                relative = os.path.relpath(path, folder).replace(os.sep, "/")
+                relative = os.path.relpath(path, root).replace(os.sep, "/")
                 if name.endswith(".rcs") and not any(fnmatch(relative, pattern) for pattern in exclude):
-                    yield path
+                    yield self._name(path)
 
-    def _exclude(self, folder: str) -> tuple[str, ...]:
-        """The globs of the folder's project file, if it has one."""
-        path = os.path.join(folder, PROJECT_FILE)
-        if not os.path.isfile(path):
+    def _name(self, path: str) -> str:
+        """The name of the file in messages: the path by which it was first reached."""
+        return self.named.setdefault(os.path.realpath(path), os.path.normpath(path))
+
+    def _root(self, folder: str) -> str:
+        if folder not in self.root_of:
+            self.root_of[folder] = project_root(os.path.join(folder, "_"))
+        return self.root_of[folder]
+
+    def _exclude(self, root: str) -> tuple[str, ...]:
+        """The globs of a project; what is wrong with its file is reported once."""
+        path = os.path.join(root, PROJECT_FILE)
+        if root not in self.excluded:
+            self.excluded[root] = self._settings(path) if os.path.isfile(path) else ()
+        return self.excluded[root]
+
+    def _settings(self, path: str) -> tuple[str, ...]:
+        text = self._text(path)
+        if isinstance(text, _Unread):
+            self.report(Code.PROJECT_FILE, text.message, Span(path, 0, 0), *text.helps)
             return ()
+        self.sources[path] = Source(path, text)
         try:
-            settings = tomllib.loads(Path(path).read_text(encoding="utf-8"))
-        except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-            self.report(Code.PROJECT_FILE, f"the project file cannot be read: {error}", Span(path, 0, 0))
+            settings = tomllib.loads(text)
+        except (tomllib.TOMLDecodeError, RecursionError) as error:
+            where = _toml_place(str(error), text)
+            message = f"the project file is not TOML: {str(error).partition(' (at ')[0]}"
+            self.report(Code.PROJECT_FILE, message, Span(path, where, where))
             return ()
         patterns = settings.get("exclude", [])
         unknown = sorted(settings.keys() - {"name", "exclude"})
-        if unknown or not isinstance(patterns, list) or not all(isinstance(one, str) for one in patterns):
-            what = f"`{unknown[0]}` is not a setting" if unknown else "`exclude` is a list of patterns"
-            self.report(Code.PROJECT_FILE, what, Span(path, 0, 0), "the settings are `name` and `exclude`")
+        wrong = f"`{unknown[0]}` is not a setting" if unknown else ""
+        if not isinstance(settings.get("name", ""), str):
+            wrong = "`name` is a text"
+        if not isinstance(patterns, list) or not all(isinstance(one, str) for one in patterns):
+            wrong = "`exclude` is a list of patterns"
+        if wrong:
+            self.report(Code.PROJECT_FILE, wrong, Span(path, 0, 0), "the settings are `name` and `exclude`")
             return ()
         return tuple(patterns)
 
     # --- reading ---
 
-    def reach(self, file: str, path: tuple[str, ...], asked: Span | None) -> None:
-        """Reads a file and all that it uses."""
-        if file in path:
-            cycle = " -> ".join((*path[path.index(file) :], file))
-            assert asked is not None
-            self.report(Code.FILE_CYCLE, f"files use each other in a circle: {cycle}", asked)
-            return
-        if file in self.files or file in self.broken:
-            return
+    def reach(self, root: str) -> None:
+        """Reads a file and all that it uses; a circle is reported where it closes."""
+        path = {root: self._used_by(root)} if self._read(root, Span(root, 0, 0)) else {}
+        while path:
+            file = next(reversed(path))
+            use = next(path[file], None)
+            if use is None:
+                del path[file]
+                continue
+            target = self._target(file, use)
+            if target is None:
+                continue
+            self.uses[file].append(target)
+            if target in path:
+                names = list(path)
+                cycle = " -> ".join((*names[names.index(target) :], target))
+                self.report(Code.FILE_CYCLE, f"files use each other in a circle: {cycle}", use.span)
+            elif self._read(target, use.span):
+                path[target] = self._used_by(target)
+
+    def _used_by(self, file: str) -> Iterator[tree.Use]:
+        return iter([one for one in self.files[file].declarations if isinstance(one, tree.Use)])
+
+    def _read(self, file: str, asked: Span) -> bool:
+        """Whether the file is now read and parsed, for the first time."""
         from rcsc.syntax.parse import parse
 
-        text = self._text(file, asked)
-        if text is None:
-            self.broken.add(file)
-            return
+        if file in self.sources:
+            return False
+        text = self.unread.get(file) or self._text(file)
+        if isinstance(text, _Unread):
+            self.unread[file] = text
+            self.report(text.code, text.message, asked, *text.helps)
+            return False
         self.sources[file] = Source(file, text)
         parsed = parse(self.sources[file])
         if not isinstance(parsed, tree.File):
             self.found.extend(parsed)
-            self.broken.add(file)
-            return
-        used = []
-        for one in parsed.declarations:
-            if isinstance(one, tree.Use):
-                target = self._used(file, one)
-                if target is not None:
-                    used.append(target)
-                    self.reach(target, (*path, file), one.span)
+            return False
         self.files[file] = parsed
-        self.uses[file] = tuple(used)
+        self.uses[file] = []
+        return True
 
-    def _used(self, file: str, use: tree.Use) -> str | None:
+    def _target(self, file: str, use: tree.Use) -> str | None:
         folder = os.path.dirname(file)
-        tried = dict.fromkeys(
-            os.path.normpath(os.path.join(base, use.path + ".rcs")) for base in (folder, project_root(file))
-        )
+        bases = (folder, self._root(folder))
+        tried = dict.fromkeys(os.path.normpath(os.path.join(base, use.path + ".rcs")) for base in bases)
         for place in tried:
-            if os.path.isfile(place):
-                return place
+            if os.path.lexists(place):
+                return self._name(place)
         places = " and ".join(f"`{place}`" for place in tried)
-        self.report(
-            Code.FILE_NOT_FOUND, f"no file `{use.path}.rcs` is found", use.span, f"looked for {places}"
-        )
+        message = f"no file `{use.path}.rcs` is found"
+        self.report(Code.FILE_NOT_FOUND, message, use.span, f"looked for {places}")
         return None
 
-    def _text(self, file: str, asked: Span | None) -> str | None:
-        span = asked or Span(file, 0, 0)
-        if file == self.stdin_name and isinstance(self.stdin, str):
-            return self.stdin
-        try:
-            piped = self.stdin if file == self.stdin_name and isinstance(self.stdin, bytes) else None
-            if (os.path.getsize(file) if piped is None else len(piped)) > MOST_BYTES:
-                self.report(Code.TOO_LARGE, f"`{file}` has more than {MOST_BYTES // 1024**2} MiB", span)
-                return None
-            raw = Path(file).read_bytes() if piped is None else piped
-        except OSError as error:
-            self.report(Code.UNREADABLE, f"`{file}` cannot be read: {error.strerror}", span)
-            return None
+    def _text(self, file: str) -> str | _Unread:
+        raw: str | bytes | _Unread
+        piped = file == self.stdin_name and self.stdin is not None
+        raw = (self.stdin or "") if piped else _bytes(file)
+        if isinstance(raw, str | _Unread):
+            return raw
+        if len(raw) > MOST_BYTES:
+            return _too_large(file)
         try:
             return raw.decode("utf-8-sig")
         except UnicodeDecodeError as error:
-            self.report(
-                Code.BAD_ENCODING, f"`{file}` is not UTF-8 at byte {error.start}", span, "save it as UTF-8"
+            return _Unread(
+                Code.BAD_ENCODING,
+                f"`{file}` is not UTF-8 at byte {error.start}",
+                ("save it as UTF-8",),
             )
-            return None
+
+
+def _bytes(file: str) -> bytes | _Unread:
+    """The content of a regular file of bounded size; a pipe or a device might never end."""
+    try:
+        about = os.stat(file)
+        if not stat.S_ISREG(about.st_mode):
+            return _Unread(Code.UNREADABLE, f"`{file}` is not a regular file", ("pipe the text to `-`",))
+        if about.st_size > MOST_BYTES:
+            return _too_large(file)
+        with open(file, "rb") as opened:
+            return opened.read(MOST_BYTES + 1)
+    except OSError as error:
+        return _Unread(Code.UNREADABLE, f"`{file}` cannot be read: {error.strerror}")
+
+
+def _too_large(file: str) -> _Unread:
+    helps = ("split it, and let one file `use` the other",)
+    return _Unread(Code.TOO_LARGE, f"`{file}` has more than {MOST_BYTES // 1024**2} MiB", helps)
+
+
+def _toml_place(message: str, text: str) -> int:
+    """The offset of an error of `tomllib`'s, which names line and column only in words."""
+    place = re.search(r"\(at line (\d+), column (\d+)\)", message)
+    if place is None:
+        return len(text) if "end of document" in message else 0
+    before = text.splitlines(keepends=True)[: int(place[1]) - 1]
+    return min(len(text), sum(map(len, before)) + int(place[2]) - 1)

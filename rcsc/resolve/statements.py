@@ -17,6 +17,7 @@ from rcsc.model import (
     Kind,
     Literal,
     Local,
+    Parameter,
     ProcedureName,
     Read,
     Real,
@@ -115,6 +116,12 @@ class Statements:
         if deferred:
             self.scope.report(
                 Code.NOT_DEFERRED, f"`{place.name.text}` is a local, not a deferred variable", place.span
+            )
+            return ()
+        if isinstance(local, Parameter):
+            message = f"`{place.name.text}` is a parameter and is not assigned"
+            self.scope.report(
+                Code.NOT_WRITABLE, message, place.span, "keep its value in a local, and assign that"
             )
             return ()
         if local.name in self.loops:
