@@ -23,7 +23,7 @@ from rcsc.testing.agree import (
     run_session,
     within,
 )
-from rcsc.testing.code_mutants import Noticed, judge_code
+from rcsc.testing.code_mutants import Noticed, judge_code, portable_agrees
 from rcsc.testing.cortex import CortexRun, run_cortex
 from rcsc.testing.esbmc import EsbmcVerdict, Said, prove_function
 from rcsc.testing.externs import c_stand_ins, python_stand_ins
@@ -240,7 +240,11 @@ class Suite:
         if self.options.mutants == 0:
             return {}
         self.options.progress(f"mutating the C of {self.program.name}")
-        judged = judge_code(self.executors.native, self.files, self.compared.replays, self.options.mutants)
+        replays = self.compared.replays
+        if not portable_agrees(self.executors.native, self.files, replays):
+            message = f"the C of `{self.program.name}` does something else without compiler built-ins"
+            self.differs(message, None, ())
+        judged = judge_code(self.executors.native, self.files, replays, self.options.mutants)
         alive = [mutant for mutant, noticed in judged if noticed is Noticed.SURVIVED]
         if alive:
             message = f"{counted(len(alive), 'mutant')} of the C of `{self.program.name}` noticed by nobody"
