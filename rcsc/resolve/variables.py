@@ -65,7 +65,8 @@ def declare_record(scope: Scope, written: tree.RecordDecl) -> None:
     if size(record) > MOST_LEAVES:
         message = f"a type has at most {MOST_LEAVES} scalar parts"
         scope.report(Code.TOO_MANY_LEAVES, message, written.name.span)
-        record = Record(written.name.text, ())
+        scope.types[written.name.text] = Bool()
+        return
     scope.types[record.name] = record
     scope.records.append(record)
 

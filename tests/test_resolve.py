@@ -1,0 +1,422 @@
+"""Names, kinds, units and ranges: every code from a minimal text, on its line and on the smallest span."""
+
+import time
+
+import pytest
+
+from rcsc.diagnostics.diagnostic import Diagnostic
+from rcsc.model import Assign, Call, Int, Program, Real, Select, Test, ToElement, ToLeaf, VariableName
+from rcsc.resolve import compile_text
+from rcsc.source import Source
+
+# Each case: the text, and for every error in it its line, its code and the text of its span.
+CASES: dict[str, tuple[str, list[tuple[int, str, str]]]] = {
+    "unknown type": ("state n : widht", [(1, "RCS201", "widht")]),
+    "unknown variable": ("invariant i : nothing = 1", [(1, "RCS201", "nothing")]),
+    "unknown field": ("record r { a : bool }\nstate s : r\ninvariant i : s.b", [(3, "RCS201", "b")]),
+    "unknown member": ("enum e { a }\nstate s : e\ninvariant i : s = e.b", [(3, "RCS201", "b")]),
+    "unknown procedure": ("procedure p { q }", [(1, "RCS201", "q")]),
+    "unknown member of an owner": ("owner o { nobody }", [(1, "RCS201", "nobody")]),
+    "unknown table": ("level l { period 40 table none }", [(1, "RCS201", "none")]),
+    "member of two enums": (
+        "enum e { a, b }\nenum f { a, c }\nprocedure p { if a = a { } }",
+        [(3, "RCS201", "a"), (3, "RCS201", "a")],
+    ),
+    "member or variable": (
+        "enum e { a, b }\nstate b : e\nstate s : e\ninvariant i : s = b",
+        [(4, "RCS201", "b")],
+    ),
+    "doubled variable": ("state n : bool\ninput n : bool", [(2, "RCS202", "n")]),
+    "doubled type": ("type n = bool\nenum n { a }", [(1, "RCS202", "n")]),
+    "doubled member": ("enum e { a, b, a }", [(1, "RCS202", "a")]),
+    "doubled field": ("record r { a : bool a : bool }", [(1, "RCS202", "a")]),
+    "doubled unit": ("unit tick\nunit tick", [(2, "RCS202", "tick")]),
+    "doubled procedure": ("procedure p { }\nowner p { }", [(2, "RCS202", "p")]),
+    "doubled local": (
+        "procedure p {\n  local n : bool\n  local n : bool\n}",
+        [(3, "RCS202", "n")],
+    ),
+    "call cycle": (
+        "procedure a { b }\nprocedure b { c }\nprocedure c { a }",
+        [(3, "RCS203", "a")],
+    ),
+    "call of itself": ("procedure a { a }", [(1, "RCS203", "a")]),
+    "input written": ("input n : bool\nprocedure p { n := true }", [(2, "RCS206", "n")]),
+    "constant written": ("const n = 1\nprocedure p { n := 2 }", [(2, "RCS206", "n")]),
+    "parameter written": ("procedure p(n : bool) { n := true }", [(1, "RCS206", "n")]),
+    "loop variable written": ("procedure p { for i in 0 .. 3 { i := 2 } }", [(1, "RCS206", "i")]),
+    "input in writes": ("input n : bool\nmodule m writes n { }", [(2, "RCS206", "n")]),
+    "doubled line": (
+        "input a : bool\ntable t {\n| line | a ||\n| x | true ||\n| x | false ||\n}",
+        [(5, "RCS207", "x")],
+    ),
+    "module reads": (
+        "input a : bool\ninput b : bool\nstate c : bool\nmodule m reads a writes c { c := a and b }",
+        [(4, "RCS208", "b")],
+    ),
+    "module writes": ("state c : bool\nmodule m reads c {\n  c := true\n}", [(3, "RCS208", "c := true")]),
+    "module calls": (
+        "state c : bool\nprocedure p { c := not c }\nmodule m reads c { p }",
+        [(3, "RCS208", "p")],
+    ),
+    "arguments": ("procedure p(n : bool) { }\nprocedure q { p }", [(2, "RCS209", "p")]),
+    "arguments of a function": (
+        "state n : int 0 .. 3\ninvariant i : abs(n, n) = 1",
+        [(2, "RCS209", "abs(n, n)")],
+    ),
+    "argument in an owner": ("procedure p(n : bool) { }\nowner o { p }", [(2, "RCS209", "p")]),
+    "next of what is not deferred": ("state n : bool\nprocedure p { next n := true }", [(2, "RCS210", "n")]),
+    "next of a local": ("procedure p { local n : bool next n := true }", [(1, "RCS210", "n")]),
+    "an input deferred": ("input n : bool deferred until n", [(1, "RCS210", "n")]),
+    "command without a table": (
+        "enum e { a, b, c }\ninput s : e\ntable t {\n| line | s ||\n| x | a ||\n}\nlevel l {\n table by s { a : t }\n}",
+        [(8, "RCS211", "s")],
+    ),
+    "two DEFAULT lines": (
+        "input a : bool\ntable t {\n| line | a ||\n| x | DEFAULT ||\n| y | DEFAULT ||\n}",
+        [(5, "RCS212", "y")],
+    ),
+    "owner cycle": ("owner a { b }\nowner b { a }", [(2, "RCS213", "a")]),
+    "bool and int": ("state n : int 0 .. 3\ninvariant i : n = true", [(2, "RCS301", "n = true")]),
+    "two enumerations": (
+        "enum e { a }\nenum f { b }\nstate s : e\nprocedure p { s := b }",
+        [(4, "RCS301", "b")],
+    ),
+    "order of members": ("enum e { a }\nstate s : e\ninvariant i : s < a", [(3, "RCS301", "s < a")]),
+    "condition that is a number": ("procedure p { if 3 { } }", [(1, "RCS301", "3")]),
+    "int and real": ("state n : int 0 .. 3\ninvariant i : n < 1.0", [(2, "RCS301", "n < 1.0")]),
+    "mod of reals": (
+        "state n : real 0.0 .. 3.0\ninvariant i : n mod 2.0 = 0.0",
+        [(2, "RCS301", "n mod 2.0")],
+    ),
+    "copy of another type": (
+        "record r { a : bool }\nrecord q { a : bool }\nstate s : r\nstate t : q\nprocedure p { s := t }",
+        [(5, "RCS301", "s := t")],
+    ),
+    "index that the copy changes": (
+        "record r { k : int 0 .. 1 }\nstate a : array[2] of r\nstate b : r\nprocedure p { a[a[0].k] := b }",
+        [(4, "RCS301", "a[a[0].k] := b")],
+    ),
+    "clamp of an enumeration": ("enum e { a }\ninput s : e clamp", [(2, "RCS301", "s")]),
+    "invariant about an input": ("input a : bool\ninvariant i : a", [(2, "RCS301", "a")]),
+    "type made of itself": ("record r { a : r }", [(1, "RCS301", "r")]),
+    "units differ": (
+        "input w : int 0 .. 9 [mm]\ninput t : int 0 .. 9 [s]\nassume a : w < t",
+        [(3, "RCS302", "w < t")],
+    ),
+    "unit against a number type": (
+        "input w : int 0 .. 9\nassume a : w < 3 [mm]",
+        [(2, "RCS302", "w < 3 [mm]")],
+    ),
+    "unit of a product": (
+        "input w : int 0 .. 9 [mm]\nstate a : int 0 .. 81 [mm]\nprocedure p { a := w * w }",
+        [(3, "RCS302", "w * w")],
+    ),
+    "unit of a quotient that may divide by zero": (
+        "input w : real 0.0 .. 9.0 [mm]\ninput t : real 0.0 .. 9.0 [s]\nassume a : w / t < 3.0 [mm]",
+        [(3, "RCS302", "w / t < 3.0 [mm]")],
+    ),
+    "unknown unit": ("input w : int 0 .. 9 [furlong]", [(1, "RCS302", "furlong")]),
+    "period in mm": (
+        "input a : bool\ntable t {\n| line | a ||\n| x | true ||\n}\nlevel l { period 40 [mm] table t }",
+        [(6, "RCS302", "40 [mm]")],
+    ),
+    "range upside down": ("input w : int 9 .. 0", [(1, "RCS303", "int 9 .. 0")]),
+    "real range upside down": ("input w : real 1.0 .. 0.0", [(1, "RCS303", "real 1.0 .. 0.0")]),
+    "cell upside down": (
+        "input w : int 0 .. 9\ntable t {\n| line | w ||\n| x | 7 .. 3 ||\n}",
+        [(4, "RCS303", "7 .. 3")],
+    ),
+    "number beyond 64 bits": ("const n = 18446744073709551616", [(1, "RCS304", "18446744073709551616")]),
+    "hexadecimal beyond 64 bits": (f"const n = 0x1{'0' * 9000}", [(1, "RCS304", f"0x1{'0' * 9000}")]),
+    "constant beyond 64 bits": (
+        "const n = 18446744073709551615 * 2",
+        [(1, "RCS304", "18446744073709551615 * 2")],
+    ),
+    "range beyond 64 bits": (
+        "input w : int -1 .. 18446744073709551615",
+        [(1, "RCS304", "int -1 .. 18446744073709551615")],
+    ),
+    "bound that is a variable": ("input w : int 0 .. 9\ninput v : int 0 .. w", [(2, "RCS305", "w")]),
+    "constant divided by zero": ("const n = 1 / 0", [(1, "RCS305", "1 / 0")]),
+    "constant made of itself": ("const a = b\nconst b = a", [(2, "RCS305", "a")]),
+    "member of a set": ("input a : int 0 .. 9\nassume s : a in {a}", [(2, "RCS305", "a")]),
+    "initial value": ("state n : int 0 .. 9 = 10", [(1, "RCS306", "10")]),
+    "assigned constant": ("state n : int 0 .. 9\nprocedure p { n := 10 }", [(2, "RCS306", "10")]),
+    "constant index": (
+        "state a : array[3] of bool\nprocedure p { a[3] := true }",
+        [(2, "RCS306", "3")],
+    ),
+    "arm never taken": ("state n : int 0 .. 9\nprocedure p { case n { 10 { } } }", [(2, "RCS306", "10")]),
+    "one double, two numbers": (
+        "const a = 0.1\nconst b = 0.1000000000000000055511151231257827",
+        [(2, "RCS307", "0.1000000000000000055511151231257827")],
+    ),
+    "one double, two numbers, in cells": (
+        "input w : real 0.0 .. 9.0\ntable t {\n| line | w ||\n| x | < 0.3 ||\n| y | >= 0.30000000000000001 ||\n}",
+        [(5, "RCS307", "0.30000000000000001")],
+    ),
+    "length": ("state a : array[0] of bool", [(1, "RCS308", "0")]),
+    "number beyond doubles": ("const n = 1e999", [(1, "RCS309", "1e999")]),
+    "constant beyond doubles": ("const n = 1e300 * 1e300", [(1, "RCS309", "1e300 * 1e300")]),
+    "arm twice": ("state n : int 0 .. 9\nprocedure p { case n { 1 { } 2, 1 { } } }", [(2, "RCS310", "1")]),
+    "signed and unsigned": (
+        "input a : int -1 .. 1\ninput b : int 0 .. 18446744073709551615\nassume s : a < b",
+        [(3, "RCS311", "a < b")],
+    ),
+    "too many leaves": (
+        "state a : array[4096] of bool\nstate b : array[4096] of bool\nstate c : array[4096] of bool",
+        [(3, "RCS312", "c")],
+    ),
+    "type too large": (
+        "type a = array[4096] of array[4096] of bool",
+        [(1, "RCS312", "array[4096] of array[4096] of bool")],
+    ),
+    "long loop": ("procedure p { for i in 0 .. 4096 { } }", [(1, "RCS313", "for i in 0 .. 4096 { }")]),
+    "many statements": (
+        "state n : bool\nprocedure p { for i in 1 .. 4096 { for j in 1 .. 4096 { n := true } } }",
+        [(2, "RCS313", "p")],
+    ),
+    "cell that nothing satisfies": (
+        "input w : int 0 .. 9\ntable t {\n| line | w ||\n| x | > 9 ||\n}",
+        [(4, "RCS314", "> 9")],
+    ),
+    "contradiction under `when`": (
+        "input w : int 0 .. 900\ntable t {\n| line | when ||\n| x | w < 3 and w > 3 ||\n}",
+        [(4, "RCS314", "w < 3 and w > 3")],
+    ),
+    "extern names": (
+        'state n : bool\nextern procedure e writes n python "a b" c "1"',
+        [(2, "RCS504", "e"), (2, "RCS504", "e")],
+    ),
+}
+
+
+def reported(text: str) -> list[tuple[int, str, str]]:
+    found = compile_text(text)
+    assert not isinstance(found, Program), "nothing was reported"
+    source = Source("case.rcs", text)
+    for one in found:
+        assert one.message[0].islower() or not one.message[0].isalpha()
+        assert not one.message.endswith(".")
+        assert one.primary.span.file == "case.rcs"
+        assert all(label.span.file == "case.rcs" for label in one.related)
+    return [
+        (source.position(d.primary.span.start).line, d.code.value, source.slice(d.primary.span))
+        for d in found
+    ]
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_each_error_is_reported_once_on_its_smallest_span(name: str) -> None:
+    text, expected = CASES[name]
+    assert reported(text) == expected
+
+
+def program(text: str) -> Program:
+    found = compile_text(text)
+    assert isinstance(found, Program), found
+    return found
+
+
+def test_every_code_of_names_kinds_and_ranges_has_a_case() -> None:
+    from rcsc.diagnostics.codes import Code
+
+    cased = {code for _, expected in CASES.values() for _, code, _ in expected}
+    elsewhere = {"RCS204", "RCS205"}  # of several files: test_project
+    assert {c.value for c in Code if c.value[3] in "23"} - cased == elsewhere
+
+
+def test_many_errors_are_reported_in_one_run_in_order_of_position() -> None:
+    text = "state a : int 9 .. 0\nstate b : nothing\nprocedure p { c := 1 }\ntable t {\n| line | a ||\n| x | q ||\n}"
+    assert [line for line, _, _ in reported(text)] == [1, 2, 3, 6]
+
+
+def test_an_error_in_a_constant_is_not_reported_again_where_it_is_used() -> None:
+    assert [code for _, code, _ in reported("const a = 1 / 0\nconst b = a + 1\nstate n : int 0 .. b")] == [
+        "RCS305"
+    ]
+
+
+def _only(text: str) -> Diagnostic:
+    found = compile_text(text)
+    assert not isinstance(found, Program)
+    (one,) = found
+    return one
+
+
+def test_a_close_name_is_suggested() -> None:
+    one = _only("input width_mm : bool\nassume a : widht_mm")
+    assert one.help == ("did you mean `width_mm`?",)
+
+
+def test_the_first_of_two_places_is_related() -> None:
+    text = "state n : bool\nstate n : bool"
+    (label,) = _only(text).related
+    assert (label.span.start, label.span.end) == (6, 7)
+
+
+def test_a_cycle_of_calls_names_its_path() -> None:
+    assert "b -> c -> b" in _only("procedure a { b }\nprocedure b { c }\nprocedure c { b }").message
+
+
+def test_a_heading_is_wrong_once_not_in_every_line() -> None:
+    text = "table t {\n| line | nobody || nowhere |\n| x | 1 || 2 |\n| y | 2 || 3 |\n}"
+    assert [(line, what) for line, _, what in reported(text)] == [(2, "nobody"), (2, "nowhere")]
+
+
+def test_declarations_may_stand_in_any_order() -> None:
+    text = "state r : rec\nrecord rec { w : width }\ntype width = int 0 .. most\nconst most = half * 2\nconst half = 4"
+    assert program(text).variable("r.w").type == Int(0, 8)
+    assert program(text).records[0].name == "rec"
+
+
+def test_records_and_arrays_come_to_leaves_in_declared_order() -> None:
+    text = "record r { a : bool b : array[2] of int 0 .. 3 }\nstate s : array[2] of r\nstate d : bool deferred until d"
+    names = [str(v.name) for v in program(text).variables]
+    assert names == ["s[0].a", "s[0].b[0]", "s[0].b[1]", "s[1].a", "s[1].b[0]", "s[1].b[1]", "d", "d.next"]
+
+
+def test_a_record_is_copied_leaf_by_leaf() -> None:
+    text = "record r { a : bool b : bool }\nstate s : array[2] of r\nstate t : r\nstate i : int 0 .. 1\n"
+    whole, part = program(text + "procedure p { t := s[1] }\nprocedure q { s[i] := t }").procedures
+    assert [one.place for one in whole.body if isinstance(one, Assign)] == [
+        ToLeaf(VariableName(name), kind.type)
+        for name in ("t.a", "t.b")
+        for kind in [program(text).variable(name)]
+    ]
+    (first, _) = part.body
+    assert isinstance(first, Assign)
+    assert isinstance(first.place, ToElement)
+    assert first.place.leaves == ("s[0].a", "s[1].a")
+
+
+def test_locals_of_one_name_are_kept_apart() -> None:
+    text = "procedure p { if true { local n : bool } else { local n : bool } for n in 0 .. 1 { } }"
+    shown = repr(program(text).procedures[0].body)
+    assert all(f"name='{name}'" in shown for name in ("n", "n_2", "n_3"))
+
+
+def test_reads_and_writes_go_through_calls_in_declared_order() -> None:
+    text = (
+        "input a : array[11] of bool\ninput i : int 0 .. 10\nstate y : bool\nstate x : bool deferred until y\n"
+        "procedure inner { next x := a[i] }\nprocedure outer { y := x inner }"
+    )
+    outer = program(text).procedures[1]
+    assert outer.writes == ("y", "x.next")
+    assert outer.reads == (*(f"a[{at}]" for at in range(11)), "i", "x")
+
+
+def test_a_declared_path_covers_what_is_below_it() -> None:
+    text = (
+        "record r { a : bool b : bool }\ninput s : r\nstate x : bool deferred until x\n"
+        "module m reads s writes x { next x := s.a or s.b }"
+    )
+    (module,) = program(text).procedures
+    assert module.reads == ("s.a", "s.b")
+    assert module.writes == ("x", "x.next")
+
+
+def test_owners_are_laid_out_in_order() -> None:
+    text = (
+        "input a : bool\nstate n : bool\nprocedure p { n := a }\nprocedure q { n := not a }\n"
+        "owner inner { q, p }\nowner outer { p, inner }\ntable t {\n| line | a ||\n| x | true ||\n| y | false ||\n}\n"
+        "level l { period 2 [s] preprocess outer, q table t postprocess inner }"
+    )
+    (level,) = program(text).levels
+    assert (level.period_ms, level.preprocess, level.postprocess) == (2000, ("p", "q", "p", "q"), ("q", "p"))
+
+
+def test_one_meaning_is_one_test_shared_by_its_lines() -> None:
+    text = (
+        "enum e { a, b }\ninput s : e\ntable t {\n| line | s ||\n| x | a ||\n| y | = a ||\n| z |  =   a ||\n}"
+    )
+    lines = program(text).tables[0].lines
+    assert lines[0].tests[0] is lines[1].tests[0] is lines[2].tests[0]
+    assert isinstance(lines[0].tests[0], Test)
+
+
+def test_expressions_in_cells_have_spans_in_the_file() -> None:
+    text = (
+        "input w : int 0 .. 9\nstate n : int 0 .. 9\nstate a : array[3] of int 0 .. 9\nprocedure p(k : int 0 .. 9) { }\n"
+        "table t {\n| line | w + 1 || procedures | a[n] |\n| x | < 3 || p(w); p(n) | a[w] |\n| y | >= 3 || p(w); p(n) | |\n}"
+    )
+    table = program(text).tables[0]
+    for line, begin in zip(table.lines, ("| x", "| y"), strict=True):
+        row = text.index(begin)
+        for action in line.actions[:2]:
+            assert isinstance(action.statement, Call)
+            (arg,) = action.statement.args
+            assert text[arg.span.start : arg.span.end] in "wn"
+            assert arg.span.start > row
+            assert text[action.statement.span.start : action.statement.span.end] == action.text
+    stored = table.lines[0].actions[2].statement
+    assert isinstance(stored, Assign)
+    assert isinstance(stored.value, Select)
+    assert text[stored.value.index.span.start] == "w"
+    assert isinstance(stored.place, ToElement)
+    assert text[stored.place.index.span.start : stored.place.index.span.end] == "n"
+    assert text.index("| line") < stored.place.index.span.start < text.index("| x")
+
+
+def test_a_quotient_whose_divisor_may_be_zero_keeps_its_unit() -> None:
+    text = "input w : real 0.0 .. 9.0 [mm]\ninput t : real 0.0 .. 9.0 [s]\nassume a : w / t < 3.0 [mm/s]"
+    condition = program(text).assumptions[0].condition
+    kind = condition.args[0].type  # type: ignore[union-attr]  # a comparison
+    assert isinstance(kind, Real)
+    assert kind.unit == (("mm", 1), ("s", -1))
+
+
+HOSTILE = {
+    "long sum": "state n : int 0 .. 9\nprocedure p { n := " + " + ".join(["1"] * 700) + " }",
+    "records doubling": "record r0 { a : bool }\n"
+    + "\n".join(f"record r{n + 1} {{ a : r{n} b : r{n} }}" for n in range(80))
+    + "\nstate s : r80",
+    "owners doubling": "procedure p { }\nowner o0 { p }\n"
+    + "\n".join(f"owner o{n + 1} {{ o{n}, o{n} }}" for n in range(80)),
+    "calls doubling": "state n : bool\nprocedure p0 { n := true }\n"
+    + "\n".join(f"procedure p{n + 1} {{ p{n} p{n} }}" for n in range(80)),
+    "long chain of calls": "procedure p0 { }\n"
+    + "\n".join(f"procedure p{n + 1} {{ p{n} }}" for n in range(3000)),
+    "long chain of calls, callers first": "\n".join(f"procedure p{n} {{ p{n + 1} }}" for n in range(3000))
+    + "\nprocedure p3000 { }",
+    "long chain of owners": "\n".join(f"owner o{n} {{ o{n + 1} }}" for n in range(3000))
+    + "\nowner o3000 { }",
+    "long chain of constants": "\n".join(f"const c{n} = c{n + 1}" for n in range(3000)) + "\nconst c3000 = 1",
+    "products without end": "input n : int 0 .. 18446744073709551615\nassume a : "
+    + " * ".join(["n"] * 150)
+    + " > 0",
+    "copies": "state a : array[4096] of array[2] of bool\nstate i : int 0 .. 4095\nprocedure p { "
+    + "a[i] := a[i] " * 2000
+    + "}",
+    "long number": f"const a = {'9' * 100_000}",
+    "long fraction": f"const a = 0.{'9' * 100_000}",
+    "long exponent": f"const a = 1e-{'9' * 100_000}",
+    "deep exponent": "const a = 1e-99999\nconst b = 2e-99999",
+    "huge period": "input a : bool\ntable t {\n| line | a ||\n| x | true ||\n}\nlevel l { period 18446744073709551615 [s] table t }",
+    "reals that overflow": "input n : real -1e308 .. 1e308\nassume a : n * n - n * n < int(n * n) * 1",
+    "remainder by nothing": "input n : int 0 .. 9\nassume a : n mod 0 = 0 and n / 0 = 1",
+}
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+@pytest.mark.timeout(20)
+def test_hostile_texts_are_answered_soon(name: str) -> None:
+    found = compile_text(HOSTILE[name])
+    assert isinstance(found, Program) or found
+
+
+def test_a_table_of_many_lines_resolves_soon() -> None:
+    columns = 20
+    head = (
+        "".join(f"input x{n} : int 0 .. 1000000\n" for n in range(columns))
+        + "state s : int 0 .. 9\ntable t {\n"
+    )
+    heading = "| line | " + " | ".join(f"x{n}" for n in range(columns)) + " || s |\n"
+    rows = "".join(
+        f"| {row} | " + " | ".join(f">= {(row * n) % 30}" for n in range(columns)) + f" || {row % 10} |\n"
+        for row in range(2048)
+    )
+    begun = time.process_time()
+    assert len(program(head + heading + rows + "}\n").tables[0].lines) == 2048
+    assert time.process_time() - begun < 5.0
