@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from itertools import combinations
 from math import prod
 
-from rcsc.prove.atoms import Clauses, Universe
+from rcsc.prove.atoms import Clauses, Universe, meet
 from rcsc.prove.boxleaf import defect, parting
 from rcsc.prove.linear import Multipliers, Simplex
 from rcsc.prove.regions import (
@@ -110,9 +110,9 @@ class Tree:
             return self._ask(region), []
         holding = [line.index for line in region.lines if line.holds]
         fresh = [pair for pair in combinations(holding, 2) if pair not in self.search.overlaps]
-        if fresh or not region.lines:
+        if fresh or (not region.lines and not self.search.gaps):
             return self._probe(region, fresh)
-        if len(holding) > 1 and self._all_known(region):
+        if not region.lines or (len(holding) > 1 and self._all_known(region)):
             return Open(), []
         return self._narrow(region)
 
@@ -236,6 +236,8 @@ class Tree:
     def _split(self, region: Region, form: int, cut: int, rounds: int = 0) -> tuple[Node, list[Region]]:
         """Both sides of `form <= cut`; a side that linear arithmetic finds empty is a leaf at once."""
         least, greatest = self._range(region, form)
+        if not least <= cut < greatest:
+            return self._without_full_boxes(region)
         sides = [self._side(region, form, least, cut), self._side(region, form, cut + 1, greatest)]
         for side in sides:
             side.rounds = rounds
@@ -248,6 +250,30 @@ class Tree:
                     multipliers = self._refute(side)
                     side.known = None if multipliers is None else Empty(multipliers)
         return Split(form, cut), sides
+
+    def _without_full_boxes(self, region: Region) -> tuple[Node, list[Region]]:
+        """Decide the region once boxes that are all of its range are dropped: no bound could part them.
+
+        Such a box arises where a disjunction joins to everything (`x < y or x >= y`).
+        """
+        before = [*region.lines, *region.open]
+        region.lines = [self._dropped(region, line) for line in region.lines]
+        region.open = [kept for kept in (self._dropped(region, one) for one in region.open) if not kept.holds]
+        if [*region.lines, *region.open] == before:
+            return self._ask(region), []
+        return self._decide(region)
+
+    def _dropped(self, region: Region, candidate: Candidate) -> Candidate:
+        boxes = {
+            form: box
+            for form, box in candidate.boxes.items()
+            if meet(box, (whole := self._range(region, form),)) != (whole,)
+        }
+        return (
+            candidate
+            if len(boxes) == len(candidate.boxes)
+            else Candidate(candidate.index, boxes, candidate.rest)
+        )
 
     def _side(self, region: Region, form: int, low: int, high: int) -> Region:
         lines = [kept for line in region.lines if (kept := line.within(form, low, high)) is not None]
