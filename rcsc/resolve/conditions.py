@@ -142,9 +142,10 @@ def _without(box: Box, low: int, high: int) -> Box:
 
 
 def _box(condition: Expr, kind: Scalar, low: int, high: int) -> Box | None:
+    always = fold(condition)
+    if always is not None:
+        return ((low, high),) if always else ()
     match condition:
-        case Literal(value=value):
-            return ((low, high),) if value else ()
         case Read():
             return ((1, 1),)
         case Among(subject=Read(), values=values):
@@ -228,7 +229,8 @@ def _affine_box(op: Op, line: tuple[int, int], value: int, low: int, high: int) 
     if a < 0:
         a, rest, op = -a, -rest, _FLIPPED[op]
     if a == 0:
-        return None
+        always = fold(Apply(op, (Literal(0, Int(0, 0)), Literal(rest, Int(rest, rest))), Bool()))
+        return ((low, high),) if always else ()
     floor, exact = rest // a, rest % a == 0
     if op in (Op.EQ, Op.NE):
         return _against(op, floor, low, high) if exact else (() if op is Op.EQ else ((low, high),))
