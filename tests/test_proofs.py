@@ -116,3 +116,31 @@ def test_a_procedure_run_by_a_level_is_not_excused_by_the_lines_that_guard_it() 
     assert isinstance(program, Program)
     found = proving.prove_program(program, Options()).findings
     assert [one.code.value for one in found if one.severity.value == "error"] == ["RCS413"]
+
+
+def errors(proof: Proof) -> list[str]:
+    return [one.code.value for one in proof.found if one.severity.value == "error"]
+
+
+def guarded(name: str, procedure: str) -> str:
+    return f"""\
+table {name} {{
+  | line | s    || procedures |
+  | a    | < 9  || {procedure} |
+  | b    | >= 9 ||             |
+}}
+"""
+
+
+def test_tables_kept_from_different_versions_do_not_excuse_a_procedure_together(cache: Cache) -> None:
+    for first, second in (("bump", "rest"), ("rest", "bump")):
+        assert errors(run(HEAD + guarded("one", first) + guarded("two", second), cache)) == []
+    nobody = HEAD + guarded("one", "rest") + guarded("two", "rest")
+    assert errors(run(nobody, cache)) == ["RCS413"]
+
+
+def test_a_constant_that_an_action_uses_is_part_of_its_table(cache: Cache, proved: list[str]) -> None:
+    text = "const step = 1\n" + HEAD + TABLES.replace("|| bump       |", "|| s := s + step |")
+    assert errors(run(text.replace("procedure bump { s := s + 1 }", ""), cache)) == []
+    wider = text.replace("procedure bump { s := s + 1 }", "").replace("step = 1", "step = 5")
+    assert errors(run(wider, cache)) == ["RCS413"]
