@@ -139,7 +139,7 @@ def test_tables_kept_from_different_versions_do_not_excuse_a_procedure_together(
     assert errors(run(nobody, cache)) == ["RCS413"]
 
 
-def test_a_constant_that_an_action_uses_is_part_of_its_table(cache: Cache, proved: list[str]) -> None:
+def test_a_constant_that_an_action_uses_is_part_of_its_table(cache: Cache) -> None:
     text = "const step = 1\n" + HEAD + TABLES.replace("|| bump       |", "|| s := s + step |")
     assert errors(run(text.replace("procedure bump { s := s + 1 }", ""), cache)) == []
     wider = text.replace("procedure bump { s := s + 1 }", "").replace("step = 1", "step = 5")
