@@ -65,7 +65,7 @@ def test_the_state_before_the_line_is_the_witness() -> None:
     [found] = proved(COUNTER.replace("} }", "} m := max(m - 1, 1) }").replace("n < 7", "n < 0")).findings
     assert found.code.value == "RCS417"
     values = dict(zip(found.witnesses[0].variables, found.witnesses[0].values, strict=True))
-    assert values == {"up": "true", "n": "0", "m": "1"}
+    assert values == {"up": "true", "n": "1", "m": "2"}
     assert "line `one` of table `t`" in found.message
 
 
@@ -80,11 +80,9 @@ def test_procedures_of_levels_keep_invariants_as_a_whole() -> None:
     )
     assert codes(proved(COUNTER + level).findings) == []
     assert codes(proved(COUNTER + level.replace("first, second", "first")).findings) == ["RCS417"]
-    assert codes(
-        proved(
-            COUNTER + level.replace("preprocess first", "postprocess first").replace("m := 6", "m := 5")
-        ).findings
-    )
+    behind = level.replace("preprocess first, second table t", "table t postprocess first, second")
+    assert codes(proved(COUNTER + behind).findings) == []
+    assert codes(proved(COUNTER + behind.replace("m := 6", "m := 5")).findings) == ["RCS417"]
 
 
 def test_deferred_values_keep_invariants() -> None:
