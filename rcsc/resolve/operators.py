@@ -112,8 +112,8 @@ def one_kind(scope: Scope, left: Typed, right: Typed, span: Span) -> bool:
         scope.report(Code.KIND, f"the two sides are {one} and {two}", span, *helps)
         return False
     kinds = [k for k in (left.expr.type, right.expr.type) if isinstance(k, Int)]
-    mixed = bool(kinds) and min(k.low for k in kinds) < 0 and max(k.high for k in kinds) > I64_MAX
-    if mixed and all(k.low >= -(2**63) and k.high < 2**64 for k in kinds):
+    unsigned = any(k.low >= 0 and k.high > I64_MAX for k in kinds)
+    if unsigned and min(k.low for k in kinds) < 0:
         scope.report(
             Code.MIXED_SIGN, "no 64-bit integer type holds both sides", span, "narrow one of the ranges"
         )

@@ -1,0 +1,316 @@
+"""The reference meaning: expressions, statements, and what a cycle does in which order."""
+
+import math
+import sys
+from types import ModuleType
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rcsc.interpret import (
+    Fault,
+    Outcome,
+    admit,
+    call,
+    cycle,
+    divide,
+    evaluate,
+    initial,
+    matching_lines,
+    run_table,
+)
+from rcsc.model import Program, Value
+from rcsc.resolve import compile_text
+
+
+def program(text: str) -> Program:
+    found = compile_text(text)
+    assert isinstance(found, Program), found
+    return found
+
+
+def value_of(declared: str, text: str, **snapshot: Value) -> Value:
+    made = program(f"{declared}\nassume it : ({text}) = ({text})")
+    condition = made.assumptions[0].condition
+    return evaluate(condition.args[0], snapshot)  # type: ignore[union-attr]  # a comparison
+
+
+# --- expressions ---
+
+
+@given(st.integers(-(2**63), 2**63 - 1), st.integers(-(2**63), 2**63 - 1).filter(bool))
+def test_quotients_round_toward_zero_and_remainders_have_the_sign_of_the_dividend(a: int, b: int) -> None:
+    declared = "input a : int -9223372036854775808 .. 9223372036854775807\ninput b : int -9223372036854775808 .. 9223372036854775807"
+    quotient, rest = value_of(declared, "a / b", a=a, b=b), value_of(declared, "a mod b", a=a, b=b)
+    assert quotient == divide(a, b)
+    assert quotient * b + rest == a
+    assert abs(rest) < abs(b)
+    assert rest == 0 or (rest < 0) == (a < 0)
+
+
+@pytest.mark.parametrize(
+    ("a", "b", "quotient"), [(7, 2, 3), (-7, 2, -3), (7, -2, -3), (-7, -2, 3), (-1, 2, 0)]
+)
+def test_quotients_as_in_c(a: int, b: int, quotient: int) -> None:
+    assert divide(a, b) == quotient
+
+
+def test_reals_are_ieee_doubles() -> None:
+    declared = "input x : real -9.0 .. 9.0\ninput y : real -9.0 .. 9.0"
+    assert value_of(declared, "x + y", x=0.1, y=0.2) == 0.30000000000000004
+    assert value_of(declared, "x / y", x=1.0, y=3.0) == 1 / 3
+    assert value_of(declared, "int(x)", x=-2.9) == -2
+    assert value_of(declared, "max(x, y) - min(x, y)", x=2.0, y=-1.0) == 3.0
+
+
+def test_the_right_operand_is_looked_at_only_where_the_left_does_not_decide() -> None:
+    made = program(
+        "input n : int 0 .. 9\nassume a : n /= 0 and 9 / n > 2\nassume o : n = 0 or 9 / n > 2\n"
+        "assume i : n /= 0 implies 9 / n > 2"
+    )
+    values = [[evaluate(a.condition, {"n": n}) for a in made.assumptions] for n in (0, 1, 9)]
+    assert values == [[False, True, True], [True, True, True], [False, False, False]]
+
+
+def test_an_index_outside_the_array_is_no_value() -> None:
+    made = program("input a : array[2] of bool\ninput n : int 0 .. 9\nassume it : a[n]")
+    condition = made.assumptions[0].condition
+    assert evaluate(condition, {"a[0]": False, "a[1]": True, "n": 1}) is True
+    with pytest.raises(IndexError):
+        evaluate(condition, {"a[0]": False, "a[1]": True, "n": 2})
+
+
+# --- statements ---
+
+
+def after(text: str, procedure: str = "p", *args: Value, **start: Value) -> dict[str, Value]:
+    made = program(text)
+    snapshot = {**initial(made), **start}
+    call(made, procedure, list(args), snapshot)
+    return snapshot
+
+
+def test_statements_run_in_order() -> None:
+    text = """
+    enum e { red, green, blue }
+    state s : e
+    state n : int 0 .. 99
+    state a : array[4] of int 0 .. 99
+    procedure p(by : int 0 .. 9) {
+      local k : int 0 .. 99 := by
+      for i in 1 .. 3 { a[i] := k  k := k + i }
+      for i in 3 .. 1 { k := 0 }
+      case s { red, blue { n := k } else { n := 1 } }
+      if n > 10 { s := green } else if n = 1 { s := red } else { s := blue }
+      q(n)
+    }
+    procedure q(by : int 0 .. 99) { n := by + 1 }
+    """
+    assert after(text, "p", 4) == {"s": 2, "n": 11, "a[0]": 0, "a[1]": 4, "a[2]": 5, "a[3]": 7}
+    assert after(text, "p", 9) == {"s": 1, "n": 16, "a[0]": 0, "a[1]": 9, "a[2]": 10, "a[3]": 12}
+    assert after(text, "p", 9, s=1) == {"s": 0, "n": 2, "a[0]": 0, "a[1]": 9, "a[2]": 10, "a[3]": 12}
+
+
+def test_arguments_are_values() -> None:
+    text = (
+        "state n : int 0 .. 9\nprocedure p { n := 1 q(n) }\nprocedure q(k : int 0 .. 9) { n := 5 n := n - k }"
+    )
+    assert after(text)["n"] == 4
+
+
+def test_zero_has_one_sign_where_it_is_kept() -> None:
+    text = (
+        "state x : real -1.0 .. 1.0 = 0.5\nstate y : real -1.0 .. 1.0\nprocedure p { y := -(x - x) x := -y }"
+    )
+    kept = after(text)
+    assert [math.copysign(1, float(kept[name])) for name in "xy"] == [1, 1]
+
+
+def test_initial_values_are_as_declared_or_the_least() -> None:
+    text = (
+        "enum e { a, b }\nstate s : e = b\nstate f : bool\ninput n : int -3 .. 3\nstate x : real -2.5 .. 1.0"
+    )
+    assert initial(program(text)) == {"s": 1, "f": False, "n": -3, "x": -2.5}
+
+
+# --- what comes from outside ---
+
+READINGS = """
+input n : int 0 .. 9 clamp
+input m : int 0 .. 9
+input x : real -1.0 .. 1.0 clamp
+input y : real -1.0 .. 1.0 reject
+"""
+GOOD: dict[str, Value] = {"n": 1, "m": 2, "x": 0.5, "y": 0.5}
+
+
+@pytest.mark.parametrize(
+    ("given_", "admitted"),
+    [
+        ({}, GOOD),
+        ({"n": 10}, {**GOOD, "n": 9}),
+        ({"n": -(10**30)}, {**GOOD, "n": 0}),
+        ({"m": 10}, "m"),
+        ({"m": -1, "y": 9.0}, "m"),
+        ({"x": math.inf}, {**GOOD, "x": 1.0}),
+        ({"x": math.nan}, "x"),
+        ({"y": math.nextafter(1.0, 2.0)}, "y"),
+        ({"y": math.nan}, "y"),
+        ({"n": 10, "y": -math.inf}, "y"),
+    ],
+)
+def test_inputs_are_admitted(given_: dict[str, Value], admitted: dict[str, Value] | str) -> None:
+    assert admit(program(READINGS), {**GOOD, **given_}) == admitted
+
+
+def test_minus_zero_is_admitted_as_zero() -> None:
+    admitted = admit(program(READINGS), {**GOOD, "y": -0.0})
+    assert isinstance(admitted, dict)
+    assert math.copysign(1, admitted["y"]) == 1
+
+
+# --- tables and cycles ---
+
+LEVEL = """
+input go : int 0 .. 9 clamp
+input k : int 0 .. 2
+state a : int 0 .. 9 deferred until go = 9
+state b : int 0 .. 9 deferred until a = 0
+state seen : int 0 .. 9
+state log : int 0 .. 999999
+output out : int 0 .. 9
+assume calm monitored : seen < 5
+assume quiet : seen < 1
+procedure before { seen := go  log := log * 10 + 1 }
+procedure act { log := log * 10 + 2 }
+procedure behind { log := log * 10 + 4 }
+procedure defer { next a := 3  next b := 4 }
+table t assuming calm, quiet {
+  | line | seen | k || procedures | out | log          |
+  | low  | < 3  | 0 || act; defer | a   | log * 10 + 3 |
+  | mid  | < 6  | 0 || act        | 1   |              |
+  | high | > 8  | 0 || act        |     |              |
+  | rest | DEFAULT | || act       | 9   |              |
+}
+table u {
+  | line | k  || out |
+  | one  | >= 2 || 7 |
+}
+level l { preprocess before table t postprocess behind }
+level m { preprocess before table by k { 0 : t 1 : t 2 : u } postprocess behind }
+"""
+
+
+def run(level: str = "l", **start: Value) -> Outcome:
+    made = program(LEVEL)
+    chosen = next(one for one in made.levels if one.name == level)
+    return cycle(made, chosen, {**initial(made), **start})
+
+
+def test_a_cycle_senses_decides_and_acts_in_order() -> None:
+    done = run(go=3)
+    assert (done.fault, done.line, done.line_index) == (Fault.OK, "mid", 1)
+    assert (done.snapshot["log"], done.snapshot["seen"], done.snapshot["out"]) == (124, 3, 1)
+
+
+def test_actions_run_from_left_to_right_and_columns_assign_in_their_place() -> None:
+    made = program(LEVEL)
+    table = made.tables[0]
+    done = run_table(made, table, {**initial(made), "seen": 9, "log": 5})
+    assert (done.line, done.snapshot["log"]) == ("high", 52)
+    assert matching_lines(table, {**initial(made), "seen": 2}) == ["low", "mid"]
+
+
+def test_no_line_and_several_lines_end_the_cycle_before_any_action() -> None:
+    done = run(go=2)
+    assert (done.fault, done.line, done.line_index) == (Fault.SEVERAL_LINES, None, -1)
+    assert (done.snapshot["log"], done.snapshot["seen"]) == (1, 2)  # preprocess stays, postprocess is not run
+    made = program(LEVEL)
+    done = run_table(made, made.tables[1], initial(made))
+    assert (done.fault, done.line) == (Fault.NO_LINE, None)
+
+
+def test_default_runs_where_no_other_line_matches() -> None:
+    done = run(go=7)
+    assert (done.fault, done.line, done.line_index, done.snapshot["out"]) == (Fault.OK, "rest", 3, 9)
+
+
+def test_a_refused_input_leaves_all_as_it_was() -> None:
+    start: dict[str, Value] = {"k": 3, "go": 99, "log": 7}
+    done = run(go=99, k=3, log=7)
+    assert (done.fault, done.fault_at, done.line_index) == (Fault.ADMIT, "k", -1)
+    assert done.snapshot == {**initial(program(LEVEL)), **start}
+
+
+def test_clamped_inputs_are_what_the_cycle_sees() -> None:
+    assert run(go=99).snapshot["go"] == 9
+    assert run(go=99).line == "high"
+
+
+def test_deferred_variables_take_their_next_values_at_once() -> None:
+    done = run(**{"go": 9, "a": 0, "b": 1, "a.next": 5, "b.next": 6})
+    assert (done.snapshot["a"], done.snapshot["b"]) == (5, 6)  # `a = 0` is asked before a changes
+    done = run(**{"go": 9, "a": 1, "b": 1, "a.next": 0, "b.next": 6})
+    assert (done.snapshot["a"], done.snapshot["b"]) == (0, 1)
+    done = run(**{"go": 99, "a": 1, "a.next": 8})
+    assert done.snapshot["a"] == 8  # asked of what was admitted
+
+
+def test_next_is_kept_for_a_later_cycle() -> None:
+    text = (
+        "input ack : bool\nstate a : int 0 .. 9 deferred until ack\nprocedure p { next a := a + 1 }\n"
+        "table t {\n| line | ack || procedures |\n| x | false || p |\n| y | true || p |\n}"
+    )
+    made = program(text)
+    first = run_table(made, made.tables[0], initial(made)).snapshot
+    assert (first["a"], first["a.next"]) == (0, 1)
+    second = run_table(made, made.tables[0], {**first, "ack": True}).snapshot
+    assert (second["a"], second["a.next"]) == (1, 2)
+
+
+def test_monitored_assumptions_are_told_and_stop_nothing() -> None:
+    assert run(go=7).failed_assumptions == ("calm",)
+    assert run(go=3).failed_assumptions == ()
+    assert run("m", go=7, k=2).failed_assumptions == ()  # table u does not rely on it
+
+
+def test_the_selector_chooses_the_table() -> None:
+    done = run("m", go=3, k=2)
+    assert (done.line, done.snapshot["out"]) == ("one", 7)
+    assert run("m", go=3, k=1).line == "rest"
+
+
+EXTERN = """
+input a : int 0 .. 9
+state b : int 0 .. 9
+state c : int 0 .. 9
+output done : bool
+extern procedure look(k : int 0 .. 9) reads b, a writes c, b python "rcsc_case_extern:look" c "look"
+table t {
+  | line | a    || procedures | done |
+  | x    | >= 0 || look(2)    | true |
+}
+"""
+
+
+@pytest.fixture
+def _extern(monkeypatch: pytest.MonkeyPatch) -> None:
+    module = ModuleType("rcsc_case_extern")
+    module.look = lambda a, b, k: (a + b + k, 10 * a)  # type: ignore[attr-defined]  # made here
+    monkeypatch.setitem(sys.modules, "rcsc_case_extern", module)
+
+
+@pytest.mark.usefixtures("_extern")
+def test_extern_procedures_take_reads_and_arguments_and_give_writes_in_declared_order() -> None:
+    made = program(EXTERN)
+    done = run_table(made, made.tables[0], {**initial(made), "a": 0, "b": 3})
+    assert (done.fault, done.snapshot) == (Fault.OK, {"a": 0, "b": 5, "c": 0, "done": True})
+
+
+@pytest.mark.usefixtures("_extern")
+def test_what_an_extern_procedure_gives_is_admitted() -> None:
+    made = program(EXTERN)
+    done = run_table(made, made.tables[0], {**initial(made), "a": 1, "b": 3})
+    assert (done.fault, done.fault_at, done.line) == (Fault.EXTERN, "c", "x")
+    assert done.snapshot["done"] is False
