@@ -26,7 +26,7 @@ def errors(text: str) -> list[tuple[str, int]]:
     return [(d.code.value, source.position(d.primary.span.start).line) for d in parsed]
 
 
-@settings(max_examples=300)
+@settings(max_examples=120)
 @given(files())
 def test_formatted_trees_parse_to_themselves(file: tree.File) -> None:
     text = format_file(file)
@@ -34,7 +34,7 @@ def test_formatted_trees_parse_to_themselves(file: tree.File) -> None:
     assert format_file(file) == text
 
 
-@settings(max_examples=500)
+@settings(max_examples=200)
 @given(expressions())
 def test_expressions_keep_their_shape_without_needless_parentheses(expr: tree.Expr) -> None:
     text = spell_expr(expr)
@@ -145,7 +145,7 @@ GARBAGE = st.text(
 )
 
 
-@settings(max_examples=400)
+@settings(max_examples=200)
 @given(GARBAGE)
 def test_garbage_is_a_tree_or_diagnostics_inside_the_text(text: str) -> None:
     parsed = parse(Source("case.rcs", text))
