@@ -1,5 +1,6 @@
 """A proved program to a `Plan`: classes, masks and their grouping."""
 
+import os
 from math import prod
 
 from rcsc.model import (
@@ -22,19 +23,30 @@ MOST_DIRECT = 256
 MOST_GROUPED = 512
 
 
-def lower(proved: ProvedProgram) -> Plan:
-    """The plan of a proved program; there is no other way to one."""
+def lower(proved: ProvedProgram, root: str = "") -> Plan:
+    """The plan of a proved program; there is no other way to one.
+
+    Args:
+        proved: What `prove` made.
+        root: The project's folder: files are named as seen from there, so that the same project gives the
+            same bytes wherever it stands and from wherever it is compiled; "" leaves their names alone.
+    """
     program = proved.program
     monitored = tuple(at for at, a in enumerate(program.assumptions) if a.standing is Standing.MONITORED)
-    tables = tuple(_table(program, table, monitored) for table in program.tables)
-    return Plan(program, program.file.replace("\\", "/"), tables, monitored)
+    tables = tuple(_table(program, table, monitored, _seen(table.file, root)) for table in program.tables)
+    return Plan(program, _seen(program.file, root), tables, monitored)
 
 
-def _table(program: Program, table: Table, monitored: tuple[int, ...]) -> PlanTable:
-    lines = [PlanLine(line.name, line.actions, f"{table.file} line {line.name}") for line in table.lines]
+def _seen(file: str, root: str) -> str:
+    """The file's name as seen from the folder `root`, with `/`."""
+    return (os.path.relpath(file, root) if root else file).replace("\\", "/")
+
+
+def _table(program: Program, table: Table, monitored: tuple[int, ...], file: str) -> PlanTable:
+    lines = [PlanLine(line.name, line.actions, f"{file} line {line.name}") for line in table.lines]
     if table.default is not None:
         name = table.default.name
-        lines.append(PlanLine(name, table.default.actions, f"{table.file} line {name}"))
+        lines.append(PlanLine(name, table.default.actions, f"{file} line {name}"))
     relied = tuple(
         place for place, at in enumerate(monitored) if program.assumptions[at].name in table.assumptions
     )

@@ -62,7 +62,7 @@ def digest(program: Program, table: Table) -> str:
     wanted = set(table.variables)
     assumed = [a for a in program.assumptions if a.name in table.assumptions]
     for assumption in assumed:
-        hashed.update(f"assume {assumption.name} {assumption.condition!r}\n".encode())
+        hashed.update(f"assume {assumption.name} {spelled(assumption.condition)}\n".encode())
     for variable in program.variables:
         if variable.name in wanted or assumed:
             hashed.update(f"variable {variable.name} {variable.type!r}\n".encode())
@@ -82,4 +82,4 @@ def digest(program: Program, table: Table) -> str:
 def _shown(test: Test) -> str:
     if test.box is not None:
         return f"test {test.variables[0]} {test.box}\n"
-    return f"test {test.condition!r}\n"
+    return f"test {spelled(test.condition)}\n"

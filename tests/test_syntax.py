@@ -155,3 +155,33 @@ def test_garbage_is_a_tree_or_diagnostics_inside_the_text(text: str) -> None:
     for diagnostic in parsed:
         assert 0 <= diagnostic.primary.span.start <= diagnostic.primary.span.end <= len(text)
         assert diagnostic.code is not Code.INTERNAL
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "input a : int 0 .. 9\nassume x : " + " + ".join(["a"] * 5000) + " > 3\n",
+        "type t = " + "array [2] of " * 3000 + "bool\n",
+        "state a : int 0 .. 9\nprocedure p {\n" + "if a = 1 { a := 1 } else " * 2000 + "{ a := 2 }\n}\n",
+        "state a : bool\ntable t {\n| line | a ||\n|--|--||\n| x | " + "not " * 3000 + "a ||\n}\n",
+        "record r { a : bool }\nstate a : r\ninvariant t : a" + ".a" * 3000 + "\n",
+        "state a : bool\ninvariant t : " + "(" * 3000 + "a" + ")" * 3000 + "\n",
+        "state a : bool\ninvariant t : " + "a implies " * 101 + "a\n",
+    ],
+    ids=["sum", "array", "else if", "cell", "field", "brackets", "implies"],
+)
+def test_what_nests_too_deep_is_refused(text: str) -> None:
+    assert [code for code, _ in errors(text)] == ["RCS103"]
+
+
+def test_what_is_long_or_wide_but_not_deep_is_taken() -> None:
+    wide = "| x | " + " " * 200 + "a ||"
+    calls = "\n".join(["  f(-1)"] * 300)
+    text = (
+        "state a : bool\n"
+        f"table t {{\n| line | when ||\n|--|{'-' * 300}||\n{wide}\n}}\n"
+        "extern procedure f(x : int -5 .. 5)\n"
+        f"procedure p {{\n{calls}\n}}\n"
+        "invariant i : " + "a implies " * 99 + "a\n"
+    )
+    assert isinstance(parse(Source("case.rcs", text)), tree.File)

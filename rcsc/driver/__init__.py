@@ -161,8 +161,9 @@ def _executors(
 def _emitted(proved: "ProvedProgram", targets: tuple[str, ...]) -> dict[str, str]:
     from rcsc.emit import emit_c, emit_python
     from rcsc.lower import lower
+    from rcsc.project import project_root
 
-    plan = lower(proved)
+    plan = lower(proved, project_root(proved.program.file))
     return (emit_python(plan) if "python" in targets else {}) | (emit_c(plan) if "c" in targets else {})
 
 

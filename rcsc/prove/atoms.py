@@ -103,7 +103,6 @@ class Universe:
         self.single: list[int] = []
         self._column: dict[str, int] = {}
         self._form: dict[Form, int] = {}
-        self._known: dict[tuple[Expr, bool], Formula] = {}
 
     def column(self, term: Expr) -> int:
         """The number of `term`, entered when new."""
@@ -144,12 +143,6 @@ class Universe:
 
     def of(self, condition: Expr, wanted: bool = True) -> Formula:
         """`condition = wanted` with negations pushed into the atoms."""
-        known = self._known.get((condition, wanted))
-        if known is None:
-            known = self._known[condition, wanted] = self._of(condition, wanted)
-        return known
-
-    def _of(self, condition: Expr, wanted: bool) -> Formula:
         match condition:
             case Literal(value=value):
                 return TRUE if bool(value) == wanted else FALSE

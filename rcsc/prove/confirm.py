@@ -8,9 +8,9 @@ from enum import Enum, auto
 
 from rcsc.model import Program, Table
 from rcsc.prove import smt
+from rcsc.prove.asked import Asked
 from rcsc.prove.certificate import must_cover
 from rcsc.prove.options import Options
-from rcsc.prove.relational import Asked
 from rcsc.prove.smt import Answer
 from rcsc.prove.verdict import Found, Gap, Overlap, Undecided
 

@@ -11,16 +11,26 @@ from collections.abc import Callable, Mapping, Sequence
 
 from rcsc.model import Box
 from rcsc.prove.atoms import Atom, Clauses, Every, Formula, Some, Universe, clauses, every, some
+from rcsc.prove.linear import Simplex, integer_point
 from rcsc.prove.regions import Answer, Bounds, Point
 from rcsc.prove.search import Tree
+
+_ROUNDS = 200
+"""Systems looked at for an integer point before the tree of regions looks for it."""
 
 
 def find(universe: Universe, parts: Sequence[Formula], budget: int = 2_000) -> Point | Answer:
     """A point at which all parts hold; `NONE` when there is none, `UNKNOWN` past the budget."""
+    wanted = clauses(parts)
+    if not wanted.rest and not wanted.impossible and all(len(box) == 1 for _, box in wanted.boxes):
+        try:
+            return _corner(universe, {form: box[0] for form, box in wanted.boxes})
+        except TimeoutError:
+            pass  # the tree asks itself how long it goes on
     tree = Tree(
         universe,
         (),
-        (clauses(parts),),
+        (wanted,),
         lambda _: Answer.UNKNOWN,
         default=False,
         budget=budget,
@@ -30,6 +40,59 @@ def find(universe: Universe, parts: Sequence[Formula], budget: int = 2_000) -> P
     if found.gaps:
         return found.gaps[0][1]
     return Answer.UNKNOWN if found.undecided else Answer.NONE
+
+
+def _corner(universe: Universe, bounds: Mapping[int, Bounds]) -> Point | Answer:
+    """A point within the bounds on forms, of leaves only, all put to one system.
+
+    First each bound on several columns is drawn in by half the sum of its coefficients: a point of what is
+    left stays within the bounds when it is rounded to integers. Only where nothing is left are fractions
+    bounded one after the other.
+    """
+    forms, singles = universe.forms, universe.single
+    if any(universe.columns[column].opaque for form in bounds for column, _ in forms[form]):
+        return Answer.UNKNOWN
+    used = sorted({column for form in bounds if len(forms[form]) > 1 for column, _ in forms[form]})
+    system = _system(universe, bounds, used, draw_in=True)
+    if system.refute() is None:
+        at = {column: round(system.value(singles[column])) for column in used}
+        if all(
+            low <= sum(k * at[column] for column, k in forms[form]) <= high
+            for form, (low, high) in bounds.items()
+            if len(forms[form]) > 1
+        ):
+            return _completed(universe, bounds, at)
+    system = _system(universe, bounds, used, draw_in=False)
+    found = integer_point(system, [singles[column] for column in used], _ROUNDS)
+    if found is None:
+        return Answer.NONE
+    return _completed(universe, bounds, {column: int(found.value(singles[column])) for column in used})
+
+
+def _system(
+    universe: Universe, bounds: Mapping[int, Bounds], used: Sequence[int], *, draw_in: bool
+) -> Simplex:
+    forms, singles = universe.forms, universe.single
+    system = Simplex()
+    for column in used:
+        form = singles[column]
+        system.add_column(form, *bounds.get(form, (universe.low[form], universe.high[form])))
+    for form, (low, high) in bounds.items():
+        if len(forms[form]) > 1:
+            margin = (sum(abs(k) for _, k in forms[form]) + 1) // 2 if draw_in else 0
+            if low + margin > high - margin:
+                margin = 0
+            terms = [(singles[column], k) for column, k in forms[form]]
+            system.add_form(form, terms, low + margin, high - margin)
+    return system
+
+
+def _completed(universe: Universe, bounds: Mapping[int, Bounds], at: Mapping[int, int]) -> Point:
+    """The point with the least value of every column that no bound on several columns speaks of."""
+    return {
+        column: at[column] if column in at else bounds.get(form, (universe.low[form],))[0]
+        for column, form in enumerate(universe.single)
+    }
 
 
 def least(universe: Universe, parts: Sequence[Formula], columns: Sequence[int]) -> Point | Answer:
@@ -52,6 +115,11 @@ def least(universe: Universe, parts: Sequence[Formula], columns: Sequence[int]) 
                 best, high = trial, trial[column]
         pinned.append(universe.atom(form, ((low, low),)))
     return best
+
+
+def inside(universe: Universe, bounds: Mapping[int, Bounds]) -> list[Formula]:
+    """A region as formulas."""
+    return [universe.atom(form, (interval,)) for form, interval in bounds.items()]
 
 
 def widest(

@@ -11,6 +11,7 @@ Source: Dutertre and de Moura, A Fast Linear-Arithmetic Solver for DPLL(T), CAV 
 
 import math
 import operator
+from collections.abc import Sequence
 from fractions import Fraction
 from typing import TypeAlias
 
@@ -141,6 +142,38 @@ class Simplex:
                 self._rows[other] = _reduced(e * a, new)
         self._rows[entering] = _reduced(a, solved)
         self._columns[j], self._values[j] = basic, value
+
+
+def integer_point(simplex: Simplex, columns: Sequence[int], patience: int) -> Simplex | None:
+    """A system at a vertex where `columns` are integers, by bounding one fraction after the other.
+
+    Args:
+        simplex: The system; it is changed.
+        columns: Forms of it that must be integers.
+        patience: How many systems are looked at.
+
+    Returns:
+        None when there is none.
+
+    Raises:
+        TimeoutError: When the patience is at its end.
+    """
+    waiting = [simplex]
+    while waiting:
+        if patience == 0:
+            raise TimeoutError
+        patience -= 1
+        here = waiting.pop()
+        if here.refute() is not None:
+            continue
+        broken = next((form for form in columns if here.value(form).denominator != 1), None)
+        if broken is None:
+            return here
+        below, above, cut = here.copy(), here, here.value(broken).__floor__()
+        below.restrict(broken, below.low[broken], cut)
+        above.restrict(broken, cut + 1, above.high[broken])
+        waiting += [below, above]
+    return None
 
 
 def _reduced(d: int, row: list[int]) -> tuple[int, list[int]]:

@@ -1,25 +1,39 @@
-"""Tables with conditions across variables, or that rely on assumptions: a region tree, and Z3 for witnesses.
+"""Tables with conditions across variables, or that rely on assumptions: a region tree, exact arithmetic, Z3.
 
-In: a table. Out: what is wrong with it, and the tree that shows it right. Leaves that linear arithmetic cannot settle are asked
-of Z3, in one solver; *unknown* is a finding, never a proof.
+In: a table. Out: what is wrong with it, with least witnesses and the regions around them, and the certificate
+of a table in order. Linear arithmetic settles what it can; terms that are not linear are asked of Z3, in
+one solver that is made when first needed; *unknown* is a finding, never a proof.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
-from rcsc.interpret import evaluate, matching_lines
-from rcsc.model import AssumptionName, Expr, Line, Program, Read, Select, Snapshot, Table, Value, value_of_key
-from rcsc.prove import smt
-from rcsc.prove.atoms import Universe, assumptions_of, lines_of
+from rcsc.interpret import matching_lines
+from rcsc.model import AssumptionName, Program, Read, Snapshot, Table, Value, value_of_key
+from rcsc.prove.asked import Asked, shown
+from rcsc.prove.atoms import Formula, Universe, assumptions_of, lines_of, some
 from rcsc.prove.certificate import must_cover, tree_certificate
-from rcsc.prove.encode import Frame, declared, encode, least_witness
+from rcsc.prove.encode import encode
+from rcsc.prove.least import find, inside, least, negated, whole, widest
 from rcsc.prove.options import Options
-from rcsc.prove.regions import Answer as RegionAnswer
-from rcsc.prove.regions import Question
+from rcsc.prove.regions import Answer as Unsettled
+from rcsc.prove.regions import Bounds, Point, Question, Rests, Search
 from rcsc.prove.search import Tree
-from rcsc.prove.smt import Answer, Solver, Term
-from rcsc.prove.verdict import ContradictoryAssumptions, DeadLine, Found, Gap, Overlap, Undecided
-from rcsc.questions import parts, question
+from rcsc.prove.smt import Answer, Term
+from rcsc.prove.verdict import ContradictoryAssumptions, DeadLine, Found, Gap, Overlap, Region, Undecided
+from rcsc.questions import question
+
+_MOST_CANDIDATES = 64
+"""Lines in one question to the solver: it states every pair of them."""
+_MOST_GROWN = 20
+"""Findings of one table that are given the region around them."""
+_MOST_LINES_GROWN = 64
+"""Lines of a table above which no region is grown around a gap."""
+_MOST_GAPS = 64
+"""Regions of a gap among which linear arithmetic looks for the least input."""
+_MOST_REPROVED = 2_000
+"""Nodes of a tree above which it is not tried whether an assumption can be spared."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,179 +43,203 @@ class Decided:
     found: tuple[Found, ...]
     certificate: Mapping[str, object] | None
     used: tuple[AssumptionName, ...]
-    asked: int
-
-
-class Asked:
-    """One solver that knows the table's domain and assumptions, and each line as a literal."""
-
-    def __init__(self, program: Program, table: Table, options: Options) -> None:
-        self.program, self.table = program, table
-        self.frame, domain = declared(program.variables)
-        self.solver = Solver(options.timeout_ms, options.memory_mb)
-        self.solver.add(*domain)
-        wanted = set(table.assumptions)
-        self.solver.add(*[encode(a.condition, self.frame) for a in program.assumptions if a.name in wanted])
-        self._lines: dict[int, Term] = {}
-        self._tests: dict[int, Term] = {}
-
-    def line(self, at: int) -> Term:
-        """That a line matches."""
-        if at not in self._lines:
-            self._lines[at] = smt.all_of(
-                [self._test(test.condition, id(test)) for test in self.table.lines[at].tests if test]
-            )
-        return self._lines[at]
-
-    def _test(self, condition: Expr, key: int) -> Term:
-        if key not in self._tests:
-            self._tests[key] = encode(condition, self.frame)
-        return self._tests[key]
-
-    def none(self) -> Term:
-        """That no line matches."""
-        return smt.negation(smt.any_of([self.line(at) for at in range(len(self.table.lines))]))
-
-    def witness(self, *terms: Term) -> Snapshot | None:
-        """The least input for which the terms hold; None where the solver gives up."""
-        wanted = set(self.table.variables) | {
-            name
-            for a in self.program.assumptions
-            if a.name in self.table.assumptions
-            for name in _reads(a.condition)
-        }
-        variables = [v for v in self.program.variables if v.name in wanted]
-        self.solver.push()
-        self.solver.add(*terms)
-        found = least_witness(self.solver, variables, self.frame)
-        self.solver.pop()
-        return found
-
-    def holds(self, *terms: Term) -> Answer:
-        """Whether the terms can hold together."""
-        return self.solver.check(*terms)
-
-
-def _reads(expr: Expr) -> list[str]:
-
-    return [
-        name
-        for part in parts(expr)
-        for name in (
-            (part.name,) if isinstance(part, Read) else part.leaves if isinstance(part, Select) else ()
-        )
-    ]
 
 
 def decide(program: Program, table: Table, options: Options) -> Decided:
-    """Decides the table under its assumptions."""
-    asked = Asked(program, table, options)
-    if table.assumptions:
-        possible = asked.holds()
-        if possible is not Answer.SATISFIABLE:
-            wrong: Found = (
-                ContradictoryAssumptions()
-                if possible is Answer.UNSATISFIABLE
-                else Undecided("the assumptions")
+    """Decide the table under its assumptions."""
+    return _Decision(program, table, options).decided()
+
+
+class _Decision:
+    """One table being decided.
+
+    Attributes:
+        universe: Columns and forms of the lines and assumptions; every variable of a witness is a column.
+        lines, assumed: As formulas.
+    """
+
+    def __init__(self, program: Program, table: Table, options: Options) -> None:
+        self.program, self.table, self.options = program, table, options
+        self.universe = Universe()
+        self.variables = shown(program, table)
+        self.columns = [self.universe.column(Read(v.name, v.type)) for v in self.variables]
+        self.clauses = lines_of(self.universe, table)
+        self.assumptions = assumptions_of(self.universe, program, table)
+        self.lines = [whole(line) for line in self.clauses]
+        self.assumed = [whole(assumption) for assumption in self.assumptions]
+        self._asked: Asked | None = None
+
+    @property
+    def asked(self) -> Asked:
+        """Z3, made when first asked."""
+        if self._asked is None:
+            self._asked = Asked(self.program, self.table, self.options)
+        return self._asked
+
+    def decided(self) -> Decided:
+        """Everything about the table."""
+        if self.table.assumptions:
+            possible = self.satisfiable(self.assumed)
+            if possible is not Answer.SATISFIABLE:
+                contradictory = possible is Answer.UNSATISFIABLE
+                wrong: Found = ContradictoryAssumptions() if contradictory else Undecided("the assumptions")
+                return Decided((wrong,), None, ())
+        kept = tuple(range(len(self.assumptions)))
+        search = self.search(kept)
+        if search.proved:
+            kept, search = self.spared(search)
+        found = (*self.overlaps(search), *self.gap(search), *self.dead())
+        if search.undecided:
+            found = (*found, Undecided(f"{search.undecided} regions of the input space"))
+        names = tuple(self.table.assumptions[at] for at in kept)
+        certificate = (
+            tree_certificate(self.program, self.table, self.universe, search.nodes, names)
+            if search.proved
+            else None
+        )
+        return Decided(found, certificate, names if search.proved else self.table.assumptions)
+
+    def search(self, kept: Sequence[int], budget: int = 60_000, *, alone: bool = False) -> Search:
+        """The tree under some of the assumptions; `alone` without the solver, to the first finding."""
+        return Tree(
+            self.universe,
+            self.clauses,
+            [self.assumptions[at] for at in kept],
+            (lambda _: Unsettled.UNKNOWN) if alone else self.oracle,
+            default=not must_cover(self.table),
+            budget=budget,
+            first_only=alone,
+        ).run()
+
+    def spared(self, search: Search) -> tuple[tuple[int, ...], Search]:
+        """The assumptions that the proof cannot do without, one after the other left out, and its tree.
+
+        Where a solver or a large tree was needed, every assumption that some leaf rests on is kept.
+        """
+        everything = tuple(range(len(self.assumptions)))
+        if Rests() in search.nodes or len(search.nodes) > _MOST_REPROVED:
+            return everything, search
+        kept = everything
+        for at in everything:
+            fewer = tuple(one for one in kept if one != at)
+            trial = self.search(fewer, 2 * _MOST_REPROVED, alone=True)
+            if trial.proved:
+                kept, search = fewer, trial
+        return kept, search
+
+    def oracle(self, asked: Question) -> Snapshot | Unsettled:
+        """Z3's answer about a region, as the tree asks it."""
+        if len(asked.candidates) > _MOST_CANDIDATES:
+            return Unsettled.UNKNOWN
+        columns, forms = self.universe.columns, self.universe.forms
+        bounds = {
+            tuple((columns[column].name, k) for column, k in forms[form]): (low, high)
+            for form, low, high in asked.bounds
+        }
+        conditions = question(self.program, self.table, self.table.assumptions, bounds, asked.candidates)
+        z3 = self.asked
+        answer = z3.holds(*(encode(condition, z3.frame) for condition in conditions))
+        if answer is Answer.SATISFIABLE:
+            leaves = z3.frame.leaves
+            return {str(v.name): z3.solver.value(leaves[v.name], v.type) for v in self.program.variables}
+        return Unsettled.NONE if answer is Answer.UNSATISFIABLE else Unsettled.UNKNOWN
+
+    # --- findings ----------------------------------------------------------------------
+
+    def satisfiable(self, formulas: Sequence[Formula], *terms: Term) -> Answer:
+        """Whether the formulas can hold together under no assumption but what they say."""
+        point = find(self.universe, formulas)
+        if point is Unsettled.UNKNOWN:
+            return self.asked.holds(*terms)
+        return Answer.UNSATISFIABLE if isinstance(point, Unsettled) else Answer.SATISFIABLE
+
+    def overlaps(self, search: Search) -> list[Found]:
+        """Every overlapping pair with its least witness."""
+        pairs = set(search.overlaps)
+        for seen in search.witnesses:
+            pairs.update(combinations(self.matching(seen), 2))
+        found: list[Found] = []
+        for first, second in sorted(pairs):
+            grown = len(found) < _MOST_GROWN
+            found.append(self.overlap(first, second, grown=grown))
+        return found
+
+    def matching(self, snapshot: Snapshot) -> list[int]:
+        """Positions of the lines that match."""
+        names = set(matching_lines(self.table, snapshot))
+        return [at for at, line in enumerate(self.table.lines) if line.name in names]
+
+    def overlap(self, first: int, second: int, *, grown: bool) -> Found:
+        """A pair of lines that overlaps, at its least input."""
+        both = [self.lines[first], self.lines[second]]
+        point = least(self.universe, [*both, *self.assumed], self.columns)
+        if isinstance(point, Unsettled):
+            witness = self.asked.witness(self.asked.line(first), self.asked.line(second))
+            pair = f"lines `{self.table.lines[first].name}` and `{self.table.lines[second].name}`"
+            return Undecided(pair) if witness is None else Overlap(first, second, witness)
+        outside = some(negated(self.universe, line) for line in both)
+        region = self.around(point, [[outside]]) if grown else None
+        return Overlap(first, second, self.snapshot(point), region)
+
+    def gap(self, search: Search) -> list[Found]:
+        """The least input that no line matches, if there is one; also where DEFAULT takes it."""
+        seen = any(not self.matching(snapshot) for snapshot in search.witnesses)
+        if must_cover(self.table) and not search.gaps and not seen:
+            return []
+        if search.gaps and not seen and len(search.gaps) <= _MOST_GAPS:
+            points = [
+                least(self.universe, inside(self.universe, part), self.columns) for part, _ in search.gaps
+            ]
+            settled = [point for point in points if not isinstance(point, Unsettled)]
+            if len(settled) == len(points):
+                point = min(settled, key=lambda one: [one[column] for column in self.columns])
+                few = len(self.lines) <= _MOST_LINES_GROWN
+                region = self.around(point, [[line] for line in self.lines]) if few else None
+                return [Gap((self.snapshot(point),), (region,))]
+        z3 = self.asked
+        if not must_cover(self.table) and z3.holds(z3.none()) is Answer.UNSATISFIABLE:
+            return []
+        witness = z3.witness(z3.none())
+        return [Undecided("what no line matches")] if witness is None else [Gap((witness,), (None,))]
+
+    def dead(self) -> list[Found]:
+        """Lines that no input matches."""
+        found: list[Found] = []
+        for at, line in enumerate(self.lines):
+            point = find(self.universe, [line, *self.assumed])
+            if isinstance(point, Unsettled):
+                answer = Answer.UNSATISFIABLE
+                if point is Unsettled.UNKNOWN:
+                    answer = self.asked.holds(self.asked.line(at))
+                if answer is Answer.UNSATISFIABLE:
+                    found.append(DeadLine(at))
+                elif answer is Answer.UNKNOWN:
+                    found.append(Undecided(f"whether line `{self.table.lines[at].name}` can match"))
+        return found
+
+    # --- witnesses ---------------------------------------------------------------------
+
+    def snapshot(self, point: Point) -> dict[str, Value]:
+        """The point's values of the variables that are shown."""
+        pairs = zip(self.variables, self.columns, strict=True)
+        return {v.name: value_of_key(v.type, point[column]) for v, column in pairs}
+
+    def around(self, point: Point, wrong: Iterable[Sequence[Formula]]) -> Region:
+        """The widest box around the point in which, under the assumptions, none of `wrong` can hold."""
+        never = [list(formulas) for formulas in wrong]
+
+        def holds(box: list[Formula]) -> bool:
+            return all(
+                find(self.universe, [*box, *self.assumed, *formulas]) is Unsettled.NONE for formulas in never
             )
-            return Decided((wrong,), None, (), asked.solver.queries)
-    universe = Universe()
-    lines = lines_of(universe, table)
-    assumptions = assumptions_of(universe, program, table)
-    search = Tree(
-        universe, lines, assumptions, lambda q: _oracle(asked, universe, q), default=not must_cover(table)
-    ).run()
-    found = _findings(asked, search.overlaps.keys(), search.witnesses, bool(search.gaps))
-    if search.undecided:
-        found = (*found, Undecided(f"{search.undecided} regions of the input space"))
-    if must_cover(table) is False:
-        found = (*found, *_default(asked))
-    found = (*found, *_dead(asked))
-    used = tuple(table.assumptions[at] for at in sorted(search.used))
-    certificate = (
-        tree_certificate(program, table, universe, search.nodes, table.assumptions) if search.proved else None
-    )
-    return Decided(found, certificate, used, asked.solver.queries)
 
+        box = widest(self.universe, point, self.columns, holds)
+        return {
+            v.name: (bounds,)
+            for v, column in zip(self.variables, self.columns, strict=True)
+            if (bounds := box[column]) != self._extent(column)
+        }
 
-def _oracle(asked: Asked, universe: Universe, q: Question) -> Snapshot | RegionAnswer:
-    """Z3's answer about a region, as the tree asks it."""
-    bounds = {
-        tuple((universe.columns[column].name, k) for column, k in universe.forms[form]): (low, high)
-        for form, low, high in q.bounds
-    }
-    conditions = question(asked.program, asked.table, asked.table.assumptions, bounds, q.candidates)
-    terms = [encode(condition, asked.frame) for condition in conditions]
-    answer = asked.holds(*terms)
-    if answer is Answer.UNSATISFIABLE:
-        return RegionAnswer.NONE
-    if answer is Answer.UNKNOWN:
-        return RegionAnswer.UNKNOWN
-    return _model(asked, asked.frame)
-
-
-def _model(asked: Asked, frame: Frame) -> Snapshot:
-    return {v.name: asked.solver.value(frame.leaves[v.name], v.type) for v in asked.program.variables}
-
-
-def _findings(asked: Asked, pairs: object, witnesses: list[Snapshot], gap: bool) -> tuple[Found, ...]:
-    """Overlaps with their least witnesses, and the gap."""
-    assert isinstance(pairs, type({}.keys()))
-    table = asked.table
-    names = [line.name for line in table.lines]
-    all_pairs: set[tuple[int, int]] = set(pairs)
-    for seen in witnesses:
-        matching = [names.index(name) for name in matching_lines(table, seen)]
-        all_pairs.update((one, two) for at, one in enumerate(matching) for two in matching[at + 1 :])
-        gap = gap or not matching
-    found: list[Found] = []
-    for first, second in sorted(all_pairs):
-        witness = asked.witness(asked.line(first), asked.line(second))
-        pair = f"lines `{names[first]}` and `{names[second]}`"
-        found.append(Undecided(pair) if witness is None else Overlap(first, second, witness))
-    if gap and must_cover(table):
-        found.extend(_gap(asked))
-    return tuple(found)
-
-
-def _gap(asked: Asked) -> list[Found]:
-    witness = asked.witness(asked.none())
-    return [Undecided("the gap")] if witness is None else [Gap((witness,), (None,))]
-
-
-def _default(asked: Asked) -> list[Found]:
-    """What falls to a DEFAULT line, if anything does."""
-    answer = asked.holds(asked.none())
-    if answer is Answer.UNSATISFIABLE:
-        return []
-    return [Undecided("what falls to DEFAULT")] if answer is Answer.UNKNOWN else _gap(asked)
-
-
-def _dead(asked: Asked) -> list[Found]:
-    """Lines that no input matches."""
-    found: list[Found] = []
-    for at, line in enumerate(asked.table.lines):
-        if _plainly_alive(asked, line):
-            continue
-        answer = asked.holds(asked.line(at))
-        if answer is Answer.UNSATISFIABLE:
-            found.append(DeadLine(at))
-        elif answer is Answer.UNKNOWN:
-            found.append(Undecided(f"whether line `{line.name}` can match"))
-    return found
-
-
-def _plainly_alive(asked: Asked, line: Line) -> bool:
-    """Whether the least values that its boxes allow match it: no need to ask."""
-    if asked.table.assumptions:
-        return False
-    values: dict[str, Value] = {v.name: v.initial for v in asked.program.variables}
-
-    kinds = {v.name: v.type for v in asked.program.variables}
-    for test in line.tests:
-        if test is not None and test.box:
-            values[test.variables[0]] = value_of_key(kinds[test.variables[0]], test.box[0][0])
-    try:
-        return all(test is None or bool(evaluate(test.condition, values)) for test in line.tests)
-    except ArithmeticError:
-        return False
+    def _extent(self, column: int) -> Bounds:
+        found = self.universe.columns[column]
+        return found.low, found.high

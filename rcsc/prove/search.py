@@ -40,6 +40,8 @@ from rcsc.prove.regions import (
 
 _ROUNDS = 200
 """Splits in a row, made to round one vertex to integers, before a solver is asked."""
+_PATIENCE = 3
+"""Regions left undecided by the solver, after which it is asked no more: each may cost its full time."""
 
 
 class Tree:
@@ -110,9 +112,9 @@ class Tree:
             return self._ask(region), []
         holding = [line.index for line in region.lines if line.holds]
         fresh = [pair for pair in combinations(holding, 2) if pair not in self.search.overlaps]
-        if fresh or (not region.lines and not self.search.gaps):
+        if fresh or not region.lines:
             return self._probe(region, fresh)
-        if not region.lines or (len(holding) > 1 and self._all_known(region)):
+        if len(holding) > 1 and self._all_known(region):
             return Open(), []
         return self._narrow(region)
 
@@ -146,6 +148,9 @@ class Tree:
 
     def _ask(self, region: Region) -> Node:
         """Leave the region to the solver."""
+        if self.search.undecided >= _PATIENCE:
+            self.search.undecided += 1
+            return Open()
         bounds = tuple((form, low, high) for form, (low, high) in sorted(region.bounds.items()))
         answer = self.oracle(Question(bounds, tuple(line.index for line in region.lines)))
         if answer is Answer.NONE:

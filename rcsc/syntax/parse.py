@@ -44,6 +44,7 @@ def parse(source: Source) -> tree.File | tuple[Diagnostic, ...]:
         return refused
     pieces = _Pieces(source)
     found = pieces.parse()
+    found += [screen.too_deep(source, *place) for node in pieces.nodes if (place := _deep_in(node))]
     if found:
         return tuple(found[:MOST_ERRORS])
     comments = Comments(source)
@@ -52,6 +53,18 @@ def parse(source: Source) -> tree.File | tuple[Diagnostic, ...]:
     if found:
         return tuple(found[:MOST_ERRORS])
     return tree.File(declarations, tuple(words(text) for text in comments.rest()), source.name)
+
+
+def _deep_in(root: Tree[Token]) -> tuple[int, int] | None:
+    """Start and end of the first node that lies too deep; what follows may then call itself at each depth."""
+    waiting = [(root, 0)]
+    while waiting:
+        node, depth = waiting.pop()
+        if depth > screen.DEEPEST:
+            return node.meta.start_pos, node.meta.start_pos + 1
+        deeper = depth + (str(node.data) not in ("block", "arm"))
+        waiting.extend((child, deeper) for child in reversed(node.children) if isinstance(child, Tree))
+    return None
 
 
 @dataclass(slots=True)
@@ -218,6 +231,9 @@ class _Rows:
             return self.memory[start, cell.text]
         try:
             node = _parser().parse(cell.text, start=start)
+            if _deep_in(node):
+                self.found.append(screen.too_deep(self.source, cell.start, cell.end))
+                return None
             parsed = Build("", Comments(Source("", "")), None).cell(node)
         except lark.UnexpectedInput as error:
             self.found.append(_syntax_error(error, self.source.name, cell.start, cell.end, cell.text))

@@ -12,9 +12,7 @@ from rcsc.source import Source, Span
 MOST_CHARACTERS = 16 * 1024 * 1024
 DEEPEST = 100
 
-_TOKEN = re.compile(
-    r'#[^\r\n]*|^[ \t]*\|[^\r\n]*|"[^"\\\n]*"|[(\[{)\]}]|\b(?:not|implies|else)\b|[|;:,]|-', re.MULTILINE
-)
+_TOKEN = re.compile(r'#[^\r\n]*|"[^"\\\n]*"|[(\[{)\]}]')
 _DECLARATION = re.compile(
     r"^[ \t]*(?:use|unit|const|enum|type|record|input|state|output|assume|invariant|procedure|module|extern"
     r"|owner|table|level)\b",
@@ -32,39 +30,27 @@ def refuse(source: Source) -> tuple[Diagnostic, ...]:
         return (_error(Code.NUL_BYTE, "the text contains a NUL character", source, nul, nul + 1),)
     deep = _too_deep(text)
     if deep is not None:
-        return (
-            _error(
-                Code.TOO_DEEP, f"expressions and blocks nest more than {DEEPEST} deep", source, deep, deep + 1
-            ),
-        )
+        return (too_deep(source, deep, deep + 1),)
     return ()
 
 
 def _too_deep(text: str) -> int | None:
-    """The offset at which brackets, or a chain of prefix operators, nest too deep."""
-    depth = chain = 0
-    row = re.compile(r"[(\[{)\]}]|\b(?:not|implies)\b|-|[|;,]")
+    """The offset at which brackets nest too deep; operators and blocks are counted in what was parsed."""
+    depth = 0
     for match in _TOKEN.finditer(text):
-        word = match.group()
-        inner = row.finditer(text, match.start(), match.end()) if word.lstrip().startswith("|") else (match,)
-        for part in inner:
-            token = part.group()
-            if token in "([{":
-                depth += 1
-            elif token in ")]}":
-                depth = max(0, depth - 1)
-                chain = (
-                    0
-                    if token == "}" and not text[part.end() : part.end() + 8].strip().startswith("else")
-                    else chain
-                )
-            elif token in ("not", "implies", "-", "else"):
-                chain += 1
-            elif token in ";:,|":
-                chain = 0
-            if depth > DEEPEST or chain > DEEPEST:
-                return part.start()
+        token = match.group()
+        if token in "([{":
+            depth += 1
+        elif token in ")]}":
+            depth = max(0, depth - 1)
+        if depth > DEEPEST:
+            return match.start()
     return None
+
+
+def too_deep(source: Source, start: int, end: int) -> Diagnostic:
+    """That what stands from `start` to `end` has expressions, types or blocks within each other too deep."""
+    return _error(Code.TOO_DEEP, f"expressions and blocks nest more than {DEEPEST} deep", source, start, end)
 
 
 def blank_before(text: str, offset: int) -> str:

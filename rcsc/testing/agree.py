@@ -2,8 +2,8 @@
 
 In: a program, its executors, sessions. Out: the first disagreement of a session, and what was compared. The
 complete state is compared after every cycle, and each executor carries its own from cycle to cycle. Where a
-table's assumptions do not hold, nothing is claimed of its procedures and the session ends before that cycle;
-its matcher is compared there all the same (`Lines`).
+table's assumptions do not hold, nothing is claimed of its procedures and the session ends with that cycle: it
+is run and compared (the monitors too) only where the interpreter does nothing undefined in it.
 """
 
 from collections import Counter
@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from rcsc.interpret import Fault, Outcome, cycle, holds, matching_lines, run_table
-from rcsc.model import LineName, Program, Snapshot, Table, Value
+from rcsc.model import LineName, Program, Snapshot, Table, Value, key_bounds, value_of_key
 from rcsc.testing.native import Native, Result
 from rcsc.testing.reference_file import all_lines, monitored
 from rcsc.testing.sessions import Seen, Session, differences
@@ -44,6 +44,7 @@ class Compared:
     """What was compared so far.
 
     Attributes:
+        broken: Cycles in which an assumption did not hold.
         lines: By table, how often each line was taken by a step or cycle that all executors agreed on.
         kept: Sessions that ran, for the sanitized program.
         matched: Snapshots that the matchers were given.
@@ -52,6 +53,7 @@ class Compared:
     sessions: int = 0
     cycles: int = 0
     matches: int = 0
+    broken: int = 0
     faults: Counter[int] = field(default_factory=Counter)
     lines: dict[str, Counter[str]] = field(default_factory=dict)
     kept: list[tuple[int, Session, list[Seen]]] = field(default_factory=list)
@@ -122,6 +124,50 @@ def seen_in_c(program: Program, native: Native, result: Result) -> Seen:
 def rows_of(session: Session) -> list[Snapshot]:
     """One row a cycle for the shim: the start with that cycle's readings."""
     return [{**session.start, **readings} for readings in session.readings]
+
+
+def broken_cycle(
+    executors: Executors, target: Target, session: Session, good: Session, compared: Compared
+) -> Disagreement | None:
+    """The cycle after `good`, in which an assumption does not hold; see the module.
+
+    Args:
+        executors: Of the program.
+        target: A step or a cycle.
+        session: The whole session.
+        good: What `within` left of it.
+        compared: Counts what was compared.
+    """
+    program, meaning, state = executors.program, interpreter(executors.program, target), session.start
+    if len(good.readings) == len(session.readings):
+        return None
+    for readings in good.readings:
+        state = meaning({**state, **readings}).snapshot
+    one = Session(state, (session.readings[len(good.readings)],))
+    try:
+        outcome = meaning({**state, **one.readings[0]})
+    except (ZeroDivisionError, IndexError, KeyError, OverflowError, ValueError):
+        return None  # undefined, and excluded by the assumption
+    if not in_range(program, outcome.snapshot):
+        return None
+    right = seen_by_interpreter(outcome)
+    [row] = executors.native.run(executors.number(target), False, rows_of(one))
+    others = {"C": seen_in_c(program, executors.native, row), "Python": executors.python.run(target, one)[0]}
+    for name, seen in others.items():
+        words = differences(program, right, seen)
+        if words:
+            return Disagreement(name, target.function, 1, one, words)
+    compared.broken += 1
+    return None
+
+
+def in_range(program: Program, snapshot: Snapshot) -> bool:
+    """Whether every leaf lies in its declared range."""
+    for variable in program.variables:
+        low, high = (value_of_key(variable.type, key) for key in key_bounds(variable.type))
+        if not low <= snapshot[variable.name] <= high:
+            return False
+    return True
 
 
 def within(executors: Executors, target: Target, session: Session) -> Session:

@@ -80,6 +80,8 @@ def python_stand_ins(program: Program) -> Iterator[None]:
             if not getattr(sys.modules.get(name), "rcsc_stand_in", False):
                 sys.modules[name] = ModuleType(name)
                 sys.modules[name].rcsc_stand_in = True  # type: ignore[attr-defined]  # a mark of ours
+                if at > 1:
+                    setattr(sys.modules[".".join(parts[: at - 1])], parts[at - 1], sys.modules[name])
         setattr(sys.modules[module_name], function, python_function(program, procedure))
     try:
         yield

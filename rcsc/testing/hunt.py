@@ -4,6 +4,8 @@ In: executors, a target, how many examples. Out: a disagreement, or None. Import
 since it brings Hypothesis.
 """
 
+from collections.abc import Callable, Iterator
+
 from hypothesis import HealthCheck, Phase, Verbosity, assume, given, settings
 from hypothesis import strategies as st
 
@@ -12,6 +14,7 @@ from rcsc.testing.agree import (
     Compared,
     Disagreement,
     Executors,
+    broken_cycle,
     keeps_invariants,
     run_lines,
     run_session,
@@ -32,7 +35,7 @@ def _settings(examples: int) -> settings:
         derandomize=True,
         database=None,
         deadline=None,
-        phases=(Phase.generate, Phase.shrink),
+        phases=(Phase.generate,),
         suppress_health_check=list(HealthCheck),
         verbosity=Verbosity.quiet,
         print_blob=False,
@@ -64,16 +67,23 @@ def hunt_sessions(
     program = executors.program
     found: list[Disagreement] = []
 
+    def differs(session: Session) -> Disagreement | None:
+        if not keeps_invariants(program, session):
+            return None
+        good = within(executors, target, session)
+        found = run_session(executors, target, good, compared) if good.readings else None
+        return found or broken_cycle(executors, target, session, good, compared)
+
     @_settings(examples)
     @given(sessions(declarations(program), table_of(program, target), most_cycles))
     def check(session: Session) -> None:
         assume(keeps_invariants(program, session))
-        disagreement = run_session(executors, target, within(executors, target, session), compared)
-        if disagreement is not None:
+        if (disagreement := differs(session)) is not None:
             found.append(disagreement)
             raise _FoundError
 
-    return _run(check, found)
+    first = _run(check, found)
+    return None if first is None else simplest(program, first, differs)
 
 
 def hunt_lines(
@@ -84,6 +94,9 @@ def hunt_lines(
     found: list[Disagreement] = []
     one = snapshots(declarations(program), table_of(program, target))
 
+    def differs(session: Session) -> Disagreement | None:
+        return run_lines(executors, target, [session.start], compared)
+
     @_settings(max(1, examples // 8))
     @given(st.lists(one, min_size=1, max_size=8))
     def check(drawn: list[dict[str, bool | int | float]]) -> None:
@@ -92,7 +105,32 @@ def hunt_lines(
             found.append(disagreement)
             raise _FoundError
 
-    return _run(check, found)
+    first = _run(check, found)
+    return None if first is None else simplest(program, first, differs)
+
+
+def simplest(
+    program: Program, found: Disagreement, differs: Callable[[Session], Disagreement | None]
+) -> Disagreement:
+    """A disagreement with as few cycles, and as few values that are not initial, as can be had one by one."""
+    for session in _shorter(found):
+        found = differs(session) or found
+    for variable in program.variables:
+        name = str(variable.name)
+        start = {**found.session.start, name: variable.initial}
+        changed = tuple({**r, name: variable.initial} if name in r else r for r in found.session.readings)
+        found = differs(Session(start, changed)) or found
+    return found
+
+
+def _shorter(found: Disagreement) -> Iterator[Session]:
+    """The session cut after the cycle that differs, then its last cycles alone."""
+    session = found.session
+    kept = session.readings[: found.cycle]
+    yield Session(session.start, kept)
+    for count in (4, 2, 1):
+        if count < len(kept):
+            yield Session(session.start, kept[-count:])
 
 
 def _run(check: object, found: list[Disagreement]) -> Disagreement | None:

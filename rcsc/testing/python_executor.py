@@ -17,6 +17,9 @@ from rcsc.testing.sessions import Seen, Session
 from rcsc.testing.symbols import Symbols
 from rcsc.testing.targets import Target
 
+RAISED = -1
+"""Stands for a fault code where the executor raised an exception, which none may."""
+
 
 @dataclass(frozen=True, slots=True)
 class PythonExecutor:
@@ -55,7 +58,10 @@ class PythonExecutor:
         found = []
         for readings in session.readings:
             self.put(state, readings)
-            found.append(self.seen(function(state), state))
+            try:
+                found.append(self.seen(function(state), state))
+            except Exception as error:  # noqa: BLE001  # whatever it raises is a finding
+                found.append(Seen(RAISED, f"raised {error!r}", -1, (), self.leaves(state)))
         return found
 
     def seen(self, fault: int, state: Any) -> Seen:

@@ -11,12 +11,28 @@ from random import Random
 from hypothesis import strategies as st
 from hypothesis.strategies import DrawFn, SearchStrategy
 
-from rcsc.model import Kind, Line, Program, Snapshot, Table, Value, Variable, key_bounds, value_of_key
+from rcsc.interpret import evaluate
+from rcsc.model import (
+    Kind,
+    Line,
+    Program,
+    Snapshot,
+    Standing,
+    Table,
+    Value,
+    Variable,
+    key_bounds,
+    value_of_key,
+)
+from rcsc.resolve.leaves import read_by
 from rcsc.testing.edges import companions, leaf_edges, outside
 from rcsc.testing.sessions import Session
 
+BROKEN = 0.2  # how often a monitored assumption is aimed at, to break it
+TRIES = 40  # values of what an assumption reads, of which the first that break it are taken
+BETWEEN = 0.15  # how often a value may lie anywhere in its range
 BESIDE = 0.4  # how often a value is taken from a leaf that it is compared with
-DRAWN = 48  # leaves drawn one by one; the others of a larger program follow from one drawn seed
+MOST_DRAWN = 3  # leaves of a snapshot that are drawn one by one
 
 
 @dataclass(slots=True)
@@ -26,17 +42,11 @@ class Declarations:
     program: Program
     edges: dict[str, tuple[int, ...]]
     near: dict[str, tuple[str, ...]]
-    first: tuple[str, ...]
-
-    def order(self) -> list[Variable]:
-        """Leaves with the test variables first, so that they are drawn one by one."""
-        return sorted(self.program.variables, key=lambda v: v.name not in self.first)
 
 
 def declarations(program: Program) -> Declarations:
-    """Edges of every leaf, and which leaves tables test."""
-    first = tuple(str(name) for table in program.tables for name in table.variables)
-    return Declarations(program, leaf_edges(program), companions(program), first)
+    """Edges of every leaf, and what it is compared with."""
+    return Declarations(program, leaf_edges(program), companions(program))
 
 
 def keys(variable: Variable, edges: Sequence[int]) -> SearchStrategy[int]:
@@ -58,17 +68,46 @@ def _aim(known: Declarations, line: Line, drawn: dict[str, int], random: Random)
                 drawn[name] = random.choice(inside or [low, high])
 
 
-def _draw_keys(draw: DrawFn, known: Declarations) -> dict[str, int]:
-    drawn: dict[str, int] = {}
-    random = Random(draw(st.integers(0, 2**32 - 1)))  # noqa: S311  # drawn, so that it can be replayed
-    for number, variable in enumerate(known.order()):
-        edges, name = known.edges[variable.name], str(variable.name)
-        drawn[name] = draw(keys(variable, edges)) if number < DRAWN else random.choice(edges)
+def _break(known: Declarations, drawn: dict[str, int], random: Random) -> None:
+    """Moves the drawn keys to where some monitored assumption is false, if such a place is met."""
+    program = known.program
+    monitored = [a for a in program.assumptions if a.standing is Standing.MONITORED]
+    if not monitored:
+        return
+    condition = random.choice(monitored).condition
+    read = [v for v in program.variables if v.name in set(read_by(condition))]
+    for _ in range(TRIES):
+        tried = drawn | {str(v.name): random.choice(known.edges[v.name]) for v in read}
+        values = {str(v.name): value_of_key(v.type, tried[v.name]) for v in read}
+        try:
+            if not evaluate(condition, values):
+                drawn.update(tried)
+                return
+        except (ZeroDivisionError, IndexError, OverflowError):
+            continue
+
+
+def _scattered(known: Declarations, random: Random) -> dict[str, int]:
+    """A key for every leaf: mostly edges, some values between them, some beside a leaf it is compared with."""
+    found: dict[str, int] = {}
+    for variable in known.program.variables:
+        name, edges = str(variable.name), known.edges[variable.name]
         low, high = key_bounds(variable.type)
-        beside = [drawn[other] for other in known.near.get(name, ()) if other in drawn]
-        if beside and random.random() < BESIDE:  # equal to a leaf it is compared with, or next to it
-            drawn[name] = min(high, max(low, random.choice(beside) + random.choice((-1, 0, 1))))
-    return drawn
+        found[name] = random.randint(low, high) if random.random() < BETWEEN else random.choice(edges)
+        beside = [found[other] for other in known.near.get(name, ()) if other in found]
+        if beside and random.random() < BESIDE:
+            found[name] = min(high, max(low, random.choice(beside) + random.choice((-1, 0, 1))))
+    if random.random() < BROKEN:
+        _break(known, found, random)
+    return found
+
+
+def _draw_keys(draw: DrawFn, known: Declarations) -> dict[str, int]:
+    """All leaves from one drawn seed, then a few drawn one by one: a draw for each leaf costs too much."""
+    found = _scattered(known, Random(draw(st.binary(min_size=8, max_size=8))))  # noqa: S311  # drawn, so repeatable
+    for variable in draw(st.lists(st.sampled_from(known.program.variables), max_size=MOST_DRAWN)):
+        found[variable.name] = draw(keys(variable, known.edges[variable.name]))
+    return found
 
 
 @st.composite

@@ -1,0 +1,121 @@
+"""Programs for the tests of what is generated, and their generated files."""
+
+from pathlib import Path
+
+from rcsc.emit.c99 import emit_c
+from rcsc.emit.python import emit_python
+from rcsc.lower import lower
+from rcsc.model import Program, ProvedProgram, seal_of_proof
+from rcsc.project import load
+from rcsc.resolve import compile_text, resolve
+
+SHIPPED = ("tables/task/acquire.rcs", "tables/examples/approach.rcs")
+
+RICH = """
+enum mode { idle, run, stop }
+type level = int -5 .. 200
+record report {
+  echo : int 0 .. 9
+  force : real -1.5 .. 8.0
+}
+input mode_in : mode
+input width : int 0 .. 100 clamp
+input far : int -3000000000 .. 3000000000
+input huge : int 0 .. 18446744073709551615
+input force : real -2.0 .. 2.0 clamp
+input status : report
+input at : int 0 .. 3
+state phase : mode = idle deferred until status.echo = count
+state count : int 0 .. 9
+state kept : array[4] of int 0 .. 1000
+state smooth : real -4.0 .. 4.0
+output speed : level
+output total : int 0 .. 4000
+output big : int 0 .. 18446744073709551615
+
+assume narrow monitored : mode_in = stop implies width < 100
+assume calm assumed : mode_in = stop implies far < 2999999999
+
+procedure add(by : int 0 .. 10) {
+  if kept[at] <= 990 { kept[at] := kept[at] + by } else { kept[at] := 0 }
+  total := 0
+  for i in 0 .. 3 { total := min(total + kept[i], 4000) }
+}
+procedure turn {
+  local half : real -2.0 .. 2.0 := force / 2.0
+  smooth := max(-4.0, min(4.0, smooth * 0.5 + half))
+  case mode_in { idle { next phase := run } run, stop { next phase := stop } }
+  count := (count + 1) mod 10
+}
+procedure measure {
+  speed := int(abs(force) * 10.0) - 5
+  big := huge / 3 + huge mod 3
+}
+module sense reads far, width writes speed {
+  if far > 2147483648 { speed := 200 } else if far / 7 < -300000000 { speed := -5 } else { speed := width }
+}
+
+table work assuming narrow, calm {
+  | line | mode_in | phase   | width   | force  | when                 || procedures         | speed |
+  | a    | idle    | /= stop | < 10    |        |                      || add(3); turn       | 1     |
+  | b    | idle    | /= stop | >= 10   | < 0.0  |                      || turn               |       |
+  | c    | idle    | /= stop | >= 10   | >= 0.0 | far > 5 or width = 7 || add(10)            | -5    |
+  | d    | run     |         |         |        | huge > 9223372036854775807 || measure      |       |
+  | e    | run     |         |         |        | not (huge > 9223372036854775807) || turn; add(1) | width |
+  | f    | stop    |         | 0 .. 98 |        | at /= 3              || add(0)             | 0     |
+  | g    | DEFAULT |         |         |        |                      || measure; turn      | 9     |
+}
+table rest {
+  | line | width || procedures | speed |
+  | 1    | < 50  || turn       |       |
+  | 2    | >= 50 ||            | width |
+}
+level top {
+  period 40 [ms]
+  preprocess sense
+  table by mode_in { idle : work  run : work  stop : rest }
+  postprocess turn
+}
+"""
+
+EXTERN = """
+input part : int 0 .. 99
+input force : real 0.0 .. 10.0
+state height : int 0 .. 300
+state kind : int -7 .. 5
+state pull : real -1.0 .. 1.0
+extern procedure look_up(times : int 0 .. 5) reads part, force writes height, kind, pull
+  python "parts.database:height" c "parts_height"
+procedure twice { look_up(2); if kind < 0 { look_up(1) }; height := 0 }
+table t {
+  | line | part  || procedures        | height |
+  | 1    | < 50  || look_up(3)        |        |
+  | 2    | >= 50 || twice; look_up(0) | 7      |
+}
+level top {
+  period 10 [ms]
+  preprocess twice
+  table t
+}
+"""
+
+
+def program_of(text: str) -> Program:
+    """The program of a lone text."""
+    program = compile_text(text)
+    assert isinstance(program, Program), [(d.code, d.message) for d in program]
+    return program
+
+
+def shipped(path: str, repo: Path) -> Program:
+    """The program of a file of the repository."""
+    loaded = load([str(repo / path)])
+    program = resolve(loaded.roots[0], loaded)
+    assert isinstance(program, Program), program
+    return program
+
+
+def emitted(program: Program) -> dict[str, str]:
+    """Its generated files; these tests are about emission, so that the proof is taken as given."""
+    plan = lower(ProvedProgram(program, (), seal_of_proof()))
+    return emit_c(plan) | emit_python(plan)
