@@ -1,7 +1,6 @@
 """A proved program to a `Plan`: classes, masks and their grouping."""
 
 import os
-from math import prod
 
 from rcsc.model import (
     Bool,
@@ -17,10 +16,29 @@ from rcsc.model import (
     key_bounds,
     value_of_key,
 )
-from rcsc.plan import WORD, Cuts, Direct, Index, Matcher, Plan, PlanLine, PlanTable, Probe, Truth
+from rcsc.plan import (
+    WORD,
+    Coded,
+    Cuts,
+    Direct,
+    Index,
+    Matcher,
+    Plan,
+    PlanLine,
+    PlanTable,
+    Probe,
+    Truth,
+    grouped,
+)
 
 MOST_DIRECT = 256
+"""Keys of a leaf up to which each has a mask of its own."""
+MOST_CODED = 4096
+"""Keys of a leaf up to which its class is looked up; past them it is searched for."""
+FEW_CUTS = 2
+"""Cuts up to which comparing is cheaper than looking up."""
 MOST_GROUPED = 512
+"""Combinations of classes up to which leaves share a table of masks."""
 
 
 def lower(proved: ProvedProgram, root: str = "") -> Plan:
@@ -68,9 +86,8 @@ def _matcher(program: Program, table: Table) -> Matcher:
     everyone = (1 << len(table.lines)) - 1
     probes = [_leaf_probe(variables[name], stated, everyone) for name, stated in _declared(table, by_leaf)]
     probes += [_test_probe(test, lines, everyone) for test, lines in relational.values()]
-    if len(table.lines) > WORD:
-        probes = _grouped(probes)
-    return Matcher(len(table.lines), table.default is not None, tuple(probes))
+    groups = grouped(probes, MOST_GROUPED) if len(table.lines) > WORD else tuple((one,) for one in probes)
+    return Matcher(len(table.lines), table.default is not None, groups)
 
 
 def _declared(
@@ -82,47 +99,38 @@ def _declared(
 def _leaf_probe(variable: Variable, stated: list[tuple[int, Box]], everyone: int) -> Probe:
     """The masks of one leaf: for each class the lines whose boxes contain it."""
     low, high = key_bounds(variable.type)
-    small = isinstance(variable.type, Bool | Enum) or high - low < MOST_DIRECT
     index: Index
-    if small and not isinstance(variable.type, Real):
+    if not isinstance(variable.type, Real) and (
+        isinstance(variable.type, Bool | Enum) or (high - low < MOST_DIRECT and everyone.bit_length() <= WORD)
+    ):
         starts = list(range(low, high + 1))
         index = Direct(variable.name, variable.type, low, len(starts))
     else:
         edges = {edge for _, box in stated for first, last in box for edge in (first, last + 1)}
         cuts = sorted(edge for edge in edges if low < edge <= high)
         starts = [low, *cuts]
-        values = tuple(value_of_key(variable.type, cut) for cut in cuts)
-        index = Cuts(variable.name, variable.type, values)
+        if len(cuts) > FEW_CUTS and high - low < MOST_CODED and not isinstance(variable.type, Real):
+            ends = [*cuts, high + 1]
+            classes = [
+                at
+                for at, (start, end) in enumerate(zip(starts, ends, strict=True))
+                for _ in range(start, end)
+            ]
+            index = Coded(variable.name, variable.type, low, tuple(classes))
+        else:
+            index = Cuts(
+                variable.name, variable.type, tuple(value_of_key(variable.type, cut) for cut in cuts)
+            )
     excluded = [0] * len(starts)
     for at, box in stated:
         bit = 1 << at
         for place, start in enumerate(starts):
             if not any(first <= start <= last for first, last in box):
                 excluded[place] |= bit
-    return Probe((index,), tuple(everyone & ~mask for mask in excluded))
+    return Probe(index, tuple(everyone & ~mask for mask in excluded))
 
 
 def _test_probe(test: Test, lines: list[int], everyone: int) -> Probe:
     """The masks of one test: without it, the lines that do not state it."""
     stating = sum(1 << at for at in set(lines))
-    return Probe((Truth(test.condition, test.text),), (everyone & ~stating, everyone))
-
-
-def _grouped(probes: list[Probe]) -> list[Probe]:
-    """Probes joined while their classes together stay few: fewer masks to load, larger tables."""
-    bins: list[list[Probe]] = []
-    for probe in sorted(probes, key=lambda one: -len(one.masks)):
-        for group in bins:
-            if prod(len(one.masks) for one in group) * len(probe.masks) <= MOST_GROUPED:
-                group.append(probe)
-                break
-        else:
-            bins.append([probe])
-    return [_joined(group) for group in bins]
-
-
-def _joined(group: list[Probe]) -> Probe:
-    masks = group[0].masks
-    for probe in group[1:]:
-        masks = tuple(one & two for one in masks for two in probe.masks)
-    return Probe(tuple(index for probe in group for index in probe.indices), masks)
+    return Probe(Truth(test.condition, test.text), (everyone & ~stating, everyone))

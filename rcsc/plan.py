@@ -4,7 +4,9 @@ A matcher is a conjunction of look-ups: each *probe* finds the class of one leaf
 several leaves together), and the class's mask has a bit for each line that it does not exclude.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+from math import prod
 from typing import TypeAlias
 
 from rcsc.model import Action, Expr, LineName, Program, Scalar, Table, VariableName
@@ -37,6 +39,21 @@ class Cuts:
 
 
 @dataclass(frozen=True, slots=True)
+class Coded:
+    """The class of a leaf is looked up by its key less `low`."""
+
+    leaf: VariableName
+    type: Scalar
+    low: int
+    classes: tuple[int, ...]
+
+    @property
+    def count(self) -> int:
+        """How many classes there are."""
+        return max(self.classes) + 1
+
+
+@dataclass(frozen=True, slots=True)
 class Truth:
     """The class is 1 where the condition holds, else 0."""
 
@@ -45,19 +62,23 @@ class Truth:
     count: int = 2
 
 
-Index: TypeAlias = Direct | Cuts | Truth
+Index: TypeAlias = Direct | Coded | Cuts | Truth
 
 
 @dataclass(frozen=True, slots=True)
 class Probe:
-    """Several indices taken together, in mixed radix, the last one fastest.
+    """A class and what it leaves.
 
     Attributes:
-        masks: One mask (an integer, bit k for line k) for each combination of classes.
+        masks: For each class a mask: bit k is set where line k does not exclude it.
     """
 
-    indices: tuple[Index, ...]
+    index: Index
     masks: tuple[int, ...]
+
+
+Group: TypeAlias = tuple[Probe, ...]
+"""Probes that share a table: their classes are taken together, in mixed radix, the last one fastest."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,12 +92,33 @@ class Matcher:
 
     lines: int
     default: bool
-    probes: tuple[Probe, ...]
+    groups: tuple[Group, ...]
 
     @property
     def words(self) -> int:
         """Machine words of 64 lines in a mask."""
         return (self.lines + WORD - 1) // WORD
+
+
+def joined(group: Group) -> tuple[int, ...]:
+    """The masks of a group: one for each combination of classes."""
+    masks = group[0].masks
+    for probe in group[1:]:
+        masks = tuple(one & two for one in masks for two in probe.masks)
+    return masks
+
+
+def grouped(probes: Iterable[Probe], most: int) -> tuple[Group, ...]:
+    """Probes joined while their classes together are at most `most`: fewer masks to load, larger tables."""
+    bins: list[list[Probe]] = []
+    for probe in sorted(probes, key=lambda one: -len(one.masks)):
+        for group in bins:
+            if prod(len(one.masks) for one in group) * len(probe.masks) <= most:
+                group.append(probe)
+                break
+        else:
+            bins.append([probe])
+    return tuple(tuple(group) for group in bins)
 
 
 @dataclass(frozen=True, slots=True)

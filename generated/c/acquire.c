@@ -30,6 +30,18 @@ static inline int32_t acquire_bit32(uint32_t m)
 }
 #endif
 
+/* A value that was proved to fit. */
+static inline uint16_t acquire_u16_of_i64(int64_t a)
+{
+    return (uint16_t)a;
+}
+
+/* A value that was proved to fit. */
+static inline uint8_t acquire_u8_of_i64(int64_t a)
+{
+    return (uint8_t)a;
+}
+
 /* Section 8.3: a new number sets the flag; it falls when this level's own command is echoed. */
 static void acquire_do_receive(acquire_t *s)
 {
@@ -47,7 +59,7 @@ static void acquire_do_receive(acquire_t *s)
 static void acquire_do_send(acquire_t *s)
 {
     if (((int64_t)s->output_command != (int64_t)s->old_output_command)) {
-        s->inc_command_out = (uint16_t)(((int64_t)s->inc_command_out + INT64_C(1)) % INT64_C(65536));
+        s->inc_command_out = acquire_u16_of_i64((((int64_t)s->inc_command_out + INT64_C(1)) % INT64_C(65536)));
     }
     s->old_output_command = (uint8_t)(int64_t)s->output_command;
 }
@@ -111,25 +123,25 @@ static void acquire_do_remove_from_buffer_db(acquire_t *s)
             const int64_t subject = (int64_t)s->obj_ptr_in;
             if ((subject == INT64_C(1))) {
                 if (((int64_t)s->tbuffer_boxt > INT64_C(0))) {
-                    s->tbuffer_boxt = (uint8_t)((int64_t)s->tbuffer_boxt - INT64_C(1));
+                    s->tbuffer_boxt = acquire_u8_of_i64(((int64_t)s->tbuffer_boxt - INT64_C(1)));
                 } else {
                     acquire_do_buffer_empty(s);
                 }
             } else if ((subject == INT64_C(2))) {
                 if (((int64_t)s->bbuffer_boxb > INT64_C(0))) {
-                    s->bbuffer_boxb = (uint8_t)((int64_t)s->bbuffer_boxb - INT64_C(1));
+                    s->bbuffer_boxb = acquire_u8_of_i64(((int64_t)s->bbuffer_boxb - INT64_C(1)));
                 } else {
                     acquire_do_buffer_empty(s);
                 }
             } else if ((subject == INT64_C(3))) {
                 if (((int64_t)s->fbuffer_flag > INT64_C(0))) {
-                    s->fbuffer_flag = (uint8_t)((int64_t)s->fbuffer_flag - INT64_C(1));
+                    s->fbuffer_flag = acquire_u8_of_i64(((int64_t)s->fbuffer_flag - INT64_C(1)));
                 } else {
                     acquire_do_buffer_empty(s);
                 }
             } else if ((subject == INT64_C(4))) {
                 if (((int64_t)s->hbuffer_hous > INT64_C(0))) {
-                    s->hbuffer_hous = (uint8_t)((int64_t)s->hbuffer_hous - INT64_C(1));
+                    s->hbuffer_hous = acquire_u8_of_i64(((int64_t)s->hbuffer_hous - INT64_C(1)));
                 } else {
                     acquire_do_buffer_empty(s);
                 }
@@ -418,28 +430,38 @@ void acquire_init(acquire_t *s)
 int32_t acquire_acquire_line(const acquire_t *s)
 {
     /* The masks: bit k of an entry is set where line k does not exclude that class. */
-    static const uint32_t t0[6] = {
-        0xe10fu, 0xe220u, 0xe410u, 0xe840u, 0xf080u, 0xe000u
+    static const struct {
+        uint32_t t0[6];
+        uint32_t t1[3];
+        uint32_t t2[2];
+        uint32_t t3[2];
+        uint32_t t4[2];
+        uint32_t t5[6];
+        uint32_t t6[2];
+    } t = {
+        {
+            0xe10fu, 0xe220u, 0xe410u, 0xe840u, 0xf080u, 0xe000u
+        },
+        {
+            0xe000u, 0x21ffu, 0x3e00u
+        },
+        {
+            0xfffeu, 0xfff7u
+        },
+        {
+            0xfff6u, 0xfffbu
+        },
+        {
+            0xbff0u, 0x400fu
+        },
+        {
+            0xde2fu, 0xde4fu, 0xde1fu, 0xde8fu, 0xdf0fu, 0x600fu
+        },
+        {
+            0xfffdu, 0xfff2u
+        },
     };
-    static const uint32_t t1[3] = {
-        0xe000u, 0x21ffu, 0x3e00u
-    };
-    static const uint32_t t2[2] = {
-        0xfffeu, 0xfff7u
-    };
-    static const uint32_t t3[2] = {
-        0xfff6u, 0xfffbu
-    };
-    static const uint32_t t4[2] = {
-        0xbff0u, 0x400fu
-    };
-    static const uint32_t t5[6] = {
-        0xde2fu, 0xde4fu, 0xde1fu, 0xde8fu, 0xdf0fu, 0x600fu
-    };
-    static const uint32_t t6[2] = {
-        0xfffdu, 0xfff2u
-    };
-    const uint32_t m = (uint32_t)t0[s->ref_command_in] & (uint32_t)t1[s->status_in] & (uint32_t)t2[s->loc_of_obj] & (uint32_t)t3[(s->source_spec ? 1u : 0u)] & (uint32_t)t4[(s->new_command ? 1u : 0u)] & (uint32_t)t5[s->cur_state] & (uint32_t)t6[(s->obj_acquired ? 1u : 0u)];
+    const uint32_t m = (uint32_t)t.t0[s->ref_command_in] & (uint32_t)t.t1[s->status_in] & (uint32_t)t.t2[s->loc_of_obj] & (uint32_t)t.t3[(s->source_spec ? 1u : 0u)] & (uint32_t)t.t4[(s->new_command ? 1u : 0u)] & (uint32_t)t.t5[s->cur_state] & (uint32_t)t.t6[(s->obj_acquired ? 1u : 0u)];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = acquire_bit32(m | 0x10000u);
     line = several ? (-2) : line;

@@ -36,6 +36,18 @@ static inline int64_t approach_min_i64(int64_t a, int64_t b)
     return (a <= b) ? a : b;
 }
 
+/* A value that was proved to fit. */
+static inline uint16_t approach_u16_of_i64(int64_t a)
+{
+    return (uint16_t)a;
+}
+
+/* A value that was proved to fit. */
+static inline uint8_t approach_u8_of_i64(int64_t a)
+{
+    return (uint8_t)a;
+}
+
 /* Procedure smooth. */
 static void approach_do_smooth(approach_t *s)
 {
@@ -53,8 +65,8 @@ static void approach_do_full_speed(approach_t *s)
 static void approach_do_slow_down(approach_t *s)
 {
     int64_t v_left_mm = INT64_C(0);
-    v_left_mm = (int64_t)((int64_t)s->distance_mm - (int64_t)s->tolerance_mm);
-    s->speed_mm_s = (uint16_t)(INT64_C(50) + ((INT64_C(900) * v_left_mm) / (int64_t)s->braking_mm));
+    v_left_mm = ((int64_t)s->distance_mm - (int64_t)s->tolerance_mm);
+    s->speed_mm_s = approach_u16_of_i64((INT64_C(50) + ((INT64_C(900) * v_left_mm) / (int64_t)s->braking_mm)));
     s->settled = (uint8_t)INT64_C(0);
 }
 
@@ -62,7 +74,7 @@ static void approach_do_slow_down(approach_t *s)
 static void approach_do_settle(approach_t *s)
 {
     s->speed_mm_s = (uint16_t)INT64_C(0);
-    s->settled = (uint8_t)approach_min_i64(((int64_t)s->settled + INT64_C(1)), INT64_C(25));
+    s->settled = approach_u8_of_i64(approach_min_i64(((int64_t)s->settled + INT64_C(1)), INT64_C(25)));
 }
 
 /* Procedure stop. */
@@ -183,25 +195,34 @@ void approach_init(approach_t *s)
 int32_t approach_approach_line(const approach_t *s)
 {
     /* The masks: bit k of an entry is set where line k does not exclude that class. */
-    static const uint8_t t0[2] = {
-        0xeu, 0xfu
+    static const struct {
+        uint8_t t0[2];
+        uint8_t t1[2];
+        uint8_t t2[2];
+        uint8_t t3[2];
+        uint8_t t4[2];
+        uint8_t t5[2];
+    } t = {
+        {
+            0xeu, 0xfu
+        },
+        {
+            0x1u, 0xfu
+        },
+        {
+            0xdu, 0xfu
+        },
+        {
+            0x3u, 0xfu
+        },
+        {
+            0xbu, 0xfu
+        },
+        {
+            0x7u, 0xfu
+        },
     };
-    static const uint8_t t1[2] = {
-        0x1u, 0xfu
-    };
-    static const uint8_t t2[2] = {
-        0xdu, 0xfu
-    };
-    static const uint8_t t3[2] = {
-        0x3u, 0xfu
-    };
-    static const uint8_t t4[2] = {
-        0xbu, 0xfu
-    };
-    static const uint8_t t5[2] = {
-        0x7u, 0xfu
-    };
-    const uint32_t m = (uint32_t)t0[((s->force_n > s->limit_n) ? 1u : 0u)] & (uint32_t)t1[((s->force_n <= s->limit_n) ? 1u : 0u)] & (uint32_t)t2[((((int64_t)s->distance_mm - (int64_t)s->tolerance_mm) <= INT64_C(0)) ? 1u : 0u)] & (uint32_t)t3[((((int64_t)s->distance_mm - (int64_t)s->tolerance_mm) > INT64_C(0)) ? 1u : 0u)] & (uint32_t)t4[(((int64_t)s->distance_mm <= ((int64_t)s->tolerance_mm + (int64_t)s->braking_mm)) ? 1u : 0u)] & (uint32_t)t5[(((int64_t)s->distance_mm > ((int64_t)s->tolerance_mm + (int64_t)s->braking_mm)) ? 1u : 0u)];
+    const uint32_t m = (uint32_t)t.t0[((s->force_n > s->limit_n) ? 1u : 0u)] & (uint32_t)t.t1[((s->force_n <= s->limit_n) ? 1u : 0u)] & (uint32_t)t.t2[((((int64_t)s->distance_mm - (int64_t)s->tolerance_mm) <= INT64_C(0)) ? 1u : 0u)] & (uint32_t)t.t3[((((int64_t)s->distance_mm - (int64_t)s->tolerance_mm) > INT64_C(0)) ? 1u : 0u)] & (uint32_t)t.t4[(((int64_t)s->distance_mm <= ((int64_t)s->tolerance_mm + (int64_t)s->braking_mm)) ? 1u : 0u)] & (uint32_t)t.t5[(((int64_t)s->distance_mm > ((int64_t)s->tolerance_mm + (int64_t)s->braking_mm)) ? 1u : 0u)];
     const bool several = (m & (m - 0x1u)) != 0x0u;
     int32_t line = approach_bit32(m | 0x10u);
     line = (m == 0x0u) ? (-1) : line;

@@ -3,7 +3,9 @@
 
 from bisect import bisect_right as _bisect
 from enum import IntEnum
+from functools import reduce as _reduce
 from itertools import product as _product
+from operator import and_ as _and
 
 
 class task_command(IntEnum):
@@ -214,12 +216,12 @@ def _line_of(m, lines, default):
     return m.bit_length() - 1 if m & (m - 1) == 0 else -2
 
 
+def _joined(*several):
+    return tuple(_reduce(_and, masks) for masks in _product(*several))
+
+
 def _lines_of(masks, lines, default):
-    for classes in _product(*masks):
-        m = (1 << lines) - 1
-        for mask in classes:
-            m &= mask
-        yield _line_of(m, lines, default)
+    return tuple(_line_of(m, lines, default) for m in masks)
 
 
 _ACQUIRE_0 = (
@@ -260,7 +262,7 @@ _ACQUIRE_6 = (
     0xfff2,
 )
 _ACQUIRE_LINE = (
-    *_lines_of((_ACQUIRE_0, _ACQUIRE_1, _ACQUIRE_2, _ACQUIRE_3, _ACQUIRE_4, _ACQUIRE_5, _ACQUIRE_6,), 16, True),
+    *_lines_of(_joined(_ACQUIRE_0, _ACQUIRE_5, _ACQUIRE_1, _ACQUIRE_2, _ACQUIRE_3, _ACQUIRE_4, _ACQUIRE_6), 16, True),
 )
 
 
@@ -463,7 +465,7 @@ def _settle(s):
 
 def acquire_line(s):
     """The line of table acquire that matches admitted inputs: its position; -1 none, -2 several."""
-    return _ACQUIRE_LINE[((((((s.ref_command_in) * 3 + s.status_in) * 2 + s.loc_of_obj) * 2 + s.source_spec) * 2 + s.new_command) * 6 + s.cur_state) * 2 + s.obj_acquired]
+    return _ACQUIRE_LINE[s.ref_command_in * 288 + s.cur_state * 48 + s.status_in * 16 + s.loc_of_obj * 8 + s.source_spec * 4 + s.new_command * 2 + s.obj_acquired]
 
 
 def acquire_lines(states):

@@ -3,7 +3,9 @@
 
 from bisect import bisect_right as _bisect
 from enum import IntEnum
+from functools import reduce as _reduce
 from itertools import product as _product
+from operator import and_ as _and
 
 
 class task_command(IntEnum):
@@ -172,12 +174,12 @@ def _line_of(m, lines, default):
     return m.bit_length() - 1 if m & (m - 1) == 0 else -2
 
 
+def _joined(*several):
+    return tuple(_reduce(_and, masks) for masks in _product(*several))
+
+
 def _lines_of(masks, lines, default):
-    for classes in _product(*masks):
-        m = (1 << lines) - 1
-        for mask in classes:
-            m &= mask
-        yield _line_of(m, lines, default)
+    return tuple(_line_of(m, lines, default) for m in masks)
 
 
 _APPROACH_0 = (
@@ -203,6 +205,9 @@ _APPROACH_4 = (
 _APPROACH_5 = (
     0x7,
     0xf,
+)
+_APPROACH_LINE = (
+    *_lines_of(_joined(_APPROACH_0, _APPROACH_1, _APPROACH_2, _APPROACH_3, _APPROACH_4, _APPROACH_5), 4, False),
 )
 
 
@@ -273,8 +278,7 @@ def _settle(s):
 
 def approach_line(s):
     """The line of table approach that matches admitted inputs: its position; -1 none, -2 several."""
-    m = _APPROACH_0[(s.force_n > s.limit_n)] & _APPROACH_1[(s.force_n <= s.limit_n)] & _APPROACH_2[((s.distance_mm - s.tolerance_mm) <= 0)] & _APPROACH_3[((s.distance_mm - s.tolerance_mm) > 0)] & _APPROACH_4[(s.distance_mm <= (s.tolerance_mm + s.braking_mm))] & _APPROACH_5[(s.distance_mm > (s.tolerance_mm + s.braking_mm))]
-    return m.bit_length() - 1 if m and not m & (m - 1) else _line_of(m, 4, False)
+    return _APPROACH_LINE[((s.force_n > s.limit_n)) * 32 + ((s.force_n <= s.limit_n)) * 16 + (((s.distance_mm - s.tolerance_mm) <= 0)) * 8 + (((s.distance_mm - s.tolerance_mm) > 0)) * 4 + ((s.distance_mm <= (s.tolerance_mm + s.braking_mm))) * 2 + ((s.distance_mm > (s.tolerance_mm + s.braking_mm)))]
 
 
 def approach_lines(states):

@@ -27,7 +27,7 @@ from rcsc.model import (
     key_bounds,
     pending,
 )
-from rcsc.plan import WORD, Cuts, Direct, Index, Matcher, Plan, PlanTable, Probe, Truth
+from rcsc.plan import WORD, Coded, Cuts, Direct, Group, Index, Matcher, Plan, PlanTable, Truth, joined
 from rcsc.resolve.leaves import everything
 
 
@@ -176,6 +176,9 @@ class _Maker:
     def _helpers(self) -> Iterator[Function]:
         types = {"i64": "int64_t", "u64": "uint64_t", "f64": "double"}
         for name in sorted(self.text.helpers):
+            if "_of_" in name:
+                yield self._conversion(name)
+                continue
             op, short = name.split("_")
             kind = types[short]
             if op == "abs":
@@ -188,6 +191,19 @@ class _Maker:
                 body = f"    return (a {sign} b) ? a : b;"
                 yield Function(f"The {word} of two.", f"{kind} {self.p}_{name}({kind} a, {kind} b)", (body,))
         yield from self.cuts
+
+    def _conversion(self, name: str) -> Function:
+        types = {"f64": "double"} | {
+            f"{sign}{bits}": f"{'u' if sign == 'u' else ''}int{bits}_t"
+            for sign in "iu"
+            for bits in (8, 16, 32, 64)
+        }
+        target, source = (types[short] for short in name.split("_of_"))
+        return Function(
+            "A value that was proved to fit.",
+            f"{target} {self.p}_{name}({source} a)",
+            (f"    return ({target})a;",),
+        )
 
     # --- procedures ---
 
@@ -335,33 +351,41 @@ class _Maker:
 
     def _match(self, table: PlanTable, name: str) -> Iterator[str]:
         matcher = table.matcher
-        yield "    /* The masks: bit k of an entry is set where line k does not exclude that class. */"
-        for at, probe in enumerate(matcher.probes):
-            yield from self._masks(matcher, at, probe)
-        indices = [self._index(probe, f"{name}_{at}") for at, probe in enumerate(matcher.probes)]
+        if matcher.groups:
+            yield "    /* The masks: bit k of an entry is set where line k does not exclude that class. */"
+            yield from self._masks(matcher)
+        indices = [self._index(group, f"{name}_{at}") for at, group in enumerate(matcher.groups)]
         if matcher.words <= 1:
             yield from self._one_word(matcher, indices)
         else:
             yield from self._many_words(matcher, indices)
 
-    def _masks(self, matcher: Matcher, at: int, probe: Probe) -> Iterator[str]:
-        bits = _width(matcher.lines)
-        if matcher.words <= 1:
-            yield f"    static const uint{bits}_t t{at}[{len(probe.masks)}] = {{"
-            yield from _wrapped([_word(mask, bits) for mask in probe.masks])
-            yield "    };"
-            return
-        yield f"    static const uint64_t t{at}[{len(probe.masks)}][{matcher.words}] = {{"
-        for mask in probe.masks:
-            words = [_word(mask >> (WORD * w) & (2**WORD - 1), 64) for w in range(matcher.words)]
-            yield f"        {{ {', '.join(words)} }},"
+    @staticmethod
+    def _masks(matcher: Matcher) -> Iterator[str]:
+        """All tables of masks as one object: one address to load."""
+        bits = _width(matcher.lines) if matcher.words <= 1 else WORD
+        words = "" if matcher.words <= 1 else f"[{matcher.words}]"
+        masks = [joined(group) for group in matcher.groups]
+        yield "    static const struct {"
+        for at, entries in enumerate(masks):
+            yield f"        uint{bits}_t t{at}[{len(entries)}]{words};"
+        yield "    } t = {"
+        for entries in masks:
+            yield "        {"
+            if matcher.words <= 1:
+                yield from _wrapped([_word(mask, bits) for mask in entries], "            ")
+            else:
+                for mask in entries:
+                    parts = [_word(mask >> (WORD * w) & (2**WORD - 1), 64) for w in range(matcher.words)]
+                    yield f"            {{ {', '.join(parts)} }},"
+            yield "        },"
         yield "    };"
 
-    def _index(self, probe: Probe, name: str) -> str:
+    def _index(self, group: Group, name: str) -> str:
         text = ""
-        for number, index in enumerate(probe.indices):
-            one = self._class(index, f"{name}_{number}")
-            text = one if not text else f"((({text}) * {index.count}u) + {one})"
+        for number, probe in enumerate(group):
+            one = self._class(probe.index, f"{name}_{number}")
+            text = one if not text else f"((({text}) * {probe.index.count}u) + {one})"
         return text
 
     def _class(self, index: Index, name: str) -> str:
@@ -370,9 +394,19 @@ class _Maker:
                 place = self.text.place(leaf)
                 if isinstance(kind, Bool):
                     return f"({place} ? 1u : 0u)"
-                return place if low == 0 else f"(uint32_t)((int64_t){place} - {integer(low)})"
+                if low == 0:
+                    return place
+                return self.text.converted(f"((int64_t){place} - {integer(low)})", "int64_t", "uint32_t")
             case Truth(condition=condition):
                 return f"({self.text.expr(condition)} ? 1u : 0u)"
+            case Coded(leaf=leaf, low=low):
+                self.cuts.append(self._codes(index, name))
+                place = f"(int64_t){self.text.place(leaf)}"
+                return (
+                    f"{self.p}_class_{name}({place} - {integer(low)})"
+                    if low
+                    else f"{self.p}_class_{name}({place})"
+                )
             case Cuts():
                 return self._cut(index, name)
 
@@ -388,6 +422,18 @@ class _Maker:
             return "(" + " + ".join(tests) + ")"
         self.cuts.append(self._search(index, name, wide))
         return f"{self.p}_class_{name}({value})"
+
+    def _codes(self, index: Coded, name: str) -> Function:
+        width = 8 if index.count <= 256 else 16
+        lines = [
+            f"    static const uint{width}_t classes[{len(index.classes)}] = {{",
+            *_wrapped([f"{one}u" for one in index.classes]),
+            "    };",
+            "    return classes[value];",
+        ]
+        return Function(
+            "The class of the value.", f"uint32_t {self.p}_class_{name}(int64_t value)", tuple(lines)
+        )
 
     def _search(self, index: Cuts, name: str, wide: str) -> Function:
         count = len(index.cuts)
@@ -415,7 +461,7 @@ class _Maker:
     def _one_word(self, matcher: Matcher, indices: list[str]) -> Iterator[str]:
         bits = max(_width(matcher.lines), 32)
         every = f"({2**matcher.lines - 1:#x}{'ull' if bits == 64 else 'u'})"
-        loads = [f"(uint{bits}_t)t{at}[{index}]" for at, index in enumerate(indices)]
+        loads = [f"(uint{bits}_t)t.t{at}[{index}]" for at, index in enumerate(indices)]
         yield f"    const uint{bits}_t m = {' & '.join(loads) if loads else every};"
         yield f"    const bool several = (m & (m - {_word(1, bits)})) != {_word(0, bits)};"
         short = matcher.lines < bits
@@ -432,7 +478,7 @@ class _Maker:
 
     def _many_words(self, matcher: Matcher, indices: list[str]) -> Iterator[str]:
         for at, index in enumerate(indices):
-            yield f"    const uint64_t * const r{at} = t{at}[{index}];"
+            yield f"    const uint64_t * const r{at} = t.t{at}[{index}];"
         yield "    uint64_t several = 0u;"
         yield "    uint64_t seen = 0u;"
         yield "    int32_t line = 0;"
@@ -591,12 +637,12 @@ def _word(value: int, bits: int) -> str:
     return f"{value:#x}{'ull' if bits == 64 else 'u'}"
 
 
-def _wrapped(words: list[str], width: int = 96) -> list[str]:
-    lines, now = [], "        "
+def _wrapped(words: list[str], pad: str = "        ", width: int = 96) -> list[str]:
+    lines, now = [], pad
     for word in words:
         if len(now) + len(word) > width:
             lines.append(now.rstrip())
-            now = "        "
+            now = pad
         now += word + ", "
     return [*lines, now.rstrip().rstrip(",")]
 

@@ -43,6 +43,12 @@ _INFIX = {
     Op.ADD: "+", Op.SUB: "-", Op.MUL: "*", Op.DIV: "/", Op.MOD: "%",
 }  # fmt: skip
 _HELPER = {"int64_t": "i64", "uint64_t": "u64", "double": "f64"}
+_SHORT = _HELPER | {
+    f"{sign}int{bits}_t": f"{sign or 'i'}{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)
+}
+"""How a type is called in the name of a conversion."""
+_PLAIN = re.compile(r"(?:\(u?int\d+_t\))?(?:s->[\w.\[\]]+|v_\w+)|\(?-?U?INT64_C\(\d+\)\)?|[\d.e+-]+")
+"""What may be cast as it stands: a variable, or a constant."""
 _COMPARE = frozenset({Op.EQ, Op.NE, Op.LT, Op.LE, Op.GT, Op.GE})
 
 
@@ -113,11 +119,6 @@ def _shared(kinds: tuple[Scalar, ...]) -> str:
     return "uint64_t" if "uint64_t" in wide else wide[0]
 
 
-def _cast(args: tuple[Expr, ...], texts: list[str], shared: str) -> list[str]:
-    pairs = zip(args, texts, strict=True)
-    return [text if wide_type(arg.type) == shared else f"({shared}){text}" for arg, text in pairs]
-
-
 @dataclass(slots=True)
 class CText:
     """Spells for one program.
@@ -166,7 +167,7 @@ class CText:
         if op is Op.IMPLIES:
             return f"((!{texts[0]}) || {texts[1]})"
         if op in (Op.TO_INT, Op.TO_REAL):
-            return f"(({wide_type(kind)}){texts[0]})"
+            return self.converted(texts[0], wide_type(args[0].type), wide_type(kind))
         if op in (Op.ABS, Op.MIN, Op.MAX):
             return self._helper(op, args, texts, kind)
         if isinstance(args[0].type, Int) and (op in _COMPARE or isinstance(kind, Int)):
@@ -180,25 +181,42 @@ class CText:
     def _integers(self, op: Op, args: tuple[Expr, ...], texts: list[str], kind: Scalar) -> str:
         """In the one 64-bit type that the prover shows operands and result to fit in."""
         shared = _shared((*(arg.type for arg in args), kind))
-        cast = _cast(args, texts, shared)
+        cast = self._cast(args, texts, shared)
         if op is Op.NEG:
             return f"(-{cast[0]})"
         found = f"({cast[0]} {_INFIX[op]} {cast[1]})"
-        return found if op in _COMPARE or wide_type(kind) == shared else f"(({wide_type(kind)}){found})"
+        return found if op in _COMPARE else self.converted(found, shared, wide_type(kind))
 
     def _helper(self, op: Op, args: tuple[Expr, ...], texts: list[str], kind: Scalar) -> str:
         shared = _shared((*(arg.type for arg in args), kind))
         name = f"{op.value}_{_HELPER[shared]}"
         self.helpers.add(name)
-        found = f"{self.names.program}_{name}({', '.join(_cast(args, texts, shared))})"
-        return found if wide_type(kind) == shared else f"(({wide_type(kind)}){found})"
+        found = f"{self.names.program}_{name}({', '.join(self._cast(args, texts, shared))})"
+        return self.converted(found, shared, wide_type(kind))
+
+    def _cast(self, args: tuple[Expr, ...], texts: list[str], shared: str) -> list[str]:
+        pairs = zip(args, texts, strict=True)
+        return [self.converted(text, wide_type(arg.type), shared) for arg, text in pairs]
+
+    def converted(self, text: str, source: str, target: str) -> str:
+        """A value of C type `source` as one of `target`; it was proved to fit.
+
+        What an operation made is converted by a function of its own: MISRA C 10.8 forbids a cast there.
+        """
+        if source == target:
+            return text
+        if _PLAIN.fullmatch(text):
+            return f"({target}){text}"
+        name = f"{_SHORT[target]}_of_{_SHORT[source]}"
+        self.helpers.add(name)
+        return f"{self.names.program}_{name}({text})"
 
     def stored(self, kind: Scalar, value: Expr, target: str) -> str:
         """A value for a place of C type `target`."""
         text = self.expr(value)
         if isinstance(kind, Real):
             return f"{text} + 0.0"
-        return text if isinstance(kind, Bool) else f"({target}){text}"
+        return text if isinstance(kind, Bool) else self.converted(text, wide_type(value.type), target)
 
     # --- statements ---
 

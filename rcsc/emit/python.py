@@ -2,16 +2,19 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import groupby
 from math import prod
 
 from rcsc.emit.environment import render
 from rcsc.emit.names import comment, names_of, python_word
 from rcsc.emit.pytext import PyText, constant
 from rcsc.model import Admit, Int, Kind, Level, OneTable, Procedure, Real, Variable, key_bounds, pending
-from rcsc.plan import Cuts, Direct, Index, Plan, PlanTable, Probe, Truth
+from rcsc.plan import Coded, Cuts, Direct, Group, Index, Plan, PlanTable, Truth, grouped
 
 MOST_KEYS = 4096
 """Up to so many combinations of classes the line of each is looked up at once."""
+MOST_GROUPED = 512
+"""Up to so many combinations of classes leaves share a tuple of masks."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,12 +169,8 @@ class _Maker:
     def _table(self, table: PlanTable) -> Iterator[PyFunction]:
         name = self.names.tables[table.table.name]
         upper = f"_{name.upper()}"
-        masks = []
-        for at, probe in enumerate(table.matcher.probes):
-            masks.append(f"{upper}_{at}")
-            self.constants.append((f"{upper}_{at}", tuple(f"{mask:#x}," for mask in probe.masks)))
         doc = f"The line of table {table.table.name} that matches admitted inputs: its position; -1 none, -2 several."
-        yield PyFunction(f"{name}_line", "s", doc, tuple(self._match(table, masks, upper)))
+        yield PyFunction(f"{name}_line", "s", doc, tuple(self._match(table, upper)))
         doc = f"The same for many inputs, table {table.table.name}."
         yield PyFunction(f"{name}_lines", "states", doc, (f"    return [{name}_line(s) for s in states]",))
         yield PyFunction(
@@ -196,42 +195,52 @@ class _Maker:
         doc = f"One step of table {table.table.name}: admits, settles, matches, acts; the fault, 0 for none."
         yield PyFunction(f"{name}_step", "s", doc, step)
 
-    def _match(self, table: PlanTable, masks: list[str], upper: str) -> Iterator[str]:
+    def _match(self, table: PlanTable, upper: str) -> Iterator[str]:
         matcher = table.matcher
         tail = f"{matcher.lines}, {matcher.default}"
-        everything = 2**matcher.lines - 1
-        count = prod(len(probe.masks) for probe in matcher.probes)
-        plain = all(isinstance(i, Direct) and i.low == 0 for probe in matcher.probes for i in probe.indices)
-        if masks and plain and count <= MOST_KEYS and all(len(p.indices) == 1 for p in matcher.probes):
-            self.constants.append((f"{upper}_LINE", (f"*_lines_of(({', '.join(masks)},), {tail}),",)))
-            index = ""
-            for probe in matcher.probes:
-                one = self._index(probe)
-                index = one if not index else f"({index}) * {len(probe.masks)} + {one}"
-            yield f"    return {upper}_LINE[{index}]"
+        everything = (1 << matcher.lines) - 1
+        probes = [probe for group in matcher.groups for probe in group]
+        for at, probe in enumerate(probes):
+            self.constants.append((f"{upper}_{at}", tuple(f"{mask:#x}," for mask in probe.masks)))
+        names = {id(probe): f"{upper}_{at}" for at, probe in enumerate(probes)}
+        groups = grouped(probes, MOST_KEYS)
+        if len(groups) == 1:
+            self.constants.append((f"{upper}_LINE", (f"*_lines_of({_joined(groups[0], names)}, {tail}),",)))
+            yield f"    return {upper}_LINE[{self._index(groups[0], f'{upper}_K0')}]"
             return
-        ands = " & ".join(
-            f"{mask}[{self._index(probe)}]" for mask, probe in zip(masks, matcher.probes, strict=True)
-        )
-        yield f"    m = {ands or everything}"
+        ands = []
+        for at, group in enumerate(grouped(probes, MOST_GROUPED)):
+            where = f"{upper}_{names[id(group[0])].rpartition('_')[2]}"
+            if len(group) > 1:
+                where = f"{upper}_G{at}"
+                self.constants.append((where, (f"*{_joined(group, names)},",)))
+            ands.append(f"{where}[{self._index(group, f'{upper}_K{at}')}]")
+        yield f"    m = {' & '.join(ands) or everything}"
         yield f"    return m.bit_length() - 1 if m and not m & (m - 1) else _line_of(m, {tail})"
 
-    def _index(self, probe: Probe) -> str:
-        text = ""
-        for index in probe.indices:
-            one = self._class(index)
-            text = one if not text else f"({text}) * {index.count} + {one}"
-        return text
+    def _index(self, group: Group, name: str) -> str:
+        """The place of the classes together: a sum, each class times how many places it moves."""
+        stride = prod(len(probe.masks) for probe in group)
+        terms = []
+        for number, probe in enumerate(group):
+            stride //= len(probe.masks)
+            terms.append(self._class(probe.index, f"{name}_{number}", stride))
+        return " + ".join(terms)
 
-    def _class(self, index: Index) -> str:
+    def _class(self, index: Index, name: str, stride: int) -> str:
+        times = f" * {stride}" if stride > 1 else ""
         match index:
             case Direct(leaf=leaf, low=low):
-                place = self.text.place(leaf)
-                return place if low == 0 else f"{place} - {low}" if low > 0 else f"{place} + {-low}"
+                place = _less(self.text.place(leaf), low)
+                return f"({place}){times}" if times and low else place + times
             case Truth(condition=condition):
-                return self.text.expr(condition)
+                return f"({self.text.expr(condition)}){times}"
+            case Coded(leaf=leaf, low=low):
+                runs = [(at * stride, len(list(same))) for at, same in groupby(index.classes)]
+                self.constants.append((name, tuple(f"*({at},) * {length}," for at, length in runs)))
+                return f"{name}[{_less(self.text.place(leaf), low)}]"
             case Cuts(leaf=leaf, cuts=cuts):
-                return f"_bisect({tuple(cuts)!r}, {self.text.place(leaf)})"
+                return f"_bisect({tuple(cuts)!r}, {self.text.place(leaf)}){times}"
 
     def _run(self, table: PlanTable, name: str) -> Iterator[str]:
         for place in table.monitored:
@@ -263,3 +272,13 @@ class _Maker:
                   "    return s.fault"]  # fmt: skip
         doc = f"One cycle of level {level.name}, every {level.period_ms} ms; the fault, 0 for none."
         return PyFunction(f"{self.names.levels[level.name]}_cycle", "s", doc, tuple(lines))
+
+
+def _less(place: str, low: int) -> str:
+    """The place less `low`."""
+    return place if low == 0 else f"{place} - {low}" if low > 0 else f"{place} + {-low}"
+
+
+def _joined(group: Group, names: dict[int, str]) -> str:
+    """The masks of a group, made when the module is imported."""
+    return f"_joined({', '.join(names[id(probe)] for probe in group)})"

@@ -30,13 +30,12 @@ from tempfile import TemporaryDirectory
 from rcsc.model import Box, Program, Real, Table, Variable, key_bounds, real_key, value_of_key
 from rcsc.testing.edges import companions, leaf_edges, relational_tests
 from rcsc.testing.matcher_c import self_test_c
-from rcsc.testing.matcher_text import Component, Lookup, MatcherText, ShapeError, matcher_text
+from rcsc.testing.matcher_text import EVERY_KEY, Component, Lookup, MatcherText, ShapeError, matcher_text
 from rcsc.testing.native import to_word
 from rcsc.testing.search import intersection
 from rcsc.testing.symbols import Symbols
 from rcsc.testing.tools import Absent, c_compiler, run_command, write_c
 
-EVERY_KEY = 4096
 ROWS = 400
 FLAGS = ("-std=gnu11", "-O1", "-w", "-ffp-contract=off", "-shared", "-fPIC")
 MOST_SHOWN = 5

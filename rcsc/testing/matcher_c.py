@@ -38,7 +38,7 @@ uint64_t rcsc_tail_test(uint64_t *wrong) {{
 
 
 def _masks(number: int, lookup: Lookup) -> Iterator[str]:
-    entry = f"t{number}[i]" if lookup.words == 1 else f"t{number}[i][w]"
+    entry = f"t.t{number}[i]" if lookup.words == 1 else f"t.t{number}[i][w]"
     yield f"void rcsc_masks_{number}(uint64_t *out) {{ {lookup.declaration}"
     yield f"for (uint32_t i = 0; i < {lookup.entries}u; i++) for (uint32_t w = 0; w < {lookup.words}u; w++)"
     yield f"out[i * {lookup.words}u + w] = (uint64_t){entry}; }}"

@@ -3,7 +3,7 @@
 In: the emitted C and the name of a `line` function. Out: its parts, verbatim, for a self-test to compile. A
 text that is not of the shape described here is refused: the per-variable check claims nothing about it.
 
-The shape: tables `t0`, `t1`, ..; one look-up in each, `tK[INDEX]`; the look-ups joined with `&` (in words of
+The shape: tables `t.t0`, `t.t1`, ..; one look-up in each, `t.tK[INDEX]`; the look-ups joined with `&` (in words of
 64 lines where there are more); then a tail that reads nothing but the joined mask. An INDEX is one component,
 or several in mixed radix, `(((A) * nu) + B)`. A component reads one leaf and compares it with constants only,
 or is the truth of a condition.
@@ -12,22 +12,28 @@ or is the truth of a condition.
 import re
 from dataclasses import dataclass
 
-TABLE = re.compile(r"static const uint(\d+)_t t(\d+)\[(\d+)\](?:\[(\d+)\])? = \{.*?\n    \};", re.DOTALL)
+TABLES = re.compile(
+    r"static const struct \{\n(?P<fields>(?: +uint\d+_t t\d+\[\d+\](?:\[\d+\])?;\n)+)    \} t = \{.*?\n    \};",
+    re.DOTALL,
+)
+FIELD = re.compile(r"uint(\d+)_t t(\d+)\[(\d+)\](?:\[(\d+)\])?;")
 CONSTANT = r"(?:\(-INT64_C\(\d+\)(?: - INT64_C\(1\))?\)|U?INT64_C\(\d+\)|\(?-?\d+(?:\.\d+)?(?:e[+-]?\d+)?\)?)"
 PLACE = r"s->(?P<path>[A-Za-z_]\w*(?:\.\w+|\[\d+\])*)"
 AGAIN = r"(?:\((?:u?int64_t)\))?s->[A-Za-z_]\w*(?:\.\w+|\[\d+\])*"
+EVERY_KEY = 4096
+"""Keys of a leaf up to which `matcher` finds the class of each."""
 UNARY = (
     re.compile(rf"^{PLACE}$"),
     re.compile(rf"^\({PLACE} \? 1u : 0u\)$"),
-    re.compile(rf"^\(uint32_t\)\(\((?:u?int64_t)\){PLACE} - {CONSTANT}\)$"),
+    re.compile(rf"^\w+_u32_of_i64\(\(\(int64_t\){PLACE} - {CONSTANT}\)\)$"),
     re.compile(
         rf"^\(\(\((?:\((?:u?int64_t)\))?{PLACE} >= {CONSTANT}\) \? 1u : 0u\)"
         rf"(?: \+ \(\({AGAIN} >= {CONSTANT}\) \? 1u : 0u\))*\)$"
     ),
-    re.compile(rf"^(?P<search>[A-Za-z_]\w*_class_\w+)\((?:\((?:u?int64_t)\))?{PLACE}\)$"),
+    re.compile(rf"^(?P<search>[A-Za-z_]\w*_class_\w+)\((?:\((?:u?int64_t)\))?{PLACE}(?: - {CONSTANT})?\)$"),
 )
 TRUTH = re.compile(r"^\((?P<condition>.*) \? 1u : 0u\)$", re.DOTALL)
-LOAD = re.compile(r"\bt(\d+)\[")
+LOAD = re.compile(r"\bt\.t(\d+)\[")
 NUMBER = re.compile(r"(?<![\w.])(\d+(?:\.\d+)?(?:e[+-]?\d+)?)(?![\w.])")
 
 
@@ -53,7 +59,7 @@ class Lookup:
     """One table with its index.
 
     Attributes:
-        declaration: The table, verbatim.
+        declaration: All tables, verbatim.
         entries: How many masks it has.
         words: Words a mask.
     """
@@ -133,11 +139,17 @@ def component(source: str, text: str, count: int) -> Component:
 
 
 def _search_text(source: str, name: str) -> str:
-    """The body of a search function, which must use its argument only against its own constants."""
+    """The constants of a search function, which must use its argument only against them.
+
+    A function that looks the class up has none: it is made for leaves of few keys, and `matcher` tries each.
+    """
     head = re.search(rf"static inline uint32_t {name}\((?:u?int64_t|double) value\)", source)
     if head is None:
         raise ShapeError(f"no function `{name}`")
     body = function_body(source, head[0])
+    looked_up = re.search(r"classes\[(\d+)\] = ", body)
+    if looked_up and int(looked_up[1]) <= EVERY_KEY and body.count("value") == 1:
+        return ""
     if re.sub(r"\(value >= cuts\[[^\]]*\]\)", "", body).count("value"):
         raise ShapeError(f"`{name}` uses its argument in another way")
     return body.split("};")[0].split("{", 1)[1]
@@ -155,8 +167,10 @@ def matcher_text(source: str, function: str, struct: str) -> MatcherText:
         ShapeError: The text has another shape.
     """
     body = function_body(source, f"int32_t {function}(const {struct} *s)")
-    tables = list(TABLE.finditer(body))
-    rest = TABLE.sub("", body)
+    stated = TABLES.search(body)
+    declaration = stated[0] if stated else ""
+    tables = list(FIELD.finditer(stated["fields"])) if stated else []
+    rest = body.replace(declaration, "", 1) if stated else body
     joined = re.search(r"const uint(\d+)_t m = (?P<loads>.*?);\n", rest, re.DOTALL)
     if joined is None or [int(table[2]) for table in tables] != list(range(len(tables))):
         raise ShapeError("no joined mask")
@@ -164,16 +178,18 @@ def matcher_text(source: str, function: str, struct: str) -> MatcherText:
     loads = _loads(rest[: joined.start()] if many else joined["loads"])
     if [number for number, _ in loads] != list(range(len(tables))):
         raise ShapeError("not one look-up a table")
-    shape = r"\(uint\d+_t\)t\d+\[\](?: & \(uint\d+_t\)t\d+\[\])*"
+    shape = r"\(uint\d+_t\)t\.t\d+\[\](?: & \(uint\d+_t\)t\.t\d+\[\])*"
     if not many and tables and not re.fullmatch(shape, _without_indices(joined["loads"])):
         raise ShapeError("look-ups are not joined with &")
     rows = " & ".join(f"r{number}[w]" for number, _ in loads)
     if many and " ".join(joined["loads"].split()) != rows:
         raise ShapeError("rows are not joined with &")
-    lookups = tuple(_lookup(source, table, index) for table, (_, index) in zip(tables, loads, strict=True))
+    lookups = tuple(
+        _lookup(source, declaration, table, index) for table, (_, index) in zip(tables, loads, strict=True)
+    )
     begin = max((rest.rindex(f"const r{number} =") for number, _ in loads), default=0) if many else 0
     tail = rest[rest.index(";", begin) + 1 :] if many else rest[joined.end() :]
-    if re.search(r"s->|\bt\d+\[", tail):
+    if re.search(r"s->|\bt\.", tail):
         raise ShapeError("the tail reads more than the mask")
     return MatcherText(lookups, int(joined[1]), tail)
 
@@ -195,8 +211,8 @@ def _without_indices(text: str) -> str:
     return " ".join(text.split())
 
 
-def _lookup(source: str, table: re.Match[str], index: str) -> Lookup:
+def _lookup(source: str, declaration: str, table: re.Match[str], index: str) -> Lookup:
     pieces = parted(index)
     components = [component(source, text, count) for text, count in pieces]
     entries, words = int(table[3]), int(table[4] or 1)
-    return Lookup(table[0], index, entries, words, tuple(components))
+    return Lookup(declaration, index, entries, words, tuple(components))
