@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from rcsc.emit.ctext import CText, c_type, constant, integer, locals_of, wide_type
 from rcsc.emit.environment import render
-from rcsc.emit.names import Names, c_word, comment, names_of
+from rcsc.emit.names import Names, c_word, comment, names_of, short
 from rcsc.model import (
     Admit,
     Array,
@@ -125,19 +125,19 @@ class _Maker:
     # --- declarations ---
 
     def _enum(self, enum: Enum) -> Struct:
-        prefix = f"{self.p}_{enum.name}".upper()
+        prefix = f"{self.p}_{short(enum.name)}".upper()
         seen: set[str] = set()
-        short = []
+        fields = []
         for at, member in enumerate(enum.members):
-            plain = f"{prefix}_{member.upper()}"
+            plain = f"{prefix}_{short(member).upper()}"
             unique = plain if plain not in seen else f"{plain}_{at}"
             seen.add(unique)
-            short.append(Field(f"{unique} = {at}", comment(member)))
-        return Struct(f"{self.p}_{enum.name}_t", tuple(short))
+            fields.append(Field(f"{unique} = {at}", comment(member)))
+        return Struct(f"{self.p}_{short(enum.name)}_t", tuple(fields))
 
     def _record(self, record: Record) -> Struct:
         fields = tuple(Field(self._declare(c_word(f.name), f.type), comment(f.doc)) for f in record.fields)
-        return Struct(f"{self.p}_{record.name}_t", fields)
+        return Struct(f"{self.p}_{short(record.name)}_t", fields)
 
     def _declare(self, name: str, kind: Type) -> str:
         match kind:
@@ -146,7 +146,7 @@ class _Maker:
                 head, _, rest = inner.partition(name)
                 return f"{head}{name}[{length}]{rest}"
             case Record(name=record):
-                return f"{self.p}_{record}_t {name}"
+                return f"{self.p}_{short(record)}_t {name}"
             case _:
                 return f"{c_type(kind)} {name}"
 

@@ -25,14 +25,21 @@ C_WORDS = frozenset(
 )
 PYTHON_WORDS = frozenset(keyword.kwlist) | frozenset(keyword.softkwlist) | frozenset(dir(builtins))
 LONGEST = 100
+MOST_SAID = 400
+
+
+def short(name: str) -> str:
+    """`name`; a long one is cut, with a digest of the whole."""
+    if len(name) <= LONGEST:
+        return name
+    import hashlib
+
+    return f"{name[:LONGEST]}_{hashlib.sha256(name.encode()).hexdigest()[:8]}"
 
 
 def c_word(name: str) -> str:
-    """`name` where C and C++ leave it free; long ones are cut, with a digest of the whole."""
-    if len(name) > LONGEST:
-        import hashlib
-
-        name = f"{name[:LONGEST]}_{hashlib.sha256(name.encode()).hexdigest()[:8]}"
+    """`name`, short, where C and C++ leave it free."""
+    name = short(name)
     return f"{name}_" if name in C_WORDS or name.startswith("_") else name
 
 
@@ -44,7 +51,8 @@ def python_word(name: str) -> str:
 
 
 def comment(text: str) -> str:
-    """A text that can stand in a comment of either language and end neither."""
+    """A text that can stand in a comment of either language and end neither; a very long one is cut."""
+    text = text if len(text) <= MOST_SAID else f"{text[:MOST_SAID]}..."
     clean = "".join(c if c.isprintable() and c.isascii() else "?" for c in text)
     return re.sub(
         r"\?\?|\\",
@@ -90,7 +98,7 @@ class Names:
 def names_of(program: Program) -> Names:
     """All names, made unique in declared order."""
     own = re.sub(r"\W", "_", program.name, flags=re.ASCII) or "program"
-    own = f"p{own}" if own[0].isdigit() else own
+    own = own if own[0].isalpha() else f"p{own}"
     taken = Taken()
     attributes = {v.name: taken.fresh(python_word(_flat(v.name))) for v in program.variables}
     tables = _unique((t.name for t in program.tables), Taken())
@@ -110,7 +118,8 @@ def _unique(names: Iterable[str], taken: Taken) -> dict[str, str]:
 
 
 def _flat(name: str) -> str:
-    return re.sub(r"_+$", "", re.sub(r"[.\[\]]+", "_", name))
+    joined = re.sub(r"[.\[\]]+", "_", name)
+    return joined.rstrip("_") or joined
 
 
 def _paths(program: Program) -> dict[str, str]:
