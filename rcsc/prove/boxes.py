@@ -234,6 +234,7 @@ class Search:
     table: Boxes
     apart: frozenset[int]
     _without: set[tuple[int, frozenset[int]]] = field(default_factory=set)
+    _sizes: dict[int, list[int]] = field(default_factory=dict)
 
     def least(self, shown: Sequence[Mapping[str, Box]]) -> Cell | None:
         """The least cell of classes outside all lines and outside the regions shown; None where there is none."""
@@ -248,13 +249,11 @@ class Search:
             return {name: (self.table.extents[name][0],) * 2 for name in names}
         if not names or any(not any(name in lines[at] for name in names) for at in alive):
             return None
-        if self._filled(alive, lines, names):
-            return None
         memory = (depth, frozenset(alive))
         if memory in self._without:
             return None
-        name, classes = names[0], self.table.classes(names[0])
-        for low, high in zip(classes.starts, classes.ends, strict=True):
+        name = names[0]
+        for low, high in self._short(depth, alive, lines):
             inside = [at for at in alive if name not in lines[at] or _holds(lines[at][name], low)]
             found = self._search(depth + 1, inside, lines)
             if found is not None:
@@ -262,15 +261,40 @@ class Search:
         self._without.add(memory)
         return None
 
-    def _filled(self, alive: list[int], lines: Sequence[Mapping[str, Box]], names: Sequence[str]) -> bool:
-        """Whether the lines that are apart fill what the variables left span."""
-        full = {name: high - low + 1 for name in names for low, high in (self.table.extents[name],)}
-        sizes = (
-            prod(size(lines[at][n]) if n in lines[at] else full[n] for n in names)
-            for at in alive
-            if self._is_apart(at)
-        )
-        return sum(sizes) == prod(full.values())
+    def _short(
+        self, depth: int, alive: list[int], lines: Sequence[Mapping[str, Box]]
+    ) -> Iterator[tuple[int, int]]:
+        """Classes of the variable at `depth` that the lines apart do not fill, counted in one sweep."""
+        name = self.table.names[depth]
+        extents = [self.table.extents[other] for other in self.table.names[depth + 1 :]]
+        whole = prod(high - low + 1 for low, high in extents)
+        everywhere, change = 0, dict[int, int]()
+        for at in alive:
+            if self._is_apart(at):
+                inside = self._rest(at, lines[at])[depth + 1]
+                if name not in lines[at]:
+                    everywhere += inside
+                for low, high in lines[at].get(name, ()):
+                    change[low] = change.get(low, 0) + inside
+                    change[high + 1] = change.get(high + 1, 0) - inside
+        classes = self.table.classes(name)
+        for low, high in zip(classes.starts, classes.ends, strict=True):
+            everywhere += change.get(low, 0)
+            if everywhere != whole:
+                yield low, high
+
+    def _rest(self, at: int, boxes: Mapping[str, Box]) -> list[int]:
+        """For each depth how many inputs the line matches in the variables from there on."""
+        known = self._sizes.get(at)
+        if known is None:
+            known = [1]
+            for name in reversed(self.table.names):
+                low, high = self.table.extents[name]
+                known.append(known[-1] * (size(boxes[name]) if name in boxes else high - low + 1))
+            known.reverse()
+            if at < len(self.table.lines):
+                self._sizes[at] = known
+        return known
 
     def _is_apart(self, at: int) -> bool:
         return at in self.apart or at >= len(

@@ -1,0 +1,169 @@
+"""Tables of boxes against brute force: overlaps, gaps, least witnesses, regions, counts, and repairs that repair."""
+
+import re
+from itertools import product
+from typing import Any
+
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from rcsc.interpret import matching_lines
+from rcsc.model import Program, key_bounds, key_of, value_of_key
+from rcsc.prove import boxes
+from rcsc.prove.options import Options
+from rcsc.prove.repair import closing_line, parting_cell
+from rcsc.prove.table import prove_table
+from rcsc.prove.verdict import DeadLine, Gap, Overlap, Region
+from rcsc.resolve import compile_text
+
+HEAD = """enum colour { red, green, blue }
+input a : bool
+input c : colour
+input n : int -1 .. 3
+"""
+CELLS = {
+    "a": st.sampled_from(["", "", "true", "false"]),
+    "c": st.sampled_from(["", "red", "/= red", "in {red, blue}", "green", "blue"]),
+    "n": st.sampled_from(["", "0", "/= 1", "< 0", "<= 2", "> 1", ">= 3", "0 .. 2", "in {-1, 1, 3}"]),
+}
+Point = tuple[int, ...]
+
+
+@st.composite
+def texts(draw: st.DrawFn) -> str:
+    """A table of up to six lines, sometimes with a DEFAULT line."""
+    rows = [[f"l{at}", *(draw(CELLS[name]) for name in "acn")] for at in range(draw(st.integers(1, 6)))]
+    if draw(st.booleans()):
+        rows.append(["d", draw(st.sampled_from(["DEFAULT", "DEFAULT unreachable"])), "", ""])
+    return written(rows)
+
+
+def written(rows: list[list[str]]) -> str:
+    """The text of the table."""
+    lines = "\n".join("| " + " | ".join(row) + " ||" for row in rows)
+    return f"{HEAD}table t {{\n| line | a | c | n ||\n{lines}\n}}\n"
+
+
+def program_of(text: str) -> Program:
+    program = compile_text(text)
+    assume(isinstance(program, Program))
+    assert isinstance(program, Program)
+    return program
+
+
+def matched(program: Program) -> dict[Point, tuple[int, ...]]:
+    """Every input in declared order, as keys, with the lines that match it."""
+    keys = [range(key_bounds(v.type)[0], key_bounds(v.type)[1] + 1) for v in program.variables]
+    found = {}
+    for point in product(*keys):
+        values = {str(v.name): value_of_key(v.type, k) for v, k in zip(program.variables, point, strict=True)}
+        names = set(matching_lines(program.tables[0], values))
+        found[point] = tuple(at for at, line in enumerate(program.tables[0].lines) if line.name in names)
+    return found
+
+
+def point_of(program: Program, witness: Any) -> Point:
+    """A witness as keys; variables that the table does not test are at their least."""
+    return tuple(
+        key_of(v.type, witness[v.name]) if v.name in witness else key_bounds(v.type)[0]
+        for v in program.variables
+    )
+
+
+def inside(program: Program, region: Region) -> set[Point]:
+    """The points of a region."""
+    axes = [
+        [key for low, high in region.get(str(v.name), (key_bounds(v.type),)) for key in range(low, high + 1)]
+        for v in program.variables
+    ]
+    return set(product(*axes))
+
+
+@given(texts())
+def test_findings_are_those_of_brute_force(text: str) -> None:
+    program = program_of(text)
+    table, right = program.tables[0], matched(program)
+    assert boxes.applies(table)
+    found = prove_table(program, table, Options()).found
+    pairs = {
+        (one, two): min(p for p, lines in right.items() if one in lines and two in lines)
+        for one in range(len(table.lines))
+        for two in range(one + 1, len(table.lines))
+        if any(one in lines and two in lines for lines in right.values())
+    }
+    overlaps = {(f.first, f.second): f for f in found if isinstance(f, Overlap)}
+    assert overlaps.keys() == pairs.keys()
+    for pair, least in pairs.items():
+        assert point_of(program, overlaps[pair].witness) == least
+        region = overlaps[pair].region
+        assert region is not None
+        both = {p for p, lines in right.items() if set(pair) <= set(lines)}
+        assert inside(program, region) == both  # two boxes meet in a box: it is maximal
+    bare = [p for p, lines in right.items() if not lines]
+    gaps = [f for f in found if isinstance(f, Gap)]
+    assert bool(gaps) == bool(bare)
+    for gap in gaps:
+        assert point_of(program, gap.witnesses[0]) == bare[0]
+        assert gap.count is None or gap.count[0] * len(right) == gap.count[1] * len(bare)
+        covered: set[Point] = set()
+        for witness, region in zip(gap.witnesses, gap.regions, strict=True):
+            assert region is not None
+            points = inside(program, region)
+            assert points <= set(bare)
+            at = point_of(program, witness)
+            assert at in points
+            assert at == min(set(bare) - covered)
+            maximal(program, region, set(bare) - covered)
+            covered |= points
+    dead = {f.line for f in found if isinstance(f, DeadLine)}
+    assert dead == {at for at in range(len(table.lines)) if not any(at in lines for lines in right.values())}
+
+
+def maximal(program: Program, region: Region, bare: set[Point]) -> None:
+    """No variable of a region can have a neighbouring key too."""
+    for variable in program.variables:
+        name, (least, most) = str(variable.name), key_bounds(variable.type)
+        for low, high in region.get(name, ()):
+            for more in (low - 1, high + 1):
+                if least <= more <= most and not any(a <= more <= b for a, b in region[name]):
+                    wider = {**region, name: (*region[name], (more, more))}
+                    assert not inside(program, wider) <= bare
+
+
+@given(texts())
+def test_a_repair_that_is_shown_repairs(text: str) -> None:
+    program = program_of(text)
+    table, right = program.tables[0], matched(program)
+    for found in prove_table(program, table, Options()).found:
+        if isinstance(found, Overlap) and (help_ := parting_cell(program, table, found)):
+            said = re.fullmatch(r"in line `(l\d)` write `(.*)` under `(.)`: proved .*", help_)
+            assert said is not None, help_
+            after = matched(program_of(changed(text, said[1], said[3], said[2])))
+            assert not any({found.first, found.second} <= set(lines) for lines in after.values())
+            assert not any(right[p] and not lines for p, lines in after.items()), "it opened a gap"
+            assert all(set(lines) <= set(right[p]) for p, lines in after.items()), "it made an overlap"
+        if isinstance(found, Gap) and (help_ := closing_line(program, table, found)):
+            row = re.search(r"`(\|.*\|\|) \.\.\. \|`", help_)
+            assert row is not None, help_
+            after = matched(program_of(with_row(text, row[1])))
+            new = [p for p in right if len(after[p]) > len(right[p])]
+            assert new, "it closed nothing"
+            assert not any(right[p] for p in new), "it made an overlap"
+
+
+def changed(text: str, line: str, column: str, cell: str) -> str:
+    """The text with one cell replaced."""
+    rows = []
+    for row in text.splitlines():
+        cells = row.split("|")
+        if len(cells) > 2 and cells[1].strip() == line:
+            cells[2 + "acn".index(column)] = f" {cell} "
+        rows.append("|".join(cells))
+    return "\n".join(rows) + "\n"
+
+
+def with_row(text: str, row: str) -> str:
+    """The text with a row more, before its DEFAULT line."""
+    lines = text.splitlines()
+    at = next((at for at, line in enumerate(lines) if "DEFAULT" in line), len(lines) - 1)
+    return "\n".join([*lines[:at], row, *lines[at:]]) + "\n"
