@@ -12,7 +12,7 @@ from math import prod
 
 from rcsc.model import Box
 
-MANY = 256
+MANY = 64
 """Above so many lines a certificate leaves the parting form of each pair to the checker."""
 
 Cell = dict[int, tuple[int, int]]

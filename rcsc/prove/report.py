@@ -1,11 +1,13 @@
 """What was found of a table, as diagnostics."""
 
 from collections.abc import Iterator
+from math import prod
 
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label, MatchedLine, Severity, WitnessColumn
-from rcsc.model import Program, Scalar, Table, spell
+from rcsc.model import Program, Scalar, Table, key_bounds, spell
 from rcsc.prove import words
+from rcsc.prove.boxes import size
 from rcsc.prove.certificate import must_cover
 from rcsc.prove.repair import closing_line, parting_cell
 from rcsc.prove.verdict import (
@@ -104,22 +106,34 @@ def _gap(program: Program, table: Table, found: Gap) -> Diagnostic:
             Label(table.span),
             help=(repair,) if repair else (),
             witnesses=columns,
-            more=_more(found),
+            more=_more(program, found),
         )
     assert table.default is not None
     label = Label(table.default.span)
     if table.default.unreachable:
         message = f"the DEFAULT line of table `{table.name}` is declared unreachable, but {share} fall to it"
-        return Diagnostic(Code.DEFAULT_REACHED, message, label, witnesses=columns, more=_more(found))
+        return Diagnostic(Code.DEFAULT_REACHED, message, label, witnesses=columns, more=_more(program, found))
     message = f"{share} fall to the DEFAULT line of table `{table.name}`"
     return Diagnostic(
-        Code.DEFAULT_COVERS, message, label, witnesses=columns, more=_more(found), severity=Severity.NOTE
+        Code.DEFAULT_COVERS,
+        message,
+        label,
+        witnesses=columns,
+        more=_more(program, found),
+        severity=Severity.NOTE,
     )
 
 
-def _more(found: Gap) -> int:
-    """Inputs that the shown regions leave out, where they were counted; regions shown count as their witness."""
-    return 0 if found.count is None else max(0, found.count[0] - len(found.witnesses))
+def _more(program: Program, found: Gap) -> int:
+    """Inputs outside the regions shown, where they were counted; the regions do not meet."""
+    if found.count is None:
+        return 0
+    bounds = {str(v.name): key_bounds(v.type) for v in program.variables}
+    shown = 0
+    for witness, region in zip(found.witnesses, found.regions, strict=True):
+        sizes = (size((region or {}).get(name, (bounds[name],))) for name in witness)
+        shown += prod(sizes) if region is not None else 1
+    return max(0, found.count[0] - shown)
 
 
 def _share(count: int, total: int) -> str:

@@ -53,7 +53,7 @@ def table(scope: Scope, written: tree.TableDecl, sources: Sources) -> Table:
         elif default is not None:
             scope.report(Code.SEVERAL_DEFAULTS, "a table has at most one DEFAULT line", name_span)
         else:
-            default = Default(LineName(row.name), cells.actions(row), row.unreachable, row.span)
+            default = Default(LineName(row.name), cells.actions(row), row.unreachable, cells.span(row, 1))
     read = {name for line in lines for test in line.tests if test is not None for name in test.variables}
     return Table(
         TableName(written.name.text),

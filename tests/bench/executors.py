@@ -1,7 +1,7 @@
 """What a match costs: instructions of the C matcher by callgrind, nanoseconds of the Python one: `python -m tests.bench.executors`.
 
-Tables of `families.box` by size, and ACQUIRE. Beside them, in C: a scan of all lines that counts how many match. The counts hold for
-the compiler and flags at hand; the fuller the inputs' variety the fairer, so inputs are drawn over the whole space.
+Tables of `families.box` by size, and ACQUIRE. Beside them, in C: a scan of all lines that counts how many match; in Python: nested ifs that check nothing.
+The counts hold for the compiler and flags at hand; the fuller the inputs' variety the fairer, so inputs are drawn over the whole space.
 """
 
 import random
@@ -10,13 +10,14 @@ import shutil
 import subprocess
 import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 from rcsc.emit import emit_c, emit_python
 from rcsc.emit.ctext import CText
 from rcsc.emit.names import names_of
 from rcsc.lower import lower
-from rcsc.model import Program, ProvedProgram, Value, key_bounds, seal_of_proof, value_of_key
+from rcsc.model import Box, Program, ProvedProgram, Value, key_bounds, seal_of_proof, value_of_key
 from rcsc.project import load
 from rcsc.prove.options import Options
 from rcsc.prove.program import prove_program
@@ -24,6 +25,8 @@ from rcsc.resolve import compile_text, resolve
 from tests.bench import families
 
 INPUTS = 512
+MOST_NESTED = 256
+Lines = list[tuple[int, dict[str, Box]]]
 SIZES = ((64, 7), (256, 20), (1024, 20))
 REPO = Path(__file__).parents[2]
 
@@ -98,8 +101,88 @@ def instructions(folder: Path, function: str) -> float:
     return int(total[1]) / INPUTS
 
 
-def python_ns(files: dict[str, str], program: Program, samples: list[dict[str, Value]]) -> float:
-    """Nanoseconds of one match in Python, the best of five rounds."""
+def nested_ifs(program: Program) -> str:
+    """A Python function that decides by nested ifs and checks nothing: the least that Python can do.
+
+    The cut that leaves fewest lines on both sides together goes first.
+    """
+    names = names_of(program)
+    lines = [
+        (at, {str(t.variables[0]): t.box for t in line.tests if t is not None and t.box is not None})
+        for at, line in enumerate(program.tables[0].lines)
+    ]
+    none = len(lines) if program.tables[0].default else -1
+    said: list[str] = ["def nested(s):"]
+
+    def side(alive: Lines, name: str, low: int, high: int) -> Lines:
+        return [
+            (at, boxes)
+            for at, boxes in alive
+            if name not in boxes or any(a <= high and b >= low for a, b in boxes[name])
+        ]
+
+    def grow(alive: Lines, bounds: dict[str, tuple[int, int]], pad: str) -> None:
+        open_ = {
+            (name, edge)
+            for _, boxes in alive
+            for name, box in boxes.items()
+            for low, high in box
+            for edge in (low, high + 1)
+            if bounds[name][0] < edge <= bounds[name][1]
+        }
+        if not open_:
+            said.append(f"{pad}return {alive[0][0] if alive else none}")
+            return
+
+        def parts(cut: tuple[str, int]) -> tuple[Lines, Lines]:
+            name, edge = cut
+            low, high = bounds[name]
+            return side(alive, name, low, edge - 1), side(alive, name, edge, high)
+
+        def cost(cut: tuple[str, int]) -> tuple[int, int]:
+            below, above = parts(cut)
+            return len(below) + len(above), abs(len(below) - len(above))
+
+        name, edge = best = min(sorted(open_), key=cost)
+        below, above = parts(best)
+        said.append(f"{pad}if s.{names.attributes[name]} < {edge}:")
+        grow(below, {**bounds, name: (bounds[name][0], edge - 1)}, pad + " ")
+        said.append(f"{pad}else:")
+        grow(above, {**bounds, name: (edge, bounds[name][1])}, pad + " ")
+
+    grow(lines, {str(v.name): key_bounds(v.type) for v in program.variables}, " ")
+    return "\n".join(said)
+
+
+def batch_ns(folder: Path, program: Program, name: str, samples: list[dict[str, Value]]) -> float:
+    """Nanoseconds a row of the batch entry, over a million rows."""
+    names = names_of(program)
+    sets = "\n".join(
+        "    " + " ".join(f"s[{at}].{names.paths[leaf]} = {int(value)};" for leaf, value in sample.items())
+        for at, sample in enumerate(samples)
+    )
+    table = names.tables[program.tables[0].name]
+    (folder / "batch.c").write_text(
+        f'#include "{name}.h"\n#include <stdio.h>\n#include <stdlib.h>\n#include <time.h>\n#define N 1000000u\n'
+        f"static {name}_t s[{len(samples)}];\nstatic int32_t out[N];\n"
+        f"int main(void)\n{{\n    {name}_t *in = malloc(sizeof(*in) * N);\n    double best = 1e9;\n{sets}\n"
+        f"    if (!in) return 1;\n    for (uint32_t i = 0; i < N; i++) in[i] = s[(i * 2654435761u) % {len(samples)}u];\n"
+        f"    for (int r = 0; r < 7; r++) {{\n        struct timespec a, b; clock_gettime(CLOCK_MONOTONIC, &a);\n"
+        f"        {name}_{table}_lines(in, out, N); clock_gettime(CLOCK_MONOTONIC, &b);\n"
+        f"        double t = (b.tv_sec - a.tv_sec) * 1e9 + (b.tv_nsec - a.tv_nsec); if (t < best) best = t;\n    }}\n"
+        f'    printf("%f", best / N); free(in); return out[7] < -2;\n}}\n'
+    )
+    compiler = shutil.which("cc") or "cc"
+    subprocess.run(
+        [compiler, "-std=gnu11", "-O2", "-o", "batch", "batch.c", f"{name}.c"], cwd=folder, check=True
+    )
+    return float(subprocess.run([str(folder / "batch")], check=True, capture_output=True, text=True).stdout)
+
+
+def python_ns(
+    files: dict[str, str], program: Program, samples: list[dict[str, Value]]
+) -> tuple[float, float | None]:
+    """Nanoseconds of one match in Python, ours and by nested ifs."""
     names = names_of(program)
     module: dict[str, object] = {"__name__": "bench"}
     [text] = [text for name, text in files.items() if name.endswith(".py")]
@@ -111,12 +194,23 @@ def python_ns(files: dict[str, str], program: Program, samples: list[dict[str, V
         for leaf, value in sample.items():
             setattr(state, names.attributes[leaf], value)
         states.append(state)
+    nested: Callable[[object], int] | None = None
+    if len(program.tables[0].lines) <= MOST_NESTED:
+        exec(compile(nested_ifs(program), "nested", "exec"), module)  # noqa: S102 - generated here
+        nested = module["nested"]  # type: ignore[assignment]  # a function
+        assert nested is not None
+        assert all(nested(state) == match(state) for state in states)  # type: ignore[operator]  # a function
+    return quickest(match, states), quickest(nested, states) if nested else None  # type: ignore[arg-type]  # a function
+
+
+def quickest(function: Callable[[object], int], states: list[object]) -> float:
+    """Nanoseconds a call, the best of five rounds."""
     best = float("inf")
     for _ in range(5):
         begun = time.perf_counter_ns()
         for _ in range(20):
             for state in states:
-                match(state)  # type: ignore[operator]  # a function
+                function(state)
         best = min(best, (time.perf_counter_ns() - begun) / (20 * len(states)))
     return best
 
@@ -150,13 +244,17 @@ def measured(label: str, program: Program) -> str:
         )
         size = (folder / f"{names.program}.o").stat().st_size
         ours, scan = instructions(folder, function), instructions(folder, "scan")
-    return f"{label:12}{ours:10.1f}{scan:12.1f}{python_ns(files, program, samples):12.0f}{size / 1024:10.0f}"
+        batch = batch_ns(folder, program, names.program, samples)
+    python, nested = python_ns(files, program, samples)
+    beside = f"{nested:12.0f}" if nested else f"{'-':>12}"
+    return f"{label:12}{ours:10.1f}{scan:12.1f}{batch:10.1f}{python:12.0f}{beside}{size / 1024:10.0f}"
 
 
 def main() -> None:
     """Prints the table."""
     print(
-        f"{'table':12}{'masks':>10}{'scan':>12}{'Python ns':>12}{'C KiB':>10}   instructions a match, -O2, by callgrind"
+        f"{'table':12}{'masks':>10}{'scan':>12}{'batch ns':>10}{'Python ns':>12}{'nested ifs':>12}{'C KiB':>10}"
+        "   masks, scan: instructions a match, -O2, by callgrind"
     )
     for label, program in programs():
         print(measured(label, program), flush=True)

@@ -1,0 +1,40 @@
+"""What the README shows is what its commands print."""
+
+import contextlib
+import re
+from pathlib import Path
+
+from tests.picture import PICTURE, drawn, said
+
+
+def blocks(repo: Path, language: str) -> list[str]:
+    """The README's fenced texts of a language."""
+    return re.findall(
+        rf"```{language}\n(.*?)```", (repo / "README.md").read_text(encoding="utf-8"), re.DOTALL
+    )
+
+
+def words(text: str) -> str:
+    """The text with spaces as one."""
+    return " ".join(text.split())
+
+
+def test_the_picture_is_fresh(repo: Path) -> None:
+    with contextlib.chdir(repo):
+        assert PICTURE.read_text(encoding="utf-8") == drawn(), "run `python -m tests.picture`"
+
+
+def test_the_first_table_is_the_example(repo: Path) -> None:
+    [shown, *_] = blocks(repo, "rcs")
+    example = (repo / "tables/examples/grip.rcs").read_text(encoding="utf-8")
+    for line in shown.strip().splitlines():
+        assert words(line) in words(example), line
+
+
+def test_what_the_first_command_prints_is_shown_as_it_is(repo: Path) -> None:
+    [shown, *_] = blocks(repo, "text")
+    with contextlib.chdir(repo):
+        printed = said(("compile", "--check", "tables/task", "tables/examples/approach.rcs"))
+        printed += said(("check", "tables/examples/acquire_published.rcs"))
+    for line in filter(None, shown.splitlines()):
+        assert words(line) in words(printed), line
