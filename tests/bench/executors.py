@@ -1,7 +1,8 @@
 """What a match costs: instructions of the C matcher by callgrind, nanoseconds of the Python one: `python -m tests.bench.executors`.
 
-Tables of `families.box` by size, and ACQUIRE. Beside them, in C: a scan of all lines that counts how many match; in Python: nested ifs that check nothing.
-The counts hold for the compiler and flags at hand; the fuller the inputs' variety the fairer, so inputs are drawn over the whole space.
+Tables of `families.box` by size, and ACQUIRE.
+Beside them, in C: a scan of all lines that counts how many match; in Python: nested ifs that check nothing. The counts hold
+for the compiler and flags at hand; the fuller the inputs' variety the fairer, so inputs are drawn over the whole space.
 """
 
 import random
