@@ -26,13 +26,15 @@ class Loaded:
     """Parsed files.
 
     Attributes:
-        roots: Files to check, in order.
+        given: Files that the paths mean, in order.
+        roots: Those to check: of a folder those that no other of its files uses.
         files: Every file, used ones too, by name as reached from the paths given.
         uses: For each file the files that it uses.
         sources: Every text.
         found: What could not be read, found or parsed.
     """
 
+    given: tuple[str, ...]
     roots: tuple[str, ...]
     files: Mapping[str, tree.File]
     uses: Mapping[str, tuple[str, ...]]
@@ -48,7 +50,22 @@ def load(paths: Sequence[str], stdin: str | bytes | None = None, stdin_name: str
         loader.reach(file)
     found = tuple(sorted(set(loader.found), key=sort_key))
     uses = {file: tuple(used) for file, used in loader.uses.items()}
-    return Loaded(roots, loader.files, uses, loader.sources, found)
+    heads = _heads(roots, {path for path in paths if not os.path.isdir(path)}, uses)
+    return Loaded(roots, heads, loader.files, uses, loader.sources, found)
+
+
+def _heads(roots: tuple[str, ...], named: set[str], uses: Mapping[str, tuple[str, ...]]) -> tuple[str, ...]:
+    """Without the files of a folder that another of its files uses: they are checked as parts of that one."""
+    explicit = {os.path.realpath(path) for path in named}
+    used = {part for file in roots for part in uses.get(file, ()) if part != file}
+    waiting = list(used)
+    while waiting:
+        for part in uses.get(waiting.pop(), ()):
+            if part not in used:
+                used.add(part)
+                waiting.append(part)
+    heads = tuple(one for one in roots if one not in used or os.path.realpath(one) in explicit)
+    return heads or roots
 
 
 def listed(paths: Sequence[str]) -> tuple[str, ...]:

@@ -5,6 +5,7 @@
 
 import argparse
 import random
+import re
 import resource
 import time
 from collections import Counter
@@ -67,13 +68,19 @@ def _codes(found: Sequence[Diagnostic], text: str) -> tuple[str, ...]:
     return tuple(d.code.value for d in found)
 
 
+def _alone(path: Path, root: Path) -> str:
+    """The text with what it uses in the place where it says so."""
+
+    def text_of(found: re.Match[str]) -> str:
+        return _alone(root / f"{found[1]}.rcs", root)
+
+    return re.sub(r"^use ([\w/]+)$", text_of, path.read_text(encoding="utf-8"), flags=re.MULTILINE)
+
+
 def seeds() -> tuple[str, ...]:
     """Texts to mutate: the shipped tables (made to stand alone) and the manual's examples."""
-    vocabulary = (REPO / "tables/task/vocabulary.rcs").read_text(encoding="utf-8")
-    tables = [
-        path.read_text(encoding="utf-8").replace("use task/vocabulary", vocabulary)
-        for path in sorted((REPO / "tables").rglob("*.rcs"))
-    ]
+    root = REPO / "tables"
+    tables = [_alone(path, root) for path in sorted(root.rglob("*.rcs"))]
     manual = (REPO / "grammar/manual.md").read_text(encoding="utf-8").split("```")
     examples = [part.removeprefix("rcs\n") for part in manual if part.startswith("rcs\n")]
     return tuple(tables + examples * 3)

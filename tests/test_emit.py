@@ -273,14 +273,14 @@ def test_a_template_that_misspells_an_attribute_fails() -> None:
         template.render(plan=View())
 
 
-MAIN = """#include "acquire.h"
-int main(void) { acquire_t s; acquire_init(&s); return (int)acquire_task_cycle(&s); }
+MAIN = """#include "task.h"
+int main(void) { task_t s; task_init(&s); return (int)task_task_cycle(&s); }
 """
 CMAKE = """cmake_minimum_required(VERSION 3.13)
 project(app C)
-include({here}/acquire.cmake)
+include({here}/task.cmake)
 add_executable(app app.c)
-target_link_libraries(app acquire)
+target_link_libraries(app task)
 """
 
 
@@ -290,8 +290,8 @@ def test_a_user_links_it_by_pkg_config(repo: Path, tmp_path: Path) -> None:
     (tmp_path / "app.c").write_text(MAIN)
     script = (
         "export PKG_CONFIG_PATH=c\n"
-        "cc -O2 -c c/acquire.c -o acquire.o && ar rcs c/libacquire.a acquire.o\n"
-        "cc app.c $(pkg-config --cflags --libs acquire) -o app\n"
+        "cc -O2 -c c/task.c -o task.o && ar rcs c/libtask.a task.o\n"
+        "cc app.c $(pkg-config --cflags --libs task) -o app\n"
         "./app"
     )
     subprocess.run(["sh", "-eu", "-c", script], cwd=tmp_path, check=True)

@@ -48,7 +48,7 @@ def test_a_prover_that_notices_nothing_lets_mutants_live(repo: Path) -> None:
 
 
 def test_a_difference_is_one_and_no_difference_is_none(repo: Path) -> None:
-    program = shipped("tables/task/acquire.rcs", repo)
+    program = shipped("tables/examples/acquire_published.rcs", repo)
     table = program.tables[0]
     search = search_in(program)
     for mutant in list(table_mutants(program, table))[::7]:

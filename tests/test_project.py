@@ -101,7 +101,18 @@ def test_names_are_told_as_reached_from_the_paths_given(tmp_path: Path) -> None:
     write(tmp_path, sub__a="use b", sub__b="")
     assert set(load(["sub/a.rcs"]).files) == {"sub/a.rcs", "sub/b.rcs"}
     assert set(load([str(tmp_path / "sub")]).files) == {f"{tmp_path}/sub/a.rcs", f"{tmp_path}/sub/b.rcs"}
-    assert load(["sub", "./sub/a.rcs", str(tmp_path / "sub")]).roots == ("sub/a.rcs", "sub/b.rcs")
+    assert load(["sub", "./sub/a.rcs", str(tmp_path / "sub")]).given == ("sub/a.rcs", "sub/b.rcs")
+
+
+def test_of_a_folder_the_files_that_others_use_are_parts(tmp_path: Path) -> None:
+    write(tmp_path, sub__a="use b", sub__b="use c", sub__c="", sub__d="")
+    assert load(["sub"]).roots == ("sub/a.rcs", "sub/d.rcs")
+    assert load(["sub", "sub/c.rcs"]).roots == ("sub/a.rcs", "sub/c.rcs", "sub/d.rcs")
+    write(tmp_path, sub__a="use b", sub__b="use a")
+    assert load(["sub"]).roots == ("sub/c.rcs", "sub/d.rcs")
+    (tmp_path / "sub/c.rcs").unlink()
+    (tmp_path / "sub/d.rcs").unlink()
+    assert load(["sub"]).roots == ("sub/a.rcs", "sub/b.rcs")
 
 
 # --- what cannot be read ---

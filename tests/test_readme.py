@@ -34,7 +34,8 @@ def test_the_first_table_is_the_example(repo: Path) -> None:
 def test_what_the_first_command_prints_is_shown_as_it_is(repo: Path) -> None:
     [shown, *_] = blocks(repo, "text")
     with contextlib.chdir(repo):
-        printed = said(("compile", "--check", "tables/task", "tables/examples/approach.rcs"))
+        printed = said(("run", "make_boxt"))
         printed += said(("check", "tables/examples/acquire_published.rcs"))
+    plain = words(re.sub(r"\x1b\[[0-9;]*m", "", printed))
     for line in filter(None, shown.splitlines()):
-        assert words(line) in words(printed), line
+        assert line == "..." or words(line) in plain, line

@@ -27,7 +27,7 @@ def run(args: Sequence[str]) -> int:
         status = commands.main(list(args), prog_name="rcsc", standalone_mode=False)
     except click.ClickException as error:
         error.show()
-        return USAGE
+        return int(getattr(error, "status", USAGE))
     except (click.Abort, KeyboardInterrupt):
         click.echo("rcsc: interrupted; nothing was half written", err=True)
         return INTERRUPTED

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 import click
 
 from rcsc import __version__
+from rcsc.cli.cell import db, run
+from rcsc.cli.logs import log, replay
 from rcsc.cli.options import PATHS, proving, showing
 from rcsc.cli.show import Output, Progress, show
 from rcsc.diagnostics.report import Report
@@ -268,3 +270,7 @@ def completion(shell: str) -> int:
         raise click.UsageError(f"no completion for {shell}")
     click.echo(kind(commands, {}, "rcsc", "_RCSC_COMPLETE").source())
     return 0
+
+
+for _command in (db, log, replay, run):
+    commands.add_command(_command)

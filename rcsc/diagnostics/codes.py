@@ -1,8 +1,8 @@
 """Every code, with its title; the text of `rcsc explain` is in `explanations`.
 
 Codes are never renumbered and never reused. 1xx syntax and files, 2xx names and writers, 3xx kinds,
-units, ranges, 4xx proof, 5xx emission and generated files, 6xx generated-code tests, 9xx a
-bug in rcsc.
+units, ranges, 4xx proof, 5xx emission and generated files, 6xx generated-code tests, 7xx
+recorded runs, 9xx a bug in rcsc.
 """
 
 from enum import StrEnum
@@ -83,6 +83,17 @@ class Code(StrEnum):
     LINE_NOT_REACHED = "RCS602"
     NO_C_COMPILER = "RCS603"
     MATCHER_DIFFERS = "RCS604"
+    # 7xx recorded runs
+    LOG_UNREADABLE = "RCS701"
+    REPLAY_DIFFERS = "RCS702"
+    TABLES_DECIDE_OTHERWISE = "RCS703"
+    NOT_REPLAYED = "RCS704"
+    EXTRA_MISSING = "RCS705"
+    BAD_SYSTEM = "RCS721"
+    BAD_DATA = "RCS722"
+    BAD_SCRIPT = "RCS723"
+    SCRIPT_STOPPED = "RCS724"
+    STATE_TABLE_ERROR = "RCS725"
     # 9xx a bug in rcsc
     SOLVERS_DISAGREE = "RCS901"
     INTERNAL = "RCS902"

@@ -36,8 +36,8 @@ class Formatted:
 def reformat(paths: tuple[str, ...], stdin: bytes | None, *, write: bool) -> Formatted:
     """Format every file that the paths mean; used files that they do not mean are left alone."""
     loaded = load(paths, stdin)
-    roots = [name for name in loaded.roots if name in loaded.files]
-    mine = tuple(one for one in loaded.found if one.code.value < "RCS2" and _of(one, loaded.roots, paths))
+    roots = [name for name in loaded.given if name in loaded.files]
+    mine = tuple(one for one in loaded.found if one.code.value < "RCS2" and _of(one, loaded.given, paths))
     texts = {name: _text(name, loaded.files[name]) for name in roots}
     changed = {name: text for name, text in texts.items() if text != loaded.sources[name].text}
     found = list(mine)

@@ -57,7 +57,7 @@ def remember(
         if (contents[name] or b"").decode("utf-8-sig", "replace") != source.text:
             return  # changed while it was checked
     value: dict[str, Any] = {
-        "roots": list(loaded.roots),
+        "roots": list(loaded.given),
         "looked_at": {name: _digest(content) for name, content in contents.items()},
         "found": [diagnostic_to_json(one, report.sources) for one in report.found],
         "tables": [table_to_json(one) for one in report.tables],

@@ -20,9 +20,11 @@ from rcsc.model import (
     OneTable,
     Procedure,
     Program,
+    Read,
     Real,
     Record,
     Type,
+    Unit,
     Variable,
     key_bounds,
     pending,
@@ -655,10 +657,14 @@ def _type_bounds(name: str) -> tuple[int, int] | None:
     return (0, 2**bits - 1) if found[1] else (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
 
 
+def _unit(unit: Unit) -> str:
+    return "*".join(name if power == 1 else f"{name}^{power}" for name, power in unit)
+
+
 def _range(kind: Type) -> str:
     match kind:
         case Int(low, high, unit) | Real(low, high, unit):
-            units = "*".join(name if power == 1 else f"{name}^{power}" for name, power in unit)
+            units = _unit(unit)
             return f"{low} .. {high}" + (f" {units}" if units else "")
         case Enum(name=name):
             return name
@@ -668,6 +674,29 @@ def _range(kind: Type) -> str:
 
 def _plain(name: str) -> str:
     return re.sub(r"\W+", "_", name).strip("_")
+
+
+def _described(variable: Variable) -> dict[str, object]:
+    """What a log or a shell shows of a leaf: its range, unit or members, initial value and doc."""
+    kind = variable.type
+    said: dict[str, object] = {"initial": variable.initial, "doc": variable.doc}
+    match kind:
+        case Enum(members=members):
+            said["members"] = list(members)
+        case Int(low, high, unit) | Real(low, high, unit):
+            said |= {"low": low, "high": high, "unit": _unit(unit)}
+        case Bool():
+            pass
+    return said
+
+
+def _dispatched(level: Level) -> dict[str, object]:
+    """Which table a level runs: one, or by the value of a leaf."""
+    if isinstance(level.tables, OneTable):
+        return {"table": level.tables.table}
+    selector = level.tables.selector
+    by = selector.name if isinstance(selector, Read) else ""
+    return {"by": by, "tables": {str(int(value)): table for value, table in level.tables.tables}}
 
 
 def _symbols(plan: Plan, names: Names) -> str:
@@ -687,6 +716,7 @@ def _symbols(plan: Plan, names: Names) -> str:
                 "path": names.paths[v.name],
                 "c_type": c_type(v.type),
                 "attribute": names.attributes[v.name],
+                **_described(v),
             }
             for v in plan.program.variables
         ],
@@ -706,6 +736,7 @@ def _symbols(plan: Plan, names: Names) -> str:
                 "name": level.name,
                 "cycle": f"{p}_{names.levels[level.name]}_cycle",
                 "period_ms": level.period_ms,
+                **_dispatched(level),
             }
             for level in plan.program.levels
         ],

@@ -94,16 +94,20 @@ def equal(left: Term, right: Term, kind: Scalar) -> Term:
 
 
 def at_most(left: Term, right: Term, kind: Scalar) -> Term:
-    """`left <= right`."""
+    """`left <= right`; false comes before true."""
     z3: Any = _z3()
     a: Any = left
+    if isinstance(kind, Bool):
+        return Term(z3.Implies(left, right))
     return Term(z3.fpLEQ(left, right) if isinstance(kind, Real) else a <= right)
 
 
 def below(left: Term, right: Term, kind: Scalar) -> Term:
-    """`left < right`."""
+    """`left < right`; false comes before true."""
     z3: Any = _z3()
     a: Any = left
+    if isinstance(kind, Bool):
+        return Term(z3.And(z3.Not(left), right))
     return Term(z3.fpLT(left, right) if isinstance(kind, Real) else a < right)
 
 

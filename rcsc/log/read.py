@@ -1,0 +1,241 @@
+"""A log, read: the whole one, or what a kill left of it.
+
+In: an MCAP file that `rcsc.log.write` wrote. Out: a `Log`: for each level its signature and what every cycle left.
+"""
+
+import struct
+from bisect import bisect_right
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from mcap.exceptions import McapError
+from mcap.records import Channel, Chunk, Footer, McapRecord, Message, Metadata
+from mcap.stream_reader import StreamReader, breakup_chunk
+from zstandard import ZstdError
+
+from rcsc.log.layout import (
+    BUFFERS,
+    LEVELS,
+    PROGRAMS,
+    SIGNATURE,
+    SYSTEM,
+    buffer_leaves,
+    message_format,
+    signature_of,
+    system_of,
+)
+from rcsc.system.description import Description, Wire
+from rcsc.system.signature import LevelSign, Signature, Values
+
+_NOWHERE = Path()
+_DAMAGE = (McapError, ZstdError, struct.error, ValueError, EOFError, KeyError, OverflowError)
+
+
+class UnreadableLog(Exception):  # noqa: N818  # what happened, not an error of ours
+    """A file is no log of rcsc's, or nothing of it is left; says why."""
+
+
+@dataclass(slots=True)
+class Track:
+    """What one level left, or what one buffer carried, in ticks that ascend.
+
+    Attributes:
+        packed: Canonical bytes; the same object where nothing changed, so that waiting costs no memory.
+    """
+
+    layout: struct.Struct
+    ticks: list[int] = field(default_factory=list)
+    packed: list[bytes] = field(default_factory=list)
+
+    def add(self, tick: int, content: bytes) -> None:
+        """Append one record.
+
+        Raises:
+            ValueError: It has not the length that the signature says.
+        """
+        if len(content) != self.layout.size:
+            raise ValueError(f"{len(content)} bytes, not {self.layout.size}")
+        if self.packed and self.packed[-1] == content:
+            content = self.packed[-1]
+        self.ticks.append(tick)
+        self.packed.append(content)
+
+    def place(self, tick: int) -> int:
+        """Where the latest record of then lies; -1 for none."""
+        return bisect_right(self.ticks, tick) - 1
+
+    def latest(self, tick: int) -> Values | None:
+        """The value as of a tick."""
+        at = self.place(tick)
+        return None if at < 0 else self.layout.unpack(self.packed[at])
+
+    def __iter__(self) -> Iterator[tuple[int, Values]]:
+        held, values = b"", ()
+        for tick, content in zip(self.ticks, self.packed, strict=True):
+            if content is not held:
+                held, values = content, self.layout.unpack(content)
+            yield tick, values
+
+
+@dataclass(frozen=True, slots=True)
+class LoggedLevel:
+    """A level of a log; the first record is what it started from, every other one a cycle."""
+
+    name: str
+    sign: Signature
+    level: LevelSign
+    track: Track
+
+
+@dataclass(frozen=True, slots=True)
+class Log:
+    """A log.
+
+    Attributes:
+        facts: The description of the system as it was written.
+        programs: The digest of each program that ran.
+        levels: From the top down.
+        buffers: Those that no level fills, by name.
+        complete: Whether the log was closed; otherwise up to a chunk is lost.
+    """
+
+    facts: Mapping[str, str]
+    programs: Mapping[str, str]
+    levels: tuple[LoggedLevel, ...]
+    buffers: Mapping[str, Track]
+    complete: bool
+
+    def system(self, generated: Path = _NOWHERE, database: Path = _NOWHERE) -> Description:
+        """The description, with paths of here."""
+        return system_of(self.facts, generated, database)
+
+    @property
+    def tick_ms(self) -> int:
+        """Length of a tick in ms."""
+        return int(self.facts["tick_ms"])
+
+    @property
+    def first(self) -> int:
+        """The tick that recording started from, before the first cycle."""
+        return min(level.track.ticks[0] for level in self.levels)
+
+    @property
+    def last(self) -> int:
+        """The last tick."""
+        return max(level.track.ticks[-1] for level in self.levels)
+
+    @property
+    def ticks(self) -> range:
+        """Every tick in which cycles were recorded."""
+        return range(self.first + 1, self.last + 1)
+
+    def level(self, name: str) -> LoggedLevel:
+        """A level by its name.
+
+        Raises:
+            KeyError: There is none.
+        """
+        for level in self.levels:
+            if level.name == name:
+                return level
+        raise KeyError(name)
+
+    def buffer_variable(self, source: str) -> str:
+        """The variable, `level.variable`, that a buffer fills."""
+        return next(wire.target for wire in self.system().wires if wire.source == source)
+
+
+def read(path: Path) -> Log:
+    """Reads a log; one that was cut off is read as far as it goes.
+
+    Raises:
+        UnreadableLog: It cannot be read, or is none.
+    """
+    made = _Reading()
+    try:
+        for record in _records(path):
+            made.take(record)
+        return made.log()
+    except OSError as error:
+        raise UnreadableLog(f"`{path}` cannot be read: {error.strerror}") from error
+    except (KeyError, TypeError, ValueError, AttributeError, StopIteration) as error:
+        raise UnreadableLog(f"`{path}` holds no run that rcsc recorded") from error
+
+
+def _records(path: Path) -> Iterator[McapRecord]:
+    """Every record, up to the end or to where it is cut off; a chunk counts whole or not at all."""
+    with path.open("rb") as file:
+        limit = path.stat().st_size
+        records = iter(StreamReader(file, emit_chunks=True, record_size_limit=limit).records)
+        while True:
+            try:
+                record = next(records, None)
+                if record is None:
+                    return
+                inside = breakup_chunk(record, validate_crc=True) if isinstance(record, Chunk) else [record]
+            except _DAMAGE:
+                return
+            yield from inside
+
+
+@dataclass(slots=True)
+class _Reading:
+    """What was read so far."""
+
+    metadata: dict[str, dict[str, str]] = field(default_factory=dict)
+    signs: dict[str, Signature] = field(default_factory=dict)
+    tracks: dict[int, Track] = field(default_factory=dict)
+    topics: dict[str, int] = field(default_factory=dict)
+    complete: bool = False
+
+    def take(self, record: McapRecord) -> None:
+        """Notes one record."""
+        match record:
+            case Metadata(name=name, metadata=said):
+                self.metadata[name] = said
+            case Channel():
+                self._channel(record)
+            case Message(channel_id=channel, sequence=tick, data=content) if channel in self.tracks:
+                self.tracks[channel].add(tick, content)
+            case Footer():
+                self.complete = True
+            case _:
+                pass
+
+    def _channel(self, channel: Channel) -> None:
+        if channel.id in self.tracks:  # said again at the end
+            return
+        if channel.topic.startswith(LEVELS):
+            sign = signature_of(channel.metadata[SIGNATURE])
+            self.signs[channel.topic.removeprefix(LEVELS)] = sign
+            self.tracks[channel.id] = Track(sign.packed)
+        elif channel.topic.startswith(BUFFERS):
+            source, target = channel.topic.removeprefix(BUFFERS), channel.metadata["target"]
+            leaves = buffer_leaves(self.signs[target.partition(".")[0]], Wire(source, target))
+            self.tracks[channel.id] = Track(struct.Struct(message_format(leaves)))
+        else:
+            return
+        self.topics[channel.topic] = channel.id
+
+    def log(self) -> Log:
+        """The log.
+
+        Raises:
+            KeyError, TypeError, ValueError, AttributeError, StopIteration: It is none.
+        """
+        facts = self.metadata[SYSTEM]
+        levels = tuple(self._level(spec.name) for spec in system_of(facts, _NOWHERE, _NOWHERE).levels)
+        if not levels or not all(level.track.ticks for level in levels):
+            raise ValueError("no state")
+        buffers = {
+            topic.removeprefix(BUFFERS): self.tracks[channel]
+            for topic, channel in self.topics.items()
+            if topic.startswith(BUFFERS)
+        }
+        return Log(facts, self.metadata.get(PROGRAMS, {}), levels, buffers, self.complete)
+
+    def _level(self, name: str) -> LoggedLevel:
+        sign = self.signs[name]
+        level = next(one for one in sign.levels if one.name == name)
+        return LoggedLevel(name, sign, level, self.tracks[self.topics[LEVELS + name]])

@@ -1,0 +1,129 @@
+"""The recorder: attached to a running system, it writes what happens to an MCAP file.
+
+In: a `System`, after each tick. Out: the file. It depends on the run alone: no time of day, no path, no version, and
+not on which executors ran. A kill at any moment costs at most the last chunk, `CHUNK_MS` of the run.
+"""
+
+import struct
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from mcap.writer import CompressionType, Writer
+
+from rcsc.log.layout import (
+    BUFFERS,
+    LEVELS,
+    PROGRAMS,
+    SIGNATURE,
+    SYSTEM,
+    buffer_leaves,
+    fingerprints,
+    message_definition,
+    message_format,
+    outside_wires,
+    signature_text,
+    system_facts,
+)
+from rcsc.system.cell import System
+from rcsc.system.levels import RunningLevel
+from rcsc.system.signature import Leaf
+
+CHUNK_MS = 1000
+"""How much of the run a chunk holds, and so the most that a kill loses."""
+
+_ENDLESS = 1 << 40  # bytes: chunks end by time alone
+_NS_PER_MS = 1_000_000
+
+
+class Recorder:
+    """Writes every cycle of a system: `system.watch.append(Recorder(system, path))`.
+
+    The first message of a level is the state that it starts from, at the tick where recording starts.
+    """
+
+    def __init__(self, system: System, path: Path) -> None:
+        """Writes everything but the cycles, under another name first: a log that is there can be opened.
+
+        Raises:
+            OSError: The file cannot be written.
+        """
+        self._tick_ns = system.description.tick_ms * _NS_PER_MS
+        self._ticks_a_chunk = max(1, CHUNK_MS // system.description.tick_ms)
+        beside = path.with_name(f".{path.name}.part")
+        self._file = beside.open("wb", buffering=1 << 20)
+        self._writer = Writer(self._file, chunk_size=_ENDLESS, compression=CompressionType.ZSTD)
+        self._begin(system)
+        self._file.flush()
+        beside.replace(path)
+
+    def _begin(self, system: System) -> None:
+        self._writer.start(profile="rcsc", library="rcsc")
+        self._writer.add_metadata(SYSTEM, system_facts(system.description))
+        self._writer.add_metadata(PROGRAMS, fingerprints(system.description))
+        self._levels = {
+            level.name: (self._level_channel(level), level.sign.packed) for level in system.levels
+        }
+        signs = {level.name: level.sign for level in system.levels}
+        self._buffers = {
+            wire.source: self._buffer_channel(
+                wire.source, buffer_leaves(signs[wire.target.partition(".")[0]], wire), wire.target
+            )
+            for wire in outside_wires(system.description)
+            if wire.target.partition(".")[0] in signs
+        }
+        for level in system.levels:
+            self._write_level(level, system.tick)
+        self._write_buffers(system)
+        self._writer.flush()  # type: ignore[no-untyped-call]  # mcap leaves it untyped
+
+    def _level_channel(self, level: RunningLevel) -> int:
+        definition = message_definition(level.sign.leaves, trace=True)
+        schema = self._writer.register_schema(f"rcsc/{level.name}", "ros1msg", definition.encode())
+        said = {SIGNATURE: signature_text(level.sign)}
+        return self._writer.register_channel(LEVELS + level.name, "ros1", schema, said)
+
+    def _buffer_channel(
+        self, source: str, leaves: tuple[Leaf, ...], target: str
+    ) -> tuple[int, struct.Struct]:
+        definition = message_definition(leaves, trace=False)
+        name = f"rcsc/{source.replace('.', '_')}"
+        schema = self._writer.register_schema(name, "ros1msg", definition.encode())
+        channel = self._writer.register_channel(BUFFERS + source, "ros1", schema, {"target": target})
+        return channel, struct.Struct(message_format(leaves))
+
+    def __call__(self, system: System, ran: tuple[RunningLevel, ...]) -> None:
+        """Write what the levels that ran in this tick were left with, and what came from outside."""
+        for level in ran:
+            self._write_level(level, system.tick)
+        self._write_buffers(system)
+        if system.tick % self._ticks_a_chunk == 0:
+            self._writer.flush()  # type: ignore[no-untyped-call]  # mcap leaves it untyped
+
+    def _write_level(self, level: RunningLevel, tick: int) -> None:
+        channel, packed = self._levels[level.name]
+        self._write(channel, tick, packed.pack(*level.values))
+
+    def _write_buffers(self, system: System) -> None:
+        for source, (channel, packed) in self._buffers.items():
+            latest = system.buffers.latest(source)
+            if latest is not None:
+                self._write(channel, system.tick, packed.pack(*latest))
+
+    def _write(self, channel: int, tick: int, content: bytes) -> None:
+        time = tick * self._tick_ns
+        self._writer.add_message(channel, time, content, time, tick)
+
+    def close(self) -> None:
+        """Write the last chunk and the index; once is enough."""
+        if not self._file.closed:
+            self._writer.finish()  # type: ignore[no-untyped-call]  # likewise
+            self._file.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, where: TracebackType | None
+    ) -> None:
+        self.close()

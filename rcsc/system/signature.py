@@ -1,0 +1,168 @@
+"""What a generated program looks like from outside: its leaves, tables and levels, from the symbol file beside it.
+
+In: `generated/c/NAME.json`. Out: a `Signature`. The canonical bytes of a state are its leaves in declared order and
+then the trace, little-endian, without padding: the same for every executor and machine.
+"""
+
+import json
+import struct
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TypeAlias
+
+Value: TypeAlias = bool | int | float
+Values: TypeAlias = tuple[Value, ...]
+
+FORMATS = {
+    "bool": "?", "uint8_t": "B", "int8_t": "b", "uint16_t": "H", "int16_t": "h", "uint32_t": "I", "int32_t": "i",
+    "uint64_t": "Q", "int64_t": "q", "double": "d",
+}  # fmt: skip
+TRACE = ("line", "fault", "fault_at", "assumptions_failed")
+TRACE_FORMAT = "iiiQ"
+FAULTS = ("none", "input refused", "no line matches", "several lines match", "extern refused")
+
+
+@dataclass(frozen=True, slots=True)
+class Leaf:
+    """One scalar of a program's state.
+
+    Attributes:
+        kind: `input`, `state` or `output`.
+        place: How the C struct calls it; `attribute` is its name in Python.
+        members: Of an enumeration; empty for numbers and bools.
+    """
+
+    name: str
+    kind: str
+    place: str
+    attribute: str
+    c_type: str
+    members: tuple[str, ...]
+    low: float | None
+    high: float | None
+    unit: str
+    initial: Value
+    doc: str
+
+    def shown(self, value: Value) -> str:
+        """The value in the table's words."""
+        if self.members:
+            return self.members[int(value)] if 0 <= value < len(self.members) else f"{int(value)}?"
+        return ("false", "true")[bool(value)] if self.c_type == "bool" else repr(value)
+
+    def read(self, text: str) -> Value:
+        """The value that a text means.
+
+        Raises:
+            ValueError: It is none of this leaf's.
+        """
+        if self.members:
+            return self.members.index(text)
+        if self.c_type == "bool":
+            return ("false", "true").index(text) == 1
+        value: Value = float(text) if self.c_type == "double" else int(text)
+        if self.low is not None and self.high is not None and not self.low <= value <= self.high:
+            raise ValueError(f"{text} lies outside {self.low} .. {self.high}")
+        return value
+
+
+@dataclass(frozen=True, slots=True)
+class LevelSign:
+    """A level: which functions run it, and which table."""
+
+    name: str
+    cycle: str
+    period_ms: int
+    table: str
+    by: str
+    tables: Mapping[int, str]
+
+
+@dataclass(frozen=True, slots=True)
+class Signature:
+    """A program from outside."""
+
+    program: str
+    struct_name: str
+    init: str
+    leaves: tuple[Leaf, ...]
+    tables: Mapping[str, tuple[str, ...]]
+    levels: tuple[LevelSign, ...]
+    monitored: tuple[str, ...]
+    index: Mapping[str, int] = field(default_factory=dict)
+
+    @property
+    def packed(self) -> struct.Struct:
+        """Leaves and trace as canonical bytes."""
+        return struct.Struct("<" + "".join(FORMATS[leaf.c_type] for leaf in self.leaves) + TRACE_FORMAT)
+
+    def record(self, name: str) -> range:
+        """Positions of the leaves of a variable: a record's or array's are next to each other.
+
+        Raises:
+            KeyError: There is no such variable.
+        """
+        found = [
+            at
+            for at, leaf in enumerate(self.leaves)
+            if leaf.name == name or leaf.name.startswith((f"{name}.", f"{name}["))
+        ]
+        if not found:
+            raise KeyError(name)
+        return range(found[0], found[-1] + 1)
+
+    def table_of(self, level: LevelSign, values: Values) -> str:
+        """The table that the level ran in the cycle that left these values."""
+        return level.table or level.tables.get(int(values[self.index[level.by]]), "?")
+
+
+def signature(path: Path) -> Signature:
+    """Reads a symbol file.
+
+    Raises:
+        OSError: It cannot be read.
+        ValueError: It is no symbol file.
+    """
+    try:
+        said = json.loads(path.read_text(encoding="utf-8"))
+        leaves = tuple(
+            Leaf(
+                one["name"],
+                one["kind"],
+                one["path"],
+                one["attribute"],
+                one["c_type"],
+                tuple(one.get("members", ())),
+                one.get("low"),
+                one.get("high"),
+                one.get("unit", ""),
+                one["initial"],
+                one["doc"],
+            )
+            for one in said["leaves"]
+        )
+        levels = tuple(
+            LevelSign(
+                one["name"],
+                one["cycle"],
+                one["period_ms"],
+                one.get("table", ""),
+                one.get("by", ""),
+                {int(value): table for value, table in one.get("tables", {}).items()},
+            )
+            for one in said["levels"]
+        )
+        tables = {one["name"]: tuple(one["lines"]) for one in said["tables"]}
+        return Signature(
+            said["program"],
+            said["struct"],
+            said["init"],
+            leaves,
+            tables,
+            levels,
+            tuple(said["monitored"]),
+            {leaf.name: at for at, leaf in enumerate(leaves)},
+        )
+    except (KeyError, TypeError, json.JSONDecodeError) as error:
+        raise ValueError(f"{path} is no symbol file of rcsc's: {error}") from error
