@@ -45,9 +45,13 @@ class Faults:
     """What goes wrong; nothing unless a test says so."""
 
     robot_stuck: bool = False
+    robot_refuses: bool = False
     hand_stuck: bool = False
+    jammed: bool = False
     slips: bool = False
     blind: bool = False
+    dark: bool = False
+    tilted: bool = False
 
 
 @dataclass(slots=True)
@@ -92,7 +96,8 @@ class World:
             stuck = command == FOLLOW and list(goal) != self.plate
             self._robot = (number, command, EXECUTING if stuck else DONE, 0)
             return
-        if max(abs(a - b) for a, b in zip(goal, self.plate, strict=True)) > JUMP_MM:
+        far = max(abs(a - b) for a, b in zip(goal, self.plate, strict=True))
+        if far > JUMP_MM or self.faults.robot_refuses:
             self._robot = (number, command, FAILED, ROBOT_REASON)
             return
         self.plate = [float(value) for value in goal]
@@ -142,6 +147,9 @@ class World:
         self._slip()
         if not drive:
             return
+        if self.faults.jammed:
+            self.force_n = force
+            return
         thing = self.between()
         least = self._width(thing) if thing is not None else 0.0
         before, far = self.opening_mm, speed * CYCLE_S
@@ -178,7 +186,8 @@ class World:
         if number != self._asked[0]:
             self._asked = (number, fire, wanted, tick)
         if (
-            self._asked[1] != DARK
+            not self.faults.dark
+            and self._asked[1] != DARK
             and self._picture[0] != self._asked[0]
             and tick - self._asked[3] >= PICTURE_TICKS
         ):
@@ -201,7 +210,16 @@ class World:
         assumed = z - size[2] if fire == FLOOD else z - top
         _, _, _, yaw = self.pads
         turn = thing.yaw - yaw
-        return (number, True, thing.x_mm - x, thing.y_mm - y, cos(turn), sin(turn), assumed, True)
+        return (
+            number,
+            True,
+            thing.x_mm - x,
+            thing.y_mm - y,
+            cos(turn),
+            sin(turn),
+            assumed,
+            not self.faults.tilted,
+        )
 
 
 def world(database: Database) -> World:

@@ -73,11 +73,13 @@ static void emove_do_receive(emove_t *s)
             s->new_command = false;
         }
     }
-    s->ref_command_in = (uint8_t)(int64_t)s->primitive.ref_command_echo;
-    s->status_in = (uint8_t)(int64_t)s->primitive.status_report;
-    s->ref_vision_in = (uint8_t)(int64_t)s->vision.ref_command_echo;
-    s->vision_status_in = (uint8_t)(int64_t)s->vision.status_report;
-    s->idle = (((((int64_t)s->primitive.ref_command_echo == INT64_C(0)) && ((int64_t)s->primitive.status_report == INT64_C(0))) && ((int64_t)s->vision.ref_command_echo == INT64_C(0))) && ((int64_t)s->vision.status_report == INT64_C(0)));
+    if ((((int64_t)s->primitive.inc_command_echo == (int64_t)s->to_primitive.inc_command) && ((int64_t)s->vision.inc_command_echo == (int64_t)s->to_vision.inc_command))) {
+        s->ref_command_in = (uint8_t)(int64_t)s->primitive.ref_command_echo;
+        s->status_in = (uint8_t)(int64_t)s->primitive.status_report;
+        s->ref_vision_in = (uint8_t)(int64_t)s->vision.ref_command_echo;
+        s->vision_status_in = (uint8_t)(int64_t)s->vision.status_report;
+    }
+    s->idle = ((((((int64_t)s->ref_command_in == INT64_C(0)) && ((int64_t)s->status_in == INT64_C(0))) && ((int64_t)s->ref_vision_in == INT64_C(0))) && ((int64_t)s->vision_status_in == INT64_C(0))) && (s->begun || (((int64_t)s->primitive.inc_command_echo == (int64_t)s->to_primitive.inc_command) && ((int64_t)s->vision.inc_command_echo == (int64_t)s->to_vision.inc_command))));
 }
 
 /* How long the path would be that begins now. */
@@ -852,7 +854,6 @@ static void emove_run_pause_emove(emove_t *s)
         emove_do_done(s);
         break;
     case 1: /* emove/pause.rcs line 2 */
-        emove_do_begin(s);
         emove_do_nextstate(s, INT64_C(0));
         emove_do_pause(s);
         emove_do_executing(s);

@@ -74,11 +74,13 @@ static void primitive_do_receive(primitive_t *s)
             s->new_command = false;
         }
     }
-    s->ref_robot_in = (uint8_t)(int64_t)s->robot.ref_command_echo;
-    s->robot_status_in = (uint8_t)(int64_t)s->robot.status_report;
-    s->ref_gripper_in = (uint8_t)(int64_t)s->gripper.ref_command_echo;
-    s->gripper_status_in = (uint8_t)(int64_t)s->gripper.status_report;
-    s->idle = (((((((int64_t)s->robot.ref_command_echo == INT64_C(0)) && ((int64_t)s->robot.status_report == INT64_C(0))) && ((int64_t)s->gripper.ref_command_echo == INT64_C(0))) && ((int64_t)s->gripper.status_report == INT64_C(0))) && ((int64_t)s->robot.inc_command_echo == (int64_t)s->to_robot.inc_command)) && ((int64_t)s->gripper.inc_command_echo == (int64_t)s->to_gripper.inc_command));
+    if ((((int64_t)s->robot.inc_command_echo == (int64_t)s->to_robot.inc_command) && ((int64_t)s->gripper.inc_command_echo == (int64_t)s->to_gripper.inc_command))) {
+        s->ref_robot_in = (uint8_t)(int64_t)s->robot.ref_command_echo;
+        s->robot_status_in = (uint8_t)(int64_t)s->robot.status_report;
+        s->ref_gripper_in = (uint8_t)(int64_t)s->gripper.ref_command_echo;
+        s->gripper_status_in = (uint8_t)(int64_t)s->gripper.status_report;
+    }
+    s->idle = (((((((int64_t)s->ref_robot_in == INT64_C(0)) && ((int64_t)s->robot_status_in == INT64_C(0))) && ((int64_t)s->ref_gripper_in == INT64_C(0))) && ((int64_t)s->gripper_status_in == INT64_C(0))) && ((int64_t)s->robot.inc_command_echo == (int64_t)s->to_robot.inc_command)) && ((int64_t)s->gripper.inc_command_echo == (int64_t)s->to_gripper.inc_command));
 }
 
 /* Procedure measure. */
@@ -1009,7 +1011,6 @@ static void primitive_run_pause_primitive(primitive_t *s)
         primitive_do_done(s);
         break;
     case 1: /* primitive/pause.rcs line 2 */
-        primitive_do_begin(s);
         primitive_do_nextstate(s, INT64_C(0));
         primitive_do_pause(s);
         primitive_do_executing(s);

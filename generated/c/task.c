@@ -42,7 +42,7 @@ static inline uint8_t task_u8_of_i64(int64_t a)
     return (uint8_t)a;
 }
 
-/* A new number sets the flag; it falls when this level's own answer is echoed. */
+/* A new number sets the flag; it falls when this level's own answer is echoed. What E-MOVE says of an order that another has replaced is not looked at: until the last one is echoed the level sees what it saw when it gave it. */
 static void task_do_receive(task_t *s)
 {
     if (((int64_t)s->command.inc_command != (int64_t)s->inc_command_seen)) {
@@ -55,9 +55,11 @@ static void task_do_receive(task_t *s)
             s->new_command = false;
         }
     }
-    s->ref_command_in = (uint8_t)(int64_t)s->emove.ref_command_echo;
-    s->status_in = (uint8_t)(int64_t)s->emove.status_report;
-    s->idle = ((((int64_t)s->emove.ref_command_echo == INT64_C(0)) && ((int64_t)s->emove.status_report == INT64_C(0))) && (s->begun || ((int64_t)s->emove.inc_command_echo == (int64_t)s->to_emove.inc_command)));
+    if (((int64_t)s->emove.inc_command_echo == (int64_t)s->to_emove.inc_command)) {
+        s->ref_command_in = (uint8_t)(int64_t)s->emove.ref_command_echo;
+        s->status_in = (uint8_t)(int64_t)s->emove.status_report;
+    }
+    s->idle = ((((int64_t)s->ref_command_in == INT64_C(0)) && ((int64_t)s->status_in == INT64_C(0))) && (s->begun || ((int64_t)s->emove.inc_command_echo == (int64_t)s->to_emove.inc_command)));
 }
 
 /* The table test variables that the command and the database give (section 8.1). */
@@ -815,7 +817,6 @@ static void task_run_pause_task(task_t *s)
         task_do_done(s);
         break;
     case 1: /* task/pause.rcs line 2 */
-        task_do_begin(s);
         task_do_nextstate(s, INT64_C(0));
         task_do_pause(s);
         task_do_executing(s);

@@ -782,11 +782,12 @@ def _do_receive(s):
     else:
         if ((s.begun and (s.primitive_inc_command_echo == s.to_primitive_inc_command)) and (s.vision_inc_command_echo == s.to_vision_inc_command)):
             s.new_command = False
-    s.ref_command_in = s.primitive_ref_command_echo
-    s.status_in = s.primitive_status_report
-    s.ref_vision_in = s.vision_ref_command_echo
-    s.vision_status_in = s.vision_status_report
-    s.idle = ((((s.primitive_ref_command_echo == 0) and (s.primitive_status_report == 0)) and (s.vision_ref_command_echo == 0)) and (s.vision_status_report == 0))
+    if ((s.primitive_inc_command_echo == s.to_primitive_inc_command) and (s.vision_inc_command_echo == s.to_vision_inc_command)):
+        s.ref_command_in = s.primitive_ref_command_echo
+        s.status_in = s.primitive_status_report
+        s.ref_vision_in = s.vision_ref_command_echo
+        s.vision_status_in = s.vision_status_report
+    s.idle = (((((s.ref_command_in == 0) and (s.status_in == 0)) and (s.ref_vision_in == 0)) and (s.vision_status_in == 0)) and (s.begun or ((s.primitive_inc_command_echo == s.to_primitive_inc_command) and (s.vision_inc_command_echo == s.to_vision_inc_command))))
 
 
 def _do_measure(s):
@@ -1597,7 +1598,6 @@ def _pause_emove_0(s):
 
 def _pause_emove_1(s):
     """emove/pause.rcs line 2"""
-    _do_begin(s)
     _do_nextstate(s, 0)
     _do_pause(s)
     _do_executing(s)

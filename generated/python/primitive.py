@@ -810,11 +810,12 @@ def _do_receive(s):
     else:
         if ((s.begun and (s.robot_inc_command_echo == s.to_robot_inc_command)) and (s.gripper_inc_command_echo == s.to_gripper_inc_command)):
             s.new_command = False
-    s.ref_robot_in = s.robot_ref_command_echo
-    s.robot_status_in = s.robot_status_report
-    s.ref_gripper_in = s.gripper_ref_command_echo
-    s.gripper_status_in = s.gripper_status_report
-    s.idle = ((((((s.robot_ref_command_echo == 0) and (s.robot_status_report == 0)) and (s.gripper_ref_command_echo == 0)) and (s.gripper_status_report == 0)) and (s.robot_inc_command_echo == s.to_robot_inc_command)) and (s.gripper_inc_command_echo == s.to_gripper_inc_command))
+    if ((s.robot_inc_command_echo == s.to_robot_inc_command) and (s.gripper_inc_command_echo == s.to_gripper_inc_command)):
+        s.ref_robot_in = s.robot_ref_command_echo
+        s.robot_status_in = s.robot_status_report
+        s.ref_gripper_in = s.gripper_ref_command_echo
+        s.gripper_status_in = s.gripper_status_report
+    s.idle = ((((((s.ref_robot_in == 0) and (s.robot_status_in == 0)) and (s.ref_gripper_in == 0)) and (s.gripper_status_in == 0)) and (s.robot_inc_command_echo == s.to_robot_inc_command)) and (s.gripper_inc_command_echo == s.to_gripper_inc_command))
 
 
 def _do_measure(s):
@@ -1739,7 +1740,6 @@ def _pause_primitive_0(s):
 
 def _pause_primitive_1(s):
     """primitive/pause.rcs line 2"""
-    _do_begin(s)
     _do_nextstate(s, 0)
     _do_pause(s)
     _do_executing(s)

@@ -632,7 +632,7 @@ _TRANSFER_G1 = (
 
 
 def _do_receive(s):
-    """A new number sets the flag; it falls when this level's own answer is echoed."""
+    """A new number sets the flag; it falls when this level's own answer is echoed. What E-MOVE says of an order that another has replaced is not looked at: until the last one is echoed the level sees what it saw when it gave it."""
     if (s.command_inc_command != s.inc_command_seen):
         s.inc_command_seen = s.command_inc_command
         s.new_command = True
@@ -641,9 +641,10 @@ def _do_receive(s):
     else:
         if (s.begun and (s.emove_inc_command_echo == s.to_emove_inc_command)):
             s.new_command = False
-    s.ref_command_in = s.emove_ref_command_echo
-    s.status_in = s.emove_status_report
-    s.idle = (((s.emove_ref_command_echo == 0) and (s.emove_status_report == 0)) and (s.begun or (s.emove_inc_command_echo == s.to_emove_inc_command)))
+    if (s.emove_inc_command_echo == s.to_emove_inc_command):
+        s.ref_command_in = s.emove_ref_command_echo
+        s.status_in = s.emove_status_report
+    s.idle = (((s.ref_command_in == 0) and (s.status_in == 0)) and (s.begun or (s.emove_inc_command_echo == s.to_emove_inc_command)))
 
 
 def _do_test_variables(s):
@@ -1547,7 +1548,6 @@ def _pause_task_0(s):
 
 def _pause_task_1(s):
     """task/pause.rcs line 2"""
-    _do_begin(s)
     _do_nextstate(s, 0)
     _do_pause(s)
     _do_executing(s)
