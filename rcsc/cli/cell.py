@@ -3,14 +3,13 @@
 import sys
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING, Any, Literal, NoReturn
 
 import click
 
 if TYPE_CHECKING:
     from rcsc.diagnostics.codes import Code
     from rcsc.workstation.cell import Run
-    from rcsc.workstation.station import Result
 
 SYSTEM = click.option(
     "--system", "system", type=click.Path(exists=True, dir_okay=False, path_type=Path), default=None, metavar="FILE",
@@ -76,7 +75,8 @@ Examples:
   rcsc run make_boxt                     Fig. 7, corrected, to the end
   rcsc run make_boxt_printed             as printed: refused at row 22
   rcsc run make_boxt --executor python   the same, by the Python executors
-  rcsc run make_boxt --log boxt.mcap     keep every cycle""",
+  rcsc run make_boxt --log boxt.mcap     keep every cycle
+  rcsc run make_boxt --processes         each level in a process of its own""",
 )
 @click.argument("script", metavar="SCRIPT")
 @SYSTEM
@@ -86,9 +86,14 @@ Examples:
               help="Keep the complete state of every cycle in FILE (MCAP).")  # fmt: skip
 @click.option("--compile/--no-compile", "compiles", default=True, show_default=True,
               help="Prove and compile what changed before anything moves.")  # fmt: skip
+@click.option("--processes", is_flag=True,
+              help="Each level in a process of its own, over shared memory, nothing else changed.")  # fmt: skip
+@click.option("--rate", type=click.FloatRange(min=0.1, max=20), default=4.0, show_default=True, metavar="N",
+              help="With --processes: how many times as fast as the clock.")  # fmt: skip
 @click.option("-q", "--quiet", is_flag=True, help="Only what stops the script.")
-def run(
-    script: str, system: Path | None, executor: str, database: Path | None, log: Path | None, compiles: bool, quiet: bool
+def run(  # noqa: PLR0913, PLR0917  # as many as there are options
+    script: str, system: Path | None, executor: str, database: Path | None, log: Path | None, compiles: bool,
+    processes: bool, rate: float, quiet: bool,
 ) -> int:  # fmt: skip
     """Run SCRIPT, a name in the system's scripts or a CSV file, one row a command.
 
@@ -108,6 +113,8 @@ def run(
         return 1
     try:
         made = prepare(path, script, "c" if executor == "c" else "python", world, database)
+        if processes:
+            return _apart(path, script, executor, database, rate, quiet)
         _record(made, log)
         return _watch(made, quiet)
     except (BadDescription, BadData, BadScript, NotBuilt, StateTableError) as error:
@@ -151,7 +158,7 @@ def _watch(made: "Run", quiet: bool) -> int:
     begun = time.perf_counter()
     for result in made.steps():
         if not quiet:
-            _say(result)
+            _say(result.row.number, result.row.text, result.state, result.ticks)
     seconds = time.perf_counter() - begun
     for watch in made.system.watch:
         close = getattr(watch, "close", None)
@@ -160,10 +167,45 @@ def _watch(made: "Run", quiet: bool) -> int:
     return _closing(made, seconds, quiet)
 
 
-def _say(result: "Result") -> None:
-    state = result.state if result.state != "done" else click.style("done", fg="green")
-    row = f"{result.row.number:3}  {result.row.text:42}"
-    click.echo(f"{row} {state}  {result.ticks:5} cycles")
+def _apart(path: Path, script: str, executor: str, database: Path | None, rate: float, quiet: bool) -> int:
+    """The same with a process for each level."""
+    import json
+    import tempfile
+
+    from rcsc.diagnostics.codes import Code
+    from rcsc.system.description import description
+    from rcsc.system.processes import Supervisor, run_processes
+    from rcsc.system.serve import Factory
+
+    held = str(database.resolve()) if database else ""
+    place = str(path.resolve())
+    with tempfile.TemporaryDirectory(prefix="rcsc-run-") as scratch:
+        results = Path(scratch) / "results"
+        results.touch()
+        outside = Factory("sim.processes:outside", (place, script, held, str(results)))
+        queries = Factory("sim.processes:queries", (place, held))
+        kind: Literal["c", "python"] = "c" if executor == "c" else "python"
+        rows: list[list[Any]] = []
+
+        def watch(_: Supervisor) -> None:
+            said = [json.loads(line) for line in results.read_text(encoding="utf-8").splitlines()]
+            for number, text, state, _reason, ticks in [] if quiet else said[len(rows) :]:
+                _say(number, text, state, ticks)
+            rows.extend(said[len(rows) :])
+
+        run_processes(description(path), kind, {"outside": outside}, queries=queries, rate=rate, watch=watch)
+        rows += [json.loads(line) for line in results.read_text(encoding="utf-8").splitlines()[len(rows) :]]
+    if not quiet:
+        click.echo(f"each level in a process of its own, {rate:g} times as fast as the clock")
+    if rows and rows[-1][2] != "done":
+        number, text, state, reason, _ = rows[-1]
+        raise Stopped(Code.SCRIPT_STOPPED, f"row {number}, {text}: {state}: {reason}")
+    return 0
+
+
+def _say(number: int, text: str, state: str, ticks: int) -> None:
+    shown = state if state != "done" else click.style("done", fg="green")
+    click.echo(f"{number:3}  {text:42} {shown}  {ticks:5} cycles")
     sys.stdout.flush()
 
 

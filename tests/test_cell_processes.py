@@ -1,0 +1,36 @@
+"""The whole system, each level in a process of its own: MAKE BOXT ends, though levels are killed while it runs."""
+
+import json
+import signal
+from pathlib import Path
+
+from rcsc.system.description import description
+from rcsc.system.processes import Supervisor, run_processes
+from rcsc.system.serve import Factory
+from tests.cells import SYSTEM
+
+RATE = 8.0
+"""Times as fast as the clock: a cycle in five milliseconds."""
+KILLED = ("task", "primitive", "emove", "gripper", "vision")
+
+
+def test_make_boxt_ends_though_every_level_is_killed_once(tmp_path: Path) -> None:
+    results = tmp_path / "results"
+    results.touch()
+    outside = Factory("sim.processes:outside", (str(SYSTEM), "make_boxt", "", str(results)))
+    queries = Factory("sim.processes:queries", (str(SYSTEM), ""))
+    killed: list[str] = []
+
+    def watch(system: Supervisor) -> None:
+        """Kills the next level whenever three rows more are done."""
+        done = len(results.read_text(encoding="utf-8").splitlines())
+        if len(killed) < len(KILLED) and done >= 2 + 3 * len(killed) and system.runs(KILLED[len(killed)]):
+            system.stop(KILLED[len(killed)], signal.SIGKILL)
+            killed.append(KILLED[len(killed)])
+
+    run_processes(
+        description(SYSTEM), "python", {"outside": outside}, queries=queries, rate=RATE, watch=watch
+    )
+    rows = [json.loads(line) for line in results.read_text(encoding="utf-8").splitlines()]
+    assert killed == list(KILLED)
+    assert [row[2] for row in rows] == ["done"] * 27, rows[-1]
