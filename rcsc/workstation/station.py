@@ -51,8 +51,11 @@ class Workstation:
 
     def step(self, tick: int, latest: Callable[[str], Values | None]) -> Mapping[str, Values]:
         """One tick: begin a row, wait for it, or rest."""
+        report = latest("task.report")
+        if not self._sent and report is not None:
+            self._number = int(report[self._place("inc_command_echo")])  # goes on from what TASK has seen
         if not self.over:
-            self._work(tick, latest("task.report"))
+            self._work(tick, report)
         return {"workstation.order": self._sent} if self._sent else {}
 
     @property

@@ -1,0 +1,197 @@
+"""The database, the scripts, the interlocks, and the commands that use them: what is wrong is said before anything moves."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from rcsc.cli import run
+from rcsc.database.ask import open_database
+from rcsc.database.build import BadData, build
+from rcsc.workstation.cell import prepare
+from rcsc.workstation.interlocks import Cell, after, refusal
+from rcsc.workstation.script import BadScript, Row, read_script
+from sim.standin import World, world
+from tests.cells import REPO, SYSTEM
+
+PARTS = ("null_obj", "tbox", "bbox", "flag", "hous", "close_grip", "unknown_object")
+DATA = (SYSTEM.parent / "cell.toml").read_text(encoding="utf-8")
+HEAD = "command,part,source,dest,end_at\n"
+
+
+@pytest.fixture
+def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A copy of tables and generated files."""
+    shutil.copytree(REPO / "tables", tmp_path / "tables", ignore=shutil.ignore_patterns(".rcsc-cache"))
+    shutil.copytree(REPO / "generated", tmp_path / "generated")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+# --- data ---
+
+WRONG_DATA = {
+    "a location that is not there": (
+        'safe = "FIX-SAFE"',
+        'safe = "NOWHERE"',
+        "no location is called `NOWHERE`",
+    ),
+    "a part that the tables do not know": ("[object.hous", "[object.horse", "no part is called `horse`"),
+    "out of reach": ("x = 800.0, y = 0.0, z = 300.0", "x = 1800.0, y = 0.0, z = 300.0", "out of reach"),
+    "too high": ("x = 800.0, y = 0.0, z = 300.0", "x = 800.0, y = 0.0, z = 1300.0", "mm high, out of reach"),
+    "a gripper that does not open": ("departure_mm = 60.0", "departure_mm = 20.0", "do not open wider"),
+    "too many in stock": ("stock = 10", "stock = 200", "not 0 .. 99"),
+    "vision without a view": ('vupos = "BUFFER-VUPOS"\n', "", "`vupos`"),
+    "a missing value": ("breakpoint_mm = 60.0\n", "", "breakpoint_mm"),
+    "no TOML": ("[robot]", "[robot", "not TOML"),
+}
+
+
+@pytest.mark.parametrize("name", list(WRONG_DATA))
+def test_data_that_is_not_in_order_makes_no_database(name: str, tmp_path: Path) -> None:
+    old, new, said = WRONG_DATA[name]
+    assert old in DATA
+    (tmp_path / "cell.toml").write_text(DATA.replace(old, new), encoding="utf-8")
+    with pytest.raises(BadData, match=said):
+        build(tmp_path / "cell.toml", tmp_path / "cell.sqlite", PARTS)
+    assert not (tmp_path / "cell.sqlite").exists()
+
+
+def test_a_missing_or_broken_database_is_a_coded_error(
+    project: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    (project / "broken").write_bytes(b"no database" * 100)
+    for file in ("missing", "broken"):
+        assert run(["run", "make_boxt", "--no-compile", "--database", file]) == 1
+        said = capfd.readouterr()
+        assert "error[RCS722]" in said.err
+        assert said.out == ""
+
+
+def test_a_pallet_has_a_place_for_each_sector_and_others_ignore_it(tmp_path: Path) -> None:
+    (tmp_path / "cell.toml").write_text(DATA, encoding="utf-8")
+    build(tmp_path / "cell.toml", tmp_path / "cell.sqlite", PARTS)
+    held = open_database(tmp_path / "cell.sqlite")
+    station, safe = held.locations["STATION"], held.locations["WS-SAFE"]
+    grasps = {int(held.route(station, sector)[-1]) for sector in range(4)}
+    assert len({held.point(point)[1:3] for point in grasps}) == 4
+    assert held.route(station, 4)[0] is False
+    assert held.route(safe, 3) == held.route(safe, 0)
+
+
+def test_db_commands(project: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    assert run(["db", "check"]) == 0
+    assert run(["db", "build", "-o", "my.sqlite"]) == 0
+    assert run(["run", "make_boxt", "--no-compile", "--database", "my.sqlite", "-q"]) == 0
+    assert run(["db", "show", "places"]) == 0
+    assert "location\tsector" in capfd.readouterr().out
+    assert run(["db", "show", "nothing"]) == 2
+    (project / "tables/cell.toml").write_text(DATA.replace("z = 300.0", "z = 3000.0"), encoding="utf-8")
+    assert run(["db", "check"]) == 1
+    assert "error[RCS722]: location `FIX-SAFE`" in capfd.readouterr().err
+
+
+# --- scripts ---
+
+
+@pytest.mark.parametrize(
+    ("row", "said"),
+    [
+        ("DANCE,,,,", "is no command"),
+        ("VISE-TURN LEFT,,,,", "nothing that a vise can do"),
+        ("MOVE,BOX (2),BUFFER,FIX-MAC1,", "is no part"),
+        ("MOVE,,,fix mac,", "is no location"),
+    ],
+)
+def test_rows_that_say_nothing_are_named(row: str, said: str, tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text(f"{HEAD}MOVE,,,WS-SAFE,\n{row}\n", encoding="utf-8")
+    with pytest.raises(BadScript, match=f"row 2: .*{said}"):
+        read_script(tmp_path / "a.csv")
+
+
+def test_scripts_that_cannot_be_run_are_coded_errors(
+    project: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    (project / "place.csv").write_text(f"{HEAD}MOVE,,,MOON,\n", encoding="utf-8")
+    (project / "columns.csv").write_text("a,b\n1,2\n", encoding="utf-8")
+    (project / "latin.csv").write_bytes(HEAD.encode() + b"MOVE,\xff,,,\n")
+    for script in ("place.csv", "columns.csv", "latin.csv", "missing"):
+        assert run(["run", script, "--no-compile"]) == 1
+        assert "error[RCS723]" in capfd.readouterr().err, script
+
+
+def test_the_scripts_are_fig_7() -> None:
+    printed = read_script(SYSTEM.parent / "scripts/make_boxt_printed.csv")
+    mended = read_script(SYSTEM.parent / "scripts/make_boxt.csv")
+    assert len(printed) == 25
+    assert [row.text for row in mended if row.text not in {one.text for one in printed}] == []
+    assert len(mended) == 27
+
+
+# --- interlocks ---
+
+CLOSED = Cell(right_open=False, left_open=False, fixture="tbox", robot_at="FIX-SAFE")
+REFUSED = {
+    "no part": (
+        Cell(right_open=False, left_open=False, robot_at="FIX-SAFE"),
+        Row(1, "", machine="ENGRAVE PART"),
+    ),
+    "open vise": (Cell(fixture="tbox", robot_at="FIX-SAFE"), Row(1, "", machine="ENGRAVE PART")),
+    "robot there": (
+        Cell(right_open=False, left_open=False, fixture="tbox", robot_at="FIX-MAC4"),
+        Row(1, "", machine="ENGRAVE PART"),
+    ),
+    "loose part": (CLOSED, Row(1, "", vise={"right": True})),
+    "full fixture": (
+        Cell(fixture="tbox", robot_at="WS-SAFE"),
+        Row(1, "", "move", part="bbox", source="BUFFER", dest="FIX-MAC1"),
+    ),
+    "closed vise": (
+        Cell(right_open=False),
+        Row(1, "", "move", part="bbox", source="BUFFER", dest="FIX-MAC1"),
+    ),
+    "nothing held": (Cell(), Row(1, "", "release")),
+    "nothing to take": (Cell(), Row(1, "", "acquire", part="tbox", source="FIX-MAC5")),
+    "held already": (Cell(held="tbox"), Row(1, "", "acquire", part="tbox", source="BUFFER")),
+}
+
+
+@pytest.mark.parametrize("name", list(REFUSED))
+def test_interlocks_refuse(name: str) -> None:
+    assert refusal(*REFUSED[name])
+
+
+def test_interlocks_let_the_corrected_script_pass() -> None:
+    cell = Cell()
+    for row in read_script(SYSTEM.parent / "scripts/make_boxt.csv"):
+        assert not refusal(cell, row), row
+        cell = after(cell, row)
+    assert (cell.held, cell.fixture, cell.robot_at) == ("", "", "STATION") or cell.robot_at == "WS-SAFE"
+
+
+def test_a_failed_row_stops_the_script_and_can_be_tried_again() -> None:
+    made = prepare(SYSTEM, "make_boxt", "c", world)
+    outside = made.system.outside[1]
+    assert isinstance(outside, World)
+    outside.faults.blind = True
+    *_, last = made.steps()
+    assert (last.row.number, last.state, last.reason) == (2, "failed", "loc")
+    for _ in range(40):
+        made.system.step()
+    assert made.system.level("primitive").shown("to_robot.input_command") == "hold"
+    outside.faults.blind = False
+    made.station.resume()
+    assert [result.state for result in made.steps()] == ["done"] * 26
+
+
+def test_a_level_whose_proof_fails_does_not_run(project: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    file = project / "tables/gripper/gripper.rcs"
+    text = file.read_text(encoding="utf-8")
+    line = next(
+        one
+        for one in text.splitlines()
+        if one.startswith("  | 6    | false       | d_state   |            |")
+    )
+    file.write_text(text.replace(line + "\n", "", 1), encoding="utf-8")
+    assert run(["run", "make_boxt"]) == 1
+    assert "error[RCS401]" in capfd.readouterr().out
