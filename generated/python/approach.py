@@ -174,6 +174,10 @@ def _line_of(m, lines, default):
     return m.bit_length() - 1 if m & (m - 1) == 0 else -2
 
 
+def _one_of(lines, default):
+    return {0: lines if default else -1} | {1 << line: line for line in range(lines)}
+
+
 def _joined(*several):
     return tuple(_reduce(_and, masks) for masks in _product(*several))
 

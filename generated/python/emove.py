@@ -377,6 +377,10 @@ def _line_of(m, lines, default):
     return m.bit_length() - 1 if m & (m - 1) == 0 else -2
 
 
+def _one_of(lines, default):
+    return {0: lines if default else -1} | {1 << line: line for line in range(lines)}
+
+
 def _joined(*several):
     return tuple(_reduce(_and, masks) for masks in _product(*several))
 
@@ -440,6 +444,9 @@ _LOCATE_G0 = (
 )
 _LOCATE_G1 = (
     *_joined(_LOCATE_4, _LOCATE_5, _LOCATE_1, _LOCATE_6),
+)
+_LOCATE_ONE = (
+    _one_of(15, True),
 )
 _MOVE_TO_0 = (
     0xfe3,
@@ -563,6 +570,9 @@ _MOVE_TO_G1 = (
 _MOVE_TO_G2 = (
     *_joined(_MOVE_TO_7, _MOVE_TO_8),
 )
+_MOVE_TO_ONE = (
+    _one_of(12, True),
+)
 _MOVE_TO_OBJ_0 = (
     0x1ff3,
     0x1ffd,
@@ -684,6 +694,9 @@ _MOVE_TO_OBJ_G1 = (
 )
 _MOVE_TO_OBJ_G2 = (
     *_joined(_MOVE_TO_OBJ_7, _MOVE_TO_OBJ_8),
+)
+_MOVE_TO_OBJ_ONE = (
+    _one_of(13, True),
 )
 _PAUSE_EMOVE_0 = (
     0x2,
@@ -1143,8 +1156,10 @@ def _settle(s):
 
 def locate_line(s):
     """The line of table locate that matches admitted inputs: its position; -1 none, -2 several."""
-    m = _LOCATE_G0[s.cur_state * 36 + s.ref_command_in * 6 + s.status_in * 2 + s.target_known] & _LOCATE_G1[s.ref_vision_in * 12 + s.vision_status_in * 4 + s.new_command * 2 + s.idle]
-    return m.bit_length() - 1 if m and not m & (m - 1) else _line_of(m, 15, True)
+    try:
+        return _LOCATE_ONE[0][_LOCATE_G0[s.cur_state * 36 + s.ref_command_in * 6 + s.status_in * 2 + s.target_known] & _LOCATE_G1[s.ref_vision_in * 12 + s.vision_status_in * 4 + s.new_command * 2 + s.idle]]
+    except KeyError:
+        return -2
 
 
 def locate_lines(states):
@@ -1294,8 +1309,10 @@ def locate_step(s):
 
 def move_to_line(s):
     """The line of table move_to that matches admitted inputs: its position; -1 none, -2 several."""
-    m = _MOVE_TO_G0[s.path_length * 6 + s.ref_command_in] & _MOVE_TO_G1[s.cur_state * 24 + s.status_in * 8 + s.target_known * 4 + s.new_command * 2 + s.idle] & _MOVE_TO_G2[(((s.path_length - s.path_at) > 2)) * 2 + (((s.path_length - s.path_at) <= 2))]
-    return m.bit_length() - 1 if m and not m & (m - 1) else _line_of(m, 12, True)
+    try:
+        return _MOVE_TO_ONE[0][_MOVE_TO_G0[s.path_length * 6 + s.ref_command_in] & _MOVE_TO_G1[s.cur_state * 24 + s.status_in * 8 + s.target_known * 4 + s.new_command * 2 + s.idle] & _MOVE_TO_G2[(((s.path_length - s.path_at) > 2)) * 2 + (((s.path_length - s.path_at) <= 2))]]
+    except KeyError:
+        return -2
 
 
 def move_to_lines(states):
@@ -1429,8 +1446,10 @@ def move_to_step(s):
 
 def move_to_obj_line(s):
     """The line of table move_to_obj that matches admitted inputs: its position; -1 none, -2 several."""
-    m = _MOVE_TO_OBJ_G0[s.path_length * 6 + s.ref_command_in] & _MOVE_TO_OBJ_G1[s.cur_state * 24 + s.status_in * 8 + s.target_known * 4 + s.new_command * 2 + s.idle] & _MOVE_TO_OBJ_G2[(((s.path_length - s.path_at) > 2)) * 2 + (((s.path_length - s.path_at) <= 2))]
-    return m.bit_length() - 1 if m and not m & (m - 1) else _line_of(m, 13, True)
+    try:
+        return _MOVE_TO_OBJ_ONE[0][_MOVE_TO_OBJ_G0[s.path_length * 6 + s.ref_command_in] & _MOVE_TO_OBJ_G1[s.cur_state * 24 + s.status_in * 8 + s.target_known * 4 + s.new_command * 2 + s.idle] & _MOVE_TO_OBJ_G2[(((s.path_length - s.path_at) > 2)) * 2 + (((s.path_length - s.path_at) <= 2))]]
+    except KeyError:
+        return -2
 
 
 def move_to_obj_lines(states):

@@ -229,6 +229,10 @@ def _line_of(m, lines, default):
     return m.bit_length() - 1 if m & (m - 1) == 0 else -2
 
 
+def _one_of(lines, default):
+    return {0: lines if default else -1} | {1 << line: line for line in range(lines)}
+
+
 def _joined(*several):
     return tuple(_reduce(_and, masks) for masks in _product(*several))
 
@@ -411,11 +415,8 @@ _POSITION_5 = (
     0x67,
     0x7f,
 )
-_POSITION_G0 = (
-    *_joined(_POSITION_3, _POSITION_1),
-)
-_POSITION_G1 = (
-    *_joined(_POSITION_0, _POSITION_2, _POSITION_4, _POSITION_5),
+_POSITION_LINE = (
+    *_lines_of(_joined(_POSITION_3, _POSITION_1, _POSITION_0, _POSITION_2, _POSITION_4, _POSITION_5), 7, False),
 )
 _GRASP_0 = (
     0x3e,
@@ -586,6 +587,9 @@ _GRASP_3 = (
 _GRASP_LINE = (
     *_lines_of(_joined(_GRASP_3, _GRASP_1, _GRASP_0, _GRASP_2), 6, False),
 )
+_PAUSE_GRIPPER_ONE = (
+    _one_of(1, False),
+)
 
 
 def _do_receive(s):
@@ -711,8 +715,7 @@ def _settle(s):
 
 def position_line(s):
     """The line of table position that matches admitted inputs: its position; -1 none, -2 several."""
-    m = _POSITION_G0[s.waited * 3 + s.cur_state] & _POSITION_G1[s.new_command * 8 + s.at_opening * 4 + ((s.closing and s.forced)) * 2 + ((not (s.closing and s.forced)))]
-    return m.bit_length() - 1 if m and not m & (m - 1) else _line_of(m, 7, False)
+    return _POSITION_LINE[s.waited * 48 + s.cur_state * 16 + s.new_command * 8 + s.at_opening * 4 + ((s.closing and s.forced)) * 2 + ((not (s.closing and s.forced)))]
 
 
 def position_lines(states):
@@ -866,8 +869,10 @@ def grasp_step(s):
 
 def pause_gripper_line(s):
     """The line of table pause_gripper that matches admitted inputs: its position; -1 none, -2 several."""
-    m = 1
-    return m.bit_length() - 1 if m and not m & (m - 1) else _line_of(m, 1, False)
+    try:
+        return _PAUSE_GRIPPER_ONE[0][1]
+    except KeyError:
+        return -2
 
 
 def pause_gripper_lines(states):

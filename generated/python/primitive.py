@@ -404,6 +404,10 @@ def _line_of(m, lines, default):
     return m.bit_length() - 1 if m & (m - 1) == 0 else -2
 
 
+def _one_of(lines, default):
+    return {0: lines if default else -1} | {1 << line: line for line in range(lines)}
+
+
 def _joined(*several):
     return tuple(_reduce(_and, masks) for masks in _product(*several))
 
@@ -737,6 +741,9 @@ _GOTO__G0 = (
 )
 _GOTO__G1 = (
     *_joined(_GOTO__3, _GOTO__2, _GOTO__1, _GOTO__4),
+)
+_GOTO__ONE = (
+    _one_of(9, True),
 )
 _GOTHRU_0 = (
     0x7e,
@@ -1408,8 +1415,10 @@ def departure_position_fingers_step(s):
 
 def goto__line(s):
     """The line of table goto that matches admitted inputs: its position; -1 none, -2 several."""
-    m = _GOTO__G0[s.waited * 2 + s.goal_known] & _GOTO__G1[s.cur_state * 12 + s.robot_status_in * 4 + s.new_command * 2 + s.there]
-    return m.bit_length() - 1 if m and not m & (m - 1) else _line_of(m, 9, True)
+    try:
+        return _GOTO__ONE[0][_GOTO__G0[s.waited * 2 + s.goal_known] & _GOTO__G1[s.cur_state * 12 + s.robot_status_in * 4 + s.new_command * 2 + s.there]]
+    except KeyError:
+        return -2
 
 
 def goto__lines(states):

@@ -346,6 +346,10 @@ def _line_of(m, lines, default):
     return m.bit_length() - 1 if m & (m - 1) == 0 else -2
 
 
+def _one_of(lines, default):
+    return {0: lines if default else -1} | {1 << line: line for line in range(lines)}
+
+
 def _joined(*several):
     return tuple(_reduce(_and, masks) for masks in _product(*several))
 
@@ -398,11 +402,8 @@ _ACQUIRE_7 = (
     0xfffb,
     0xffe5,
 )
-_ACQUIRE_G0 = (
-    *_joined(_ACQUIRE_4, _ACQUIRE_1, _ACQUIRE_2, _ACQUIRE_0),
-)
-_ACQUIRE_G1 = (
-    *_joined(_ACQUIRE_3, _ACQUIRE_5, _ACQUIRE_6, _ACQUIRE_7),
+_ACQUIRE_LINE = (
+    *_lines_of(_joined(_ACQUIRE_4, _ACQUIRE_1, _ACQUIRE_2, _ACQUIRE_0, _ACQUIRE_3, _ACQUIRE_5, _ACQUIRE_6, _ACQUIRE_7), 16, True),
 )
 _CLEAR_0 = (
     0x1fe0,
@@ -448,11 +449,8 @@ _CLEAR_7 = (
     0x1fef,
     0x1ff7,
 )
-_CLEAR_G0 = (
-    *_joined(_CLEAR_4, _CLEAR_1, _CLEAR_2, _CLEAR_0),
-)
-_CLEAR_G1 = (
-    *_joined(_CLEAR_3, _CLEAR_5, _CLEAR_6, _CLEAR_7),
+_CLEAR_LINE = (
+    *_lines_of(_joined(_CLEAR_4, _CLEAR_1, _CLEAR_2, _CLEAR_0, _CLEAR_3, _CLEAR_5, _CLEAR_6, _CLEAR_7), 13, True),
 )
 _MOVE_0 = (
     0xffe7f,
@@ -520,6 +518,9 @@ _MOVE_G0 = (
 )
 _MOVE_G1 = (
     *_joined(_MOVE_3, _MOVE_1, _MOVE_4, _MOVE_6, _MOVE_7, _MOVE_8, _MOVE_9, _MOVE_10),
+)
+_MOVE_ONE = (
+    _one_of(20, True),
 )
 _PAUSE_TASK_0 = (
     0x2,
@@ -628,6 +629,9 @@ _TRANSFER_G0 = (
 )
 _TRANSFER_G1 = (
     *_joined(_TRANSFER_3, _TRANSFER_5, _TRANSFER_6, _TRANSFER_7, _TRANSFER_8, _TRANSFER_9),
+)
+_TRANSFER_ONE = (
+    _one_of(22, True),
 )
 
 
@@ -1010,8 +1014,7 @@ def _settle(s):
 
 def acquire_line(s):
     """The line of table acquire that matches admitted inputs: its position; -1 none, -2 several."""
-    m = _ACQUIRE_G0[s.cur_state * 36 + s.ref_command_in * 6 + s.status_in * 2 + s.new_command] & _ACQUIRE_G1[s.idle * 8 + s.loc_of_obj * 4 + s.source_spec * 2 + s.obj_acquired]
-    return m.bit_length() - 1 if m and not m & (m - 1) else _line_of(m, 16, True)
+    return _ACQUIRE_LINE[s.cur_state * 576 + s.ref_command_in * 96 + s.status_in * 32 + s.new_command * 16 + s.idle * 8 + s.loc_of_obj * 4 + s.source_spec * 2 + s.obj_acquired]
 
 
 def acquire_lines(states):
@@ -1175,8 +1178,7 @@ def acquire_step(s):
 
 def clear_line(s):
     """The line of table clear that matches admitted inputs: its position; -1 none, -2 several."""
-    m = _CLEAR_G0[s.cur_state * 36 + s.ref_command_in * 6 + s.status_in * 2 + s.new_command] & _CLEAR_G1[s.idle * 8 + s.dest_spec * 4 + s.names_known * 2 + s.obj_acquired]
-    return m.bit_length() - 1 if m and not m & (m - 1) else _line_of(m, 13, True)
+    return _CLEAR_LINE[s.cur_state * 576 + s.ref_command_in * 96 + s.status_in * 32 + s.new_command * 16 + s.idle * 8 + s.dest_spec * 4 + s.names_known * 2 + s.obj_acquired]
 
 
 def clear_lines(states):
@@ -1320,8 +1322,10 @@ def clear_step(s):
 
 def move_line(s):
     """The line of table move that matches admitted inputs: its position; -1 none, -2 several."""
-    m = _MOVE_G0[s.cur_state * 42 + s.command_obj * 6 + s.ref_command_in] & _MOVE_G1[s.status_in * 128 + s.new_command * 64 + s.idle * 32 + s.loc_of_obj * 16 + s.source_spec * 8 + s.dest_spec * 4 + s.names_known * 2 + s.obj_acquired]
-    return m.bit_length() - 1 if m and not m & (m - 1) else _line_of(m, 20, True)
+    try:
+        return _MOVE_ONE[0][_MOVE_G0[s.cur_state * 42 + s.command_obj * 6 + s.ref_command_in] & _MOVE_G1[s.status_in * 128 + s.new_command * 64 + s.idle * 32 + s.loc_of_obj * 16 + s.source_spec * 8 + s.dest_spec * 4 + s.names_known * 2 + s.obj_acquired]]
+    except KeyError:
+        return -2
 
 
 def move_lines(states):
@@ -1694,8 +1698,10 @@ def release_part_step(s):
 
 def transfer_line(s):
     """The line of table transfer that matches admitted inputs: its position; -1 none, -2 several."""
-    m = _TRANSFER_G0[s.cur_state * 36 + s.ref_command_in * 6 + s.status_in * 2 + s.new_command] & _TRANSFER_G1[s.idle * 32 + s.loc_of_obj * 16 + s.source_spec * 8 + s.dest_spec * 4 + s.names_known * 2 + s.obj_acquired]
-    return m.bit_length() - 1 if m and not m & (m - 1) else _line_of(m, 22, True)
+    try:
+        return _TRANSFER_ONE[0][_TRANSFER_G0[s.cur_state * 36 + s.ref_command_in * 6 + s.status_in * 2 + s.new_command] & _TRANSFER_G1[s.idle * 32 + s.loc_of_obj * 16 + s.source_spec * 8 + s.dest_spec * 4 + s.names_known * 2 + s.obj_acquired]]
+    except KeyError:
+        return -2
 
 
 def transfer_lines(states):

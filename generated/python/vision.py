@@ -251,6 +251,10 @@ def _line_of(m, lines, default):
     return m.bit_length() - 1 if m & (m - 1) == 0 else -2
 
 
+def _one_of(lines, default):
+    return {0: lines if default else -1} | {1 << line: line for line in range(lines)}
+
+
 def _joined(*several):
     return tuple(_reduce(_and, masks) for masks in _product(*several))
 
@@ -506,11 +510,11 @@ _LINE_FLASH_5 = (
     0xfb,
     0xfd,
 )
-_LINE_FLASH_G0 = (
-    *_joined(_LINE_FLASH_5, _LINE_FLASH_2),
+_LINE_FLASH_LINE = (
+    *_lines_of(_joined(_LINE_FLASH_5, _LINE_FLASH_2, _LINE_FLASH_0, _LINE_FLASH_1, _LINE_FLASH_3, _LINE_FLASH_4), 8, False),
 )
-_LINE_FLASH_G1 = (
-    *_joined(_LINE_FLASH_0, _LINE_FLASH_1, _LINE_FLASH_3, _LINE_FLASH_4),
+_PAUSE_VISION_ONE = (
+    _one_of(1, False),
 )
 
 
@@ -743,8 +747,7 @@ def flood_flash_step(s):
 
 def line_flash_line(s):
     """The line of table line_flash that matches admitted inputs: its position; -1 none, -2 several."""
-    m = _LINE_FLASH_G0[s.waited * 3 + s.cur_state] & _LINE_FLASH_G1[s.camera_flat * 8 + s.new_command * 4 + s.arrived * 2 + s.fits]
-    return m.bit_length() - 1 if m and not m & (m - 1) else _line_of(m, 8, False)
+    return _LINE_FLASH_LINE[s.waited * 48 + s.cur_state * 16 + s.camera_flat * 8 + s.new_command * 4 + s.arrived * 2 + s.fits]
 
 
 def line_flash_lines(states):
@@ -833,8 +836,10 @@ def line_flash_step(s):
 
 def pause_vision_line(s):
     """The line of table pause_vision that matches admitted inputs: its position; -1 none, -2 several."""
-    m = 1
-    return m.bit_length() - 1 if m and not m & (m - 1) else _line_of(m, 1, False)
+    try:
+        return _PAUSE_VISION_ONE[0][1]
+    except KeyError:
+        return -2
 
 
 def pause_vision_lines(states):

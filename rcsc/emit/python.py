@@ -9,9 +9,9 @@ from rcsc.emit.environment import render
 from rcsc.emit.names import comment, names_of, python_word
 from rcsc.emit.pytext import PyText, constant
 from rcsc.model import Admit, Int, Kind, Level, OneTable, Procedure, Real, Variable, key_bounds, pending
-from rcsc.plan import Coded, Cuts, Direct, Group, Index, Plan, PlanTable, Truth, grouped
+from rcsc.plan import WORD, Coded, Cuts, Direct, Group, Index, Plan, PlanTable, Truth, grouped
 
-MOST_KEYS = 4096
+MOST_KEYS = 8192
 """Up to so many combinations of classes the line of each is looked up at once."""
 MOST_GROUPED = 512
 """Up to so many combinations of classes leaves share a tuple of masks."""
@@ -215,7 +215,15 @@ class _Maker:
                 where = f"{upper}_G{at}"
                 self.constants.append((where, (f"*{_joined(group, names)},",)))
             ands.append(f"{where}[{self._index(group, f'{upper}_K{at}')}]")
-        yield f"    m = {' & '.join(ands) or everything}"
+        m = " & ".join(ands) or str(everything)
+        if matcher.lines <= WORD:  # small masks are found fastest in a dictionary, large ones by their length
+            self.constants.append((f"{upper}_ONE", (f"_one_of({tail}),",)))
+            yield "    try:"
+            yield f"        return {upper}_ONE[0][{m}]"
+            yield "    except KeyError:"
+            yield "        return -2"
+            return
+        yield f"    m = {m}"
         yield f"    return m.bit_length() - 1 if m and not m & (m - 1) else _line_of(m, {tail})"
 
     def _index(self, group: Group, name: str) -> str:
