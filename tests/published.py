@@ -46,7 +46,10 @@ def empty_buffer(cycles: int = 8) -> list[Cycle]:
         "cur_state.next": "state_3", "obj_ptr_in": "tbox", "remember_current_loc": "buffer", "old_output_command": "locate",
         "output_command": "locate", "source_spec": "true",
     }  # fmt: skip
-    now: dict[str, Value] = {**initial(program), **{name: _value(kinds[name], word) for name, word in begin.items()}}
+    now: dict[str, Value] = {
+        **initial(program),
+        **{name: _value(kinds[name], word) for name, word in begin.items()},
+    }
     now["tbuffer_boxt"] = 0
     found, sent, waited = [], int(now["inc_command_out"]), 0
     for _ in range(cycles):

@@ -10,6 +10,7 @@ from rcsc import __version__
 from rcsc.cli.cell import db, run
 from rcsc.cli.logs import log, replay
 from rcsc.cli.options import PATHS, proving, showing
+from rcsc.cli.shell import shell
 from rcsc.cli.show import Output, Progress, show
 from rcsc.diagnostics.report import Report
 
@@ -272,5 +273,5 @@ def completion(shell: str) -> int:
     return 0
 
 
-for _command in (db, log, replay, run):
+for _command in (db, log, replay, run, shell):
     commands.add_command(_command)

@@ -12,7 +12,7 @@ _STAGES = {
     "4": "proof",
     "5": "generated files",
     "6": "tests of what is generated",
-    "7": "recorded runs",
+    "7": "running systems and recorded runs",
     "9": "bugs in rcsc",
 }
 

@@ -1,0 +1,109 @@
+"""`rcsc shell`: a system under somebody's hands."""
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from rcsc.cli.cell import EXECUTOR, stop, system_path
+
+if TYPE_CHECKING:
+    from rcsc.shell.commands import Commands
+    from rcsc.shell.refusal import Refused
+    from rcsc.system.cell import Kind
+
+
+@click.command(
+    short_help="Run, step and change a system by hand.",
+    epilog="""\b
+Examples:
+  rcsc shell                          tables/system.toml, with stand-ins for robot, hand and camera
+  rcsc shell --script morning.txt     commands from a file; 1 at the first that fails
+  echo 'step 5' | rcsc shell --alone  nothing outside the levels, and a database that knows nothing
+
+\b
+In the shell:
+  TASK-LEVEL                          one cycle of level task
+  cur_state ?                         show a variable
+  command.input_command = acquire     set it
+  run until task.cur_state = state_3
+  help""",
+)
+@click.option("--script", type=click.Path(exists=True, dir_okay=False, path_type=Path), default=None, metavar="FILE",
+              help="Do the commands of FILE, one a line; else they are read from standard input.")  # fmt: skip
+@EXECUTOR
+@click.option("--alone", is_flag=True,
+              help="No stand-ins and no database: buffers from outside and answers are what is set by hand.")  # fmt: skip
+@click.argument(
+    "system", required=False, type=click.Path(exists=True, dir_okay=False, path_type=Path), metavar="[SYSTEM]"
+)
+def shell(script: Path | None, executor: str, alone: bool, system: Path | None) -> int:
+    """Run any module, procedure, owner, table or level of SYSTEM by name; look at and set any variable; step, run, undo.
+
+    SYSTEM is a system's description; without it, system.toml here or in tables/. Generated executors run, as they are.
+    """
+    commands = _commands(system_path(system), "c" if executor == "c" else "python", alone)
+    from rcsc.shell.terminal import converse, follow
+
+    if script is None and sys.stdin.isatty() and sys.stdout.isatty() and _has_prompt():
+        return converse(commands, click.echo, _complain)
+    with _lines(script) as (lines, name):
+        return follow(commands, lines, name, click.echo, _complain)
+
+
+def _commands(path: Path, kind: "Kind", alone: bool) -> "Commands":
+    from rcsc.database.build import BadData
+    from rcsc.shell.commands import Commands
+    from rcsc.shell.reload import Plant
+    from rcsc.shell.session import Session, silent_queries
+    from rcsc.system.cell import Outside, assemble, signatures
+    from rcsc.system.description import BadDescription, description
+    from rcsc.system.executors import NotBuilt
+    from rcsc.workstation.cell import database_of
+    from sim.standin import world
+
+    try:
+        said = description(path)
+        signs = signatures(said)
+        outside: tuple[Outside, ...] = ()
+        if alone or not said.database.is_file():
+            queries = silent_queries(said, signs)
+        else:
+            database = database_of(said, signs)
+            queries, outside = database.queries, (world(database),)
+        system = assemble(said, kind, queries, outside)
+        return Commands(Session(system, Plant(path, said, kind, queries)))
+    except (BadDescription, BadData, NotBuilt) as error:
+        stop(error)
+
+
+def _has_prompt() -> bool:
+    import importlib.util
+
+    return importlib.util.find_spec("prompt_toolkit") is not None
+
+
+@contextmanager
+def _lines(script: Path | None) -> Iterator[tuple[Iterator[str], str]]:
+    """The lines of a script, or of standard input, and what to call it."""
+    if script is None:
+        yield iter(sys.stdin), "-"
+        return
+    try:
+        text = script.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise click.BadParameter(f"{script} cannot be read: {error}", param_hint="--script") from error
+    yield iter(text.splitlines()), str(script)
+
+
+def _complain(where: str, refused: "Refused") -> None:
+    """A refusal, as every error is shown."""
+    first, *rest = str(refused).splitlines() or [""]
+    click.echo(f"{where}error[{refused.code.value}]: {first}", err=True)
+    for line in rest:
+        click.echo(f"  {line}", err=True)
+    for one in refused.helps:
+        click.echo(f"  = help: {one}", err=True)

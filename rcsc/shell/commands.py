@@ -1,0 +1,301 @@
+"""What people type, as what a session does.
+
+In: a line. Out: what to show; a refusal where it is not done.
+"""
+
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+from rcsc.diagnostics.codes import Code
+from rcsc.shell import names
+from rcsc.shell.expressions import Question, asked
+from rcsc.shell.names import NamedLine
+from rcsc.shell.parts import call_of, part_names
+from rcsc.shell.refusal import Refused
+from rcsc.shell.session import MOST_CYCLES, Session
+from rcsc.system.levels import RunningLevel
+
+Said = list[str]
+_SHOW = re.compile(rf"(?P<name>{names.NAME})\s*\?$")
+_SET = re.compile(rf"(?P<name>{names.NAME})\s*=(?!=)\s*(?P<value>.*)$")
+_SUFFIX = "_level"
+HELP = """\
+NAME                    run the module, procedure, owner or table of that name on the level chosen
+NAME(VALUE, ...)        the same, with arguments
+PREPROCESS, STATE-TABLE, POSTPROCESS
+                        run that part of the level chosen
+TASK-LEVEL              run one cycle of level `task` alone
+NAME ?                  show a variable of the level chosen; LEVEL.NAME ? of another
+NAME = VALUE            set it, in the buffer that carries it too
+level [LEVEL]           choose a level
+levels                  all levels
+lines                   the line that each level ran last
+show [LEVEL]            what the last cycle changed, and what was set since; all variables of a level
+buffers [NAME]          the latest value of each buffer
+step [N]                N cycles of all levels
+step LEVEL [N]          N cycles of one level alone: its neighbours are what its buffers say
+run [N]                 N cycles, or until a breakpoint
+run until CONDITION     until it holds
+run to [LEVEL.]TABLE.LINE
+                        until the level runs that line
+run to cycle N          until N cycles are done
+break CONDITION         stop `run` where it comes to hold; a line, too: break task.acquire.5
+breaks, delete N        the breakpoints; one less
+undo [N]                go back to before the last cycle, or the last N
+reload [LEVEL]          prove and take a level's tables as they are now
+expect CONDITION        fail unless it holds
+help, quit
+A CONDITION compares variables: task.cur_state = state_3 and not (new_command or primitive.travelled_mm > 40).
+Everything from # on is a comment."""
+
+
+@dataclass(slots=True)
+class Commands:
+    """The commands of a session.
+
+    Attributes:
+        over: Whether `quit` was said.
+    """
+
+    session: Session
+    over: bool = False
+
+    def do(self, line: str) -> Said:
+        """Does what a line says; what to show.
+
+        Raises:
+            Refused: It was not done.
+        """
+        text = line.partition("#")[0].strip()
+        if not text:
+            return []
+        shown, set_ = _SHOW.match(text), _SET.match(text)
+        if shown:
+            return self._show_variable(shown["name"])
+        if set_:
+            return [self.session.set(set_["name"], set_["value"].strip())]
+        word, _, rest = text.partition(" ")
+        command = self._words.get(word.casefold())
+        return self._by_name(text) if command is None else command(rest.strip())
+
+    @property
+    def _words(self) -> dict[str, Callable[[str], Said]]:
+        return {
+            "break": self._break, "breaks": self._breaks, "buffers": self._buffers, "delete": self._delete,
+            "expect": self._expect, "help": self._help, "level": self._level, "levels": self._levels,
+            "lines": self._lines, "quit": self._quit, "reload": self._reload, "run": self._run, "show": self._show,
+            "step": self._step, "undo": self._undo,
+        }  # fmt: skip
+
+    def completions(self) -> Iterator[str]:
+        """Every word that may be typed."""
+        yield from self._words
+        for level in self.session.levels:
+            yield from (level.name, f"{level.name}-level")
+            yield from (f"{level.name}.{leaf.name}" for leaf in level.sign.leaves)
+            for table in names.tables_of(level):
+                yield from (f"{level.name}.{table}.{line}" for line in level.sign.tables[table])
+        yield from (leaf.name for leaf in self.session.level.sign.leaves)
+        yield from self._parts(self.session.level)
+
+    # --- by name ---
+
+    def _by_name(self, text: str) -> Said:
+        said = call_of(text)
+        if said is None:
+            raise Refused(Code.SHELL_COMMAND, f"`{text}` is no command", "`help` lists the commands")
+        name, args = said
+        cycled = self._cycled(name)
+        if cycled is not None:
+            return self._alone(cycled, _number(args[0]) if args else 1)
+        level, rest = names.split(name, self.session.levels, self.session.level)
+        if names.found(rest, part_names(self.session.program(level))) is None:
+            raise self._unknown(name)
+        return self.session.part(level, rest, args)
+
+    def _cycled(self, name: str) -> RunningLevel | None:
+        """The level that `task-level`, or `task`, cycles."""
+        wanted = names.normal(name)
+        every = {names.normal(level.name): level for level in self.session.levels}
+        return every.get(wanted.removesuffix(_SUFFIX)) or every.get(wanted)
+
+    def _unknown(self, name: str) -> Refused:
+        level, rest = names.split(name, self.session.levels, self.session.level)
+        if names.positions(level.sign, rest):
+            return Refused(
+                Code.SHELL_COMMAND, f"`{name}` is a variable", f"`{name} ?` shows it, `{name} = ...` sets it"
+            )
+        return names.unknown(name, "command, module, procedure, owner, table or level", self.completions())
+
+    def _parts(self, level: RunningLevel) -> tuple[str, ...]:
+        try:
+            return tuple(part_names(self.session.program(level)))
+        except Refused:
+            return ()
+
+    # --- variables ---
+
+    def _show_variable(self, name: str) -> Said:
+        level, places = names.variable(name, self.session.levels, self.session.level)
+        return [names.shown(level, at) for at in places]
+
+    def _show(self, rest: str) -> Said:
+        if not rest:
+            return self.session.changed() or ["the last cycle changed nothing"]
+        level = names.level_of(rest, self.session.levels)
+        return [names.shown(level, at) for at in range(len(level.sign.leaves))]
+
+    def _buffers(self, rest: str) -> Said:
+        every = [
+            wire for wire in self.session.system.description.wires if rest in wire.source + " " + wire.target
+        ]
+        if not every:
+            raise names.unknown(rest, "buffer", [w.source for w in self.session.system.description.wires])
+        return [f"{wire.source} = {wire.target}: {self._held(wire.source, wire.target)}" for wire in every]
+
+    def _held(self, source: str, target: str) -> str:
+        """A buffer's latest value, in the words of the level at either end."""
+        latest = self.session.memory.latest(source)
+        if latest is None:
+            return "nothing yet"
+        for end in (source, target):
+            name, _, variable = end.partition(".")
+            level = names.by_name(self.session.levels).get(name)
+            if level is not None:
+                leaves = [level.sign.leaves[at] for at in level.sign.record(variable)]
+                return ", ".join(
+                    f"{leaf.name.removeprefix(f'{variable}.')} {leaf.shown(value)}"
+                    for leaf, value in zip(leaves, latest, strict=True)
+                )
+        return str(latest)
+
+    # --- levels ---
+
+    def _level(self, rest: str) -> Said:
+        if rest:
+            self.session.chosen = names.level_of(rest, self.session.levels).name
+        return [f"level `{self.session.chosen}`"]
+
+    def _levels(self, rest: str) -> Said:
+        _nothing("levels", rest)
+        return [
+            f"{'*' if one.name == self.session.chosen else ' '} {one.name:14} every {one.level.period_ms} ms: "
+            f"{', '.join(names.tables_of(one))}"
+            for one in self.session.levels
+        ]
+
+    def _lines(self, rest: str) -> Said:
+        _nothing("lines", rest)
+        return [f"{one.name:14} {_at(one)}" for one in self.session.levels]
+
+    # --- cycles ---
+
+    def _step(self, rest: str) -> Said:
+        words = rest.split()
+        if words and not _is_number(words[0]):
+            level = names.level_of(words[0], self.session.levels)
+            return self._alone(level, _number(" ".join(words[1:]) or "1"))
+        for _ in range(_number(rest or "1")):
+            self.session.cycle()
+            if self.session.interrupted:
+                break
+        return [f"cycle {self.session.system.tick}: {', '.join(_at(one) for one in self.session.levels)}"]
+
+    def _alone(self, level: RunningLevel, count: int) -> Said:
+        for _ in range(count):
+            self.session.cycle_alone(level)
+        return [f"{level.name} alone: {_at(level)}"]
+
+    def _run(self, rest: str) -> Said:
+        word, _, more = rest.partition(" ")
+        if word == "until":
+            return [self.session.run(MOST_CYCLES, self.session.question(more))]
+        if word == "to":
+            return [self._run_to(more.strip())]
+        if not rest and not self.session.stops.every:
+            raise Refused(
+                Code.SHELL_COMMAND,
+                "nothing would stop it",
+                "`run N`, `run until CONDITION`, or `break` first",
+            )
+        return [self.session.run(_number(rest) if rest else MOST_CYCLES)]
+
+    def _run_to(self, place: str) -> str:
+        word, _, number = place.partition(" ")
+        if word != "cycle":
+            return self.session.run(MOST_CYCLES, self._line(place))
+        left = _number(number) - self.session.system.tick
+        if left < 0:
+            raise Refused(
+                Code.SHELL_COMMAND, f"it is cycle {self.session.system.tick} already", "`undo` goes back"
+            )
+        return self.session.run(left)
+
+    def _line(self, place: str) -> NamedLine:
+        line = names.line_of(place, self.session.levels, self.session.level)
+        if line is None:
+            raise names.unknown(place, "line", self.completions())
+        return line
+
+    def _undo(self, rest: str) -> Said:
+        self.session.undo(_number(rest or "1"))
+        return [f"cycle {self.session.system.tick}: {', '.join(_at(one) for one in self.session.levels)}"]
+
+    def _reload(self, rest: str) -> Said:
+        return [self.session.reload(names.level_of(rest or self.session.chosen, self.session.levels).name)]
+
+    # --- conditions ---
+
+    def _break(self, rest: str) -> Said:
+        what: Question | NamedLine | None = names.line_of(rest, self.session.levels, self.session.level)
+        stop = self.session.stops.add(what or self.session.question(rest))
+        return [f"breakpoint {stop.number}: {stop.text}"]
+
+    def _breaks(self, rest: str) -> Said:
+        _nothing("breaks", rest)
+        return [f"{stop.number}: {stop.text}" for stop in self.session.stops.every] or ["no breakpoints"]
+
+    def _delete(self, rest: str) -> Said:
+        number = _number(rest)
+        stop = next((one for one in self.session.stops.every if one.number == number), None)
+        if stop is None:
+            raise Refused(Code.SHELL_NAME, f"there is no breakpoint {number}", "`breaks` lists them")
+        self.session.stops.every.remove(stop)
+        return []
+
+    def _expect(self, rest: str) -> Said:
+        condition = self.session.question(rest)
+        if not asked(condition, self.session.levels):
+            now = condition.now(names.by_name(self.session.levels))
+            raise Refused(Code.SHELL_EXPECTED, f"`{condition.text}` does not hold{f': {now}' if now else ''}")
+        return []
+
+    def _help(self, rest: str) -> Said:
+        _nothing("help", rest)
+        return HELP.splitlines()
+
+    def _quit(self, rest: str) -> Said:
+        _nothing("quit", rest)
+        self.over = True
+        return []
+
+
+def _at(level: RunningLevel) -> str:
+    """`task.acquire.5`; a hyphen for no line."""
+    return f"{level.name}.{level.table}.{level.line or '-'}"
+
+
+def _is_number(text: str) -> bool:
+    return text.isascii() and text.isdecimal()
+
+
+def _number(text: str) -> int:
+    if not _is_number(text) or len(text) > 9 or int(text) > MOST_CYCLES:
+        raise Refused(Code.SHELL_COMMAND, f"`{text}` is no number of cycles up to {MOST_CYCLES}")
+    return int(text)
+
+
+def _nothing(word: str, rest: str) -> None:
+    if rest:
+        raise Refused(Code.SHELL_COMMAND, f"`{word}` takes nothing after it, not `{rest}`")

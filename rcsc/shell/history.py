@@ -1,0 +1,89 @@
+"""What `undo` goes back to: the whole system as it was before each of the last cycles.
+
+In: a system. Out: `Moment`s. Values and buffers are tuples, kept as they are; what stands outside is copied.
+"""
+
+import copy
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, is_dataclass
+
+from rcsc.system.cell import Outside, System
+from rcsc.system.levels import RunningLevel
+from rcsc.system.signature import Values
+
+MOST = 10_000
+
+
+class Memory:
+    """Common memory whose contents can be kept and put back."""
+
+    def __init__(self, held: Mapping[str, Values]) -> None:
+        self.held = dict(held)
+
+    def publish(self, name: str, values: Values) -> None:
+        """Make this the latest value."""
+        self.held[name] = values
+
+    def latest(self, name: str) -> Values | None:
+        """The latest value; None before the first."""
+        return self.held.get(name)
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """The whole system at one time.
+
+    Attributes:
+        levels: With the tables that they had then.
+        values: Of each level, the trace too.
+        answers: What the database was set by hand to say.
+    """
+
+    tick: int
+    levels: tuple[RunningLevel, ...]
+    values: tuple[Values, ...]
+    buffers: Mapping[str, Values]
+    outside: tuple[Outside, ...]
+    answers: Mapping[tuple[object, ...], Values]
+
+    def of(self, name: str) -> tuple[RunningLevel, Values]:
+        """A level of then, and its values."""
+        return next(
+            (level, values)
+            for level, values in zip(self.levels, self.values, strict=True)
+            if level.name == name
+        )
+
+
+def kept(system: System, memory: Memory, answers: Mapping[tuple[object, ...], Values]) -> Moment:
+    """The system as it is now."""
+    return Moment(
+        system.tick,
+        system.levels,
+        tuple(level.values for level in system.levels),
+        dict(memory.held),
+        tuple(_copied(one) for one in system.outside),
+        dict(answers),
+    )
+
+
+def put_back(moment: Moment, system: System, memory: Memory) -> None:
+    """Makes the system what it was."""
+    system.tick, system.levels, system.outside = moment.tick, moment.levels, moment.outside
+    memory.held = dict(moment.buffers)
+    for level, values in zip(moment.levels, moment.values, strict=True):
+        level.restore(values)
+        level.values = values  # the trace too, which the executor does not take back
+
+
+def _copied(outside: Outside) -> Outside:
+    """A copy that shares what never changes, as the database."""
+    return copy.deepcopy(outside, {id(one): one for one in _parts(outside) if _is_frozen(one)})
+
+
+def _parts(whole: object) -> list[object]:
+    return [getattr(whole, one.name, None) for one in fields(whole)] if is_dataclass(whole) else []
+
+
+def _is_frozen(value: object) -> bool:
+    return is_dataclass(value) and bool(getattr(type(value), "__dataclass_params__").frozen)  # noqa: B009  # unknown to mypy

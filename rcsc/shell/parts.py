@@ -1,0 +1,238 @@
+"""Parts of a level, run by themselves: a module or procedure, an owner, a table, or one of the level's three steps.
+
+In: a level's program and its present values. Out: the values afterwards. Parts are run by the reference interpreter: the
+executors have whole cycles only. A part outside a cycle may meet what the proofs exclude within one; that is refused,
+and nothing has happened.
+"""
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from rcsc.diagnostics.codes import Code
+from rcsc.interpret import ExternError, admit, call, evaluate, execute, holds, matching_lines, settle
+from rcsc.model import (
+    Bool,
+    Enum,
+    Int,
+    Level,
+    OneTable,
+    Procedure,
+    Program,
+    Scalar,
+    Standing,
+    Table,
+    Value,
+    key_bounds,
+    key_of,
+    spell,
+)
+from rcsc.shell.names import found, near
+from rcsc.shell.refusal import Refused
+from rcsc.system.levels import RunningLevel
+from rcsc.system.signature import Values
+
+STEPS = ("preprocess", "state_table", "postprocess")
+"""Of a cycle; run one after the other they are one."""
+_CALL = re.compile(r"(?P<name>[\w.\-]+)\s*(?:\((?P<inside>.*)\)|(?P<after>[^()]*))$")
+UNDEFINED = (ArithmeticError, IndexError, KeyError)
+
+
+@dataclass(frozen=True, slots=True)
+class Ran:
+    """What a part did.
+
+    Attributes:
+        values: All leaves and the trace.
+        said: In words.
+    """
+
+    values: Values
+    said: str
+
+
+@dataclass(slots=True)
+class _Part:
+    """A part under way: the snapshot, and what the trace says."""
+
+    program: Program
+    level: Level
+    now: dict[str, Value]
+    trace: Values
+
+
+def part_names(program: Program) -> Iterator[str]:
+    """What can be run by name."""
+    yield from STEPS
+    yield from (one.name for one in program.owners)
+    yield from (one.name for one in program.tables)
+    yield from (one.name for one in program.procedures)
+
+
+def call_of(text: str) -> tuple[str, tuple[str, ...]] | None:
+    """A name and its arguments, as `nextstate(state_2)` or `nextstate state_2`; None where it is no call."""
+    match = _CALL.match(text.strip())
+    if match is None:
+        return None
+    inside = (match["inside"] or match["after"] or "").replace(",", " ").split()
+    return match["name"], tuple(inside)
+
+
+def run_part(running: RunningLevel, program: Program, name: str, args: Sequence[str]) -> Ran:
+    """Runs the part of that name on the level's present values.
+
+    Raises:
+        Refused: There is no such part, or it met what cannot be.
+    """
+    meant = found(name, part_names(program))
+    if meant is None:
+        raise Refused(
+            Code.SHELL_NAME,
+            f"level `{running.name}` has no module, procedure, owner or table `{name}`",
+            *near(name, part_names(program)),
+        )
+    names = [leaf.name for leaf in running.sign.leaves]
+    level = next(one for one in program.levels if one.name == running.name)
+    part = _Part(program, level, dict(zip(names, running.values, strict=False)), running.values[len(names) :])
+    try:
+        said = _run(part, meant, args)
+    except ExternError as error:
+        raise Refused(
+            Code.SHELL_PART, f"an extern procedure in `{meant}` gave no value for `{error}`"
+        ) from error
+    except UNDEFINED as error:
+        raise Refused(
+            Code.SHELL_PART, f"`{meant}` divides by zero or leaves an array: nothing was changed"
+        ) from error
+    _within(part, running, meant)
+    return Ran((*(part.now[one] for one in names), *part.trace), said)
+
+
+def _run(part: _Part, name: str, args: Sequence[str]) -> str:
+    program = part.program
+    procedure = next((one for one in program.procedures if one.name == name), None)
+    if procedure is not None:
+        call(program, name, _arguments(procedure, args), part.now)
+        return f"procedure `{name}`"
+    if args:
+        raise Refused(Code.SHELL_COMMAND, f"`{name}` takes no arguments")
+    owner = next((one for one in program.owners if one.name == name), None)
+    if owner is not None:
+        return f"owner `{name}`: {', '.join(_in_order(part, _flat(program, owner.members)))}"
+    table = next((one for one in program.tables if one.name == name), None)
+    return _match(part, table) if table is not None else _step(part, name)
+
+
+def _step(part: _Part, name: str) -> str:
+    if name == "preprocess":
+        admitted = admit(part.program, part.now)
+        if isinstance(admitted, str):
+            raise Refused(Code.STATE_TABLE_ERROR, f"input `{admitted}` is refused: it lies outside its range")
+        part.now = admitted
+        settle(part.program, part.now)
+        return f"preprocess: {', '.join(_in_order(part, part.level.preprocess)) or 'nothing'}"
+    if name == "postprocess":
+        return f"postprocess: {', '.join(_in_order(part, part.level.postprocess)) or 'nothing'}"
+    return _match(part, _chosen(part))
+
+
+def _in_order(part: _Part, procedures: Sequence[str]) -> Sequence[str]:
+    for one in procedures:
+        call(part.program, one, [], part.now)
+    return procedures
+
+
+def _flat(program: Program, members: Sequence[str]) -> list[str]:
+    """The procedures of an owner, those of owners in it too."""
+    owners: Mapping[str, Sequence[str]] = {one.name: one.members for one in program.owners}
+    return [
+        name
+        for member in members
+        for name in (_flat(program, owners[member]) if member in owners else [member])
+    ]
+
+
+def _chosen(part: _Part) -> Table:
+    tables = part.level.tables
+    name = (
+        tables.table
+        if isinstance(tables, OneTable)
+        else dict(tables.tables)[evaluate(tables.selector, part.now)]
+    )
+    return next(one for one in part.program.tables if one.name == name)
+
+
+def _match(part: _Part, table: Table) -> str:
+    """Runs the line that matches; assumptions that fail are told, and kept in the trace."""
+    failed = _failed(part, table)
+    matching = matching_lines(table, part.now)
+    warned = f"; assumptions that do not hold: {', '.join(failed)}" if failed else ""
+    if len(matching) > 1:
+        raise Refused(
+            Code.STATE_TABLE_ERROR, f"table `{table.name}`: lines {', '.join(matching)} match{warned}"
+        )
+    if not matching and table.default is None:
+        raise Refused(Code.STATE_TABLE_ERROR, f"table `{table.name}`: no line matches{warned}")
+    at = next((at for at, line in enumerate(table.lines) if line.name in matching), len(table.lines))
+    line = table.lines[at] if matching else table.default
+    assert line is not None  # it was looked at above
+    execute(part.program, [action.statement for action in line.actions], part.now, {})
+    # The line is kept in the trace as the level's own only where it is of the table that the level would run.
+    part.trace = (at, 0, -1, part.trace[-1]) if table is _chosen(part) else part.trace
+    done = "; ".join(action.text for action in line.actions)
+    return f"table `{table.name}`, line {line.name}: {done or 'nothing'}{warned}"
+
+
+def _failed(part: _Part, table: Table) -> list[str]:
+    return [
+        one.name
+        for one in part.program.assumptions
+        if one.name in table.assumptions
+        and one.standing is Standing.MONITORED
+        and not holds(one.condition, part.now)
+    ]
+
+
+def _arguments(procedure: Procedure, given: Sequence[str]) -> list[Value]:
+    if len(given) != len(procedure.params):
+        wanted = ", ".join(one.name for one in procedure.params) or "none"
+        raise Refused(
+            Code.SHELL_COMMAND, f"`{procedure.name}` takes {len(procedure.params)} arguments: {wanted}"
+        )
+    return [
+        _argument(param.name, param.type, text) for param, text in zip(procedure.params, given, strict=True)
+    ]
+
+
+def _argument(name: str, kind: Scalar, text: str) -> Value:
+    """The value that a text means for a parameter."""
+    try:
+        value: Value
+        if isinstance(kind, Bool):
+            value = ("false", "true").index(text) == 1
+        elif isinstance(kind, Enum):
+            value = kind.members.index(found(text, kind.members) or text)
+        else:
+            value = int(text) if isinstance(kind, Int) else float(text)
+        low, high = key_bounds(kind)
+        if low <= key_of(kind, value) <= high:
+            return value
+    except (ValueError, OverflowError):
+        pass
+    members = kind.members if isinstance(kind, Enum) else ()
+    raise Refused(Code.SHELL_VALUE, f"`{text}` is no value of parameter `{name}`", *near(text, members))
+
+
+def _within(part: _Part, running: RunningLevel, name: str) -> None:
+    """Nothing leaves its declared range: within a cycle that is proved, by itself a part may be asked for more."""
+    for leaf in part.program.variables:
+        value = part.now[leaf.name]
+        if value == running.value(leaf.name):
+            continue
+        low, high = key_bounds(leaf.type)
+        if not low <= key_of(leaf.type, value) <= high:
+            raise Refused(
+                Code.SHELL_PART,
+                f"`{name}` would set `{running.name}.{leaf.name}` to {spell(leaf.type, value)}, out of its range",
+                "nothing was changed; within a cycle the proof excludes it",
+            )

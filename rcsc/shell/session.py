@@ -1,0 +1,287 @@
+"""A system under somebody's hands: cycles, single levels, parts of levels, variables, what to stop at, and the way back.
+
+In: a system ready for its first tick. Out: a `Session`; each of its methods does one thing and says what it did. Nothing is read or
+printed here.
+"""
+
+from collections import deque
+from collections.abc import Mapping, Sequence
+
+from rcsc.diagnostics.codes import Code
+from rcsc.model import Program
+from rcsc.shell import history, names
+from rcsc.shell.expressions import Question, question
+from rcsc.shell.names import NamedLine
+from rcsc.shell.parts import run_part
+from rcsc.shell.refusal import Refused
+from rcsc.shell.reload import Plant, program_of, reload
+from rcsc.shell.stops import Stops, reached, stands
+from rcsc.system.cell import StateTableError, System
+from rcsc.system.description import BadDescription, Description, LevelSpec
+from rcsc.system.levels import Fill, Query, RunningLevel
+from rcsc.system.signature import FAULTS, Signature, Value, Values
+
+MOST_CYCLES = 100_000
+"""After which `run` gives up: more than an hour of control time."""
+
+
+class Session:
+    """A system and what is done with it.
+
+    Attributes:
+        chosen: Name of the level whose parts and variables are meant where none is named.
+        stops: Breakpoints.
+        interrupted: Set, and cleared again, from outside: cycles end after the present one.
+    """
+
+    def __init__(self, system: System, plant: Plant) -> None:
+        self.system, self.plant = system, plant
+        buffers = {wire.source: system.buffers.latest(wire.source) for wire in system.description.wires}
+        self.memory = history.Memory({name: held for name, held in buffers.items() if held is not None})
+        system.buffers = self.memory
+        self.chosen = system.levels[0].name
+        self.stops = Stops()
+        self.interrupted = False
+        self._past: deque[history.Moment] = deque(maxlen=history.MOST)
+        self._answers: dict[tuple[object, ...], Values] = {}
+        # By identity, as after a reload another level has the name; the level is kept, so that its number stays its own.
+        self._programs: dict[int, tuple[RunningLevel, Program]] = {}
+        for level in system.levels:
+            self._answer_by_hand(level)
+
+    # --- names ---
+
+    @property
+    def levels(self) -> tuple[RunningLevel, ...]:
+        """From the top down."""
+        return self.system.levels
+
+    @property
+    def level(self) -> RunningLevel:
+        """The level chosen."""
+        return self.system.level(self.chosen)
+
+    def spec(self, name: str) -> LevelSpec:
+        """What the description says of a level."""
+        return next(one for one in self.system.description.levels if one.name == name)
+
+    def question(self, text: str) -> Question:
+        """What a condition asks.
+
+        Raises:
+            Refused: It is none.
+        """
+        return question(text, self.levels, self.level)
+
+    def program(self, level: RunningLevel) -> Program:
+        """What a level's tables mean.
+
+        Raises:
+            Refused: The sources are not those of the executors.
+        """
+        key = id(level)
+        if key not in self._programs:
+            self._programs[key] = level, program_of(self.plant, self.spec(level.name))
+        return self._programs[key][1]
+
+    # --- cycles ---
+
+    def cycle(self) -> None:
+        """One cycle of everything.
+
+        Raises:
+            Refused: A level was refused an input, or no line or several matched.
+        """
+        self._keep()
+        try:
+            self.system.step()
+        except StateTableError as error:
+            raise Refused(Code.STATE_TABLE_ERROR, str(error), "`undo` takes the cycle back") from error
+
+    def cycle_alone(self, level: RunningLevel) -> None:
+        """One cycle of one level: it takes its buffers as they are, runs, and gives.
+
+        Raises:
+            Refused: It was refused an input, or no line or several matched.
+        """
+        self._keep()
+        level.take(self.memory)
+        fault = level.run()
+        level.give(self.memory)
+        if fault:
+            raise Refused(Code.STATE_TABLE_ERROR, _fault(level), "`undo` takes the cycle back")
+
+    def part(self, level: RunningLevel, name: str, args: Sequence[str]) -> list[str]:
+        """Runs a part of a level on its present values; what it did.
+
+        Raises:
+            Refused: There is none of that name, or it met what cannot be.
+        """
+        ran = run_part(level, self.program(level), name, args)
+        self._keep()
+        level.executor.put(0, ran.values[: len(level.sign.leaves)])
+        level.values = _spoken(level, ran.values)
+        return [f"{level.name}: {ran.said}", *self.changed()]
+
+    def run(self, most: int, until: Question | NamedLine | None = None) -> str:
+        """Cycles until the condition holds, a breakpoint is met, or there were enough; why it ended.
+
+        Raises:
+            Refused: As `cycle`.
+        """
+        self.stops.look(self.levels)
+        if isinstance(until, Question) and stands(until, self.levels):
+            return f"cycle {self.system.tick}: `{until.text}` holds"
+        for _ in range(most):
+            self.cycle()
+            if until is not None and stands(until, self.levels):
+                return f"cycle {self.system.tick}: {reached(until)}"
+            met = self.stops.met(self.levels)
+            if met is not None:
+                return f"cycle {self.system.tick}: breakpoint {met.number}, {reached(met.what)}"
+            if self.interrupted:
+                return f"cycle {self.system.tick}: interrupted"
+        if until is None:
+            return f"cycle {self.system.tick}"
+        raise Refused(Code.SHELL_COMMAND, f"{most} cycles did not come to it")
+
+    def undo(self, count: int) -> None:
+        """Goes back to before the last cycles.
+
+        Raises:
+            Refused: So many are not kept.
+        """
+        if count > len(self._past):
+            raise Refused(Code.SHELL_COMMAND, f"only {len(self._past)} cycles can be undone")
+        moment = self._past[-count]
+        for _ in range(count):
+            self._past.pop()
+        reloaded = moment.levels != self.system.levels
+        history.put_back(moment, self.system, self.memory)
+        self._answers = dict(moment.answers)
+        if reloaded:
+            self.stops.ask_again(self.levels)
+
+    def changed(self) -> list[str]:
+        """Variables that the last cycle left with another value: `task.cur_state: d_state -> state_2`."""
+        if not self._past:
+            return []
+        said = []
+        for level in self.levels:
+            old, values = self._past[-1].of(level.name)
+            for at, leaf in enumerate(level.sign.leaves):
+                before = old.sign.index.get(leaf.name)
+                shown = "" if before is None else old.sign.leaves[before].shown(values[before])
+                if shown != leaf.shown(level.values[at]):
+                    said.append(
+                        f"{level.name}.{leaf.name}: {shown or 'nothing'} -> {leaf.shown(level.values[at])}"
+                    )
+        return said
+
+    # --- variables ---
+
+    def set(self, name: str, text: str) -> str:
+        """Sets a variable; in the buffer that carries it, too.
+
+        Raises:
+            Refused: There is none, or the text is no value of it.
+        """
+        level, at = names.one_leaf(name, self.levels, self.level)
+        value = names.value_of(level.sign.leaves[at], text)
+        level.executor.put(at, (value,))
+        level.values = _spoken(level, _with(level.values, at, value))
+        for buffer, first, end in _carriers(level):
+            if first <= at < end:
+                held = self.memory.latest(buffer)
+                record = level.values[first:end] if held is None else _with(held, at - first, value)
+                self.memory.publish(buffer, record)
+        self._answer(level, at)
+        return names.shown(level, at)
+
+    def _answer(self, level: RunningLevel, at: int) -> None:
+        """What is set in a record that the database fills is from now on its answer to the same question."""
+        for feed, fill in zip(self.spec(level.name).feeds, level.fills, strict=True):
+            run = level.sign.record(feed.into)
+            if at in run:
+                keys = tuple(level.values[key] for key in fill.keys)
+                self._answers[level.name, fill.first, keys] = level.values[run.start : run.stop]
+
+    def _answer_by_hand(self, level: RunningLevel) -> None:
+        level.fills = tuple(
+            Fill(self._query(level.name, fill), fill.first, fill.keys) for fill in level.fills
+        )
+
+    def _query(self, level: str, fill: Fill) -> Query:
+        def query(*keys: Value) -> Values:
+            answer = self._answers.get((level, fill.first, keys))
+            return fill.query(*keys) if answer is None else answer
+
+        return query
+
+    # --- other tables ---
+
+    def reload(self, name: str) -> str:
+        """Takes a level's tables as they are now, if they are proved and the present state lies in what was proved.
+
+        Raises:
+            Refused: They are not taken; the old ones run on.
+        """
+        old = self.system.level(name)
+        made = reload(self.plant, self.spec(name), old)
+        self._keep()
+        self._answer_by_hand(made.level)
+        self._programs[id(made.level)] = made.level, made.program
+        self.system.levels = tuple(made.level if one is old else one for one in self.levels)
+        gone = self.stops.ask_again(self.levels)
+        return "; ".join([f"level `{name}` runs its new tables: {made.said}", *gone])
+
+    def _keep(self) -> None:
+        self._past.append(history.kept(self.system, self.memory, self._answers))
+
+
+def _with(values: Values, at: int, value: Value) -> Values:
+    return (*values[:at], value, *values[at + 1 :])
+
+
+def _spoken(level: RunningLevel, values: Values) -> Values:
+    """The values, without a line where they ask for another table than the one that it is of."""
+    line = len(level.sign.leaves)
+    same = level.sign.table_of(level.level, values) == level.table or values[line] != level.values[line]
+    return values if same else _with(values, line, -1)
+
+
+def _carriers(level: RunningLevel) -> list[tuple[str, int, int]]:
+    """Buffers that the level takes or gives, and which leaves they carry."""
+    taken = [(take.buffer, take.first, take.first + take.count) for take in level.takes]
+    return taken + [(give.buffer, give.first, give.end) for give in level.gives]
+
+
+def _fault(level: RunningLevel) -> str:
+    where = f"level `{level.name}`, table `{level.table}`: {FAULTS[level.fault]}"
+    at = int(level.values[len(level.sign.leaves) + 2])
+    return (
+        where
+        if at < 0
+        else f"{where}: `{level.sign.leaves[at].name}` = {level.sign.leaves[at].shown(level.values[at])}"
+    )
+
+
+def silent_queries(system: Description, signs: Mapping[str, Signature]) -> dict[str, Query]:
+    """A database that knows nothing: every answer is what stands in the record before the first cycle.
+
+    Raises:
+        BadDescription: A feed fills what its program does not have.
+    """
+    found = {}
+    for spec in system.levels:
+        for feed in spec.feeds:
+            try:
+                run = signs[spec.name].record(feed.into)
+            except KeyError as error:
+                raise BadDescription(f"level `{spec.name}` has no variable `{feed.into}` to fill") from error
+            found[feed.query] = _silent(tuple(signs[spec.name].leaves[at].initial for at in run))
+    return found
+
+
+def _silent(answer: Values) -> Query:
+    return lambda *_: answer

@@ -1,0 +1,85 @@
+"""Breakpoints: conditions and lines at which `run` stops where they come to hold."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from rcsc.shell.expressions import Question, asked, question
+from rcsc.shell.names import NamedLine, level_of, line_of, unknown
+from rcsc.shell.refusal import Refused
+from rcsc.system.levels import RunningLevel
+
+Levels = Sequence[RunningLevel]
+
+
+@dataclass(slots=True)
+class Stop:
+    """A breakpoint.
+
+    Attributes:
+        stood: Whether it held already before the cycle: it stops where it comes to hold.
+    """
+
+    number: int
+    what: Question | NamedLine
+    stood: bool = False
+
+    @property
+    def text(self) -> str:
+        """As it was given."""
+        return self.what.text if isinstance(self.what, Question) else str(self.what)
+
+
+def stands(what: Question | NamedLine, levels: Levels) -> bool:
+    """Whether the condition holds, or the line was the level's last."""
+    return asked(what, levels) if isinstance(what, Question) else what.matched(level_of(what.level, levels))
+
+
+def reached(what: Question | NamedLine) -> str:
+    """What was come to, in words."""
+    return f"`{what.text}` holds" if isinstance(what, Question) else f"line {what}"
+
+
+@dataclass(slots=True)
+class Stops:
+    """The breakpoints of a session, in the order in which they were set."""
+
+    every: list[Stop] = field(default_factory=list)
+    _numbered: int = 0
+
+    def add(self, what: Question | NamedLine) -> Stop:
+        """A new one."""
+        self._numbered += 1
+        self.every.append(Stop(self._numbered, what))
+        return self.every[-1]
+
+    def look(self, levels: Levels) -> None:
+        """Notes what holds already."""
+        for stop in self.every:
+            stop.stood = stands(stop.what, levels)
+
+    def met(self, levels: Levels) -> Stop | None:
+        """The first that has come to hold since they were looked at."""
+        before = [stop.stood for stop in self.every]
+        self.look(levels)
+        return next(
+            (stop for stop, stood in zip(self.every, before, strict=True) if stop.stood and not stood), None
+        )
+
+    def ask_again(self, levels: Levels) -> list[str]:
+        """Has them speak of other levels; those that cannot are gone, and are named."""
+        kept, said = [], []
+        for stop in self.every:
+            try:
+                _again(stop, levels)
+                kept.append(stop)
+            except Refused as refused:
+                said.append(f"breakpoint {stop.number}, `{stop.text}`, is gone: {refused}")
+        self.every = kept
+        return said
+
+
+def _again(stop: Stop, levels: Levels) -> None:
+    if isinstance(stop.what, Question):
+        stop.what = question(stop.what.text, levels, level_of(stop.what.chosen, levels))
+    elif line_of(str(stop.what), levels, levels[0]) is None:
+        raise unknown(str(stop.what), "line", ())

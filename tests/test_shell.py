@@ -1,0 +1,542 @@
+"""The interactive shell: from outside as a user drives it, and through its session."""
+
+import os
+import pty
+import select
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from rcsc.diagnostics.codes import Code
+from rcsc.shell.commands import HELP, Commands
+from rcsc.shell.refusal import Refused
+from rcsc.shell.reload import Plant
+from rcsc.shell.session import Session, silent_queries
+from rcsc.system.cell import Kind, assemble, signatures
+from rcsc.system.description import description
+from rcsc.workstation.cell import database_of
+from sim.standin import world
+
+REPO = Path(__file__).parents[1]
+SYSTEM = REPO / "tables" / "system.toml"
+RCSC = [sys.executable, "-c", "from rcsc.cli import main; main()", "shell"]
+MOVE = ["command.inc_command = 1", "command.input_command = move", "command.dest_locpt = 3"]
+DONE = "run until task.report.inc_command_echo = 1 and task.report.status_report = done"
+
+
+def alone(path: Path = SYSTEM, kind: Kind = "c") -> Commands:
+    """Levels with nothing outside and a database that knows nothing."""
+    said = description(path)
+    queries = silent_queries(said, signatures(said))
+    return Commands(Session(assemble(said, kind, queries), Plant(path, said, kind, queries)))
+
+
+def inhabited(kind: Kind = "c") -> Commands:
+    """Levels with the cell's database and stand-ins."""
+    said = description(SYSTEM)
+    database = database_of(said, signatures(said))
+    system = assemble(said, kind, database.queries, (world(database),))
+    return Commands(Session(system, Plant(SYSTEM, said, kind, database.queries)))
+
+
+@pytest.fixture
+def shell() -> Commands:
+    return alone()
+
+
+@pytest.fixture
+def project(tmp_path: Path) -> Path:
+    """A copy of the project, to be edited; its system's description."""
+    shutil.copytree(REPO / "tables", tmp_path / "tables", ignore=shutil.ignore_patterns(".rcsc-cache"))
+    shutil.copytree(REPO / "generated", tmp_path / "generated")
+    return tmp_path / "tables" / "system.toml"
+
+
+def edit(system: Path, old: str, new: str) -> None:
+    gripper = system.parent / "gripper" / "gripper.rcs"
+    text = gripper.read_text(encoding="utf-8")
+    assert old in text
+    gripper.write_text(text.replace(old, new, 1), encoding="utf-8")
+
+
+def do(commands: Commands, *lines: str) -> list[str]:
+    """Does the lines; what the last one said."""
+    return [commands.do(line) for line in lines][-1]
+
+
+def refused(commands: Commands, line: str) -> Refused:
+    with pytest.raises(Refused) as caught:
+        commands.do(line)
+    return caught.value
+
+
+def state(commands: Commands) -> list[object]:
+    session = commands.session
+    return [session.system.tick, dict(session.memory.held), *[level.values for level in session.levels]]
+
+
+def script(text: str, *args: str, tmp_path: Path) -> subprocess.CompletedProcess[str]:
+    path = tmp_path / "script.txt"
+    path.write_text(text, encoding="utf-8")
+    return run("--script", str(path), *args)
+
+
+def run(*args: str, stdin: str = "") -> subprocess.CompletedProcess[str]:
+    return subprocess.run([*RCSC, *args], cwd=REPO, input=stdin, capture_output=True, text=True, check=False)
+
+
+# --- from outside ----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", ["c", "python"])
+def test_a_script_moves_the_robot_and_says_so(tmp_path: Path, kind: str) -> None:
+    lines = [
+        *MOVE,
+        "run to task.move.13  # the answer",
+        "expect task.status_report = done and task.current_loc = 3",
+        "",
+    ]
+    done = script("\n".join(lines), "--executor", kind, tmp_path=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.splitlines()[-1].endswith(": line task.move.13")
+
+
+def test_a_script_stops_at_the_first_command_that_fails(tmp_path: Path) -> None:
+    done = script("step 2\nexpect task.idle = false\nstep 3\n", "--alone", tmp_path=tmp_path)
+    assert done.returncode == 1
+    assert "cycle 2" in done.stdout
+    assert "cycle 5" not in done.stdout
+    assert (
+        done.stderr
+        == f"{tmp_path}/script.txt:2: error[RCS736]: `task.idle = false` does not hold: task.idle = true\n"
+    )
+
+
+def test_commands_from_a_pipe_end_with_quit() -> None:
+    done = run("--alone", stdin="step\nquit\nnonsense\n")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.startswith("cycle 1: task.pause_task.1")
+
+
+def test_wrong_usage_is_2_and_a_wrong_system_is_1(tmp_path: Path) -> None:
+    assert run("--script", "no such file").returncode == 2
+    assert run("--executor", "fortran").returncode == 2
+    bad = tmp_path / "system.toml"
+    bad.write_text("name = 1", encoding="utf-8")
+    done = run(str(bad))
+    assert done.returncode == 1
+    assert "error[RCS721]" in done.stderr
+
+
+def test_a_script_is_interrupted_between_cycles(tmp_path: Path) -> None:
+    path = tmp_path / "script.txt"
+    path.write_text("step\nrun until task.cur_state = state_8\nstep 7\n", encoding="utf-8")
+    ran = subprocess.Popen(
+        [*RCSC, "--alone", "--script", str(path), "--executor", "python"],
+        cwd=REPO, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env={**os.environ, "PYTHONUNBUFFERED": "1"},
+    )  # fmt: skip
+    assert ran.stdout is not None
+    assert ran.stdout.readline().startswith("cycle 1:")
+    time.sleep(0.3)
+    ran.send_signal(signal.SIGINT)
+    out, _ = ran.communicate(timeout=60)
+    assert ran.returncode == 130
+    assert "cycle" not in out
+
+
+def test_on_a_terminal_it_asks_completes_and_keeps_its_history(tmp_path: Path) -> None:
+    pytest.importorskip("prompt_toolkit")
+    here, there = pty.openpty()
+    ran = subprocess.Popen(
+        [*RCSC, "--alone", "--executor", "python"], cwd=REPO, stdin=there, stdout=there, stderr=there,
+        env={**os.environ, "XDG_STATE_HOME": str(tmp_path), "TERM": "xterm", "PROMPT_TOOLKIT_NO_CPR": "1"}, start_new_session=True,
+    )  # fmt: skip
+    os.close(there)
+    try:
+        _converse(here, ran)
+        assert ran.wait(timeout=30) == 0
+    finally:
+        ran.kill()
+        ran.wait()
+        os.close(here)
+    assert "+inc_command_seen ?" in (tmp_path / "rcsc" / "shell-history").read_text(encoding="utf-8")
+
+
+def _converse(here: int, ran: subprocess.Popen[bytes]) -> None:
+    _until(here, "task>")
+    os.write(here, b"INC_COMMAND_S\t")
+    _until(here, "inc_command_seen")
+    os.write(here, b" ?\r")
+    _until(here, "task.inc_command_seen = 0")
+    os.write(here, b"nonsense\r")
+    _until(here, "RCS731")
+    os.write(here, b"break status_report = failed\r")
+    _until(here, "breakpoint 1: status_report = failed")
+    os.write(here, b"run\r")
+    time.sleep(1.5)
+    ran.send_signal(signal.SIGINT)
+    _until(here, "interrupted")
+    os.write(here, b"quit\r")
+
+
+def _until(terminal: int, wanted: str, seconds: float = 30.0) -> str:
+    shown, end = "", time.monotonic() + seconds
+    while wanted not in shown:
+        ready, _, _ = select.select([terminal], [], [], max(0.0, end - time.monotonic()))
+        assert ready, f"`{wanted}` did not come: {shown}"
+        shown += os.read(terminal, 65536).decode(errors="replace")
+    return shown
+
+
+# --- variables -------------------------------------------------------------------------
+
+
+def test_a_variable_is_shown_and_set(shell: Commands) -> None:
+    assert do(shell, "cur_state ?") == ["task.cur_state = d_state", "task.cur_state.next = d_state"]
+    assert do(shell, "CUR-STATE=STATE-3") == ["task.cur_state = state_3"]
+    assert do(shell, "task.cur_state?")[0] == "task.cur_state = state_3"
+    assert do(shell, "gripper.command.opening_mm = 12.5") == ["gripper.command.opening_mm = 12.5 [mm]"]
+    assert do(shell, "level gripper", "command.opening_mm ?") == ["gripper.command.opening_mm = 12.5 [mm]"]
+    assert do(shell, "new_command = true") == ["gripper.new_command = true"]
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("cur_state = state_33", "one of d_state, f_state"),
+        ("new_command = 1", "false or true"),
+        ("tbuffer_boxt = 100", "int 0 .. 99"),
+        ("tbuffer_boxt = 1.5", "int 0 .. 99"),
+        ("tbuffer_boxt =", "int 0 .. 99"),
+        ("gripper.command.opening_mm = nan", "real 0.0 .. 200.0 [mm]"),
+        ("gripper.command.opening_mm = -0.1", "real 0.0 .. 200.0 [mm]"),
+    ],
+)
+def test_a_value_that_is_none_of_the_variables_is_refused(shell: Commands, line: str, said: str) -> None:
+    before = state(shell)
+    error = refused(shell, line)
+    assert error.code is Code.SHELL_VALUE
+    assert said in str(error)
+    assert state(shell) == before
+
+
+def test_an_unknown_name_comes_with_those_near_it(shell: Commands) -> None:
+    for line in ("cur_stat ?", "cur_stat = state_2", "task.cur_stat ?", "expect cur_stat = state_2"):
+        error = refused(shell, line)
+        assert error.code is Code.SHELL_NAME
+        assert "cur_state" in error.helps[0], line
+    assert "near it: gripper" in refused(shell, "level griper").helps[0]
+    assert "near it: remove_from_buffer_db" in refused(shell, "remove-from-buffer").helps[0]
+    assert "`cur_state ?`" in refused(shell, "cur_state").helps[0]
+    assert "its parts: command.inc_command" in refused(shell, "command = pause").helps[0]
+
+
+def test_what_is_set_stands_in_the_buffer_that_carries_it(shell: Commands) -> None:
+    do(shell, "gripper.command.input_command = position", "gripper.command.opening_mm = 50")
+    assert "input_command position, opening_mm 50.0" in do(shell, "buffers gripper.command")[0]
+    do(shell, "step gripper")
+    assert do(shell, "gripper.to_hand ?")[1] == "gripper.to_hand.opening_mm = 0.0 [mm]"
+    do(shell, "gripper.command.inc_command = 1", "step gripper")
+    assert do(shell, "gripper.to_hand ?")[:2] == [
+        "gripper.to_hand.drive = true", "gripper.to_hand.opening_mm = 50.0 [mm]"
+    ]  # fmt: skip
+    do(shell, "step 2")  # PRIMITIVE gives its own order again
+    assert do(shell, "gripper.command.input_command ?") == ["gripper.command.input_command = pause"]
+
+
+def test_what_is_set_in_a_record_of_the_databases_is_its_answer(shell: Commands) -> None:
+    do(shell, *MOVE, "dest.known = true")
+    do(shell, "step 2", "expect task.dest_spec = true", "undo 2", "step 2", "expect dest_spec = true")
+    do(shell, "command.dest_locpt = 4", "step", "expect dest_spec = false")
+    do(shell, "command.dest_locpt = 3", "step", "expect dest_spec = true")
+
+
+# --- by name ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", ["c", "python"])
+def test_the_three_parts_of_a_level_are_one_cycle_of_it(kind: Kind) -> None:
+    """The interpreter, a part at a time, leaves what the executor leaves; the line, too."""
+    commands = inhabited(kind)
+    do(commands, *MOVE)
+    for _ in range(40):
+        for level in commands.session.levels:
+            level.take(commands.session.memory)
+            level.values = level.executor.values()
+            do(commands, f"level {level.name}", "PREPROCESS", "STATE-TABLE", "POSTPROCESS")
+            by_parts = level.values
+            do(commands, "undo 3", f"{level.name}-level")
+            assert level.values == by_parts
+            do(commands, "undo")
+        do(commands, "step")
+    do(commands, "expect task.status_report = done and emove.table = pause_emove")
+
+
+def test_a_procedure_a_module_an_owner_and_a_table_run_by_name(shell: Commands) -> None:
+    assert do(shell, "FAIL")[0] == "task: procedure `fail`"
+    assert do(shell, "status_report ?") == ["task.status_report = failed"]
+    do(shell, "nextstate(state_2)", "expect cur_state.next = state_2")
+    do(shell, "task.nextstate state-4", "expect cur_state.next = state_4")
+    do(shell, "command.inc_command = 9", "receive", "expect inc_command_seen = 9 and new_command")
+    do(shell, "command.inc_command = 10", "PREPROCESS-TASK", "expect inc_command_seen = 10")
+    said = do(shell, "level gripper", "new_command = true", "GRASP")
+    assert said[0] == "gripper: table `grasp`, line 1: state(moving); drive; executing"
+    do(shell, "expect gripper.cur_state = moving and gripper.to_hand.drive")
+    assert do(shell, "gripper-level") == ["gripper alone: gripper.pause_gripper.1"]
+    assert do(shell, "gripper 2") == ["gripper alone: gripper.pause_gripper.1"]
+
+
+def test_parts_run_only_from_the_sources_that_the_executors_were_made_of(project: Path) -> None:
+    edit(project, "table position {", "procedure nothing {\n  waited := waited\n}\n\ntable position {")
+    commands = alone(project)
+    assert refused(commands, "gripper.nothing").code is Code.SHELL_RELOAD
+    do(commands, "reload gripper", "gripper.nothing")
+    before = state(commands)
+    assert refused(commands, "nextstate").code is Code.SHELL_COMMAND
+    assert refused(commands, "nextstate(state_99)").code is Code.SHELL_VALUE
+    assert refused(commands, "fail 1").code is Code.SHELL_COMMAND
+    assert state(commands) == before
+
+
+def test_a_table_by_name_in_a_state_that_it_does_not_expect(shell: Commands) -> None:
+    """A line that matches runs; what it relied on is told."""
+    said = do(shell, "cur_state = state_2", "ACQUIRE")
+    assert said[0].startswith("task: table `acquire`, line 16: state_failure")
+    assert said[0].endswith("; assumptions that do not hold: in_step")
+
+
+ALONE = """
+procedure one_more {
+  waited := waited + 1
+}
+
+assume low monitored : waited < 150
+
+table counts assuming low {
+  | line | waited || procedures |
+  | all  | < 150  || one_more   |
+}
+
+level gripper {"""
+
+
+def test_a_part_that_meets_what_the_proof_excludes_is_refused_and_changes_nothing(project: Path) -> None:
+    commands = alone(project)
+    edit(project, "level gripper {", ALONE)
+    do(commands, "reload gripper", "level gripper", "waited = 149", "COUNTS", "expect waited = 150")
+    before = state(commands)
+    error = refused(commands, "one-more")
+    assert error.code is Code.SHELL_PART
+    assert "`gripper.waited` to 151" in str(error)
+    error = refused(commands, "counts")
+    assert error.code is Code.STATE_TABLE_ERROR
+    assert "no line matches; assumptions that do not hold: low" in str(error)
+    assert state(commands) == before
+
+
+# --- cycles ----------------------------------------------------------------------------
+
+
+def test_one_level_steps_alone(shell: Commands) -> None:
+    others = [level.values for level in shell.session.levels[:-1]]
+    do(shell, "gripper.command.inc_command = 4", "step gripper 3")
+    assert [level.values for level in shell.session.levels[:-1]] == others
+    assert shell.session.system.tick == 0
+    assert shell.session.memory.latest("gripper.report") is not None
+    do(shell, "expect gripper.report.inc_command_echo = 4")
+
+
+@pytest.mark.parametrize("kind", ["c", "python"])
+def test_undo_goes_back_and_what_follows_is_the_same(kind: Kind) -> None:
+    commands = inhabited(kind)
+    do(commands, *MOVE)
+    states = []
+    for _ in range(25):
+        states.append(state(commands))
+        do(commands, "step")
+    end, plate = state(commands), list(commands.session.system.outside[0].plate)  # type: ignore[attr-defined]  # the stand-in's
+    do(commands, "undo 15")
+    assert state(commands) == states[10]
+    do(commands, "step 15")
+    assert state(commands) == end
+    assert commands.session.system.outside[0].plate == plate  # type: ignore[attr-defined]  # the stand-in's
+    do(commands, "undo 25")
+    assert state(commands) == states[0]
+    assert refused(commands, "undo").code is Code.SHELL_COMMAND
+
+
+def test_run_stops_at_lines_conditions_and_cycles() -> None:
+    commands = inhabited()
+    do(commands, *MOVE)
+    assert do(commands, "run to cycle 2") == ["cycle 2"]
+    assert refused(commands, "run to cycle 1").code is Code.SHELL_COMMAND
+    assert do(commands, "break task.move.13", "breaks") == ["1: task.move.13"]
+    do(commands, "break primitive.report.ref_command_echo = goto")
+    assert do(commands, "run 1000")[0].endswith(
+        "breakpoint 2, `primitive.report.ref_command_echo = goto` holds"
+    )
+    do(commands, "delete 2")
+    assert do(commands, "run")[0].endswith("breakpoint 1, line task.move.13")
+    tick = commands.session.system.tick
+    assert do(commands, DONE) == [f"cycle {tick}: `{DONE.removeprefix('run until ')}` holds"]
+    assert do(commands, "run 3") == [f"cycle {tick + 3}"]  # it stands at the line, it does not come to it
+    do(commands, "delete 1")
+    assert refused(commands, "delete 1").code is Code.SHELL_NAME
+    assert refused(commands, "run").code is Code.SHELL_COMMAND
+    assert refused(commands, "run to task.move.99").code is Code.SHELL_NAME
+
+
+def test_a_refused_input_is_a_state_table_error_that_can_be_undone(shell: Commands) -> None:
+    before = state(shell)
+    shell.session.memory.publish("workstation.order", (0, 77, 0, 0, 0, 0, 0, 0))
+    error = refused(shell, "step")
+    assert error.code is Code.STATE_TABLE_ERROR
+    assert "input refused: `command.input_command` = 77?" in str(error)
+    assert refused(shell, "task-level").code is Code.STATE_TABLE_ERROR
+    do(shell, "undo 2")
+    assert state(shell)[2:] == before[2:]
+
+
+def test_show_lines_levels_and_help(shell: Commands) -> None:
+    assert do(shell, "lines")[0].split() == ["task", "task.pause_task.-"]
+    do(shell, "command.inc_command = 5", "step")
+    assert do(shell, "lines")[0].split() == ["task", "task.pause_task.1"]
+    assert "task.inc_command_seen: 0 -> 5" in do(shell, "show")
+    assert len(do(shell, "show gripper")) == 25
+    do(shell, "command.input_command = acquire")
+    assert do(shell, "lines")[0].split() == ["task", "task.acquire.-"]
+    assert [line[0] for line in do(shell, "levels")] == ["*", " ", " ", " ", " "]
+    assert do(shell, "help") == HELP.splitlines()
+    assert {"task.acquire.5", "cur_state", "receive", "undo", "task-level"} <= set(shell.completions())
+
+
+# --- conditions ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "condition",
+    [
+        "task.cur_state = d_state",
+        "cur-state == D-STATE and not (new_command or task.begun)",
+        "d_state = cur_state",
+        "tbuffer_boxt >= 10 and tbuffer_boxt /= -1.5e3",
+        "task.idle or task.cur_state = state_2",
+        "not not idle = true",
+        "task.table = pause_task",
+        "gripper.command.opening_mm < .5",
+        "task.cur_state = task.cur_state.next",
+    ],
+)
+def test_conditions_that_hold(shell: Commands, condition: str) -> None:
+    assert do(shell, f"expect {condition}") == []
+    assert refused(shell, f"expect not ({condition})").code is Code.SHELL_EXPECTED
+
+
+@pytest.mark.parametrize(
+    ("condition", "code"),
+    [
+        ("", Code.SHELL_COMMAND),
+        ("task.cur_state", Code.SHELL_COMMAND),
+        ("cur_state < state_2", Code.SHELL_COMMAND),
+        ("cur_state = state_22", Code.SHELL_VALUE),
+        ("cur_state = 1", Code.SHELL_VALUE),
+        ("cur_state = status_report", Code.SHELL_COMMAND),
+        ("new_command = 1", Code.SHELL_COMMAND),
+        ("(new_command", Code.SHELL_COMMAND),
+        ("new_command)", Code.SHELL_COMMAND),
+        ("new_command and", Code.SHELL_COMMAND),
+        ("__import__('os')", Code.SHELL_COMMAND),
+        ("1 < tbuffer_boxt < 3", Code.SHELL_COMMAND),
+        ("nobody = 3", Code.SHELL_NAME),
+        ("nobody", Code.SHELL_NAME),
+        ("not " * 1000 + "idle", Code.SHELL_COMMAND),
+        ("(" * 1000, Code.SHELL_COMMAND),
+    ],
+)
+def test_conditions_that_are_none(shell: Commands, condition: str, code: Code) -> None:
+    assert refused(shell, f"expect {condition}").code is code
+
+
+# --- reload ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", ["c", "python"])
+def test_reload_takes_proved_tables_in_the_present_state(project: Path, kind: Kind) -> None:
+    commands = alone(project, kind)
+    do(commands, "gripper.command.inc_command = 3", "gripper.command.input_command = grasp")
+    do(commands, "gripper.command.force_n = 10", "step gripper")
+    do(commands, "break gripper.waited = 140", "break gripper.grasp.4")
+    edit(project, "const most_waited = 150", "const most_waited = 200")
+    edit(project, "state failure : reason", "state failure : reason\nstate tries : int 3 .. 9 = 3")
+    [said] = do(commands, "reload gripper")
+    assert "25 variables keep their values; new: tries" in said
+    do(commands, "expect gripper.tries = 3 and gripper.cur_state = moving", "step gripper 180")
+    do(commands, "expect gripper.waited = 180 and gripper.line = 3")
+    do(commands, "gripper.waited = 200", "level gripper", "STATE-TABLE")
+    assert [stop.text for stop in commands.session.stops.every] == ["gripper.waited = 140", "gripper.grasp.4"]
+    do(commands, "undo 182")  # the part and the cycles, then the reload itself
+    assert refused(commands, "gripper.tries ?").code is Code.SHELL_NAME
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "why"),
+    [
+        (
+            "| 2    | false       | moving    | true   | ",
+            "| 2    | false       | d_state   | true   | ",
+            "RCS40",
+        ),
+        ("state waited : int 0 .. most_waited", "state waited : bool", "RCS3"),
+        ("inc_command_seen : number", "inc_command_seen : int 0 .. 65535 [mm]", "RCS3"),
+        ("state at_opening : bool", "state at_opening : bool = true\nstate other : bool", ""),
+        ("enum gripper_state { d_state, ", "enum gripper_state { ", "RCS2"),
+        ("state at_opening : bool", "state at_opening : intt", "RCS2"),
+        ("  drive : bool\n", "  drive : bool\n  twice : bool\n", "buffer `gripper.to_hand` has another form"),
+        (
+            "## Within half",
+            "invariant counted : waited = 0 implies inc_command_seen = inc_command_seen\n## Within half",
+            "",
+        ),
+        ("state forced : bool", "state forced : int 0 .. 1", "RCS3"),
+    ],
+)
+def test_reload_refuses_and_the_old_tables_run_on(project: Path, old: str, new: str, why: str) -> None:
+    commands = alone(project)
+    do(commands, "step 2")
+    before = state(commands)
+    edit(project, old, new)
+    if not why:
+        assert "runs its new tables" in do(commands, "reload gripper")[0]
+        return
+    error = refused(commands, "reload gripper")
+    assert error.code is Code.SHELL_RELOAD
+    assert why in str(error)
+    assert state(commands) == before
+    do(commands, "step", "expect gripper.line = 1")
+
+
+def test_reload_refuses_a_state_that_an_invariant_or_assumption_excludes(project: Path) -> None:
+    commands = alone(project)
+    do(commands, "step", "gripper.waited = 7")
+    edit(project, "const most_waited = 150", "const most_waited = 400")
+    do(commands, "reload gripper", "gripper.waited = 300")
+    edit(project, "const most_waited = 400", "const most_waited = 150")
+    assert "`waited` = 300 lies outside its new range 0 .. 150" in str(refused(commands, "reload gripper"))
+    do(commands, "gripper.waited = 7", "reload gripper")
+    edit(
+        project,
+        "enum gripper_state { d_state, f_state, moving }",
+        "enum gripper_state { moving, f_state, d_state }",
+    )
+    do(commands, "reload gripper", "expect gripper.cur_state = d_state")
+    edit(project, "procedure executing {", "invariant short : waited <= 150\nprocedure executing {")
+    assert "runs its new tables" in do(commands, "reload gripper")[0]
+    edit(project, "table position {", "assume calm monitored : waited /= 7\ntable position assuming calm {")
+    error = refused(commands, "reload gripper")
+    assert "assumption `calm` does not hold of the present state" in str(error)
+    do(commands, "gripper.waited = 4", "reload gripper")
