@@ -3,18 +3,20 @@
 In: the SQLite file. Out: a `Database` whose answers are tuples in the order of the records that they fill.
 """
 
+import json
 import sqlite3
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from rcsc.database.build import BadData
+from rcsc.database.pose import Pose, Vector, about_z
 from rcsc.system.signature import Values
 
 NO_PLACE: Values = (False, False, False, 0, 0)
-NO_ROUTE: Values = (False, 0, 0, 0, 0, 0, 0)
-NO_PART: Values = (False, 0.0)
+NO_ROUTE: Values = (False, 0, 0, 0, 0, 0, 0, 0)
+NO_PART: Values = (False, 0.0, 0.0, 0.0)
 NO_POINT: Values = (False, *(0.0,) * 9, 1.0, 10.0, 0.0)
 NO_FINGERS: Values = (False, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
@@ -31,6 +33,40 @@ class Part:
 
 
 @dataclass(frozen=True, slots=True)
+class Station:
+    """A table that things stand on, and its fixture: a vise, a V-block, or nothing.
+
+    Attributes:
+        frame: Its axes: the middle of its top, x away from the robot.
+        size_mm: Along x and y.
+        vise: The vise's numbers by name; empty where there is none.
+        vblock: The V-block's.
+    """
+
+    name: str
+    frame: Pose
+    yaw_deg: float
+    size_mm: tuple[float, float]
+    vise: Mapping[str, Any]
+    vblock: Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Hand:
+    """What is at the robot's wrist.
+
+    Attributes:
+        tool_mm: From the wrist plate to the middle of the pads.
+        pad_mm: From there to the pads' lower edge.
+        camera_mm: Where the camera is, as the plate sees it.
+    """
+
+    tool_mm: float
+    pad_mm: float
+    camera_mm: Vector
+
+
+@dataclass(frozen=True, slots=True)
 class Database:
     """Everything that the levels may ask."""
 
@@ -40,6 +76,8 @@ class Database:
     stock: Mapping[int, int]
     parts: tuple[Part, ...]
     home: Values
+    hand: Hand
+    stations: Mapping[str, Station]
     _places: Mapping[int, Values]
     _routes: Mapping[tuple[int, int], Values]
     _parts: Mapping[int, Values]
@@ -51,14 +89,17 @@ class Database:
         return self._places.get(location, NO_PLACE)
 
     def route(self, location: int, sector: int) -> Values:
-        """known, departure (first point, count), approach (first point, count), hover point, grasp point."""
+        """known, departure (first point, count), approach (first point, count), points to hover, to grasp and to look from."""
         known = self._routes.get((location, sector))
         if known is None and (location, 1) not in self._routes:  # no pallet: it has no sectors
             known = self._routes.get((location, 0))
         return known or NO_ROUTE
 
     def part(self, number: int) -> Values:
-        """known, expected range in mm."""
+        """known, ranges in mm from the camera to its top as it lies, and at which its top is where the pads take it; lift in mm.
+
+        The lift: how much higher than at the locations of the data the pads hold it.
+        """
         return self._parts.get(number, NO_PART)
 
     def point(self, number: int) -> Values:
@@ -68,6 +109,10 @@ class Database:
     def fingers(self, number: int, grasp: int) -> Values:
         """known, approach, departure and grip opening and tolerance in mm, force in N, speed in mm/s."""
         return self._fingers.get((number, grasp), NO_FINGERS)
+
+    def routes(self) -> tuple[tuple[int, int, Values], ...]:
+        """Every route with its location and sector."""
+        return tuple((location, sector, row) for (location, sector), row in self._routes.items())
 
     @property
     def queries(self) -> dict[str, Callable[..., Values]]:
@@ -115,6 +160,7 @@ def _read(held: sqlite3.Connection) -> Database:
     def rows(query: str) -> list[tuple[Any, ...]]:
         return list(held.execute(query))
 
+    robot = rows("select * from robot")[0]
     motion = {name: tuple(row) for name, *row in rows("select * from trajectories")}
     points = {
         number: (True, *plate, *motion[trajectory])
@@ -131,7 +177,9 @@ def _read(held: sqlite3.Connection) -> Database:
         },
         dict(rows("select number, stock from objects")),
         tuple(Part(*row) for row in rows("select * from parts")),
-        rows("select * from home")[0],
+        tuple(robot[:9]),
+        Hand(robot[9], robot[10], (robot[11], robot[12], robot[13])),
+        {name: _station(name, rest) for name, *rest in rows("select * from stations")},
         {
             number: (True, bool(vision), bool(buffer), vupos or 0, safe or 0)
             for number, vision, buffer, vupos, safe in rows(
@@ -140,9 +188,17 @@ def _read(held: sqlite3.Connection) -> Database:
         },
         {(location, sector): (True, *rest) for location, sector, *rest in rows("select * from places")},
         {
-            number: (True, expected)
-            for number, expected in rows("select number, expected_range_mm from objects")
+            number: (True, *ranges)
+            for number, *ranges in rows(
+                "select number, expected_range_mm, grip_range_mm, lift_mm from objects"
+            )
         },
         points,
         {(number, grasp): (True, *rest) for number, grasp, *rest in rows("select * from grasps")},
     )
+
+
+def _station(name: str, row: Sequence[Any]) -> Station:
+    x, y, z, yaw, length, width, vise, vblock = row
+    frame = Pose(about_z(yaw), (x, y, z))
+    return Station(name, frame, yaw, (length, width), json.loads(vise or "{}"), json.loads(vblock or "{}"))

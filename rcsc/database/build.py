@@ -4,20 +4,21 @@ In: `cell.toml`, and the names of parts as the tables have them. Out: a SQLite f
 """
 
 import hashlib
+import json
 import sqlite3
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from math import cos, hypot, radians, sin
+from math import hypot
 from pathlib import Path
 from typing import Any
 
-ARM_MM = 100.0
-"""From the plate's centre to its two other points (section 7.1)."""
+from rcsc.database.pose import DOWN, Pose, Rotation, about_y, about_z, nine, product
+
 SCHEMA = """
 create table meta (digest text not null);
 create table objects (number integer primary key, name text unique not null, length_mm real not null, width_mm real not null,
-  height_mm real not null, stock integer not null, expected_range_mm real not null);
+  height_mm real not null, stock integer not null, expected_range_mm real not null, grip_range_mm real not null, lift_mm real not null);
 create table grasps (object integer not null references objects, grasp integer not null, approach_mm real not null,
   departure_mm real not null, grip_mm real not null, tolerance_mm real not null, force_n real not null, speed_mm_s real not null,
   primary key (object, grasp));
@@ -27,14 +28,20 @@ create table trajectories (name text primary key, speed_mm_s real not null, acce
 create table points (number integer primary key, location integer not null references locations, sector integer not null,
   role text not null, x0 real, y0 real, z0 real, x1 real, y1 real, z1 real, x2 real, y2 real, z2 real,
   trajectory text not null references trajectories);
+create table stations (name text primary key, x_mm real not null, y_mm real not null, z_mm real not null, yaw_deg real not null,
+  length_mm real not null, width_mm real not null, vise text, vblock text);
 create table places (location integer not null references locations, sector integer not null, depart_first integer not null,
   depart_count integer not null, approach_first integer not null, approach_count integer not null, hover integer not null,
-  grasp integer not null, primary key (location, sector));
-create table home (x0 real, y0 real, z0 real, x1 real, y1 real, z1 real, x2 real, y2 real, z2 real);
+  grasp integer not null, view integer not null, primary key (location, sector));
+create table robot (x0 real, y0 real, z0 real, x1 real, y1 real, z1 real, x2 real, y2 real, z2 real, tool_mm real, pad_mm real,
+  camera_x_mm real, camera_y_mm real, camera_z_mm real);
 create table parts (object integer not null references objects, x_mm real not null, y_mm real not null, z_mm real not null,
   yaw_deg real not null);
 """
-Plate = tuple[float, ...]
+HOVER_MM = 100.0
+"""How far above a part the robot turns its hand before it goes down."""
+DEPTH_MM, CLEARANCE_MM = 12.0, 4.0
+"""From the top of a part to the middle of the pads, if the pads then stay so far above what it lies on: vision errs by 2 mm."""
 
 
 class BadData(Exception):  # noqa: N818  # what happened, not an error of ours
@@ -46,26 +53,31 @@ class BadData(Exception):  # noqa: N818  # what happened, not an error of ours
 
 
 @dataclass(frozen=True, slots=True)
-class Pose:
-    """Where the middle of the fingers' pads is, and how the hand is turned about the vertical."""
+class Place:
+    """Where a thing of the data is: axes that stand on a station, or on the floor under the robot.
 
-    x_mm: float
-    y_mm: float
-    z_mm: float
-    yaw_deg: float
+    Attributes:
+        frame: The station's axes.
+        hand: The pads' axes, seen from the base.
+    """
 
-    def raised(self, by_mm: float, east: float = 0.0, north: float = 0.0) -> "Pose":
-        """The pose above this one, and beside it."""
-        return Pose(self.x_mm + east, self.y_mm + north, self.z_mm + by_mm, self.yaw_deg)
+    frame: Pose
+    hand: Pose
 
-    def plate(self, tool_mm: float) -> Plate:
-        """The nine numbers of the wrist plate (section 7.1): the centre, a point along the tool, a point along the fingers."""
-        z, turn = self.z_mm + tool_mm, radians(self.yaw_deg)
-        return (
-            self.x_mm, self.y_mm, z,
-            self.x_mm, self.y_mm, z - ARM_MM,
-            self.x_mm + ARM_MM * cos(turn), self.y_mm + ARM_MM * sin(turn), z,
-        )  # fmt: skip
+    def moved(self, x_mm: float, y_mm: float, z_mm: float) -> "Place":
+        """The same, beside or above, along the station's axes."""
+        to = self.frame.point((x_mm, y_mm, z_mm))
+        by = [a - b for a, b in zip(to, self.frame.at_mm, strict=True)]
+        at = self.hand.at_mm
+        return Place(self.frame, Pose(self.hand.turn, (at[0] + by[0], at[1] + by[1], at[2] + by[2])))
+
+    def plate(self, tool_mm: float) -> Pose:
+        """The wrist plate of a hand that is there."""
+        return self.hand @ Pose(UPRIGHT, (0.0, 0.0, -tool_mm))
+
+
+UPRIGHT: Rotation = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+FLOOR = Pose(UPRIGHT, (0.0, 0.0, 0.0))
 
 
 def read_data(path: Path) -> dict[str, Any]:
@@ -83,8 +95,8 @@ def read_data(path: Path) -> dict[str, Any]:
 
 
 def digest(data: Path, objects: Sequence[str]) -> str:
-    """What a database must have been made of to be fresh."""
-    hashed = hashlib.sha256(SCHEMA.encode() + "\0".join(objects).encode())
+    """What a database must have been made of to be fresh: the data, the parts' names, and this module, which has rules of its own."""
+    hashed = hashlib.sha256(Path(__file__).read_bytes() + "\0".join(objects).encode())
     hashed.update(data.read_bytes())
     return hashed.hexdigest()
 
@@ -141,6 +153,7 @@ class _Rows:
             "objects": list(self._objects()),
             "grasps": list(self._grasps()),
             "locations": list(self._locations()),
+            "stations": list(self._stations()),
             "trajectories": [
                 (name, one["speed_mm_s"], one["accel_mm_s2"], one["breakpoint_mm"])
                 for name, one in said["trajectory"].items()
@@ -148,11 +161,16 @@ class _Rows:
         }
         places = list(self._places())
         self.tables |= {"points": self.points, "places": places, "parts": list(self._parts())}
-        self.tables["home"] = [_pose(said["robot"]["home"]).plate(self.tool_mm)]
+        robot = said["robot"]
+        home = self._place(robot["home"], None, "home").plate(self.tool_mm)
+        camera = [float(value) for value in robot["camera_mm"]]
+        self.tables["robot"] = [(*nine(home), self.tool_mm, float(robot["pad_mm"]), *camera)]
 
     def wrong(self, where: str, what: str) -> None:
         """Notes a problem."""
         self.problems.append(f"{where}: {what}")
+
+    # --- parts ---
 
     def _object(self, name: str, where: str) -> int:
         if name in self.objects:
@@ -161,6 +179,7 @@ class _Rows:
         return 0
 
     def _objects(self) -> Iterator[tuple[Any, ...]]:
+        camera_mm, pads_mm = self._view()
         for name, one in self.said["object"].items():
             length, width, height = map(float, one["size_mm"])
             where = f"object `{name}`"
@@ -169,37 +188,46 @@ class _Rows:
             stock = int(one.get("stock", 0))
             if not 0 <= stock <= 99:
                 self.wrong(where, f"a stock of {stock} is not 0 .. 99")
-            yield self._object(name, where), name, length, width, height, stock, self._range(height)
+            expected = max(0.0, camera_mm - height)
+            depth = depth_mm(height, float(self.said["robot"]["pad_mm"]))
+            grip = max(0.0, camera_mm - pads_mm - depth)
+            lift = height - depth - float(self.said["robot"]["hold_mm"]) if height > 0 else 0.0
+            yield self._object(name, where), name, length, width, height, stock, expected, grip, lift
 
-    def _range(self, height_mm: float) -> float:
-        """From the camera, which sits at the wrist plate, to the top of a part that lies where vision looks."""
+    def _view(self) -> tuple[float, float]:
+        """How far the camera is above the station where vision looks, and how far the pads are when they take the part there."""
         for one in self.said["location"].values():
-            if one.get("vision"):
-                vupos = self.said["location"].get(one.get("vupos", ""), {}).get("at")
-                surface = float(self.said["surface_mm"]) if "surface_mm" in self.said else 0.0
-                return float(vupos["z"]) + self.tool_mm - surface - height_mm if vupos else 0.0
-        return 0.0
+            looks = self.said["location"].get(one.get("vupos", ""))
+            if one.get("vision") and looks is not None:
+                camera_z = self.tool_mm - float(self.said["robot"]["camera_mm"][2])
+                return float(looks["at"]["z"]) + camera_z, float(one["at"]["z"])
+        return 0.0, 0.0
 
     def _grasps(self) -> Iterator[tuple[Any, ...]]:
         for name, one in self.said["object"].items():
             for grasp, how in one.get("grasp", {}).items():
                 where = f"object `{name}`, grasp {grasp}"
-                row = [
-                    float(how[key])
-                    for key in (
-                        "approach_mm",
-                        "departure_mm",
-                        "grip_mm",
-                        "tolerance_mm",
-                        "force_n",
-                        "speed_mm_s",
-                    )
-                ]
+                row = [float(how[key]) for key in GRASP_KEYS]
                 if not row[2] <= row[0] or not row[2] <= row[1]:
                     self.wrong(where, "the fingers do not open wider than the part")
                 if not 0 <= int(grasp) <= 9:
                     self.wrong(where, "a grasp is numbered 0 .. 9")
                 yield self._object(name, where), int(grasp), *row
+
+    def _parts(self) -> Iterator[tuple[Any, ...]]:
+        for one in self.said.get("part", ()):
+            where = f"part `{one['object']}`"
+            frame, at = self._frame(one.get("station"), where), one["at"]
+            x, y, z = frame.point((float(at["x"]), float(at["y"]), float(at.get("z", 0.0))))
+            yield (
+                self._object(one["object"], where),
+                x,
+                y,
+                z,
+                float(at["yaw"]) + self._yaw(one.get("station")),
+            )
+
+    # --- places ---
 
     def _locations(self) -> Iterator[tuple[Any, ...]]:
         for name, one in self.said["location"].items():
@@ -222,39 +250,125 @@ class _Rows:
             self.wrong(where, f"no location is called `{name}`")
         return self.numbers.get(name)
 
+    def _stations(self) -> Iterator[tuple[Any, ...]]:
+        for name, one in self.said.get("station", {}).items():
+            at, (length, width) = one["at"], map(float, one["size_mm"])
+            if min(length, width) <= 0:
+                self.wrong(f"station `{name}`", "a size is not positive")
+            where = (float(at["x"]), float(at["y"]), float(at["z"]), float(at["yaw"]))
+            vise = _floats(one["vise"], VISE_KEYS) if "vise" in one else None
+            vblock = _floats(one["vblock"], VBLOCK_KEYS) if "vblock" in one else None
+            yield name, *where, length, width, vise, vblock
+
+    def _frame(self, station: str | None, where: str) -> Pose:
+        if station is None:
+            return FLOOR
+        if station not in self.said.get("station", {}):
+            self.wrong(where, f"no station is called `{station}`")
+            return FLOOR
+        at = self.said["station"][station]["at"]
+        return Pose(about_z(float(at["yaw"])), (float(at["x"]), float(at["y"]), float(at["z"])))
+
+    def _yaw(self, station: str | None) -> float:
+        return (
+            float(self.said["station"][station]["at"]["yaw"])
+            if station in self.said.get("station", {})
+            else 0.0
+        )
+
+    def _place(self, at: Mapping[str, float], station: str | None, where: str) -> Place:
+        frame = self._frame(station, where)
+        turn = product(about_z(float(at["yaw"])), product(DOWN, about_y(float(at.get("tilt", 0.0)))))
+        return Place(frame, frame @ Pose(turn, (float(at["x"]), float(at["y"]), float(at["z"]))))
+
     def _places(self) -> Iterator[tuple[Any, ...]]:
         for name, one in self.said["location"].items():
-            at = _pose(one["at"])
-            for sector, (east, north) in enumerate(one.get("sectors", [[0.0, 0.0]])):
-                pose = at.raised(0.0, east, north)
-                via = [pose.raised(float(height)) for height in one.get("via", ())]
-                key = self.numbers[name], sector
-                where = f"location `{name}`, sector {sector}"
-                departs = [self._point(where, key, "departure", up, "fast") for up in reversed(via)]
-                comes = [self._point(where, key, "approach", up, "fast") for up in via]
-                comes.append(self._point(where, key, "arrival", pose, "fine" if via else "fast"))
-                hover = self._point(where, key, "hover", pose.raised(100.0), "fast")
-                grasp = self._point(where, key, "grasp", pose, "fine")
-                yield *key, departs[0] if departs else 0, len(departs), comes[0], len(comes), hover, grasp
+            reference = self._place(one["at"], one.get("station"), f"location `{name}`")
+            for sector, (x_mm, y_mm) in enumerate(one.get("sectors", [[0.0, 0.0]])):
+                yield self._row(name, one, sector, reference.moved(float(x_mm), float(y_mm), 0.0))
 
-    def _point(self, where: str, key: tuple[int, int], role: str, pose: Pose, trajectory: str) -> int:
-        plate, robot = pose.plate(self.tool_mm), self.said["robot"]
-        far = hypot(plate[0], plate[1])
-        if not robot["reach_mm"][0] <= far <= robot["reach_mm"][1]:
-            self.wrong(where, f"the {role} is {far:.0f} mm from the base, out of reach")
-        if not robot["height_mm"][0] <= plate[2] <= robot["height_mm"][1]:
-            self.wrong(where, f"the {role} is {plate[2]:.0f} mm high, out of reach")
+    def _row(self, name: str, one: Mapping[str, Any], sector: int, place: Place) -> tuple[Any, ...]:
+        key = self.numbers[name], sector
+        where = f"location `{name}`, sector {sector}"
+        fine = "fine" if one.get("via") or one.get("approach") else "fast"
+        through = one.get("trajectory", "fast")
+        out = one.get("departure", one.get("via", ())[::-1])
+        departs = [self._point(where, key, "departure", to, through) for to in self._path(place, out, where)]
+        into = one.get("approach", one.get("via", ()))
+        comes = [self._point(where, key, "approach", to, through) for to in self._path(place, into, where)]
+        comes.append(self._point(where, key, "arrival", place, fine))
+        hover = self._point(where, key, "hover", place.moved(0.0, 0.0, HOVER_MM), "fast")
+        grasp = self._point(where, key, "grasp", place, "fine")
+        view = self._point(where, key, "view", self._viewpoint(place, one, where), "fast")
+        return *key, departs[0] if departs else 0, len(departs), comes[0], len(comes), hover, grasp, view
+
+    def _path(self, place: Place, said: Sequence[Any], where: str) -> list[Place]:
+        """What the robot comes or goes through: a height, an offset, or another location."""
+        return [self._through(place, one, where) for one in said]
+
+    def _through(self, place: Place, said: object, where: str) -> Place:
+        if isinstance(said, str):
+            other = self.said["location"].get(said)
+            if other is None:
+                self.wrong(where, f"no location is called `{said}`")
+                return place
+            return self._place(other["at"], other.get("station"), where)
+        if isinstance(said, list):
+            x_mm, y_mm, z_mm = map(float, said)
+            return place.moved(x_mm, y_mm, z_mm)
+        if isinstance(said, int | float):
+            return place.moved(0.0, 0.0, float(said))
+        self.wrong(where, f"`{said}` is no height, offset or location")
+        return place
+
+    def _viewpoint(self, place: Place, one: Mapping[str, Any], where: str) -> Place:
+        """From where the camera, not the hand, would stand over the place: vision's second look is centred on the part."""
+        looks = self.said["location"].get(one.get("vupos", ""))
+        if not one.get("vision") or looks is None:
+            return place
+        from_ = self._place(looks["at"], looks.get("station"), where)
+        camera_x, camera_y, _ = map(float, self.said["robot"]["camera_mm"])
+        above = from_.hand.point((-camera_x, -camera_y, 0.0))
+        return Place(from_.frame, Pose(from_.hand.turn, above))
+
+    def _point(self, where: str, key: tuple[int, int], role: str, place: Place, trajectory: str) -> int:
+        plate, robot = place.plate(self.tool_mm), self.said["robot"]
+        x_mm, y_mm, z_mm = plate.at_mm
+        if not robot["reach_mm"][0] <= hypot(x_mm, y_mm) <= robot["reach_mm"][1]:
+            self.wrong(where, f"the {role} is {hypot(x_mm, y_mm):.0f} mm from the base, out of reach")
+        if not robot["height_mm"][0] <= z_mm <= robot["height_mm"][1]:
+            self.wrong(where, f"the {role} is {z_mm:.0f} mm high, out of reach")
         if trajectory not in self.said["trajectory"]:
             self.wrong(where, f"no trajectory is called `{trajectory}`")
         number = len(self.points) + 1
-        self.points.append((number, *key, role, *plate, trajectory))
+        self.points.append((number, *key, role, *nine(plate), trajectory))
         return number
 
-    def _parts(self) -> Iterator[tuple[Any, ...]]:
-        for one in self.said.get("part", ()):
-            at = one["at"]
-            yield self._object(one["object"], "a part"), at["x"], at["y"], at.get("z", 0.0), at["yaw"]
+
+def depth_mm(height_mm: float, pad_mm: float) -> float:
+    """From the top of a part to the middle of the pads that take it from above.
+
+    Args:
+        height_mm: Of the part.
+        pad_mm: From the middle of the pads to their lower edge.
+    """
+    return min(DEPTH_MM, height_mm - pad_mm - CLEARANCE_MM)
 
 
-def _pose(at: Mapping[str, float]) -> Pose:
-    return Pose(float(at["x"]), float(at["y"]), float(at["z"]), float(at["yaw"]))
+GRASP_KEYS = ("approach_mm", "departure_mm", "grip_mm", "tolerance_mm", "force_n", "speed_mm_s")
+VISE_KEYS = ("bed_mm", "between_mm", "open_mm", "beyond_mm", "left_n", "right_n")
+VBLOCK_KEYS = ("wall_mm", "width_mm", "bottom_mm")
+
+
+def _floats(said: Mapping[str, Any], keys: Sequence[str]) -> str:
+    """The numbers of a fixture, as JSON.
+
+    Raises:
+        KeyError: One is missing.
+    """
+    return json.dumps(
+        {
+            key: [float(x) for x in said[key]] if isinstance(said[key], list) else float(said[key])
+            for key in keys
+        }
+    )

@@ -1,0 +1,79 @@
+"""Whether the arm can go where the database says: every point, and the straight lines between those that follow one another.
+
+In: a database. Out: what is wrong, by point; nothing where all is well.
+"""
+
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+
+from rcsc.database.ask import Database
+from rcsc.database.pose import pose_of
+from sim.arm import Joints, solve
+
+STEP_MM = 10.0
+"""Lines are looked at so often."""
+JUMP_RAD = 0.35
+"""A joint that would turn farther from one step to the next is turning over."""
+HOME: Joints = (0.6, 1.03, -3.23, 0.0, -0.94, 0.26)
+"""An elbow up, a hand down: from where the home pose is looked for."""
+
+
+def home(database: Database) -> Joints | None:
+    """The joints at the home pose; None where the arm cannot be there."""
+    plate = pose_of([float(value) for value in database.home])
+    return None if plate is None else solve(plate, HOME)
+
+
+def unreachable(database: Database) -> tuple[str, ...]:
+    """Points that the arm cannot take, and paths on which it would have to turn over."""
+    start = home(database)
+    if start is None:
+        return ("the robot cannot be at its home",)
+    return tuple(_problems(database, start))
+
+
+def _problems(database: Database, start: Joints) -> Iterator[str]:
+    names = {number: name for name, number in database.locations.items()}
+    stops: dict[str, list[tuple[float, ...]]] = {}
+    for location, sector, row in database.routes():
+        _, leaves, many, comes, more, hover, grasp, view = (int(value) for value in row)
+        where = f"location `{names[location]}`" + (f", sector {sector}" if sector else "")
+        approach = [_plate(database, comes + at) for at in range(more)]
+        departure = [_plate(database, leaves + at) for at in range(many)]
+        stops[where] = [approach[0], *departure[-1:]]
+        for what, path in (
+            ("approach and departure", [*approach, *departure]),
+            ("hover and grasp", [_plate(database, view), _plate(database, hover), _plate(database, grasp)]),
+        ):
+            if not _passes(path, start):
+                yield f"{where}: the arm cannot go along its {what}"
+    for a, first in stops.items():
+        for b, second in stops.items():
+            if a != b and not _passes([first[-1], second[0]], start):
+                yield f"the arm cannot go from {a} to {b}"
+
+
+def _plate(database: Database, point: int) -> tuple[float, ...]:
+    return tuple(float(value) for value in database.point(point)[1:10])
+
+
+def _passes(path: Sequence[tuple[float, ...]], start: Joints) -> bool:
+    """Whether the arm follows the lines without turning over."""
+    joints = _at(path[0], start)
+    for a, b in pairwise(path):
+        far = max(abs(x - y) for x, y in zip(a, b, strict=True))
+        steps = max(1, round(far / STEP_MM))
+        for at in range(1, steps + 1):
+            if joints is None:
+                return False
+            share = at / steps
+            after = _at([x + (y - x) * share for x, y in zip(a, b, strict=True)], joints)
+            if after is None or max(abs(x - y) for x, y in zip(joints, after, strict=True)) > JUMP_RAD:
+                return False
+            joints = after
+    return joints is not None
+
+
+def _at(numbers: Sequence[float], near: Joints) -> Joints | None:
+    plate = pose_of(numbers)
+    return None if plate is None else solve(plate, near)
