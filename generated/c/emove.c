@@ -82,11 +82,19 @@ static void emove_do_receive(emove_t *s)
     s->idle = ((((((int64_t)s->ref_command_in == INT64_C(0)) && ((int64_t)s->status_in == INT64_C(0))) && ((int64_t)s->ref_vision_in == INT64_C(0))) && ((int64_t)s->vision_status_in == INT64_C(0))) && (s->begun || (((int64_t)s->primitive.inc_command_echo == (int64_t)s->to_primitive.inc_command) && ((int64_t)s->vision.inc_command_echo == (int64_t)s->to_vision.inc_command))));
 }
 
-/* How long the path would be that begins now. */
+/* How long the path would be that begins now; whether the part is still there. */
 static void emove_do_measure(emove_t *s)
 {
     if (s->new_command) {
         s->path_length = emove_u8_of_i64(((int64_t)s->origin.depart_count + (int64_t)s->target.approach_count));
+    }
+    if (((!s->begun) || (((int64_t)s->old_order.input_command == INT64_C(1)) || ((int64_t)s->old_order.input_command == INT64_C(2))))) {
+        s->lost = ((((int64_t)s->command.gripped_obj_ptr == INT64_C(1)) || ((int64_t)s->command.gripped_obj_ptr == INT64_C(2)) || ((int64_t)s->command.gripped_obj_ptr == INT64_C(3)) || ((int64_t)s->command.gripped_obj_ptr == INT64_C(4))) && (!s->primitive.holds));
+    }
+    if (((int64_t)s->command.input_command == INT64_C(2))) {
+        s->lift_mm = s->object_data.lift_mm + 0.0;
+    } else {
+        s->lift_mm = s->held_data.lift_mm + 0.0;
     }
 }
 
@@ -169,6 +177,12 @@ static void emove_do_primitive_failure(emove_t *s)
     s->failure = (uint8_t)(int64_t)s->primitive.failure;
 }
 
+/* The fingers are not where the part would keep them. */
+static void emove_do_part_lost(emove_t *s)
+{
+    s->failure = (uint8_t)INT64_C(11);
+}
+
 /* What vision says went wrong. */
 static void emove_do_vision_failure(emove_t *s)
 {
@@ -231,6 +245,7 @@ static void emove_do_flood_flash(emove_t *s)
 /* Procedure line_flash. */
 static void emove_do_line_flash(emove_t *s)
 {
+    emove_do_pause(s);
     s->to_vision.input_command = (uint8_t)INT64_C(2);
 }
 
@@ -262,6 +277,7 @@ static void emove_do_aim(emove_t *s, int64_t v_at)
         s->to_primitive.displaced.y = s->displaced_here.y + 0.0;
     } else {
         s->to_primitive.pose_ptr = emove_u16_of_i64(emove_min_i64((((int64_t)s->target.approach_first + v_at) - (int64_t)s->depart_count), INT64_C(9999)));
+        s->to_primitive.displaced.z = s->lift_mm + 0.0;
     }
 }
 
@@ -295,6 +311,17 @@ static void emove_do_arrived(emove_t *s)
     s->displaced_here.y = 0.0 + 0.0;
 }
 
+/* The camera above the part: the two lines of the second picture are to fall on it. */
+static void emove_do_aim_view(emove_t *s)
+{
+    s->to_vision.input_command = (uint8_t)INT64_C(0);
+    emove_do_no_displacement(s);
+    s->to_primitive.pose_ptr = (uint16_t)(int64_t)s->target.view_point;
+    s->to_primitive.displaced.x = s->vision.x_mm + 0.0;
+    s->to_primitive.displaced.y = s->vision.y_mm + 0.0;
+    s->here_next = (uint8_t)INT64_C(0);
+}
+
 /* Above the part, turned with it. */
 static void emove_do_aim_above(emove_t *s)
 {
@@ -307,11 +334,11 @@ static void emove_do_aim_above(emove_t *s)
     s->here_next = (uint8_t)INT64_C(0);
 }
 
-/* Around the part; its top is as much higher as its range is shorter. */
+/* Around the part; the pads go as much lower as its top is farther away than one that they would take without. */
 static void emove_do_aim_at_part(emove_t *s)
 {
     s->to_primitive.pose_ptr = (uint16_t)(int64_t)s->target.grasp_point;
-    s->to_primitive.displaced.z = emove_max_f64((-500.0), emove_min_f64(500.0, (s->object_data.expected_range_mm - s->vision.range_mm))) + 0.0;
+    s->to_primitive.displaced.z = emove_max_f64((-500.0), emove_min_f64(500.0, (s->object_data.grip_range_mm - s->vision.range_mm))) + 0.0;
 }
 
 /* Procedure located. */
@@ -382,25 +409,25 @@ static void emove_admit(emove_t *s)
     if (((int64_t)s->vision.ref_command_echo > INT64_C(2))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 13;
+            s->fault_at = 14;
         }
     }
     if (((int64_t)s->vision.status_report > INT64_C(2))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 14;
+            s->fault_at = 15;
         }
     }
     if (((int64_t)s->vision.failure > INT64_C(15))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 15;
+            s->fault_at = 16;
         }
     }
     if (!((s->vision.x_mm >= (-500.0)) && (s->vision.x_mm <= 500.0))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 16;
+            s->fault_at = 17;
         }
     } else {
         s->vision.x_mm = s->vision.x_mm + 0.0;
@@ -408,7 +435,7 @@ static void emove_admit(emove_t *s)
     if (!((s->vision.y_mm >= (-500.0)) && (s->vision.y_mm <= 500.0))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 17;
+            s->fault_at = 18;
         }
     } else {
         s->vision.y_mm = s->vision.y_mm + 0.0;
@@ -416,7 +443,7 @@ static void emove_admit(emove_t *s)
     if (!((s->vision.c >= (-1.0)) && (s->vision.c <= 1.0))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 18;
+            s->fault_at = 19;
         }
     } else {
         s->vision.c = s->vision.c + 0.0;
@@ -424,7 +451,7 @@ static void emove_admit(emove_t *s)
     if (!((s->vision.s >= (-1.0)) && (s->vision.s <= 1.0))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 19;
+            s->fault_at = 20;
         }
     } else {
         s->vision.s = s->vision.s + 0.0;
@@ -432,7 +459,7 @@ static void emove_admit(emove_t *s)
     if (!((s->vision.range_mm >= 0.0) && (s->vision.range_mm <= 2000.0))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 20;
+            s->fault_at = 21;
         }
     } else {
         s->vision.range_mm = s->vision.range_mm + 0.0;
@@ -440,82 +467,134 @@ static void emove_admit(emove_t *s)
     if (((int64_t)s->origin.depart_first > INT64_C(9999))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 22;
+            s->fault_at = 23;
         }
     }
     if (((int64_t)s->origin.depart_count > INT64_C(31))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 23;
+            s->fault_at = 24;
         }
     }
     if (((int64_t)s->origin.approach_first > INT64_C(9999))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 24;
+            s->fault_at = 25;
         }
     }
     if (((int64_t)s->origin.approach_count > INT64_C(31))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 25;
+            s->fault_at = 26;
         }
     }
     if (((int64_t)s->origin.hover_point > INT64_C(9999))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 26;
+            s->fault_at = 27;
         }
     }
     if (((int64_t)s->origin.grasp_point > INT64_C(9999))) {
         if (s->fault == 0) {
             s->fault = 1;
-            s->fault_at = 27;
+            s->fault_at = 28;
         }
     }
-    if (((int64_t)s->target.depart_first > INT64_C(9999))) {
+    if (((int64_t)s->origin.view_point > INT64_C(9999))) {
         if (s->fault == 0) {
             s->fault = 1;
             s->fault_at = 29;
         }
     }
-    if (((int64_t)s->target.depart_count > INT64_C(31))) {
-        if (s->fault == 0) {
-            s->fault = 1;
-            s->fault_at = 30;
-        }
-    }
-    if (((int64_t)s->target.approach_first > INT64_C(9999))) {
+    if (((int64_t)s->target.depart_first > INT64_C(9999))) {
         if (s->fault == 0) {
             s->fault = 1;
             s->fault_at = 31;
         }
     }
-    if (((int64_t)s->target.approach_count > INT64_C(31))) {
+    if (((int64_t)s->target.depart_count > INT64_C(31))) {
         if (s->fault == 0) {
             s->fault = 1;
             s->fault_at = 32;
         }
     }
-    if (((int64_t)s->target.hover_point > INT64_C(9999))) {
+    if (((int64_t)s->target.approach_first > INT64_C(9999))) {
         if (s->fault == 0) {
             s->fault = 1;
             s->fault_at = 33;
         }
     }
-    if (((int64_t)s->target.grasp_point > INT64_C(9999))) {
+    if (((int64_t)s->target.approach_count > INT64_C(31))) {
         if (s->fault == 0) {
             s->fault = 1;
             s->fault_at = 34;
         }
     }
-    if (!((s->object_data.expected_range_mm >= 0.0) && (s->object_data.expected_range_mm <= 2000.0))) {
+    if (((int64_t)s->target.hover_point > INT64_C(9999))) {
+        if (s->fault == 0) {
+            s->fault = 1;
+            s->fault_at = 35;
+        }
+    }
+    if (((int64_t)s->target.grasp_point > INT64_C(9999))) {
         if (s->fault == 0) {
             s->fault = 1;
             s->fault_at = 36;
         }
+    }
+    if (((int64_t)s->target.view_point > INT64_C(9999))) {
+        if (s->fault == 0) {
+            s->fault = 1;
+            s->fault_at = 37;
+        }
+    }
+    if (!((s->object_data.expected_range_mm >= 0.0) && (s->object_data.expected_range_mm <= 2000.0))) {
+        if (s->fault == 0) {
+            s->fault = 1;
+            s->fault_at = 39;
+        }
     } else {
         s->object_data.expected_range_mm = s->object_data.expected_range_mm + 0.0;
+    }
+    if (!((s->object_data.grip_range_mm >= 0.0) && (s->object_data.grip_range_mm <= 2000.0))) {
+        if (s->fault == 0) {
+            s->fault = 1;
+            s->fault_at = 40;
+        }
+    } else {
+        s->object_data.grip_range_mm = s->object_data.grip_range_mm + 0.0;
+    }
+    if (!((s->object_data.lift_mm >= (-500.0)) && (s->object_data.lift_mm <= 500.0))) {
+        if (s->fault == 0) {
+            s->fault = 1;
+            s->fault_at = 41;
+        }
+    } else {
+        s->object_data.lift_mm = s->object_data.lift_mm + 0.0;
+    }
+    if (!((s->held_data.expected_range_mm >= 0.0) && (s->held_data.expected_range_mm <= 2000.0))) {
+        if (s->fault == 0) {
+            s->fault = 1;
+            s->fault_at = 43;
+        }
+    } else {
+        s->held_data.expected_range_mm = s->held_data.expected_range_mm + 0.0;
+    }
+    if (!((s->held_data.grip_range_mm >= 0.0) && (s->held_data.grip_range_mm <= 2000.0))) {
+        if (s->fault == 0) {
+            s->fault = 1;
+            s->fault_at = 44;
+        }
+    } else {
+        s->held_data.grip_range_mm = s->held_data.grip_range_mm + 0.0;
+    }
+    if (!((s->held_data.lift_mm >= (-500.0)) && (s->held_data.lift_mm <= 500.0))) {
+        if (s->fault == 0) {
+            s->fault = 1;
+            s->fault_at = 45;
+        }
+    } else {
+        s->held_data.lift_mm = s->held_data.lift_mm + 0.0;
     }
     if (s->fault != 0) {
         before.line = -1;
@@ -547,11 +626,11 @@ static void emove_settle(emove_t *s)
 static void emove_run_locate(emove_t *s)
 {
     /* in_step */
-    if (!(((!(!s->new_command)) || ((((((((((((int64_t)s->cur_state == INT64_C(0)) || ((int64_t)s->cur_state == INT64_C(1))) && ((int64_t)s->ref_command_in == INT64_C(0))) && ((int64_t)s->ref_vision_in == INT64_C(0))) || ((((int64_t)s->cur_state == INT64_C(2)) && ((int64_t)s->ref_command_in == INT64_C(2))) && ((int64_t)s->ref_vision_in == INT64_C(0)))) || (((((int64_t)s->cur_state == INT64_C(3)) || ((int64_t)s->cur_state == INT64_C(9)) || ((int64_t)s->cur_state == INT64_C(10))) && ((int64_t)s->ref_command_in == INT64_C(1))) && ((int64_t)s->ref_vision_in == INT64_C(0)))) || (((((int64_t)s->cur_state == INT64_C(4)) || ((int64_t)s->cur_state == INT64_C(8))) && ((int64_t)s->ref_command_in == INT64_C(3))) && ((int64_t)s->ref_vision_in == INT64_C(0)))) || (((((int64_t)s->cur_state == INT64_C(5)) || ((int64_t)s->cur_state == INT64_C(12))) && ((int64_t)s->ref_command_in == INT64_C(4))) && ((int64_t)s->ref_vision_in == INT64_C(0)))) || ((((int64_t)s->cur_state == INT64_C(6)) && ((int64_t)s->ref_command_in == INT64_C(0))) && ((int64_t)s->ref_vision_in == INT64_C(1)))) || ((((int64_t)s->cur_state == INT64_C(7)) && ((int64_t)s->ref_command_in == INT64_C(0))) && ((int64_t)s->ref_vision_in == INT64_C(2)))) || ((((int64_t)s->cur_state == INT64_C(11)) && ((int64_t)s->ref_command_in == INT64_C(5))) && ((int64_t)s->ref_vision_in == INT64_C(0))))))) {
+    if (!(((!(!s->new_command)) || ((((((((((((int64_t)s->cur_state == INT64_C(0)) || ((int64_t)s->cur_state == INT64_C(1))) && ((int64_t)s->ref_command_in == INT64_C(0))) && ((int64_t)s->ref_vision_in == INT64_C(0))) || ((((int64_t)s->cur_state == INT64_C(2)) && ((int64_t)s->ref_command_in == INT64_C(2))) && ((int64_t)s->ref_vision_in == INT64_C(0)))) || (((((int64_t)s->cur_state == INT64_C(3)) || ((int64_t)s->cur_state == INT64_C(7)) || ((int64_t)s->cur_state == INT64_C(10)) || ((int64_t)s->cur_state == INT64_C(11))) && ((int64_t)s->ref_command_in == INT64_C(1))) && ((int64_t)s->ref_vision_in == INT64_C(0)))) || (((((int64_t)s->cur_state == INT64_C(4)) || ((int64_t)s->cur_state == INT64_C(9))) && ((int64_t)s->ref_command_in == INT64_C(3))) && ((int64_t)s->ref_vision_in == INT64_C(0)))) || (((((int64_t)s->cur_state == INT64_C(5)) || ((int64_t)s->cur_state == INT64_C(13))) && ((int64_t)s->ref_command_in == INT64_C(4))) && ((int64_t)s->ref_vision_in == INT64_C(0)))) || ((((int64_t)s->cur_state == INT64_C(6)) && ((int64_t)s->ref_command_in == INT64_C(0))) && ((int64_t)s->ref_vision_in == INT64_C(1)))) || ((((int64_t)s->cur_state == INT64_C(8)) && ((int64_t)s->ref_command_in == INT64_C(0))) && ((int64_t)s->ref_vision_in == INT64_C(2)))) || ((((int64_t)s->cur_state == INT64_C(12)) && ((int64_t)s->ref_command_in == INT64_C(5))) && ((int64_t)s->ref_vision_in == INT64_C(0))))))) {
         s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 0u);
     }
     /* locate_states */
-    if (!(((!(!s->new_command)) || (((int64_t)s->cur_state == INT64_C(0)) || ((int64_t)s->cur_state == INT64_C(1)) || ((int64_t)s->cur_state == INT64_C(5)) || ((int64_t)s->cur_state == INT64_C(6)) || ((int64_t)s->cur_state == INT64_C(7)) || ((int64_t)s->cur_state == INT64_C(8)) || ((int64_t)s->cur_state == INT64_C(9)) || ((int64_t)s->cur_state == INT64_C(10)))))) {
+    if (!(((!(!s->new_command)) || (((int64_t)s->cur_state == INT64_C(0)) || ((int64_t)s->cur_state == INT64_C(1)) || ((int64_t)s->cur_state == INT64_C(5)) || ((int64_t)s->cur_state == INT64_C(6)) || ((int64_t)s->cur_state == INT64_C(7)) || ((int64_t)s->cur_state == INT64_C(8)) || ((int64_t)s->cur_state == INT64_C(9)) || ((int64_t)s->cur_state == INT64_C(10)) || ((int64_t)s->cur_state == INT64_C(11)))))) {
         s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 1u);
     }
     s->line = emove_locate_line(s);
@@ -579,60 +658,66 @@ static void emove_run_locate(emove_t *s)
         emove_do_executing(s);
         break;
     case 4: /* emove/locate.rcs line 4 */
+        emove_do_aim_view(s);
         emove_do_nextstate(s, INT64_C(7));
-        emove_do_line_flash(s);
-        emove_do_executing(s);
-        break;
-    case 5: /* emove/locate.rcs line 5 */
-        emove_do_aim_above(s);
-        emove_do_nextstate(s, INT64_C(8));
-        emove_do_approach_position_fingers(s);
-        emove_do_executing(s);
-        break;
-    case 6: /* emove/locate.rcs line 6 */
-        emove_do_nextstate(s, INT64_C(9));
         emove_do_goto_(s);
         emove_do_executing(s);
         break;
-    case 7: /* emove/locate.rcs line 7 */
-        emove_do_aim_at_part(s);
+    case 5: /* emove/locate.rcs line 4a */
+        emove_do_nextstate(s, INT64_C(8));
+        emove_do_line_flash(s);
+        emove_do_executing(s);
+        break;
+    case 6: /* emove/locate.rcs line 5 */
+        emove_do_aim_above(s);
+        emove_do_nextstate(s, INT64_C(9));
+        emove_do_approach_position_fingers(s);
+        emove_do_executing(s);
+        break;
+    case 7: /* emove/locate.rcs line 6 */
         emove_do_nextstate(s, INT64_C(10));
         emove_do_goto_(s);
         emove_do_executing(s);
         break;
-    case 8: /* emove/locate.rcs line 8 */
+    case 8: /* emove/locate.rcs line 7 */
+        emove_do_aim_at_part(s);
+        emove_do_nextstate(s, INT64_C(11));
+        emove_do_goto_(s);
+        emove_do_executing(s);
+        break;
+    case 9: /* emove/locate.rcs line 8 */
         emove_do_located(s);
         emove_do_nextstate(s, INT64_C(0));
         emove_do_pause(s);
         emove_do_done(s);
         break;
-    case 9: /* emove/locate.rcs line 9 */
+    case 10: /* emove/locate.rcs line 9 */
         emove_do_pause(s);
         emove_do_done(s);
         break;
-    case 10: /* emove/locate.rcs line 10 */
+    case 11: /* emove/locate.rcs line 10 */
         emove_do_primitive_failure(s);
         emove_do_nextstate(s, INT64_C(1));
         emove_do_pause(s);
         emove_do_fail(s);
         break;
-    case 11: /* emove/locate.rcs line 11 */
+    case 12: /* emove/locate.rcs line 11 */
         emove_do_vision_failure(s);
         emove_do_nextstate(s, INT64_C(1));
         emove_do_pause(s);
         emove_do_fail(s);
         break;
-    case 12: /* emove/locate.rcs line 12 */
+    case 13: /* emove/locate.rcs line 12 */
         emove_do_pause(s);
         emove_do_fail(s);
         break;
-    case 13: /* emove/locate.rcs line 13 */
+    case 14: /* emove/locate.rcs line 13 */
         emove_do_executing(s);
         break;
-    case 14: /* emove/locate.rcs line 14 */
+    case 15: /* emove/locate.rcs line 14 */
         emove_do_executing(s);
         break;
-    case 15: /* emove/locate.rcs line 15 */
+    case 16: /* emove/locate.rcs line 15 */
         emove_do_primitive_failure(s);
         emove_do_nextstate(s, INT64_C(1));
         emove_do_pause(s);
@@ -652,7 +737,7 @@ static void emove_run_locate(emove_t *s)
 static void emove_run_move_to(emove_t *s)
 {
     /* in_step */
-    if (!(((!(!s->new_command)) || ((((((((((((int64_t)s->cur_state == INT64_C(0)) || ((int64_t)s->cur_state == INT64_C(1))) && ((int64_t)s->ref_command_in == INT64_C(0))) && ((int64_t)s->ref_vision_in == INT64_C(0))) || ((((int64_t)s->cur_state == INT64_C(2)) && ((int64_t)s->ref_command_in == INT64_C(2))) && ((int64_t)s->ref_vision_in == INT64_C(0)))) || (((((int64_t)s->cur_state == INT64_C(3)) || ((int64_t)s->cur_state == INT64_C(9)) || ((int64_t)s->cur_state == INT64_C(10))) && ((int64_t)s->ref_command_in == INT64_C(1))) && ((int64_t)s->ref_vision_in == INT64_C(0)))) || (((((int64_t)s->cur_state == INT64_C(4)) || ((int64_t)s->cur_state == INT64_C(8))) && ((int64_t)s->ref_command_in == INT64_C(3))) && ((int64_t)s->ref_vision_in == INT64_C(0)))) || (((((int64_t)s->cur_state == INT64_C(5)) || ((int64_t)s->cur_state == INT64_C(12))) && ((int64_t)s->ref_command_in == INT64_C(4))) && ((int64_t)s->ref_vision_in == INT64_C(0)))) || ((((int64_t)s->cur_state == INT64_C(6)) && ((int64_t)s->ref_command_in == INT64_C(0))) && ((int64_t)s->ref_vision_in == INT64_C(1)))) || ((((int64_t)s->cur_state == INT64_C(7)) && ((int64_t)s->ref_command_in == INT64_C(0))) && ((int64_t)s->ref_vision_in == INT64_C(2)))) || ((((int64_t)s->cur_state == INT64_C(11)) && ((int64_t)s->ref_command_in == INT64_C(5))) && ((int64_t)s->ref_vision_in == INT64_C(0))))))) {
+    if (!(((!(!s->new_command)) || ((((((((((((int64_t)s->cur_state == INT64_C(0)) || ((int64_t)s->cur_state == INT64_C(1))) && ((int64_t)s->ref_command_in == INT64_C(0))) && ((int64_t)s->ref_vision_in == INT64_C(0))) || ((((int64_t)s->cur_state == INT64_C(2)) && ((int64_t)s->ref_command_in == INT64_C(2))) && ((int64_t)s->ref_vision_in == INT64_C(0)))) || (((((int64_t)s->cur_state == INT64_C(3)) || ((int64_t)s->cur_state == INT64_C(7)) || ((int64_t)s->cur_state == INT64_C(10)) || ((int64_t)s->cur_state == INT64_C(11))) && ((int64_t)s->ref_command_in == INT64_C(1))) && ((int64_t)s->ref_vision_in == INT64_C(0)))) || (((((int64_t)s->cur_state == INT64_C(4)) || ((int64_t)s->cur_state == INT64_C(9))) && ((int64_t)s->ref_command_in == INT64_C(3))) && ((int64_t)s->ref_vision_in == INT64_C(0)))) || (((((int64_t)s->cur_state == INT64_C(5)) || ((int64_t)s->cur_state == INT64_C(13))) && ((int64_t)s->ref_command_in == INT64_C(4))) && ((int64_t)s->ref_vision_in == INT64_C(0)))) || ((((int64_t)s->cur_state == INT64_C(6)) && ((int64_t)s->ref_command_in == INT64_C(0))) && ((int64_t)s->ref_vision_in == INT64_C(1)))) || ((((int64_t)s->cur_state == INT64_C(8)) && ((int64_t)s->ref_command_in == INT64_C(0))) && ((int64_t)s->ref_vision_in == INT64_C(2)))) || ((((int64_t)s->cur_state == INT64_C(12)) && ((int64_t)s->ref_command_in == INT64_C(5))) && ((int64_t)s->ref_vision_in == INT64_C(0))))))) {
         s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 0u);
     }
     /* move_to_states */
@@ -710,24 +795,30 @@ static void emove_run_move_to(emove_t *s)
         emove_do_pause(s);
         emove_do_done(s);
         break;
-    case 8: /* emove/move_to.rcs line 8 */
+    case 8: /* emove/move_to.rcs line 7a */
+        emove_do_part_lost(s);
+        emove_do_nextstate(s, INT64_C(1));
+        emove_do_pause(s);
+        emove_do_fail(s);
+        break;
+    case 9: /* emove/move_to.rcs line 8 */
         emove_do_pause(s);
         emove_do_done(s);
         break;
-    case 9: /* emove/move_to.rcs line 9 */
+    case 10: /* emove/move_to.rcs line 9 */
         emove_do_primitive_failure(s);
         emove_do_nextstate(s, INT64_C(1));
         emove_do_pause(s);
         emove_do_fail(s);
         break;
-    case 10: /* emove/move_to.rcs line 10 */
+    case 11: /* emove/move_to.rcs line 10 */
         emove_do_pause(s);
         emove_do_fail(s);
         break;
-    case 11: /* emove/move_to.rcs line 11 */
+    case 12: /* emove/move_to.rcs line 11 */
         emove_do_executing(s);
         break;
-    case 12: /* emove/move_to.rcs line 12 */
+    case 13: /* emove/move_to.rcs line 12 */
         emove_do_primitive_failure(s);
         emove_do_nextstate(s, INT64_C(1));
         emove_do_pause(s);
@@ -747,7 +838,7 @@ static void emove_run_move_to(emove_t *s)
 static void emove_run_move_to_obj(emove_t *s)
 {
     /* in_step */
-    if (!(((!(!s->new_command)) || ((((((((((((int64_t)s->cur_state == INT64_C(0)) || ((int64_t)s->cur_state == INT64_C(1))) && ((int64_t)s->ref_command_in == INT64_C(0))) && ((int64_t)s->ref_vision_in == INT64_C(0))) || ((((int64_t)s->cur_state == INT64_C(2)) && ((int64_t)s->ref_command_in == INT64_C(2))) && ((int64_t)s->ref_vision_in == INT64_C(0)))) || (((((int64_t)s->cur_state == INT64_C(3)) || ((int64_t)s->cur_state == INT64_C(9)) || ((int64_t)s->cur_state == INT64_C(10))) && ((int64_t)s->ref_command_in == INT64_C(1))) && ((int64_t)s->ref_vision_in == INT64_C(0)))) || (((((int64_t)s->cur_state == INT64_C(4)) || ((int64_t)s->cur_state == INT64_C(8))) && ((int64_t)s->ref_command_in == INT64_C(3))) && ((int64_t)s->ref_vision_in == INT64_C(0)))) || (((((int64_t)s->cur_state == INT64_C(5)) || ((int64_t)s->cur_state == INT64_C(12))) && ((int64_t)s->ref_command_in == INT64_C(4))) && ((int64_t)s->ref_vision_in == INT64_C(0)))) || ((((int64_t)s->cur_state == INT64_C(6)) && ((int64_t)s->ref_command_in == INT64_C(0))) && ((int64_t)s->ref_vision_in == INT64_C(1)))) || ((((int64_t)s->cur_state == INT64_C(7)) && ((int64_t)s->ref_command_in == INT64_C(0))) && ((int64_t)s->ref_vision_in == INT64_C(2)))) || ((((int64_t)s->cur_state == INT64_C(11)) && ((int64_t)s->ref_command_in == INT64_C(5))) && ((int64_t)s->ref_vision_in == INT64_C(0))))))) {
+    if (!(((!(!s->new_command)) || ((((((((((((int64_t)s->cur_state == INT64_C(0)) || ((int64_t)s->cur_state == INT64_C(1))) && ((int64_t)s->ref_command_in == INT64_C(0))) && ((int64_t)s->ref_vision_in == INT64_C(0))) || ((((int64_t)s->cur_state == INT64_C(2)) && ((int64_t)s->ref_command_in == INT64_C(2))) && ((int64_t)s->ref_vision_in == INT64_C(0)))) || (((((int64_t)s->cur_state == INT64_C(3)) || ((int64_t)s->cur_state == INT64_C(7)) || ((int64_t)s->cur_state == INT64_C(10)) || ((int64_t)s->cur_state == INT64_C(11))) && ((int64_t)s->ref_command_in == INT64_C(1))) && ((int64_t)s->ref_vision_in == INT64_C(0)))) || (((((int64_t)s->cur_state == INT64_C(4)) || ((int64_t)s->cur_state == INT64_C(9))) && ((int64_t)s->ref_command_in == INT64_C(3))) && ((int64_t)s->ref_vision_in == INT64_C(0)))) || (((((int64_t)s->cur_state == INT64_C(5)) || ((int64_t)s->cur_state == INT64_C(13))) && ((int64_t)s->ref_command_in == INT64_C(4))) && ((int64_t)s->ref_vision_in == INT64_C(0)))) || ((((int64_t)s->cur_state == INT64_C(6)) && ((int64_t)s->ref_command_in == INT64_C(0))) && ((int64_t)s->ref_vision_in == INT64_C(1)))) || ((((int64_t)s->cur_state == INT64_C(8)) && ((int64_t)s->ref_command_in == INT64_C(0))) && ((int64_t)s->ref_vision_in == INT64_C(2)))) || ((((int64_t)s->cur_state == INT64_C(12)) && ((int64_t)s->ref_command_in == INT64_C(5))) && ((int64_t)s->ref_vision_in == INT64_C(0))))))) {
         s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 0u);
     }
     /* move_to_obj_states */
@@ -872,11 +963,11 @@ static void emove_run_pause_emove(emove_t *s)
 static void emove_run_pickup(emove_t *s)
 {
     /* in_step */
-    if (!(((!(!s->new_command)) || ((((((((((((int64_t)s->cur_state == INT64_C(0)) || ((int64_t)s->cur_state == INT64_C(1))) && ((int64_t)s->ref_command_in == INT64_C(0))) && ((int64_t)s->ref_vision_in == INT64_C(0))) || ((((int64_t)s->cur_state == INT64_C(2)) && ((int64_t)s->ref_command_in == INT64_C(2))) && ((int64_t)s->ref_vision_in == INT64_C(0)))) || (((((int64_t)s->cur_state == INT64_C(3)) || ((int64_t)s->cur_state == INT64_C(9)) || ((int64_t)s->cur_state == INT64_C(10))) && ((int64_t)s->ref_command_in == INT64_C(1))) && ((int64_t)s->ref_vision_in == INT64_C(0)))) || (((((int64_t)s->cur_state == INT64_C(4)) || ((int64_t)s->cur_state == INT64_C(8))) && ((int64_t)s->ref_command_in == INT64_C(3))) && ((int64_t)s->ref_vision_in == INT64_C(0)))) || (((((int64_t)s->cur_state == INT64_C(5)) || ((int64_t)s->cur_state == INT64_C(12))) && ((int64_t)s->ref_command_in == INT64_C(4))) && ((int64_t)s->ref_vision_in == INT64_C(0)))) || ((((int64_t)s->cur_state == INT64_C(6)) && ((int64_t)s->ref_command_in == INT64_C(0))) && ((int64_t)s->ref_vision_in == INT64_C(1)))) || ((((int64_t)s->cur_state == INT64_C(7)) && ((int64_t)s->ref_command_in == INT64_C(0))) && ((int64_t)s->ref_vision_in == INT64_C(2)))) || ((((int64_t)s->cur_state == INT64_C(11)) && ((int64_t)s->ref_command_in == INT64_C(5))) && ((int64_t)s->ref_vision_in == INT64_C(0))))))) {
+    if (!(((!(!s->new_command)) || ((((((((((((int64_t)s->cur_state == INT64_C(0)) || ((int64_t)s->cur_state == INT64_C(1))) && ((int64_t)s->ref_command_in == INT64_C(0))) && ((int64_t)s->ref_vision_in == INT64_C(0))) || ((((int64_t)s->cur_state == INT64_C(2)) && ((int64_t)s->ref_command_in == INT64_C(2))) && ((int64_t)s->ref_vision_in == INT64_C(0)))) || (((((int64_t)s->cur_state == INT64_C(3)) || ((int64_t)s->cur_state == INT64_C(7)) || ((int64_t)s->cur_state == INT64_C(10)) || ((int64_t)s->cur_state == INT64_C(11))) && ((int64_t)s->ref_command_in == INT64_C(1))) && ((int64_t)s->ref_vision_in == INT64_C(0)))) || (((((int64_t)s->cur_state == INT64_C(4)) || ((int64_t)s->cur_state == INT64_C(9))) && ((int64_t)s->ref_command_in == INT64_C(3))) && ((int64_t)s->ref_vision_in == INT64_C(0)))) || (((((int64_t)s->cur_state == INT64_C(5)) || ((int64_t)s->cur_state == INT64_C(13))) && ((int64_t)s->ref_command_in == INT64_C(4))) && ((int64_t)s->ref_vision_in == INT64_C(0)))) || ((((int64_t)s->cur_state == INT64_C(6)) && ((int64_t)s->ref_command_in == INT64_C(0))) && ((int64_t)s->ref_vision_in == INT64_C(1)))) || ((((int64_t)s->cur_state == INT64_C(8)) && ((int64_t)s->ref_command_in == INT64_C(0))) && ((int64_t)s->ref_vision_in == INT64_C(2)))) || ((((int64_t)s->cur_state == INT64_C(12)) && ((int64_t)s->ref_command_in == INT64_C(5))) && ((int64_t)s->ref_vision_in == INT64_C(0))))))) {
         s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 0u);
     }
     /* pickup_states */
-    if (!(((!(!s->new_command)) || (((int64_t)s->cur_state == INT64_C(0)) || ((int64_t)s->cur_state == INT64_C(1)) || ((int64_t)s->cur_state == INT64_C(11)))))) {
+    if (!(((!(!s->new_command)) || (((int64_t)s->cur_state == INT64_C(0)) || ((int64_t)s->cur_state == INT64_C(1)) || ((int64_t)s->cur_state == INT64_C(12)))))) {
         s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 4u);
     }
     s->line = emove_pickup_line(s);
@@ -888,7 +979,7 @@ static void emove_run_pickup(emove_t *s)
         break;
     case 1: /* emove/pickup.rcs line 1 */
         emove_do_begin(s);
-        emove_do_nextstate(s, INT64_C(11));
+        emove_do_nextstate(s, INT64_C(12));
         emove_do_immed_grasp(s);
         emove_do_executing(s);
         break;
@@ -934,11 +1025,11 @@ static void emove_run_pickup(emove_t *s)
 static void emove_run_release_part(emove_t *s)
 {
     /* in_step */
-    if (!(((!(!s->new_command)) || ((((((((((((int64_t)s->cur_state == INT64_C(0)) || ((int64_t)s->cur_state == INT64_C(1))) && ((int64_t)s->ref_command_in == INT64_C(0))) && ((int64_t)s->ref_vision_in == INT64_C(0))) || ((((int64_t)s->cur_state == INT64_C(2)) && ((int64_t)s->ref_command_in == INT64_C(2))) && ((int64_t)s->ref_vision_in == INT64_C(0)))) || (((((int64_t)s->cur_state == INT64_C(3)) || ((int64_t)s->cur_state == INT64_C(9)) || ((int64_t)s->cur_state == INT64_C(10))) && ((int64_t)s->ref_command_in == INT64_C(1))) && ((int64_t)s->ref_vision_in == INT64_C(0)))) || (((((int64_t)s->cur_state == INT64_C(4)) || ((int64_t)s->cur_state == INT64_C(8))) && ((int64_t)s->ref_command_in == INT64_C(3))) && ((int64_t)s->ref_vision_in == INT64_C(0)))) || (((((int64_t)s->cur_state == INT64_C(5)) || ((int64_t)s->cur_state == INT64_C(12))) && ((int64_t)s->ref_command_in == INT64_C(4))) && ((int64_t)s->ref_vision_in == INT64_C(0)))) || ((((int64_t)s->cur_state == INT64_C(6)) && ((int64_t)s->ref_command_in == INT64_C(0))) && ((int64_t)s->ref_vision_in == INT64_C(1)))) || ((((int64_t)s->cur_state == INT64_C(7)) && ((int64_t)s->ref_command_in == INT64_C(0))) && ((int64_t)s->ref_vision_in == INT64_C(2)))) || ((((int64_t)s->cur_state == INT64_C(11)) && ((int64_t)s->ref_command_in == INT64_C(5))) && ((int64_t)s->ref_vision_in == INT64_C(0))))))) {
+    if (!(((!(!s->new_command)) || ((((((((((((int64_t)s->cur_state == INT64_C(0)) || ((int64_t)s->cur_state == INT64_C(1))) && ((int64_t)s->ref_command_in == INT64_C(0))) && ((int64_t)s->ref_vision_in == INT64_C(0))) || ((((int64_t)s->cur_state == INT64_C(2)) && ((int64_t)s->ref_command_in == INT64_C(2))) && ((int64_t)s->ref_vision_in == INT64_C(0)))) || (((((int64_t)s->cur_state == INT64_C(3)) || ((int64_t)s->cur_state == INT64_C(7)) || ((int64_t)s->cur_state == INT64_C(10)) || ((int64_t)s->cur_state == INT64_C(11))) && ((int64_t)s->ref_command_in == INT64_C(1))) && ((int64_t)s->ref_vision_in == INT64_C(0)))) || (((((int64_t)s->cur_state == INT64_C(4)) || ((int64_t)s->cur_state == INT64_C(9))) && ((int64_t)s->ref_command_in == INT64_C(3))) && ((int64_t)s->ref_vision_in == INT64_C(0)))) || (((((int64_t)s->cur_state == INT64_C(5)) || ((int64_t)s->cur_state == INT64_C(13))) && ((int64_t)s->ref_command_in == INT64_C(4))) && ((int64_t)s->ref_vision_in == INT64_C(0)))) || ((((int64_t)s->cur_state == INT64_C(6)) && ((int64_t)s->ref_command_in == INT64_C(0))) && ((int64_t)s->ref_vision_in == INT64_C(1)))) || ((((int64_t)s->cur_state == INT64_C(8)) && ((int64_t)s->ref_command_in == INT64_C(0))) && ((int64_t)s->ref_vision_in == INT64_C(2)))) || ((((int64_t)s->cur_state == INT64_C(12)) && ((int64_t)s->ref_command_in == INT64_C(5))) && ((int64_t)s->ref_vision_in == INT64_C(0))))))) {
         s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 0u);
     }
     /* release_part_states */
-    if (!(((!(!s->new_command)) || (((int64_t)s->cur_state == INT64_C(0)) || ((int64_t)s->cur_state == INT64_C(1)) || ((int64_t)s->cur_state == INT64_C(12)))))) {
+    if (!(((!(!s->new_command)) || (((int64_t)s->cur_state == INT64_C(0)) || ((int64_t)s->cur_state == INT64_C(1)) || ((int64_t)s->cur_state == INT64_C(13)))))) {
         s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << 5u);
     }
     s->line = emove_release_part_line(s);
@@ -950,33 +1041,40 @@ static void emove_run_release_part(emove_t *s)
         break;
     case 1: /* emove/release.rcs line 1 */
         emove_do_begin(s);
-        emove_do_nextstate(s, INT64_C(12));
+        emove_do_nextstate(s, INT64_C(13));
         emove_do_departure_position_fingers(s);
         emove_do_executing(s);
         break;
-    case 2: /* emove/release.rcs line 2 */
+    case 2: /* emove/release.rcs line 1a */
+        emove_do_begin(s);
+        emove_do_part_lost(s);
+        emove_do_nextstate(s, INT64_C(1));
+        emove_do_pause(s);
+        emove_do_fail(s);
+        break;
+    case 3: /* emove/release.rcs line 2 */
         emove_do_nextstate(s, INT64_C(0));
         emove_do_pause(s);
         emove_do_done(s);
         break;
-    case 3: /* emove/release.rcs line 3 */
+    case 4: /* emove/release.rcs line 3 */
         emove_do_pause(s);
         emove_do_done(s);
         break;
-    case 4: /* emove/release.rcs line 4 */
+    case 5: /* emove/release.rcs line 4 */
         emove_do_primitive_failure(s);
         emove_do_nextstate(s, INT64_C(1));
         emove_do_pause(s);
         emove_do_fail(s);
         break;
-    case 5: /* emove/release.rcs line 5 */
+    case 6: /* emove/release.rcs line 5 */
         emove_do_pause(s);
         emove_do_fail(s);
         break;
-    case 6: /* emove/release.rcs line 6 */
+    case 7: /* emove/release.rcs line 6 */
         emove_do_executing(s);
         break;
-    case 7: /* emove/release.rcs line 7 */
+    case 8: /* emove/release.rcs line 7 */
         emove_do_primitive_failure(s);
         emove_do_nextstate(s, INT64_C(1));
         emove_do_pause(s);
@@ -1011,6 +1109,7 @@ void emove_init(emove_t *s)
     s->primitive.ref_command_echo = (uint8_t)INT64_C(0);
     s->primitive.status_report = (uint8_t)INT64_C(0);
     s->primitive.failure = (uint8_t)INT64_C(0);
+    s->primitive.holds = false;
     s->vision.inc_command_echo = (uint16_t)INT64_C(0);
     s->vision.ref_command_echo = (uint8_t)INT64_C(0);
     s->vision.status_report = (uint8_t)INT64_C(0);
@@ -1027,6 +1126,7 @@ void emove_init(emove_t *s)
     s->origin.approach_count = (uint8_t)INT64_C(0);
     s->origin.hover_point = (uint16_t)INT64_C(0);
     s->origin.grasp_point = (uint16_t)INT64_C(0);
+    s->origin.view_point = (uint16_t)INT64_C(0);
     s->target.known = false;
     s->target.depart_first = (uint16_t)INT64_C(0);
     s->target.depart_count = (uint8_t)INT64_C(0);
@@ -1034,8 +1134,15 @@ void emove_init(emove_t *s)
     s->target.approach_count = (uint8_t)INT64_C(0);
     s->target.hover_point = (uint16_t)INT64_C(0);
     s->target.grasp_point = (uint16_t)INT64_C(0);
+    s->target.view_point = (uint16_t)INT64_C(0);
     s->object_data.known = false;
     s->object_data.expected_range_mm = 0.0;
+    s->object_data.grip_range_mm = 0.0;
+    s->object_data.lift_mm = (-500.0);
+    s->held_data.known = false;
+    s->held_data.expected_range_mm = 0.0;
+    s->held_data.grip_range_mm = 0.0;
+    s->held_data.lift_mm = (-500.0);
     s->new_command = false;
     s->begun = false;
     s->inc_command_seen = (uint16_t)INT64_C(0);
@@ -1059,6 +1166,8 @@ void emove_init(emove_t *s)
     s->displaced_here.z = (-500.0);
     s->displaced_here.c = (-1.0);
     s->displaced_here.s = (-1.0);
+    s->lift_mm = (-500.0);
+    s->lost = false;
     s->old_order.inc_command = (uint16_t)INT64_C(0);
     s->old_order.input_command = (uint8_t)INT64_C(0);
     s->old_order.obj_ptr = (uint8_t)INT64_C(0);
@@ -1100,44 +1209,44 @@ int32_t emove_locate_line(const emove_t *s)
 {
     /* The masks: bit k of an entry is set where line k does not exclude that class. */
     static const struct {
-        uint16_t t0[2];
-        uint16_t t1[2];
-        uint16_t t2[6];
-        uint16_t t3[3];
-        uint16_t t4[3];
-        uint16_t t5[3];
-        uint16_t t6[2];
-        uint16_t t7[13];
+        uint32_t t0[2];
+        uint32_t t1[2];
+        uint32_t t2[6];
+        uint32_t t3[3];
+        uint32_t t4[3];
+        uint32_t t5[3];
+        uint32_t t6[2];
+        uint32_t t7[14];
     } t = {
         {
-            0x7ffbu, 0x7ffdu
+            0xfffbu, 0xfffdu
         },
         {
-            0x7ff8u, 0x7u
+            0xfff8u, 0x7u
         },
         {
-            0x7e37u, 0x7fb7u, 0x7e37u, 0x7e77u, 0x7e3fu, 0x7e37u
+            0xfc57u, 0xff77u, 0xfc57u, 0xfcd7u, 0xfc5fu, 0xfc57u
         },
         {
-            0x5bffu, 0x7a37u, 0x1607u
+            0xb7ffu, 0xf457u, 0x2c07u
         },
         {
-            0x7fcfu, 0x7fdfu, 0x7fefu
+            0xffafu, 0xffbfu, 0xffefu
         },
         {
-            0x37ffu, 0x77cfu, 0x3fcfu
+            0x6fffu, 0xefafu, 0x7fafu
         },
         {
-            0x7ff9u, 0x7ffeu
+            0xfff9u, 0xfffeu
         },
         {
-            0x207u, 0x1007u, 0x7u, 0x7u, 0x7u, 0x240fu, 0x4c17u, 0x4c27u, 0x2447u, 0x2487u,
-            0x2507u, 0x7u, 0x7u
+            0x407u, 0x2007u, 0x7u, 0x7u, 0x7u, 0x480fu, 0x9817u, 0x4827u, 0x9847u, 0x4887u,
+            0x4907u, 0x4a07u, 0x7u, 0x7u
         },
     };
     const uint32_t m = (uint32_t)t.t0[(s->target.known ? 1u : 0u)] & (uint32_t)t.t1[(s->new_command ? 1u : 0u)] & (uint32_t)t.t2[s->ref_command_in] & (uint32_t)t.t3[s->status_in] & (uint32_t)t.t4[s->ref_vision_in] & (uint32_t)t.t5[s->vision_status_in] & (uint32_t)t.t6[(s->idle ? 1u : 0u)] & (uint32_t)t.t7[s->cur_state];
     const bool several = (m & (m - 0x1u)) != 0x0u;
-    int32_t line = emove_bit32(m | 0x8000u);
+    int32_t line = emove_bit32(m | 0x10000u);
     line = several ? (-2) : line;
     return line;
 }
@@ -1161,49 +1270,53 @@ int32_t emove_move_to_line(const emove_t *s)
         uint16_t t2[6];
         uint16_t t3[3];
         uint16_t t4[2];
-        uint16_t t5[13];
+        uint16_t t5[14];
         uint16_t t6[63];
         uint16_t t7[2];
         uint16_t t8[2];
+        uint16_t t9[2];
     } t = {
         {
-            0xfe3u, 0xffdu
+            0x1fe3u, 0x1ffdu
         },
         {
-            0xfe0u, 0x1fu
+            0x1fe0u, 0x1fu
         },
         {
-            0xd1fu, 0xf9fu, 0xf7fu, 0xd1fu, 0xd1fu, 0xd1fu
+            0x1a1fu, 0x1f9fu, 0x1e7fu, 0x1a1fu, 0x1a1fu, 0x1a1fu
         },
         {
-            0x5ffu, 0xd1fu, 0x71fu
+            0xbffu, 0x1a1fu, 0xe1fu
         },
         {
-            0xfe1u, 0xffeu
+            0x1fe1u, 0x1ffeu
         },
         {
-            0x31fu, 0x41fu, 0xa7fu, 0xa9fu, 0x21fu, 0x21fu, 0x21fu, 0x21fu, 0x21fu, 0x21fu,
-            0x21fu, 0x21fu, 0x21fu
+            0x61fu, 0x81fu, 0x147fu, 0x159fu, 0x41fu, 0x41fu, 0x41fu, 0x41fu, 0x41fu, 0x41fu,
+            0x41fu, 0x41fu, 0x41fu, 0x41fu
         },
         {
-            0xfe7u, 0xfebu, 0xff3u, 0xff3u, 0xff3u, 0xff3u, 0xff3u, 0xff3u, 0xff3u, 0xff3u,
-            0xff3u, 0xff3u, 0xff3u, 0xff3u, 0xff3u, 0xff3u, 0xff3u, 0xff3u, 0xff3u, 0xff3u,
-            0xff3u, 0xff3u, 0xff3u, 0xff3u, 0xff3u, 0xff3u, 0xff3u, 0xff3u, 0xff3u, 0xff3u,
-            0xff3u, 0xff3u, 0xff3u, 0xff3u, 0xff3u, 0xff3u, 0xff3u, 0xff3u, 0xff3u, 0xff3u,
-            0xff3u, 0xff3u, 0xff3u, 0xff3u, 0xff3u, 0xff3u, 0xff3u, 0xff3u, 0xff3u, 0xff3u,
-            0xff3u, 0xff3u, 0xff3u, 0xff3u, 0xff3u, 0xff3u, 0xff3u, 0xff3u, 0xff3u, 0xff3u,
-            0xff3u, 0xff3u, 0xff3u
+            0x1fe7u, 0x1febu, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u,
+            0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u,
+            0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u,
+            0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u,
+            0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u,
+            0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u,
+            0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u, 0x1ff3u
         },
         {
-            0xfdfu, 0xfffu
+            0x1effu, 0x1f7fu
         },
         {
-            0xfbfu, 0xfffu
+            0x1fdfu, 0x1fffu
+        },
+        {
+            0x1fbfu, 0x1fffu
         },
     };
-    const uint32_t m = (uint32_t)t.t0[(s->target.known ? 1u : 0u)] & (uint32_t)t.t1[(s->new_command ? 1u : 0u)] & (uint32_t)t.t2[s->ref_command_in] & (uint32_t)t.t3[s->status_in] & (uint32_t)t.t4[(s->idle ? 1u : 0u)] & (uint32_t)t.t5[s->cur_state] & (uint32_t)t.t6[s->path_length] & (uint32_t)t.t7[((((int64_t)s->path_length - (int64_t)s->path_at) > INT64_C(2)) ? 1u : 0u)] & (uint32_t)t.t8[((((int64_t)s->path_length - (int64_t)s->path_at) <= INT64_C(2)) ? 1u : 0u)];
+    const uint32_t m = (uint32_t)t.t0[(s->target.known ? 1u : 0u)] & (uint32_t)t.t1[(s->new_command ? 1u : 0u)] & (uint32_t)t.t2[s->ref_command_in] & (uint32_t)t.t3[s->status_in] & (uint32_t)t.t4[(s->idle ? 1u : 0u)] & (uint32_t)t.t5[s->cur_state] & (uint32_t)t.t6[s->path_length] & (uint32_t)t.t7[(s->lost ? 1u : 0u)] & (uint32_t)t.t8[((((int64_t)s->path_length - (int64_t)s->path_at) > INT64_C(2)) ? 1u : 0u)] & (uint32_t)t.t9[((((int64_t)s->path_length - (int64_t)s->path_at) <= INT64_C(2)) ? 1u : 0u)];
     const bool several = (m & (m - 0x1u)) != 0x0u;
-    int32_t line = emove_bit32(m | 0x1000u);
+    int32_t line = emove_bit32(m | 0x2000u);
     line = several ? (-2) : line;
     return line;
 }
@@ -1227,7 +1340,7 @@ int32_t emove_move_to_obj_line(const emove_t *s)
         uint16_t t2[6];
         uint16_t t3[3];
         uint16_t t4[2];
-        uint16_t t5[13];
+        uint16_t t5[14];
         uint16_t t6[63];
         uint16_t t7[2];
         uint16_t t8[2];
@@ -1249,7 +1362,7 @@ int32_t emove_move_to_obj_line(const emove_t *s)
         },
         {
             0x60fu, 0x80fu, 0x14cfu, 0x150fu, 0x143fu, 0x40fu, 0x40fu, 0x40fu, 0x40fu, 0x40fu,
-            0x40fu, 0x40fu, 0x40fu
+            0x40fu, 0x40fu, 0x40fu, 0x40fu
         },
         {
             0x1fd7u, 0x1fdbu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu, 0x1febu,
@@ -1320,7 +1433,7 @@ int32_t emove_pickup_line(const emove_t *s)
         uint8_t t1[6];
         uint8_t t2[3];
         uint8_t t3[2];
-        uint8_t t4[13];
+        uint8_t t4[14];
     } t = {
         {
             0x7cu, 0x3u
@@ -1335,7 +1448,7 @@ int32_t emove_pickup_line(const emove_t *s)
             0x7du, 0x7eu
         },
         {
-            0xbu, 0x23u, 0x3u, 0x3u, 0x3u, 0x3u, 0x3u, 0x3u, 0x3u, 0x3u, 0x3u, 0x57u, 0x3u
+            0xbu, 0x23u, 0x3u, 0x3u, 0x3u, 0x3u, 0x3u, 0x3u, 0x3u, 0x3u, 0x3u, 0x3u, 0x57u, 0x3u
         },
     };
     const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->ref_command_in] & (uint32_t)t.t2[s->status_in] & (uint32_t)t.t3[(s->idle ? 1u : 0u)] & (uint32_t)t.t4[s->cur_state];
@@ -1359,31 +1472,36 @@ int32_t emove_release_part_line(const emove_t *s)
 {
     /* The masks: bit k of an entry is set where line k does not exclude that class. */
     static const struct {
-        uint8_t t0[2];
-        uint8_t t1[6];
-        uint8_t t2[3];
-        uint8_t t3[2];
-        uint8_t t4[13];
+        uint16_t t0[2];
+        uint16_t t1[6];
+        uint16_t t2[3];
+        uint16_t t3[2];
+        uint16_t t4[14];
+        uint16_t t5[2];
     } t = {
         {
-            0x7cu, 0x3u
+            0xf8u, 0x7u
         },
         {
-            0x6bu, 0x6bu, 0x6bu, 0x6bu, 0x7fu, 0x6bu
+            0xd7u, 0xd7u, 0xd7u, 0xd7u, 0xffu, 0xd7u
         },
         {
-            0x2fu, 0x6bu, 0x3bu
+            0x5fu, 0xd7u, 0x77u
         },
         {
-            0x7du, 0x7eu
+            0xf9u, 0xfeu
         },
         {
-            0xbu, 0x23u, 0x3u, 0x3u, 0x3u, 0x3u, 0x3u, 0x3u, 0x3u, 0x3u, 0x3u, 0x3u, 0x57u
+            0x17u, 0x47u, 0x7u, 0x7u, 0x7u, 0x7u, 0x7u, 0x7u, 0x7u, 0x7u, 0x7u, 0x7u, 0x7u,
+            0xafu
+        },
+        {
+            0xfbu, 0xfdu
         },
     };
-    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->ref_command_in] & (uint32_t)t.t2[s->status_in] & (uint32_t)t.t3[(s->idle ? 1u : 0u)] & (uint32_t)t.t4[s->cur_state];
+    const uint32_t m = (uint32_t)t.t0[(s->new_command ? 1u : 0u)] & (uint32_t)t.t1[s->ref_command_in] & (uint32_t)t.t2[s->status_in] & (uint32_t)t.t3[(s->idle ? 1u : 0u)] & (uint32_t)t.t4[s->cur_state] & (uint32_t)t.t5[(s->lost ? 1u : 0u)];
     const bool several = (m & (m - 0x1u)) != 0x0u;
-    int32_t line = emove_bit32(m | 0x80u);
+    int32_t line = emove_bit32(m | 0x100u);
     line = several ? (-2) : line;
     return line;
 }

@@ -96,12 +96,13 @@ typedef enum {
     EMOVE_EMOVE_STATE_OPENING = 4,
     EMOVE_EMOVE_STATE_LOOKING = 5,
     EMOVE_EMOVE_STATE_FLOODING = 6,
-    EMOVE_EMOVE_STATE_LINING = 7,
-    EMOVE_EMOVE_STATE_CLOSING = 8,
-    EMOVE_EMOVE_STATE_HOVERING = 9,
-    EMOVE_EMOVE_STATE_LOWERING = 10,
-    EMOVE_EMOVE_STATE_GRASPING = 11,
-    EMOVE_EMOVE_STATE_RELEASING = 12
+    EMOVE_EMOVE_STATE_CENTERING = 7,
+    EMOVE_EMOVE_STATE_LINING = 8,
+    EMOVE_EMOVE_STATE_CLOSING = 9,
+    EMOVE_EMOVE_STATE_HOVERING = 10,
+    EMOVE_EMOVE_STATE_LOWERING = 11,
+    EMOVE_EMOVE_STATE_GRASPING = 12,
+    EMOVE_EMOVE_STATE_RELEASING = 13
 } emove_emove_state_t;
 
 typedef struct {
@@ -163,6 +164,7 @@ typedef struct {
     uint8_t ref_command_echo;
     uint8_t status_report;
     uint8_t failure;
+    bool holds;
 } emove_primitive_report_t;
 
 typedef struct {
@@ -222,11 +224,14 @@ typedef struct {
     uint8_t approach_count;
     uint16_t hover_point;
     uint16_t grasp_point;
+    uint16_t view_point;
 } emove_route_t;
 
 typedef struct {
     bool known;
     double expected_range_mm;
+    double grip_range_mm;
+    double lift_mm;
 } emove_part_t;
 
 /* The complete state in one block: copying it is copying everything that a cycle depends on. */
@@ -237,6 +242,7 @@ typedef struct {
     emove_route_t origin; /* input; From the database: where the robot is. */
     emove_route_t target; /* input; From the database: the location of the command. */
     emove_part_t object_data; /* input; From the database: the part of the command. */
+    emove_part_t held_data; /* input; From the database: the part in the gripper. */
     bool new_command; /* state; True until this level's own answer to a new command is echoed (sections 8.3 and 9). */
     bool begun; /* state; This level has answered the new command; pausing the levels below first is no answer. */
     uint16_t inc_command_seen; /* state; 0 .. 65535; Number of the command now being worked on; echoed to TASK. */
@@ -256,6 +262,8 @@ typedef struct {
     uint8_t depart_count; /* state; 0 .. 31 */
     uint8_t path_length; /* state; 0 .. 62; How many points the path has. */
     emove_shift_t displaced_here; /* state; How far the part that was located here was displaced: the departure is displaced as far. */
+    double lift_mm; /* state; -500.0 .. 500.0 mm; How much higher than the location has it the pads are to be: a part is taken, or put down, by its own height. */
+    bool lost; /* state; A part was gripped and is not between the fingers any more; looked at until a line has decided by it, since that line may match again before its order is echoed. */
     emove_primitive_order_t old_order; /* state; The orders that were last numbered. */
     emove_vision_order_t old_vision; /* state */
     uint8_t status_report; /* state; level_status; What the command does, to be reported. */

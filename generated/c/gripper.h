@@ -153,6 +153,7 @@ typedef struct {
     uint8_t ref_command_echo;
     uint8_t status_report;
     uint8_t failure;
+    bool holds;
 } gripper_primitive_report_t;
 
 typedef struct {

@@ -86,8 +86,15 @@ static void primitive_do_receive(primitive_t *s)
 /* Procedure measure. */
 static void primitive_do_measure(primitive_t *s)
 {
+    int64_t v_i = INT64_C(0);
     s->near_ = ((s->length_mm - s->travelled_mm) <= s->goal.breakpoint_mm);
     s->there = (s->travelled_mm >= s->length_mm);
+    if (((int64_t)s->old_robot == INT64_C(1))) {
+        s->settled = true;
+        for (v_i = INT64_C(0); (v_i <= INT64_C(8)); v_i = v_i + INT64_C(1)) {
+            s->settled = (s->settled && (primitive_abs_f64((s->robot.plate[v_i] - s->to[v_i])) <= 1.5));
+        }
+    }
     s->fits = (primitive_abs_f64((s->gripper.opening_mm - s->fingers.grip_mm)) <= s->fingers.tolerance_mm);
     s->closed = (s->gripper.opening_mm < 1.0);
 }
@@ -115,6 +122,7 @@ static void primitive_do_answer(primitive_t *s)
     s->report.ref_command_echo = (uint8_t)(int64_t)s->command.input_command;
     s->report.status_report = (uint8_t)(int64_t)s->status_report;
     s->report.failure = (uint8_t)(int64_t)s->failure;
+    s->report.holds = (s->fits && (!s->closed));
 }
 
 /* This line answers the new command. */
@@ -194,6 +202,7 @@ static void primitive_do_pause(primitive_t *s)
 /* Procedure follow. */
 static void primitive_do_follow(primitive_t *s)
 {
+    s->display = (uint8_t)INT64_C(0);
     s->to_robot.input_command = (uint8_t)INT64_C(1);
     s->to_gripper.input_command = (uint8_t)INT64_C(0);
 }
@@ -202,6 +211,7 @@ static void primitive_do_follow(primitive_t *s)
 static void primitive_do_position(primitive_t *s, double v_opening_mm)
 {
     primitive_do_pause(s);
+    s->display = (uint8_t)INT64_C(1);
     s->to_gripper.opening_mm = v_opening_mm + 0.0;
     s->to_gripper.force_n = s->fingers.force_n + 0.0;
     s->to_gripper.speed_mm_s = s->fingers.speed_mm_s + 0.0;
@@ -212,6 +222,7 @@ static void primitive_do_position(primitive_t *s, double v_opening_mm)
 static void primitive_do_grasp(primitive_t *s)
 {
     primitive_do_pause(s);
+    s->display = (uint8_t)INT64_C(1);
     s->to_gripper.opening_mm = 0.0 + 0.0;
     s->to_gripper.force_n = s->fingers.force_n + 0.0;
     s->to_gripper.speed_mm_s = s->fingers.speed_mm_s + 0.0;
@@ -246,16 +257,20 @@ static void primitive_do_measure_length(primitive_t *s)
     s->length_mm = primitive_max_f64(v_root, v_most) + 0.0;
 }
 
-/* From where the robot is, or was last told to be, to the point displaced: the centre by `x`, `y`, `z`, the two other points of the plate turned about the vertical through it. */
+/* From where the robot is, or was last told to be, to the point displaced: the centre by `x` along the plate's x axis, by `y` to the left of it, and by `z` upward; the two other points of the plate turned about the vertical through it. */
 static void primitive_do_start(primitive_t *s)
 {
     double v_u = 0.0;
     double v_v = 0.0;
+    double v_east = 0.0;
+    double v_north = 0.0;
     int64_t v_i = INT64_C(0);
     int64_t v_i_2 = INT64_C(0);
     int64_t v_k = INT64_C(0);
     v_u = 0.0;
     v_v = 0.0;
+    v_east = 0.0;
+    v_north = 0.0;
     if (((int64_t)s->old_robot != INT64_C(1))) {
         for (v_i = INT64_C(0); (v_i <= INT64_C(8)); v_i = v_i + INT64_C(1)) {
             s->to_robot.plate[v_i] = s->robot.plate[v_i] + 0.0;
@@ -265,8 +280,10 @@ static void primitive_do_start(primitive_t *s)
     for (v_i_2 = INT64_C(0); (v_i_2 <= INT64_C(8)); v_i_2 = v_i_2 + INT64_C(1)) {
         s->from[v_i_2] = s->to_robot.plate[v_i_2] + 0.0;
     }
-    primitive_do_within(s, INT64_C(0), (s->goal.plate[0] + s->command.displaced.x) + 0.0);
-    primitive_do_within(s, INT64_C(1), (s->goal.plate[1] + s->command.displaced.y) + 0.0);
+    v_east = ((s->goal.plate[6] - s->goal.plate[0]) / 100.0) + 0.0;
+    v_north = ((s->goal.plate[7] - s->goal.plate[1]) / 100.0) + 0.0;
+    primitive_do_within(s, INT64_C(0), ((s->goal.plate[0] + (s->command.displaced.x * v_east)) - (s->command.displaced.y * v_north)) + 0.0);
+    primitive_do_within(s, INT64_C(1), ((s->goal.plate[1] + (s->command.displaced.x * v_north)) + (s->command.displaced.y * v_east)) + 0.0);
     primitive_do_within(s, INT64_C(2), (s->goal.plate[2] + s->command.displaced.z) + 0.0);
     for (v_k = INT64_C(1); (v_k <= INT64_C(2)); v_k = v_k + INT64_C(1)) {
         v_u = (s->goal.plate[(INT64_C(3) * v_k)] - s->goal.plate[0]) + 0.0;
@@ -836,20 +853,31 @@ static void primitive_run_goto_(primitive_t *s)
         primitive_do_nextstate(s, INT64_C(0));
         primitive_do_done(s);
         break;
-    case 6: /* primitive/goto.rcs line 7 */
+    case 6: /* primitive/goto.rcs line 6a */
+        primitive_do_stop(s);
+        primitive_do_wait(s);
+        primitive_do_executing(s);
+        break;
+    case 7: /* primitive/goto.rcs line 6b */
         primitive_do_robot_failure(s);
         primitive_do_nextstate(s, INT64_C(1));
         primitive_do_pause(s);
         primitive_do_fail(s);
         break;
-    case 7: /* primitive/goto.rcs line 8 */
-        primitive_do_done(s);
-        break;
-    case 8: /* primitive/goto.rcs line 9 */
+    case 8: /* primitive/goto.rcs line 7 */
+        primitive_do_robot_failure(s);
+        primitive_do_nextstate(s, INT64_C(1));
         primitive_do_pause(s);
         primitive_do_fail(s);
         break;
-    case 9: /* primitive/goto.rcs line 10 */
+    case 9: /* primitive/goto.rcs line 8 */
+        primitive_do_done(s);
+        break;
+    case 10: /* primitive/goto.rcs line 9 */
+        primitive_do_pause(s);
+        primitive_do_fail(s);
+        break;
+    case 11: /* primitive/goto.rcs line 10 */
         primitive_do_robot_failure(s);
         primitive_do_nextstate(s, INT64_C(1));
         primitive_do_pause(s);
@@ -1113,6 +1141,7 @@ void primitive_init(primitive_t *s)
     s->speed_mm_s = 0.0;
     s->near_ = false;
     s->there = false;
+    s->settled = false;
     s->fits = false;
     s->closed = false;
     s->waited = (uint8_t)INT64_C(0);
@@ -1144,6 +1173,8 @@ void primitive_init(primitive_t *s)
     s->report.ref_command_echo = (uint8_t)INT64_C(0);
     s->report.status_report = (uint8_t)INT64_C(0);
     s->report.failure = (uint8_t)INT64_C(0);
+    s->report.holds = false;
+    s->display = (uint8_t)INT64_C(0);
 }
 
 /* The line of table approach_position_fingers that matches admitted inputs: its position; -1 none, -2 several. */
@@ -1234,55 +1265,59 @@ int32_t primitive_goto__line(const primitive_t *s)
         uint16_t t2[3];
         uint16_t t3[4];
         uint16_t t4[2];
-        uint16_t t5[251];
+        uint16_t t5[2];
+        uint16_t t6[251];
     } t = {
         {
-            0x1feu, 0x1fdu
+            0x7feu, 0x7fdu
         },
         {
-            0x1fcu, 0x3u
+            0x7fcu, 0x3u
         },
         {
-            0x1a7u, 0x19fu, 0x1c3u
+            0x6e7u, 0x61fu, 0x703u
         },
         {
-            0x83u, 0x103u, 0x7fu, 0x3u
+            0x203u, 0x403u, 0x1ffu, 0x3u
         },
         {
-            0x1c7u, 0x1fbu
+            0x707u, 0x7fbu
         },
         {
-            0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu,
-            0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu,
-            0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu,
-            0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu,
-            0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu,
-            0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu,
-            0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu,
-            0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu,
-            0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu,
-            0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu,
-            0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu,
-            0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu,
-            0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu,
-            0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu,
-            0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu,
-            0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu,
-            0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu,
-            0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu,
-            0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu,
-            0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu,
-            0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu,
-            0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu,
-            0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu,
-            0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu,
-            0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu, 0x1efu,
-            0x1f7u
+            0x7dfu, 0x73fu
+        },
+        {
+            0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu,
+            0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu,
+            0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu,
+            0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu,
+            0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu,
+            0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu,
+            0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu,
+            0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu,
+            0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu,
+            0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu,
+            0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu,
+            0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu,
+            0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu,
+            0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu,
+            0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu,
+            0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu,
+            0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu,
+            0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu,
+            0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu,
+            0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu,
+            0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu,
+            0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu,
+            0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu,
+            0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu,
+            0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu, 0x76fu,
+            0x7b7u
         },
     };
-    const uint32_t m = (uint32_t)t.t0[(s->goal.known ? 1u : 0u)] & (uint32_t)t.t1[(s->new_command ? 1u : 0u)] & (uint32_t)t.t2[s->robot_status_in] & (uint32_t)t.t3[s->cur_state] & (uint32_t)t.t4[(s->there ? 1u : 0u)] & (uint32_t)t.t5[s->waited];
+    const uint32_t m = (uint32_t)t.t0[(s->goal.known ? 1u : 0u)] & (uint32_t)t.t1[(s->new_command ? 1u : 0u)] & (uint32_t)t.t2[s->robot_status_in] & (uint32_t)t.t3[s->cur_state] & (uint32_t)t.t4[(s->there ? 1u : 0u)] & (uint32_t)t.t5[(s->settled ? 1u : 0u)] & (uint32_t)t.t6[s->waited];
     const bool several = (m & (m - 0x1u)) != 0x0u;
-    int32_t line = primitive_bit32(m | 0x200u);
+    int32_t line = primitive_bit32(m | 0x800u);
     line = several ? (-2) : line;
     return line;
 }

@@ -95,6 +95,11 @@ typedef enum {
     PRIMITIVE_PRIMITIVE_STATE_FINGERING = 3
 } primitive_primitive_state_t;
 
+typedef enum {
+    PRIMITIVE_DISPLAY_PATH = 0,
+    PRIMITIVE_DISPLAY_FINGERS = 1
+} primitive_display_t;
+
 typedef struct {
     uint16_t inc_command;
     uint8_t input_command;
@@ -154,6 +159,7 @@ typedef struct {
     uint8_t ref_command_echo;
     uint8_t status_report;
     uint8_t failure;
+    bool holds;
 } primitive_primitive_report_t;
 
 typedef struct {
@@ -247,6 +253,7 @@ typedef struct {
     double speed_mm_s; /* state; 0.0 .. 2000.0 mm*s^-1 */
     bool near_; /* state; The end of the line is within the breakpoint distance; the line is at its end. */
     bool there; /* state */
+    bool settled; /* state; The robot says that it is at the end of the line: its status may be that of an earlier pose. Looked at while it follows. */
     bool fits; /* state; The finger spacing is that of the part; the fingers touch each other. */
     bool closed; /* state */
     uint8_t waited; /* state; 0 .. 250; Cycles that the robot has been waited for. */
@@ -257,6 +264,7 @@ typedef struct {
     primitive_robot_order_t to_robot; /* output; To the robot controller. */
     primitive_gripper_order_t to_gripper; /* output; To the gripper controller. */
     primitive_primitive_report_t report; /* output; To E-MOVE. */
+    uint8_t display; /* output; display; To whoever looks. */
     int32_t line; /* trace: position of the line that ran; -1 for none */
     int32_t fault; /* trace: 0 none, 1 input refused, 2 no line, 3 several lines, 4 extern refused */
     int32_t fault_at; /* trace: position of the variable that was refused; -1 for none */

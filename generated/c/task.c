@@ -241,11 +241,21 @@ static void task_do_cmd_failure(task_t *s)
     s->failure = (uint8_t)INT64_C(1);
 }
 
+/* E-MOVE found that the part is not between the fingers any more. */
+static void task_do_lost_on_the_way(task_t *s)
+{
+    if (((int64_t)s->emove.failure == INT64_C(11))) {
+        s->failure = (uint8_t)INT64_C(11);
+        task_do_none_acquired(s);
+    }
+}
+
 /* Procedure move_failure. */
 static void task_do_move_failure(task_t *s)
 {
     s->failure = (uint8_t)INT64_C(2);
     s->remember_current_loc = (uint8_t)INT64_C(0);
+    task_do_lost_on_the_way(s);
 }
 
 /* Procedure loc_failure. */
@@ -254,10 +264,46 @@ static void task_do_loc_failure(task_t *s)
     s->failure = (uint8_t)INT64_C(3);
 }
 
+/* One part more on the buffer table. */
+static void task_do_add_to_buffer_db(task_t *s, int64_t v_what)
+{
+    {
+        const int64_t subject = v_what;
+        if ((subject == INT64_C(1))) {
+            if (((int64_t)s->tbuffer_boxt < INT64_C(99))) {
+                s->tbuffer_boxt = task_u8_of_i64(((int64_t)s->tbuffer_boxt + INT64_C(1)));
+            }
+        } else if ((subject == INT64_C(2))) {
+            if (((int64_t)s->bbuffer_boxb < INT64_C(99))) {
+                s->bbuffer_boxb = task_u8_of_i64(((int64_t)s->bbuffer_boxb + INT64_C(1)));
+            }
+        } else if ((subject == INT64_C(3))) {
+            if (((int64_t)s->fbuffer_flag < INT64_C(99))) {
+                s->fbuffer_flag = task_u8_of_i64(((int64_t)s->fbuffer_flag + INT64_C(1)));
+            }
+        } else if ((subject == INT64_C(4))) {
+            if (((int64_t)s->hbuffer_hous < INT64_C(99))) {
+                s->hbuffer_hous = task_u8_of_i64(((int64_t)s->hbuffer_hous + INT64_C(1)));
+            }
+        } else {
+            /* nothing */
+        }
+    }
+}
+
+/* What was counted off and could not be picked up lies there still; once: the order that follows is no PICKUP. */
+static void task_do_back_to_buffer_db(task_t *s)
+{
+    if ((s->source.buffer && ((int64_t)s->old_order.input_command == INT64_C(4)))) {
+        task_do_add_to_buffer_db(s, (int64_t)s->command.obj);
+    }
+}
+
 /* Nothing, or a part of the wrong size, is in the gripper. */
 static void task_do_pic_failure(task_t *s)
 {
     s->failure = (uint8_t)INT64_C(4);
+    task_do_back_to_buffer_db(s);
     task_do_none_acquired(s);
     if (((int64_t)s->emove.failure == INT64_C(12))) {
         s->obj_acquired = true;
@@ -317,28 +363,7 @@ static void task_do_release(task_t *s)
 static void task_do_released(task_t *s)
 {
     if (s->here.buffer) {
-        {
-            const int64_t subject = (int64_t)s->obj_now_in_gripper;
-            if ((subject == INT64_C(1))) {
-                if (((int64_t)s->tbuffer_boxt < INT64_C(99))) {
-                    s->tbuffer_boxt = task_u8_of_i64(((int64_t)s->tbuffer_boxt + INT64_C(1)));
-                }
-            } else if ((subject == INT64_C(2))) {
-                if (((int64_t)s->bbuffer_boxb < INT64_C(99))) {
-                    s->bbuffer_boxb = task_u8_of_i64(((int64_t)s->bbuffer_boxb + INT64_C(1)));
-                }
-            } else if ((subject == INT64_C(3))) {
-                if (((int64_t)s->fbuffer_flag < INT64_C(99))) {
-                    s->fbuffer_flag = task_u8_of_i64(((int64_t)s->fbuffer_flag + INT64_C(1)));
-                }
-            } else if ((subject == INT64_C(4))) {
-                if (((int64_t)s->hbuffer_hous < INT64_C(99))) {
-                    s->hbuffer_hous = task_u8_of_i64(((int64_t)s->hbuffer_hous + INT64_C(1)));
-                }
-            } else {
-                /* nothing */
-            }
-        }
+        task_do_add_to_buffer_db(s, (int64_t)s->obj_now_in_gripper);
     }
     task_do_none_acquired(s);
 }
@@ -365,6 +390,7 @@ static void task_do_ended(task_t *s)
 static void task_do_release_failure(task_t *s)
 {
     s->failure = (uint8_t)(int64_t)s->emove.failure;
+    task_do_lost_on_the_way(s);
 }
 
 /* Admits every input; a refused one leaves everything else as it was. */

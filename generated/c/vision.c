@@ -63,7 +63,7 @@ static void vision_do_receive(vision_t *s)
 static void vision_do_measure(vision_t *s)
 {
     s->arrived = ((int64_t)s->camera.number == (int64_t)s->to_camera.number);
-    s->fits = (vision_abs_f64((s->camera.range_mm - s->command.expected_range_mm)) <= 2.0);
+    s->fits = (vision_abs_f64((s->camera.range_mm - s->command.expected_range_mm)) <= 4.0);
 }
 
 /* Procedure answer. */

@@ -115,12 +115,13 @@ class emove_state(IntEnum):
     opening = 4
     looking = 5
     flooding = 6
-    lining = 7
-    closing = 8
-    hovering = 9
-    lowering = 10
-    grasping = 11
-    releasing = 12
+    centering = 7
+    lining = 8
+    closing = 9
+    hovering = 10
+    lowering = 11
+    grasping = 12
+    releasing = 13
 
 
 class _Refused(Exception):
@@ -151,6 +152,7 @@ class State:
         "primitive_ref_command_echo",
         "primitive_status_report",
         "primitive_failure",
+        "primitive_holds",
         "vision_inc_command_echo",
         "vision_ref_command_echo",
         "vision_status_report",
@@ -167,6 +169,7 @@ class State:
         "origin_approach_count",
         "origin_hover_point",
         "origin_grasp_point",
+        "origin_view_point",
         "target_known",
         "target_depart_first",
         "target_depart_count",
@@ -174,8 +177,15 @@ class State:
         "target_approach_count",
         "target_hover_point",
         "target_grasp_point",
+        "target_view_point",
         "object_data_known",
         "object_data_expected_range_mm",
+        "object_data_grip_range_mm",
+        "object_data_lift_mm",
+        "held_data_known",
+        "held_data_expected_range_mm",
+        "held_data_grip_range_mm",
+        "held_data_lift_mm",
         "new_command",
         "begun",
         "inc_command_seen",
@@ -199,6 +209,8 @@ class State:
         "displaced_here_z",
         "displaced_here_c",
         "displaced_here_s",
+        "lift_mm",
+        "lost",
         "old_order_inc_command",
         "old_order_input_command",
         "old_order_obj_ptr",
@@ -252,6 +264,7 @@ class State:
         self.primitive_ref_command_echo = 0  # From PRIMITIVE.
         self.primitive_status_report = 0  # From PRIMITIVE.
         self.primitive_failure = 0  # From PRIMITIVE.
+        self.primitive_holds = False  # From PRIMITIVE.
         self.vision_inc_command_echo = 0  # From vision.
         self.vision_ref_command_echo = 0  # From vision.
         self.vision_status_report = 0  # From vision.
@@ -268,6 +281,7 @@ class State:
         self.origin_approach_count = 0  # From the database: where the robot is.
         self.origin_hover_point = 0  # From the database: where the robot is.
         self.origin_grasp_point = 0  # From the database: where the robot is.
+        self.origin_view_point = 0  # From the database: where the robot is.
         self.target_known = False  # From the database: the location of the command.
         self.target_depart_first = 0  # From the database: the location of the command.
         self.target_depart_count = 0  # From the database: the location of the command.
@@ -275,8 +289,15 @@ class State:
         self.target_approach_count = 0  # From the database: the location of the command.
         self.target_hover_point = 0  # From the database: the location of the command.
         self.target_grasp_point = 0  # From the database: the location of the command.
+        self.target_view_point = 0  # From the database: the location of the command.
         self.object_data_known = False  # From the database: the part of the command.
         self.object_data_expected_range_mm = 0.0  # From the database: the part of the command.
+        self.object_data_grip_range_mm = 0.0  # From the database: the part of the command.
+        self.object_data_lift_mm = -500.0  # From the database: the part of the command.
+        self.held_data_known = False  # From the database: the part in the gripper.
+        self.held_data_expected_range_mm = 0.0  # From the database: the part in the gripper.
+        self.held_data_grip_range_mm = 0.0  # From the database: the part in the gripper.
+        self.held_data_lift_mm = -500.0  # From the database: the part in the gripper.
         self.new_command = False  # True until this level's own answer to a new command is echoed (sections 8.3 and 9).
         self.begun = False  # This level has answered the new command; pausing the levels below first is no answer.
         self.inc_command_seen = 0  # Number of the command now being worked on; echoed to TASK.
@@ -300,6 +321,8 @@ class State:
         self.displaced_here_z = -500.0  # How far the part that was located here was displaced: the departure is displaced as far.
         self.displaced_here_c = -1.0  # How far the part that was located here was displaced: the departure is displaced as far.
         self.displaced_here_s = -1.0  # How far the part that was located here was displaced: the departure is displaced as far.
+        self.lift_mm = -500.0  # How much higher than the location has it the pads are to be: a part is taken, or put down, by its own height.
+        self.lost = False  # A part was gripped and is not between the fingers any more; looked at until a line has decided by it, since that line may match again before its order is echoed.
         self.old_order_inc_command = 0  # The orders that were last numbered.
         self.old_order_input_command = 0  # The orders that were last numbered.
         self.old_order_obj_ptr = 0  # The orders that were last numbered.
@@ -390,52 +413,53 @@ def _lines_of(masks, lines, default):
 
 
 _LOCATE_0 = (
-    0x7ffb,
-    0x7ffd,
+    0xfffb,
+    0xfffd,
 )
 _LOCATE_1 = (
-    0x7ff8,
+    0xfff8,
     0x7,
 )
 _LOCATE_2 = (
-    0x7e37,
-    0x7fb7,
-    0x7e37,
-    0x7e77,
-    0x7e3f,
-    0x7e37,
+    0xfc57,
+    0xff77,
+    0xfc57,
+    0xfcd7,
+    0xfc5f,
+    0xfc57,
 )
 _LOCATE_3 = (
-    0x5bff,
-    0x7a37,
-    0x1607,
+    0xb7ff,
+    0xf457,
+    0x2c07,
 )
 _LOCATE_4 = (
-    0x7fcf,
-    0x7fdf,
-    0x7fef,
+    0xffaf,
+    0xffbf,
+    0xffef,
 )
 _LOCATE_5 = (
-    0x37ff,
-    0x77cf,
-    0x3fcf,
+    0x6fff,
+    0xefaf,
+    0x7faf,
 )
 _LOCATE_6 = (
-    0x7ff9,
-    0x7ffe,
+    0xfff9,
+    0xfffe,
 )
 _LOCATE_7 = (
-    0x207,
-    0x1007,
+    0x407,
+    0x2007,
     0x7,
     0x7,
     0x7,
-    0x240f,
-    0x4c17,
-    0x4c27,
-    0x2447,
-    0x2487,
-    0x2507,
+    0x480f,
+    0x9817,
+    0x4827,
+    0x9847,
+    0x4887,
+    0x4907,
+    0x4a07,
     0x7,
     0x7,
 )
@@ -446,120 +470,125 @@ _LOCATE_G1 = (
     *_joined(_LOCATE_4, _LOCATE_5, _LOCATE_1, _LOCATE_6),
 )
 _LOCATE_ONE = (
-    _one_of(15, True),
+    _one_of(16, True),
 )
 _MOVE_TO_0 = (
-    0xfe3,
-    0xffd,
+    0x1fe3,
+    0x1ffd,
 )
 _MOVE_TO_1 = (
-    0xfe0,
+    0x1fe0,
     0x1f,
 )
 _MOVE_TO_2 = (
-    0xd1f,
-    0xf9f,
-    0xf7f,
-    0xd1f,
-    0xd1f,
-    0xd1f,
+    0x1a1f,
+    0x1f9f,
+    0x1e7f,
+    0x1a1f,
+    0x1a1f,
+    0x1a1f,
 )
 _MOVE_TO_3 = (
-    0x5ff,
-    0xd1f,
-    0x71f,
+    0xbff,
+    0x1a1f,
+    0xe1f,
 )
 _MOVE_TO_4 = (
-    0xfe1,
-    0xffe,
+    0x1fe1,
+    0x1ffe,
 )
 _MOVE_TO_5 = (
-    0x31f,
+    0x61f,
+    0x81f,
+    0x147f,
+    0x159f,
     0x41f,
-    0xa7f,
-    0xa9f,
-    0x21f,
-    0x21f,
-    0x21f,
-    0x21f,
-    0x21f,
-    0x21f,
-    0x21f,
-    0x21f,
-    0x21f,
+    0x41f,
+    0x41f,
+    0x41f,
+    0x41f,
+    0x41f,
+    0x41f,
+    0x41f,
+    0x41f,
+    0x41f,
 )
 _MOVE_TO_6 = (
-    0xfe7,
-    0xfeb,
-    0xff3,
-    0xff3,
-    0xff3,
-    0xff3,
-    0xff3,
-    0xff3,
-    0xff3,
-    0xff3,
-    0xff3,
-    0xff3,
-    0xff3,
-    0xff3,
-    0xff3,
-    0xff3,
-    0xff3,
-    0xff3,
-    0xff3,
-    0xff3,
-    0xff3,
-    0xff3,
-    0xff3,
-    0xff3,
-    0xff3,
-    0xff3,
-    0xff3,
-    0xff3,
-    0xff3,
-    0xff3,
-    0xff3,
-    0xff3,
-    0xff3,
-    0xff3,
-    0xff3,
-    0xff3,
-    0xff3,
-    0xff3,
-    0xff3,
-    0xff3,
-    0xff3,
-    0xff3,
-    0xff3,
-    0xff3,
-    0xff3,
-    0xff3,
-    0xff3,
-    0xff3,
-    0xff3,
-    0xff3,
-    0xff3,
-    0xff3,
-    0xff3,
-    0xff3,
-    0xff3,
-    0xff3,
-    0xff3,
-    0xff3,
-    0xff3,
-    0xff3,
-    0xff3,
-    0xff3,
-    0xff3,
+    0x1fe7,
+    0x1feb,
+    0x1ff3,
+    0x1ff3,
+    0x1ff3,
+    0x1ff3,
+    0x1ff3,
+    0x1ff3,
+    0x1ff3,
+    0x1ff3,
+    0x1ff3,
+    0x1ff3,
+    0x1ff3,
+    0x1ff3,
+    0x1ff3,
+    0x1ff3,
+    0x1ff3,
+    0x1ff3,
+    0x1ff3,
+    0x1ff3,
+    0x1ff3,
+    0x1ff3,
+    0x1ff3,
+    0x1ff3,
+    0x1ff3,
+    0x1ff3,
+    0x1ff3,
+    0x1ff3,
+    0x1ff3,
+    0x1ff3,
+    0x1ff3,
+    0x1ff3,
+    0x1ff3,
+    0x1ff3,
+    0x1ff3,
+    0x1ff3,
+    0x1ff3,
+    0x1ff3,
+    0x1ff3,
+    0x1ff3,
+    0x1ff3,
+    0x1ff3,
+    0x1ff3,
+    0x1ff3,
+    0x1ff3,
+    0x1ff3,
+    0x1ff3,
+    0x1ff3,
+    0x1ff3,
+    0x1ff3,
+    0x1ff3,
+    0x1ff3,
+    0x1ff3,
+    0x1ff3,
+    0x1ff3,
+    0x1ff3,
+    0x1ff3,
+    0x1ff3,
+    0x1ff3,
+    0x1ff3,
+    0x1ff3,
+    0x1ff3,
+    0x1ff3,
 )
 _MOVE_TO_7 = (
-    0xfdf,
-    0xfff,
+    0x1eff,
+    0x1f7f,
 )
 _MOVE_TO_8 = (
-    0xfbf,
-    0xfff,
+    0x1fdf,
+    0x1fff,
+)
+_MOVE_TO_9 = (
+    0x1fbf,
+    0x1fff,
 )
 _MOVE_TO_G0 = (
     *_joined(_MOVE_TO_6, _MOVE_TO_2),
@@ -568,10 +597,10 @@ _MOVE_TO_G1 = (
     *_joined(_MOVE_TO_5, _MOVE_TO_3, _MOVE_TO_0, _MOVE_TO_1, _MOVE_TO_4),
 )
 _MOVE_TO_G2 = (
-    *_joined(_MOVE_TO_7, _MOVE_TO_8),
+    *_joined(_MOVE_TO_7, _MOVE_TO_8, _MOVE_TO_9),
 )
 _MOVE_TO_ONE = (
-    _one_of(12, True),
+    _one_of(13, True),
 )
 _MOVE_TO_OBJ_0 = (
     0x1ff3,
@@ -604,6 +633,7 @@ _MOVE_TO_OBJ_5 = (
     0x14cf,
     0x150f,
     0x143f,
+    0x40f,
     0x40f,
     0x40f,
     0x40f,
@@ -738,6 +768,7 @@ _PICKUP_4 = (
     0x3,
     0x3,
     0x3,
+    0x3,
     0x57,
     0x3,
 )
@@ -745,43 +776,48 @@ _PICKUP_LINE = (
     *_lines_of(_joined(_PICKUP_4, _PICKUP_1, _PICKUP_2, _PICKUP_0, _PICKUP_3), 7, True),
 )
 _RELEASE_PART_0 = (
-    0x7c,
-    0x3,
+    0xf8,
+    0x7,
 )
 _RELEASE_PART_1 = (
-    0x6b,
-    0x6b,
-    0x6b,
-    0x6b,
-    0x7f,
-    0x6b,
+    0xd7,
+    0xd7,
+    0xd7,
+    0xd7,
+    0xff,
+    0xd7,
 )
 _RELEASE_PART_2 = (
-    0x2f,
-    0x6b,
-    0x3b,
+    0x5f,
+    0xd7,
+    0x77,
 )
 _RELEASE_PART_3 = (
-    0x7d,
-    0x7e,
+    0xf9,
+    0xfe,
 )
 _RELEASE_PART_4 = (
-    0xb,
-    0x23,
-    0x3,
-    0x3,
-    0x3,
-    0x3,
-    0x3,
-    0x3,
-    0x3,
-    0x3,
-    0x3,
-    0x3,
-    0x57,
+    0x17,
+    0x47,
+    0x7,
+    0x7,
+    0x7,
+    0x7,
+    0x7,
+    0x7,
+    0x7,
+    0x7,
+    0x7,
+    0x7,
+    0x7,
+    0xaf,
+)
+_RELEASE_PART_5 = (
+    0xfb,
+    0xfd,
 )
 _RELEASE_PART_LINE = (
-    *_lines_of(_joined(_RELEASE_PART_4, _RELEASE_PART_1, _RELEASE_PART_2, _RELEASE_PART_0, _RELEASE_PART_3), 7, True),
+    *_lines_of(_joined(_RELEASE_PART_4, _RELEASE_PART_1, _RELEASE_PART_2, _RELEASE_PART_0, _RELEASE_PART_3, _RELEASE_PART_5), 8, True),
 )
 
 
@@ -804,9 +840,15 @@ def _do_receive(s):
 
 
 def _do_measure(s):
-    """How long the path would be that begins now."""
+    """How long the path would be that begins now; whether the part is still there."""
     if s.new_command:
         s.path_length = (s.origin_depart_count + s.target_approach_count)
+    if ((not s.begun) or (s.old_order_input_command in (1, 2,))):
+        s.lost = ((s.command_gripped_obj_ptr in (1, 2, 3, 4,)) and (not s.primitive_holds))
+    if (s.command_input_command == 2):
+        s.lift_mm = s.object_data_lift_mm + 0.0
+    else:
+        s.lift_mm = s.held_data_lift_mm + 0.0
 
 
 def _do_send(s):
@@ -876,6 +918,11 @@ def _do_primitive_failure(s):
     s.failure = s.primitive_failure
 
 
+def _do_part_lost(s):
+    """The fingers are not where the part would keep them."""
+    s.failure = 11
+
+
 def _do_vision_failure(s):
     """What vision says went wrong."""
     s.failure = s.vision_failure
@@ -929,6 +976,7 @@ def _do_flood_flash(s):
 
 def _do_line_flash(s):
     """Procedure line_flash."""
+    _do_pause(s)
     s.to_vision_input_command = 2
 
 
@@ -957,6 +1005,7 @@ def _do_aim(s, v_at):
         s.to_primitive_displaced_y = s.displaced_here_y + 0.0
     else:
         s.to_primitive_pose_ptr = _min(((s.target_approach_first + v_at) - s.depart_count), 9999)
+        s.to_primitive_displaced_z = s.lift_mm + 0.0
 
 
 def _do_aim_first(s):
@@ -985,6 +1034,16 @@ def _do_arrived(s):
     s.displaced_here_y = 0.0 + 0.0
 
 
+def _do_aim_view(s):
+    """The camera above the part: the two lines of the second picture are to fall on it."""
+    s.to_vision_input_command = 0
+    _do_no_displacement(s)
+    s.to_primitive_pose_ptr = s.target_view_point
+    s.to_primitive_displaced_x = s.vision_x_mm + 0.0
+    s.to_primitive_displaced_y = s.vision_y_mm + 0.0
+    s.here_next = 0
+
+
 def _do_aim_above(s):
     """Above the part, turned with it."""
     s.to_primitive_pose_ptr = s.target_hover_point
@@ -997,9 +1056,9 @@ def _do_aim_above(s):
 
 
 def _do_aim_at_part(s):
-    """Around the part; its top is as much higher as its range is shorter."""
+    """Around the part; the pads go as much lower as its top is farther away than one that they would take without."""
     s.to_primitive_pose_ptr = s.target_grasp_point
-    s.to_primitive_displaced_z = _max((-500.0), _min(500.0, (s.object_data_expected_range_mm - s.vision_range_mm))) + 0.0
+    s.to_primitive_displaced_z = _max((-500.0), _min(500.0, (s.object_data_grip_range_mm - s.vision_range_mm))) + 0.0
 
 
 def _do_located(s):
@@ -1051,93 +1110,130 @@ def _admit(s):
     i11 = s.primitive_failure
     if not 0 <= i11 <= 15:
         return _refused(s, 11)
-    i12 = s.vision_inc_command_echo
-    if not 0 <= i12 <= 65535:
+    i12 = s.primitive_holds
+    if not 0 <= i12 <= 1:
         return _refused(s, 12)
-    i13 = s.vision_ref_command_echo
-    if not 0 <= i13 <= 2:
+    i13 = s.vision_inc_command_echo
+    if not 0 <= i13 <= 65535:
         return _refused(s, 13)
-    i14 = s.vision_status_report
+    i14 = s.vision_ref_command_echo
     if not 0 <= i14 <= 2:
         return _refused(s, 14)
-    i15 = s.vision_failure
-    if not 0 <= i15 <= 15:
+    i15 = s.vision_status_report
+    if not 0 <= i15 <= 2:
         return _refused(s, 15)
-    i16 = s.vision_x_mm
-    if not -500.0 <= i16 <= 500.0:
+    i16 = s.vision_failure
+    if not 0 <= i16 <= 15:
         return _refused(s, 16)
-    i16 = i16 + 0.0
-    i17 = s.vision_y_mm
+    i17 = s.vision_x_mm
     if not -500.0 <= i17 <= 500.0:
         return _refused(s, 17)
     i17 = i17 + 0.0
-    i18 = s.vision_c
-    if not -1.0 <= i18 <= 1.0:
+    i18 = s.vision_y_mm
+    if not -500.0 <= i18 <= 500.0:
         return _refused(s, 18)
     i18 = i18 + 0.0
-    i19 = s.vision_s
+    i19 = s.vision_c
     if not -1.0 <= i19 <= 1.0:
         return _refused(s, 19)
     i19 = i19 + 0.0
-    i20 = s.vision_range_mm
-    if not 0.0 <= i20 <= 2000.0:
+    i20 = s.vision_s
+    if not -1.0 <= i20 <= 1.0:
         return _refused(s, 20)
     i20 = i20 + 0.0
-    i21 = s.origin_known
-    if not 0 <= i21 <= 1:
+    i21 = s.vision_range_mm
+    if not 0.0 <= i21 <= 2000.0:
         return _refused(s, 21)
-    i22 = s.origin_depart_first
-    if not 0 <= i22 <= 9999:
+    i21 = i21 + 0.0
+    i22 = s.origin_known
+    if not 0 <= i22 <= 1:
         return _refused(s, 22)
-    i23 = s.origin_depart_count
-    if not 0 <= i23 <= 31:
+    i23 = s.origin_depart_first
+    if not 0 <= i23 <= 9999:
         return _refused(s, 23)
-    i24 = s.origin_approach_first
-    if not 0 <= i24 <= 9999:
+    i24 = s.origin_depart_count
+    if not 0 <= i24 <= 31:
         return _refused(s, 24)
-    i25 = s.origin_approach_count
-    if not 0 <= i25 <= 31:
+    i25 = s.origin_approach_first
+    if not 0 <= i25 <= 9999:
         return _refused(s, 25)
-    i26 = s.origin_hover_point
-    if not 0 <= i26 <= 9999:
+    i26 = s.origin_approach_count
+    if not 0 <= i26 <= 31:
         return _refused(s, 26)
-    i27 = s.origin_grasp_point
+    i27 = s.origin_hover_point
     if not 0 <= i27 <= 9999:
         return _refused(s, 27)
-    i28 = s.target_known
-    if not 0 <= i28 <= 1:
+    i28 = s.origin_grasp_point
+    if not 0 <= i28 <= 9999:
         return _refused(s, 28)
-    i29 = s.target_depart_first
+    i29 = s.origin_view_point
     if not 0 <= i29 <= 9999:
         return _refused(s, 29)
-    i30 = s.target_depart_count
-    if not 0 <= i30 <= 31:
+    i30 = s.target_known
+    if not 0 <= i30 <= 1:
         return _refused(s, 30)
-    i31 = s.target_approach_first
+    i31 = s.target_depart_first
     if not 0 <= i31 <= 9999:
         return _refused(s, 31)
-    i32 = s.target_approach_count
+    i32 = s.target_depart_count
     if not 0 <= i32 <= 31:
         return _refused(s, 32)
-    i33 = s.target_hover_point
+    i33 = s.target_approach_first
     if not 0 <= i33 <= 9999:
         return _refused(s, 33)
-    i34 = s.target_grasp_point
-    if not 0 <= i34 <= 9999:
+    i34 = s.target_approach_count
+    if not 0 <= i34 <= 31:
         return _refused(s, 34)
-    i35 = s.object_data_known
-    if not 0 <= i35 <= 1:
+    i35 = s.target_hover_point
+    if not 0 <= i35 <= 9999:
         return _refused(s, 35)
-    i36 = s.object_data_expected_range_mm
-    if not 0.0 <= i36 <= 2000.0:
+    i36 = s.target_grasp_point
+    if not 0 <= i36 <= 9999:
         return _refused(s, 36)
-    i36 = i36 + 0.0
-    s.vision_x_mm = i16
-    s.vision_y_mm = i17
-    s.vision_c = i18
-    s.vision_s = i19
-    s.vision_range_mm = i20
-    s.object_data_expected_range_mm = i36
+    i37 = s.target_view_point
+    if not 0 <= i37 <= 9999:
+        return _refused(s, 37)
+    i38 = s.object_data_known
+    if not 0 <= i38 <= 1:
+        return _refused(s, 38)
+    i39 = s.object_data_expected_range_mm
+    if not 0.0 <= i39 <= 2000.0:
+        return _refused(s, 39)
+    i39 = i39 + 0.0
+    i40 = s.object_data_grip_range_mm
+    if not 0.0 <= i40 <= 2000.0:
+        return _refused(s, 40)
+    i40 = i40 + 0.0
+    i41 = s.object_data_lift_mm
+    if not -500.0 <= i41 <= 500.0:
+        return _refused(s, 41)
+    i41 = i41 + 0.0
+    i42 = s.held_data_known
+    if not 0 <= i42 <= 1:
+        return _refused(s, 42)
+    i43 = s.held_data_expected_range_mm
+    if not 0.0 <= i43 <= 2000.0:
+        return _refused(s, 43)
+    i43 = i43 + 0.0
+    i44 = s.held_data_grip_range_mm
+    if not 0.0 <= i44 <= 2000.0:
+        return _refused(s, 44)
+    i44 = i44 + 0.0
+    i45 = s.held_data_lift_mm
+    if not -500.0 <= i45 <= 500.0:
+        return _refused(s, 45)
+    i45 = i45 + 0.0
+    s.vision_x_mm = i17
+    s.vision_y_mm = i18
+    s.vision_c = i19
+    s.vision_s = i20
+    s.vision_range_mm = i21
+    s.object_data_expected_range_mm = i39
+    s.object_data_grip_range_mm = i40
+    s.object_data_lift_mm = i41
+    s.held_data_expected_range_mm = i43
+    s.held_data_grip_range_mm = i44
+    s.held_data_lift_mm = i45
     return 0
 
 
@@ -1169,9 +1265,9 @@ def locate_lines(states):
 
 def _run_locate(s):
     """Matches table locate and runs the line."""
-    if not (not (not s.new_command) or ((((((((((s.cur_state in (0, 1,)) and (s.ref_command_in == 0)) and (s.ref_vision_in == 0)) or (((s.cur_state == 2) and (s.ref_command_in == 2)) and (s.ref_vision_in == 0))) or (((s.cur_state in (3, 9, 10,)) and (s.ref_command_in == 1)) and (s.ref_vision_in == 0))) or (((s.cur_state in (4, 8,)) and (s.ref_command_in == 3)) and (s.ref_vision_in == 0))) or (((s.cur_state in (5, 12,)) and (s.ref_command_in == 4)) and (s.ref_vision_in == 0))) or (((s.cur_state == 6) and (s.ref_command_in == 0)) and (s.ref_vision_in == 1))) or (((s.cur_state == 7) and (s.ref_command_in == 0)) and (s.ref_vision_in == 2))) or (((s.cur_state == 11) and (s.ref_command_in == 5)) and (s.ref_vision_in == 0)))):  # in_step
+    if not (not (not s.new_command) or ((((((((((s.cur_state in (0, 1,)) and (s.ref_command_in == 0)) and (s.ref_vision_in == 0)) or (((s.cur_state == 2) and (s.ref_command_in == 2)) and (s.ref_vision_in == 0))) or (((s.cur_state in (3, 7, 10, 11,)) and (s.ref_command_in == 1)) and (s.ref_vision_in == 0))) or (((s.cur_state in (4, 9,)) and (s.ref_command_in == 3)) and (s.ref_vision_in == 0))) or (((s.cur_state in (5, 13,)) and (s.ref_command_in == 4)) and (s.ref_vision_in == 0))) or (((s.cur_state == 6) and (s.ref_command_in == 0)) and (s.ref_vision_in == 1))) or (((s.cur_state == 8) and (s.ref_command_in == 0)) and (s.ref_vision_in == 2))) or (((s.cur_state == 12) and (s.ref_command_in == 5)) and (s.ref_vision_in == 0)))):  # in_step
         s.assumptions_failed |= 1 << 0
-    if not (not (not s.new_command) or (s.cur_state in (0, 1, 5, 6, 7, 8, 9, 10,))):  # locate_states
+    if not (not (not s.new_command) or (s.cur_state in (0, 1, 5, 6, 7, 8, 9, 10, 11,))):  # locate_states
         s.assumptions_failed |= 1 << 1
     line = locate_line(s)
     if line < 0:
@@ -1213,35 +1309,43 @@ def _locate_3(s):
 
 def _locate_4(s):
     """emove/locate.rcs line 4"""
+    _do_aim_view(s)
     _do_nextstate(s, 7)
-    _do_line_flash(s)
-    _do_executing(s)
-
-
-def _locate_5(s):
-    """emove/locate.rcs line 5"""
-    _do_aim_above(s)
-    _do_nextstate(s, 8)
-    _do_approach_position_fingers(s)
-    _do_executing(s)
-
-
-def _locate_6(s):
-    """emove/locate.rcs line 6"""
-    _do_nextstate(s, 9)
     _do_goto_(s)
     _do_executing(s)
 
 
+def _locate_5(s):
+    """emove/locate.rcs line 4a"""
+    _do_nextstate(s, 8)
+    _do_line_flash(s)
+    _do_executing(s)
+
+
+def _locate_6(s):
+    """emove/locate.rcs line 5"""
+    _do_aim_above(s)
+    _do_nextstate(s, 9)
+    _do_approach_position_fingers(s)
+    _do_executing(s)
+
+
 def _locate_7(s):
-    """emove/locate.rcs line 7"""
-    _do_aim_at_part(s)
+    """emove/locate.rcs line 6"""
     _do_nextstate(s, 10)
     _do_goto_(s)
     _do_executing(s)
 
 
 def _locate_8(s):
+    """emove/locate.rcs line 7"""
+    _do_aim_at_part(s)
+    _do_nextstate(s, 11)
+    _do_goto_(s)
+    _do_executing(s)
+
+
+def _locate_9(s):
     """emove/locate.rcs line 8"""
     _do_located(s)
     _do_nextstate(s, 0)
@@ -1249,13 +1353,13 @@ def _locate_8(s):
     _do_done(s)
 
 
-def _locate_9(s):
+def _locate_10(s):
     """emove/locate.rcs line 9"""
     _do_pause(s)
     _do_done(s)
 
 
-def _locate_10(s):
+def _locate_11(s):
     """emove/locate.rcs line 10"""
     _do_primitive_failure(s)
     _do_nextstate(s, 1)
@@ -1263,7 +1367,7 @@ def _locate_10(s):
     _do_fail(s)
 
 
-def _locate_11(s):
+def _locate_12(s):
     """emove/locate.rcs line 11"""
     _do_vision_failure(s)
     _do_nextstate(s, 1)
@@ -1271,23 +1375,23 @@ def _locate_11(s):
     _do_fail(s)
 
 
-def _locate_12(s):
+def _locate_13(s):
     """emove/locate.rcs line 12"""
     _do_pause(s)
     _do_fail(s)
 
 
-def _locate_13(s):
+def _locate_14(s):
     """emove/locate.rcs line 13"""
     _do_executing(s)
 
 
-def _locate_14(s):
+def _locate_15(s):
     """emove/locate.rcs line 14"""
     _do_executing(s)
 
 
-def _locate_15(s):
+def _locate_16(s):
     """emove/locate.rcs line 15"""
     _do_primitive_failure(s)
     _do_nextstate(s, 1)
@@ -1310,7 +1414,7 @@ def locate_step(s):
 def move_to_line(s):
     """The line of table move_to that matches admitted inputs: its position; -1 none, -2 several."""
     try:
-        return _MOVE_TO_ONE[0][_MOVE_TO_G0[s.path_length * 6 + s.ref_command_in] & _MOVE_TO_G1[s.cur_state * 24 + s.status_in * 8 + s.target_known * 4 + s.new_command * 2 + s.idle] & _MOVE_TO_G2[(((s.path_length - s.path_at) > 2)) * 2 + (((s.path_length - s.path_at) <= 2))]]
+        return _MOVE_TO_ONE[0][_MOVE_TO_G0[s.path_length * 6 + s.ref_command_in] & _MOVE_TO_G1[s.cur_state * 24 + s.status_in * 8 + s.target_known * 4 + s.new_command * 2 + s.idle] & _MOVE_TO_G2[s.lost * 4 + (((s.path_length - s.path_at) > 2)) * 2 + (((s.path_length - s.path_at) <= 2))]]
     except KeyError:
         return -2
 
@@ -1322,7 +1426,7 @@ def move_to_lines(states):
 
 def _run_move_to(s):
     """Matches table move_to and runs the line."""
-    if not (not (not s.new_command) or ((((((((((s.cur_state in (0, 1,)) and (s.ref_command_in == 0)) and (s.ref_vision_in == 0)) or (((s.cur_state == 2) and (s.ref_command_in == 2)) and (s.ref_vision_in == 0))) or (((s.cur_state in (3, 9, 10,)) and (s.ref_command_in == 1)) and (s.ref_vision_in == 0))) or (((s.cur_state in (4, 8,)) and (s.ref_command_in == 3)) and (s.ref_vision_in == 0))) or (((s.cur_state in (5, 12,)) and (s.ref_command_in == 4)) and (s.ref_vision_in == 0))) or (((s.cur_state == 6) and (s.ref_command_in == 0)) and (s.ref_vision_in == 1))) or (((s.cur_state == 7) and (s.ref_command_in == 0)) and (s.ref_vision_in == 2))) or (((s.cur_state == 11) and (s.ref_command_in == 5)) and (s.ref_vision_in == 0)))):  # in_step
+    if not (not (not s.new_command) or ((((((((((s.cur_state in (0, 1,)) and (s.ref_command_in == 0)) and (s.ref_vision_in == 0)) or (((s.cur_state == 2) and (s.ref_command_in == 2)) and (s.ref_vision_in == 0))) or (((s.cur_state in (3, 7, 10, 11,)) and (s.ref_command_in == 1)) and (s.ref_vision_in == 0))) or (((s.cur_state in (4, 9,)) and (s.ref_command_in == 3)) and (s.ref_vision_in == 0))) or (((s.cur_state in (5, 13,)) and (s.ref_command_in == 4)) and (s.ref_vision_in == 0))) or (((s.cur_state == 6) and (s.ref_command_in == 0)) and (s.ref_vision_in == 1))) or (((s.cur_state == 8) and (s.ref_command_in == 0)) and (s.ref_vision_in == 2))) or (((s.cur_state == 12) and (s.ref_command_in == 5)) and (s.ref_vision_in == 0)))):  # in_step
         s.assumptions_failed |= 1 << 0
     if not (not (not s.new_command) or (s.cur_state in (0, 1, 2, 3,))):  # move_to_states
         s.assumptions_failed |= 1 << 2
@@ -1400,12 +1504,20 @@ def _move_to_7(s):
 
 
 def _move_to_8(s):
+    """emove/move_to.rcs line 7a"""
+    _do_part_lost(s)
+    _do_nextstate(s, 1)
+    _do_pause(s)
+    _do_fail(s)
+
+
+def _move_to_9(s):
     """emove/move_to.rcs line 8"""
     _do_pause(s)
     _do_done(s)
 
 
-def _move_to_9(s):
+def _move_to_10(s):
     """emove/move_to.rcs line 9"""
     _do_primitive_failure(s)
     _do_nextstate(s, 1)
@@ -1413,18 +1525,18 @@ def _move_to_9(s):
     _do_fail(s)
 
 
-def _move_to_10(s):
+def _move_to_11(s):
     """emove/move_to.rcs line 10"""
     _do_pause(s)
     _do_fail(s)
 
 
-def _move_to_11(s):
+def _move_to_12(s):
     """emove/move_to.rcs line 11"""
     _do_executing(s)
 
 
-def _move_to_12(s):
+def _move_to_13(s):
     """emove/move_to.rcs line 12"""
     _do_primitive_failure(s)
     _do_nextstate(s, 1)
@@ -1459,7 +1571,7 @@ def move_to_obj_lines(states):
 
 def _run_move_to_obj(s):
     """Matches table move_to_obj and runs the line."""
-    if not (not (not s.new_command) or ((((((((((s.cur_state in (0, 1,)) and (s.ref_command_in == 0)) and (s.ref_vision_in == 0)) or (((s.cur_state == 2) and (s.ref_command_in == 2)) and (s.ref_vision_in == 0))) or (((s.cur_state in (3, 9, 10,)) and (s.ref_command_in == 1)) and (s.ref_vision_in == 0))) or (((s.cur_state in (4, 8,)) and (s.ref_command_in == 3)) and (s.ref_vision_in == 0))) or (((s.cur_state in (5, 12,)) and (s.ref_command_in == 4)) and (s.ref_vision_in == 0))) or (((s.cur_state == 6) and (s.ref_command_in == 0)) and (s.ref_vision_in == 1))) or (((s.cur_state == 7) and (s.ref_command_in == 0)) and (s.ref_vision_in == 2))) or (((s.cur_state == 11) and (s.ref_command_in == 5)) and (s.ref_vision_in == 0)))):  # in_step
+    if not (not (not s.new_command) or ((((((((((s.cur_state in (0, 1,)) and (s.ref_command_in == 0)) and (s.ref_vision_in == 0)) or (((s.cur_state == 2) and (s.ref_command_in == 2)) and (s.ref_vision_in == 0))) or (((s.cur_state in (3, 7, 10, 11,)) and (s.ref_command_in == 1)) and (s.ref_vision_in == 0))) or (((s.cur_state in (4, 9,)) and (s.ref_command_in == 3)) and (s.ref_vision_in == 0))) or (((s.cur_state in (5, 13,)) and (s.ref_command_in == 4)) and (s.ref_vision_in == 0))) or (((s.cur_state == 6) and (s.ref_command_in == 0)) and (s.ref_vision_in == 1))) or (((s.cur_state == 8) and (s.ref_command_in == 0)) and (s.ref_vision_in == 2))) or (((s.cur_state == 12) and (s.ref_command_in == 5)) and (s.ref_vision_in == 0)))):  # in_step
         s.assumptions_failed |= 1 << 0
     if not (not (not s.new_command) or (s.cur_state in (0, 1, 2, 3, 4,))):  # move_to_obj_states
         s.assumptions_failed |= 1 << 3
@@ -1646,9 +1758,9 @@ def pickup_lines(states):
 
 def _run_pickup(s):
     """Matches table pickup and runs the line."""
-    if not (not (not s.new_command) or ((((((((((s.cur_state in (0, 1,)) and (s.ref_command_in == 0)) and (s.ref_vision_in == 0)) or (((s.cur_state == 2) and (s.ref_command_in == 2)) and (s.ref_vision_in == 0))) or (((s.cur_state in (3, 9, 10,)) and (s.ref_command_in == 1)) and (s.ref_vision_in == 0))) or (((s.cur_state in (4, 8,)) and (s.ref_command_in == 3)) and (s.ref_vision_in == 0))) or (((s.cur_state in (5, 12,)) and (s.ref_command_in == 4)) and (s.ref_vision_in == 0))) or (((s.cur_state == 6) and (s.ref_command_in == 0)) and (s.ref_vision_in == 1))) or (((s.cur_state == 7) and (s.ref_command_in == 0)) and (s.ref_vision_in == 2))) or (((s.cur_state == 11) and (s.ref_command_in == 5)) and (s.ref_vision_in == 0)))):  # in_step
+    if not (not (not s.new_command) or ((((((((((s.cur_state in (0, 1,)) and (s.ref_command_in == 0)) and (s.ref_vision_in == 0)) or (((s.cur_state == 2) and (s.ref_command_in == 2)) and (s.ref_vision_in == 0))) or (((s.cur_state in (3, 7, 10, 11,)) and (s.ref_command_in == 1)) and (s.ref_vision_in == 0))) or (((s.cur_state in (4, 9,)) and (s.ref_command_in == 3)) and (s.ref_vision_in == 0))) or (((s.cur_state in (5, 13,)) and (s.ref_command_in == 4)) and (s.ref_vision_in == 0))) or (((s.cur_state == 6) and (s.ref_command_in == 0)) and (s.ref_vision_in == 1))) or (((s.cur_state == 8) and (s.ref_command_in == 0)) and (s.ref_vision_in == 2))) or (((s.cur_state == 12) and (s.ref_command_in == 5)) and (s.ref_vision_in == 0)))):  # in_step
         s.assumptions_failed |= 1 << 0
-    if not (not (not s.new_command) or (s.cur_state in (0, 1, 11,))):  # pickup_states
+    if not (not (not s.new_command) or (s.cur_state in (0, 1, 12,))):  # pickup_states
         s.assumptions_failed |= 1 << 4
     line = pickup_line(s)
     if line < 0:
@@ -1668,7 +1780,7 @@ def _pickup_0(s):
 def _pickup_1(s):
     """emove/pickup.rcs line 1"""
     _do_begin(s)
-    _do_nextstate(s, 11)
+    _do_nextstate(s, 12)
     _do_immed_grasp(s)
     _do_executing(s)
 
@@ -1727,7 +1839,7 @@ def pickup_step(s):
 
 def release_part_line(s):
     """The line of table release_part that matches admitted inputs: its position; -1 none, -2 several."""
-    return _RELEASE_PART_LINE[s.cur_state * 72 + s.ref_command_in * 12 + s.status_in * 4 + s.new_command * 2 + s.idle]
+    return _RELEASE_PART_LINE[s.cur_state * 144 + s.ref_command_in * 24 + s.status_in * 8 + s.new_command * 4 + s.idle * 2 + s.lost]
 
 
 def release_part_lines(states):
@@ -1737,9 +1849,9 @@ def release_part_lines(states):
 
 def _run_release_part(s):
     """Matches table release_part and runs the line."""
-    if not (not (not s.new_command) or ((((((((((s.cur_state in (0, 1,)) and (s.ref_command_in == 0)) and (s.ref_vision_in == 0)) or (((s.cur_state == 2) and (s.ref_command_in == 2)) and (s.ref_vision_in == 0))) or (((s.cur_state in (3, 9, 10,)) and (s.ref_command_in == 1)) and (s.ref_vision_in == 0))) or (((s.cur_state in (4, 8,)) and (s.ref_command_in == 3)) and (s.ref_vision_in == 0))) or (((s.cur_state in (5, 12,)) and (s.ref_command_in == 4)) and (s.ref_vision_in == 0))) or (((s.cur_state == 6) and (s.ref_command_in == 0)) and (s.ref_vision_in == 1))) or (((s.cur_state == 7) and (s.ref_command_in == 0)) and (s.ref_vision_in == 2))) or (((s.cur_state == 11) and (s.ref_command_in == 5)) and (s.ref_vision_in == 0)))):  # in_step
+    if not (not (not s.new_command) or ((((((((((s.cur_state in (0, 1,)) and (s.ref_command_in == 0)) and (s.ref_vision_in == 0)) or (((s.cur_state == 2) and (s.ref_command_in == 2)) and (s.ref_vision_in == 0))) or (((s.cur_state in (3, 7, 10, 11,)) and (s.ref_command_in == 1)) and (s.ref_vision_in == 0))) or (((s.cur_state in (4, 9,)) and (s.ref_command_in == 3)) and (s.ref_vision_in == 0))) or (((s.cur_state in (5, 13,)) and (s.ref_command_in == 4)) and (s.ref_vision_in == 0))) or (((s.cur_state == 6) and (s.ref_command_in == 0)) and (s.ref_vision_in == 1))) or (((s.cur_state == 8) and (s.ref_command_in == 0)) and (s.ref_vision_in == 2))) or (((s.cur_state == 12) and (s.ref_command_in == 5)) and (s.ref_vision_in == 0)))):  # in_step
         s.assumptions_failed |= 1 << 0
-    if not (not (not s.new_command) or (s.cur_state in (0, 1, 12,))):  # release_part_states
+    if not (not (not s.new_command) or (s.cur_state in (0, 1, 13,))):  # release_part_states
         s.assumptions_failed |= 1 << 5
     line = release_part_line(s)
     if line < 0:
@@ -1759,25 +1871,34 @@ def _release_part_0(s):
 def _release_part_1(s):
     """emove/release.rcs line 1"""
     _do_begin(s)
-    _do_nextstate(s, 12)
+    _do_nextstate(s, 13)
     _do_departure_position_fingers(s)
     _do_executing(s)
 
 
 def _release_part_2(s):
+    """emove/release.rcs line 1a"""
+    _do_begin(s)
+    _do_part_lost(s)
+    _do_nextstate(s, 1)
+    _do_pause(s)
+    _do_fail(s)
+
+
+def _release_part_3(s):
     """emove/release.rcs line 2"""
     _do_nextstate(s, 0)
     _do_pause(s)
     _do_done(s)
 
 
-def _release_part_3(s):
+def _release_part_4(s):
     """emove/release.rcs line 3"""
     _do_pause(s)
     _do_done(s)
 
 
-def _release_part_4(s):
+def _release_part_5(s):
     """emove/release.rcs line 4"""
     _do_primitive_failure(s)
     _do_nextstate(s, 1)
@@ -1785,18 +1906,18 @@ def _release_part_4(s):
     _do_fail(s)
 
 
-def _release_part_5(s):
+def _release_part_6(s):
     """emove/release.rcs line 5"""
     _do_pause(s)
     _do_fail(s)
 
 
-def _release_part_6(s):
+def _release_part_7(s):
     """emove/release.rcs line 6"""
     _do_executing(s)
 
 
-def _release_part_7(s):
+def _release_part_8(s):
     """emove/release.rcs line 7"""
     _do_primitive_failure(s)
     _do_nextstate(s, 1)
@@ -1850,6 +1971,7 @@ _LOCATE_ACTIONS = (
     _locate_13,
     _locate_14,
     _locate_15,
+    _locate_16,
 )
 LOCATE_LINES = (
     "0",
@@ -1857,6 +1979,7 @@ LOCATE_LINES = (
     "2",
     "3",
     "4",
+    "4a",
     "5",
     "6",
     "7",
@@ -1884,6 +2007,7 @@ _MOVE_TO_ACTIONS = (
     _move_to_10,
     _move_to_11,
     _move_to_12,
+    _move_to_13,
 )
 MOVE_TO_LINES = (
     "0",
@@ -1894,6 +2018,7 @@ MOVE_TO_LINES = (
     "5",
     "6",
     "7",
+    "7a",
     "8",
     "9",
     "10",
@@ -1973,10 +2098,12 @@ _RELEASE_PART_ACTIONS = (
     _release_part_5,
     _release_part_6,
     _release_part_7,
+    _release_part_8,
 )
 RELEASE_PART_LINES = (
     "0",
     "1",
+    "1a",
     "2",
     "3",
     "4",

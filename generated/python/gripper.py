@@ -602,9 +602,9 @@ def _do_receive(s):
 
 
 def _do_measure(s):
-    """Within half a millimetre; the force met."""
+    """Within half a millimetre; the force met but for a twentieth: fingers come to rest a little before they push all of it."""
     s.at_opening = (abs((s.hand_opening_mm - s.command_opening_mm)) <= 0.5)
-    s.forced = (s.hand_force_n >= s.command_force_n)
+    s.forced = (s.hand_force_n >= (0.95 * s.command_force_n))
     s.closing = (s.command_opening_mm < s.hand_opening_mm)
 
 

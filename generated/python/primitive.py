@@ -114,6 +114,13 @@ class primitive_state(IntEnum):
     fingering = 3
 
 
+class display(IntEnum):
+    """The members, in declared order."""
+
+    path = 0
+    fingers = 1
+
+
 class _Refused(Exception):
     """An extern procedure gave a value outside its declared range."""
 
@@ -211,6 +218,7 @@ class State:
         "speed_mm_s",
         "near",
         "there",
+        "settled",
         "fits",
         "closed",
         "waited",
@@ -242,6 +250,8 @@ class State:
         "report_ref_command_echo",
         "report_status_report",
         "report_failure",
+        "report_holds",
+        "display",
         "line",
         "fault",
         "fault_at",
@@ -330,6 +340,7 @@ class State:
         self.speed_mm_s = 0.0
         self.near = False  # The end of the line is within the breakpoint distance; the line is at its end.
         self.there = False
+        self.settled = False  # The robot says that it is at the end of the line: its status may be that of an earlier pose. Looked at while it follows.
         self.fits = False  # The finger spacing is that of the part; the fingers touch each other.
         self.closed = False
         self.waited = 0  # Cycles that the robot has been waited for.
@@ -361,6 +372,8 @@ class State:
         self.report_ref_command_echo = 0  # To E-MOVE.
         self.report_status_report = 0  # To E-MOVE.
         self.report_failure = 0  # To E-MOVE.
+        self.report_holds = False  # To E-MOVE.
+        self.display = 0  # To whoever looks.
         self.line = -1
         self.fault = 0
         self.fault_at = -1
@@ -461,289 +474,293 @@ _DEPARTURE_POSITION_FINGERS_LINE = (
     *_lines_of(_joined(_DEPARTURE_POSITION_FINGERS_3, _DEPARTURE_POSITION_FINGERS_2, _DEPARTURE_POSITION_FINGERS_0, _DEPARTURE_POSITION_FINGERS_1), 7, True),
 )
 _GOTO__0 = (
-    0x1fe,
-    0x1fd,
+    0x7fe,
+    0x7fd,
 )
 _GOTO__1 = (
-    0x1fc,
+    0x7fc,
     0x3,
 )
 _GOTO__2 = (
-    0x1a7,
-    0x19f,
-    0x1c3,
+    0x6e7,
+    0x61f,
+    0x703,
 )
 _GOTO__3 = (
-    0x83,
-    0x103,
-    0x7f,
+    0x203,
+    0x403,
+    0x1ff,
     0x3,
 )
 _GOTO__4 = (
-    0x1c7,
-    0x1fb,
+    0x707,
+    0x7fb,
 )
 _GOTO__5 = (
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1ef,
-    0x1f7,
+    0x7df,
+    0x73f,
+)
+_GOTO__6 = (
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x76f,
+    0x7b7,
 )
 _GOTO__G0 = (
-    *_joined(_GOTO__5, _GOTO__0),
+    *_joined(_GOTO__6, _GOTO__0),
 )
 _GOTO__G1 = (
-    *_joined(_GOTO__3, _GOTO__2, _GOTO__1, _GOTO__4),
+    *_joined(_GOTO__3, _GOTO__2, _GOTO__1, _GOTO__4, _GOTO__5),
 )
 _GOTO__ONE = (
-    _one_of(9, True),
+    _one_of(11, True),
 )
 _GOTHRU_0 = (
     0x7e,
@@ -829,6 +846,10 @@ def _do_measure(s):
     """Procedure measure."""
     s.near = ((s.length_mm - s.travelled_mm) <= s.goal_breakpoint_mm)
     s.there = (s.travelled_mm >= s.length_mm)
+    if (s.old_robot == 1):
+        s.settled = True
+        for v_i in range(0, 9):
+            s.settled = (s.settled and (abs(((s.robot_plate_0, s.robot_plate_1, s.robot_plate_2, s.robot_plate_3, s.robot_plate_4, s.robot_plate_5, s.robot_plate_6, s.robot_plate_7, s.robot_plate_8,)[v_i] - (s.to_0, s.to_1, s.to_2, s.to_3, s.to_4, s.to_5, s.to_6, s.to_7, s.to_8,)[v_i])) <= 1.5))
     s.fits = (abs((s.gripper_opening_mm - s.fingers_grip_mm)) <= s.fingers_tolerance_mm)
     s.closed = (s.gripper_opening_mm < 1.0)
 
@@ -852,6 +873,7 @@ def _do_answer(s):
     s.report_ref_command_echo = s.command_input_command
     s.report_status_report = s.status_report
     s.report_failure = s.failure
+    s.report_holds = (s.fits and (not s.closed))
 
 
 def _do_begin(s):
@@ -917,6 +939,7 @@ def _do_pause(s):
 
 def _do_follow(s):
     """Procedure follow."""
+    s.display = 0
     s.to_robot_input_command = 1
     s.to_gripper_input_command = 0
 
@@ -924,6 +947,7 @@ def _do_follow(s):
 def _do_position(s, v_opening_mm):
     """To an opening; fails if the force is met first."""
     _do_pause(s)
+    s.display = 1
     s.to_gripper_opening_mm = v_opening_mm + 0.0
     s.to_gripper_force_n = s.fingers_force_n + 0.0
     s.to_gripper_speed_mm_s = s.fingers_speed_mm_s + 0.0
@@ -933,6 +957,7 @@ def _do_position(s, v_opening_mm):
 def _do_grasp(s):
     """Until the force is met (section 6.5: 100 lb, from the database)."""
     _do_pause(s)
+    s.display = 1
     s.to_gripper_opening_mm = 0.0 + 0.0
     s.to_gripper_force_n = s.fingers_force_n + 0.0
     s.to_gripper_speed_mm_s = s.fingers_speed_mm_s + 0.0
@@ -945,15 +970,17 @@ def _do_within(s, v_at, v_value):
 
 
 def _do_start(s):
-    """From where the robot is, or was last told to be, to the point displaced: the centre by `x`, `y`, `z`, the two other points of the plate turned about the vertical through it."""
+    """From where the robot is, or was last told to be, to the point displaced: the centre by `x` along the plate's x axis, by `y` to the left of it, and by `z` upward; the two other points of the plate turned about the vertical through it."""
     if (s.old_robot != 1):
         for v_i in range(0, 9):
             setattr(s, ('to_robot_plate_0', 'to_robot_plate_1', 'to_robot_plate_2', 'to_robot_plate_3', 'to_robot_plate_4', 'to_robot_plate_5', 'to_robot_plate_6', 'to_robot_plate_7', 'to_robot_plate_8',)[v_i], (s.robot_plate_0, s.robot_plate_1, s.robot_plate_2, s.robot_plate_3, s.robot_plate_4, s.robot_plate_5, s.robot_plate_6, s.robot_plate_7, s.robot_plate_8,)[v_i] + 0.0)
         s.speed_mm_s = 0.0 + 0.0
     for v_i_2 in range(0, 9):
         setattr(s, ('from_0', 'from_1', 'from_2', 'from_3', 'from_4', 'from_5', 'from_6', 'from_7', 'from_8',)[v_i_2], (s.to_robot_plate_0, s.to_robot_plate_1, s.to_robot_plate_2, s.to_robot_plate_3, s.to_robot_plate_4, s.to_robot_plate_5, s.to_robot_plate_6, s.to_robot_plate_7, s.to_robot_plate_8,)[v_i_2] + 0.0)
-    _do_within(s, 0, (s.goal_plate_0 + s.command_displaced_x) + 0.0)
-    _do_within(s, 1, (s.goal_plate_1 + s.command_displaced_y) + 0.0)
+    v_east = ((s.goal_plate_6 - s.goal_plate_0) / 100.0) + 0.0
+    v_north = ((s.goal_plate_7 - s.goal_plate_1) / 100.0) + 0.0
+    _do_within(s, 0, ((s.goal_plate_0 + (s.command_displaced_x * v_east)) - (s.command_displaced_y * v_north)) + 0.0)
+    _do_within(s, 1, ((s.goal_plate_1 + (s.command_displaced_x * v_north)) + (s.command_displaced_y * v_east)) + 0.0)
     _do_within(s, 2, (s.goal_plate_2 + s.command_displaced_z) + 0.0)
     for v_k in range(1, 3):
         v_u = ((s.goal_plate_0, s.goal_plate_1, s.goal_plate_2, s.goal_plate_3, s.goal_plate_4, s.goal_plate_5, s.goal_plate_6, s.goal_plate_7, s.goal_plate_8,)[(3 * v_k)] - s.goal_plate_0) + 0.0
@@ -1416,7 +1443,7 @@ def departure_position_fingers_step(s):
 def goto__line(s):
     """The line of table goto that matches admitted inputs: its position; -1 none, -2 several."""
     try:
-        return _GOTO__ONE[0][_GOTO__G0[s.waited * 2 + s.goal_known] & _GOTO__G1[s.cur_state * 12 + s.robot_status_in * 4 + s.new_command * 2 + s.there]]
+        return _GOTO__ONE[0][_GOTO__G0[s.waited * 2 + s.goal_known] & _GOTO__G1[s.cur_state * 24 + s.robot_status_in * 8 + s.new_command * 4 + s.there * 2 + s.settled]]
     except KeyError:
         return -2
 
@@ -1487,6 +1514,21 @@ def _goto__5(s):
 
 
 def _goto__6(s):
+    """primitive/goto.rcs line 6a"""
+    _do_stop(s)
+    _do_wait(s)
+    _do_executing(s)
+
+
+def _goto__7(s):
+    """primitive/goto.rcs line 6b"""
+    _do_robot_failure(s)
+    _do_nextstate(s, 1)
+    _do_pause(s)
+    _do_fail(s)
+
+
+def _goto__8(s):
     """primitive/goto.rcs line 7"""
     _do_robot_failure(s)
     _do_nextstate(s, 1)
@@ -1494,18 +1536,18 @@ def _goto__6(s):
     _do_fail(s)
 
 
-def _goto__7(s):
+def _goto__9(s):
     """primitive/goto.rcs line 8"""
     _do_done(s)
 
 
-def _goto__8(s):
+def _goto__10(s):
     """primitive/goto.rcs line 9"""
     _do_pause(s)
     _do_fail(s)
 
 
-def _goto__9(s):
+def _goto__11(s):
     """primitive/goto.rcs line 10"""
     _do_robot_failure(s)
     _do_nextstate(s, 1)
@@ -1836,6 +1878,8 @@ _GOTO__ACTIONS = (
     _goto__7,
     _goto__8,
     _goto__9,
+    _goto__10,
+    _goto__11,
 )
 GOTO__LINES = (
     "1",
@@ -1844,6 +1888,8 @@ GOTO__LINES = (
     "4",
     "5",
     "6",
+    "6a",
+    "6b",
     "7",
     "8",
     "9",

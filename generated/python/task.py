@@ -801,10 +801,18 @@ def _do_cmd_failure(s):
     s.failure = 1
 
 
+def _do_lost_on_the_way(s):
+    """E-MOVE found that the part is not between the fingers any more."""
+    if (s.emove_failure == 11):
+        s.failure = 11
+        _do_none_acquired(s)
+
+
 def _do_move_failure(s):
     """Procedure move_failure."""
     s.failure = 2
     s.remember_current_loc = 0
+    _do_lost_on_the_way(s)
 
 
 def _do_loc_failure(s):
@@ -812,9 +820,33 @@ def _do_loc_failure(s):
     s.failure = 3
 
 
+def _do_add_to_buffer_db(s, v_what):
+    """One part more on the buffer table."""
+    case_2 = v_what
+    if case_2 in (1,):
+        if (s.tbuffer_boxt < 99):
+            s.tbuffer_boxt = (s.tbuffer_boxt + 1)
+    elif case_2 in (2,):
+        if (s.bbuffer_boxb < 99):
+            s.bbuffer_boxb = (s.bbuffer_boxb + 1)
+    elif case_2 in (3,):
+        if (s.fbuffer_flag < 99):
+            s.fbuffer_flag = (s.fbuffer_flag + 1)
+    elif case_2 in (4,):
+        if (s.hbuffer_hous < 99):
+            s.hbuffer_hous = (s.hbuffer_hous + 1)
+
+
+def _do_back_to_buffer_db(s):
+    """What was counted off and could not be picked up lies there still; once: the order that follows is no PICKUP."""
+    if (s.source_buffer and (s.old_order_input_command == 4)):
+        _do_add_to_buffer_db(s, s.command_obj)
+
+
 def _do_pic_failure(s):
     """Nothing, or a part of the wrong size, is in the gripper."""
     s.failure = 4
+    _do_back_to_buffer_db(s)
     _do_none_acquired(s)
     if (s.emove_failure == 12):
         s.obj_acquired = True
@@ -865,19 +897,7 @@ def _do_release(s):
 def _do_released(s):
     """The part lies where the robot is; on the buffer it is counted, once: by the next cycle none is in the gripper."""
     if s.here_buffer:
-        case_2 = s.obj_now_in_gripper
-        if case_2 in (1,):
-            if (s.tbuffer_boxt < 99):
-                s.tbuffer_boxt = (s.tbuffer_boxt + 1)
-        elif case_2 in (2,):
-            if (s.bbuffer_boxb < 99):
-                s.bbuffer_boxb = (s.bbuffer_boxb + 1)
-        elif case_2 in (3,):
-            if (s.fbuffer_flag < 99):
-                s.fbuffer_flag = (s.fbuffer_flag + 1)
-        elif case_2 in (4,):
-            if (s.hbuffer_hous < 99):
-                s.hbuffer_hous = (s.hbuffer_hous + 1)
+        _do_add_to_buffer_db(s, s.obj_now_in_gripper)
     _do_none_acquired(s)
 
 
@@ -899,6 +919,7 @@ def _do_ended(s):
 def _do_release_failure(s):
     """Opening the gripper failed: what it holds is not known."""
     s.failure = s.emove_failure
+    _do_lost_on_the_way(s)
 
 
 def _admit(s):

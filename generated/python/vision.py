@@ -530,7 +530,7 @@ def _do_receive(s):
 def _do_measure(s):
     """Procedure measure."""
     s.arrived = (s.camera_number == s.to_camera_number)
-    s.fits = (abs((s.camera_range_mm - s.command_expected_range_mm)) <= 2.0)
+    s.fits = (abs((s.camera_range_mm - s.command_expected_range_mm)) <= 4.0)
 
 
 def _do_answer(s):
