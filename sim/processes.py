@@ -1,12 +1,12 @@
-"""What stands outside the levels when they run as processes: the workstation and the stand-ins, in a process of their own.
+"""What stands outside the levels when they run as processes: the workstation and the plant, in a process of their own.
 
 Made by `rcsc.system.serve.Factory`, from arguments that travel: names of files. The workstation's results go to a file, a line a
-row, where the process that started all reads them.
+row, where the process that started all reads them. Buffers without a level at either end stay in this process.
 """
 
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from rcsc.system.cell import Outside, signatures
@@ -16,7 +16,7 @@ from rcsc.system.signature import Values
 from rcsc.workstation.cell import database_of, script_path
 from rcsc.workstation.script import read_script
 from rcsc.workstation.station import Workstation, workstation
-from sim.standin import world
+from sim.cell import Backend, plant
 
 
 @dataclass(slots=True)
@@ -29,8 +29,8 @@ class Told:
 
     @property
     def over(self) -> bool:
-        """Whether the script has come to its end, or was stopped."""
-        return self.station.over
+        """Whether the script has come to its end, or was stopped and TASK has paused."""
+        return self.station.over and self.station.at_rest
 
     def step(self, tick: int, latest: Callable[[str], Values | None]) -> Mapping[str, Values]:
         """One tick of the workstation."""
@@ -43,14 +43,57 @@ class Told:
         return given
 
 
-def outside(system: str, script: str, database: str, results: str) -> list[Outside]:
-    """Workstation and stand-ins."""
+@dataclass(slots=True)
+class Joined:
+    """Several things outside as one: what they say to each other stays between them.
+
+    Attributes:
+        shared: Buffers that levels have, too.
+    """
+
+    told: Told
+    others: tuple[Outside, ...]
+    shared: frozenset[str]
+    _held: dict[str, Values] = field(default_factory=dict)
+
+    @property
+    def over(self) -> bool:
+        """Whether the script is."""
+        return self.told.over
+
+    def step(self, tick: int, latest: Callable[[str], Values | None]) -> Mapping[str, Values]:
+        """One tick of all: each sees what the tick before left."""
+
+        def seen(name: str) -> Values | None:
+            return latest(name) if name in self.shared else self._held.get(name)
+
+        given = [one.step(tick, seen) for one in (self.told, *self.others)]
+        said = {name: values for published in given for name, values in published.items()}
+        self._held |= {name: values for name, values in said.items() if name not in self.shared}
+        return {name: values for name, values in said.items() if name in self.shared}
+
+
+def outside(
+    system: str, script: str, database: str, results: str, first: int = 0, backend: Backend = "mujoco"
+) -> list[Outside]:
+    """Workstation and plant.
+
+    Args:
+        system: The description's path.
+        script: Its name.
+        database: Path of one to be used as it is; empty for the system's own.
+        results: Path of the file where results go.
+        first: The row to begin at, from 0, as if those before were done.
+        backend: Physics, or kinematics alone.
+    """
     path = Path(system)
     said = description(path)
     signs = signatures(said)
     held = database_of(said, signs, Path(database) if database else None)
     station = workstation(read_script(script_path(script, path)), held.locations, signs["task"])
-    return [Told(station, Path(results)), world(held)]
+    station.begin_at(first)
+    shared = frozenset(wire.source for wire in said.wires)
+    return [Joined(Told(station, Path(results)), (plant(held, backend),), shared)]
 
 
 def queries(system: str, database: str) -> dict[str, Query]:

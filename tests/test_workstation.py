@@ -1,22 +1,31 @@
 """The database, the scripts, the interlocks, and the commands that use them: what is wrong is said before anything moves."""
 
+import json
 import shutil
 from pathlib import Path
 
 import pytest
 
 from rcsc.cli import run
-from rcsc.database.ask import open_database
+from rcsc.database.ask import Database, open_database
 from rcsc.database.build import BadData, build
+from rcsc.system.cell import System
 from rcsc.workstation.cell import prepare
 from rcsc.workstation.interlocks import Cell, after, refusal
 from rcsc.workstation.script import BadScript, Row, read_script
-from sim.standin import World, world
+from sim.cell import Lying, lying, plant
+from sim.model import Body
+from sim.plant import Plant
 from tests.cells import REPO, SYSTEM
 
 PARTS = ("null_obj", "tbox", "bbox", "flag", "hous", "close_grip", "unknown_object")
 DATA = (SYSTEM.parent / "cell.toml").read_text(encoding="utf-8")
 HEAD = "command,part,source,dest,end_at\n"
+
+
+def kinematic(database: Database) -> list[Plant]:
+    """What stands outside, without physics."""
+    return [plant(database, "kinematic")]
 
 
 @pytest.fixture
@@ -37,12 +46,12 @@ WRONG_DATA = {
         "no location is called `NOWHERE`",
     ),
     "a part that the tables do not know": ("[object.hous", "[object.horse", "no part is called `horse`"),
-    "out of reach": ("x = 800.0, y = 0.0, z = 300.0", "x = 1800.0, y = 0.0, z = 300.0", "out of reach"),
-    "too high": ("x = 800.0, y = 0.0, z = 300.0", "x = 800.0, y = 0.0, z = 1300.0", "mm high, out of reach"),
-    "a gripper that does not open": ("departure_mm = 60.0", "departure_mm = 20.0", "do not open wider"),
+    "out of reach": ("x = 198.4, y = 545.0", "x = 198.4, y = 1545.0", "mm from the base, out of reach"),
+    "too high": ("y = 545.0, z = 350.0", "y = 545.0, z = 1350.0", "mm high, out of reach"),
+    "a gripper that does not open": ("departure_mm = 90.0", "departure_mm = 20.0", "do not open wider"),
     "too many in stock": ("stock = 10", "stock = 200", "not 0 .. 99"),
     "vision without a view": ('vupos = "BUFFER-VUPOS"\n', "", "`vupos`"),
-    "a missing value": ("breakpoint_mm = 60.0\n", "", "breakpoint_mm"),
+    "a missing value": ("breakpoint_mm = 30.0\n", "", "breakpoint_mm"),
     "no TOML": ("[robot]", "[robot", "not TOML"),
 }
 
@@ -79,16 +88,49 @@ def test_a_pallet_has_a_place_for_each_sector_and_others_ignore_it(tmp_path: Pat
     assert held.route(safe, 3) == held.route(safe, 0)
 
 
+QUICK = ("--no-compile", "--plant", "kinematic")
+
+
 def test_db_commands(project: Path, capfd: pytest.CaptureFixture[str]) -> None:
     assert run(["db", "check"]) == 0
+    assert not (project / "tables/.rcsc-cache").exists(), "looking makes nothing"
     assert run(["db", "build", "-o", "my.sqlite"]) == 0
-    assert run(["run", "make_boxt", "--no-compile", "--database", "my.sqlite", "-q"]) == 0
+    assert run(["run", "make_boxt", *QUICK, "--database", "my.sqlite", "-q"]) == 0
     assert run(["db", "show", "places"]) == 0
     assert "location\tsector" in capfd.readouterr().out
     assert run(["db", "show", "nothing"]) == 2
-    (project / "tables/cell.toml").write_text(DATA.replace("z = 300.0", "z = 3000.0"), encoding="utf-8")
+    (project / "tables/cell.toml").write_text(DATA.replace("z = 350.0", "z = 3000.0"), encoding="utf-8")
     assert run(["db", "check"]) == 1
     assert "error[RCS722]: location `FIX-SAFE`" in capfd.readouterr().err
+
+
+@pytest.mark.parametrize("command", [["db", "check"], ["db", "build"], ["run", "make_boxt", *QUICK]])
+def test_a_station_turned_so_that_the_arm_cannot_follow_is_named(
+    command: list[str], project: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Every point is as near and as high as before: only the joints tell."""
+    turned = DATA.replace("y = -217.3, z = 350.0, yaw = -22.0", "y = -217.3, z = 350.0, yaw = 158.0")
+    assert turned != DATA
+    (project / "tables/cell.toml").write_text(turned, encoding="utf-8")
+    build(project / "tables/cell.toml", project / "other.sqlite", PARTS)
+    assert run(command) == 1
+    said = capfd.readouterr()
+    assert "error[RCS722]: " in said.err
+    assert "location `V-BLK1`" in said.err
+    assert "BUFFER`:" not in said.err
+    assert said.out == ""
+    if command[0] == "db":
+        assert not (project / "tables/.rcsc-cache").exists(), "nothing is written"
+
+
+def test_what_was_gripped_with_any_grasp_can_be_let_go_of(tmp_path: Path) -> None:
+    """TASK remembers an unknown object by the number of the grasp that was tried."""
+    build(SYSTEM.parent / "cell.toml", tmp_path / "cell.sqlite", PARTS)
+    held = open_database(tmp_path / "cell.sqlite")
+    unknown = held.objects["unknown_object"]
+    tried = {grasp for part in held.objects.values() for grasp in range(10) if held.fingers(part, grasp)[0]}
+    assert tried == {0, 2, 3}
+    assert {grasp for grasp in tried if held.fingers(unknown, grasp)[0]} == tried
 
 
 # --- scripts ---
@@ -116,7 +158,7 @@ def test_scripts_that_cannot_be_run_are_coded_errors(
     (project / "columns.csv").write_text("a,b\n1,2\n", encoding="utf-8")
     (project / "latin.csv").write_bytes(HEAD.encode() + b"MOVE,\xff,,,\n")
     for script in ("place.csv", "columns.csv", "latin.csv", "missing"):
-        assert run(["run", script, "--no-compile"]) == 1
+        assert run(["run", script, *QUICK]) == 1
         assert "error[RCS723]" in capfd.readouterr().err, script
 
 
@@ -170,9 +212,9 @@ def test_interlocks_let_the_corrected_script_pass() -> None:
 
 
 def test_a_failed_row_stops_the_script_and_can_be_tried_again() -> None:
-    made = prepare(SYSTEM, "make_boxt", "c", world)
+    made = prepare(SYSTEM, "make_boxt", "c", kinematic)
     outside = made.system.outside[1]
-    assert isinstance(outside, World)
+    assert isinstance(outside, Plant)
     outside.faults.blind = True
     *_, last = made.steps()
     assert (last.row.number, last.state, last.reason) == (2, "failed", "loc")
@@ -182,6 +224,62 @@ def test_a_failed_row_stops_the_script_and_can_be_tried_again() -> None:
     outside.faults.blind = False
     made.station.resume()
     assert [result.state for result in made.steps()] == ["done"] * 26
+
+
+def test_a_part_of_the_wrong_size_is_let_go_of_and_the_next_is_acquired() -> None:
+    def house_in_the_fixture(database: Database) -> list[Plant]:
+        frame = database.stations["fixture"].frame
+        house = Lying(4, Body((70.0, 50.0, 50.0), frame.point((0.0, 0.0, 45.0)), frame.turn))
+        return [plant(database, "kinematic", [*lying(database), house])]
+
+    rows = (
+        Row(1, "", "acquire", part="tbox", grasp=3, source="FIX-MAC5"),
+        Row(2, "", "release", end_at="FIX-SAFE"),
+        Row(3, "", "acquire", part="tbox", grasp=2, source="BUFFER"),
+    )
+    made = prepare(SYSTEM, rows, "c", house_in_the_fixture)
+    made.station.cell = Cell(fixture="tbox")  # as a script before this one left it
+    [failed] = made.steps()
+    assert (failed.state, failed.reason) == ("failed", "pic")
+    assert made.station.cell.held == "unknown_object"
+    made.station.resume()
+    made.station.begin_at(1)
+    assert [(one.state, one.reason) for one in made.steps()] == [("done", ""), ("done", "")]
+    assert made.system.level("task").shown("obj_now_in_gripper") == "tbox"
+    [*_, house] = made.system.outside[1].mechanism.parts()  # type: ignore[attr-defined]  # a plant
+    assert house.at_mm[2] == pytest.approx(395.0, abs=1.0), "it lies where it lay"
+
+
+def _shifted(world: Plant, by_mm: float) -> None:
+    """Somebody moves the first part aside."""
+    said = json.loads(json.dumps(world.state()))
+    said["mechanism"]["poses"][0]["at_mm"][0] += by_mm
+    world.restore(said)
+
+
+def test_a_part_that_was_not_picked_up_is_counted_on_the_buffer_again() -> None:
+    """Taken away as the hand comes down, which closes on nothing: the count falls by one, and rises again, once."""
+    rows = tuple(Row(at, "", "acquire", part="tbox", grasp=2, source="BUFFER") for at in (1, 2))
+    made = prepare(SYSTEM, rows, "c", kinematic)
+    world = made.system.outside[1]
+    assert isinstance(world, Plant)
+    counts: list[int] = []
+
+    def watch(system: System, _: object) -> None:
+        count = int(system.level("task").value("tbuffer_boxt"))
+        if counts[-1:] != [count]:
+            counts.append(count)
+            _shifted(world, {2: 300.0, 3: -300.0}.get(len(counts), 0.0))
+
+    made.system.watch.append(watch)
+    [failed] = made.steps()
+    assert (failed.state, failed.reason) == ("failed", "pic")
+    for _ in range(20):
+        made.system.step()
+    assert counts == [10, 9, 10]
+    made.station.resume()
+    assert [one.state for one in made.steps()] == ["done", "refused"]
+    assert counts == [10, 9, 10, 9]
 
 
 def test_a_level_whose_proof_fails_does_not_run(project: Path, capfd: pytest.CaptureFixture[str]) -> None:

@@ -1,15 +1,12 @@
-"""The commands that run the cell: `rcsc run` and `rcsc db`."""
+"""What the commands about a system share, and `rcsc db`."""
 
-import sys
-import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, NoReturn
+from typing import TYPE_CHECKING, NoReturn
 
 import click
 
 if TYPE_CHECKING:
     from rcsc.diagnostics.codes import Code
-    from rcsc.workstation.cell import Run
 
 SYSTEM = click.option(
     "--system", "system", type=click.Path(exists=True, dir_okay=False, path_type=Path), default=None, metavar="FILE",
@@ -58,7 +55,10 @@ def stop(error: Exception) -> NoReturn:
     from rcsc.diagnostics.codes import Code
     from rcsc.system.cell import StateTableError
     from rcsc.workstation.script import BadScript
+    from rcsc.workstation.stopped import NotResumed
 
+    if isinstance(error, NotResumed):
+        raise Stopped(error.code, str(error), "`--from-row N` begins anew at row N") from error
     if isinstance(error, BadData):
         raise Stopped(Code.BAD_DATA, "\n".join(error.problems)) from error
     if isinstance(error, BadScript):
@@ -68,60 +68,7 @@ def stop(error: Exception) -> NoReturn:
     raise Stopped(Code.BAD_SYSTEM, str(error)) from error
 
 
-@click.command(
-    short_help="Run a workstation's script on the generated executors.",
-    epilog="""\b
-Examples:
-  rcsc run make_boxt                     Fig. 7, corrected, to the end
-  rcsc run make_boxt_printed             as printed: refused at row 22
-  rcsc run make_boxt --executor python   the same, by the Python executors
-  rcsc run make_boxt --log boxt.mcap     keep every cycle
-  rcsc run make_boxt --processes         each level in a process of its own""",
-)
-@click.argument("script", metavar="SCRIPT")
-@SYSTEM
-@EXECUTOR
-@DATABASE
-@click.option("--log", type=click.Path(dir_okay=False, path_type=Path), default=None, metavar="FILE",
-              help="Keep the complete state of every cycle in FILE (MCAP).")  # fmt: skip
-@click.option("--compile/--no-compile", "compiles", default=True, show_default=True,
-              help="Prove and compile what changed before anything moves.")  # fmt: skip
-@click.option("--processes", is_flag=True,
-              help="Each level in a process of its own, over shared memory, nothing else changed.")  # fmt: skip
-@click.option("--rate", type=click.FloatRange(min=0.1, max=20), default=4.0, show_default=True, metavar="N",
-              help="With --processes: how many times as fast as the clock.")  # fmt: skip
-@click.option("-q", "--quiet", is_flag=True, help="Only what stops the script.")
-def run(  # noqa: PLR0913, PLR0917  # as many as there are options
-    script: str, system: Path | None, executor: str, database: Path | None, log: Path | None, compiles: bool,
-    processes: bool, rate: float, quiet: bool,
-) -> int:  # fmt: skip
-    """Run SCRIPT, a name in the system's scripts or a CSV file, one row a command.
-
-    What changed is proved and compiled, then the script runs on the generated executors, with stand-ins for robot, hand
-    and camera, and what each command did is printed. Interlocks refuse a row that would machine a loose part.
-    """
-    from rcsc.database.build import BadData
-    from rcsc.system.cell import StateTableError
-    from rcsc.system.description import BadDescription
-    from rcsc.system.executors import NotBuilt
-    from rcsc.workstation.cell import prepare
-    from rcsc.workstation.script import BadScript
-    from sim.standin import world
-
-    path = system_path(system)
-    if compiles and not _compiled(path, quiet):
-        return 1
-    try:
-        made = prepare(path, script, "c" if executor == "c" else "python", world, database)
-        if processes:
-            return _apart(path, script, executor, database, rate, quiet)
-        _record(made, log)
-        return _watch(made, quiet)
-    except (BadDescription, BadData, BadScript, NotBuilt, StateTableError) as error:
-        stop(error)
-
-
-def _compiled(path: Path, quiet: bool) -> bool:
+def compiled(path: Path, quiet: bool) -> bool:
     """Proves and compiles what changed; findings are shown."""
     from rcsc import driver
     from rcsc.cli.show import Output, show
@@ -147,91 +94,6 @@ def _compiled(path: Path, quiet: bool) -> bool:
     return not made.report.failed
 
 
-def _record(made: "Run", log: Path | None) -> None:
-    if log is not None:
-        from rcsc.log.write import Recorder
-
-        made.system.watch.append(Recorder(made.system, log))
-
-
-def _watch(made: "Run", quiet: bool) -> int:
-    begun = time.perf_counter()
-    for result in made.steps():
-        if not quiet:
-            _say(result.row.number, result.row.text, result.state, result.ticks)
-    seconds = time.perf_counter() - begun
-    for watch in made.system.watch:
-        close = getattr(watch, "close", None)
-        if close is not None:
-            close()
-    return _closing(made, seconds, quiet)
-
-
-def _apart(path: Path, script: str, executor: str, database: Path | None, rate: float, quiet: bool) -> int:
-    """The same with a process for each level."""
-    import json
-    import tempfile
-
-    from rcsc.diagnostics.codes import Code
-    from rcsc.system.description import description
-    from rcsc.system.processes import Supervisor, run_processes
-    from rcsc.system.serve import Factory
-
-    held = str(database.resolve()) if database else ""
-    place = str(path.resolve())
-    with tempfile.TemporaryDirectory(prefix="rcsc-run-") as scratch:
-        results = Path(scratch) / "results"
-        results.touch()
-        outside = Factory("sim.processes:outside", (place, script, held, str(results)))
-        queries = Factory("sim.processes:queries", (place, held))
-        kind: Literal["c", "python"] = "c" if executor == "c" else "python"
-        rows: list[list[Any]] = []
-
-        def watch(_: Supervisor) -> None:
-            said = [json.loads(line) for line in results.read_text(encoding="utf-8").splitlines()]
-            for number, text, state, _reason, ticks in [] if quiet else said[len(rows) :]:
-                _say(number, text, state, ticks)
-            rows.extend(said[len(rows) :])
-
-        run_processes(description(path), kind, {"outside": outside}, queries=queries, rate=rate, watch=watch)
-        rows += [json.loads(line) for line in results.read_text(encoding="utf-8").splitlines()[len(rows) :]]
-    if not quiet:
-        click.echo(f"each level in a process of its own, {rate:g} times as fast as the clock")
-    if rows and rows[-1][2] != "done":
-        number, text, state, reason, _ = rows[-1]
-        raise Stopped(Code.SCRIPT_STOPPED, f"row {number}, {text}: {state}: {reason}")
-    return 0
-
-
-def _say(number: int, text: str, state: str, ticks: int) -> None:
-    shown = state if state != "done" else click.style("done", fg="green")
-    click.echo(f"{number:3}  {text:42} {shown}  {ticks:5} cycles")
-    sys.stdout.flush()
-
-
-def _closing(made: "Run", seconds: float, quiet: bool) -> int:
-    from rcsc.diagnostics.codes import Code
-
-    station, ticks = made.station, made.system.tick
-    stopped = station.stopped
-    failed = sum(1 for level in made.system.levels if level.values[-1])
-    if not quiet:
-        minutes = ticks * made.system.description.tick_ms / 60_000
-        click.echo(
-            f"{ticks} cycles ({minutes:.1f} min of control time) in {seconds:.2f} s; {failed} assumptions failed"
-        )
-    if stopped is not None:
-        word = "refused" if stopped.state == "refused" else "failed"
-        raise Stopped(
-            Code.SCRIPT_STOPPED,
-            f"row {stopped.row.number}, {stopped.row.text}: {word}: {stopped.reason}",
-            "the robot is paused; mend the cause and run the script from this row",
-        )
-    if not station.over:
-        raise Stopped(Code.SCRIPT_STOPPED, f"row {station.at + 1} did not end in {ticks} cycles")
-    return 0
-
-
 @click.group(
     short_help="Build, check and show the cell's database.",
     epilog="""\b
@@ -252,7 +114,7 @@ def db() -> None:
               help="Where it goes.")  # fmt: skip
 def build(system: Path | None, output: Path | None) -> int:
     """Make the database; nothing is written when the data is not in order."""
-    made, problems, target = _built(system, output)
+    made, problems, target = _built(system, output, writes=True)
     if problems:
         from rcsc.diagnostics.codes import Code
 
@@ -265,10 +127,7 @@ def build(system: Path | None, output: Path | None) -> int:
 @SYSTEM
 def check(system: Path | None) -> int:
     """Check the data file; every problem is named."""
-    import tempfile
-
-    with tempfile.TemporaryDirectory() as scratch:
-        _, problems, _ = _built(system, Path(scratch) / "cell.sqlite")
+    _, problems, _ = _built(system, None, writes=False)
     if problems:
         from rcsc.diagnostics.codes import Code
 
@@ -277,17 +136,30 @@ def check(system: Path | None) -> int:
     return 0
 
 
-def _built(system: Path | None, output: Path | None) -> tuple[str, tuple[str, ...], Path]:
+def _built(system: Path | None, output: Path | None, *, writes: bool) -> tuple[str, tuple[str, ...], Path]:
+    """Makes the database where it harms nobody, has the arm go everywhere in it, and only then writes it."""
+    import tempfile
+
+    from rcsc.database.ask import open_database
     from rcsc.database.build import BadData
     from rcsc.database.build import build as build_database
     from rcsc.system.cell import signatures
     from rcsc.system.description import BadDescription, description
     from rcsc.workstation.cell import database_path, parts_of
+    from sim.reach import unreachable
 
     try:
         said = description(system_path(system))
+        parts = parts_of(signatures(said))
         target = output or database_path(said)
-        build_database(said.database, target, parts_of(signatures(said)))
+        with tempfile.TemporaryDirectory() as scratch:
+            tried = Path(scratch) / "cell.sqlite"
+            build_database(said.database, tried, parts)
+            problems = unreachable(open_database(tried))
+        if problems:
+            return "", problems, Path()
+        if writes:
+            build_database(said.database, target, parts)
     except BadData as error:
         return "", error.problems, Path()
     except BadDescription as error:

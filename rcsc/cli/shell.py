@@ -63,7 +63,7 @@ def _commands(path: Path, kind: "Kind", alone: bool) -> "Commands":
     from rcsc.system.description import BadDescription, description
     from rcsc.system.executors import NotBuilt
     from rcsc.workstation.cell import database_of
-    from sim.standin import world
+    from sim.cell import plant
 
     try:
         said = description(path)
@@ -73,7 +73,7 @@ def _commands(path: Path, kind: "Kind", alone: bool) -> "Commands":
             queries = silent_queries(said, signs)
         else:
             database = database_of(said, signs)
-            queries, outside = database.queries, (world(database),)
+            queries, outside = database.queries, (plant(database, "kinematic"),)
         system = assemble(said, kind, queries, outside)
         return Commands(Session(system, Plant(path, said, kind, queries)))
     except (BadDescription, BadData, NotBuilt) as error:

@@ -5,7 +5,8 @@ rest is automatic (Haynes et al. 1984, section 9).
 """
 
 import tomllib
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -48,7 +49,11 @@ class Wire:
 
 @dataclass(frozen=True, slots=True)
 class Description:
-    """A whole system; levels from the top down."""
+    """A whole system; levels from the top down.
+
+    Attributes:
+        displays: Sets of variables to look at, by the name that a level's `display` gives them.
+    """
 
     name: str
     generated: Path
@@ -56,6 +61,7 @@ class Description:
     tick_ms: int
     levels: tuple[LevelSpec, ...]
     wires: tuple[Wire, ...]
+    displays: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
 
 def description(path: Path) -> Description:
@@ -83,6 +89,7 @@ def description(path: Path) -> Description:
             int(said["tick_ms"]),
             levels,
             wires,
+            {str(name): tuple(map(str, shown)) for name, shown in said.get("displays", {}).items()},
         )
     except OSError as error:
         raise BadDescription(f"{path} cannot be read: {error.strerror}") from error

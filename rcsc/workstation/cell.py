@@ -1,9 +1,9 @@
-"""A cell ready to run: system, database, workstation and what stands in for robot, hand and camera.
+"""A cell ready to run: system, database, workstation and what else stands outside the levels.
 
 In: the description's path, a script. Out: a `Run` that is stepped to its end.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,20 +21,24 @@ MOST_TICKS = 100_000
 
 @dataclass(slots=True)
 class Run:
-    """A script in the making."""
+    """A script in the making.
+
+    Attributes:
+        station: The first of what stands outside.
+    """
 
     system: System
     station: Workstation
     database: Database
 
     def steps(self, most: int = MOST_TICKS) -> Iterator[Result]:
-        """Runs to the end of the script, or to what stops it; each result as it comes.
+        """Runs to the end of the script, or to what stops it and until TASK has paused; each result as it comes.
 
         Raises:
             StateTableError: A level met a fault that the proofs exclude.
         """
         known = len(self.station.results)
-        while not self.station.over and self.system.tick < most:
+        while not (self.station.over and self.station.at_rest) and self.system.tick < most:
             self.system.step()
             while known < len(self.station.results):
                 yield self.station.results[known]
@@ -71,11 +75,18 @@ def script_path(name: str, system: Path) -> Path:
     return path if path.suffix == ".csv" or path.is_file() else system.parent / "scripts" / f"{name}.csv"
 
 
+def safe_places(database: Database) -> dict[str, str]:
+    """The safe location of each location that has one, by name."""
+    names = {number: name for name, number in database.locations.items()}
+    safe = {name: int(database.place(number)[4]) for name, number in database.locations.items()}
+    return {name: names[number] for name, number in safe.items() if number}
+
+
 def prepare(
     path: Path,
     rows: tuple[Row, ...] | str,
     kind: Kind,
-    stand_in: Callable[[Database], Outside],
+    outside: Callable[[Database], Iterable[Outside]],
     database: Path | None = None,
 ) -> Run:
     """A cell ready for its first tick.
@@ -84,7 +95,7 @@ def prepare(
         path: The system's description.
         rows: The script, or its name.
         kind: Which executors run.
-        stand_in: Makes what stands outside, from the database.
+        outside: Makes what stands outside, from the database: robot, hand, camera, vise and machine.
         database: A database to be used as it is.
 
     Raises:
@@ -96,5 +107,5 @@ def prepare(
         raise BadScript("the system has no level `task` to send commands to")
     held = database_of(system, signs, database)
     script = read_script(script_path(rows, path)) if isinstance(rows, str) else rows
-    station = workstation(script, held.locations, signs["task"])
-    return Run(assemble(system, kind, held.queries, [station, stand_in(held)]), station, held)
+    station = workstation(script, held.locations, signs["task"], safe_places(held))
+    return Run(assemble(system, kind, held.queries, [station, *outside(held)]), station, held)
