@@ -1,0 +1,139 @@
+"""A browser without a window, told what to do over a pipe: Chromium's DevTools protocol, and no package for it.
+
+In: addresses and expressions of the page's own language. Out: what they are. The pipe is Chromium's `--remote-debugging-pipe`: file
+descriptors 3 and 4, JSON messages that end with a zero byte; no port is opened.
+"""
+
+import base64
+import fcntl
+import json
+import os
+import select
+import shutil
+import subprocess
+import tempfile
+import time
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
+PATIENCE_S = 20.0
+"""After that something is broken; a machine under load needs some seconds."""
+OPTIONS = (
+    "--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--no-first-run", "--hide-scrollbars",
+    "--disable-background-networking", "--disable-component-update", "--disable-extensions", "--disable-sync",
+    "--window-size=1400,1300", "--remote-debugging-pipe",
+)  # fmt: skip
+
+
+class Browser:
+    """One browser with one page; a context manager."""
+
+    def __init__(self) -> None:
+        found = next((path for name in NAMES if (path := shutil.which(name))), None)
+        assert found, "Chromium is needed (Debian's package `chromium`)"
+        self._profile = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
+        orders, self._orders = (_high(end) for end in os.pipe())
+        self._answers, answers = (_high(end) for end in os.pipe())
+        self._process = subprocess.Popen(
+            [
+                "bash", "-c", f'exec "$@" 3<&{orders} 4>&{answers}', "browser",
+                found, *OPTIONS, f"--user-data-dir={self._profile.name}", "about:blank",
+            ],
+            pass_fds=(orders, answers), stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL, start_new_session=True,
+        )  # fmt: skip
+        os.close(orders)
+        os.close(answers)
+        self._held, self._number = b"", 0
+        self.said: list[str] = []
+        targets = self._tell("Target.getTargets")["targetInfos"]
+        page = next(one["targetId"] for one in targets if one["type"] == "page")
+        self._session = self._tell("Target.attachToTarget", targetId=page, flatten=True)["sessionId"]
+        for domain in ("Page", "Runtime", "Log"):
+            self._tell(f"{domain}.enable")
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        os.close(self._orders)  # the browser ends when its pipe does
+        try:
+            self._process.wait(10)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        os.close(self._answers)
+        self._profile.cleanup()
+
+    def open(self, address: str, *, dark: bool = False) -> None:
+        """Goes to an address; `said` is what the new page complains of."""
+        colours = [{"name": "prefers-color-scheme", "value": "dark" if dark else "light"}]
+        self._tell("Emulation.setEmulatedMedia", features=colours)
+        self.said.clear()
+        assert not self._tell("Page.navigate", url=address).get("errorText")
+        self.wait("document.readyState === 'complete'")
+
+    def value(self, expression: str) -> Any:
+        """What an expression is; a promise is waited for."""
+        found = self._tell("Runtime.evaluate", expression=expression, returnByValue=True, awaitPromise=True)
+        assert "exceptionDetails" not in found, found["exceptionDetails"]
+        return found["result"].get("value")
+
+    def wait(self, expression: str) -> None:
+        """Waits until an expression is true."""
+        until = time.monotonic() + PATIENCE_S
+        while not self.value(f"!!({expression})"):
+            assert time.monotonic() < until, f"never: {expression}; the page said {self.said}"
+            time.sleep(0.03)
+
+    def type(self, text: str) -> None:
+        """Types into what has the focus, and presses Enter."""
+        self._tell("Input.insertText", text=text)
+        enter = {"key": "Enter", "code": "Enter", "windowsVirtualKeyCode": 13, "text": "\r"}
+        for kind in ("keyDown", "keyUp"):
+            self._tell("Input.dispatchKeyEvent", type=kind, **enter)
+
+    def screenshot(self, path: Path) -> None:
+        """Writes what is seen, as PNG."""
+        path.write_bytes(base64.b64decode(self._tell("Page.captureScreenshot")["data"]))
+
+    def _tell(self, method: str, **parameters: Any) -> dict[str, Any]:
+        self._number += 1
+        order: dict[str, Any] = {"id": self._number, "method": method, "params": parameters}
+        if hasattr(self, "_session"):
+            order["sessionId"] = self._session
+        os.write(self._orders, json.dumps(order).encode() + b"\0")
+        while True:
+            answer = self._answer()
+            if answer.get("id") == self._number:
+                assert "error" not in answer, f"{method}: {answer['error']}"
+                result: dict[str, Any] = answer["result"]
+                return result
+            self._note(answer)
+
+    def _note(self, event: dict[str, Any]) -> None:
+        if event.get("method") == "Runtime.exceptionThrown":
+            self.said.append(str(event["params"]["exceptionDetails"]))
+        if event.get("method") == "Log.entryAdded":
+            self.said.append(event["params"]["entry"]["text"])
+
+    def _answer(self) -> dict[str, Any]:
+        while b"\0" not in self._held:
+            ready, _, _ = select.select([self._answers], [], [], PATIENCE_S)
+            read = os.read(self._answers, 1 << 16) if ready else b""
+            assert read, f"the browser says nothing; it ended with {self._process.poll()}"
+            self._held += read
+        message, self._held = self._held.split(b"\0", 1)
+        answer: dict[str, Any] = json.loads(message)
+        return answer
+
+
+def _high(end: int) -> int:
+    """The same pipe under a number above those that the browser wants."""
+    moved = fcntl.fcntl(end, fcntl.F_DUPFD_CLOEXEC, 16)
+    os.close(end)
+    return moved
