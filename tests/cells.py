@@ -1,17 +1,18 @@
 """Cells for tests: runs that can be forked at any tick, and a workstation that says what it is told."""
 
 import copy
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from rcsc.database.ask import Database
 from rcsc.system.buffers import CommonMemory
 from rcsc.system.cell import Kind, System, assemble, signatures
 from rcsc.system.description import description
 from rcsc.system.levels import RunningLevel
 from rcsc.system.signature import Value, Values
 from rcsc.workstation.cell import database_of
-from sim.standin import World, world
+from sim.cell import Lying, plant
 
 REPO = Path(__file__).parents[1]
 SYSTEM = REPO / "tables" / "system.toml"
@@ -19,6 +20,12 @@ PAUSE_ENDS = 40
 """Cycles within which TASK has answered PAUSE, whatever was under way."""
 COMMAND_ENDS = 700
 """Cycles within which TASK has answered any command with done or failed."""
+
+
+def database() -> Database:
+    """The cell's database, made anew where the data has changed."""
+    said = description(SYSTEM)
+    return database_of(said, signatures(said))
 
 
 @dataclass(slots=True)
@@ -34,13 +41,13 @@ class Teller:
 
 
 class Cell:
-    """The whole system on stand-ins, told what to do by a test."""
+    """The whole system on the kinematic plant, told what to do by a test."""
 
-    def __init__(self, kind: Kind = "c") -> None:
+    def __init__(self, kind: Kind = "c", parts: Sequence[Lying] | None = None) -> None:
         said = description(SYSTEM)
         signs = signatures(said)
         self.database = database_of(said, signs)
-        self.world: World = world(self.database)
+        self.world = plant(self.database, "kinematic", parts)
         self.teller = Teller(
             names=tuple(
                 signs["task"].leaves[at].name.rpartition(".")[2] for at in signs["task"].record("command")
@@ -105,7 +112,7 @@ class Cell:
         held = other.system.buffers
         assert isinstance(held, CommonMemory)
         self.system.buffers = copy.deepcopy(held)
-        state = copy.deepcopy(other.world)
+        state = copy.deepcopy(other.world, {id(other.database): self.database})
         self.world = state
         self.system.outside = (self.teller, state)
         self.teller.order = dict(other.teller.order)

@@ -17,7 +17,7 @@ KILLED = ("task", "primitive", "emove", "gripper", "vision")
 def test_make_boxt_ends_though_every_level_is_killed_once(tmp_path: Path) -> None:
     results = tmp_path / "results"
     results.touch()
-    outside = Factory("sim.processes:outside", (str(SYSTEM), "make_boxt", "", str(results)))
+    outside = Factory("sim.processes:outside", (str(SYSTEM), "make_boxt", "", str(results), 0, "kinematic"))
     queries = Factory("sim.processes:queries", (str(SYSTEM), ""))
     killed: list[str] = []
 

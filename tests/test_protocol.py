@@ -48,8 +48,9 @@ def late_cell(seed: int, most: int, share: float) -> Cell:
 
 
 @settings(max_examples=6)
-@given(st.integers(0, 10**6), st.integers(1, 3), st.floats(0.2, 0.9))
+@given(st.integers(0, 10**6), st.integers(1, 2), st.floats(0.2, 0.9))
 def test_everything_ends_though_every_buffer_is_late(seed: int, most: int, share: float) -> None:
+    """Up to two cycles: a robot that is shown but one pose in four would have to jump, and refuses (the test below)."""
     cell = late_cell(seed, most, share)
     for command, said in SCRIPT:
         cell.tell(command, **said)

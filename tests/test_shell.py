@@ -20,7 +20,7 @@ from rcsc.shell.session import Session, silent_queries
 from rcsc.system.cell import Kind, assemble, signatures
 from rcsc.system.description import description
 from rcsc.workstation.cell import database_of
-from sim.standin import world
+from sim.cell import plant
 
 REPO = Path(__file__).parents[1]
 SYSTEM = REPO / "tables" / "system.toml"
@@ -37,10 +37,10 @@ def alone(path: Path = SYSTEM, kind: Kind = "c") -> Commands:
 
 
 def inhabited(kind: Kind = "c") -> Commands:
-    """Levels with the cell's database and stand-ins."""
+    """Levels with the cell's database and plant."""
     said = description(SYSTEM)
     database = database_of(said, signatures(said))
-    system = assemble(said, kind, database.queries, (world(database),))
+    system = assemble(said, kind, database.queries, (plant(database, "kinematic"),))
     return Commands(Session(system, Plant(SYSTEM, said, kind, database.queries)))
 
 
@@ -264,7 +264,7 @@ def test_the_three_parts_of_a_level_are_one_cycle_of_it(kind: Kind) -> None:
     """The interpreter, a part at a time, leaves what the executor leaves; the line, too."""
     commands = inhabited(kind)
     do(commands, *MOVE)
-    for _ in range(40):
+    for _ in range(60):
         for level in commands.session.levels:
             level.take(commands.session.memory)
             level.values = level.executor.values()
@@ -359,12 +359,12 @@ def test_undo_goes_back_and_what_follows_is_the_same(kind: Kind) -> None:
     for _ in range(25):
         states.append(state(commands))
         do(commands, "step")
-    end, plate = state(commands), list(commands.session.system.outside[0].plate)  # type: ignore[attr-defined]  # the stand-in's
+    end, plate = state(commands), commands.session.system.outside[0].plate  # type: ignore[attr-defined]  # the plant's
     do(commands, "undo 15")
     assert state(commands) == states[10]
     do(commands, "step 15")
     assert state(commands) == end
-    assert commands.session.system.outside[0].plate == plate  # type: ignore[attr-defined]  # the stand-in's
+    assert commands.session.system.outside[0].plate == plate  # type: ignore[attr-defined]  # the plant's
     do(commands, "undo 25")
     assert state(commands) == states[0]
     assert refused(commands, "undo").code is Code.SHELL_COMMAND

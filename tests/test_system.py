@@ -1,14 +1,23 @@
-"""The whole system on stand-ins: MAKE BOXT, PAUSE and new commands at every cycle, faults, and what is reported of them."""
+"""The whole system without physics: MAKE BOXT, PAUSE and new commands at every cycle, faults, and what is reported of them."""
 
 from pathlib import Path
 
 import pytest
 
+from rcsc.database.ask import Database
+from rcsc.database.pose import about_z
 from rcsc.system.cell import System
 from rcsc.system.levels import RunningLevel
 from rcsc.workstation.cell import prepare
-from sim.standin import Thing, world
+from sim.cell import Lying, plant
+from sim.model import Body
+from sim.plant import Plant
+from sim.witness import placements
 from tests.cells import COMMAND_ENDS, PAUSE_ENDS, SCRIPT, SYSTEM, Cell, through_script
+
+
+def world(database: Database) -> tuple[Plant]:
+    return (plant(database, "kinematic"),)
 
 
 def test_make_boxt_runs_to_the_end_and_both_executors_do_the_same() -> None:
@@ -24,10 +33,13 @@ def test_make_boxt_runs_to_the_end_and_both_executors_do_the_same() -> None:
         results = list(run.steps())
         assert [result.state for result in results] == ["done"] * 27
         traces.append(trace)
-        part = run.system.outside[1].things[0]  # type: ignore[attr-defined]  # the stand-in's
-        station = run.database.point(int(run.database.route(run.database.locations["STATION"], 3)[-1]))
-        assert (part.x_mm, part.y_mm) == pytest.approx(station[1:3], abs=1.0)
-        assert not part.held
+        made = run.system.outside[1]
+        assert isinstance(made, Plant)
+        [placed] = placements(run.station.results, run.database, made)
+        assert placed.place == "STATION(3)"
+        assert placed.error_mm < 1.0
+        assert made.mechanism.parts()[0].axis(2)[2] < -0.99  # turned over
+        assert made.mechanism.touching() == frozenset()
         assert run.system.level("task").value("tbuffer_boxt") == 9
     assert traces[0] == traces[1]
 
@@ -52,7 +64,7 @@ def test_pause_at_every_cycle_of_every_command(probe: Cell) -> None:
         probe.take_over(main)
         probe.tell("pause")
         assert probe.until_over(PAUSE_ENDS) == "done", main.system.tick
-        where = list(probe.world.plate)
+        where = probe.world.plate
         probe.system.step()
         probe.system.step()
         assert probe.world.plate == where
@@ -71,13 +83,8 @@ def test_a_new_command_at_every_cycle_of_every_command(probe: Cell) -> None:
         probe.tell("move", dest="WS-SAFE")
         assert probe.until_over(COMMAND_ENDS) == "done", (main.system.tick, probe.reason())
         assert probe.failed == []
-        assert probe.world.plate == pytest.approx(
-            list(
-                probe.database.point(int(probe.database.route(probe.database.locations["WS-SAFE"], 0)[-1]))[
-                    1:10
-                ]
-            )
-        )
+        route = probe.database.route(probe.database.locations["WS-SAFE"], 0)
+        assert probe.world.plate == pytest.approx(probe.database.point(int(route[3]))[1:10])
 
 
 def test_every_command_is_answered_by_its_own_number_across_the_wrap() -> None:
@@ -127,8 +134,9 @@ def test_a_second_command_while_a_part_is_held_is_refused() -> None:
 
 
 def test_a_part_of_the_wrong_size_is_an_unknown_object() -> None:
-    cell = Cell()
-    cell.world.things.append(Thing(4, 800.0, 0.0, 112.5, 0.0))  # a house where a box top should be
+    fixture = Cell().database.stations["fixture"].frame
+    house = Body((70.0, 50.0, 50.0), fixture.point((0.0, 0.0, 45.0)), about_z(20.0))
+    cell = Cell(parts=[Lying(4, house)])  # a house where a box top should be
     assert cell.do("acquire", obj="tbox", grasp=2, source="FIX-MAC5") == "failed"
     assert cell.reason() == "pic"
     assert cell.system.level("task").shown("obj_now_in_gripper") == "unknown_object"
@@ -171,7 +179,7 @@ def test_a_fault_below_is_reported_upward(
 
 def test_a_station_moves_in_the_data_and_nothing_is_compiled_again(tmp_path: Path) -> None:
     data = (SYSTEM.parent / "cell.toml").read_text(encoding="utf-8")
-    moved = data.replace("at = { x = 600.0, y = 0.0, z = 350.0", "at = { x = 650.0, y = 40.0, z = 350.0")
+    moved = data.replace("at = { x = 560.0, y = 0.0, z = 560.0", "at = { x = 530.0, y = 40.0, z = 550.0")
     assert moved != data
     system = SYSTEM.read_text(encoding="utf-8").replace(
         '"../generated"', f'"{SYSTEM.parents[1] / "generated"}"'
@@ -182,7 +190,9 @@ def test_a_station_moves_in_the_data_and_nothing_is_compiled_again(tmp_path: Pat
     script.write_text("command,part,source,dest,end_at\nMOVE,,,WS-SAFE,\n", encoding="utf-8")
     run = prepare(tmp_path / "system.toml", str(script), "c", world)
     assert [result.state for result in run.steps()] == ["done"]
-    assert run.system.outside[1].plate[:2] == [650.0, 40.0]  # type: ignore[attr-defined]  # the stand-in's
+    made = run.system.outside[1]
+    assert isinstance(made, Plant)
+    assert made.plate[:3] == pytest.approx((530.0, 40.0, 715.0))
 
 
 def test_the_script_of_these_tests_has_every_command() -> None:

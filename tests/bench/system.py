@@ -1,7 +1,8 @@
 """What a whole cycle costs: `python -m tests.bench.system`.
 
-MAKE BOXT on stand-ins, all 27 rows: microseconds a control tick and a level's cycle, by executor, with and without a log, and bytes of
-log a tick. Then each level by itself, from the smallest to the largest: the cost grows with the leaves of its state.
+MAKE BOXT on the kinematic plant, all 27 rows: microseconds a control tick and a level's cycle, by executor, with and without a log, and
+bytes of log a tick; the plant's own time is left out (`tests.bench.loop` has it). Then each level by itself, from the smallest to the
+largest: the cost grows with the leaves of its state.
 """
 
 import statistics
@@ -9,32 +10,43 @@ import tempfile
 import time
 from pathlib import Path
 
+from rcsc.database.ask import Database
 from rcsc.log.write import Recorder
 from rcsc.system.cell import Kind
 from rcsc.workstation.cell import Run, prepare
-from sim.standin import world
+from sim.cell import plant
+from sim.witness import Timed
 
 SYSTEM = Path(__file__).parents[2] / "tables" / "system.toml"
 ROUNDS = 5
 
 
+def kinematic(database: Database) -> list[Timed]:
+    """What stands outside, and how long it takes."""
+    return [Timed(plant(database, "kinematic"))]
+
+
 def finished(kind: Kind, log: Path | None) -> tuple[float, Run]:
-    """Seconds of the steps alone, and the run."""
-    run = prepare(SYSTEM, "make_boxt", kind, world)
+    """Seconds of the steps without the plant's, and the run."""
+    run = prepare(SYSTEM, "make_boxt", kind, kinematic)
     if log is None:
-        begun = time.perf_counter()
-        assert all(result.state == "done" for result in run.steps())
-        return time.perf_counter() - begun, run
+        return stepped(run), run
     with Recorder(run.system, log) as recorder:
         run.system.watch.append(recorder)
-        begun = time.perf_counter()
-        assert all(result.state == "done" for result in run.steps())
-    return time.perf_counter() - begun, run
+        return stepped(run), run
+
+
+def stepped(run: Run) -> float:
+    """Runs to the end; seconds, but for the plant's."""
+    begun = time.perf_counter()
+    assert [result.state for result in run.steps()] == ["done"] * 27
+    plants = [one.seconds for one in run.system.outside if isinstance(one, Timed)]
+    return time.perf_counter() - begun - sum(plants)
 
 
 def levels_alone(kind: Kind) -> dict[str, float]:
     """Microseconds a cycle of each level with its buffers, nothing outside."""
-    run = prepare(SYSTEM, "make_boxt", kind, world)
+    run = prepare(SYSTEM, "make_boxt", kind, kinematic)
     costs = {}
     for level in run.system.levels:
         times = []
@@ -67,7 +79,7 @@ def main() -> None:
         f"\n{'level':12}{'leaves':>8}{'lines':>7}{'C us':>8}{'Python us':>11}   one cycle at rest, buffers included"
     )
     in_c, in_python = levels_alone("c"), levels_alone("python")
-    run = prepare(SYSTEM, "make_boxt", "python", world)
+    run = prepare(SYSTEM, "make_boxt", "python", kinematic)
     for level in run.system.levels:
         lines = sum(len(names) for names in level.sign.tables.values())
         costs = f"{in_c[level.name]:8.1f}{in_python[level.name]:11.1f}"

@@ -1,0 +1,77 @@
+"""A plant ready for its first cycle, made of the database."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from rcsc.database.ask import Database
+from rcsc.database.build import BadData
+from rcsc.database.pose import about_z
+from sim.kinematic import Kinematic
+from sim.model import USUAL, Body, Make
+from sim.physical import Physical
+from sim.plant import Plant
+from sim.reach import home, unreachable
+from sim.robot import Robot
+
+Backend = Literal["mujoco", "kinematic"]
+
+
+@dataclass(frozen=True, slots=True)
+class Lying:
+    """A part that lies somewhere at first: what it is, and its body."""
+
+    object: int
+    body: Body
+
+
+def lying(database: Database) -> tuple[Lying, ...]:
+    """The parts of the database where it has them."""
+    return tuple(
+        Lying(part.object, Body(size, (part.x_mm, part.y_mm, part.z_mm + size[2] / 2), about_z(part.yaw_deg)))
+        for part in database.parts
+        for size in [database.sizes[part.object]]
+    )
+
+
+def plant(
+    database: Database,
+    backend: Backend = "mujoco",
+    parts: Sequence[Lying] | None = None,
+    seed: int = 0,
+    make: Make = USUAL,
+) -> Plant:
+    """A plant whose robot is at home.
+
+    Args:
+        database: The cell.
+        backend: Physics, or kinematics alone.
+        parts: What lies about; the database's parts when nobody says.
+        seed: Of the sensor's noise.
+        make: Step and friction of physics.
+
+    Raises:
+        BadData: The robot cannot be at its home.
+    """
+    start = home(database)
+    if start is None:
+        raise BadData(("the robot cannot be at its home",))
+    here = lying(database) if parts is None else tuple(parts)
+    bodies = [one.body for one in here]
+    mechanism = (
+        Physical(database, bodies, start, seed, make)
+        if backend == "mujoco"
+        else Kinematic(database, bodies, start, seed)
+    )
+    return Plant(database, mechanism, Robot(start), tuple(one.object for one in here))
+
+
+def checked(database: Database) -> None:
+    """Has the arm look at every point of the database, before anything moves.
+
+    Raises:
+        BadData: It cannot be somewhere.
+    """
+    problems = unreachable(database)
+    if problems:
+        raise BadData(problems)

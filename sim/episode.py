@@ -1,0 +1,263 @@
+"""An episode: one run of the cell with everything that is odd about it, as a value; and what became of it.
+
+In: parts, a script, what goes wrong and when. Out: rows, findings, lines of tables, a digest. An episode travels as JSON, and gives
+the same outcome in every process and with both kinds of executors.
+"""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+from typing import Any, Literal, NamedTuple, get_args
+
+from rcsc.system.cell import Kind
+from sim.cell import Backend
+from sim.faults import Faults
+
+SYSTEM = Path(__file__).parents[1] / "tables" / "system.toml"
+HARM = Literal["lost", "doubled", "stale", "delayed"]
+COLUMNS = "command,part,source,dest,end_at"
+
+FAULTS: Mapping[str, str] = {
+    **{one.name: "a switch of sim.faults" for one in fields(Faults)},
+    "lost": "a buffer: what is published in some cycles never arrives",
+    "doubled": "a buffer: each value is read in two cycles, and every other one never",
+    "stale": "a buffer: readers see one value for some cycles",
+    "delayed": "a buffer: values arrive some cycles late, in order",
+    "restarted": "a level: it loses its state, and goes on as a restarted process does",
+    "pushed": "parts: somebody pushes one that lies there; without physics only",
+    "missing part": "parts: what the script asks for is nowhere",
+    "wrong part": "parts: another lies where it should be",
+    "two parts": "parts: two of a kind lie there",
+    "odd size": "parts: a size that the database does not have",
+    "odd weight": "parts: a density or a friction that is not usual",
+    "changed command": "the script: another command comes before the last one has ended",
+}
+"""Fault classes, and how each is injected."""
+
+
+@dataclass(frozen=True, slots=True)
+class PartSpec:
+    """A part that lies on a station at first.
+
+    Attributes:
+        object: What it is in truth; a name of the database.
+        station: On which it lies; its place there is seen from the station.
+        size_mm: Length, width and height; empty for the database's.
+        friction: Against everything but the pads.
+    """
+
+    object: str
+    station: str = "buffer"
+    x_mm: float = 0.0
+    y_mm: float = 0.0
+    yaw_deg: float = 0.0
+    size_mm: tuple[float, ...] = ()
+    density_kg_m3: float = 2700.0
+    friction: float = 0.4
+
+
+@dataclass(frozen=True, slots=True)
+class FaultSpec:
+    """A switch of `sim.faults.Faults` in these ticks, the last included."""
+
+    name: str
+    first_tick: int
+    last_tick: int
+    value: float = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class TransportSpec:
+    """What happens to a buffer in these ticks; `ticks` is how late a delayed value comes."""
+
+    buffer: str
+    kind: HARM
+    first_tick: int
+    last_tick: int
+    ticks: int = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Restart:
+    """A level loses its state before it runs in this tick."""
+
+    tick: int
+    level: str
+
+
+@dataclass(frozen=True, slots=True)
+class Interruption:
+    """From this tick on TASK is given another command, whatever is under way; no interlock looks at it."""
+
+    tick: int
+    row: str
+
+
+@dataclass(frozen=True, slots=True)
+class Push:
+    """Somebody pushes a part that lies there, by its number in `parts`; seen from the base."""
+
+    tick: int
+    part: int
+    x_mm: float
+    y_mm: float
+
+
+@dataclass(frozen=True, slots=True)
+class Episode:
+    """One run.
+
+    Attributes:
+        rows: Of the script, each a line of CSV as in tables/scripts.
+        step_s: Of physics.
+    """
+
+    backend: Backend = "kinematic"
+    executor: Kind = "c"
+    seed: int = 0
+    parts: tuple[PartSpec, ...] = ()
+    rows: tuple[str, ...] = ()
+    faults: tuple[FaultSpec, ...] = ()
+    transport: tuple[TransportSpec, ...] = ()
+    restarts: tuple[Restart, ...] = ()
+    interruptions: tuple[Interruption, ...] = ()
+    step_s: float = 0.002
+    pushes: tuple[Push, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Refuses what no episode can be.
+
+        Raises:
+            ValueError: A backend, an executor, a fault or a harm that nobody knows; a push with physics.
+        """
+        known = {one.name for one in fields(Faults)}
+        for said, words in (
+            (self.backend, get_args(Backend)),
+            (self.executor, get_args(Kind)),
+            *((fault.name, known) for fault in self.faults),
+            *((one.kind, get_args(HARM)) for one in self.transport),
+        ):
+            if said not in words:
+                raise ValueError(f"`{said}` is none of {', '.join(sorted(words))}")
+        if self.pushes and self.backend != "kinematic":
+            raise ValueError("with physics nothing but a force moves a part")
+
+    def to_json(self) -> str:
+        """As text that `from_json` reads; the same text for the same episode."""
+        return json.dumps(asdict(self), indent=1) + "\n"
+
+    @classmethod
+    def from_json(cls, text: str) -> "Episode":
+        """An episode that `to_json` wrote.
+
+        Raises:
+            ValueError: The text is none.
+        """
+        try:
+            said = {**json.loads(text)}
+            for name, kind in _LISTS.items():
+                said[name] = tuple(kind(**_tuples(one)) for one in said.get(name, ()))
+            said["rows"] = tuple(said.get("rows", ()))
+            return cls(**said)
+        except (TypeError, AttributeError) as error:
+            raise ValueError(f"no episode: {error}") from error
+
+
+_LISTS: Mapping[str, type] = {
+    "parts": PartSpec,
+    "faults": FaultSpec,
+    "transport": TransportSpec,
+    "restarts": Restart,
+    "interruptions": Interruption,
+    "pushes": Push,
+}
+
+
+def _tuples(said: Mapping[str, Any]) -> dict[str, Any]:
+    """JSON has no tuples."""
+    return {name: tuple(value) if isinstance(value, list) else value for name, value in said.items()}
+
+
+class RowEnd(NamedTuple):
+    """What became of a row: `state` is done, failed, refused, or changed where another command came first."""
+
+    number: int
+    text: str
+    state: str
+    reason: str
+    ticks: int
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """A property that did not hold, first in this tick."""
+
+    property: str
+    tick: int
+    said: str
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What became of an episode.
+
+    Attributes:
+        end: `done`; `failed:REASON`; `refused` by an interlock, or because the script cannot be read; `state-table error`; `hang`.
+        lines: Level, table and line that ran.
+        digest: Of every level's values in every cycle, as canonical bytes.
+    """
+
+    rows: tuple[RowEnd, ...]
+    findings: tuple[Finding, ...]
+    end: str
+    ticks: int
+    lines: frozenset[tuple[str, str, str]]
+    digest: str
+
+
+def run(episode: Episode, system: Path = SYSTEM, log: Path | None = None) -> Outcome:
+    """Runs it to its end, with every property watching.
+
+    Args:
+        episode: What to run.
+        system: The description of the system; its generated executors are used as they are.
+        log: Where to keep every cycle (MCAP); none where nobody says.
+
+    Raises:
+        BadDescription, BadData, NotBuilt: The system is not in order.
+        OSError: The log cannot be written.
+    """
+    from sim.loop import Loop
+
+    return Loop(episode, system, log).finish()
+
+
+def draw(seed: int, backend: Backend = "kinematic") -> Episode:
+    """The episode of a seed: nominal ones, with one fault and with several, with odd parts, and with scripts that are not legal."""
+    from sim.sampling import draw as drawn
+
+    return drawn(seed, backend)
+
+
+def script(rows: Sequence[str]) -> str:
+    """The rows as the text of a script, for `rcsc run`."""
+    return "\n".join((COLUMNS, *rows)) + "\n"
+
+
+def fault_classes(episode: Episode) -> tuple[str, ...]:
+    """Which of `FAULTS` an episode has, in their order; empty where it is nominal.
+
+    Parts count only where the script asks for one: what lies about and is not asked for is no fault.
+    """
+    from sim.oddities import odd_parts
+
+    has = {
+        *(one.name for one in episode.faults),
+        *(one.kind for one in episode.transport),
+        *(("restarted",) if episode.restarts else ()),
+        *(("changed command",) if episode.interruptions else ()),
+        *(("pushed",) if episode.pushes else ()),
+        *odd_parts(episode),
+    }
+    return tuple(name for name in FAULTS if name in has)

@@ -1,0 +1,35 @@
+"""What is odd about an episode's parts, for summaries by fault.
+
+In: an episode. Out: names of `sim.episode.FAULTS` that are about parts.
+"""
+
+import csv
+from collections.abc import Iterator, Sequence
+
+from rcsc.workstation.script import PARTS
+from sim.episode import COLUMNS, Episode, PartSpec
+
+USUAL = PartSpec("")
+
+
+def odd_parts(episode: Episode) -> Iterator[str]:
+    """`missing part`, `wrong part` and `two parts` of those that are asked for at the buffer; `odd size`, `odd weight` of any."""
+    here = [part.object for part in episode.parts if part.station == "buffer"]
+    for wanted in _asked((*episode.rows, *(one.row for one in episode.interruptions))):
+        if wanted not in here:
+            yield "wrong part" if here else "missing part"
+        elif here.count(wanted) > 1:
+            yield "two parts"
+    for part in episode.parts:
+        if part.size_mm:
+            yield "odd size"
+        if (part.density_kg_m3, part.friction) != (USUAL.density_kg_m3, USUAL.friction):
+            yield "odd weight"
+
+
+def _asked(rows: Sequence[str]) -> Iterator[str]:
+    """Objects that rows take from the buffer."""
+    for row in csv.DictReader([COLUMNS, *rows]):
+        name = PARTS.get((row["part"] or "").partition(" ")[0])
+        if name and row["source"] == "BUFFER":
+            yield name
