@@ -1,0 +1,233 @@
+"""Seeded bugs and the properties that catch them: `python -m tests.matrix` prints which catches which.
+
+A bug is a change to the text of a table. Where the changed table still proves, it is compiled as ever; where it does not, its executors
+are made all the same, which only tests can: rcsc has no option that skips a proof.
+"""
+
+import shutil
+import sys
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from rcsc import driver
+from rcsc.driver.work import Settings
+from rcsc.emit.write import write
+from rcsc.model import Program
+from rcsc.project import load
+from rcsc.prove.options import Options
+from rcsc.resolve import resolve
+from sim.episode import Episode, FaultSpec, Finding, Interruption, PartSpec, Restart
+from sim.loop import Loop
+from sim.properties import PROPERTIES
+from tests.emitted import emitted
+
+REPO = Path(__file__).parents[1]
+TBOX = (PartSpec("tbox", "buffer", 20.0, -30.0, 10.0),)
+ACQUIRE = Episode(executor="python", parts=TBOX, rows=("ACQUIRE,BOXT (2),BUFFER,,",))
+FAR = Episode(executor="python", rows=("MOVE,,,BUFFER-SAFE,",))
+MOST_TICKS = 1500
+ADDRESS = """
+
+_cycle = gripper_cycle
+
+
+def gripper_cycle(s):
+    fault = _cycle(s)
+    s.waited = id(s) // 16 % 151
+    return fault
+"""
+"""A value that comes of where the state lies in memory."""
+
+
+@dataclass(frozen=True, slots=True)
+class Bug:
+    """A change, the property that is to catch it, and the episode in which it shows.
+
+    Attributes:
+        file: Under tables; a generated file where no table could say it.
+    """
+
+    name: str
+    property: str
+    file: str
+    old: str
+    new: str
+    episode: Episode
+
+
+BUGS = (
+    Bug(
+        "GRASP has no line for having failed",
+        "no state-table error",
+        "tables/gripper/gripper.rcs",
+        "  | 6    | false       | f_state   |        |               ||                              | hold        | fail       |\n",
+        "",
+        replace(
+            ACQUIRE,
+            rows=(),
+            interruptions=(Interruption(1, "ACQUIRE,BOXT (2),FIX-MAC5,,"),),
+            faults=(FaultSpec("hand_weak", 60, 999),),
+        ),
+    ),
+    Bug(
+        "TASK does not wait for the echo",
+        "assumptions hold",
+        "tables/task/common.rcs",
+        "state cur_state : task_state = d_state deferred until emove.inc_command_echo = to_emove.inc_command",
+        "state cur_state : task_state = d_state deferred until emove.inc_command_echo >= 0",
+        ACQUIRE,
+    ),
+    Bug(
+        "PAUSE says done only to itself",
+        "ends in DONE or FAIL",
+        "tables/emove/pause.rcs",
+        "| pause       | done       |",
+        "| pause       | executing  |",
+        replace(FAR, rows=("PAUSE,,,,",)),
+    ),
+    Bug(
+        "ACQUIRE forgets that it has failed",
+        "answered once",
+        "tables/task/acquire.rcs",
+        "| pause       | fail       |\n  | 15 ",
+        "| pause       | executing  |\n  | 15 ",
+        replace(ACQUIRE, rows=(), interruptions=(Interruption(1, "ACQUIRE,BOXT (2),,,"),)),
+    ),
+    Bug("a count hangs on an address", "replays exactly", "generated/python/gripper.py", "", ADDRESS, FAR),
+    Bug(
+        "IMMED-GRASP is done with anything between the fingers",
+        "DONE is true",
+        "tables/primitive/immed_grasp.rcs",
+        "|| misfit_failure; nextstate(f_state)      | pause       | fail       |",
+        "|| nextstate(d_state)                      |             | done       |",
+        replace(ACQUIRE, rows=(), interruptions=(Interruption(1, "ACQUIRE,BOXT (2),FIX-MAC5,,"),)),
+    ),
+    Bug(
+        "PICKUP is counted until it is echoed",
+        "buffer counts",
+        "tables/task/common.rcs",
+        "if source.buffer and old_order.input_command /= pickup {",
+        "if source.buffer {",
+        ACQUIRE,
+    ),
+    Bug(
+        "LOC=>FAILURE says pic",
+        "right reason",
+        "tables/task/common.rcs",
+        "  failure := loc\n",
+        "  failure := pic\n",
+        replace(ACQUIRE, faults=(FaultSpec("blind", 0, 99_999),)),
+    ),
+    Bug(
+        "E-MOVE does not pass PAUSE on",
+        "still after FAIL",
+        "tables/emove/common.rcs",
+        "procedure pause {\n  to_primitive.input_command := pause\n",
+        "procedure pause {\n",
+        replace(FAR, restarts=(Restart(12, "task"),)),
+    ),
+    Bug(
+        "LOCATE goes too low",
+        "only allowed contact",
+        "tables/emove/common.rcs",
+        "object_data.grip_range_mm - vision.range_mm",
+        "object_data.grip_range_mm - vision.range_mm - 30.0",
+        replace(ACQUIRE, backend="mujoco", step_s=0.004),
+    ),
+    Bug(
+        "GRASP is told too great a force",
+        "grip force",
+        "tables/primitive/common.rcs",
+        "  to_gripper.opening_mm := 0.0\n  to_gripper.force_n := fingers.force_n\n",
+        "  to_gripper.opening_mm := 0.0\n  to_gripper.force_n := min(1000.0, fingers.force_n * 1.5)\n",
+        ACQUIRE,
+    ),
+    Bug(
+        "GOTO knows no greatest speed",
+        "joints within limits",
+        "tables/primitive/common.rcs",
+        "min(goal.speed_mm_s, speed_mm_s",
+        "min(2000.0, speed_mm_s",
+        FAR,
+    ),
+)
+
+
+def project(folder: Path) -> Path:
+    """A copy of tables and executors; the path of its description."""
+    shutil.copytree(REPO / "tables", folder / "tables", ignore=shutil.ignore_patterns(".rcsc-cache"))
+    shutil.copytree(REPO / "generated", folder / "generated", ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copy(REPO / "tables" / "rcsc.toml", folder / "tables" / "rcsc.toml")
+    return folder / "tables" / "system.toml"
+
+
+def seed(bug: Bug, folder: Path) -> bool:
+    """Changes a project; whether its tables still prove.
+
+    Raises:
+        ValueError: The text to be changed is not there once.
+    """
+    path = folder / bug.file
+    text = path.read_text(encoding="utf-8")
+    if bug.old and text.count(bug.old) != 1:
+        raise ValueError(f"{bug.name}: {bug.file} has the text {text.count(bug.old)} times")
+    path.write_text(text.replace(bug.old, bug.new) if bug.old else text + bug.new, encoding="utf-8")
+    if not bug.file.startswith("tables/"):
+        return True
+    name = bug.file.split("/")[1]
+    root = str(folder / "tables" / name / f"{name}.rcs")
+    generated = folder / "generated"
+    made = driver.compile_(
+        Settings((root,), Options(solver="boxes")), generated, ("python", "c"), only_check=False
+    )
+    if made.report.failed:
+        loaded = load([root])
+        program = resolve(loaded.roots[0], loaded)
+        assert isinstance(program, Program), program
+        write(emitted(program), str(generated))
+    return not made.report.failed
+
+
+def findings(bug: Bug, folder: Path) -> tuple[bool, tuple[Finding, ...]]:
+    """Whether the bug passes the proofs, and what the properties say of it until its own speaks."""
+    system = project(folder)
+    proved = seed(bug, folder)
+    loop = Loop(bug.episode, system)
+    while (
+        not loop.over
+        and loop.system.tick < MOST_TICKS
+        and all(one.property != bug.property for one in loop.findings)
+    ):
+        loop.step()
+    return proved, tuple(loop.findings)
+
+
+def rows() -> Iterator[tuple[Bug, bool, dict[str, Finding]]]:
+    """Each bug with what caught it."""
+    for bug in BUGS:
+        with tempfile.TemporaryDirectory(prefix="rcsc-matrix-") as folder:
+            proved, found = findings(bug, Path(folder))
+        yield bug, proved, {one.property: one for one in found}
+
+
+def main() -> int:
+    """Prints the matrix; 1 where a bug was not caught."""
+    names = [one.name for one in PROPERTIES]
+    for at, name in enumerate(names):
+        sys.stdout.write(f"{'ABCDEFGHIJKLMNOP'[at]} {name}\n")
+    missed = 0
+    sys.stdout.write(f"\n{'seeded bug':54} proves  {' '.join('ABCDEFGHIJKLMNOP'[: len(names)])}\n")
+    for bug, proved, found in rows():
+        marks = (
+            "#" if name == bug.property and name in found else "x" if name in found else "." for name in names
+        )
+        missed += bug.property not in found
+        said = found[bug.property].said if bug.property in found else "NOT CAUGHT"
+        sys.stdout.write(f"{bug.name:54} {'yes' if proved else 'no':6}  {' '.join(marks)}  {said}\n")
+    return int(bool(missed))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
