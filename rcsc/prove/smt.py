@@ -58,6 +58,16 @@ def literal(kind: Scalar, value: Value) -> Term:
     return Term(z3.FPVal(float(value), _double_sort()) if isinstance(kind, Real) else z3.IntVal(int(value)))
 
 
+def member(name: str) -> Term:
+    """A fresh constant for a member of an enumeration, by index, in 16 bits: quicker than an integer."""
+    return Term(_z3().BitVec(name, 16))
+
+
+def member_literal(index: int) -> Term:
+    """A member as a constant; indices are far below the sign bit, so that order is theirs."""
+    return Term(_z3().BitVecVal(index, 16))
+
+
 def truth(value: bool) -> Term:
     """The constant true or false."""
     return Term(_z3().BoolVal(value))
@@ -213,6 +223,14 @@ class Solver:
         if answer == z3.sat:
             return Answer.SATISFIABLE
         return Answer.UNSATISFIABLE if answer == z3.unsat else Answer.UNKNOWN
+
+    def core(self) -> tuple[str, ...]:
+        """Names of the constants assumed in the last check that cannot hold together; a small set, not the least."""
+        return tuple(sorted(str(one) for one in self._solver.unsat_core()))
+
+    def script(self) -> str:
+        """What is asserted as an SMT-LIB 2 script, with `(check-sat)` at its end."""
+        return f"(set-logic ALL)\n{self._solver.to_smt2()}"
 
     def value(self, term: Term, kind: Scalar) -> Value:
         """The value of a constant in the model of the last satisfiable answer."""

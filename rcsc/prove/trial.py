@@ -32,6 +32,11 @@ def found(conditions: Sequence[Node], variables: Sequence[Node]) -> Point | None
     return None if best is None else _lowered(order, conditions, variables, best)
 
 
+def holds_at(condition: Node, point: Mapping[str, Value]) -> bool:
+    """Whether a condition holds at a point that has a value for each of its variables; not where it is undefined."""
+    return _all_hold(list(parts_first(condition)), [condition], point)
+
+
 def _pick(variable: Node, number: int, random: Random) -> Value:
     low, high = key_bounds(variable.kind)
     ends = [low, high]

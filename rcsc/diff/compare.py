@@ -1,0 +1,81 @@
+"""Two versions of programs compared: everything that changed, or the proof that nothing did.
+
+In: resolved programs. Out: a `ProgramDifference`. What a solver gives up on is named, and then nothing is called proved.
+"""
+
+from collections.abc import Callable, Iterable, Iterator
+
+from rcsc.diff import parts
+from rcsc.diff.align import aligned
+from rcsc.diff.difference import Difference, Part, ProgramDifference, Traces
+from rcsc.diff.revision import NotComparedError
+from rcsc.diff.sides import Side, pairs
+from rcsc.diff.tables import table_part
+from rcsc.diff.traces import traces
+from rcsc.diff.versions import Versions
+from rcsc.model import Program
+from rcsc.prove import smt
+from rcsc.prove.cover import UndecidedError
+from rcsc.prove.evaluation import TooLongError
+from rcsc.prove.options import Options
+
+
+def compare(name: str, before: Program, after: Program, options: Options) -> ProgramDifference:
+    """What changed between two versions of a program."""
+    made = aligned(before, after)
+    versions = Versions(made, options)
+    given_up: tuple[type[BaseException], ...] = (
+        UndecidedError,
+        TooLongError,
+        RecursionError,
+        *smt.troubles(),
+    )
+    undecided: list[str] = []
+    found: list[Part] = []
+    for what, steps in _steps(versions):
+        try:
+            found += steps()
+        except given_up:
+            undecided.append(what)
+    seen: tuple[Traces, ...] = ()
+    if not undecided:
+        try:
+            seen = tuple(one for one in traces(versions) if one.new or one.gone)
+        except given_up:
+            undecided.append("the state graphs of levels")
+    return ProgramDifference(name, made.changes, tuple(found), seen, tuple(undecided))
+
+
+def _steps(versions: Versions) -> Iterator[tuple[str, Callable[[], Iterable[Part]]]]:
+    """What is compared, one after the other, with what to call it where it cannot be decided."""
+    one = {str(table.name): table for table in versions.before.tables}
+    two = {str(table.name): table for table in versions.after.tables}
+    for name in dict.fromkeys((*one, *two)):
+        if name in one and name in two:
+            yield f"table `{name}`", lambda n=name: [table_part(versions, one[n], two[n])]  # type: ignore[misc]  # bound early
+        else:
+            said = ("gone",) if name in one else ("new",)
+            yield "", lambda n=name, s=said: [Part("table", n, s)]  # type: ignore[misc]  # bound early
+    yield "procedures", lambda: list(parts.procedures(versions))
+    yield "levels", lambda: list(parts.levels(versions))
+    yield "assumptions and invariants", lambda: list(parts.conditions(versions))
+
+
+def difference(before: Side, after: Side, options: Options, progress: Callable[[str], None]) -> Difference:
+    """What changed between two sides, program by program.
+
+    Raises:
+        NotComparedError: Neither side has a program.
+    """
+    if not before.programs and not after.programs:
+        raise NotComparedError(
+            "neither side has a table to compare", "give a file, or a folder with `*.rcs` files"
+        )
+    found, said = [], []
+    for name, one, two in pairs(before, after):
+        if one is None or two is None:
+            said.append(f"program `{name}` is {'new' if one is None else 'gone'}")
+        else:
+            progress(f"comparing {name}")
+            found.append(compare(name, one, two, options))
+    return Difference(before.name, after.name, tuple(found), tuple(said))

@@ -1,0 +1,214 @@
+"""Two versions of what is no table: procedures, what a level runs around its table, conditions with a name, periods.
+
+In: versions. Out: `Part`s.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping
+from functools import partial
+
+from rcsc.diff.contrast import changes, contrast
+from rcsc.diff.difference import Basis, Change, Part, Sort
+from rcsc.diff.versions import Doing, Runner, Versions
+from rcsc.diff.words import number
+from rcsc.interpret import call, execute
+from rcsc.model import (
+    Assumption,
+    Call,
+    Expr,
+    Int,
+    Invariant,
+    Level,
+    OneTable,
+    Procedure,
+    ProcedureName,
+    Program,
+    Real,
+    Scalar,
+    Statement,
+    Value,
+)
+from rcsc.prove import values
+from rcsc.prove.effect import Effect
+from rcsc.prove.values import TRUE, Node
+
+
+def procedures(versions: Versions) -> Iterator[Part]:
+    """Every procedure that both versions have, called with the same arguments.
+
+    Raises:
+        UndecidedError, TooLongError, RecursionError: As `tables.table_part`.
+    """
+    later = versions.digests[1].procedures
+    for name, one in versions.digests[0].procedures.items():
+        if name in later:
+            yield _procedure(versions, one, later[name])
+
+
+def _procedure(versions: Versions, one: Procedure, two: Procedure) -> Part:
+    name, (first, second) = str(one.name), versions.digests
+    if first.procedure(name) == second.procedure(name):
+        return Part("procedure", name, basis=Basis.DIGEST)
+    calls: list[Statement] = [Call(ProcedureName(name))]
+    apart = sorted(versions.aligned.apart & (first.touched(calls, ()) | second.touched(calls, ())))
+    if apart:
+        return Part("procedure", name, (f"cannot be compared: `{apart[0]}` changed its kind",))
+    if [(p.name, _kind(p.type)) for p in one.params] != [(p.name, _kind(p.type)) for p in two.params]:
+        return Part("procedure", name, ("its parameters changed",))
+    args = [
+        values.variable(
+            p.name if p.name not in versions.kinds else f"argument {p.name}", _narrower(p.type, q.type)
+        )
+        for p, q in zip(one.params, two.params, strict=True)
+    ]
+    runner = partial(_call, name, [node.name for node in args])
+    effects = [meaning.procedure(name, args) for meaning in versions.meanings()]
+    return _effects(versions, "procedure", name, (effects[0], effects[1]), (runner, runner))
+
+
+def _kind(kind: Scalar) -> object:
+    """The type without its bounds."""
+    return (type(kind), kind.unit) if isinstance(kind, Int | Real) else kind
+
+
+def _narrower(one: Scalar, two: Scalar) -> Scalar:
+    """The values of both types, one kind."""
+    match one, two:
+        case Int(), Int():
+            return Int(max(one.low, two.low), min(one.high, two.high), one.unit)
+        case Real(), Real():
+            return Real(max(one.low, two.low), min(one.high, two.high), one.unit)
+        case _:
+            return one
+
+
+def _call(name: str, args: list[str], program: Program, now: dict[str, Value]) -> None:
+    call(program, name, [now.pop(arg) if arg.startswith("argument ") else now[arg] for arg in args], now)
+
+
+def _run(body: list[Statement], program: Program, now: dict[str, Value]) -> None:
+    execute(program, body, now, {})
+
+
+def _effects(
+    versions: Versions, what: str, name: str, pair: tuple[Effect, Effect], runners: tuple[Runner, Runner]
+) -> Part:
+    """Where two effects differ, all inputs free."""
+    before = versions.queries
+    one, two = (Doing(name, effect, run, {}) for effect, run in zip(pair, runners, strict=True))
+    made = contrast(versions, TRUE, (one, two))
+    found = changes(versions, Sort.EFFECT, (name, name), TRUE, TRUE, made) if made.differ else []
+    return Part(what, name, (), tuple(found), (), Basis.SOLVER, versions.queries - before)
+
+
+# --- levels ----------------------------------------------------------------------------------
+
+
+def levels(versions: Versions) -> Iterator[Part]:
+    """Every level that both versions have: period, which table runs when, and what runs before and behind it.
+
+    Raises:
+        UndecidedError, TooLongError, RecursionError: As `tables.table_part`.
+    """
+    later = {level.name: level for level in versions.after.levels}
+    for one in versions.before.levels:
+        two = later.get(one.name)
+        if two is None:
+            yield Part("level", one.name, ("gone",))
+            continue
+        yield Part("level", one.name, tuple(_level(one, two)), basis=Basis.DIGEST)
+        yield _sequence(versions, "preprocess", one.name, (one.preprocess, two.preprocess))
+        yield _sequence(versions, "postprocess", one.name, (one.postprocess, two.postprocess))
+    known = {level.name for level in versions.before.levels}
+    yield from (Part("level", name, ("new",)) for name in later if name not in known)
+
+
+def _level(one: Level, two: Level) -> Iterator[str]:
+    """What changed of the level itself."""
+    if one.period_ms != two.period_ms:
+        yield f"period: {one.period_ms} ms, now {two.period_ms} ms"
+    first, second = _chosen(one), _chosen(two)
+    for at in dict.fromkeys((*first, *second)):
+        if first.get(at) != second.get(at):
+            yield f"table for {at or 'every cycle'}: {first.get(at, 'none')}, now {second.get(at, 'none')}"
+    if _selector(one) != _selector(two):
+        yield "which command chooses the table"
+
+
+def _chosen(level: Level) -> Mapping[str, str]:
+    if isinstance(level.tables, OneTable):
+        return {"": f"`{level.tables.table}`"}
+    kind = level.tables.selector.type
+    return {number(kind, value): f"`{table}`" for value, table in level.tables.tables}
+
+
+def _selector(level: Level) -> Expr | None:
+    return None if isinstance(level.tables, OneTable) else level.tables.selector
+
+
+def _sequence(
+    versions: Versions, what: str, level: str, names: tuple[tuple[str, ...], tuple[str, ...]]
+) -> Part:
+    """What runs before a level's table, or behind it, as one run."""
+    bodies: list[list[Statement]] = [[Call(ProcedureName(name)) for name in part] for part in names]
+    first, second = versions.digests
+    if first.body(bodies[0]) == second.body(bodies[1]):
+        return Part(what, level, basis=Basis.DIGEST)
+    apart = sorted(versions.aligned.apart & (first.touched(bodies[0], ()) | second.touched(bodies[1], ())))
+    if apart:
+        return Part(what, level, (f"cannot be compared: `{apart[0]}` changed its kind",))
+    one, two = (m.effect(body) for m, body in zip(versions.meanings(), bodies, strict=True))
+    return _effects(versions, what, level, (one, two), (partial(_run, bodies[0]), partial(_run, bodies[1])))
+
+
+# --- conditions --------------------------------------------------------------------------------
+
+
+def conditions(versions: Versions) -> Iterator[Part]:
+    """Assumptions, invariants, and when deferred values are taken.
+
+    Raises:
+        UndecidedError: As `tables.table_part`.
+    """
+    before, after = versions.before, versions.after
+    for what, one, two in (
+        ("assumption", _named(before.assumptions), _named(after.assumptions)),
+        ("invariant", _named(before.invariants), _named(after.invariants)),
+        ("deferred value", _deferred(before), _deferred(after)),
+    ):
+        for name in dict.fromkeys((*one, *two)):
+            if name not in two or name not in one:
+                if what != "deferred value":  # the declaration says so
+                    yield Part(what, name, ("gone" if name not in two else "new",))
+            else:
+                yield _condition(versions, what, name, (one[name], two[name]))
+    standing = {str(known.name): known.standing for known in before.assumptions}
+    for assumption in after.assumptions:
+        was = standing.get(str(assumption.name), assumption.standing)
+        if was is not assumption.standing:
+            said = f"{was.value}, now {assumption.standing.value}"
+            yield Part("standing of assumption", str(assumption.name), (said,))
+
+
+def _named(conditions: Iterable[Assumption | Invariant]) -> dict[str, Expr]:
+    return {str(one.name): one.condition for one in conditions}
+
+
+def _deferred(program: Program) -> dict[str, Expr]:
+    return {str(v.name): v.deferred_until for v in program.variables if v.deferred_until is not None}
+
+
+def _condition(versions: Versions, what: str, name: str, pair: tuple[Expr, Expr]) -> Part:
+    """Where a condition was true and is not now, and the other way."""
+    if repr(pair[0]) == repr(pair[1]):
+        return Part(what, name, basis=Basis.DIGEST)
+    before = versions.queries
+    first, second = versions.meanings()
+    one, two = first.condition(pair[0]), second.condition(pair[1])
+    found: list[Change] = []
+    for labels, region in ((("true", "false"), _but(one, two)), (("false", "true"), _but(two, one))):
+        found += changes(versions, Sort.CONDITION, labels, versions.shared.one(region))
+    return Part(what, name, (), tuple(found), (), Basis.SOLVER, versions.queries - before)
+
+
+def _but(one: Node, two: Node) -> Node:
+    return values.both(one, values.negation(two))

@@ -1,0 +1,295 @@
+"""A table's graph, derived from what its lines mean.
+
+In: a program and one of its tables, as written too. Out: a `StateGraph`, and notes on what the graph does not hold; or why there is
+none. Which line leads from which state to which is answered by Z3 (`prove.steps`); the words on the edges are the table's own.
+"""
+
+from dataclasses import dataclass, field, replace
+
+from rcsc.diagnostics.codes import Code
+from rcsc.diagnostics.diagnostic import Diagnostic, Label
+from rcsc.graph import words
+from rcsc.graph.model import ANY, Edge, StateGraph
+from rcsc.model import (
+    Action,
+    Assign,
+    Bool,
+    Default,
+    Enum,
+    Int,
+    Kind,
+    Line,
+    Program,
+    Table,
+    Value,
+    Variable,
+    key_bounds,
+    spell,
+)
+from rcsc.prove.options import Options
+from rcsc.prove.smt import troubles
+from rcsc.prove.steps import MOST_STATES, Step, Steps, UnansweredError
+from rcsc.syntax import tree
+from rcsc.syntax.spell import spell_condition, spell_expr
+
+
+@dataclass(frozen=True, slots=True)
+class Derived:
+    """A table's graph.
+
+    Attributes:
+        everywhere: Terms that every edge which leaves a state by itself states, and that are left out of `shown`.
+        lost: What the graph does not hold, in sentences; no proof rests on them.
+    """
+
+    graph: StateGraph
+    everywhere: str = ""
+    lost: tuple[str, ...] = ()
+
+
+def derive(
+    program: Program, table: Table, file: tree.File, options: Options, state: str = ""
+) -> Derived | Diagnostic:
+    """The graph of a table.
+
+    Args:
+        program: What runs the table.
+        table: One of its tables.
+        file: The file that declares the table.
+        options: Limits of the solver.
+        state: The variable whose values are the states; "" for `cur_state`, else the only one that fits.
+    """
+    chosen = _state(program, table, state)
+    if isinstance(chosen, Diagnostic):
+        return chosen
+    written = next(
+        one for one in file.declarations if isinstance(one, tree.TableDecl) and one.name.text == table.name
+    )
+    try:
+        return _Derivation(program, table, file, written, Steps(program, table, chosen, options)).derived()
+    except UnansweredError:
+        return _undecided(table)
+    except troubles():
+        return _undecided(table)
+
+
+def _undecided(table: Table) -> Diagnostic:
+    message = f"the steps of table `{table.name}` are not decided within the limits"
+    return Diagnostic(Code.UNDECIDED, message, Label(table.span), help=("raise `--timeout`",))
+
+
+def _state(program: Program, table: Table, wanted: str) -> Variable | Diagnostic:
+    """The variable whose values are the states."""
+    fit = [v for v in program.variables if v.kind is Kind.STATE and not v.name.endswith(".next") and _few(v)]
+    if wanted:
+        found = [v for v in fit if v.name == wanted]
+    else:
+        found = [v for v in fit if v.name == "cur_state"] or [
+            v for v in fit if isinstance(v.type, Enum) and v.name in table.variables
+        ]
+    if len(found) == 1:
+        return found[0]
+    several = f"several variables could be the state of table `{table.name}`: " + ", ".join(
+        f"`{v.name}`" for v in found
+    )
+    none = (
+        f"`{wanted}` is no state variable of few values"
+        if wanted
+        else f"table `{table.name}` has no variable that could be its state"
+    )
+    helps = ("name one with `--state`: an enumeration, a boolean or a few integers",)
+    return Diagnostic(Code.GRAPH_NO_STATE, several if found else none, Label(table.span), help=helps)
+
+
+def _few(variable: Variable) -> bool:
+    low, high = key_bounds(variable.type)
+    return isinstance(variable.type, Enum | Bool | Int) and high - low < MOST_STATES
+
+
+@dataclass(slots=True)
+class _Derivation:
+    """One table's graph in the making."""
+
+    program: Program
+    table: Table
+    file: tree.File
+    written: tree.TableDecl
+    steps: Steps
+    lost: list[str] = field(default_factory=list)
+
+    def derived(self) -> Derived:
+        states = self.steps.states()
+        steps = self.steps.steps(states)
+        edges: list[Edge] = []
+        for at, line in enumerate(self._lines()):
+            edges += self._edges(at, line, [one for one in steps if one.line == at], states)
+        common = self._common(edges)
+        edges = [self._eased(edge, common) for edge in edges]
+        self._comments()
+        used = tuple(
+            name for name in map(self._spelled, states) if any(name in (e.source, e.target) for e in edges)
+        )
+        graph = StateGraph(
+            self.table.name,
+            self.steps.state.name,
+            tuple(edges),
+            self.steps.state.deferred_until is not None,
+            self._spelled(self.steps.state.initial),
+            tuple(self.table.assumptions),
+            tuple(one.path for one in self.file.declarations if isinstance(one, tree.Use)),
+            self._columns(),
+            tuple(line.name for line in self._lines()),
+            used,
+        )
+        return Derived(graph, words.guard(common), tuple(self.lost))
+
+    # --- words ---
+
+    def _lines(self) -> list[Line | Default]:
+        return [*self.table.lines, *([self.table.default] if self.table.default else [])]
+
+    def _row(self, at: int) -> tree.Row:
+        name = self._lines()[at].name
+        return next(row for row in self.written.rows if row.name == name)
+
+    def _spelled(self, value: Value) -> str:
+        return spell(self.steps.state.type, value)
+
+    def _is_state(self, heading: tree.Heading) -> bool:
+        return heading.subject is not None and spell_expr(heading.subject) == self.steps.state.name
+
+    def _columns(self) -> str:
+        left = [_heading(one) for one in self.written.conditions]
+        right = [_heading(one) for one in self.written.actions]
+        return f"{' | '.join(left)} || {' | '.join(right)}".strip()
+
+    def _terms(self, at: int, columns: tuple[int, ...] | None = None) -> list[tree.Expr]:
+        """What the line's cells say, the state's left out; of these columns only where they are given."""
+        cells = zip(self.written.conditions, self._row(at).conditions, strict=True)
+        return [
+            words.term(heading, cell)
+            for column, (heading, cell) in enumerate(cells)
+            if cell is not None and not self._is_state(heading) and (columns is None or column in columns)
+        ]
+
+    # --- edges ---
+
+    def _edges(self, at: int, line: Line | Default, steps: list[Step], states: list[Value]) -> list[Edge]:
+        """The edges of one line, drawn from every state at once where it is so."""
+        default = "" if isinstance(line, Line) else f"DEFAULT{' unreachable' if line.unreachable else ''}"
+        sources = list(dict.fromkeys(one.source for one in steps))
+        goal = self._goal(line.actions)
+        if goal is not None and goal in sources and sources != states:
+            goal = None  # a loop says that nothing is written: here the action has to say it
+        by = self._deciders(line.actions, goal)
+        stays = goal is None and not by
+        effect = self._effect(self._row(at), line.actions, goal)
+        base = Edge(line.name, ANY, ANY, words.guard(self._terms(at)), effect, default=default)
+        if not steps:
+            return self._unreached(base, goal, at)
+        anywhere = sources == states and (stays or all(one.target == goal for one in steps))
+        self._narrowed(at, [] if anywhere else sources)
+        if anywhere:
+            return [replace(base, target=ANY if goal is None else self._spelled(goal))]
+        return [
+            replace(
+                base,
+                source=self._spelled(one.source),
+                target=self._spelled(one.target),
+                decided="" if stays or one.target == goal else by,
+            )
+            for one in steps
+        ]
+
+    def _goal(self, actions: tuple[Action, ...]) -> Value | None:
+        """The state to which one action goes, whatever the input, before any other can write it; None where none does."""
+        writers = [action for action in actions if self.steps.writes(action)]
+        goals = [self.steps.sets(action) for action in writers]
+        return goals[0] if goals and all(goal is None for goal in goals[1:]) else None
+
+    def _deciders(self, actions: tuple[Action, ...], goal: Value | None) -> str:
+        """The actions that can write the state, but the one that the edge says."""
+        writers = [action for action in actions if self.steps.writes(action)]
+        return ", ".join(action.text for action in (writers if goal is None else writers[1:]))
+
+    def _unreached(self, base: Edge, goal: Value | None, at: int) -> list[Edge]:
+        """A DEFAULT line that is never reached is drawn for what it says; another line has no edge."""
+        if base.default:
+            return [replace(base, target=ANY if goal is None else self._spelled(goal))]
+        self.lost.append(
+            f"line `{self._lines()[at].name}` matches nothing under the assumptions and has no edge"
+        )
+        return []
+
+    def _narrowed(self, at: int, sources: list[Value]) -> None:
+        """Says so where the states written are not those from which the edges come."""
+        stated = [
+            spell_condition(cell, whole=False)
+            for heading, cell in zip(self.written.conditions, self._row(at).conditions, strict=True)
+            if cell is not None and self._is_state(heading)
+        ]
+        names = [self._spelled(one) for one in sources]
+        again = names[0] if len(names) == 1 else "in {" + ", ".join(names) + "}" if names else ""
+        before = " and ".join(stated)
+        if before != again and not self._row(at).default:
+            said, then = (f"`{text}`" if text else "a blank" for text in (before, again))
+            name = self._lines()[at].name
+            self.lost.append(f"line `{name}`: {said} under `{self.steps.state.name}` comes back as {then}")
+
+    def _effect(self, row: tree.Row, actions: tuple[Action, ...], goal: Value | None) -> str:
+        """The action cells, without the one action that the edge itself says."""
+        left = list(actions)
+        told = None if goal is None else next(one for one in actions if self.steps.writes(one))
+        cells = []
+        for cell in row.actions:
+            written = (cell,) if isinstance(cell, tree.Comparison) else cell
+            taken = [_taken(left) for _ in written]
+            cells.append("; ".join(one.text for one in taken if one is not told))
+        return words.effect(tuple(map(_heading, self.written.actions)), tuple(cells))
+
+    # --- what is shown ---
+
+    def _common(self, edges: list[Edge]) -> list[tree.Expr]:
+        """Terms of every edge that leaves a state by itself."""
+        own = [words.terms_of(edge.guard) for edge in edges if edge.source != ANY]
+        return [one for one in own[0] if all(one in terms for terms in own)] if len(own) > 1 else []
+
+    def _eased(self, edge: Edge, common: list[tree.Expr]) -> Edge:
+        if edge.default:
+            return edge
+        at = next(at for at, line in enumerate(self._lines()) if line.name == edge.line)
+        source = None if edge.source == ANY else self._value(edge.source)
+        terms = self._terms(at, self.steps.needed(at, source))
+        if source is not None:
+            terms = [one for one in terms if one not in common]
+        return replace(edge, shown=words.guard(terms))
+
+    def _value(self, name: str) -> Value:
+        return next(value for value in self.steps.states() if self._spelled(value) == name)
+
+    def _comments(self) -> None:
+        many = (
+            len(self.written.doc)
+            + len(self.written.comments)
+            + sum(len(row.comments) for row in self.written.rows)
+        )
+        if many:
+            self.lost.append(f"{many} lines of comment")
+
+
+def _heading(heading: tree.Heading) -> str:
+    return heading.word if heading.subject is None else spell_expr(heading.subject)
+
+
+def _taken(left: list[Action]) -> Action:
+    """The next action written; the assignment of a whole record is several in the model."""
+    first = left.pop(0)
+    while left and isinstance(first.statement, Assign) and _of_one(first, left[0]):
+        left.pop(0)
+    return first
+
+
+def _of_one(first: Action, other: Action) -> bool:
+    one, two = first.statement, other.statement
+    alike = other.heading == first.heading and other.text == first.text
+    return alike and isinstance(one, Assign) and isinstance(two, Assign) and one.place != two.place

@@ -1,0 +1,79 @@
+"""The graph of lines: which line can match in the cycle after which.
+
+In: a program and one of its tables. Out: a `StateGraph` whose nodes are lines: it is drawn in every form, but no table is made of it. An
+edge says what must hold for the second line to match, beside what follows from the first having matched. A line that can follow most
+others is drawn once, from every line, with the lines that it cannot follow.
+"""
+
+from rcsc.diagnostics.codes import Code
+from rcsc.diagnostics.diagnostic import Diagnostic, Label
+from rcsc.graph import words
+from rcsc.graph.derive import Derived
+from rcsc.graph.model import ANY, LINES, Edge, StateGraph
+from rcsc.model import Program, Table
+from rcsc.prove.follow import Follow, following
+from rcsc.prove.options import Options
+from rcsc.prove.steps import UnansweredError
+from rcsc.syntax import tree
+
+_MOST = 2 / 3
+"""A line that can follow more than this share of the lines is drawn from every line."""
+
+
+def derive_lines(program: Program, table: Table, file: tree.File, options: Options) -> Derived | Diagnostic:
+    """The graph of a table's lines; the level that runs the table, if one does, is followed for a whole cycle."""
+    try:
+        follows = following(program, table, options)
+    except UnansweredError:
+        message = f"which lines of table `{table.name}` can follow which is not decided within the limits"
+        return Diagnostic(Code.UNDECIDED, message, Label(table.span), help=("raise `--timeout`",))
+    written = next(
+        one for one in file.declarations if isinstance(one, tree.TableDecl) and one.name.text == table.name
+    )
+    names = [row.name for row in written.rows if not row.default] + [
+        row.name for row in written.rows if row.default
+    ]
+    rows = {row.name: row for row in written.rows}
+    terms = [_terms(written, rows[name]) for name in names]
+    live = sorted({one.line for one in follows})
+    edges: list[Edge] = []
+    many = [at for at in live if sum(one.then == at for one in follows) > _MOST * len(live)]
+    own = [one for one in follows if one.then not in many]
+    common = _common([list(terms[one.then].values()) for one in own])
+    for at in live:
+        before = [one for one in follows if one.then == at]
+        if at in many:
+            edges.append(_from_any(names, at, before, terms[at], live))
+        else:
+            edges += [_edge(names, one, terms[at], common) for one in before]
+    graph = StateGraph(
+        table.name, LINES, tuple(edges), lines=tuple(names), states=tuple(names[at] for at in live)
+    )
+    return Derived(graph, words.guard(common))
+
+
+def _terms(written: tree.TableDecl, row: tree.Row) -> dict[int, tree.Expr]:
+    cells = enumerate(zip(written.conditions, row.conditions, strict=True))
+    return {at: words.term(heading, cell) for at, (heading, cell) in cells if cell is not None}
+
+
+def _common(every: list[list[tree.Expr]]) -> list[tree.Expr]:
+    return [one for one in every[0] if all(one in terms for terms in every)] if len(every) > 1 else []
+
+
+def _edge(names: list[str], follow: Follow, terms: dict[int, tree.Expr], common: list[tree.Expr]) -> Edge:
+    shown = [terms[at] for at in follow.needed if terms[at] not in common]
+    whole = words.guard(list(terms.values()))
+    return Edge("", names[follow.line], names[follow.then], whole, shown=words.guard(shown))
+
+
+def _from_any(
+    names: list[str], at: int, before: list[Follow], terms: dict[int, tree.Expr], live: list[int]
+) -> Edge:
+    never = [names[one] for one in live if one not in {follow.line for follow in before}]
+    whole = words.guard(list(terms.values()))
+    needed = {column for follow in before for column in follow.needed}
+    shown = words.guard([terms[column] for column in sorted(needed)])
+    return Edge(
+        "", ANY, names[at], whole, shown=shown, decided=f"never after {', '.join(never)}" if never else ""
+    )

@@ -1,0 +1,134 @@
+"""Whether the table that a graph says does what another table does: proved, or refuted by an input.
+
+In: a file that declares a table, and the table to stand in its place. Out: the program with it, and the verdict.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from rcsc.diagnostics.codes import Code
+from rcsc.diagnostics.diagnostic import Diagnostic, Label, WitnessColumn
+from rcsc.model import Program, Table, spell
+from rcsc.project import Loaded
+from rcsc.prove.options import Options
+from rcsc.prove.same import Comparison, Differs, NotDecided, Same, compare
+from rcsc.resolve import resolve
+from rcsc.source import Source, Span
+from rcsc.syntax import tree
+from rcsc.syntax.format import format_file
+from rcsc.syntax.parse import parse
+
+MOST_NAMED = 3
+"""Variables named of those that differ."""
+
+
+@dataclass(frozen=True, slots=True)
+class Against:
+    """The verdict on a table in place of another.
+
+    Attributes:
+        found: Why it is not the same; empty where it is proved.
+        questions: How many the proof put to Z3.
+        sources: Texts that `found` points into.
+    """
+
+    found: tuple[Diagnostic, ...]
+    questions: int = 0
+    sources: Mapping[str, Source] | None = None
+
+
+def in_place(file: tree.File, table: tree.TableDecl) -> str:
+    """The file's text with the table in the place of the one of its name, or at its end; comments above a table stay."""
+    kept: list[tree.Declaration] = []
+    there = False
+    for one in file.declarations:
+        if isinstance(one, tree.TableDecl) and one.name.text == table.name.text:
+            there = True
+            kept.append(replace(table, comments=one.comments, doc=one.doc))
+        else:
+            kept.append(one)
+    declarations = tuple(kept) if there else (*kept, table)
+    return format_file(replace(file, declarations=declarations))
+
+
+def against(
+    loaded: Loaded, root: str, program: Program, table: Table, new: tree.TableDecl, options: Options
+) -> Against:
+    """Whether the new table does what the present one does.
+
+    Args:
+        loaded: Has the files of the program.
+        root: The root file of the program.
+        program: What `root` resolves to.
+        table: The present table.
+        new: The table to stand in its place.
+        options: Limits of the solver.
+    """
+    name = f"{table.file} (from the graph)"
+    text = in_place(loaded.files[table.file], new)
+    parsed = parse(Source(table.file, text))
+    if not isinstance(parsed, tree.File):
+        return Against(parsed, sources={table.file: Source(table.file, text)})
+    sources = {**loaded.sources, table.file: Source(table.file, text)}
+    changed = replace(loaded, files={**loaded.files, table.file: parsed}, sources=sources)
+    resolved = resolve(root, changed)
+    if not isinstance(resolved, Program):
+        shown = tuple(_renamed(one, table.file, name) for one in resolved)
+        return Against(shown, sources={**loaded.sources, name: Source(name, text)})
+    other = next(one for one in resolved.tables if one.name == table.name)
+    verdict = compare((program, table), (resolved, other), options)
+    if isinstance(verdict, Same) and set(other.assumptions) != set(table.assumptions):
+        return Against((_assuming(table, other),))
+    questions = verdict.questions if isinstance(verdict, Same) else 0
+    return Against(_findings(verdict, program, table), questions, loaded.sources)
+
+
+def _renamed(found: Diagnostic, file: str, name: str) -> Diagnostic:
+    def moved(label: Label) -> Label:
+        span = label.span
+        return Label(Span(name, span.start, span.end), label.message) if span.file == file else label
+
+    return replace(found, primary=moved(found.primary), related=tuple(map(moved, found.related)))
+
+
+def _assuming(table: Table, other: Table) -> Diagnostic:
+    message = f"the graph's table `{table.name}` does not rest on the same assumptions"
+    names = [", ".join(f"`{name}`" for name in one.assumptions) or "none" for one in (table, other)]
+    return Diagnostic(
+        Code.GRAPH_DIFFERS,
+        message,
+        Label(table.span),
+        notes=(f"the table: {names[0]}; the graph: {names[1]}",),
+    )
+
+
+def _findings(verdict: Comparison, program: Program, table: Table) -> tuple[Diagnostic, ...]:
+    match verdict:
+        case Same():
+            return ()
+        case NotDecided():
+            message = f"whether the graph says table `{table.name}` is not decided within the limits"
+            return (Diagnostic(Code.UNDECIDED, message, Label(table.span), help=("raise `--timeout`",)),)
+        case Differs(witness=witness, first=first, second=second, changed=changed):
+            shown = [
+                (v, value) for v, value in witness if any(v.name == one.name for one in program.variables)
+            ]
+            column = WitnessColumn(
+                table.name,
+                tuple(v.name for v, _ in shown),
+                tuple(spell(v.type, value) for v, value in shown),
+            )
+            what = f"the table comes to {_outcome(first)}, the graph to {_outcome(second)}"
+            more = f" and {len(changed) - MOST_NAMED} more" if len(changed) > MOST_NAMED else ""
+            after = (
+                f"afterwards these differ: {', '.join(f'`{name}`' for name in changed[:MOST_NAMED])}{more}"
+            )
+            message = f"the graph does not say table `{table.name}`: {what} for some input"
+            notes = (after,) if changed else ()
+            return (
+                Diagnostic(Code.GRAPH_DIFFERS, message, Label(table.span), notes=notes, witnesses=(column,)),
+            )
+
+
+def _outcome(name: str) -> str:
+    return name if " " in name else f"line `{name}`"
