@@ -39,8 +39,10 @@ def test_every_code_is_explained_and_most_by_example() -> None:
         assert not found.title.endswith(".")
         assert len(found.text) > 30
     without = {code for code, found in explanations().items() if not found.wrong}
-    runs = {code for code in without if code.value[3] == "7"}  # no text of a table shows a recorded run
-    assert len(without - runs) <= 20
+    runs = {
+        code for code in without if code.value[3] in "79"
+    }  # no text of a table shows a recorded run, or a bug in rcsc
+    assert len(without - runs) <= 18
     assert {code.value[3] for code in without} >= {"9"}
 
 

@@ -7,9 +7,14 @@ from typing import TYPE_CHECKING
 import click
 
 from rcsc import __version__
-from rcsc.cli.cell import db, run
+from rcsc.cli.campaign import campaign
+from rcsc.cli.cell import db
+from rcsc.cli.diff import diff
+from rcsc.cli.graph import graph, table
 from rcsc.cli.logs import log, replay
 from rcsc.cli.options import PATHS, proving, showing
+from rcsc.cli.prove import prove
+from rcsc.cli.script import run
 from rcsc.cli.shell import shell
 from rcsc.cli.show import Output, Progress, show
 from rcsc.diagnostics.report import Report
@@ -273,5 +278,5 @@ def completion(shell: str) -> int:
     return 0
 
 
-for _command in (db, log, replay, run, shell):
+for _command in (campaign, db, diff, graph, log, prove, replay, run, shell, table):
     commands.add_command(_command)

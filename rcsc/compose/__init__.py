@@ -1,0 +1,50 @@
+"""The levels proved together: for any delay, any order of commands, any answer of the database.
+
+What is proved, of each level alone in its environment (`level`):
+
+- every assumption of its tables holds in every cycle in which the table runs; exactly one line matches; DEFAULT is
+  not reached where it is said to be unreachable; no state is written directly while another is pending;
+- a command number is taken up once, and no other command replaces an order before its echo, but for a new command;
+- what it guarantees its neighbours: its report echoes the number and the command of the order that it took in that
+  very cycle (so that none is lost and none echoed that was not run); its orders change only together with their
+  numbers, and numbers come one after the other.
+
+What it assumes of its environment, the contract (`transition`), in words:
+
+- of the superior: an order that it takes under the number that it took last is the same order, as far as the superior
+  numbers it. Otherwise nothing: any command, at any moment, whether or not the last one was echoed, done, or seen;
+- of a subordinate, whose report it may see late, twice or never: (1) what is reported under the number of the last
+  order is about the command of that order; (2) the number after the last one is not echoed; (3) once the last order
+  is echoed, it stays so until another is given. Nothing of the status, of how long anything takes, nor of reports
+  about older orders;
+- of the database: the same question has the same answer. Of everything else: its declared range.
+
+Why the contract may be assumed. Let a superior U publish orders, a subordinate D take them and publish reports,
+through buffers that hold the latest value, whole (`system.buffers`; processes copy under a sequence lock,
+`system.shared`). What D takes was published by U, never older than what it took before; likewise back. Suppose that
+up to some cycle every level has kept its guarantees. U's orders are then numbered one after the other, so that two
+orders under one number are the same, or 65536 numbers apart. D's report echoes the order that it took: so what is
+reported under number *n* is about order *n* (1); no number is echoed that was not sent (2); as D takes no older
+order, it keeps echoing the last one (3); and an order taken twice under one number is one order. So the contract
+holds up to the next cycle, in which, by the proofs of the levels, every guarantee is kept again; at first it holds
+because both begin with the same order (checked, `system`). This is induction over cycles of all levels at once: a
+guarantee in a cycle rests on contracts about what was published before it. So levels are proved one by one, and the
+cost grows with their number.
+
+What it rests on besides:
+
+- *Numbers.* They are 16 bits and wrap; here they are exact. "65536 numbers apart" is excluded by *freshness*: nobody
+  is so late that all numbers go round meanwhile, which takes at least 65536 cycles, 43 minutes at 40 ms. A level that
+  waits for echoes before it orders again cannot come near it (`WAITS`).
+- *Restarts.* A level may begin anew at any moment as `system.adopt` says: its order is PAUSE under the number after the
+  one that it finds echoed, and what it takes counts as seen. Such a beginning is proved like the first. For its
+  neighbours it is an order that is superseded, or a report that failed; freshness then asks more: no order that the
+  level gave before and that is not echoed yet may still be on its way, for it has the number that is now used again.
+- *Reals* and arithmetic are followed as far as `keyed` says; the rest may take any value.
+- What stands outside the levels (workstation, robot, hand, camera) keeps to the same contract by its own means; it is
+  listed, not proved.
+
+Modules, in the order the data flows: `contract` (who is whose environment), `transition` (a cycle as nodes), `keyed`
+(nodes as terms), `goals`, `features` (what an invariant may speak of), `walk` (states to begin with), `projection`
+(the invariant), `level`, `system`, `trace` (the shortest failing run, run by the interpreter).
+"""

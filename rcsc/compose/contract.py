@@ -1,0 +1,134 @@
+"""What a level may take its environment to do: the contract of its buffers.
+
+In: a system's description and its programs. Out: for each level its `Links`: who gives it orders, to whom it gives
+orders, and which inputs the database fills. The names of the fields are those of section 9 of Haynes et al. (1984): an
+order has `inc_command` and `input_command`, a report `inc_command_echo`, `ref_command_echo` and `status_report`.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from rcsc.model import Kind, Program
+from rcsc.system.description import BadDescription, Description
+
+NUMBER, COMMAND = "inc_command", "input_command"
+ECHO, ECHOED, STATUS = "inc_command_echo", "ref_command_echo", "status_report"
+
+
+@dataclass(frozen=True, slots=True)
+class Below:
+    """A subordinate.
+
+    Attributes:
+        name: Of the level, or of what stands outside.
+        order: This level's output record that orders it.
+        report: The input record in which it reports.
+        outside: Whether it is no level of the system.
+    """
+
+    name: str
+    order: str
+    report: str
+    outside: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Above:
+    """The superior.
+
+    Attributes:
+        order: The input record in which it orders.
+        report: This level's output record that reports to it.
+        numbered: Leaves of the order that are the same wherever the number is (not the number itself).
+    """
+
+    name: str
+    order: str
+    report: str
+    outside: bool
+    numbered: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """What the database fills: the same keys give the same answer."""
+
+    into: str
+    leaves: tuple[str, ...]
+    keys: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Links:
+    """One level's environment; `free` are the inputs that nothing is known of but their ranges."""
+
+    level: str
+    above: Above | None
+    below: tuple[Below, ...]
+    asked: tuple[Asked, ...]
+    free: tuple[str, ...]
+
+
+def leaves_under(program: Program, record: str) -> tuple[str, ...]:
+    """The leaves of a record, array or scalar variable, in declared order."""
+    inside = (f"{record}.", f"{record}[")
+    return tuple(str(v.name) for v in program.variables if v.name == record or v.name.startswith(inside))
+
+
+def links(system: Description, level: str, program: Program) -> Links:
+    """The environment of a level, with every leaf of its order taken to be numbered.
+
+    Raises:
+        BadDescription: An order has no report to answer it, or a report no order.
+    """
+    inputs = {_variable(w.target): _owner(w.source) for w in system.wires if _owner(w.target) == level}
+    outputs = {_variable(w.source): _owner(w.target) for w in system.wires if _owner(w.source) == level}
+    names = {str(v.name) for v in program.variables}
+    levels = {spec.name for spec in system.levels}
+    above: Above | None = None
+    below: list[Below] = []
+    used: set[str] = set()
+    for record, owner in inputs.items():
+        back = [made for made, to in outputs.items() if to == owner]
+        if f"{record}.{NUMBER}" in names:
+            report = _one(back, names, ECHO, f"{level}.{record}", owner)
+            order = leaves_under(program, record)
+            numbered = tuple(leaf for leaf in order if leaf != f"{record}.{NUMBER}")
+            above = Above(owner, record, report, owner not in levels, numbered)
+            used |= {*order}
+        elif f"{record}.{ECHO}" in names:
+            order_record = _one(back, names, NUMBER, f"{level}.{record}", owner)
+            below.append(Below(owner, order_record, record, owner not in levels))
+            used |= {*leaves_under(program, record)}
+    feeds = next((spec.feeds for spec in system.levels if spec.name == level), ())
+    asked = tuple(Asked(feed.into, leaves_under(program, feed.into), feed.keys) for feed in feeds)
+    used |= {leaf for one in asked for leaf in one.leaves}
+    free = tuple(str(v.name) for v in program.variables if v.kind is Kind.INPUT and v.name not in used)
+    return Links(level, above, tuple(below), asked, free)
+
+
+def answered(all_links: Mapping[str, Links]) -> tuple[tuple[str, Below, str], ...]:
+    """Each pair of neighbouring levels: the upper one, its view of the lower one, and the lower one's name."""
+    return tuple(
+        (one.level, below, below.name)
+        for one in all_links.values()
+        for below in one.below
+        if not below.outside
+    )
+
+
+def _one(back: list[str], names: set[str], field: str, where: str, owner: str) -> str:
+    fitting = [record for record in back if f"{record}.{field}" in names]
+    if len(fitting) != 1:
+        raise BadDescription(
+            f"`{where}` needs one buffer to `{owner}` with `{field}`, and has {len(fitting)}"
+        )
+    return fitting[0]
+
+
+def _owner(end: str) -> str:
+    return end.partition(".")[0]
+
+
+def _variable(end: str) -> str:
+    return end.partition(".")[2]

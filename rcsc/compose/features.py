@@ -1,0 +1,243 @@
+"""What the invariants may speak of: features of a state, each with a few values.
+
+In: one cycle from anywhere, and the nodes that are to be proved. Out: the `Feature`s in their cone. Nothing here names a table or
+a state; all of it is read from the model:
+
+- leaves of few values that conditions of tables, assumptions or the contract read, and flags;
+- whether two leaves are equal that the level itself compares: an order and the last one, a number and the one seen;
+- which class of a wide leaf's values a cell of a table tells apart;
+- whether a test variable still is what its module would compute now: a module that reads inputs only says the same again
+  as long as its inputs stay, which is what makes a line that matches again do the same again.
+"""
+
+from collections.abc import Container, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+
+from rcsc.compose.contract import COMMAND
+from rcsc.compose.transition import GHOST, Cycle, Leaves, Stepper
+from rcsc.interpret import call, holds
+from rcsc.model import (
+    Apply,
+    Bool,
+    Call,
+    Enum,
+    Expr,
+    Kind,
+    OneTable,
+    Op,
+    Procedure,
+    Program,
+    Read,
+    Scalar,
+    Test,
+    Value,
+    key_of,
+    pending,
+    spell,
+)  # fmt: skip
+from rcsc.prove import values
+from rcsc.prove.symbolic import Run
+from rcsc.prove.values import Node
+from rcsc.questions import parts
+from rcsc.resolve.leaves import everything, expressions, read_by
+
+MOST_VALUES = 32
+"""Members up to which an enumeration is a feature."""
+
+
+@dataclass(frozen=True, slots=True)
+class Feature:
+    """A leaf of few values; or, as a truth value, whether it equals another leaf, or what a module computes of it.
+
+    Attributes:
+        parts: Whether it is one of those that part the states.
+    """
+
+    leaf: str
+    kind: Scalar
+    other: str = ""
+    module: Procedure | None = field(default=None, repr=False)
+    test: Test | None = field(default=None, repr=False)
+    parts: bool = False
+
+    @property
+    def name(self) -> str:
+        """In the tables' words."""
+        if self.test is not None:
+            return f"({self.leaf} {self.test.text})"
+        if self.module is not None:
+            return f"({self.leaf} is as `{self.module.name}` computes it)"
+        return f"({self.leaf} = {self.other})" if self.other else self.leaf
+
+    @property
+    def size(self) -> int:
+        """How many values it has."""
+        return len(self.kind.members) if isinstance(self.kind, Enum) else 2
+
+    def node(self, leaves: Leaves) -> Node:
+        """Its value in a state."""
+        if self.test is not None:
+            return Run({}, {}, dict(leaves)).evaluate(self.test.condition)
+        if self.module is not None:
+            kinds = {name: node.kind for name, node in leaves.items()}
+            run = Run({self.module.name: self.module}, kinds, dict(leaves))
+            run.execute((Call(self.module.name),))
+            return values.equal(leaves[self.leaf], run.leaf(self.leaf))
+        return values.equal(leaves[self.leaf], leaves[self.other]) if self.other else leaves[self.leaf]
+
+    def shown(self, value: int) -> str:
+        """A value in the tables' words."""
+        return spell(self.kind, value)
+
+
+def cone(cycle: Cycle, goals: Iterable[Node]) -> frozenset[str]:
+    """The leaves whose values before a cycle can influence the goals, now or in a later cycle."""
+    found: set[str] = set()
+    waiting = [name for name in values.variables(goals) if name in cycle.before]
+    while waiting:
+        name = waiting.pop()
+        if name not in found:
+            found.add(name)
+            waiting += [one for one in values.variables([cycle.after[name]]) if one in cycle.before]
+    return frozenset(found)
+
+
+def features(stepper: Stepper, cycle: Cycle, goals: Iterable[Node]) -> tuple[Feature, ...]:
+    """The features in the cone of the goals, in declared order."""
+    inside = cone(cycle, goals)
+    program, kinds = stepper.program, stepper.kinds
+    read = _read(stepper)
+    computed = {leaf: module for leaf, module in _computed(stepper) if leaf in read}
+    chosen = [
+        name
+        for name, kind in kinds.items()
+        if _small(kind) and (name in computed or (name in inside and (name in read or _flag(program, name))))
+    ]
+    parting = {
+        *_selector(stepper),
+        *(name for name in chosen if _flag(program, name) and name not in computed),
+    }
+    found = [Feature(name, kinds[name], parts=name in parting) for name in chosen]
+    pairs = sorted({*compared(program), *_questions(stepper)})
+    found += [Feature(one, Bool(), other) for one, other in pairs if {one, other} <= inside and one in kinds]
+    found += [Feature(leaf, Bool(), module=module) for leaf, module in computed.items()]
+    found += _cells(stepper, {*inside, *computed})
+    return tuple(found)
+
+
+def point(stepper: Stepper, chosen: tuple[Feature, ...], state: Mapping[str, Value]) -> tuple[int, ...]:
+    """The features of a state that was run; modules are run by the interpreter."""
+    again: dict[str, dict[str, Value]] = {}
+    found = []
+    for one in chosen:
+        if one.test is not None:
+            found.append(int(holds(one.test, state)))
+        elif one.module is not None:
+            if one.module.name not in again:
+                again[one.module.name] = dict(state)
+                call(stepper.program, one.module.name, [], again[one.module.name])
+            found.append(int(state[one.leaf] == again[one.module.name][one.leaf]))
+        elif one.other:
+            found.append(int(state[one.leaf] == state[one.other]))
+        else:
+            found.append(key_of(one.kind, state[one.leaf]))
+    return tuple(found)
+
+
+def _small(kind: Scalar) -> bool:
+    return isinstance(kind, Bool) or (isinstance(kind, Enum) and len(kind.members) <= MOST_VALUES)
+
+
+def _flag(program: Program, name: str) -> bool:
+    """A truth value that the level itself keeps."""
+    return any(
+        v.name == name and isinstance(v.type, Bool) and v.kind is Kind.STATE for v in program.variables
+    )
+
+
+def _read(stepper: Stepper) -> set[str]:
+    """Leaves that decide which line runs, or that the contract speaks of; with what they will be."""
+    program, level = stepper.program, stepper.level
+    conditions = [one.condition for one in program.assumptions]
+    conditions += [
+        test.condition
+        for table in program.tables
+        for line in table.lines
+        for test in line.tests
+        if test is not None
+    ]
+    if not isinstance(level.tables, OneTable):
+        conditions.append(level.tables.selector)
+    found = {str(name) for condition in conditions for name in read_by(condition)}
+    found |= {f"{below.order}.{COMMAND}" for below in stepper.links.below}
+    found |= {f"{GHOST}{asked.into}" for asked in stepper.links.asked}
+    return found | {
+        str(pending(v.name)) for v in program.variables if v.deferred_until is not None and v.name in found
+    }
+
+
+def _computed(stepper: Stepper) -> Iterator[tuple[str, Procedure]]:
+    """Leaves that a module of the preprocess computes of inputs, flags, and what it writes itself."""
+    variables = {str(v.name): v for v in stepper.program.variables}
+    for name in stepper.level.preprocess:
+        module = stepper.procedures[name]
+        used = {
+            str(read)
+            for one in everything(module.body)
+            for expr in expressions(one)
+            for read in read_by(expr)
+        }
+        calls = any(isinstance(one, Call) for one in everything(module.body))
+        own = set(map(str, module.writes))
+        free = all(
+            variables[leaf].kind is Kind.INPUT or _flag(stepper.program, leaf) or leaf in own for leaf in used
+        )
+        if free and not calls and module.extern is None:
+            for leaf in module.writes:
+                yield str(leaf), module
+
+
+def _cells(stepper: Stepper, inside: Container[str]) -> Iterator[Feature]:
+    """Conditions of cells on one leaf of many values: which of its classes it is in."""
+    seen = set()
+    kinds = stepper.kinds
+    for table in stepper.program.tables:
+        for line in table.lines:
+            for test in line.tests:
+                if test is None or test.box is None:
+                    continue
+                leaf = str(test.variables[0])
+                if not _small(kinds[leaf]) and leaf in inside and (leaf, test.box) not in seen:
+                    seen.add((leaf, test.box))
+                    yield Feature(leaf, Bool(), test=test)
+
+
+def compared(program: Program) -> Iterator[tuple[str, str]]:
+    """Pairs of leaves that some procedure, or a deferral, compares for equality."""
+    conditions: list[Expr] = [v.deferred_until for v in program.variables if v.deferred_until is not None]
+    conditions += [
+        expr
+        for procedure in program.procedures
+        for one in everything(procedure.body)
+        for expr in expressions(one)
+    ]
+    for condition in conditions:
+        for part in parts(condition):
+            match part:
+                case Apply(op=Op.EQ | Op.NE, args=(Read(name=one), Read(name=two))) if one != two:
+                    yield min(str(one), str(two)), max(str(one), str(two))
+                case _:
+                    pass
+
+
+def _questions(stepper: Stepper) -> Iterator[tuple[str, str]]:
+    """What was asked of the database, and what would be asked now."""
+    for asked in stepper.links.asked:
+        for key in asked.keys:
+            yield f"{GHOST}{asked.into} {key}", key
+
+
+def _selector(stepper: Stepper) -> Iterator[str]:
+    """The leaves that select the table."""
+    if not isinstance(stepper.level.tables, OneTable):
+        yield from map(str, read_by(stepper.level.tables.selector))

@@ -1,0 +1,284 @@
+"""One cycle of a level in its environment, as nodes: derived from the model that the executors are emitted from.
+
+In: a program, its level, the links. Out: `Cycle`s. A cycle takes the inputs, settles deferred values, runs preprocess, the
+selected table and postprocess, exactly as `interpret.cycle` does; what the environment may do is a condition on what is taken.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+
+from rcsc.compose.contract import COMMAND, ECHO, ECHOED, NUMBER, Below, Links
+from rcsc.interpret import evaluate
+from rcsc.model import (
+    Action,
+    Bool,
+    Call,
+    Enum,
+    Int,
+    Kind,
+    Level,
+    OneTable,
+    Op,
+    Procedure,
+    Program,
+    Scalar,
+    Snapshot,
+    Table,
+    pending,
+)  # fmt: skip
+from rcsc.prove import values
+from rcsc.prove.evaluation import State
+from rcsc.prove.symbolic import Run
+from rcsc.prove.values import FALSE, TRUE, Node
+from rcsc.system.adopt import FAILED
+
+GHOST = "asked "
+"""Names of what the proof remembers and the level does not: that the database was asked, and for which keys."""
+
+SEEN = "inc_command_seen"
+"""The number of the command being worked on; a level that restarts counts the one in its buffer as seen."""
+Leaves = dict[str, Node]
+NUMBERS = 65536
+"""Command numbers that there are (16 bits)."""
+
+
+@dataclass(frozen=True, slots=True)
+class TableAt:
+    """A table in one cycle.
+
+    Attributes:
+        chosen: When it is the one that runs.
+        matches: When each of its lines matches, in order.
+        assumptions: When each of its assumptions holds, by name.
+    """
+
+    table: Table
+    chosen: Node
+    matches: tuple[Node, ...]
+    assumptions: Mapping[str, Node]
+
+    @property
+    def none(self) -> Node:
+        """No line matches."""
+        return values.all_of(map(values.negation, self.matches))
+
+    def several(self) -> Node:
+        """At least two lines match."""
+        found, before = FALSE, FALSE
+        for match in self.matches:
+            found = values.either(found, values.both(before, match))
+            before = values.either(before, match)
+        return found
+
+
+@dataclass(frozen=True, slots=True)
+class Cycle:
+    """One cycle.
+
+    Attributes:
+        before: Every leaf as the last cycle left it, and the ghosts; inputs as last taken.
+        taken: The inputs of this cycle.
+        contract: What the environment keeps to.
+        middle: Every leaf that the table sees.
+        tables: Each table that may run.
+        after: Every leaf and ghost behind the cycle.
+    """
+
+    before: Leaves
+    taken: Leaves
+    contract: Node
+    middle: Leaves
+    tables: tuple[TableAt, ...]
+    after: Leaves
+
+
+@dataclass(slots=True)
+class Stepper:
+    """Makes cycles of one level."""
+
+    program: Program
+    level: Level
+    links: Links
+    procedures: dict[str, Procedure] = field(init=False)
+    kinds: dict[str, Scalar] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.procedures = {one.name: one for one in self.program.procedures}
+        self.kinds = {str(v.name): v.type for v in self.program.variables}
+        for asked in self.links.asked:
+            self.kinds[f"{GHOST}{asked.into}"] = Bool()
+            for key in asked.keys:
+                self.kinds[f"{GHOST}{asked.into} {key}"] = self.kinds[key]
+
+    def anywhere(self) -> Leaves:
+        """Any values at all: the start of a step of induction."""
+        return {name: values.variable(name, kind) for name, kind in self.kinds.items()}
+
+    def first(self) -> Leaves:
+        """The values before the first cycle."""
+        start = {str(v.name): values.constant(v.type, v.initial) for v in self.program.variables}
+        return {
+            **{name: values.constant(kind, 0) for name, kind in self.kinds.items() if name.startswith(GHOST)},
+            **start,
+        }
+
+    def restarted(self) -> Leaves:
+        """The values before the first cycle after a restart, as `system.adopt` makes them, whatever stood in the buffers.
+
+        A member that a state has no name for leaves it as it is initially, as there.
+        """
+        start = self.first()
+        inputs = {str(v.name) for v in self.program.variables if v.kind is Kind.INPUT}
+        start |= {
+            name: values.variable(f"{name} before restart", self.kinds[name]) for name in sorted(inputs)
+        }
+        for name, member in FAILED.items():
+            kind = self.kinds.get(name)
+            if isinstance(kind, Enum) and member in kind.members:
+                start[name] = values.constant(kind, kind.members.index(member))
+        if (above := self.links.above) is not None and SEEN in start:
+            start[SEEN] = start[f"{above.order}.{NUMBER}"]
+        for below in self.links.below:
+            start[f"{below.order}.{NUMBER}"] = successor(start[f"{below.report}.{ECHO}"])
+            start[f"{below.order}.{COMMAND}"] = values.constant(self.kinds[f"{below.order}.{COMMAND}"], 0)
+        return start
+
+    def of(self, program: Program) -> "Stepper":
+        """The same level with another program of the same leaves."""
+        return Stepper(
+            program, next(one for one in program.levels if one.name == self.level.name), self.links
+        )
+
+    def table_of(self, snapshot: Snapshot) -> str:
+        """The table that ran in a cycle, by what the cycle left: nobody but the environment writes what selects it."""
+        if isinstance(self.level.tables, OneTable):
+            return str(self.level.tables.table)
+        return str(dict(self.level.tables.tables)[evaluate(self.level.tables.selector, snapshot)])
+
+    def cycle(self, before: Leaves, suffix: str = " taken", taken: Leaves | None = None) -> Cycle:
+        """One cycle from `before`; the inputs it takes, if not given, are fresh variables, named with the suffix."""
+        if taken is None:
+            inputs = [v for v in self.program.variables if v.kind is Kind.INPUT]
+            taken = {str(v.name): values.variable(f"{v.name}{suffix}", v.type) for v in inputs}
+        run = Run(self.procedures, self.kinds, dict(before))
+        run.state.leaves.update(taken)
+        ghosts, answers = self._database(before, taken)
+        contract = values.both(self._protocol(before, taken), answers)
+        self._settle(run)
+        run.execute(Call(self.procedures[name].name) for name in self.level.preprocess)
+        middle = {**before, **run.state.leaves}
+        tables = tuple(self._tables(run))
+        self._lines(run, tables)
+        run.execute(Call(self.procedures[name].name) for name in self.level.postprocess)
+        after = {**before, **run.state.leaves, **ghosts}
+        return Cycle(before, taken, contract, middle, tables, after)
+
+    # --- the environment ---
+
+    def _protocol(self, before: Leaves, taken: Leaves) -> Node:
+        """What holds of orders and reports, whatever the delay (`compose.__doc__`)."""
+        kept = TRUE
+        if (above := self.links.above) is not None:
+            number = f"{above.order}.{NUMBER}"
+            same = values.all_of(values.equal(before[leaf], taken[leaf]) for leaf in above.numbered)
+            kept = values.both(kept, values.follows(values.equal(before[number], taken[number]), same))
+        for below in self.links.below:
+            kept = values.both(kept, self._echo(below, before, taken))
+        return kept
+
+    @staticmethod
+    def _echo(below: Below, before: Leaves, taken: Leaves) -> Node:
+        """The last order's number with another command is not echoed, nor a number not yet sent; what is echoed stays so."""
+        sent, last = before[f"{below.order}.{NUMBER}"], before[f"{below.report}.{ECHO}"]
+        echo = taken[f"{below.report}.{ECHO}"]
+        it = values.equal(taken[f"{below.report}.{ECHOED}"], before[f"{below.order}.{COMMAND}"])
+        now = values.equal(echo, sent)
+        stays = values.follows(values.equal(last, sent), now)
+        return values.all_of(
+            (values.follows(now, it), stays, values.negation(values.equal(echo, successor(sent))))
+        )
+
+    def _database(self, before: Leaves, taken: Leaves) -> tuple[Leaves, Node]:
+        """What was asked, and that the same question has the same answer."""
+        ghosts: Leaves = {}
+        kept = TRUE
+        for asked in self.links.asked:
+            again = before[f"{GHOST}{asked.into}"]
+            for key in asked.keys:
+                name = f"{GHOST}{asked.into} {key}"
+                ghosts[name] = taken.get(key, before[key])
+                again = values.both(again, values.equal(before[name], ghosts[name]))
+            same = values.all_of(values.equal(before[leaf], taken[leaf]) for leaf in asked.leaves)
+            kept = values.both(kept, values.follows(again, same))
+            ghosts[f"{GHOST}{asked.into}"] = TRUE
+        return ghosts, kept
+
+    # --- the level ---
+
+    def _settle(self, run: Run) -> None:
+        deferred = [v for v in self.program.variables if v.deferred_until is not None]
+        ready = [run.evaluate(v.deferred_until) for v in deferred if v.deferred_until is not None]
+        later = [run.leaf(pending(v.name)) for v in deferred]
+        for variable, when, value in zip(deferred, ready, later, strict=True):
+            run.write(variable.name, value, when)
+
+    def _tables(self, run: Run) -> Iterable[TableAt]:
+        by_name = {table.name: table for table in self.program.tables}
+        if isinstance(self.level.tables, OneTable):
+            choices: list[tuple[Node, Table]] = [(TRUE, by_name[self.level.tables.table])]
+        else:
+            selector = run.evaluate(self.level.tables.selector)
+            choices = [
+                (values.equal(selector, values.constant(selector.kind, value)), by_name[name])
+                for value, name in self.level.tables.tables
+            ]
+        for chosen, table in choices:
+            assumptions = {
+                str(one.name): run.evaluate(one.condition)
+                for one in self.program.assumptions
+                if one.name in table.assumptions
+            }
+            matches = tuple(
+                values.all_of(run.evaluate(test.condition) for test in line.tests if test is not None)
+                for line in table.lines
+            )
+            yield TableAt(table, chosen, matches, assumptions)
+
+    def _lines(self, run: Run, tables: tuple[TableAt, ...]) -> None:
+        """Runs the line that matches, the first where there are several, of the table that is chosen."""
+        middle = run.state
+        ways: list[tuple[Node, State]] = []
+        for at in tables:
+            left = at.chosen
+            for match, line in zip(at.matches, at.table.lines, strict=True):
+                ways.append(_way(run, middle, values.both(left, match), line.actions))
+                left = values.both(left, values.negation(match))
+            if at.table.default is not None:
+                ways.append(_way(run, middle, left, at.table.default.actions))
+        names = {name for _, state in ways for name in state.leaves}
+        leaves = {}
+        for name in sorted(names):
+            found = run.start[name] if name not in middle.leaves else middle.leaves[name]
+            base = found
+            for when, state in reversed(ways):
+                found = values.choice(when, state.leaves.get(name, base), found)
+            leaves[name] = found
+        run.state = State({**middle.leaves, **leaves})
+
+
+def _way(run: Run, middle: State, when: Node, actions: tuple[Action, ...]) -> tuple[Node, State]:
+    """What the actions of one line leave."""
+    run.state = State(dict(middle.leaves))
+    with run.where(when):
+        for action in actions:
+            run.state = State(dict(run.state.leaves))
+            run.execute((action.statement,))
+    return when, run.state
+
+
+def successor(number: Node) -> Node:
+    """The number after this one, of 16 bits."""
+    one, many = values.constant(number.kind, 1), values.constant(Int(0, NUMBERS), NUMBERS)
+    return values.arithmetic(
+        Op.MOD, (values.arithmetic(Op.ADD, (number, one), Int(0, NUMBERS)), many), number.kind
+    )
