@@ -268,7 +268,9 @@ def test_a_restart_is_what_the_system_does(level: str) -> None:
             assert node.low == int(adopted[name]) or isinstance(node.kind, Real), name
     free = {name for name, node in stepper.restarted().items() if not node.known}
     inputs = {str(v.name) for v in stepper.program.variables if v.kind is Kind.INPUT}
-    numbers = {f"{below.order}.inc_command" for below in stepper.links.below}
+    numbers = {f"{below.order}.inc_command" for below in stepper.links.below} | (
+        {"to_camera.number"} & set(start)
+    )
     assert free == inputs | numbers | {"inc_command_seen"}
     assert all(adopted[name] == 1 for name in numbers)  # the one after the one that stands echoed
 
@@ -279,13 +281,6 @@ def test_a_restart_is_what_the_system_does(level: str) -> None:
 @pytest.mark.parametrize("level", ["gripper", "vision"])
 def test_the_controllers_are_proved_in_their_environment(level: str) -> None:
     assert prove_level(steppers(SHIPPED)[level], LITTLE).open == ()
-
-
-@pytest.mark.slow
-def test_every_assumption_of_primitive_is_proved_with_two_subordinates() -> None:
-    proof = prove_level(steppers(SHIPPED)["primitive"], Effort(walks=40, cycles=80))
-    assert {goal.sort for goal in proof.open} <= {Sort.NUMBERED}  # the robot's poses follow under one number
-    assert len([1 for goal, _ in proof.found if goal.sort is Sort.ASSUMPTION]) == 10
 
 
 def test_without_deferral_the_published_argument_is_found_in_three_cycles() -> None:
@@ -299,9 +294,6 @@ def test_without_deferral_the_published_argument_is_found_in_three_cycles() -> N
     assert "assumption `in_step` fails" in "\n".join(time_line(stepper, trace))
 
 
-@pytest.mark.xfail(
-    strict=True, reason="a path is measured from where the robot was when the database was asked"
-)
 def test_a_path_begins_where_the_robot_is() -> None:
     """`here` settles when PAUSE is echoed; a command that comes in that very cycle finds `origin` answered for the place before."""
     stepper = steppers(SHIPPED)["emove"]

@@ -98,4 +98,5 @@ def test_every_dependency_has_a_tested_range() -> None:
     for requirement in project["dependencies"]:
         assert re.fullmatch(r"[a-z0-9-]+>=[\d.]+,<\d+", requirement), requirement
     assert project["requires-python"] == ">=3.11"
-    assert "mujoco" not in " ".join(project["dependencies"])
+    named = {re.split("[>=<]", requirement)[0] for requirement in project["dependencies"]}
+    assert {"z3-solver", "lark", "mujoco-core", "numpy", "hypothesis", "jinja2"} <= named

@@ -264,7 +264,7 @@ def test_the_three_parts_of_a_level_are_one_cycle_of_it(kind: Kind) -> None:
     """The interpreter, a part at a time, leaves what the executor leaves; the line, too."""
     commands = inhabited(kind)
     do(commands, *MOVE)
-    for _ in range(60):
+    for _ in range(80):
         for level in commands.session.levels:
             level.take(commands.session.memory)
             level.values = level.executor.values()

@@ -79,7 +79,7 @@ static void emove_do_receive(emove_t *s)
         s->ref_vision_in = (uint8_t)(int64_t)s->vision.ref_command_echo;
         s->vision_status_in = (uint8_t)(int64_t)s->vision.status_report;
     }
-    s->idle = ((((((int64_t)s->ref_command_in == INT64_C(0)) && ((int64_t)s->status_in == INT64_C(0))) && ((int64_t)s->ref_vision_in == INT64_C(0))) && ((int64_t)s->vision_status_in == INT64_C(0))) && (s->begun || (((int64_t)s->primitive.inc_command_echo == (int64_t)s->to_primitive.inc_command) && ((int64_t)s->vision.inc_command_echo == (int64_t)s->to_vision.inc_command))));
+    s->idle = ((((((((int64_t)s->ref_command_in == INT64_C(0)) && ((int64_t)s->status_in == INT64_C(0))) && ((int64_t)s->ref_vision_in == INT64_C(0))) && ((int64_t)s->vision_status_in == INT64_C(0))) && (s->begun || (((int64_t)s->primitive.inc_command_echo == (int64_t)s->to_primitive.inc_command) && ((int64_t)s->vision.inc_command_echo == (int64_t)s->to_vision.inc_command)))) && ((int64_t)s->here == (int64_t)s->here_asked)) && ((int64_t)s->here_sector == (int64_t)s->here_sector_asked));
 }
 
 /* How long the path would be that begins now; whether the part is still there. */
@@ -127,6 +127,13 @@ static void emove_do_answer(emove_t *s)
     s->report.ref_command_echo = (uint8_t)(int64_t)s->command.input_command;
     s->report.status_report = (uint8_t)(int64_t)s->status_report;
     s->report.failure = (uint8_t)(int64_t)s->failure;
+}
+
+/* Behind the table: the next cycle's question. */
+static void emove_do_asked(emove_t *s)
+{
+    s->here_asked = (uint8_t)(int64_t)s->here;
+    s->here_sector_asked = (uint8_t)(int64_t)s->here_sector;
 }
 
 /* This line answers the new command. */
@@ -1158,6 +1165,8 @@ void emove_init(emove_t *s)
     s->here = (uint8_t)INT64_C(0);
     s->here_next = (uint8_t)INT64_C(0);
     s->here_sector = (uint8_t)INT64_C(0);
+    s->here_asked = (uint8_t)INT64_C(0);
+    s->here_sector_asked = (uint8_t)INT64_C(0);
     s->depart_first = (uint16_t)INT64_C(0);
     s->depart_count = (uint8_t)INT64_C(0);
     s->path_length = (uint8_t)INT64_C(0);
@@ -1610,6 +1619,9 @@ int32_t emove_emove_cycle(emove_t *s)
             } else {
                 s->fault = 2; /* no table for it: proved impossible */
             }
+        }
+        if (s->fault == 0) {
+            emove_do_asked(s);
         }
         if (s->fault == 0) {
             emove_do_send(s);

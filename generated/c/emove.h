@@ -258,6 +258,8 @@ typedef struct {
     uint8_t here; /* state; 0 .. 255; Where the robot is; 0 while it moves. */
     uint8_t here_next; /* state; the deferred next value of here */
     uint8_t here_sector; /* state; 0 .. 99 */
+    uint8_t here_asked; /* state; 0 .. 255; What the database was asked in this cycle: the answer to a new place comes a cycle after it, and a path is not planned before. */
+    uint8_t here_sector_asked; /* state; 0 .. 99 */
     uint16_t depart_first; /* state; 0 .. 9999; The departure of the path under way, kept because `here` is forgotten as soon as the robot moves. */
     uint8_t depart_count; /* state; 0 .. 31 */
     uint8_t path_length; /* state; 0 .. 62; How many points the path has. */

@@ -201,6 +201,8 @@ class State:
         "here",
         "here_next",
         "here_sector",
+        "here_asked",
+        "here_sector_asked",
         "depart_first",
         "depart_count",
         "path_length",
@@ -313,6 +315,8 @@ class State:
         self.here = 0  # Where the robot is; 0 while it moves.
         self.here_next = 0  # Where the robot is; 0 while it moves.
         self.here_sector = 0
+        self.here_asked = 0  # What the database was asked in this cycle: the answer to a new place comes a cycle after it, and a path is not planned before.
+        self.here_sector_asked = 0
         self.depart_first = 0  # The departure of the path under way, kept because `here` is forgotten as soon as the robot moves.
         self.depart_count = 0
         self.path_length = 0  # How many points the path has.
@@ -836,7 +840,7 @@ def _do_receive(s):
         s.status_in = s.primitive_status_report
         s.ref_vision_in = s.vision_ref_command_echo
         s.vision_status_in = s.vision_status_report
-    s.idle = (((((s.ref_command_in == 0) and (s.status_in == 0)) and (s.ref_vision_in == 0)) and (s.vision_status_in == 0)) and (s.begun or ((s.primitive_inc_command_echo == s.to_primitive_inc_command) and (s.vision_inc_command_echo == s.to_vision_inc_command))))
+    s.idle = (((((((s.ref_command_in == 0) and (s.status_in == 0)) and (s.ref_vision_in == 0)) and (s.vision_status_in == 0)) and (s.begun or ((s.primitive_inc_command_echo == s.to_primitive_inc_command) and (s.vision_inc_command_echo == s.to_vision_inc_command)))) and (s.here == s.here_asked)) and (s.here_sector == s.here_sector_asked))
 
 
 def _do_measure(s):
@@ -876,6 +880,12 @@ def _do_answer(s):
     s.report_ref_command_echo = s.command_input_command
     s.report_status_report = s.status_report
     s.report_failure = s.failure
+
+
+def _do_asked(s):
+    """Behind the table: the next cycle's question."""
+    s.here_asked = s.here
+    s.here_sector_asked = s.here_sector
 
 
 def _do_begin(s):
@@ -1947,6 +1957,7 @@ def emove_cycle(s):
             _do_measure(s)
             {0: _run_pause_emove, 1: _run_move_to, 2: _run_move_to_obj, 3: _run_locate, 4: _run_pickup, 5: _run_release_part}[s.command_input_command](s)
             if s.fault == 0:
+                _do_asked(s)
                 _do_send(s)
                 _do_answer(s)
         except _Refused as refused:

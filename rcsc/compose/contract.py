@@ -5,7 +5,6 @@ orders, and which inputs the database fills. The names of the fields are those o
 order has `inc_command` and `input_command`, a report `inc_command_echo`, `ref_command_echo` and `status_report`.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 from rcsc.model import Kind, Program
@@ -105,16 +104,6 @@ def links(system: Description, level: str, program: Program) -> Links:
     used |= {leaf for one in asked for leaf in one.leaves}
     free = tuple(str(v.name) for v in program.variables if v.kind is Kind.INPUT and v.name not in used)
     return Links(level, above, tuple(below), asked, free)
-
-
-def answered(all_links: Mapping[str, Links]) -> tuple[tuple[str, Below, str], ...]:
-    """Each pair of neighbouring levels: the upper one, its view of the lower one, and the lower one's name."""
-    return tuple(
-        (one.level, below, below.name)
-        for one in all_links.values()
-        for below in one.below
-        if not below.outside
-    )
 
 
 def _one(back: list[str], names: set[str], field: str, where: str, owner: str) -> str:

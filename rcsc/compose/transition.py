@@ -30,7 +30,7 @@ from rcsc.prove import values
 from rcsc.prove.evaluation import State
 from rcsc.prove.symbolic import Run
 from rcsc.prove.values import FALSE, TRUE, Node
-from rcsc.system.adopt import FAILED
+from rcsc.system.adopt import ECHOES, FAILED, ORDER
 
 GHOST = "asked "
 """Names of what the proof remembers and the level does not: that the database was asked, and for which keys."""
@@ -138,9 +138,16 @@ class Stepper:
                 start[name] = values.constant(kind, kind.members.index(member))
         if (above := self.links.above) is not None and SEEN in start:
             start[SEEN] = start[f"{above.order}.{NUMBER}"]
-        for below in self.links.below:
-            start[f"{below.order}.{NUMBER}"] = successor(start[f"{below.report}.{ECHO}"])
-            start[f"{below.order}.{COMMAND}"] = values.constant(self.kinds[f"{below.order}.{COMMAND}"], 0)
+        outputs = [
+            str(v.name) for v in self.program.variables if v.kind is Kind.OUTPUT and v.name.startswith(ORDER)
+        ]
+        for leaf in outputs:
+            record, _, part = leaf.partition(".")
+            echo = f"{record.removeprefix(ORDER)}.{ECHOES.get(part, '')}"
+            if part == COMMAND:
+                start[leaf] = values.constant(self.kinds[leaf], 0)
+            elif echo in start:
+                start[leaf] = successor(start[echo])
         return start
 
     def of(self, program: Program) -> "Stepper":

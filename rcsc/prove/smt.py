@@ -224,10 +224,6 @@ class Solver:
             return Answer.SATISFIABLE
         return Answer.UNSATISFIABLE if answer == z3.unsat else Answer.UNKNOWN
 
-    def core(self) -> tuple[str, ...]:
-        """Names of the constants assumed in the last check that cannot hold together; a small set, not the least."""
-        return tuple(sorted(str(one) for one in self._solver.unsat_core()))
-
     def script(self) -> str:
         """What is asserted as an SMT-LIB 2 script, with `(check-sat)` at its end."""
         return f"(set-logic ALL)\n{self._solver.to_smt2()}"

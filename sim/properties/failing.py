@@ -112,12 +112,14 @@ class RightReason:
         target = middle_of_pads(database, command.source, command.sector)
         if target is None:
             return True
-        near_mm = SEEN_MM if database.place(command.source)[1] else TAKEN_MM
+        looks = bool(database.place(command.source)[1])
+        near_mm = SEEN_MM if looks else TAKEN_MM
+        top = database.sizes[database.objects[command.obj]][:2]
         at = [pose.at_mm for pose in cycle.parts]
         here = [
             one
             for one, kind in enumerate(self._objects)
-            if kind == command.obj
+            if (kind == command.obj or (looks and database.sizes[database.objects[kind]][:2] == top))
             and dist(at[one][:2], target[:2]) < near_mm
             and dist(at[one], target) < SEEN_MM
         ]

@@ -10,6 +10,8 @@ from sim.properties.cycle import COUNTED, LETS_GO, Command, Cycle, last_point, m
 
 PLATE_MM = 3.0
 """The plate is this near to the point of a location: the robot's own tolerance of 1 mm, and what a clamped part pushes it aside."""
+CLOSING_TICKS = 40
+"""Fingers that were closing when TASK lost its state have closed by then."""
 PLACED_MM = 15.0
 """A part that was put down lies this near, aside, to where the fingers were to let go of it: 1 mm of vision, the slack between part
 and jaws, and in the V-block half of what a part slides until it lies on both walls."""
@@ -50,6 +52,7 @@ class DoneTrue:
         self._begun: Command | None = None
         self._objects = cycle.objects()
         self._before = cycle.joints
+        self._forgot: int | None = None  # when TASK lost its state, until the hand is empty
 
     def watch(self, cycle: Cycle) -> str | None:
         """In which way it is not."""
@@ -68,6 +71,10 @@ class DoneTrue:
     def _follow(self, cycle: Cycle) -> None:
         """Which part was in the fingers last, and whether a fault took it out of them."""
         believed = cycle.shown("task", "obj_now_in_gripper") != "null_obj"
+        if "task" in cycle.restarted:
+            self._forgot = cycle.tick
+        elif self._forgot is not None and not cycle.held and cycle.tick - self._forgot > CLOSING_TICKS:
+            self._forgot = None
         if cycle.held:
             self._in_hand = cycle.held[0]
             if cycle.command is not None and cycle.shown("task", "to_emove.input_command") == "pickup":
@@ -106,7 +113,8 @@ class DoneTrue:
         if self._excused:
             return None
         if believed == "null_obj":
-            return f"the hand holds part {cycle.held[0]}, and TASK knows of none" if cycle.held else None
+            unknown = cycle.held and self._forgot is None
+            return f"the hand holds part {cycle.held[0]}, and TASK knows of none" if unknown else None
         if not cycle.held:
             return f"TASK holds `{believed}`, and nothing is between the pads"
         known, _, _, grip_mm, tolerance_mm, *_ = cycle.database.fingers(
@@ -145,18 +153,20 @@ class CountsTrue:
         self._begun: Command | None = None
         self._was = self._difference(cycle)
         self._excused = False
+        self._forgot = -CLOSING_TICKS
 
     def watch(self, cycle: Cycle) -> str | None:
         """Which count is wrong."""
         if "task" in cycle.restarted:
-            self._excused = True  # it has forgotten what it counted
+            self._excused, self._forgot = True, cycle.tick  # it has forgotten what it counted
         if cycle.command is not self._begun:
             same = (
                 self._begun is not None
                 and cycle.command is not None
                 and self._begun.number == cycle.command.number
             )
-            self._excused = (self._excused and same) or (self.changed_pickup and _picking(cycle))
+            closing = cycle.tick - self._forgot < CLOSING_TICKS  # fingers may still take a part
+            self._excused = (self._excused and (same or closing)) or (self.changed_pickup and _picking(cycle))
             self._begun, self._was = cycle.command, self._difference(cycle)
         if cycle.command is None or cycle.ended != "done" or self._excused:
             return None
