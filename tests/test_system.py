@@ -13,7 +13,7 @@ from sim.cell import Lying, plant
 from sim.model import Body
 from sim.plant import Plant
 from sim.witness import placements
-from tests.cells import COMMAND_ENDS, PAUSE_ENDS, SCRIPT, SYSTEM, Cell, through_script
+from tests.cells import PAUSE_ENDS, SCRIPT, SYSTEM, Cell, through_script
 
 
 def world(database: Database) -> tuple[Plant]:

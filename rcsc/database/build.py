@@ -5,6 +5,7 @@ In: `cell.toml`, and the names of parts as the tables have them. Out: a SQLite f
 
 import hashlib
 import json
+import os
 import sqlite3
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
@@ -120,7 +121,7 @@ def build(data: Path, database: Path, objects: Sequence[str]) -> None:
         raise BadData((f"{data}: {type(error).__name__}: {error}",)) from error
     if rows.problems:
         raise BadData(rows.problems)
-    beside = database.with_name(f".{database.name}.new")
+    beside = database.with_name(f".{database.name}.{os.getpid()}.new")  # several processes may find it stale at once
     beside.unlink(missing_ok=True)
     database.parent.mkdir(parents=True, exist_ok=True)
     made = sqlite3.connect(beside)
