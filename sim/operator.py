@@ -53,7 +53,7 @@ class Operator:
             return {ORDER: self.sent}
         if self._row is not None:
             self._wait(tick, self._row, latest)
-            return {}
+            return {ORDER: self.sent}  # again: a buffer may have been lost
         return {} if self._alone else self._go_on(tick, latest)
 
     # --- the script ---

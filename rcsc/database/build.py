@@ -121,7 +121,9 @@ def build(data: Path, database: Path, objects: Sequence[str]) -> None:
         raise BadData((f"{data}: {type(error).__name__}: {error}",)) from error
     if rows.problems:
         raise BadData(rows.problems)
-    beside = database.with_name(f".{database.name}.{os.getpid()}.new")  # several processes may find it stale at once
+    beside = database.with_name(
+        f".{database.name}.{os.getpid()}.new"
+    )  # several processes may find it stale at once
     beside.unlink(missing_ok=True)
     database.parent.mkdir(parents=True, exist_ok=True)
     made = sqlite3.connect(beside)

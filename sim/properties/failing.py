@@ -18,8 +18,8 @@ REASONS: Mapping[str, frozenset[str]] = {
     "hand_stuck": HAND,
     "hand_weak": HAND,
     "jammed": HAND,
-    "slips": frozenset({"pic", "loc"}),
-    "drops": frozenset({"pic", "loc"}),
+    "slips": frozenset({"pic", "loc", "move"}),  # what slipped sits askew, and is pressed on where it is put
+    "drops": frozenset({"pic", "loc", "move"}),
     "blind": frozenset({"loc"}),
     "dark": frozenset({"loc"}),
     "late_ticks": frozenset({"loc"}),
@@ -93,11 +93,14 @@ class RightReason:
         if reason == "buf":
             return command.obj in cycle.counts and cycle.counts[command.obj] == 0
         if reason == "nothing_gripped":
-            return not cycle.held  # what was in the hand is lost, whatever took it
+            # what was in the hand is lost, whatever took it; or a level below has forgotten how far apart the fingers are
+            return not cycle.held or self._restarted
         if reason == "move" and command.name == "release" and not command.end_at and not command.here:
             return (
                 True  # it was changed in mid-motion: there is no location whose safe position it could go to
             )
+        if reason == "move" and not command.here:
+            return True  # it was stopped on its way: from there no straight line may lead where it is to go
         since = command.tick if not self._restarted else 0
         named = (name for name, at in cycle.last.items() if at >= since or name == "restarted")
         if any(reason in REASONS[name] for name in named):

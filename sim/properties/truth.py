@@ -112,6 +112,10 @@ class DoneTrue:
         believed = cycle.shown("task", "obj_now_in_gripper")
         if self._excused:
             return None
+        if (
+            believed == "unknown_object"
+        ):  # of which nothing is known; jammed fingers may have nothing between them
+            return None
         if believed == "null_obj":
             unknown = cycle.held and self._forgot is None
             return f"the hand holds part {cycle.held[0]}, and TASK knows of none" if unknown else None
@@ -166,7 +170,11 @@ class CountsTrue:
                 and self._begun.number == cycle.command.number
             )
             closing = cycle.tick - self._forgot < CLOSING_TICKS  # fingers may still take a part
-            self._excused = (self._excused and (same or closing)) or (self.changed_pickup and _picking(cycle))
+            believed = (
+                cycle.shown("task", "obj_now_in_gripper") != "null_obj"
+            )  # a part that a changed PICKUP has counted
+            still = same or closing or believed or bool(cycle.held)
+            self._excused = (self._excused and still) or (self.changed_pickup and _picking(cycle))
             self._begun, self._was = cycle.command, self._difference(cycle)
         if cycle.command is None or cycle.ended != "done" or self._excused:
             return None
