@@ -10,6 +10,8 @@ from sim.properties.cycle import COUNTED, LETS_GO, Command, Cycle, last_point, m
 
 PLATE_MM = 3.0
 """The plate is this near to the point of a location: the robot's own tolerance of 1 mm, and what a clamped part pushes it aside."""
+FALLS_MM = 20.0
+"""A part that is let go of higher than this above where it ends has fallen, and may have rolled."""
 CLOSING_TICKS = 40
 """Fingers that were closing when TASK lost its state have closed by then."""
 PLACED_MM = 15.0
@@ -139,6 +141,8 @@ class DoneTrue:
         there = middle_of_pads(cycle.database, command.dest, command.sector) if command.dest else None
         target = there or self._let_go  # RELEASE lets go where the hand is
         at = cycle.parts[self._in_hand].at_mm
+        if there is None and self._let_go[2] - at[2] > FALLS_MM:
+            return None  # it was let go of in the air: where it comes to rest nobody has said
         off_mm = dist(target[:2], at[:2])
         return f"part {self._in_hand} lies {off_mm:.1f} mm aside" if off_mm > PLACED_MM else None
 
