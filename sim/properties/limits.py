@@ -91,6 +91,8 @@ class ForceWithin:
             self._key = key
             known, *_, force_n, _ = cycle.database.fingers(*key)
             self._most_n = max(self._most_n, float(force_n)) if known else self._most_n
+        if "slips" in cycle.last:
+            return None  # what slipped sits askew, and is wedged between the pads where it is put down: it is not the motor that presses
         most_n = FORCE_SHARE * self._most_n + FORCE_N
         return f"{cycle.force_n:.0f} N, not {self._most_n:.0f}" if cycle.force_n > most_n else None
 
