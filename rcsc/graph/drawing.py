@@ -21,12 +21,14 @@ MOST_LETTERS = 34
 
 _STYLE = """
   svg { background: #fff; --ink: #1b1f24; --quiet: #59636e; --line: #8c959f; --state: #eef4fb; --edge: #2f6fb0; --badge: #fff; }
-  text { font: 11px ui-monospace, "DejaVu Sans Mono", Menlo, Consolas, monospace; fill: var(--ink); }
-  .title { font-size: 15px; font-weight: 600; } .quiet { fill: var(--quiet); }
-  .state { fill: var(--state); stroke: var(--edge); stroke-width: 1.4; } .name { text-anchor: middle; font-weight: 600; }
-  .arrow { fill: none; stroke: var(--line); stroke-width: 1.3; } .tip { fill: var(--line); }
+  text { font: 11px ui-monospace, "DejaVu Sans Mono", Menlo, Consolas, monospace; fill: #1b1f24; fill: var(--ink); }
+  .title { font-size: 15px; font-weight: 600; } .quiet { fill: #59636e; fill: var(--quiet); }
+  .state { fill: #eef4fb; fill: var(--state); stroke: #2f6fb0; stroke: var(--edge); stroke-width: 1.4; }
+  .name { text-anchor: middle; font-weight: 600; }
+  .arrow { fill: none; stroke: #8c959f; stroke: var(--line); stroke-width: 1.3; } .tip { fill: #8c959f; fill: var(--line); }
   .dashed { stroke-dasharray: 5 4; }
-  .badge { fill: var(--badge); stroke: var(--edge); stroke-width: 1.2; } .number { text-anchor: middle; font-size: 10px; }
+  .badge { fill: #fff; fill: var(--badge); stroke: #2f6fb0; stroke: var(--edge); stroke-width: 1.2; }
+  .number { text-anchor: middle; font-size: 10px; }
   .paper { fill: #fff; fill-opacity: .82; }
   @media (prefers-color-scheme: dark) {
     svg { background: #15191e; --ink: #e6edf3; --quiet: #9aa4af; --line: #6e7781; --state: #1c2b3a; --edge: #6cb0f5; --badge: #15191e; }
