@@ -213,6 +213,17 @@ def test_garbage_is_never_believed(data: st.DataObject) -> None:
         assert buffers.latest("wide.out") == pattern(2)
 
 
+def test_a_damaged_word_does_not_bring_back_what_was_before(buffers: SharedMemoryBuffers) -> None:
+    """Every byte of the word, changed to everything."""
+    buffers.commit("wide", complete(1))
+    at = buffers.layout.regions["wide"].at
+    word = buffers.block.read(at, 8)
+    for byte in range(8):
+        for value in range(256):
+            buffers.block.write(at, word[:byte] + bytes([value]) + word[byte + 1 :])
+            assert again(buffers).checkpoint("wide") in {complete(1), Absent.LOST}
+
+
 def test_a_block_of_noise_holds_nothing(buffers: SharedMemoryBuffers) -> None:
     for seed in range(200):
         buffers.block.write(0, seeded(seed).randbytes(buffers.layout.size))

@@ -31,6 +31,10 @@ LINE = 64  # bytes of a cache line: writers of different regions do not slow eac
 CHECKPOINT = 1 << 63
 MOST_BUFFERS = 63
 TRIES = 10_000
+# From one stamp to the next. Odd, so that slots take turns; and no byte of it is 00 or ff, so that the stamps differ in every
+# byte, whatever is carried: a damaged word does not name the slot before.
+STEP = 0x9E37_79B9_7F4A_7C15
+STAMPS = 1 << 64
 
 
 class Absent(Enum):
@@ -236,7 +240,7 @@ class SharedMemoryBuffers:
         region = self.layout.regions[name]
         held = self._image(name)
         # After garbage, a stamp that no reader has met: it would take the new value for one that it knows.
-        stamp = (held.stamp if held else time.time_ns()) + 1
+        stamp = ((held.stamp if held else time.time_ns()) + STEP) % STAMPS
         image = HEAD.pack(stamp, mask, self._checksum(stamp, mask, payload), 0) + payload
         at = region.place(stamp)
         self.block.set_word(at, 0)
