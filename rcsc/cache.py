@@ -138,17 +138,16 @@ def digest_of_tool() -> str:
 
 def _files(package: Path) -> Iterator[tuple[str, int, int]]:
     """Name, size and time of change of every file that rcsc is made of, in order."""
-    folders = [package, package.parent / "grammar"]
-    found = []
-    while folders:
-        folder = folders.pop()
-        if not folder.is_dir():
-            continue
-        with os.scandir(folder) as entries:
-            for entry in entries:
-                if entry.is_dir() and entry.name != "__pycache__":
-                    folders.append(Path(entry.path))
-                elif entry.name.endswith((".py", ".lark", ".jinja", ".md")):
-                    status = entry.stat()
-                    found.append((entry.path, status.st_size, status.st_mtime_ns))
-    yield from sorted(found)
+    folders = (package, package.parent / "grammar")
+    yield from sorted(file for folder in folders if folder.is_dir() for file in _files_below(str(folder)))
+
+
+def _files_below(folder: str) -> Iterator[tuple[str, int, int]]:
+    """These of one folder and those in it; `os.scandir` asks once for a folder where `Path.rglob` asks for each file."""
+    with os.scandir(folder) as entries:
+        for entry in entries:
+            if entry.name.endswith((".py", ".lark", ".jinja", ".md")):
+                status = entry.stat()
+                yield entry.path, status.st_size, status.st_mtime_ns
+            elif entry.name != "__pycache__" and entry.is_dir():
+                yield from _files_below(entry.path)

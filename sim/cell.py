@@ -11,7 +11,7 @@ from sim.kinematic import Kinematic
 from sim.model import USUAL, Body, Make
 from sim.physical import Physical
 from sim.plant import Plant
-from sim.reach import home, unreachable
+from sim.reach import home
 from sim.robot import Robot
 
 Backend = Literal["mujoco", "kinematic"]
@@ -64,14 +64,3 @@ def plant(
         else Kinematic(database, bodies, start, seed)
     )
     return Plant(database, mechanism, Robot(start), tuple(one.object for one in here))
-
-
-def checked(database: Database) -> None:
-    """Has the arm look at every point of the database, before anything moves.
-
-    Raises:
-        BadData: It cannot be somewhere.
-    """
-    problems = unreachable(database)
-    if problems:
-        raise BadData(problems)

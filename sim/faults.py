@@ -2,6 +2,11 @@
 
 from dataclasses import dataclass
 
+from sim.arm import Joints
+
+WEAK = 0.05
+"""What a weak motor has left of its force."""
+
 
 @dataclass(slots=True)
 class Faults:
@@ -46,3 +51,15 @@ class Faults:
     vise_stuck: bool = False
     vise_weak: bool = False
     vise_mute: bool = False
+
+    def reachable(self, before: Joints, goal: Joints) -> Joints:
+        """The goal, but for joints that are stuck where they were told to be last; both in radians."""
+        return tuple(
+            was if self.robot_stuck or self.joint_stuck == at else wanted
+            for at, (was, wanted) in enumerate(zip(before, goal, strict=True), 1)
+        )
+
+    @property
+    def motor(self) -> float:
+        """The share of its force that the motor of the fingers has."""
+        return WEAK if self.hand_weak else 1.0

@@ -12,12 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from rcsc.database.ask import Database, Station
+from rcsc.database.ask import Database
 from rcsc.database.pose import Pose, Rotation, Vector, apply, cross, dot, minus, transposed, unit
 from sim.arm import Joints, plate
 from sim.faults import Faults
 from sim.model import GAIN_N_M, OPEN_MM, Body
-from sim.physical import CLEAR, EMPTY_MM, JAWS_MM, NOISY, WEAK
+from sim.physical import CLEAR, EMPTY_MM, JAWS_MM, NOISY
 from sim.plant import CYCLE_S, Grip
 from sim.restore import plain, read
 from sim.vision.flood import Features, Found
@@ -136,11 +136,7 @@ class Kinematic:
         )
 
     def _move(self, goal: Joints) -> None:
-        stuck, was = self.faults.joint_stuck, self._joints
-        self._joints = tuple(
-            before if self.faults.robot_stuck or stuck == at else after
-            for at, (before, after) in enumerate(zip(self._joints, goal, strict=True), 1)
-        )
+        was, self._joints = self._joints, self.faults.reachable(self._joints, goal)
         self._pads = plate(self._joints) @ Pose(UPRIGHT, (0.0, 0.0, self.database.hand.tool_mm))
         if self._held is not None:
             if self.faults.slips and self._joints != was:
@@ -172,7 +168,7 @@ class Kinematic:
         wanted = max(before - far, min(before + far, grip.opening_mm))
         self._opening_mm = min(OPEN_MM, max(wanted, least) if wanted < before else wanted)
         met = (grip.opening_mm < least and self._opening_mm <= least) or self._opening_mm <= 0.0
-        self._force_n = grip.force_n * (WEAK if self.faults.hand_weak else 1.0) if met else 0.0
+        self._force_n = grip.force_n * self.faults.motor if met else 0.0
         if part is not None and met:
             self._hold(part)
         elif self._held is not None and self._opening_mm > least:
@@ -201,22 +197,14 @@ class Kinematic:
         if part is None:
             return
         body, pose = self.bodies[part], self._poses[part]
-        station = self._under(pose.at_mm)
+        station = self.database.station_below(pose.at_mm)
         floor = 0.0 if station is None else station.frame.at_mm[2]
-        low = pose.at_mm[2] - sum(abs(pose.axis(at)[2]) * body.size_mm[at] / 2 for at in range(3))
+        low = body.lowest_mm(pose)
         in_fixture = station is not None and (station.vise or station.vblock) and low - floor < REST_MM
         if not in_fixture:
             x, y, _ = pose.at_mm
             height = _extent(body, pose, (0.0, 0.0, 1.0))
             self._poses[part] = Pose(_square(pose.turn, (0.0, 0.0, 1.0)), (x, y, floor + height / 2))
-
-    def _under(self, at_mm: Vector) -> Station | None:
-        """The station below a point."""
-        for one in self.database.stations.values():
-            x, y, _ = one.frame.inside(at_mm)
-            if abs(x) <= one.size_mm[0] / 2 and abs(y) <= one.size_mm[1] / 2:
-                return one
-        return None
 
     # --- vise ---
 
@@ -247,21 +235,15 @@ class Kinematic:
 
     # --- camera ---
 
-    def flood(self, wanted: int) -> Found | None:
+    def flood(self, wanted: Features, expected_mm: float) -> Found | None:
         """What the image processing would say of a flood picture."""
-        size, expected_mm = self.database.sizes.get(wanted), float(self.database.part(wanted)[1])
-        if size is None or min(size) <= 0.0 or expected_mm <= 0.0:
-            return None
-        return perceive(self._tops(), Features(size[0], size[1]), expected_mm, self._rng, self._optics())
+        return perceive(self._tops(), wanted, expected_mm, self._rng, self._optics())
 
-    def lines(self, wanted: int) -> Surface | None:
+    def lines(self, expected_mm: float) -> Surface | None:
         """What it would say of a picture with two lines: of the top below it, if lines fall on one where they are looked for."""
-        expected_mm = float(self.database.part(wanted)[1])
         tops = [top for top in self._tops() if abs(top.range_mm - expected_mm) < LINE_MM]
         below = min(tops, key=lambda top: hypot(top.x_mm, top.y_mm), default=None)
-        if expected_mm <= 0.0 or below is None:
-            return None
-        return perceive_surface(below, self._rng, self._optics())
+        return None if below is None else perceive_surface(below, self._rng, self._optics())
 
     def _optics(self) -> Optics:
         return NOISY if self.faults.noisy else CLEAR

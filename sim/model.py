@@ -15,7 +15,7 @@ from itertools import starmap
 from math import cos, radians, sin, sqrt
 
 from rcsc.database.ask import Database, Station
-from rcsc.database.pose import Rotation, Vector
+from rcsc.database.pose import Pose, Rotation, Vector
 from sim.arm import ELBOW_MM, FLANGE_MM, FOREARM_MM, LIMITS_DEG, OFFSET_MM, SHOULDER_MM, UPPER_MM
 
 M = 0.001
@@ -53,6 +53,10 @@ class Body:
     turn: Rotation
     density_kg_m3: float = DENSITY_KG_M3
     friction: float = 0.4
+
+    def lowest_mm(self, pose: Pose) -> float:
+        """The height of its lowest point where it lies so."""
+        return pose.at_mm[2] - sum(abs(pose.axis(at)[2]) * self.size_mm[at] / 2 for at in range(3))
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,7 +26,6 @@ from sim.vision.optics import Optics
 STATE = mujoco.mjtState.mjSTATE_INTEGRATION
 SLIPPERY = 0.002
 """Half a kilogram between pads that push 445 N each slips below 0.006."""
-WEAK = 0.05
 CLOSED_MM = 0.5
 """Fingers that are closer touch each other: what their motor pushes is what they push on each other."""
 CLEAR = Optics()
@@ -164,7 +163,7 @@ class Physical:
     def advance(self, goal: Joints, grip: Grip, jaws_mm: tuple[float, float]) -> None:
         """One cycle: the joints go to the goal in equal steps, fingers and jaws to their own."""
         self._apply_faults()
-        before, self._goal = self._goal, self._reachable(goal)
+        before, self._goal = self._goal, self.faults.reachable(self._goal, goal)
         a, b = np.array(before), np.array(self._goal)
         first, self._setpoint_m = self._setpoint_m, self._squeezed(grip)
         if not self.faults.vise_stuck:
@@ -181,14 +180,6 @@ class Physical:
             self.model, self.data
         )  # what is read belongs to the end of the cycle, not to the step before it
 
-    def _reachable(self, goal: Joints) -> Joints:
-        """The goal, but for joints that are stuck where they were told to be last."""
-        stuck = self.faults.joint_stuck
-        return tuple(
-            before if self.faults.robot_stuck or stuck == at else after
-            for at, (before, after) in enumerate(zip(self._goal, goal, strict=True), 1)
-        )
-
     def _squeezed(self, grip: Grip) -> float:
         """Where the fingers are sent, in m: toward the opening at the speed, and no farther from where they are than the force.
 
@@ -199,7 +190,7 @@ class Physical:
         if self.faults.hand_stuck or not grip.drive:
             # Fingers that are stuck on something go on pressing it.
             return width_m if self.faults.hand_stuck and self.hand()[1] <= 0.0 else self._setpoint_m
-        give_m = grip.force_n * (WEAK if self.faults.hand_weak else 1.0) / GAIN_N_M
+        give_m = grip.force_n * self.faults.motor / GAIN_N_M
         far_m = grip.speed_mm_s * CYCLE_S / 1000
         wanted_m = grip.opening_mm / 1000 if grip.opening_mm > 0 else width_m - give_m
         after = max(self._setpoint_m - far_m, min(self._setpoint_m + far_m, wanted_m))
@@ -211,25 +202,15 @@ class Physical:
 
     # --- camera ---
 
-    def flood(self, wanted: int) -> Found | None:
+    def flood(self, wanted: Features, expected_mm: float) -> Found | None:
         """A flood picture, looked at for a part."""
-        size = self.database.sizes.get(wanted)
-        expected_mm = self._expected_mm(wanted)
-        if size is None or min(size) <= 0.0 or expected_mm <= 0.0:
-            return None
         camera, optics = self._camera()
-        return find(camera.flood(self.data, self._rng), Features(size[0], size[1]), expected_mm, optics)
+        return find(camera.flood(self.data, self._rng), wanted, expected_mm, optics)
 
-    def lines(self, wanted: int) -> Surface | None:
+    def lines(self, expected_mm: float) -> Surface | None:
         """A picture with two lines, looked at for a part."""
-        expected_mm = self._expected_mm(wanted)
-        if expected_mm <= 0.0:
-            return None
         camera, optics = self._camera()
         return measure(camera.lines(self.data, self._rng), expected_mm, optics)
-
-    def _expected_mm(self, wanted: int) -> float:
-        return float(self.database.part(wanted)[1])
 
     def _camera(self) -> tuple[Camera, Optics]:
         optics = NOISY if self.faults.noisy else CLEAR

@@ -18,7 +18,7 @@ from sim.faults import Faults
 from sim.fixture import MachineController, ViseController
 from sim.restore import plain, read
 from sim.robot import FOLLOW, Robot
-from sim.vision.flood import Found
+from sim.vision.flood import Features, Found
 from sim.vision.line import Surface
 
 CYCLE_S = 0.04
@@ -79,11 +79,11 @@ class Mechanism(Protocol):
         """One cycle: the joints go to the goal in equal steps, fingers and jaws to their own."""
         ...
 
-    def flood(self, wanted: int) -> Found | None:
+    def flood(self, wanted: Features, expected_mm: float) -> Found | None:
         """A flood picture, looked at for a part; None where none matches."""
         ...
 
-    def lines(self, wanted: int) -> Surface | None:
+    def lines(self, expected_mm: float) -> Surface | None:
         """A picture with two lines, looked at for a part; None where the lines do not fall on a surface."""
         ...
 
@@ -209,16 +209,24 @@ class Plant:
 
     def _shot(self, fire: int, wanted: int) -> tuple[Value, ...]:
         """matched, x, y, cosine and sine of the turn, range, flat."""
-        if self.faults.blind or fire == DARK:
+        expected_mm = float(self.database.part(wanted)[1])
+        if self.faults.blind or fire == DARK or expected_mm <= 0.0:
             return NO_PICTURE
         if fire == FLOOD:
-            found = self.mechanism.flood(wanted)
+            found = self._found(wanted, expected_mm)
             return NO_PICTURE if found is None else (True, *self._in_hand(found), False)
-        surface = self.mechanism.lines(wanted)
+        surface = self.mechanism.lines(expected_mm)
         if surface is None:
             return NO_PICTURE
         flat = surface.normal[2] >= FLAT_COS and not self.faults.tilted
         return (True, 0.0, 0.0, 1.0, 0.0, min(RANGE_MM, surface.range_mm), flat)
+
+    def _found(self, wanted: int, expected_mm: float) -> Found | None:
+        """Where the camera sees the part; None where it sees none, or where none can be looked for."""
+        size = self.database.sizes.get(wanted)
+        if size is None or min(size) <= 0.0:
+            return None
+        return self.mechanism.flood(Features(size[0], size[1]), expected_mm)
 
     def _in_hand(self, found: Found) -> tuple[float, float, float, float, float]:
         """From camera coordinates to the hand's: along the plate's x, to the left of it, and a turn about the vertical.

@@ -3,10 +3,14 @@
 In: a database. Out: what is wrong, by point; nothing where all is well.
 """
 
+import hashlib
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
+from pathlib import Path
 
+from rcsc.cache import Cache
 from rcsc.database.ask import Database
+from rcsc.database.build import BadData
 from rcsc.database.pose import pose_of
 from sim.arm import Joints, solve
 
@@ -16,6 +20,8 @@ JUMP_RAD = 0.35
 """A joint that would turn farther from one step to the next is turning over."""
 HOME: Joints = (0.6, 1.03, -3.23, 0.0, -0.94, 0.26)
 """An elbow up, a hand down: from where the home pose is looked for."""
+RULES = ("arm.py", "reach.py")
+"""The modules that say where the arm can be."""
 
 
 def home(database: Database) -> Joints | None:
@@ -30,6 +36,34 @@ def unreachable(database: Database) -> tuple[str, ...]:
     if start is None:
         return ("the robot cannot be at its home",)
     return tuple(_problems(database, start))
+
+
+def checked(database: Database, cache: Cache | None = None) -> None:
+    """Has the arm go everywhere in the database, before anything moves.
+
+    Args:
+        database: The cell.
+        cache: Where it is kept which databases have passed; the arm need not go anywhere in one of them. None for nowhere.
+
+    Raises:
+        BadData: It cannot be somewhere.
+    """
+    seen = _digest(database)
+    if cache is not None and cache.load("reach", seen) is not None:
+        return
+    problems = unreachable(database)
+    if problems:
+        raise BadData(problems)
+    if cache is not None:
+        cache.store({}, "reach", seen)
+
+
+def _digest(database: Database) -> str:
+    """Of all that the database says, and of the rules of reach, which stand outside what a cache knows to be its tool."""
+    hashed = hashlib.sha256(repr(database).encode())
+    for rules in RULES:
+        hashed.update(Path(__file__).with_name(rules).read_bytes())
+    return hashed.hexdigest()
 
 
 def _problems(database: Database, start: Joints) -> Iterator[str]:

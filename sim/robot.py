@@ -10,9 +10,9 @@ from math import isfinite
 
 from rcsc.database.pose import nine, pose_of
 from rcsc.system.signature import Value, Values
+from rcsc.workstation.orders import DONE, EXECUTING, FAILED
 from sim.arm import Joints, plate, solve
 
-DONE, EXECUTING, FAILED = 0, 1, 2
 HOLD, FOLLOW = 0, 1
 ROBOT_REASON = 9
 """`robot` of `reason` in tables/vocabulary.rcs."""

@@ -273,9 +273,7 @@ def _nearest(place: str, part: str, sector: int, database: Database, plant: Plan
 
 def _upright(place: str, sector: int, number: int, database: Database) -> Vector | None:
     """The middle of a part that stands upright at a location; None where it lies tilted."""
-    route = database.route(database.locations[place], sector)
-    last = int(route[3]) + int(route[4]) - 1
-    plate = pose_of([float(value) for value in database.point(last)[1:10]])
+    plate = database.plate(database.locations[place], sector)
     if plate is None or plate.axis(2)[2] > -0.999:
         return None
     at = plate.point((0.0, 0.0, database.hand.tool_mm))
@@ -286,11 +284,10 @@ def _upright(place: str, sector: int, number: int, database: Database) -> Vector
 
 def _surface(database: Database, at: Vector, lowest_mm: float) -> float:
     """What a part rests on whose lowest point is so high: the vise's bed, or the station's top."""
-    for one in database.stations.values():
-        x, y, _ = one.frame.inside(at)
-        if abs(x) <= one.size_mm[0] / 2 and abs(y) <= one.size_mm[1] / 2:
-            return one.frame.at_mm[2] + (float(one.vise["bed_mm"][2]) if one.vise else 0.0)
-    return lowest_mm
+    station = database.station_below(at)
+    if station is None:
+        return lowest_mm
+    return station.frame.at_mm[2] + (float(station.vise["bed_mm"][2]) if station.vise else 0.0)
 
 
 def _leaf(system: System, name: str) -> float:

@@ -8,8 +8,8 @@ from rcsc.system.description import Description, LevelSpec, Wire, description
 from rcsc.system.serve import Factory
 from rcsc.system.shared import Layout, SharedMemoryBuffers, layout
 from rcsc.system.signature import Leaf, LevelSign, Signature, Values
+from rcsc.workstation.orders import DONE, EXECUTING
 
-DONE, EXECUTING, FAILED = 0, 1, 2
 PAUSE, ACQUIRE, MOVE, RELEASE = 0, 1, 2, 3
 TBOX = 1
 STORE, BENCH = 1, 2

@@ -1,7 +1,7 @@
 """Tables of boxes against brute force: overlaps, gaps, least witnesses, regions, counts, and repairs that repair."""
 
 import re
-from itertools import product
+from itertools import pairwise, product
 from typing import Any
 
 from hypothesis import assume, given
@@ -167,3 +167,25 @@ def with_row(text: str, row: str) -> str:
     lines = text.splitlines()
     at = next((at for at, line in enumerate(lines) if "DEFAULT" in line), len(lines) - 1)
     return "\n".join([*lines[:at], row, *lines[at:]]) + "\n"
+
+
+@given(st.integers(-(2**64), 2**64), st.integers(0, 2**70), st.data())
+def test_furthest_is_the_last_that_fits_and_asks_little(start: int, length: int, data: st.DataObject) -> None:
+    end = start + length
+    last = data.draw(st.one_of(st.sampled_from([start, end]), st.integers(start, end)))
+    asked: list[int] = []
+
+    def fits(at: int) -> bool:
+        asked.append(at)
+        return at <= last
+
+    assert boxes.furthest(start, end, fits) == last
+    assert all(start < at <= end for at in asked)
+    assert len(asked) <= (1 if last == end else 2 + length.bit_length())
+
+
+@given(st.sets(st.integers(0, 12)))
+def test_joined_is_what_was_apart_and_no_neighbours(keys: set[int]) -> None:
+    found = boxes.joined((key, key) for key in sorted(keys))
+    assert {at for low, high in found for at in range(low, high + 1)} == keys
+    assert all(one[1] + 1 < two[0] for one, two in pairwise(found))

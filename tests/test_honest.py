@@ -1,6 +1,7 @@
 """What would be cheating in the physical cell (it is listed in sim/physical.py), looked for in the model, in the code and in runs."""
 
 import ast
+from functools import partial
 from pathlib import Path
 
 import mujoco
@@ -14,6 +15,7 @@ from sim.model import mjcf
 from sim.physical import Physical
 from sim.plant import Grip, Plant
 from sim.reach import home
+from sim.vision.flood import Features
 from tests.cells import SYSTEM, database
 
 SIM = Path(__file__).parents[1] / "sim"
@@ -178,11 +180,13 @@ def test_what_the_camera_cannot_see_is_not_found(held: Database) -> None:
     """A part that throws back no light is not there for vision, though its pose is what it was."""
     made = _above_the_buffer(held)
     wanted = held.objects["tbox"]
-    seen = made.flood(wanted)
+    length_mm, width_mm, _ = held.sizes[wanted]
+    look = partial(made.flood, Features(length_mm, width_mm), float(held.part(wanted)[1]))
+    seen = look()
     assert seen is not None
     for at in range(len(made.bodies)):
         made.model.geom_group[made.model.geom(f"part{at}").id] = 3
-    assert made.flood(wanted) is None
+    assert look() is None
 
 
 def test_a_run_needs_no_true_pose(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -19,11 +19,12 @@ from hypothesis import strategies as st
 from rcsc.database.pose import nine
 from sim.arm import LIMITS_DEG, plate, skeleton
 from sim.pictures.plot import plot, ticks
-from sim.pictures.solid import ABOVE, OVERVIEW, View, solid
+from sim.pictures.solid import OVERVIEW, View, solid
 from sim.pictures.stick import FRONT, HIGH_MM, LOW_MM, SIDE, TOP, Outline, Scene, pads, stick
 from sim.report import Figure, Frame, Matched, Placement, Row, Story, page, report
 from tests.browser import Browser
 
+ABOVE = View((0.35, -0.001, 2.9), (0.35, 0.0, 0.3))
 SVG = "{http://www.w3.org/2000/svg}"
 Array = np.ndarray[Any, Any]
 Polygon = tuple[Array, Array]

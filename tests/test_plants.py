@@ -17,18 +17,20 @@ from hypothesis import strategies as st
 
 from rcsc.database.ask import Database
 from rcsc.database.build import build
-from rcsc.database.pose import Pose, Rotation, about_x, about_y, about_z, nine, pose_of, product
+from rcsc.database.pose import Pose, Rotation, about_y, about_z, nine, pose_of, product
 from rcsc.system.cell import System
 from rcsc.system.signature import Values
 from rcsc.workstation.cell import prepare
+from rcsc.workstation.orders import DONE, EXECUTING, FAILED
 from sim.arm import LIMITS, margins_deg, plate, skeleton, solutions, solve
 from sim.cell import Backend, lying, plant
 from sim.faults import Faults
 from sim.model import mjcf
 from sim.physical import Physical
-from sim.plant import Grip, Plant
+from sim.plant import FLOOD, LINE, NO_PICTURE, PICTURE_TICKS, Grip, Plant
 from sim.reach import home, unreachable
-from sim.robot import DONE, EXECUTING, FAILED, FOLLOW, HOLD, JUMP_RAD, LAG_RAD, Robot
+from sim.robot import FOLLOW, HOLD, JUMP_RAD, LAG_RAD, Robot
+from sim.vision.flood import Features
 from tests.cells import REPO, SYSTEM, database
 
 joint = st.tuples(
@@ -52,7 +54,7 @@ def near(a: Pose, b: Pose, tolerance: float = 1e-6) -> bool:
 
 @given(angle, angle, angle, st.tuples(*[st.floats(-2000, 2000)] * 3))
 def test_nine_numbers_say_a_pose(a: float, b: float, c: float, at: tuple[float, float, float]) -> None:
-    pose = Pose(product(about_z(a), product(about_y(b), about_x(c))), at)
+    pose = Pose(product(about_z(a), product(about_y(b), about_z(c))), at)
     read = pose_of(nine(pose))
     assert read is not None
     assert near(read, pose)
@@ -223,11 +225,13 @@ def script(tmp_path: Path, *rows: str) -> str:
 def digests(made: Plant) -> Iterator[str]:
     """A digest of all that was published, cycle by cycle, while the arm swings and the fingers close."""
     start = made.robot.joints
+    length_mm, width_mm, _ = made.database.sizes[1]
+    top = Features(length_mm, width_mm)
     hashed = hashlib.sha256()
     for tick in range(40):
         to = tuple(value + 0.004 * tick for value in start)
         made.mechanism.advance(to, Grip(True, 0.0, 100.0, 80.0), (-6.0, -6.0))
-        made.mechanism.flood(1)
+        made.mechanism.flood(top, float(made.database.part(1)[1]))
         state = json.dumps(
             [
                 made.mechanism.joints(),
@@ -238,6 +242,26 @@ def digests(made: Plant) -> Iterator[str]:
         )
         hashed.update(state.encode())
         yield hashed.hexdigest()
+
+
+@pytest.mark.parametrize("backend", ["mujoco", "kinematic"])
+def test_what_nobody_can_look_for_makes_no_picture(
+    backend: Backend, held: Database, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """No object, one that is not in the database, and fingers without a part: the image processing is not even asked."""
+    made = plant(held, backend)
+    monkeypatch.setattr(made.mechanism, "flood", refuse)
+    monkeypatch.setattr(made.mechanism, "lines", refuse)
+    asked = [(FLOOD, 0), (LINE, 0), (FLOOD, 99), (LINE, 99), (FLOOD, held.objects["close_grip"])]
+    for number, (fire, wanted) in enumerate(asked, 1):
+        for tick in range(PICTURE_TICKS + 1):
+            order = {"vision.to_camera": (number, fire, wanted)}
+            said = made.step(10 * number + tick, order.get)
+        assert said["camera.picture"] == (number, *NO_PICTURE)
+
+
+def refuse(*_: object) -> None:
+    raise AssertionError("it was asked")
 
 
 REPEAT = """

@@ -13,6 +13,7 @@ from rcsc.system.cell import System
 from rcsc.workstation.cell import prepare
 from rcsc.workstation.interlocks import Cell, after, refusal
 from rcsc.workstation.script import BadScript, Row, read_script
+from sim import reach
 from sim.cell import Lying, lying, plant
 from sim.model import Body
 from sim.plant import Plant
@@ -121,6 +122,64 @@ def test_a_station_turned_so_that_the_arm_cannot_follow_is_named(
     assert said.out == ""
     if command[0] == "db":
         assert not (project / "tables/.rcsc-cache").exists(), "nothing is written"
+
+
+@pytest.fixture
+def looks(project: Path, monkeypatch: pytest.MonkeyPatch) -> list[Database]:
+    """The databases that the arm has gone everywhere in; beside it a script of one short row."""
+    seen: list[Database] = []
+    unreachable = reach.unreachable
+
+    def look(held: Database) -> tuple[str, ...]:
+        seen.append(held)
+        return unreachable(held)
+
+    monkeypatch.setattr(reach, "unreachable", look)
+    monkeypatch.delenv("RCSC_CACHE_DIR", raising=False)
+    (project / "short.csv").write_text(HEAD + "MOVE,,,WS-SAFE,\n", encoding="utf-8")
+    return seen
+
+
+SHORT = ["run", "short.csv", *QUICK, "-q"]
+
+
+def test_the_arm_goes_everywhere_once_in_each_database(looks: list[Database], project: Path) -> None:
+    data = project / "tables/cell.toml"
+    for text in (DATA, DATA.replace("stock = 10", "stock = 9"), DATA + "# other bytes, the same cell\n"):
+        data.write_text(text, encoding="utf-8")
+        assert [run(SHORT), run(SHORT)] == [0, 0]
+    assert [9 in held.stock.values() for held in looks] == [False, True]
+
+
+def test_a_cell_in_which_the_arm_cannot_go_everywhere_is_refused_every_time(
+    looks: list[Database], project: Path
+) -> None:
+    """The first refusal leaves a database that is as new as the data: that is not what is asked."""
+    turned = DATA.replace("y = -217.3, z = 350.0, yaw = -22.0", "y = -217.3, z = 350.0, yaw = 158.0")
+    (project / "tables/cell.toml").write_text(turned, encoding="utf-8")
+    assert [run(SHORT), run(SHORT)] == [1, 1]
+    assert len(looks) == 2
+
+
+def test_a_database_that_was_made_without_a_look_is_looked_at(
+    looks: list[Database], project: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert run(["db", "show"]) == 0
+    assert not looks
+    assert [run(SHORT), len(looks)] == [0, 1]
+    # one that was brought along, and is none that anybody looked at
+    (project / "tables/other.toml").write_text(DATA.replace("z = 350.0", "z = 355.0"), encoding="utf-8")
+    build(project / "tables/other.toml", project / "other.sqlite", PARTS)
+    assert [run([*SHORT, "--database", "other.sqlite"]), len(looks)] == [0, 2]
+    assert [run([*SHORT, "--database", "other.sqlite"]), len(looks)] == [0, 2]
+    monkeypatch.setattr(reach, "RULES", ("arm.py",))  # as if they had changed
+    assert [run(SHORT), len(looks)] == [0, 3]
+
+
+def test_what_db_build_made_need_not_be_looked_at_again(looks: list[Database]) -> None:
+    assert [run(["db", "build"]), len(looks)] == [0, 1]
+    assert [run(SHORT), len(looks)] == [0, 1]
+    assert [run(["db", "check"]), len(looks)] == [0, 2]  # who asks for it gets it
 
 
 def test_what_was_gripped_with_any_grasp_can_be_let_go_of(tmp_path: Path) -> None:

@@ -114,12 +114,7 @@ def db() -> None:
               help="Where it goes.")  # fmt: skip
 def build(system: Path | None, output: Path | None) -> int:
     """Make the database; nothing is written when the data is not in order."""
-    made, problems, target = _built(system, output, writes=True)
-    if problems:
-        from rcsc.diagnostics.codes import Code
-
-        raise Stopped(Code.BAD_DATA, "\n".join(problems))
-    click.echo(f"{made} made of the data: {target}" if made else f"{target}")
+    click.echo(f"database made of the data: {_built(system, output, writes=True)}")
     return 0
 
 
@@ -127,44 +122,38 @@ def build(system: Path | None, output: Path | None) -> int:
 @SYSTEM
 def check(system: Path | None) -> int:
     """Check the data file; every problem is named."""
-    _, problems, _ = _built(system, None, writes=False)
-    if problems:
-        from rcsc.diagnostics.codes import Code
-
-        raise Stopped(Code.BAD_DATA, "\n".join(problems))
+    _built(system, None, writes=False)
     click.echo("the data is in order")
     return 0
 
 
-def _built(system: Path | None, output: Path | None, *, writes: bool) -> tuple[str, tuple[str, ...], Path]:
-    """Makes the database where it harms nobody, has the arm go everywhere in it, and only then writes it."""
+def _built(system: Path | None, output: Path | None, *, writes: bool) -> Path:
+    """Makes the database where it harms nobody, has the arm go everywhere in it, and only then writes it; where to."""
     import tempfile
 
+    from rcsc.cache import open_cache
     from rcsc.database.ask import open_database
     from rcsc.database.build import BadData
     from rcsc.database.build import build as build_database
     from rcsc.system.cell import signatures
     from rcsc.system.description import BadDescription, description
     from rcsc.workstation.cell import database_path, parts_of
-    from sim.reach import unreachable
+    from sim.reach import checked
 
     try:
-        said = description(system_path(system))
+        path = system_path(system)
+        said = description(path)
         parts = parts_of(signatures(said))
         target = output or database_path(said)
         with tempfile.TemporaryDirectory() as scratch:
             tried = Path(scratch) / "cell.sqlite"
             build_database(said.database, tried, parts)
-            problems = unreachable(open_database(tried))
-        if problems:
-            return "", problems, Path()
+            checked(open_database(tried), open_cache(path.parent) if writes else None)
         if writes:
             build_database(said.database, target, parts)
-    except BadData as error:
-        return "", error.problems, Path()
-    except BadDescription as error:
+    except (BadData, BadDescription) as error:
         stop(error)
-    return "database", (), target
+    return target
 
 
 @db.command(short_help="Show what the database says.")

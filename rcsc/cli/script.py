@@ -119,14 +119,16 @@ def _run(asked: Asked, processes: bool, from_row: int | None, resumes: bool) -> 
         BadDescription, BadData, BadScript, NotBuilt, NotResumed: Something is not in order; nothing has moved.
         StateTableError: A level met a fault that the proofs exclude.
     """
+    from rcsc.cache import open_cache
     from rcsc.workstation.cell import prepare
-    from sim.cell import checked, plant
+    from sim.cell import plant
+    from sim.reach import checked
     from sim.witness import Timed, Witness
 
     timed: list[Timed] = []
 
     def outside(database: Any) -> list[Timed]:
-        checked(database)
+        checked(database, open_cache(asked.path.parent))
         timed.append(Timed(plant(database, asked.backend, seed=asked.seed)))
         return timed
 
@@ -263,39 +265,12 @@ def _say(number: int, text: str, state: str, ticks: int) -> None:
 
 def _apart(made: "Run", asked: Asked) -> int:
     """The same with a process for each level."""
-    import json
     import tempfile
 
     from rcsc.diagnostics.codes import Code
-    from rcsc.system.description import description
-    from rcsc.system.processes import Supervisor, run_processes
-    from rcsc.system.serve import Factory
 
-    held = str(asked.database.resolve()) if asked.database else ""
-    place = str(asked.path.resolve())
     with tempfile.TemporaryDirectory(prefix="rcsc-run-") as scratch:
-        results = Path(scratch) / "results"
-        results.touch()
-        said = (place, asked.script, held, str(results), made.station.at, asked.backend)
-        outside = Factory("sim.processes:outside", said)
-        queries = Factory("sim.processes:queries", (place, held))
-        rows: list[list[Any]] = []
-
-        def watch(_: Supervisor) -> None:
-            said = [json.loads(line) for line in results.read_text(encoding="utf-8").splitlines()]
-            for number, text, state, _reason, ticks in [] if asked.quiet else said[len(rows) :]:
-                _say(number, text, state, ticks)
-            rows.extend(said[len(rows) :])
-
-        run_processes(
-            description(asked.path),
-            asked.kind,
-            {"outside": outside},
-            queries=queries,
-            rate=asked.rate,
-            watch=watch,
-        )
-        rows += [json.loads(line) for line in results.read_text(encoding="utf-8").splitlines()[len(rows) :]]
+        rows = _rows_apart(asked, made.station.at, Path(scratch) / "results")
     if not asked.quiet:
         click.echo(f"each level in a process of its own, {asked.rate:g} times as fast as the clock")
     if rows and rows[-1][2] != "done":
@@ -306,6 +281,43 @@ def _apart(made: "Run", asked: Asked) -> int:
             f"mend the cause, then begin anew: {asked.again} --processes --from-row {number}",
         )
     return 0
+
+
+def _rows_apart(asked: Asked, first: int, results: Path) -> list[list[Any]]:
+    """Runs the processes to the end: of each row its number, text, state, reason and ticks; `results` is where they travel."""
+    import json
+
+    from rcsc.system.description import description
+    from rcsc.system.processes import Supervisor, run_processes
+    from rcsc.system.serve import Factory
+
+    held = str(asked.database.resolve()) if asked.database else ""
+    place = str(asked.path.resolve())
+    outside = Factory(
+        "sim.processes:outside", (place, asked.script, held, str(results), first, asked.backend)
+    )
+    queries = Factory("sim.processes:queries", (place, held))
+    rows: list[list[Any]] = []
+
+    def more() -> list[list[Any]]:
+        return [json.loads(line) for line in results.read_text(encoding="utf-8").splitlines()[len(rows) :]]
+
+    def watch(_: Supervisor) -> None:
+        new = more()
+        for number, text, state, _reason, ticks in [] if asked.quiet else new:
+            _say(number, text, state, ticks)
+        rows.extend(new)
+
+    results.touch()
+    run_processes(
+        description(asked.path),
+        asked.kind,
+        {"outside": outside},
+        queries=queries,
+        rate=asked.rate,
+        watch=watch,
+    )
+    return rows + more()
 
 
 # --- when it is over ---

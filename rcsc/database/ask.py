@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from rcsc.database.build import BadData
-from rcsc.database.pose import Pose, Vector, about_z
+from rcsc.database.pose import Pose, Vector, about_z, pose_of
 from rcsc.system.signature import Values
 
 NO_PLACE: Values = (False, False, False, 0, 0)
@@ -49,6 +49,11 @@ class Station:
     size_mm: tuple[float, float]
     vise: Mapping[str, Any]
     vblock: Mapping[str, Any]
+
+    def below(self, at_mm: Vector) -> bool:
+        """Whether it stands below a point of the base's axes, however high that is."""
+        x, y, _ = self.frame.inside(at_mm)
+        return abs(x) <= self.size_mm[0] / 2 and abs(y) <= self.size_mm[1] / 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,6 +114,22 @@ class Database:
     def fingers(self, number: int, grasp: int) -> Values:
         """known, approach, departure and grip opening and tolerance in mm, force in N, speed in mm/s."""
         return self._fingers.get((number, grasp), NO_FINGERS)
+
+    def plate(self, location: int, sector: int) -> Pose | None:
+        """The wrist plate, in mm, at the last point of the way to a location; None where there is no such way."""
+        known, _, _, comes, many, *_ = self.route(location, sector)
+        if not known or not many:
+            return None
+        return pose_of([float(value) for value in self.point(int(comes) + int(many) - 1)[1:10]])
+
+    def pads(self, location: int, sector: int) -> Vector | None:
+        """The middle of the pads, in mm, when the robot is there; None likewise."""
+        plate = self.plate(location, sector)
+        return None if plate is None else plate.point((0.0, 0.0, self.hand.tool_mm))
+
+    def station_below(self, at_mm: Vector) -> Station | None:
+        """The station that stands below a point; None over the floor."""
+        return next((one for one in self.stations.values() if one.below(at_mm)), None)
 
     def routes(self) -> tuple[tuple[int, int, Values], ...]:
         """Every route with its location and sector."""

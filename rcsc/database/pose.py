@@ -98,12 +98,6 @@ def unit(v: Vector) -> Vector:
     return (v[0] / length, v[1] / length, v[2] / length)
 
 
-def about_x(angle_deg: float) -> Rotation:
-    """A turn about x."""
-    c, s = cos(radians(angle_deg)), sin(radians(angle_deg))
-    return ((1.0, 0.0, 0.0), (0.0, c, -s), (0.0, s, c))
-
-
 def about_y(angle_deg: float) -> Rotation:
     """A turn about y."""
     c, s = cos(radians(angle_deg)), sin(radians(angle_deg))

@@ -6,6 +6,7 @@ and the name of the table. Composite states and notes are not read.
 """
 
 import re
+from dataclasses import dataclass, field
 
 from rcsc.graph.model import ANY, HEADER, Edge, StateGraph, header
 from rcsc.graph.reading import Drawn, UnreadableError, finished
@@ -50,49 +51,63 @@ def _text(edge: Edge) -> str:
 
 def read(text: str) -> StateGraph:
     """The graph that the text draws; UnreadableError where it is none."""
-    said: dict[str, str] = {}
-    drawn: list[Drawn] = []
-    names: dict[str, str] = {}
-    begun = False
+    read_ = _Read()
     at = 0
     for raw in text.splitlines(keepends=True):
-        line, offset = raw.strip(), at + len(raw) - len(raw.lstrip())
+        read_.line(raw.strip(), at + len(raw) - len(raw.lstrip()))
         at += len(raw)
-        if match := _HEADER.match(line):
-            if match[1] in HEADER:
-                said[match[1]] = match[2].strip()
-        elif line in ("stateDiagram-v2", "stateDiagram"):
-            begun = True
-        elif line and not line.startswith("%%"):
-            if not begun and not _PASSED.match(line) and not line.startswith("title:"):
-                raise UnreadableError("the text does not begin with `stateDiagram-v2`", offset)
-            _statement(line.removesuffix(";"), offset, said, drawn, names)
-    if not begun:
+    if not read_.begun:
         raise UnreadableError("the text has no `stateDiagram-v2`")
-    ends = {name: ANY for name, shown in names.items() if shown == _ANY_NAME}
+    ends = {name: ANY for name, shown in read_.names.items() if shown == _ANY_NAME}
     return finished(
-        said,
-        [Drawn(ends.get(d.source, d.source), ends.get(d.target, d.target), d.said, d.offset) for d in drawn],
+        read_.said,
+        [
+            Drawn(ends.get(d.source, d.source), ends.get(d.target, d.target), d.said, d.offset)
+            for d in read_.drawn
+        ],
     )
 
 
-def _statement(
-    line: str, offset: int, said: dict[str, str], drawn: list[Drawn], names: dict[str, str]
-) -> None:
-    if match := _ARROW.match(line):
-        source, target, text = match[1], match[2], match[3] or ""
+@dataclass(slots=True)
+class _Read:
+    """What the lines so far say: of the graph, of its arrows, and what states are shown as, by their names."""
+
+    said: dict[str, str] = field(default_factory=dict)
+    drawn: list[Drawn] = field(default_factory=list)
+    names: dict[str, str] = field(default_factory=dict)
+    begun: bool = False
+
+    def line(self, line: str, offset: int) -> None:
+        """Takes the next line, without the space around it; `offset` is where in the text it begins."""
+        if match := _HEADER.match(line):
+            if match[1] in HEADER:
+                self.said[match[1]] = match[2].strip()
+        elif line in ("stateDiagram-v2", "stateDiagram"):
+            self.begun = True
+        elif not line or line.startswith("%%"):
+            return
+        elif self.begun or _PASSED.match(line) or line.startswith("title:"):
+            self._statement(line.removesuffix(";"), offset)
+        else:
+            raise UnreadableError("the text does not begin with `stateDiagram-v2`", offset)
+
+    def _statement(self, line: str, offset: int) -> None:
+        if match := _ARROW.match(line):
+            self._arrow(match[1], match[2], match[3] or "", offset)
+        elif match := _ALIAS.match(line):
+            self.names[match[2]] = match[1]
+        elif match := _NAMED.match(line):
+            self.names[match[1]] = match[2]
+        elif not _PASSED.match(line):
+            raise UnreadableError(f"`{line}` is not read: only arrows between plain states are", offset)
+
+    def _arrow(self, source: str, target: str, text: str, offset: int) -> None:
         if source == "[*]":
-            said["initial"] = target
+            self.said["initial"] = target
         elif target == "[*]":
             raise UnreadableError("a table has no end: a level runs its table in every cycle", offset)
         else:
-            drawn.append(Drawn(source, target, _transition(text, offset), offset))
-    elif match := _ALIAS.match(line):
-        names[match[2]] = match[1]
-    elif match := _NAMED.match(line):
-        names[match[1]] = match[2]
-    elif not _PASSED.match(line):
-        raise UnreadableError(f"`{line}` is not read: only arrows between plain states are", offset)
+            self.drawn.append(Drawn(source, target, _transition(text, offset), offset))
 
 
 def _transition(text: str, offset: int) -> dict[str, str]:

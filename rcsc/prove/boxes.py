@@ -8,7 +8,7 @@ all keys of a class are alike. Source: `notes/performance.md`, A.3.
 """
 
 from bisect import bisect_left, bisect_right
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import prod
 
@@ -33,6 +33,34 @@ def meet(one: Box, two: Box) -> Box:
 def size(box: Box) -> int:
     """How many keys it has."""
     return sum(high - low + 1 for low, high in box)
+
+
+def joined(intervals: Iterable[tuple[int, int]]) -> Box:
+    """Intervals in their order, neighbours made one."""
+    found: list[tuple[int, int]] = []
+    for low, high in intervals:
+        if found and found[-1][1] + 1 == low:
+            found[-1] = (found[-1][0], high)
+        else:
+            found.append((low, high))
+    return tuple(found)
+
+
+def furthest(start: int, end: int, fits: Callable[[int], bool]) -> int:
+    """The greatest value up to `end` to which it fits; at `start` it does, and up to somewhere.
+
+    The end is tried first: what is grown often goes as far as its variable does, and that takes one question.
+    """
+    if start == end or fits(end):
+        return end
+    low, high = start, end - 1
+    while low < high:
+        middle = (low + high + 1) // 2
+        if fits(middle):
+            low = middle
+        else:
+            high = middle - 1
+    return low
 
 
 def lines_of(table: Table) -> list[dict[str, Box]]:
@@ -313,15 +341,12 @@ class Search:
             close = [
                 boxes for boxes in lines if all(meet(box, region[n]) for n, box in boxes.items() if n != name)
             ]
-            free: list[tuple[int, int]] = []
             classes = self.table.classes(name)
-            for low, high in zip(classes.starts, classes.ends, strict=True):
-                if not any(name not in boxes or _holds(boxes[name], low) for boxes in close):
-                    if free and free[-1][1] + 1 == low:
-                        free[-1] = (free[-1][0], high)
-                    else:
-                        free.append((low, high))
-            region[name] = tuple(free)
+            region[name] = joined(
+                (low, high)
+                for low, high in zip(classes.starts, classes.ends, strict=True)
+                if not any(name not in boxes or _holds(boxes[name], low) for boxes in close)
+            )
         return region
 
 

@@ -27,7 +27,7 @@ from rcsc.model import (
     value_of_key,
 )
 from rcsc.prove import smt, trial, values
-from rcsc.prove.boxes import meet, size
+from rcsc.prove.boxes import furthest, joined, meet, size
 from rcsc.prove.encode import Frame, at_most_key, least_witness
 from rcsc.prove.options import Options
 from rcsc.prove.smt import Answer, Solver, Term
@@ -175,7 +175,7 @@ class Space:
             kind = node.kind
             classes = _classes(cuts[name], key_bounds(kind)[1])
             inside = [one for one in classes if trial.holds_at(part, {name: value_of_key(kind, one[0])})]
-            hull[name] = meet(hull[name], _joined(inside))
+            hull[name] = meet(hull[name], joined(inside))
         return hull, rest
 
     def _made(self, found: list[dict[str, Box]], *, exact: bool) -> Cover:
@@ -267,37 +267,14 @@ def _widest(at: int, classes: list[tuple[int, int]], fits: Callable[[Box], bool]
     if not fits((home,)):
         return (_stretched(at, home, fits),)
     near = sorted(classes, key=lambda one: abs(one[0] - home[0]))[:_MOST_CLASSES]
-    return _joined(one for one in sorted(near) if one == home or fits((one,)))
+    return joined(one for one in sorted(near) if one == home or fits((one,)))
 
 
 def _stretched(at: int, ends: tuple[int, int], fits: Callable[[Box], bool]) -> tuple[int, int]:
     """As far up, then down, from `at` as fits."""
-    top = _furthest(at, ends[1], lambda end: fits(((at, end),)))
-    bottom = -_furthest(-at, -ends[0], lambda end: fits(((-end, top),)))
+    top = furthest(at, ends[1], lambda end: fits(((at, end),)))
+    bottom = -furthest(-at, -ends[0], lambda end: fits(((-end, top),)))
     return bottom, top
-
-
-def _furthest(start: int, end: int, fits: Callable[[int], bool]) -> int:
-    """The greatest value from `start` on up to which it fits."""
-    low, high = start, end
-    while low < high:
-        middle = (low + high + 1) // 2
-        if fits(middle):
-            low = middle
-        else:
-            high = middle - 1
-    return low
-
-
-def _joined(parts: Iterable[tuple[int, int]]) -> Box:
-    """Neighbouring intervals made one."""
-    found: list[tuple[int, int]] = []
-    for low, high in parts:
-        if found and found[-1][1] + 1 == low:
-            found[-1] = (found[-1][0], high)
-        else:
-            found.append((low, high))
-    return tuple(found)
 
 
 _PLAIN = {*COMPARISONS, Op.NOT, Op.AND, CONSTANT, VARIABLE, NARROWED}

@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 from rcsc.model import Box
 from rcsc.prove.atoms import Atom, Clauses, Every, Formula, Some, Universe, clauses, every, some
+from rcsc.prove.boxes import furthest
 from rcsc.prove.linear import Simplex, integer_point
 from rcsc.prove.regions import Answer, Bounds, Point
 from rcsc.prove.search import Tree
@@ -149,24 +150,10 @@ def widest(
         if fits(column, least_, greatest):
             box[column] = (least_, greatest)
             continue
-        top = _furthest(at, greatest, lambda end, c=column, a=at: fits(c, a, end))  # type: ignore[misc]  # bound early
-        bottom = -_furthest(-at, -least_, lambda end, c=column, t=top: fits(c, -end, t))  # type: ignore[misc]  # as above
+        top = furthest(at, greatest, lambda end, c=column, a=at: fits(c, a, end))  # type: ignore[misc]  # bound early
+        bottom = -furthest(-at, -least_, lambda end, c=column, t=top: fits(c, -end, t))  # type: ignore[misc]  # as above
         box[column] = (bottom, top)
     return box
-
-
-def _furthest(start: int, end: int, fits: Callable[[int], bool]) -> int:
-    """The greatest value from `start` on to which it fits (it does at `start`)."""
-    if fits(end):
-        return end
-    low, high = start, end - 1
-    while low < high:
-        middle = (low + high + 1) // 2
-        if fits(middle):
-            low = middle
-        else:
-            high = middle - 1
-    return low
 
 
 def negated(universe: Universe, formula: Formula) -> Formula:

@@ -12,6 +12,7 @@ from typing import TypeAlias
 from rcsc.meaning import relying
 from rcsc.model import Action, Kind, Program, Scalar, Table, Value, Variable, VariableName, value_of_key
 from rcsc.prove import smt, values
+from rcsc.prove.effect import Shared
 from rcsc.prove.encode import Frame, least_witness
 from rcsc.prove.evaluation import State, TooLongError
 from rcsc.prove.options import Options
@@ -84,7 +85,8 @@ def compare(first: tuple[Program, Table], second: tuple[Program, Table], options
 class _Question:
     def __init__(self, first: tuple[Program, Table], second: tuple[Program, Table], options: Options) -> None:
         self.options = options
-        self.start: dict[str, Node] = {}
+        self.shared = Shared()
+        self.start = self.shared.start
         program = relying(first[0])
         self.variables = program.variables
         self.kinds = {str(v.name): v.type for v in program.variables}
@@ -142,8 +144,9 @@ class _Question:
         for name in {**one, **two}:
             a = one[name] if name in one else run.leaf(name)
             b = two[name] if name in two else run.leaf(name)
-            if not _alike(a, b):
-                yield name, values.negation(values.equal(a, b))
+            same = self.shared.equal(a, b)
+            if same is not values.TRUE:
+                yield name, values.negation(same)
 
     def _check(self, wrong: Node) -> tuple[Answer, Solver | None, dict[str, Node]]:
         """Whether it can be, the solver that says so, and the variables that it is about."""
@@ -184,20 +187,3 @@ class _Question:
 
 def _shown(name: str, kind: Scalar) -> Variable:
     return Variable(VariableName(name), Kind.STATE, kind, value_of_key(kind, 0))
-
-
-def _alike(one: Node, two: Node) -> bool:
-    """Whether the two are built alike, so that nobody need be asked."""
-    waiting = [(one, two)]
-    seen: set[tuple[int, int]] = set()
-    while waiting:
-        a, b = waiting.pop()
-        if a is b or (id(a), id(b)) in seen:
-            continue
-        seen.add((id(a), id(b)))
-        if (a.op, a.name, len(a.args), a.kind) != (b.op, b.name, len(b.args), b.kind):
-            return False
-        if not a.args and (a.low, a.high) != (b.low, b.high):
-            return False
-        waiting += zip(a.args, b.args, strict=True)
-    return True

@@ -163,12 +163,6 @@ def admitted(term: Term, inside: Term, other: Term) -> Term:
     return choice(inside, term, other)
 
 
-def is_finite(term: Term) -> Term:
-    """Neither infinite nor NaN."""
-    z3: Any = _z3()
-    return Term(z3.Not(z3.Or(z3.fpIsInf(term), z3.fpIsNaN(term))))
-
-
 def constants(term: Term) -> frozenset[str]:
     """Names of the constants in the term."""
     z3: Any = _z3()

@@ -21,6 +21,7 @@ BETWEEN = (VISE_ORDER, VISE_REPORT, MACHINE_ORDER, MACHINE_REPORT)
 """Buffers that have no level at either end."""
 
 DONE, EXECUTING, FAILED = 0, 1, 2
+"""`level_status` of tables/vocabulary.rcs: how it stands in every report, the robot's too."""
 NUMBERS = 65536
 OPEN_MM = 19.0
 """An open jaw stands farther out than this."""

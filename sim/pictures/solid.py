@@ -49,9 +49,6 @@ class View:
 
 
 OVERVIEW = View((1.75, -1.15, 1.5), (0.32, 0.0, 0.52), field_deg=44.0)
-FRONT = View((1.95, -0.6, 1.15), (0.25, 0.0, 0.5))
-ABOVE = View((0.35, -0.001, 2.9), (0.35, 0.0, 0.3))
-VIEWS = {"overview": OVERVIEW, "front": FRONT, "above": ABOVE}
 
 
 @dataclass(frozen=True, slots=True)

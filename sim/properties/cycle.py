@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import ClassVar, Protocol
 
 from rcsc.database.ask import Database
-from rcsc.database.pose import Pose, Vector, pose_of
+from rcsc.database.pose import Pose
 from rcsc.system.executors import Executor
 from rcsc.system.levels import RunningLevel
 from rcsc.system.signature import Value, Values
@@ -151,21 +151,6 @@ def _held(touching: frozenset[tuple[str, str]]) -> tuple[int, ...]:
     left = {other for pad, other in touching if pad == "pad_left"}
     right = {other for pad, other in touching if pad == "pad_right"}
     return tuple(sorted(int(name[4:]) for name in left & right if name.startswith("part")))
-
-
-def last_point(database: Database, location: int, sector: int) -> tuple[float, ...] | None:
-    """The nine numbers, in mm, of the last point of the way to a location; None where there is no such."""
-    known, _, _, comes, many, *_ = database.route(location, sector)
-    if not known or not many:
-        return None
-    return tuple(float(value) for value in database.point(int(comes) + int(many) - 1)[1:10])
-
-
-def middle_of_pads(database: Database, location: int, sector: int) -> Vector | None:
-    """Where the middle of the pads is when the robot is there, in mm."""
-    point = last_point(database, location, sector)
-    pads = None if point is None else pose_of(point)
-    return None if pads is None else pads.point((0.0, 0.0, database.hand.tool_mm))
 
 
 class Property(Protocol):

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from rcsc.database.ask import Database
 from sim.model import DENSITY_KG_M3
-from sim.properties.cycle import Command, Cycle, middle_of_pads
+from sim.properties.cycle import Command, Cycle
 
 ROBOT = frozenset({"move", "loc", "robot"})
 HAND = frozenset({"move", "loc", "pic", "grip"})
@@ -112,7 +112,7 @@ class RightReason:
         if not command.source or command.obj not in self._objects:
             return True
         database = cycle.database
-        target = middle_of_pads(database, command.source, command.sector)
+        target = database.pads(command.source, command.sector)
         if target is None:
             return True
         looks = bool(database.place(command.source)[1])

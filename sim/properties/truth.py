@@ -4,9 +4,8 @@ from math import dist
 from typing import ClassVar
 
 from rcsc.database.ask import Database, Station
-from rcsc.database.pose import Vector
 from sim.arm import plate
-from sim.properties.cycle import COUNTED, LETS_GO, Command, Cycle, last_point, middle_of_pads
+from sim.properties.cycle import COUNTED, LETS_GO, Command, Cycle
 
 PLATE_MM = 3.0
 """The plate is this near to the point of a location: the robot's own tolerance of 1 mm, and what a clamped part pushes it aside."""
@@ -49,7 +48,7 @@ class DoneTrue:
     def __init__(self, cycle: Cycle) -> None:
         self._in_hand: int | None = None
         self._taken = 0  # when the command was given that took it
-        self._let_go: Vector = (0.0, 0.0, 0.0)
+        self._let_go = (0.0, 0.0, 0.0)
         self._excused = False
         self._begun: Command | None = None
         self._objects = cycle.objects()
@@ -95,11 +94,11 @@ class DoneTrue:
         location = _ends_at(cycle, command)
         if not location or command.name == "acquire":
             return None
-        point = last_point(cycle.database, location, command.sector if location == command.dest else 0)
-        at = plate(cycle.joints).at_mm
-        off_mm = (
-            0.0 if point is None else min(dist((*point[:2], point[2] + up), at) for up in self._lifts(cycle))
-        )
+        there = cycle.database.plate(location, command.sector if location == command.dest else 0)
+        if there is None:
+            return None
+        (x, y, z), at = there.at_mm, plate(cycle.joints).at_mm
+        off_mm = min(dist((x, y, z + up), at) for up in self._lifts(cycle))
         return f"the plate is {off_mm:.1f} mm off" if off_mm > PLATE_MM else None
 
     def _lifts(self, cycle: Cycle) -> tuple[float, ...]:
@@ -138,7 +137,7 @@ class DoneTrue:
             return None
         if cycle.was_active(PUSHED, command.tick) or cycle.was_active(ASIDE, self._taken):
             return None
-        there = middle_of_pads(cycle.database, command.dest, command.sector) if command.dest else None
+        there = cycle.database.pads(command.dest, command.sector) if command.dest else None
         target = there or self._let_go  # RELEASE lets go where the hand is
         at = cycle.parts[self._in_hand].at_mm
         if there is None and self._let_go[2] - at[2] > FALLS_MM:
@@ -234,18 +233,13 @@ def _buffers(database: Database) -> tuple[Station, ...]:
     """Tables that a location stands on whose parts TASK counts."""
     found = []
     for location in database.locations.values():
-        at = middle_of_pads(database, location, 0) if database.place(location)[2] else None
+        at = database.pads(location, 0) if database.place(location)[2] else None
         if at is not None:
-            found += [one for one in database.stations.values() if _over(one, at)]
+            found += [one for one in database.stations.values() if one.below(at)]
     return tuple(found)
 
 
-def _over(station: Station, at: Vector) -> bool:
-    x, y, _ = station.frame.inside(at)
-    return abs(x) <= station.size_mm[0] / 2 and abs(y) <= station.size_mm[1] / 2
-
-
 def _lies_on(cycle: Cycle, part: int, tables: tuple[Station, ...]) -> bool:
-    pose, size = cycle.parts[part], cycle.bodies[part].size_mm
-    low = pose.at_mm[2] - sum(abs(pose.axis(at)[2]) * size[at] / 2 for at in range(3))
-    return any(_over(one, pose.at_mm) and low - one.frame.at_mm[2] < ON_TABLE_MM for one in tables)
+    pose = cycle.parts[part]
+    low = cycle.bodies[part].lowest_mm(pose)
+    return any(one.below(pose.at_mm) and low - one.frame.at_mm[2] < ON_TABLE_MM for one in tables)

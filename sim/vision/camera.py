@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from sim.vision.optics import STANDARD, Floats, FloodImage, LineImage, Optics
 
 CAMERA, PROJECTOR = "wrist", "projector"
-FURNITURE_GROUP, PART_GROUP = 0, 1
+PART_GROUP = 1
+"""Of the geoms that are parts: bare metal."""
 FAR_M = 5.0
 SUBRAYS = 4
 """A pixel on a part's edge is the mean of so many rays each way; with fewer, an edge along the rows moves in jumps."""
