@@ -15,7 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rcsc.system.adopt import adopt
-from rcsc.system.block import FOLDER, Block
+from rcsc.system.block import FOLDER, PREFIX, Block
 from rcsc.system.buffers import Buffers, CommonMemory
 from rcsc.system.cell import Outside, assemble, executors
 from rcsc.system.description import BadDescription, Description, LevelSpec, Wire, description
@@ -23,10 +23,9 @@ from rcsc.system.processes import Supervisor, run_processes
 from rcsc.system.serve import Factory, begin, cycle
 from rcsc.system.shared import TRIES, Absent, Layout, SharedMemoryBuffers, layout
 from rcsc.system.signature import Leaf, Signature, Value, Values, signature
+from rcsc.workstation.orders import DONE, EXECUTING
 from tests.processes_outside import (
     ACQUIRE,
-    DONE,
-    EXECUTING,
     HERE,
     NUMBERS,
     PAUSE,
@@ -445,13 +444,13 @@ def test_a_run_of_all_processes_ends_and_leaves_nothing(repo: Path, tmp_path: Pa
     """From outside: nothing on the standard error stream, no block left, nothing lost by processes that somebody killed."""
     script = tmp_path / "script.py"
     script.write_text(SCRIPT.format(repo=str(repo), folder=str(tmp_path)))
-    before = set(FOLDER.glob("rcsc-*"))
-    ran = subprocess.run(
-        [sys.executable, str(script)], capture_output=True, text=True, timeout=60, check=False
+    ran = subprocess.Popen(
+        [sys.executable, str(script)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
-    assert (ran.returncode, ran.stdout, ran.stderr) == (0, "over\n", "")
+    said = ran.communicate(timeout=60)
+    assert (ran.returncode, *said) == (0, "over\n", "")
     answered_once(tmp_path / "sent", len(ROUND), 1)
-    assert set(FOLDER.glob("rcsc-*")) <= before
+    assert blocks_of(ran) == []
 
 
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
@@ -459,18 +458,22 @@ def test_a_run_that_is_ended_leaves_nothing(repo: Path, tmp_path: Path, how: sig
     """After SIGKILL, too: the processes miss who started them."""
     script = tmp_path / "script.py"
     script.write_text(SCRIPT.format(repo=str(repo), folder=str(tmp_path)).replace(", 1, 1)", ", 100000, 1)"))
-    before = set(FOLDER.glob("rcsc-*"))
     ran = subprocess.Popen(
         [sys.executable, str(script)], stderr=subprocess.PIPE, text=True, start_new_session=True
     )
     until((tmp_path / "below").exists, "it does not run")
-    assert set(FOLDER.glob("rcsc-*")) > before
+    assert blocks_of(ran)
     ran.send_signal(how)
     said = ran.communicate(timeout=60)[1]
     assert how is signal.SIGKILL or said.rstrip().endswith("KeyboardInterrupt")
     assert said.count("Traceback") == (how is not signal.SIGKILL)
     assert "resource_tracker" not in said
-    until(lambda: set(FOLDER.glob("rcsc-*")) <= before, "a block is left")
+    until(lambda: not blocks_of(ran), "a block is left")
+
+
+def blocks_of(made_by: subprocess.Popen[str]) -> list[Path]:
+    """Blocks of this process alone: others may run."""
+    return list(FOLDER.glob(f"{PREFIX}{made_by.pid}-*"))
 
 
 SCRIPT = """
