@@ -42,17 +42,25 @@ MOST_GROUPED = 512
 
 
 def lower(proved: ProvedProgram, root: str = "") -> Plan:
-    """The plan of a proved program; there is no other way to one.
+    """The plan of a proved program; there is no other way to one that is not marked.
 
     Args:
         proved: What `prove` made.
         root: The project's folder: files are named as seen from there, so that the same project gives the
             same bytes wherever it stands and from wherever it is compiled; "" leaves their names alone.
     """
-    program = proved.program
+    return _plan(proved.program, root, proved=True)
+
+
+def lower_by_force(program: Program, root: str = "") -> Plan:
+    """The plan of a program that is not proved, to run a finding: what is emitted of it is marked, and no cell runs it."""
+    return _plan(program, root, proved=False)
+
+
+def _plan(program: Program, root: str, *, proved: bool) -> Plan:
     monitored = tuple(at for at, a in enumerate(program.assumptions) if a.standing is Standing.MONITORED)
     tables = tuple(_table(program, table, monitored, _seen(table.file, root)) for table in program.tables)
-    return Plan(program, _seen(program.file, root), tables, monitored)
+    return Plan(program, _seen(program.file, root), tables, monitored, proved)
 
 
 def _seen(file: str, root: str) -> str:

@@ -144,16 +144,27 @@ class PlanTable:
     monitored: tuple[int, ...]
 
 
+UNPROVED = "NOT PROVED: made by force to run a finding; no cell runs it"
+"""What every file says that is emitted of a program that is not proved."""
+
+
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """A proved program, ready to be spelled.
+    """A program, ready to be spelled.
 
     Attributes:
         source: The root file, relative, with `/`.
         monitored: Positions in `program.assumptions` of those that the executors check.
+        proved: Whether it is proved; of one that is not, every file is marked (`UNPROVED`).
     """
 
     program: Program
     source: str
     tables: tuple[PlanTable, ...]
     monitored: tuple[int, ...]
+    proved: bool = True
+
+    @property
+    def mark(self) -> str:
+        """The mark of what is not proved; empty for what is."""
+        return "" if self.proved else UNPROVED

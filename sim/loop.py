@@ -9,7 +9,6 @@ from dataclasses import fields, replace
 from pathlib import Path
 
 from rcsc.log.write import Recorder
-from rcsc.system.adopt import adopt, standing
 from rcsc.system.cell import StateTableError, System, executors
 from rcsc.system.levels import RunningLevel, running_level
 from rcsc.system.signature import Values
@@ -90,7 +89,6 @@ class Loop:
             for spec in said.levels
         )
         self.system = System(said, levels, (self.operator, self.plant), self.buffers)
-        self._initial = {level.name: level.values for level in levels}
         self._packed = {level.name: level.sign.packed for level in levels}
         self._by = {level.name: level.sign.index.get(level.level.by, -1) for level in levels}
         self._recorder = None if log is None else Recorder(self.system, log)
@@ -142,7 +140,7 @@ class Loop:
         self.buffers.begin(tick)
         self.cycle.restarted = tuple(one.level for one in self.episode.restarts if one.tick == tick)
         for name in self.cycle.restarted:
-            self._lose(self.system.level(name))
+            self.system.restart(name)
         for one in self.episode.pushes:
             if one.tick == tick:
                 self._push(one)
@@ -247,12 +245,6 @@ class Loop:
             cycle.active |= {"pushed"}
         for name in cycle.active:
             cycle.last[name] = tick
-
-    def _lose(self, level: RunningLevel) -> None:
-        """As a process that was killed and has lost what it kept: `rcsc.system.serve.begin`."""
-        level.restore(self._initial[level.name])
-        level.take(self.buffers)
-        level.restore(adopt(level.sign, level.executor.values(), standing(level, self.buffers)))
 
     # --- what is seen ---
 

@@ -4,7 +4,8 @@ import json
 import shutil
 import subprocess
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 from random import Random
@@ -12,14 +13,29 @@ from random import Random
 import pytest
 
 from rcsc.cli import run
+from rcsc.diagnostics.render import plain
 from rcsc.diff.compare import compare
-from rcsc.diff.difference import Basis, Change, Part, ProgramDifference, Sort, holds_in
-from rcsc.diff.present import within_reach
-from rcsc.interpret import execute, matching_lines
-from rcsc.model import Program, Table, Value, key_bounds, key_of, value_of_key
+from rcsc.diff.difference import Basis, Change, Difference, Part, ProgramDifference, Sort, holds_in
+from rcsc.diff.forms import rows
+from rcsc.diff.present import knows, within_reach
+from rcsc.interpret import cycle, execute, initial, matching_lines
+from rcsc.model import (
+    Bool,
+    Enum,
+    Kind,
+    Program,
+    Scalar,
+    Table,
+    Value,
+    key_bounds,
+    key_of,
+    spell,
+    value_of_key,
+)
 from rcsc.project import load
 from rcsc.prove.options import Options
 from rcsc.prove.smt import Answer, Solver
+from rcsc.prove.steps import UnansweredError
 from rcsc.resolve import compile_text, resolve
 
 REPO = Path(__file__).parents[1]
@@ -450,16 +466,6 @@ def test_where_only_one_version_goes_wrong_is_a_change() -> None:
     assert [v.leaf for v in change.values] == ["the run"]
 
 
-def test_what_a_running_system_can_meet_is_told_from_its_state() -> None:
-    change = LEVEL.replace("|| to(end)    |", "|| to(start)  |")
-    found = differ(LEVEL, change)
-    met = {
-        state: [(one.name, this.after) for one, this in within_reach(found, program(change), {"at": index})]
-        for index, state in enumerate(("start", "middle", "end"))
-    }
-    assert met == {"start": [], "middle": [("walk", "line `on`")], "end": []}
-
-
 # --- declarations ------------------------------------------------------------------------------------
 
 
@@ -576,6 +582,156 @@ def test_a_deferral_that_ends_otherwise_is_a_changed_condition() -> None:
     assert (change.before, change.after) == ("false", "true")
 
 
+# --- from the state in which a level stands ---------------------------------------------------------
+
+SMALL = (
+    LEVEL.replace("int 0 .. 9", "int 0 .. 2")
+    .replace("| at     | go    ||", "| at     | seen  ||")
+    .replace("next at := where }", "next at := where\n  sent := (sent + 1) mod 3 }")
+    .replace("procedure send { sent := echo }", "procedure send { }")
+)
+EDITS: dict[str, tuple[tuple[str, str], ...]] = {
+    "a step": (("to(end)    |", "to(start)  |"),),
+    "members numbered anew": (
+        ("{ start, middle, end }", "{ end, start, middle }"),
+        ("to(end)    |", "to(start)  |"),
+    ),
+    "when it is taken": (("deferred until echo = sent", "deferred until echo >= sent"),),
+    "what it senses": (("{ seen := go }", "{ seen := go and echo = 2 }"),),
+    "what it senses where": (("{ seen := go }", "{ seen := go and at = start }"),),
+    "behind the table": (("procedure send { }", "procedure send { if at = end { sent := 0 } }"),),
+    "another line, the same": (("| back |", "| home |"),),
+    "a period": (("period 40 [ms]", "period 80 [ms]"),),
+}
+
+
+def states(made: Program) -> Iterator[dict[str, Value]]:
+    """Every state, inputs as they are initially."""
+    own = [v for v in made.variables if v.kind is not Kind.INPUT]
+    kinds = [range(low, high + 1) for low, high in (key_bounds(v.type) for v in own)]
+    for keys in product(*kinds):
+        here = {str(v.name): value_of_key(v.type, key) for v, key in zip(own, keys, strict=True)}
+        yield initial(made) | here
+
+
+def shown_cycle(made: Program, words: dict[str, str]) -> dict[str, str]:
+    """What a cycle leaves, in words, as another version may number members otherwise."""
+    kinds = {str(v.name): v.type for v in made.variables}
+    now = {
+        name: kind.members.index(words[name]) if isinstance(kind, Enum) else parsed(kind, words[name])
+        for name, kind in kinds.items()
+    }
+    left = cycle(made, made.levels[0], now).snapshot
+    return {name: spell(kind, left[name]) for name, kind in kinds.items()}
+
+
+def parsed(kind: Scalar, word: str) -> Value:
+    return word == "true" if isinstance(kind, Bool) else int(word)
+
+
+@pytest.mark.parametrize("edits", EDITS.values(), ids=EDITS)
+def test_out_of_reach_is_where_no_input_makes_a_difference(edits: tuple[tuple[str, str], ...]) -> None:
+    text = SMALL
+    for old, new in edits:
+        assert text.count(old) == 1, old
+        text = text.replace(old, new)
+    before, after = program(SMALL), program(text)
+    found = compare("case", before, after, Options())
+    kinds = {str(v.name): v.type for v in after.variables}
+    taken = [v for v in after.variables if v.kind is Kind.INPUT]
+    differs = reached = 0
+    for state in states(after):
+        met = within_reach(found, after, after.levels[0], state, Options())
+        said = {name: spell(kind, state[name]) for name, kind in kinds.items()}
+        other = False
+        for keys in product(*(range(key_bounds(v.type)[1] + 1) for v in taken)):
+            given = {
+                str(v.name): spell(v.type, value_of_key(v.type, k)) for v, k in zip(taken, keys, strict=True)
+            }
+            other |= shown_cycle(before, said | given) != shown_cycle(after, said | given)
+        assert met or not other, said
+        differs += other
+        reached += bool(met)
+    parts = {one.what for one in found.parts if one.changed}
+    if parts == {"table"}:
+        assert 0 < differs == reached < 54  # a region that is reached makes a difference
+    assert bool(reached) == found.changed
+
+
+def test_a_region_that_boxes_do_not_say_counts_as_met() -> None:
+    after = program(LEVEL.replace("|| to(end)    |", "|| to(start)  |"))
+    found = compare("case", program(LEVEL), after, Options())
+    level, [table, *_] = after.levels[0], found.parts
+    [change] = table.changes
+    for where, met in ((change.where, False), (replace(change.where, exact=False), True)):
+        one = replace(found, parts=(replace(table, changes=(replace(change, where=where),)),))
+        assert bool(within_reach(one, after, level, initial(after), Options())) is met
+
+
+def test_a_state_is_known_where_some_line_is_for_it() -> None:
+    made = program(
+        LEVEL.replace("  | back | end    |       || to(start)  |\n", "").replace(
+            "| rest | /= end | false ||            |\n",
+            "| rest | /= end | false || |\n  | lost | DEFAULT | || |\n",
+        )
+    )
+    table = made.tables[0]
+    assert [knows(made, table, "at", value, Options()) for value in range(3)] == [True, True, False]
+    narrow = program(
+        LEVEL.replace("table walk {", "assume early monitored : at /= end\ntable walk assuming early {")
+    )
+    assert [knows(narrow, narrow.tables[0], "at", value, Options()) for value in range(3)] == [
+        True,
+        True,
+        False,
+    ]
+
+
+def walked(made: Program) -> set[tuple[str, str]]:
+    """Pairs of lines in successive cycles, by trying everything; at first nothing is under way."""
+    pairs = set()
+    level, taken = made.levels[0], [v for v in made.variables if v.kind is Kind.INPUT]
+    every = [
+        {str(v.name): value_of_key(v.type, key) for v, key in zip(taken, keys, strict=True)}
+        for keys in product(*(range(key_bounds(v.type)[1] + 1) for v in taken))
+    ]
+    for state in states(made):
+        if state["at"] == state["at.next"]:
+            for one in every:
+                first = cycle(made, level, state | one)
+                pairs |= {
+                    (str(first.line), str(cycle(made, level, first.snapshot | two).line)) for two in every
+                }
+    return pairs
+
+
+@pytest.mark.parametrize("edits", EDITS.values(), ids=EDITS)
+def test_lines_that_can_newly_follow_are_those_that_do(edits: tuple[tuple[str, str], ...]) -> None:
+    text = SMALL
+    for old, new in edits:
+        text = text.replace(old, new)
+    before, after = program(SMALL), program(text)
+    found = compare("case", before, after, Options(), follow=True)
+    names = {"back": "home"} if "| home |" in text else {}
+    one = {(names.get(a, a), names.get(b, b)) for a, b in walked(before)}
+    two = walked(after)
+    assert {pair for follows in found.follows for pair in follows.new} == two - one
+    assert {pair for follows in found.follows for pair in follows.gone} == one - two
+
+
+def test_a_question_without_an_answer_leaves_the_steps_open(monkeypatch: pytest.MonkeyPatch) -> None:
+    def unanswered(*_: object) -> None:
+        raise UnansweredError
+
+    monkeypatch.setattr("rcsc.diff.follows.following", unanswered)
+    found = compare(
+        "case", program(LEVEL), program(LEVEL.replace("to(end)    |", "to(start)  |")), Options(), follow=True
+    )
+    [one] = found.follows
+    assert (one.new, one.gone, one.decided) == ((), (), False)
+    assert "which line can follow which was not decided" in plain(rows(Difference("a", "b", (found,))))
+
+
 # --- the command ------------------------------------------------------------------------------------------
 
 
@@ -626,6 +782,26 @@ def test_json_and_markdown_say_the_same(folder: Path, capfd: pytest.CaptureFixtu
         in text
     )
     assert text.count("<details>") == text.count("</details>") == 1
+
+
+def test_the_command_shows_which_lines_can_follow_which(
+    folder: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    (folder / "c.rcs").write_text(LEVEL, encoding="utf-8")
+    (folder / "d.rcs").write_text(LEVEL.replace("|| to(end)    |", "|| to(start)  |"), encoding="utf-8")
+    assert run(["diff", "c.rcs", "d.rcs"]) == 1
+    assert "from line to line" not in capfd.readouterr().out
+    assert run(["diff", "c.rcs", "d.rcs", "--follow"]) == 1
+    assert (
+        "  level `walker`, table `walk`: 1 step from line to line newly possible\n    on -> off\n"
+        in capfd.readouterr().out
+    )
+    assert run(["diff", "c.rcs", "d.rcs", "--follow", "--format", "markdown"]) == 1
+    assert "- on → off" in capfd.readouterr().out
+    assert run(["diff", "c.rcs", "d.rcs", "--follow", "--json"]) == 1
+    [follows] = json.loads(capfd.readouterr().out)["programs"][0]["follows"]
+    assert follows["new"] == [["on", "off"]]
+    assert follows["gone"] == [["on", "back"]]
 
 
 def test_what_the_solver_gives_up_on_is_an_error(

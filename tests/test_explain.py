@@ -12,7 +12,7 @@ from rcsc.prove.options import Options
 from rcsc.prove.program import prove_program
 from rcsc.resolve import compile_text
 
-NOTES = {Code.DEFAULT_COVERS}
+NOTES = {Code.DEFAULT_COVERS, Code.PROPERTY_ELSEWHERE}
 """Codes whose right form is the wrong one's, or that are said of what is right."""
 
 

@@ -1,7 +1,6 @@
 """Logs: the same bytes from every executor, readable after a kill, replayed exactly, asked, exported and drawn."""
 
 import csv
-import importlib.util
 import json
 import os
 import shutil
@@ -16,6 +15,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 from mcap.reader import make_reader
+from mcap.writer import Writer
 
 from rcsc.cli.commands import commands
 from rcsc.log.export import coverage, csv_text, json_text
@@ -24,10 +24,12 @@ from rcsc.log.read import Log, UnreadableLog, read
 from rcsc.log.replay import Replay, find
 from rcsc.log.words import words
 from rcsc.log.write import CHUNK_MS, Recorder
-from rcsc.system.cell import Kind, System, assemble
-from rcsc.system.description import Description, description
+from rcsc.system.adopt import Begun
+from rcsc.system.cell import Kind, StateTableError, System, assemble
+from rcsc.system.description import Description, LevelSpec, Wire, description
 from rcsc.system.levels import Query
 from rcsc.system.signature import Values
+from tests.emitted import emitted, program_of
 
 REPO = Path(__file__).parents[1]
 TICKS = 130
@@ -140,7 +142,6 @@ def test_everything_is_in_it(log: Log) -> None:
     assert set(log.buffers) == {"workstation.order", "robot.report", "hand.report", "camera.picture"}
     assert log.buffers["workstation.order"].latest(30) == (2, 3, 1, 1, 2, 3, 4, 0)
     assert log.buffers["camera.picture"].ticks == []
-    assert log.buffer_variable("robot.report") == "primitive.robot"
     assert log.level("task").sign == running.level("task").sign
 
 
@@ -329,6 +330,213 @@ def test_tables_with_other_lines_and_leaves(log: Log, edited: Path) -> None:
     assert moment.tick == 43
 
 
+def test_a_log_that_cannot_be_written_leaves_nothing(tmp_path: Path) -> None:
+    (tmp_path / "run.mcap").mkdir()
+    with pytest.raises(OSError, match=r"run\.mcap"):
+        Recorder(system("python"), tmp_path / "run.mcap")
+    assert [path.name for path in tmp_path.iterdir()] == ["run.mcap"]
+
+
+# --- restarts ---
+
+
+def restarted(path: Path, kind: Kind) -> Path:
+    """A run in which levels are started again, each before the cycle with the number after."""
+    running = system(kind)
+    levels = {level.name: level for level in running.levels}
+    levels["vision"].level = replace(levels["vision"].level, period_ms=120)
+    checkpoints: dict[int, Values] = {}
+    with Recorder(running, path) as recorder:
+        running.watch.append(recorder)
+        for tick in range(60):
+            checkpoints[tick] = levels["gripper"].values
+            if tick in (0, 31, 32):
+                running.restart("task")
+            if tick == 32:
+                running.restart("emove")
+                running.restart("emove")
+            if tick == 20:
+                running.restart("gripper")
+                running.restart("gripper", checkpoints[11])  # the last is what counts
+            if tick in (34, 35):  # no cycle of VISION's between
+                running.restart("vision")
+            running.step()
+    return path
+
+
+@pytest.fixture(scope="module")
+def again_and_again(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return restarted(tmp_path_factory.mktemp("restarts") / "run.mcap", "python")
+
+
+STARTED = {
+    ("task", 1): Begun.ANEW, ("task", 32): Begun.ANEW, ("task", 33): Begun.ANEW, ("emove", 33): Begun.ANEW,
+    ("gripper", 21): Begun.CHECKPOINT, ("vision", 37): Begun.ANEW,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", ["c", "python"])
+def test_restarts_are_recorded_and_replayed_exactly(again_and_again: Path, kind: Kind) -> None:
+    again = Replay(read(again_and_again), REPO / "generated", kind)
+    moments = list(again.moments())
+    assert [moment.tick for moment in moments if moment.differs] == []
+    began = {
+        (cycle.level, moment.tick): cycle.restarted
+        for moment in moments
+        for cycle in moment.cycles
+        if cycle.restarted is not None
+    }
+    assert began == STARTED
+    assert not again.go(33).differs
+    assert again.back().cycles[0].restarted is Begun.ANEW
+
+
+def test_the_executors_record_the_same_restarts(tmp_path: Path, again_and_again: Path) -> None:
+    assert restarted(tmp_path / "c.mcap", "c").read_bytes() == again_and_again.read_bytes()
+
+
+def test_every_restart_is_in_the_log_and_said(again_and_again: Path) -> None:
+    log = read(again_and_again)
+    assert [(one.tick, one.begun) for one in log.level("emove").restarts] == [(33, Begun.ANEW)] * 2
+    anew, gripper = log.level("gripper").restarts
+    assert (anew.begun, gripper.begun) == (Begun.ANEW, Begun.CHECKPOINT)
+    assert anew.values != gripper.values
+    before = log.level("gripper").track.latest(11)
+    assert before is not None
+    assert gripper.values == before[: len(gripper.values)]
+    said = json.loads(json_text(log))["restarts"]
+    assert {"level": "gripper", "tick": 21, "from": "checkpoint"} in said
+    assert len(said) == 9
+    shown = run("log", again_and_again).output
+    assert "started again before cycle 21: from the state that its last cycle left" in shown
+    assert shown.count("started again") == 9
+    args = ["--generated", REPO / "generated", "--executor", "python", "--at", 33]
+    assert run("replay", again_and_again, *args).output.count("started again, anew") == 2
+
+
+def without_restarts(path: Path, out: Path) -> None:
+    """The log as it was written before restarts were recorded."""
+    old = Writer(str(out))
+    old.start(profile="rcsc", library="rcsc")
+    with path.open("rb") as file:
+        reader = make_reader(file)
+        for metadata in reader.iter_metadata():
+            old.add_metadata(metadata.name, metadata.metadata)
+        channels: dict[str, int] = {}
+        for schema, channel, message in reader.iter_messages():
+            if schema is None or channel.topic.startswith("/restarts/"):
+                continue
+            if channel.topic not in channels:
+                number = old.register_schema(schema.name, schema.encoding, schema.data)
+                channels[channel.topic] = old.register_channel(
+                    channel.topic, channel.message_encoding, number, dict(channel.metadata)
+                )
+            old.add_message(
+                channels[channel.topic], message.log_time, message.data, message.log_time, message.sequence
+            )
+    old.finish()  # type: ignore[no-untyped-call]  # mcap leaves it untyped
+
+
+def test_an_older_log_is_read_and_its_restarts_are_differences(tmp_path: Path, again_and_again: Path) -> None:
+    old = tmp_path / "old.mcap"
+    without_restarts(again_and_again, old)
+    log = read(old)
+    assert log.last == read(again_and_again).last
+    assert all(level.restarts == () for level in log.levels)
+    differing = {
+        moment.tick for moment in Replay(log, REPO / "generated", "python").moments() if moment.differs
+    }
+    assert differing
+    assert differing <= {tick for _, tick in STARTED}
+    assert run("log", old).return_value == 0
+
+
+def test_a_log_without_a_restart_has_no_channel_for_one(logged: Path) -> None:
+    with logged.open("rb") as file:
+        summary = make_reader(file).get_summary()
+    assert summary is not None
+    assert not any(channel.topic.startswith("/restarts/") for channel in summary.channels.values())
+
+
+def test_a_restart_before_the_recording_begins_is_the_state_that_it_starts_from(tmp_path: Path) -> None:
+    running = system("python")
+    for _ in range(30):
+        running.step()
+    running.restart("task")
+    with Recorder(running, tmp_path / "late.mcap") as recorder:
+        running.watch.append(recorder)
+        running.step()
+        running.step()
+    again = Replay(read(tmp_path / "late.mcap"), REPO / "generated", "python")
+    assert again.first_difference() is None
+    assert again.log.ticks == range(31, 33)
+
+
+# --- one level alone, and executors that are not proved ---
+
+GAPS = """
+record order { number : int 0 .. 65535  width : int 0 .. 100 }
+input command : order
+input reported : int 0 .. 9
+input force : real -2.0 .. 2.0 clamp
+state seen : int 0 .. 65535
+output sent : int 0 .. 9
+assume calm monitored : reported < 9
+procedure take { seen := command.number }
+table orders assuming calm {
+  | line | command.width | reported || procedures | sent |
+  | few  | < 50          | < 5      || take       | 1    |
+  | some | in {7, 60}    |          ||            | 2    |
+  | many | > 60          |          ||            | 3    |
+}
+level lone { period 40 [ms] table orders }
+"""
+STEPS = ((1, 3), 2), ((2, 3), 3)
+
+
+@pytest.mark.parametrize(
+    ("order", "report", "said"),
+    [
+        ((3, 55), 9, "table orders: no line matches"),
+        ((3, 7), 2, "table orders: several lines match"),
+        ((3, 101), 2, "table orders: input refused, `command.width`"),
+    ],
+)
+def test_a_run_of_a_level_alone_that_ends_in_a_fault_replays(
+    tmp_path: Path, order: Values, report: int, said: str
+) -> None:
+    """As a finding of the prover is: executors of a program that is not proved, inputs that are given."""
+    for name, text in emitted(program_of(GAPS)).items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    wires = (Wire("over.order", "lone.command"), Wire("under.report", "lone.reported"))
+    about = Description("finding", tmp_path, tmp_path, 40, (LevelSpec("lone", "case_", ()),), wires)
+    logs = []
+    log = tmp_path / "finding.mcap"
+    for kind in ("c", "python"):
+        running = assemble(about, "c" if kind == "c" else "python", {})
+        with Recorder(running, log) as recorder:
+            running.watch.append(recorder)
+            for given, reported in (*STEPS, (order, report)):
+                running.buffers.publish("over.order", given)
+                running.buffers.publish("under.report", (reported,))
+                running.levels[0].executor.put(3, (1.5,))  # no buffer carries it
+                if given == order:
+                    with pytest.raises(StateTableError):
+                        running.step()
+                else:
+                    running.step()
+        logs.append(log.read_bytes())
+    assert logs[0] == logs[1]
+    for args in (["--executor", "c"], ["--executor", "python"]):
+        whole = run("replay", log, "--generated", tmp_path, *args)
+        assert whole.output == "3 ticks replayed: nothing differs\n"
+    last = run("replay", log, "--generated", tmp_path, "--at", 3, "--show", "lone").output
+    assert f"  lone: {said}\n" in last
+    assert f"the last: {said}" in run("log", log).output
+    assert find(read(log), predicate("lone.fault != none", read(log))) == 3
+
+
 def test_the_first_cycle_where_something_holds(log: Log) -> None:
     asked = {
         "task.command.inc_command == 2": 27,
@@ -435,8 +643,6 @@ def test_a_planted_difference_by_the_command(
 
 
 def test_pictures(tmp_path: Path, logged: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    if importlib.util.find_spec("matplotlib") is None:
-        pytest.skip("matplotlib is not installed")
     out = tmp_path / "run.svg"
     names = "task.cur_state,primitive.robot.plate[0],task.line,task.new_command"
     assert run("log", logged, "--plot", names, "-o", out).return_value == 0

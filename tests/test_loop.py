@@ -19,6 +19,7 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, 
 from rcsc.database.build import BadData
 from rcsc.log.read import read
 from rcsc.log.replay import Replay
+from rcsc.system.adopt import Begun
 from sim.episode import (
     FAULTS,
     HARM,
@@ -189,18 +190,35 @@ def test_the_digest_is_the_same_in_another_process_and_another_for_another_seed(
     assert run(replace(ODD, seed=7)).digest != here
 
 
-def test_the_log_of_an_episode_replays_exactly(tmp_path: Path) -> None:
-    outcome = run(replace(ODD, restarts=()), log=tmp_path / "log.mcap")
-    replay = Replay(read(tmp_path / "log.mcap"), SYSTEM.parents[1] / "generated")
-    assert replay.first_difference() is None
-    assert len(list(replay.moments())) == outcome.ticks
+RESTARTS = {
+    "one": (Restart(40, "vision"),),
+    "before the first cycle": (Restart(0, "task"),),
+    "two in succession": (Restart(40, "emove"), Restart(41, "emove")),
+    "two before one cycle": (Restart(40, "emove"), Restart(40, "emove")),
+    "two levels at once": (Restart(40, "task"), Restart(40, "primitive")),
+    "every level, the last again": tuple(Restart(at, level) for at in (60, 61) for level in LEVELS),
+}
 
 
-def test_a_restart_is_the_one_cycle_that_a_log_does_not_explain(tmp_path: Path) -> None:
-    """A log holds what levels left, not that one of them was put back to where it began."""
-    run(ODD, log=tmp_path / "log.mcap")
-    replay = Replay(read(tmp_path / "log.mcap"), SYSTEM.parents[1] / "generated")
-    assert {moment.tick for moment in replay.moments() if moment.differs} == {41}
+@pytest.mark.parametrize("restarts", RESTARTS.values(), ids=RESTARTS)
+def test_the_log_of_an_episode_replays_exactly_whatever_is_restarted(
+    restarts: tuple[Restart, ...], tmp_path: Path
+) -> None:
+    outcome = run(replace(ODD, restarts=restarts), log=tmp_path / "log.mcap")
+    log = read(tmp_path / "log.mcap")
+    replay = Replay(log, SYSTEM.parents[1] / "generated")
+    moments = list(replay.moments())
+    assert [moment.tick for moment in moments if moment.differs] == []
+    assert len(moments) == outcome.ticks
+    began = [
+        (moment.tick, cycle.level, cycle.restarted)
+        for moment in moments
+        for cycle in moment.cycles
+        if cycle.restarted is not None
+    ]
+    assert began == [(one.tick + 1, one.level, Begun.ANEW) for one in dict.fromkeys(restarts)]
+    for level in log.levels:
+        assert len(level.restarts) == sum(one.level == level.name for one in restarts)
 
 
 # --- episodes as values ---

@@ -8,11 +8,17 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from rcsc.diagnostics.codes import Code
+from rcsc.diff.compare import compare
+from rcsc.diff.difference import ProgramDifference
+from rcsc.driver import TARGETS, compile_
+from rcsc.driver.work import Settings
+from rcsc.prove.options import Options
 from rcsc.shell.commands import HELP, Commands
 from rcsc.shell.refusal import Refused
 from rcsc.shell.reload import Plant
@@ -295,7 +301,7 @@ def test_parts_run_only_from_the_sources_that_the_executors_were_made_of(project
     edit(project, "table position {", "procedure nothing {\n  waited := waited\n}\n\ntable position {")
     commands = alone(project)
     assert refused(commands, "gripper.nothing").code is Code.SHELL_RELOAD
-    do(commands, "reload gripper", "gripper.nothing")
+    do(commands, "reload gripper anyway", "gripper.nothing")
     before = state(commands)
     assert refused(commands, "nextstate").code is Code.SHELL_COMMAND
     assert refused(commands, "nextstate(state_99)").code is Code.SHELL_VALUE
@@ -473,8 +479,13 @@ def test_reload_takes_proved_tables_in_the_present_state(project: Path, kind: Ki
     do(commands, "break gripper.waited = 140", "break gripper.grasp.4")
     edit(project, "const most_waited = 150", "const most_waited = 200")
     edit(project, "state failure : reason", "state failure : reason\nstate tries : int 3 .. 9 = 3")
-    [said] = do(commands, "reload gripper")
-    assert "25 variables keep their values; new: tries" in said
+    said = do(commands, "reload gripper")
+    assert (
+        said[-1]
+        == "level `gripper` runs its new tables from cycle 1 on: 25 variables keep their values; new: tries"
+    )
+    assert "2 tables changed; 1 as before, proved; 1 other part changed; 2 declarations changed" in said
+    assert "out of reach of the present state: whatever the inputs, the next cycle does as before" in said
     do(commands, "expect gripper.tries = 3 and gripper.cur_state = moving", "step gripper 180")
     do(commands, "expect gripper.waited = 180 and gripper.line = 3")
     do(commands, "gripper.waited = 200", "level gripper", "STATE-TABLE")
@@ -511,7 +522,10 @@ def test_reload_refuses_and_the_old_tables_run_on(project: Path, old: str, new: 
     before = state(commands)
     edit(project, old, new)
     if not why:
-        assert "runs its new tables" in do(commands, "reload gripper")[0]
+        said = do(commands, "reload gripper")
+        assert (
+            "level `gripper` runs its new tables from cycle 3 on: 25 variables keep their values" in said[-1]
+        )
         return
     error = refused(commands, "reload gripper")
     assert error.code is Code.SHELL_RELOAD
@@ -520,7 +534,7 @@ def test_reload_refuses_and_the_old_tables_run_on(project: Path, old: str, new: 
     do(commands, "step", "expect gripper.line = 1")
 
 
-def test_reload_refuses_a_state_that_an_invariant_or_assumption_excludes(project: Path) -> None:
+def test_reload_refuses_a_state_that_a_range_or_an_assumption_excludes(project: Path) -> None:
     commands = alone(project)
     do(commands, "step", "gripper.waited = 7")
     edit(project, "const most_waited = 150", "const most_waited = 400")
@@ -528,15 +542,297 @@ def test_reload_refuses_a_state_that_an_invariant_or_assumption_excludes(project
     edit(project, "const most_waited = 400", "const most_waited = 150")
     assert "`waited` = 300 lies outside its new range 0 .. 150" in str(refused(commands, "reload gripper"))
     do(commands, "gripper.waited = 7", "reload gripper")
-    edit(
-        project,
-        "enum gripper_state { d_state, f_state, moving }",
-        "enum gripper_state { moving, f_state, d_state }",
-    )
-    do(commands, "reload gripper", "expect gripper.cur_state = d_state")
-    edit(project, "procedure executing {", "invariant short : waited <= 150\nprocedure executing {")
-    assert "runs its new tables" in do(commands, "reload gripper")[0]
     edit(project, "table position {", "assume calm monitored : waited /= 7\ntable position assuming calm {")
+    do(commands, "reload gripper", "undo")  # it is PAUSE's table that runs next
+    do(commands, "gripper.command.input_command = position")
     error = refused(commands, "reload gripper")
-    assert "assumption `calm` does not hold of the present state" in str(error)
+    assert error.code is Code.SHELL_RELOAD
+    assert "assumption `calm` of table `position` does not hold of the present state: waited = 7" in str(
+        error
+    )
+    assert refused(commands, "reload gripper anyway").code is Code.SHELL_RELOAD
     do(commands, "gripper.waited = 4", "reload gripper")
+
+
+# --- reload is gated: what changed, and whether it is met at once ---
+
+WALKER = """\
+enum place { start, middle, end }
+input go : bool
+input echo : int 0 .. 2
+state at : place = start deferred until echo = sent
+state seen : bool
+output sent : int 0 .. 2
+procedure to(where : place) { next at := where  sent := (sent + 1) mod 3 }
+procedure sense { seen := go }
+table walk {
+  | line | at     | seen  || procedures |
+  | off  | start  | true  || to(middle) |
+  | on   | middle | true  || to(end)    |
+  | back | end    |       || to(start)  |
+  | rest | /= end | false ||            |
+}
+level walker { period 40 [ms]  preprocess sense  table walk }
+"""
+ON = "|| to(end)    |", "|| to(start)  |"
+WALK = """\
+name = "small"
+generated = "generated"
+data = "cell.toml"
+tick_ms = 40
+[[level]]
+name = "walker"
+[buffers]
+"outside.go" = "walker.go"
+"outside.echo" = "walker.echo"
+"walker.sent" = "outside.order"
+"""
+OUT_OF_REACH = "out of reach of the present state: whatever the inputs, the next cycle does as before"
+WITHIN_REACH = "within reach of the present state, with some inputs: table `walk`, line `on`"
+
+
+@pytest.fixture
+def walker(tmp_path: Path) -> Path:
+    """A level with a deferred state; its source."""
+    source = tmp_path / "walker.rcs"
+    source.write_text(WALKER, encoding="utf-8")
+    (tmp_path / "system.toml").write_text(WALK, encoding="utf-8")
+    assert not compile_(
+        Settings((str(source),), Options()), tmp_path / "generated", TARGETS, only_check=False
+    ).report.failed
+    return source
+
+
+def walking(source: Path) -> Commands:
+    return alone(source.parent / "system.toml", "python")
+
+
+def write(source: Path, *edits: tuple[str, str], text: str = WALKER) -> None:
+    for old, new in edits:
+        assert text.count(old) == 1, old
+        text = text.replace(old, new)
+    source.write_text(text, encoding="utf-8")
+
+
+def test_a_reload_that_changes_nothing_says_so_and_one_that_changes_no_meaning_too(walker: Path) -> None:
+    commands = walking(walker)
+    same = ["level `walker` runs these very tables: nothing changed"]
+    assert do(commands, "reload") == same
+    assert do(commands, "diff") == same
+    assert refused(commands, "undo").code is Code.SHELL_COMMAND  # nothing was taken
+    write(walker, ("table walk {", "# a walk\ntable walk {"))
+    assert do(commands, "reload")[0] == "same meaning; 1 as before, proved"
+    assert do(commands, "reload") == same
+    write(walker, ("| back |", "| home |"))
+    said = do(commands, "reload")
+    assert "same meaning; 1 as before, proved; 1 region with another line to the same effect" in said
+    assert OUT_OF_REACH not in said  # it is not worth saying where nothing changed
+    do(commands, "at = end", "at.next = end", "step", "expect walker.line = home")
+
+
+def test_a_change_that_the_present_state_does_not_meet_is_taken_with_what_it_changes(walker: Path) -> None:
+    commands = walking(walker)
+    write(walker, ON)
+    before = state(commands)
+    shown = do(commands, "diff")
+    assert state(commands) == before
+    assert shown[-1] == "`reload walker` takes it: 6 variables keep their values"
+    said = do(commands, "reload walker")
+    assert said[:-1] == shown[:-1]
+    assert OUT_OF_REACH in said
+    assert "    line `on`: another effect  (1 of 6 inputs)" in said
+    assert "      where  at = middle, seen = true" in said
+    assert "      at.next: end -> start  [procedures]" in said
+    assert "    proved: nothing else changed" in "\n".join(said)
+    at = said.index("  level `walker`, table `walk`: 1 step from line to line newly possible")
+    assert said[at + 1] == "    on -> off"
+    do(commands, "go = true", "step", "echo = 1", "step", "echo = 2", "step", "expect at = start")
+
+
+def test_a_change_within_reach_is_taken_and_one_that_is_met_at_once_only_if_that_is_said(
+    walker: Path,
+) -> None:
+    commands = walking(walker)
+    do(commands, "go = true", "step", "expect at.next = middle")
+    write(walker, ON)
+    said = do(commands, "diff")  # the echo may come, but has not
+    assert WITHIN_REACH in said
+    assert said[-1].startswith("`reload walker` takes it")
+    do(commands, "echo = 1")
+    before = state(commands)
+    said = do(commands, "diff")
+    assert said[-1].startswith("`reload walker anyway` takes it")
+    error = refused(commands, "reload walker")
+    assert error.code is Code.SHELL_OTHERWISE
+    first, *rest = str(error).splitlines()
+    assert first == (
+        "level `walker` keeps its tables: in the present state the next cycle would do otherwise: "
+        "table `walk`, line `on` before, table `walk`, line `on` now"
+    )
+    assert rest[0] == "  at.next: end -> start"
+    assert WITHIN_REACH in rest
+    assert error.helps == ("`reload walker anyway` takes them",)
+    assert state(commands) == before
+    do(commands, "step", "expect at.next = end", "undo")
+    said = do(commands, "reload ANYWAY")
+    assert (
+        "in the present state the next cycle would do otherwise: table `walk`, line `on` before, table `walk`, line `on` now"
+        in said
+    )
+    do(commands, "step", "expect at.next = start")
+    do(commands, "undo 2", "step", "expect at.next = end")  # the cycle, then the reload
+
+
+def test_members_that_are_numbered_anew_are_the_same_states(walker: Path) -> None:
+    commands = walking(walker)
+    write(walker, ON, ("{ start, middle, end }", "{ end, start, middle }"))
+    assert OUT_OF_REACH in do(commands, "diff")
+    do(commands, "at = middle", "at.next = middle")
+    assert WITHIN_REACH in do(commands, "diff")
+    do(commands, "go = true")
+    assert refused(commands, "reload").code is Code.SHELL_OTHERWISE
+    do(commands, "go = false", "reload", "expect at = middle", "go = true", "step", "expect at.next = start")
+
+
+def test_a_state_that_the_new_table_does_not_know_is_refused_whatever_is_said(walker: Path) -> None:
+    commands = walking(walker)
+    on = "  | on   | middle | true  || to(end)    |\n"
+    lost = (
+        (on, ""),
+        (
+            "| rest | /= end | false ||            |",
+            "| rest | start  | false ||            |\n  | lost | DEFAULT | || |",
+        ),
+    )
+    write(walker, *lost)
+    do(commands, "reload", "undo")  # nothing is on its way there
+    do(commands, "go = true", "step", "go = false")
+    for line in ("reload", "reload anyway", "diff"):
+        error = refused(commands, line)
+        assert error.code is Code.SHELL_RELOAD
+        assert "`at` is to be middle, for which table `walk` has no line" in str(error)
+        assert "add a line for middle" in error.helps[0]
+    do(commands, "echo = 1", "step", "expect at = middle")
+    assert "`at` is middle, for which table `walk` has no line" in str(refused(commands, "reload anyway"))
+    write(
+        walker, (on, ""), ("place { start, middle, end }", "place { start, end }"), ("to(middle)", "to(end)")
+    )
+    assert "`at` = middle, which its new type does not have" in str(refused(commands, "reload anyway"))
+    do(commands, "undo")
+    assert "`at.next` = middle, which its new type does not have" in str(refused(commands, "reload anyway"))
+
+
+def test_a_pending_state_that_an_assumption_excludes_is_refused(walker: Path) -> None:
+    commands = walking(walker)
+    write(walker, ("table walk {", "assume early assumed : at /= middle\ntable walk assuming early {"))
+    do(commands, "go = true", "step")
+    assert "`at` is to be middle, for which table `walk` has no line" in str(refused(commands, "reload"))
+    do(commands, "echo = 1")
+    error = refused(commands, "reload")
+    assert "assumption `early` of table `walk` does not hold of the present state: at = middle" in str(error)
+    do(commands, "at = start", "at.next = start", "reload")
+
+
+def test_an_invariant_that_does_not_hold_of_the_present_state_is_refused(walker: Path) -> None:
+    text = WALKER.replace("state seen : bool", "state seen : bool\nstate count : int 0 .. 5")
+    commands = walking(walker)
+    write(walker, text=text)
+    do(commands, "reload", "count = 4")
+    write(walker, ("table walk {", "invariant few : count <= 3 or seen\ntable walk {"), text=text)
+    assert "RCS4" in str(refused(commands, "reload anyway"))  # `sense` does not keep it
+    write(walker, ("table walk {", "invariant few : count <= 3\ntable walk {"), text=text)
+    error = refused(commands, "reload anyway")
+    assert error.code is Code.SHELL_RELOAD
+    assert "invariant `few` does not hold of the present state: count = 4" in str(error)
+    do(commands, "count = 3", "reload")
+
+
+def test_what_cannot_be_compared_is_taken_only_if_that_is_said(
+    walker: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write(walker, ON)
+    commands = walking(walker)  # its executors are of the text before
+    error = refused(commands, "reload")
+    assert error.code is Code.SHELL_OTHERWISE
+    assert "the sources of what runs are not known" in str(error)
+    assert "nothing changed" not in do(commands, "reload anyway")[-1]
+    write(walker)
+    monkeypatch.setattr(
+        "rcsc.shell.gate.compare",
+        lambda *args, **more: replace(compare(*args, **more), undecided=("table `walk`",)),
+    )
+    error = refused(commands, "reload")
+    assert (error.code, "the solver gave up on table `walk`" in str(error)) == (Code.SHELL_OTHERWISE, True)
+    monkeypatch.setattr("rcsc.shell.gate.compare", lambda name, *_, **__: ProgramDifference(name))
+    do(commands, "at = middle", "at.next = middle", "go = true")
+    with pytest.raises(RuntimeError, match="nothing is said to differ"):
+        do(commands, "reload")
+
+
+CALLED: list[bool] = []
+
+
+def outside_world(seen: bool) -> bool:
+    """An extern procedure: what it does cannot be taken back."""
+    CALLED.append(seen)
+    return seen
+
+
+def test_what_is_admitted_of_an_input_is_met_in_any_state(walker: Path) -> None:
+    commands = walking(walker)
+    write(walker, ("input echo : int 0 .. 2", "input echo : int 0 .. 2 clamp"))
+    said = do(commands, "diff")
+    assert OUT_OF_REACH not in said
+    assert any(
+        line.startswith("within reach of the present state, with some inputs: declaration of variable `echo`")
+        for line in said
+    )
+    do(commands, "reload")
+    commands.session.memory.publish("outside.echo", (7,))
+    write(walker)
+    error = refused(commands, "reload")
+    assert error.code is Code.SHELL_OTHERWISE
+    assert "table `walk`, line `rest` before, table `walk`, input refused now" in str(error)
+
+
+def test_extern_procedures_are_not_tried_out(walker: Path) -> None:
+    extern = 'state told : bool\nextern procedure tell reads seen writes told python "tests.test_shell:outside_world" c "tell"\n'
+    text = WALKER.replace("procedure sense {", f"{extern}procedure sense {{").replace(
+        "preprocess sense", "preprocess sense, tell"
+    )
+    write(walker, text=text)
+    made = compile_(
+        Settings((str(walker),), Options()), walker.parent / "generated", TARGETS, only_check=False
+    )
+    assert not made.report.failed, made.report.found
+    commands = walking(walker)
+    CALLED.clear()
+    write(walker, ON, text=text)
+    error = refused(commands, "reload")
+    assert error.code is Code.SHELL_OTHERWISE
+    assert "the next cycle was not tried out, and assumptions not looked at" in str(error)
+    do(commands, "reload anyway")
+    assert CALLED == []
+    do(commands, "step")
+    assert len(CALLED) == 1
+
+
+def test_a_file_that_is_used_is_kept_too(walker: Path) -> None:
+    enum, rest = WALKER.split("\n", 1)
+    (walker.parent / "words").mkdir()
+    (walker.parent / "words" / "places.rcs").write_text(enum, encoding="utf-8")
+    write(walker, text=f"use words/places\n{rest}")
+    assert not compile_(
+        Settings((str(walker),), Options()), walker.parent / "generated", TARGETS, only_check=False
+    ).report.failed
+    commands = walking(walker)
+    (walker.parent / "words" / "places.rcs").write_text(
+        enum.replace("end }", "end, gone }"), encoding="utf-8"
+    )
+    error = refused(commands, "reload")
+    assert (error.code, "RCS401" in str(error)) == (Code.SHELL_RELOAD, True)  # a gap, in what was edited
+    do(commands, "sense")  # what runs is known by what it was made of
+    (walker.parent / "words" / "places.rcs").write_text(
+        enum.replace("start, middle", "middle, start"), encoding="utf-8"
+    )
+    assert "  enumeration `place`: start, middle, end -> middle, start, end" in do(commands, "reload")

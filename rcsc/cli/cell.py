@@ -54,9 +54,14 @@ def stop(error: Exception) -> NoReturn:
     from rcsc.database.build import BadData
     from rcsc.diagnostics.codes import Code
     from rcsc.system.cell import StateTableError
+    from rcsc.system.unproved import UnprovedExecutors
     from rcsc.workstation.script import BadScript
     from rcsc.workstation.stopped import NotResumed
 
+    if isinstance(error, UnprovedExecutors):
+        raise Stopped(
+            Code.EXECUTORS_NOT_PROVED, str(error), "mend the tables, then `rcsc compile`"
+        ) from error
     if isinstance(error, NotResumed):
         raise Stopped(error.code, str(error), "`--from-row N` begins anew at row N") from error
     if isinstance(error, BadData):

@@ -59,10 +59,12 @@ Exit status: 0 same meaning, 1 changed, 2 usage, an error, or not decided.""",
               help="Time limit of each question to the solver; past it nothing is called proved.")  # fmt: skip
 @click.option("--memory", type=click.IntRange(min=64), default=4096, show_default=True, metavar="MB",
               help="Memory limit of the solver.")  # fmt: skip
+@click.option("--follow", is_flag=True,
+              help="For a changed table also: which line can match in the cycle after which, what is new and what is gone.")  # fmt: skip
 @click.option("-q", "--quiet", is_flag=True, help="Only what changed, no summary and no progress.")
 def diff(  # noqa: PLR0913, PLR0917  # as many as there are options
     paths: tuple[str, ...], revision: str | None, form: str, file: Path | None, color: str, timeout: float,
-    memory: int, quiet: bool,
+    memory: int, follow: bool, quiet: bool,
 ) -> int:  # fmt: skip
     """Show the inputs for which another line, effect or fault follows in B than in A, and prove that there are no others.
 
@@ -77,7 +79,7 @@ def diff(  # noqa: PLR0913, PLR0917  # as many as there are options
     options = Options(timeout_ms=max(1, round(timeout * 1000)), memory_mb=memory)
     progress = Progress(wanted=not quiet)
     try:
-        found = _found(asked, options, progress)
+        found = _found(asked, options, progress, follow)
     except NotComparedError as error:
         return _refuse(Code.NOT_COMPARED, str(error), *error.helps)
     finally:
@@ -104,7 +106,7 @@ def _asked(paths: tuple[str, ...], revision: str | None) -> "tuple[Given, Given]
 
 
 def _found(
-    asked: "tuple[Given, Given]", options: "Options", progress: Callable[[str], None]
+    asked: "tuple[Given, Given]", options: "Options", progress: Callable[[str], None], follow: bool
 ) -> "Difference | int":
     """The difference, or the status where a side has errors."""
     from rcsc.diff.compare import difference
@@ -116,7 +118,7 @@ def _found(
         sides.append(read(one))
     if any(side.found for side in sides):
         return _wrong(sides)
-    return difference(sides[0], sides[1], options, progress)
+    return difference(sides[0], sides[1], options, progress, follow=follow)
 
 
 def _wrong(sides: "list[Side]") -> int:
@@ -134,7 +136,8 @@ def _refuse(code: Code, message: str, *helps: str) -> int:
 
 def _text(found: "Difference", form: str, quiet: bool, color: bool) -> str:
     from rcsc.diagnostics.render import paint, plain
-    from rcsc.diff.forms import markdown, rows, to_json
+    from rcsc.diff.forms import markdown, rows
+    from rcsc.diff.jsonform import to_json
 
     if form == "json":
         return json.dumps(to_json(found), indent=2, ensure_ascii=False) + "\n"

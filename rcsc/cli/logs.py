@@ -14,13 +14,13 @@ from rcsc.diagnostics.report import Report
 from rcsc.source import Span
 
 if TYPE_CHECKING:
-    from rcsc.log.read import Log
+    from rcsc.log.read import Log, LoggedLevel
     from rcsc.log.replay import Cycle, Moment, Replay
 
 FILE = click.argument("file", type=click.Path(exists=True, dir_okay=False, path_type=Path), metavar="FILE")
 _TO = click.Path(dir_okay=False, path_type=Path)
 _SHOWN = 12
-"""Differences that are shown of one level."""
+"""Differences, and restarts, that are shown of one level."""
 
 
 def _told(command: Callable[..., int]) -> Callable[..., int]:
@@ -145,15 +145,30 @@ def _summary(found: "Log") -> None:
     end = "" if found.complete else "; cut off: up to the last second is lost"
     click.echo(f"{found.facts['name']}: {count} ticks of {found.tick_ms} ms, {seconds:g} s{end}")
     for level in found.levels:
-        click.echo(f"level {level.name}: {len(level.track.ticks) - 1} cycles")
-        for one in coverage(found):
-            if one.level == level.name:
-                ran = len(one.lines) - len(one.never)
-                click.echo(f"  table {one.table}: {ran} of {len(one.lines)} lines ran")
-                often = ", ".join(f"{line}: {times}" for line, times in one.lines.items() if times)
+        _summed(level)
+        for table in coverage(found):
+            if table.level == level.name:
+                ran = len(table.lines) - len(table.never)
+                click.echo(f"  table {table.table}: {ran} of {len(table.lines)} lines ran")
+                often = ", ".join(f"{line}: {times}" for line, times in table.lines.items() if times)
                 click.echo(f"    ran    {often or 'none'}")
-                if one.never:
-                    click.echo(f"    never  {', '.join(one.never)}")
+                if table.never:
+                    click.echo(f"    never  {', '.join(table.never)}")
+
+
+def _summed(level: "LoggedLevel") -> None:
+    """How many cycles, how they ended, and how often the level was started again."""
+    from rcsc.log.words import begun_in_words, fault_in_words
+
+    values = level.track.layout.unpack(level.track.packed[-1])
+    fault = fault_in_words(level.sign, level.level, values)
+    click.echo(
+        f"level {level.name}: {len(level.track.ticks) - 1} cycles{f'; the last: {fault}' if fault else ''}"
+    )
+    for one in level.restarts[:_SHOWN]:
+        click.echo(f"  started again before cycle {one.tick}: {begun_in_words(one.begun)}")
+    if len(level.restarts) > _SHOWN:
+        click.echo(f"  and {len(level.restarts) - _SHOWN} times more")
 
 
 @click.command(
@@ -216,13 +231,16 @@ def _wanted(found: "Log", at: int | None, find_: str | None) -> int | None:
 
 
 def _show_moment(again: "Replay", moment: "Moment", level: str | None) -> None:
-    from rcsc.log.words import words
+    from rcsc.log.words import begun_in_words, fault_in_words, words
 
     click.echo(f"cycle {moment.tick}, {moment.tick * again.log.tick_ms} ms")
     for cycle in moment.cycles:
-        click.echo(f"  {cycle.level}: {cycle.line_then}")
+        if cycle.restarted is not None:
+            click.echo(f"  {cycle.level}: started again, {begun_in_words(cycle.restarted)}")
+        logged = again.log.level(cycle.level)
+        fault = fault_in_words(logged.sign, logged.level, cycle.recorded)
+        click.echo(f"  {cycle.level}: {fault or cycle.line_then}")
         if cycle.level == level:
-            logged = again.log.level(level)
             for name, said in words(logged.sign, logged.level, cycle.recorded).items():
                 click.echo(f"    {name} = {said}")
 

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Iterator
 from rcsc.diff import parts
 from rcsc.diff.align import aligned
 from rcsc.diff.difference import Difference, Part, ProgramDifference, Traces
+from rcsc.diff.follows import follows
 from rcsc.diff.revision import NotComparedError
 from rcsc.diff.sides import Side, pairs
 from rcsc.diff.tables import table_part
@@ -20,8 +21,10 @@ from rcsc.prove.evaluation import TooLongError
 from rcsc.prove.options import Options
 
 
-def compare(name: str, before: Program, after: Program, options: Options) -> ProgramDifference:
-    """What changed between two versions of a program."""
+def compare(
+    name: str, before: Program, after: Program, options: Options, *, follow: bool = False
+) -> ProgramDifference:
+    """What changed between two versions of a program; with `follow`, which lines can follow which, too."""
     made = aligned(before, after)
     versions = Versions(made, options)
     given_up: tuple[type[BaseException], ...] = (
@@ -43,7 +46,12 @@ def compare(name: str, before: Program, after: Program, options: Options) -> Pro
             seen = tuple(one for one in traces(versions) if one.new or one.gone)
         except given_up:
             undecided.append("the state graphs of levels")
-    return ProgramDifference(name, made.changes, tuple(found), seen, tuple(undecided))
+    pairs = (
+        tuple(one for one in follows(versions) if one.new or one.gone or not one.decided) if follow else ()
+    )
+    return ProgramDifference(
+        name, made.changes, tuple(found), seen, tuple(undecided), pairs, dict(versions.kinds)
+    )
 
 
 def _steps(versions: Versions) -> Iterator[tuple[str, Callable[[], Iterable[Part]]]]:
@@ -61,8 +69,10 @@ def _steps(versions: Versions) -> Iterator[tuple[str, Callable[[], Iterable[Part
     yield "assumptions and invariants", lambda: list(parts.conditions(versions))
 
 
-def difference(before: Side, after: Side, options: Options, progress: Callable[[str], None]) -> Difference:
-    """What changed between two sides, program by program.
+def difference(
+    before: Side, after: Side, options: Options, progress: Callable[[str], None], *, follow: bool = False
+) -> Difference:
+    """What changed between two sides, program by program; with `follow`, which lines can follow which, too.
 
     Raises:
         NotComparedError: Neither side has a program.
@@ -77,5 +87,5 @@ def difference(before: Side, after: Side, options: Options, progress: Callable[[
             said.append(f"program `{name}` is {'new' if one is None else 'gone'}")
         else:
             progress(f"comparing {name}")
-            found.append(compare(name, one, two, options))
+            found.append(compare(name, one, two, options, follow=follow))
     return Difference(before.name, after.name, tuple(found), tuple(said))

@@ -3,12 +3,12 @@
 Texts in them are in table words.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from enum import StrEnum
 
 from rcsc.diff.align import Declaration
-from rcsc.model import Box
+from rcsc.model import Box, Scalar
 from rcsc.model import Value as Scalars
 from rcsc.prove.verdict import Region
 
@@ -147,6 +147,23 @@ class Traces:
 
 
 @dataclass(frozen=True, slots=True)
+class Follows:
+    """A table's lines in successive cycles, compared: pairs of which the second can match in the cycle after the first.
+
+    Attributes:
+        new: Pairs of the later version alone.
+        gone: Pairs of the earlier version alone; a line that was only renamed has its new name.
+        decided: Whether the solver answered; else nothing is known.
+    """
+
+    level: str
+    table: str
+    new: tuple[tuple[str, str], ...] = ()
+    gone: tuple[tuple[str, str], ...] = ()
+    decided: bool = True
+
+
+@dataclass(frozen=True, slots=True)
 class ProgramDifference:
     """Two versions of one program.
 
@@ -155,6 +172,8 @@ class ProgramDifference:
         declarations: Variables and enumerations that changed.
         parts: Tables first, then procedures, levels, conditions.
         undecided: What the solver gave up on: nothing is proved of the program then.
+        follows: Of tables whose lines can follow otherwise than before; only where it was asked for.
+        kinds: What regions count values by, for each leaf.
     """
 
     name: str
@@ -162,6 +181,8 @@ class ProgramDifference:
     parts: tuple[Part, ...] = ()
     traces: tuple[Traces, ...] = ()
     undecided: tuple[str, ...] = ()
+    follows: tuple[Follows, ...] = ()
+    kinds: Mapping[str, Scalar] = field(default_factory=dict, compare=False, repr=False)
 
     @property
     def changed(self) -> bool:

@@ -1,12 +1,10 @@
-"""A difference as rows of text, as JSON, and as Markdown for a review comment.
+"""A difference as rows of text and as Markdown for a review comment.
 
-In: a `Difference`. Out: the same things said in each form; the same difference gives the same text on every machine.
+In: a `Difference`. Out: the same things said in each form (JSON: `jsonform`); the same difference gives the same text on every machine.
 """
 
 from collections.abc import Iterator, Sequence
-from typing import Any
 
-from rcsc import __version__
 from rcsc.diagnostics.render import Piece, Row, Style
 from rcsc.diagnostics.spelling import escape
 from rcsc.diff.align import Declaration
@@ -14,6 +12,7 @@ from rcsc.diff.difference import (
     Basis,
     Change,
     Difference,
+    Follows,
     Part,
     ProgramDifference,
     Sort,
@@ -23,12 +22,9 @@ from rcsc.diff.difference import (
     Where,
 )
 
-FORM = 1
-"""Version of the JSON form; it rises when a member changes its meaning or goes away."""
 MOST_TRANSITIONS = 6
 """Steps of one level that are shown in full; JSON has all."""
 _EVERYWHERE = "every input"
-Json = dict[str, Any]
 
 
 # --- in words ----------------------------------------------------------------------------
@@ -152,6 +148,8 @@ def _program(program: ProgramDifference) -> Iterator[Row]:
             yield from _part(part)
     for traces in program.traces:
         yield from _traced(traces)
+    for follows in program.follows:
+        yield from _followed(follows)
     for what in program.undecided:
         yield (Piece(f"  not decided: {what}", Style.ERROR),)
 
@@ -193,6 +191,28 @@ def _change(part: Part, change: Change) -> Iterator[Row]:
     for value in change.values:
         heading = f"  [{', '.join(value.headings)}]" if value.headings else ""
         yield (Piece(f"      {value.leaf or 'the run'}: {_left(value)}{heading}"),)
+
+
+def _followed(follows: Follows) -> Iterator[Row]:
+    where = f"  level `{follows.level}`, table `{follows.table}`"
+    if not follows.decided:
+        yield (Piece(f"{where}: which line can follow which was not decided", Style.NOTE),)
+    for word, pairs, style in (
+        ("newly possible", follows.new, Style.WARNING),
+        ("no longer possible", follows.gone, Style.NOTE),
+    ):
+        if pairs:
+            yield (Piece(f"{where}: {_count(len(pairs), 'step')} from line to line {word}", style),)
+            for line, then in _by_line(pairs).items():
+                yield (Piece(f"    {line} -> {', '.join(then)}"),)
+
+
+def _by_line(pairs: Sequence[tuple[str, str]]) -> dict[str, list[str]]:
+    """The lines that can follow each."""
+    found: dict[str, list[str]] = {}
+    for line, then in pairs:
+        found.setdefault(line, []).append(then)
+    return found
 
 
 def _traced(traces: Traces) -> Iterator[Row]:
@@ -242,6 +262,8 @@ def _program_marked(program: ProgramDifference) -> Iterator[str]:
             yield from _part_marked(part)
     for traces in program.traces:
         yield from _traces_marked(traces)
+    for follows in program.follows:
+        yield from _follows_marked(follows)
 
 
 def _part_marked(part: Part) -> Iterator[str]:
@@ -313,92 +335,16 @@ def _traces_marked(traces: Traces) -> Iterator[str]:
         yield ""
 
 
+def _follows_marked(follows: Follows) -> Iterator[str]:
+    where = f"**table `{follows.table}`** of level `{follows.level}`"
+    if not follows.decided:
+        yield from (f"{where}: which line can follow which was not decided", "")
+    for word, pairs in (("newly possible", follows.new), ("no longer possible", follows.gone)):
+        if pairs:
+            yield f"{where}: {_count(len(pairs), 'step')} from line to line {word}"
+            yield from ("", *(f"- {line} → {', '.join(then)}" for line, then in _by_line(pairs).items()), "")
+
+
 def _cell(text: str) -> str:
     """Text that ends no cell and marks nothing up."""
     return text.replace("|", "\\|").replace("<", "&lt;").replace("\n", " ")
-
-
-# --- JSON ----------------------------------------------------------------------------------
-
-
-def to_json(found: Difference) -> Json:
-    """As a JSON value."""
-    return {
-        "form": FORM,
-        "tool": {"name": "rcsc", "version": __version__},
-        "command": "diff",
-        "before": found.before,
-        "after": found.after,
-        "changed": found.changed,
-        "decided": not found.undecided,
-        "said": list(found.said),
-        "programs": [_program_json(program) for program in found.programs],
-    }
-
-
-def _program_json(program: ProgramDifference) -> Json:
-    return {
-        "program": program.name,
-        "changed": program.changed,
-        "undecided": list(program.undecided),
-        "declarations": [
-            {"what": d.what, "before": d.before, "after": d.after} for d in program.declarations
-        ],
-        "parts": [_part_json(part) for part in program.parts],
-        "traces": [
-            {"level": t.level, "new": [_step_json(s) for s in t.new], "gone": [_step_json(s) for s in t.gone]}
-            for t in program.traces
-        ],
-    }
-
-
-def _part_json(part: Part) -> Json:
-    return {
-        "what": part.what,
-        "name": part.name,
-        "changed": part.changed,
-        "said": list(part.said),
-        "basis": None if part.basis is None else part.basis.value,
-        "questions": part.queries,
-        "changes": [_change_json(change) for change in part.changes],
-        "moved": [_change_json(change) for change in part.moved],
-    }
-
-
-def _change_json(change: Change) -> Json:
-    where = change.where
-    return {
-        "sort": change.sort.value,
-        "before": change.before,
-        "after": change.after,
-        "relied_on": change.relied_on,
-        "where": {
-            "boxes": [list(words) for words in where.words],
-            "exact": where.exact,
-            "also": where.also,
-            "inputs": None if where.inputs is None else {"in": where.inputs[0], "of": where.inputs[1]},
-        },
-        "input": dict(change.witness),
-        "least": change.least,
-        "values": [
-            {
-                "leaf": value.leaf,
-                "headings": list(value.headings),
-                "before": value.before,
-                "after": value.after,
-                "at_input": list(value.at),
-            }
-            for value in change.values
-        ],
-    }
-
-
-def _step_json(step: Transition) -> Json:
-    return {
-        "variable": step.variable,
-        "from": step.before,
-        "to": step.after,
-        "by": list(step.by),
-        "trace": [{"state": state, "line": line} for state, line in step.trace],
-        "input": dict(step.witness),
-    }

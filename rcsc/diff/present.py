@@ -1,32 +1,206 @@
-"""What of a difference a system meets that stands in some state: for whoever is about to take the new tables.
+"""What of a difference a level meets that stands in some state: for whoever is about to take the new tables.
 
-In: a difference and a state. Out: its changes that some input leads to from there.
+In: a difference, the new version and a state. Out: what of the difference the next cycle can come to from there, and whether the
+new tables know a state at all.
 """
 
-from rcsc.diff.difference import Change, Part, ProgramDifference, holds_in
-from rcsc.model import Kind, Program, Snapshot, key_of
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import count
+
+from rcsc.diff.difference import Change, Part, ProgramDifference
+from rcsc.diff.tables import assumed
+from rcsc.model import (
+    Box,
+    Call,
+    Enum,
+    Kind,
+    Level,
+    OneTable,
+    ProcedureName,
+    Program,
+    Snapshot,
+    Table,
+    Value,
+    pending,
+    value_of_key,
+)
+from rcsc.prove import smt, values
+from rcsc.prove.cover import Space, UndecidedError
+from rcsc.prove.effect import Meaning, Shared
+from rcsc.prove.evaluation import TooLongError
+from rcsc.prove.follow import loosened
+from rcsc.prove.options import Options
+from rcsc.prove.symbolic import Run
+from rcsc.prove.values import Node
+
+_ELSEWHERE = frozenset({"procedure", "assumption", "invariant", "standing of assumption"})
+"""Parts that do nothing by themselves: what a changed procedure does is seen in the tables that call it."""
 
 
-def within_reach(found: ProgramDifference, after: Program, now: Snapshot) -> tuple[tuple[Part, Change], ...]:
-    """The changes whose region the next cycle can meet if it begins in this state; inputs are free.
+@dataclass(frozen=True, slots=True)
+class Met:
+    """What of a difference can be met.
 
-    A region that its boxes do not say exactly counts as met: in doubt a change is shown. What `preprocess` makes of
-    the state is not followed; a state that it writes is to be left out of `now`.
+    Attributes:
+        change: None where what changed of the part is no region.
+    """
+
+    part: Part
+    change: Change | None
+
+
+def within_reach(
+    found: ProgramDifference, after: Program, level: Level, now: Snapshot, options: Options
+) -> tuple[Met, ...]:
+    """What of a difference the level's next cycle can come to if it begins in this state; inputs are free.
+
+    Deferred values and `preprocess` are followed as the later version has them. In doubt it is said to come to it: a region
+    that its boxes do not say exactly counts as met, and so does what runs behind the table; arithmetic on doubles is taken
+    to give any value within its bounds.
 
     Args:
         found: The difference.
         after: The version to be taken.
-        now: Values of states and outputs, by leaf; others may be left out.
+        level: The level, of that version.
+        now: Values of all leaves, in the numbers of that version; those of inputs are not looked at.
+        options: Limits of the solver.
     """
-    kinds = {str(v.name): v.type for v in after.variables if v.kind is not Kind.INPUT and v.name in now}
-    keys = {name: key_of(kind, now[name]) for name, kind in kinds.items()}
-    return tuple(
-        (part, change)
+    own = [level.tables.table] if isinstance(level.tables, OneTable) else [t for _, t in level.tables.tables]
+    declared = tuple(_declared(found))
+    parts = [
+        part
         for part in found.parts
-        for change in part.changes
-        if not change.where.exact
-        or any(
-            holds_in({name: part_ for name, part_ in box.items() if name in keys}, keys)
+        if part.what not in _ELSEWHERE and (part.what != "table" or part.name in own)
+    ]
+    if not any(part.changed for part in parts):
+        return declared
+    cycle: _Cycle | None
+    given_up: tuple[type[BaseException], ...] = (TooLongError, RecursionError, *smt.troubles())
+    try:
+        cycle = _Cycle(found, after, level, now, options)
+    except given_up:
+        cycle = None
+    return (*declared, *(met for part in parts for met in _met(part, cycle)))
+
+
+def _declared(found: ProgramDifference) -> Iterator[Met]:
+    """Declarations that say what a cycle does: what is admitted of an input, and whether a value is deferred."""
+    for one in found.declarations:
+        if one.before and one.after:
+            admits = one.before.startswith("input ") or one.after.startswith("input ")
+            defers = one.before.endswith(" deferred") != one.after.endswith(" deferred")
+            if admits or defers:
+                yield Met(Part("declaration of", one.what, (f"{one.before} -> {one.after}",)), None)
+
+
+def _met(part: Part, cycle: "_Cycle | None") -> Iterator[Met]:
+    """What of a part is met; all of it where the cycle cannot be followed."""
+    if part.said:
+        yield Met(part, None)
+    for change in part.changes:
+        if cycle is None or part.what == "postprocess" or cycle.reached(part, change):
+            yield Met(part, change)
+
+
+class _Cycle:
+    """The beginning of a cycle, from one state with any inputs: what leaves are when each part looks at them."""
+
+    def __init__(
+        self, found: ProgramDifference, program: Program, level: Level, now: Snapshot, options: Options
+    ) -> None:
+        self.found, self.level, self.options = found, level, options
+        self.numbers = count(1)
+        self.kinds = {str(v.name): v.type for v in program.variables}
+        self.program = program
+        start = {
+            str(v.name): values.variable(v.name, v.type)
+            if v.kind is Kind.INPUT
+            else values.constant(v.type, now[v.name])
+            for v in program.variables
+        }
+        run = Run({str(p.name): p for p in program.procedures}, self.kinds, start)
+        self.inputs = self._leaves(run)
+        self._settle(run)
+        self.settled = self._leaves(run)
+        run.execute(Call(ProcedureName(name)) for name in level.preprocess)
+        self.seen = self._leaves(run)
+        self.chosen = {} if isinstance(level.tables, OneTable) else self._chosen(run)
+
+    def _leaves(self, run: Run) -> dict[str, Node]:
+        return {name: run.leaf(name) for name in self.kinds}
+
+    def _settle(self, run: Run) -> None:
+        """Source: `rcsc.interpret.settle`."""
+        deferred = [v for v in self.program.variables if v.deferred_until is not None]
+        due = [run.evaluate(v.deferred_until) for v in deferred if v.deferred_until is not None]
+        later = [run.leaf(pending(v.name)) for v in deferred]
+        for variable, when, value in zip(deferred, due, later, strict=True):
+            run.write(variable.name, value, when)
+
+    def _chosen(self, run: Run) -> dict[str, Node]:
+        """When each table is the one that runs."""
+        assert not isinstance(self.level.tables, OneTable)
+        selector = run.evaluate(self.level.tables.selector)
+        found: dict[str, Node] = {}
+        for value, name in self.level.tables.tables:
+            here = values.equal(selector, values.constant(selector.kind, value))
+            found[name] = values.either(found[name], here) if name in found else here
+        return found
+
+    def reached(self, part: Part, change: Change) -> bool:
+        """Whether some inputs lead into the region; in doubt they do."""
+        if not change.where.exact:
+            return True
+        leaves = {"table": self.seen, "deferred value": self.inputs}.get(part.what, self.settled)
+        inside = values.any_of(
+            values.all_of(self._in(leaves[name], name, box[name]) for name in box if name in leaves)
             for box in change.where.boxes
         )
-    )
+        whole = values.both(
+            inside, self.chosen.get(part.name, values.TRUE) if part.what == "table" else values.TRUE
+        )
+        if whole.known:
+            return bool(whole.low)
+        given_up: tuple[type[BaseException], ...] = (UndecidedError, RecursionError, *smt.troubles())
+        try:
+            space = Space(values.variables([whole]).values(), (), self.options)
+            bounds = list(loosened([whole], self.numbers))  # before there are terms
+            solver = space.solver(whole)
+            solver.add(*bounds)
+            return space.answered(solver)
+        except given_up:
+            return True
+
+    def _in(self, node: Node, name: str, box: Box) -> Node:
+        """That a leaf lies in a part of a region, which may number members of an enumeration otherwise."""
+        kind, own = self.found.kinds.get(name, self.kinds[name]), self.kinds[name]
+        if isinstance(kind, Enum) and isinstance(own, Enum):
+            members = [kind.members[key] for low, high in box for key in range(low, high + 1)]
+            return values.among(node, [own.members.index(one) for one in members if one in own.members])
+        return values.any_of(
+            values.inside(node, value_of_key(kind, low), value_of_key(kind, high)) for low, high in box
+        )
+
+
+def knows(program: Program, table: Table, leaf: str, value: Value, options: Options) -> bool:
+    """Whether the table has a line, DEFAULT left out, for some input under its assumptions in which the leaf has this value.
+
+    Raises:
+        UndecidedError: The solver gave up.
+    """
+    kinds = {str(v.name): v.type for v in program.variables}
+    shared = Shared()
+    for name, kind in kinds.items():
+        shared.start[name] = shared.one(values.variable(name, kind))
+    meaning = Meaning(program, kinds, shared)
+    known = assumed(program, table, meaning)
+    lines = [
+        values.all_of(meaning.condition(test.condition) for test in line.tests if test is not None)
+        for line in table.lines
+    ]
+    here = values.equal(shared.start[leaf], values.constant(kinds[leaf], value))
+    whole = shared.one(values.all_of([known, here, values.any_of(lines)]))
+    if whole.known:
+        return bool(whole.low)
+    return Space(values.variables([whole]).values(), (), options).possible(whole)

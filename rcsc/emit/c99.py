@@ -65,6 +65,7 @@ class CFile:
     program: str
     guard: str
     source: str
+    mark: str
     enums: tuple[Struct, ...]
     structs: tuple[Struct, ...]
     fields: tuple[Field, ...]
@@ -111,6 +112,7 @@ class _Maker:
             self.p,
             f"{self.p.upper()}_H",
             comment(self.plan.source),
+            self.plan.mark,
             tuple(self._enum(enum) for enum in self.program.enums),
             tuple(self._record(record) for record in self.program.records),
             tuple(self._fields()),
@@ -260,40 +262,36 @@ class _Maker:
         pad, kind = "    " * indent, variable.type
         if isinstance(kind, Bool):
             return
-        low, high = (kind.low, kind.high) if isinstance(kind, Int | Real) else key_bounds(kind)
-        ends = [constant(kind, low), constant(kind, high)]
-        wide = place if isinstance(kind, Real) else f"({wide_type(kind)}){place}"
-        own = c_type(kind)
-        bounds = _type_bounds(own)
-        below = None if bounds and bounds[0] >= low else f"{wide} < {ends[0]}"
-        above = None if bounds and bounds[1] <= high else f"{wide} > {ends[1]}"
         if isinstance(kind, Real):
-            reject = f"!(({place} >= {ends[0]}) && ({place} <= {ends[1]}))"
+            low, high = constant(kind, kind.low), constant(kind, kind.high)
             if variable.admit is Admit.CLAMP:
-                yield f"{pad}if ({place} < {ends[0]}) {{"
-                yield f"{pad}    {place} = {ends[0]};"
-                yield f"{pad}}} else if ({place} > {ends[1]}) {{"
-                yield f"{pad}    {place} = {ends[1]};"
-                yield f"{pad}}} else {{"
-                yield f"{pad}    /* in range, or not a number */"
-                yield f"{pad}}}"
-            yield f"{pad}if ({reject}) {{"
+                yield from self._clamped_double(place, low, high, pad)
+            yield f"{pad}if (!(({place} >= {low}) && ({place} <= {high}))) {{"
             yield from self._refuse(position, fault, indent + 1)
             yield f"{pad}}} else {{"
             yield f"{pad}    {place} = {place} + 0.0;"
             yield f"{pad}}}"
-        elif variable.admit is Admit.CLAMP:
-            for test, end in ((below, ends[0]), (above, ends[1])):
-                if test:
-                    yield f"{pad}if ({test}) {{"
-                    yield f"{pad}    {place} = ({own}){end};"
-                    yield f"{pad}}}"
-        else:
-            tests = [f"({test})" for test in (below, above) if test]
-            if tests:
-                yield f"{pad}if ({' || '.join(tests)}) {{"
-                yield from self._refuse(position, fault, indent + 1)
+            return
+        outside = _outside(kind, place)
+        if variable.admit is Admit.CLAMP:
+            for test, end in outside:
+                yield f"{pad}if ({test}) {{"
+                yield f"{pad}    {place} = ({c_type(kind)}){end};"
                 yield f"{pad}}}"
+        elif outside:
+            yield f"{pad}if ({' || '.join(f'({test})' for test, _ in outside)}) {{"
+            yield from self._refuse(position, fault, indent + 1)
+            yield f"{pad}}}"
+
+    @staticmethod
+    def _clamped_double(place: str, low: str, high: str, pad: str) -> Iterator[str]:
+        yield f"{pad}if ({place} < {low}) {{"
+        yield f"{pad}    {place} = {low};"
+        yield f"{pad}}} else if ({place} > {high}) {{"
+        yield f"{pad}    {place} = {high};"
+        yield f"{pad}}} else {{"
+        yield f"{pad}    /* in range, or not a number */"
+        yield f"{pad}}}"
 
     @staticmethod
     def _refuse(position: int, fault: str, indent: int) -> Iterator[str]:
@@ -649,6 +647,15 @@ def _wrapped(words: list[str], pad: str = "        ", width: int = 96) -> list[s
     return [*lines, now.rstrip().rstrip(",")]
 
 
+def _outside(kind: Int | Enum, place: str) -> list[tuple[str, str]]:
+    """For each end of the range that the C type passes: the test that a value is beyond it, and the end."""
+    low, high = key_bounds(kind)
+    least, greatest = _type_bounds(c_type(kind)) or (low - 1, high + 1)
+    wide = f"({wide_type(kind)}){place}"
+    ends = ((least < low, "<", low), (greatest > high, ">", high))
+    return [(f"{wide} {op} {constant(kind, end)}", constant(kind, end)) for passed, op, end in ends if passed]
+
+
 def _type_bounds(name: str) -> tuple[int, int] | None:
     found = re.match(r"(u?)int(\d+)_t", name)
     if found is None:
@@ -703,6 +710,7 @@ def _symbols(plan: Plan, names: Names) -> str:
     """What everything is called, for tools."""
     p = names.program
     document = {
+        **({"unproved": plan.mark} if plan.mark else {}),
         "program": p,
         "struct": f"{p}_t",
         "header": f"{p}.h",

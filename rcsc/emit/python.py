@@ -40,6 +40,7 @@ class PyFile:
     """What the template lays out."""
 
     source: str
+    mark: str
     enums: tuple[PyEnum, ...]
     attributes: tuple[tuple[str, str, str], ...]  # name, initial value, doc
     imports: tuple[str, ...]
@@ -83,7 +84,14 @@ class _Maker:
         )
         source = comment(self.plan.source)
         return PyFile(
-            source, enums, attributes, self._imports(), tuple(self.constants), tuple(functions), lines
+            source,
+            self.plan.mark,
+            enums,
+            attributes,
+            self._imports(),
+            tuple(self.constants),
+            tuple(functions),
+            lines,
         )
 
     def _imports(self) -> tuple[str, ...]:

@@ -96,6 +96,11 @@ def json_text(log: Log) -> str:
         "complete": log.complete,
         "programs": dict(log.programs),
         "levels": [level.name for level in log.levels],
+        "restarts": [
+            {"level": level.name, "tick": one.tick, "from": one.begun.value}
+            for level in log.levels
+            for one in level.restarts
+        ],
     }
     known = {level.name: columns(level.sign, level.level) for level in log.levels}
     lines = (json.dumps(_cycle(log, known, tick, held), ensure_ascii=False) for tick, held in rows(log))

@@ -13,6 +13,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from rcsc.system.adopt import Begun
 from rcsc.system.description import Description, Feed, LevelSpec, Wire
 from rcsc.system.signature import FORMATS, Leaf, LevelSign, Signature
 
@@ -21,7 +22,7 @@ SYSTEM, PROGRAMS = "rcsc.system", "rcsc.programs"
 """Names of the metadata records."""
 SIGNATURE = "rcsc.signature"
 """Key of a level's channel that holds its program's signature."""
-LEVELS, BUFFERS = "/levels/", "/buffers/"
+LEVELS, BUFFERS, RESTARTS = "/levels/", "/buffers/", "/restarts/"
 """How the topics of channels begin."""
 
 _ROS = {
@@ -48,6 +49,21 @@ def _field(leaf: Leaf) -> Iterable[str]:
         yield f"{kind} {name.upper()}_{member.upper()}={value}"
     said = " ".join(f"{leaf.name} ({leaf.kind}{', ' + leaf.unit if leaf.unit else ''}) {leaf.doc}".split())
     yield f"{kind} {name} # {said}"
+
+
+def restart_topic(begun: Begun, level: str) -> str:
+    """The channel of a level's restarts of one kind: `/restarts/anew/task`."""
+    return f"{RESTARTS}{begun.value}/{level}"
+
+
+def restart_of(topic: str) -> tuple[Begun, str]:
+    """What `restart_topic` was made of.
+
+    Raises:
+        ValueError: A kind that this version does not know.
+    """
+    begun, _, level = topic.removeprefix(RESTARTS).partition("/")
+    return Begun(begun), level
 
 
 def message_format(leaves: Iterable[Leaf]) -> str:
@@ -129,7 +145,7 @@ def fingerprints(system: Description) -> dict[str, str]:
             f"c/{program}.json",
             f"c/{program}.c",
             f"c/{program}.h",
-            f"python/{program.rstrip('_')}.py",
+            f"python/{program}.py",
         ):
             path = system.generated / name
             content = path.read_bytes() if path.is_file() else b""

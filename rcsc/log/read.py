@@ -18,13 +18,16 @@ from rcsc.log.layout import (
     BUFFERS,
     LEVELS,
     PROGRAMS,
+    RESTARTS,
     SIGNATURE,
     SYSTEM,
     buffer_leaves,
     message_format,
+    restart_of,
     signature_of,
     system_of,
 )
+from rcsc.system.adopt import Begun
 from rcsc.system.description import Description, Wire
 from rcsc.system.signature import LevelSign, Signature, Values
 
@@ -79,13 +82,37 @@ class Track:
 
 
 @dataclass(frozen=True, slots=True)
+class LoggedRestart:
+    """A level that was started again.
+
+    Attributes:
+        tick: That of the cycle that it came before.
+        values: All leaves, from which the level went on.
+    """
+
+    tick: int
+    begun: Begun
+    values: Values
+
+
+@dataclass(frozen=True, slots=True)
 class LoggedLevel:
-    """A level of a log; the first record is what it started from, every other one a cycle."""
+    """A level of a log; the first record is what it started from, every other one a cycle.
+
+    Attributes:
+        restarts: In order; logs that were written before there were such records have none.
+    """
 
     name: str
     sign: Signature
     level: LevelSign
     track: Track
+    restarts: tuple[LoggedRestart, ...] = ()
+
+    def restarted(self, at: int) -> LoggedRestart | None:
+        """The restart that the cycle whose record has this place began from; None where it went on from the record before."""
+        after, until = self.track.ticks[at - 1], self.track.ticks[at]
+        return next((one for one in reversed(self.restarts) if after < one.tick <= until), None)
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,10 +168,6 @@ class Log:
                 return level
         raise KeyError(name)
 
-    def buffer_variable(self, source: str) -> str:
-        """The variable, `level.variable`, that a buffer fills."""
-        return next(wire.target for wire in self.system().wires if wire.source == source)
-
 
 def read(path: Path) -> Log:
     """Reads a log; one that was cut off is read as far as it goes.
@@ -187,6 +210,8 @@ class _Reading:
     signs: dict[str, Signature] = field(default_factory=dict)
     tracks: dict[int, Track] = field(default_factory=dict)
     topics: dict[str, int] = field(default_factory=dict)
+    begun: dict[int, tuple[Begun, str, struct.Struct]] = field(default_factory=dict)
+    restarts: dict[str, list[LoggedRestart]] = field(default_factory=dict)
     complete: bool = False
 
     def take(self, record: McapRecord) -> None:
@@ -198,10 +223,17 @@ class _Reading:
                 self._channel(record)
             case Message(channel_id=channel, sequence=tick, data=content) if channel in self.tracks:
                 self.tracks[channel].add(tick, content)
+            case Message(channel_id=channel, sequence=tick, data=content) if channel in self.begun:
+                self._restart(*self.begun[channel], tick, content)
             case Footer():
                 self.complete = True
             case _:
                 pass
+
+    def _restart(self, begun: Begun, level: str, layout: struct.Struct, tick: int, content: bytes) -> None:
+        if len(content) != layout.size:
+            raise ValueError(f"{len(content)} bytes, not {layout.size}")
+        self.restarts.setdefault(level, []).append(LoggedRestart(tick, begun, layout.unpack(content)))
 
     def _channel(self, channel: Channel) -> None:
         if channel.id in self.tracks:  # said again at the end
@@ -214,6 +246,10 @@ class _Reading:
             source, target = channel.topic.removeprefix(BUFFERS), channel.metadata["target"]
             leaves = buffer_leaves(self.signs[target.partition(".")[0]], Wire(source, target))
             self.tracks[channel.id] = Track(struct.Struct(message_format(leaves)))
+        elif channel.topic.startswith(RESTARTS):
+            begun, level = restart_of(channel.topic)
+            self.begun[channel.id] = begun, level, struct.Struct(message_format(self.signs[level].leaves))
+            return
         else:
             return
         self.topics[channel.topic] = channel.id
@@ -238,4 +274,5 @@ class _Reading:
     def _level(self, name: str) -> LoggedLevel:
         sign = self.signs[name]
         level = next(one for one in sign.levels if one.name == name)
-        return LoggedLevel(name, sign, level, self.tracks[self.topics[LEVELS + name]])
+        restarts = tuple(self.restarts.get(name, ()))
+        return LoggedLevel(name, sign, level, self.tracks[self.topics[LEVELS + name]], restarts)

@@ -1,5 +1,7 @@
 """Replay: every level runs again from the recorded state with the recorded inputs, and must leave what it left then.
 
+A level that was started again runs from the state that is recorded of that.
+
 In: a log and a folder of generated executors. Out: moments, and differences in the words of the tables. With another
 folder than the log was written with it is a what-if: the first difference is where the other tables leave something
 else; a line of another name that leaves the same is none.
@@ -14,6 +16,7 @@ from rcsc.log.expression import Predicate
 from rcsc.log.layout import fingerprints
 from rcsc.log.read import Log, LoggedLevel
 from rcsc.log.words import line_of, words
+from rcsc.system.adopt import Begun
 from rcsc.system.cell import Kind, executors, signatures
 from rcsc.system.description import BadDescription
 from rcsc.system.executors import Executor
@@ -37,6 +40,7 @@ class Cycle:
 
     Attributes:
         line_then: `table line`, as recorded; `line_now` as it matched now.
+        restarted: From what state the level had been started again before it; None where it had not.
     """
 
     level: str
@@ -45,6 +49,7 @@ class Cycle:
     differences: tuple[Difference, ...]
     recorded: Values
     now: Values
+    restarted: Begun | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +97,8 @@ class _Again:
             return None
         track = self.logged.track
         recorded = track.layout.unpack(track.packed[at])
-        self._put(track.layout.unpack(track.packed[at - 1]), recorded)
+        restart = self.logged.restarted(at)
+        self._put(track.layout.unpack(track.packed[at - 1]) if restart is None else restart.values, recorded)
         self.executor.cycle()
         now = self.executor.values()
         equal = self.same and self.packed.pack(*now) == track.packed[at]
@@ -103,6 +109,7 @@ class _Again:
             () if equal else self._differences(recorded, now),
             recorded,
             now,
+            None if restart is None else restart.begun,
         )
 
     def _put(self, before: Values, recorded: Values) -> None:

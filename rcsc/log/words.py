@@ -8,6 +8,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from rcsc.system.adopt import Begun
 from rcsc.system.signature import FAULTS, LevelSign, Signature, Value, Values
 
 TRACED = ("table", "line", "fault", "fault_at", "assumptions_failed")
@@ -52,6 +53,25 @@ def words(sign: Signature, level: LevelSign, values: Values) -> dict[str, str]:
     """Everything, by name."""
     said = {leaf.name: leaf.shown(value) for leaf, value in zip(sign.leaves, values, strict=False)}
     return traced(sign, level, values) | said
+
+
+def fault_in_words(sign: Signature, level: LevelSign, values: Values) -> str:
+    """`table acquire: no line matches`, `table acquire: input refused, `status_in``; empty where the cycle ended well."""
+    if int(values[len(sign.leaves) + 1]) == 0:
+        return ""
+    leaf = refused_of(sign, values)
+    return f"table {sign.table_of(level, values)}: {fault_of(sign, values)}" + (f", `{leaf}`" if leaf else "")
+
+
+def begun_in_words(begun: Begun) -> str:
+    """From what state a level went on that was started again."""
+    return _BEGUN[begun]
+
+
+_BEGUN = {
+    Begun.CHECKPOINT: "from the state that its last cycle left",
+    Begun.ANEW: "anew, its command failed and its orders at rest",
+}
 
 
 def plain(value: Value) -> Value | str:

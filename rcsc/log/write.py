@@ -22,9 +22,11 @@ from rcsc.log.layout import (
     message_definition,
     message_format,
     outside_wires,
+    restart_topic,
     signature_text,
     system_facts,
 )
+from rcsc.system.adopt import Begun, Restarted
 from rcsc.system.cell import System
 from rcsc.system.levels import RunningLevel
 from rcsc.system.signature import Leaf
@@ -39,7 +41,8 @@ _NS_PER_MS = 1_000_000
 class Recorder:
     """Writes every cycle of a system: `system.watch.append(Recorder(system, path))`.
 
-    The first message of a level is the state that it starts from, at the tick where recording starts.
+    The first message of a level is the state that it starts from, at the tick where recording starts. A level that is started
+    again has a channel for that: each message is the state from which it goes on, at the tick of the cycle that it comes before.
     """
 
     def __init__(self, system: System, path: Path) -> None:
@@ -53,9 +56,14 @@ class Recorder:
         beside = path.with_name(f".{path.name}.part")
         self._file = beside.open("wb", buffering=1 << 20)
         self._writer = Writer(self._file, chunk_size=_ENDLESS, compression=CompressionType.ZSTD)
-        self._begin(system)
-        self._file.flush()
-        beside.replace(path)
+        try:
+            self._begin(system)
+            self._file.flush()
+            beside.replace(path)
+        except OSError:
+            self._file.close()
+            beside.unlink(missing_ok=True)
+            raise
 
     def _begin(self, system: System) -> None:
         self._writer.start(profile="rcsc", library="rcsc")
@@ -64,6 +72,7 @@ class Recorder:
         self._levels = {
             level.name: (self._level_channel(level), level.sign.packed) for level in system.levels
         }
+        self._restarts: dict[tuple[str, Begun], tuple[int, struct.Struct]] = {}
         signs = {level.name: level.sign for level in system.levels}
         self._buffers = {
             wire.source: self._buffer_channel(
@@ -93,7 +102,9 @@ class Recorder:
         return channel, struct.Struct(message_format(leaves))
 
     def __call__(self, system: System, ran: tuple[RunningLevel, ...]) -> None:
-        """Write what the levels that ran in this tick were left with, and what came from outside."""
+        """Write which levels were started again, what those that ran in this tick were left with, and what came from outside."""
+        for one in system.restarts:
+            self._write_restart(system.level(one.level), one, system.tick)
         for level in ran:
             self._write_level(level, system.tick)
         self._write_buffers(system)
@@ -103,6 +114,19 @@ class Recorder:
     def _write_level(self, level: RunningLevel, tick: int) -> None:
         channel, packed = self._levels[level.name]
         self._write(channel, tick, packed.pack(*level.values))
+
+    def _write_restart(self, level: RunningLevel, restarted: Restarted, tick: int) -> None:
+        key = level.name, restarted.begun
+        if key not in self._restarts:  # a log without one has no such channel
+            self._restarts[key] = self._restart_channel(level, restarted.begun)
+        channel, packed = self._restarts[key]
+        self._write(channel, tick, packed.pack(*restarted.values))
+
+    def _restart_channel(self, level: RunningLevel, begun: Begun) -> tuple[int, struct.Struct]:
+        definition = message_definition(level.sign.leaves, trace=False)
+        schema = self._writer.register_schema(f"rcsc/{level.name}_restart", "ros1msg", definition.encode())
+        channel = self._writer.register_channel(restart_topic(begun, level.name), "ros1", schema)
+        return channel, struct.Struct(message_format(level.sign.leaves))
 
     def _write_buffers(self, system: System) -> None:
         for source, (channel, packed) in self._buffers.items():

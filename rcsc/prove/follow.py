@@ -10,6 +10,7 @@ within its bounds: there it may say "can" too often, never too seldom. Of the le
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import count
 
 from rcsc.meaning import relying
 from rcsc.model import (
@@ -84,6 +85,24 @@ def _level_of(program: Program, table: Table) -> tuple[Level, Value | None] | No
     return None
 
 
+def loosened(nodes: Sequence[Node], numbers: Iterator[int]) -> Iterator[Term]:
+    """Makes every result of arithmetic on doubles any value within its bounds, and yields the bounds.
+
+    Args:
+        nodes: None of which is a term yet.
+        numbers: Others for each result: two results are not the same.
+    """
+    for one in values.parts_first(*nodes):
+        if one.op in _ARITHMETIC and any(isinstance(part.kind, Real) for part in (one, *one.args)):
+            if one.term is None:
+                one.term = smt.variable(f"double!{next(numbers)}", one.kind)
+            if one.ordered:
+                ends = (
+                    Int(int(one.low), int(one.high)) if isinstance(one.kind, Int) else Real(one.low, one.high)
+                )
+                yield within(one.term, ends)
+
+
 class _Cycles:
     """Two cycles of the level one after the other, from any state."""
 
@@ -96,7 +115,7 @@ class _Cycles:
         self.start: dict[str, Node] = {}
         self.options = options
         self.cycle = 0
-        self.loose = 0
+        self.loose = count(1)
 
     def pairs(self) -> Iterator[Follow]:
         """Every pair that is possible."""
@@ -117,27 +136,13 @@ class _Cycles:
             nexts = self._lines(run)
             solver = Solver(self.options.timeout_ms, self.options.memory_mb)
             solver.add(
-                *values.domain(values.variables([*known, *nexts]).values()), *self._loosened(known + nexts)
+                *values.domain(values.variables([*known, *nexts]).values()),
+                *loosened(known + nexts, self.loose),
             )
             solver.add(*map(values.term_of, known))
             for to, node in enumerate(nexts):
                 if answered(solver, values.term_of(node)):
                     yield Follow(at, to, self._needed(run, solver, to))
-
-    def _loosened(self, nodes: list[Node]) -> Iterator[Term]:
-        """Makes every result of arithmetic on doubles any value within its bounds, and yields the bounds."""
-        for one in values.parts_first(*nodes):
-            if one.op in _ARITHMETIC and any(isinstance(part.kind, Real) for part in (one, *one.args)):
-                if one.term is None:
-                    self.loose += 1
-                    one.term = smt.variable(f"double!{self.loose}", one.kind)
-                if one.ordered:
-                    ends = (
-                        Int(int(one.low), int(one.high))
-                        if isinstance(one.kind, Int)
-                        else Real(one.low, one.high)
-                    )
-                    yield within(one.term, ends)
 
     def _needed(self, run: Run, solver: Solver, line: int) -> tuple[int, ...]:
         if line == len(self.table.lines):

@@ -43,7 +43,9 @@ run to cycle N          until N cycles are done
 break CONDITION         stop `run` where it comes to hold; a line, too: break task.acquire.5
 breaks, delete N        the breakpoints; one less
 undo [N]                go back to before the last cycle, or the last N
-reload [LEVEL]          prove and take a level's tables as they are now
+reload [LEVEL] [anyway] prove and take a level's tables as they are now, with what they do otherwise; `anyway` even
+                        where the present state is one in which the next cycle does otherwise
+diff [LEVEL]            the same, but take nothing
 expect CONDITION        fail unless it holds
 help, quit
 A CONDITION compares variables: task.cur_state = state_3 and not (new_command or primitive.travelled_mm > 40).
@@ -83,6 +85,7 @@ class Commands:
     def _words(self) -> dict[str, Callable[[str], Said]]:
         return {
             "break": self._break, "breaks": self._breaks, "buffers": self._buffers, "delete": self._delete,
+            "diff": self._diff,
             "expect": self._expect, "help": self._help, "level": self._level, "levels": self._levels,
             "lines": self._lines, "quit": self._quit, "reload": self._reload, "run": self._run, "show": self._show,
             "step": self._step, "undo": self._undo,
@@ -243,7 +246,15 @@ class Commands:
         return [f"cycle {self.session.system.tick}: {', '.join(_at(one) for one in self.session.levels)}"]
 
     def _reload(self, rest: str) -> Said:
-        return [self.session.reload(names.level_of(rest or self.session.chosen, self.session.levels).name)]
+        words = rest.split()
+        anyway = bool(words) and words[-1].casefold() == "anyway"
+        return self.session.reload(self._named(" ".join(words[:-1] if anyway else words)), anyway=anyway)
+
+    def _diff(self, rest: str) -> Said:
+        return self.session.difference(self._named(rest))
+
+    def _named(self, rest: str) -> str:
+        return names.level_of(rest or self.session.chosen, self.session.levels).name
 
     # --- conditions ---
 

@@ -1,7 +1,7 @@
-"""New tables for a level that runs: proved and compiled beside it, and taken only where the present state fits them.
+"""New tables for a level that runs: proved and compiled beside it, in its present state.
 
 In: a running level, the system's description and where it stands. Out: `Reloaded`, or a refusal that says why; then the
-old level runs on.
+old level runs on. Whether it is taken is for `gate` to judge.
 """
 
 import tempfile
@@ -16,11 +16,14 @@ from rcsc.diagnostics.report import Report
 from rcsc.driver import TARGETS, compile_
 from rcsc.driver.work import Settings
 from rcsc.interpret import holds
-from rcsc.model import Program, Standing, Value
+from rcsc.log.layout import fingerprints
+from rcsc.model import Program, Value
 from rcsc.project import load
 from rcsc.prove.options import Options
 from rcsc.resolve import resolve
+from rcsc.shell.gate import witness
 from rcsc.shell.refusal import Refused
+from rcsc.shell.sources import Kept, kept, laid_out
 from rcsc.system.cell import Kind, executors
 from rcsc.system.description import BadDescription, Description, LevelSpec
 from rcsc.system.executors import NotBuilt
@@ -49,11 +52,15 @@ class Reloaded:
     """A level with new tables, in the state of the old one.
 
     Attributes:
+        digest: Of its executors, as `rcsc.log.layout.fingerprints` has it.
+        sources: What they were made of.
         said: What became of its variables.
     """
 
     level: RunningLevel
     program: Program
+    digest: str
+    sources: Kept
     said: str
 
 
@@ -74,21 +81,27 @@ def source_of(plant: Plant, spec: LevelSpec) -> Path:
     return found
 
 
-def program_of(plant: Plant, spec: LevelSpec) -> Program:
+def program_of(plant: Plant, spec: LevelSpec, held: Kept | None) -> Program:
     """What the tables that the executors were compiled of mean.
 
+    Args:
+        plant: Where the system comes from.
+        spec: The level.
+        held: Its sources as they were when it began to run; None where they were not there.
+
     Raises:
-        Refused: They have changed since, or are not in order.
+        Refused: They had changed since they were compiled, or are not in order.
     """
     source = source_of(plant, spec)
-    made = compile_(_settings(source), plant.system.generated, TARGETS, only_check=True)
-    if made.report.failed:
-        raise Refused(
-            Code.SHELL_RELOAD,
-            f"`{source}` is not what level `{spec.name}` runs: {_why(made.report)}",
-            f"`reload {spec.name}` takes it",
-        )
-    return _resolved(source)
+    with laid_out(held or kept(source)) as there:
+        made = compile_(_settings(there), plant.system.generated, TARGETS, only_check=True)
+        if made.report.failed:
+            raise Refused(
+                Code.SHELL_RELOAD,
+                f"`{source}` is not what level `{spec.name}` runs: {_why(made.report)}",
+                f"`reload {spec.name}` takes it",
+            )
+        return _resolved(there)
 
 
 def reload(plant: Plant, spec: LevelSpec, old: RunningLevel) -> Reloaded:
@@ -98,6 +111,7 @@ def reload(plant: Plant, spec: LevelSpec, old: RunningLevel) -> Reloaded:
         Refused: They are not proved, or the present state is not in what was proved.
     """
     source = source_of(plant, spec)
+    sources = kept(source)
     with tempfile.TemporaryDirectory(prefix="rcsc-reload-") as scratch:
         made = compile_(_settings(source), Path(scratch), TARGETS, only_check=False)
         if made.report.failed:
@@ -110,10 +124,11 @@ def reload(plant: Plant, spec: LevelSpec, old: RunningLevel) -> Reloaded:
             level = running_level(spec, there, sign, executor, plant.queries)
         except (OSError, ValueError, StopIteration, BadDescription, NotBuilt) as error:
             raise _refused(spec.name, str(error) or "it has no such level") from error
+        digest = fingerprints(there)[spec.program]
     _same_buffers(old, level)
     said = _carried(old, level)
     _in_proof(level, program)
-    return Reloaded(level, program, said)
+    return Reloaded(level, program, digest, sources, said)
 
 
 def _settings(source: Path) -> Settings:
@@ -140,8 +155,8 @@ def _why(report: Report) -> str:
 
 def _same_buffers(old: RunningLevel, new: RunningLevel) -> None:
     """What the level's neighbours see keeps its form: they were compiled for it."""
-    for kept, made in ((_buffers(old), _buffers(new)), (_buffers(new), _buffers(old))):
-        for name, form in kept.items():
+    for one, made in ((_buffers(old), _buffers(new)), (_buffers(new), _buffers(old))):
+        for name, form in one.items():
             if made.get(name) != form:
                 raise _refused(
                     old.name,
@@ -202,14 +217,13 @@ def _form(leaf: Leaf) -> str:
 
 
 def _in_proof(level: RunningLevel, program: Program) -> None:
-    """What the proofs rest on holds of the present values."""
+    """The invariants, which every cycle keeps, hold of the present values."""
     sign: Signature = level.sign
     now = {leaf.name: value for leaf, value in zip(sign.leaves, level.values, strict=False)}
-    used = {name for table in program.tables for name in table.assumptions}
     for one in program.invariants:
         if not holds(one.condition, now):
-            raise _refused(level.name, f"invariant `{one.name}` does not hold of the present state")
-    for assumption in program.assumptions:
-        monitored = assumption.standing is Standing.MONITORED and assumption.name in used
-        if monitored and not holds(assumption.condition, now):
-            raise _refused(level.name, f"assumption `{assumption.name}` does not hold of the present state")
+            raise _refused(
+                level.name,
+                f"invariant `{one.name}` does not hold of the present state: {witness(program, one.condition, now)}",
+                "it is proved to be kept, but of a state in which it holds: set what it speaks of first",
+            )

@@ -8,13 +8,16 @@ from collections import deque
 from collections.abc import Mapping, Sequence
 
 from rcsc.diagnostics.codes import Code
+from rcsc.log.layout import fingerprints
 from rcsc.model import Program
 from rcsc.shell import history, names
 from rcsc.shell.expressions import Question, question
+from rcsc.shell.gate import Judged, Running, judge
 from rcsc.shell.names import NamedLine
 from rcsc.shell.parts import run_part
 from rcsc.shell.refusal import Refused
-from rcsc.shell.reload import Plant, program_of, reload
+from rcsc.shell.reload import Plant, Reloaded, program_of, reload, source_of
+from rcsc.shell.sources import Kept, kept
 from rcsc.shell.stops import Stops, reached, stands
 from rcsc.system.cell import StateTableError, System
 from rcsc.system.description import BadDescription, Description, LevelSpec
@@ -46,6 +49,13 @@ class Session:
         self._answers: dict[tuple[object, ...], Values] = {}
         # By identity, as after a reload another level has the name; the level is kept, so that its number stays its own.
         self._programs: dict[int, tuple[RunningLevel, Program]] = {}
+        # What runs is known by its executors' digest, and what it means by its sources, from before anybody edits them.
+        digests = fingerprints(system.description)
+        self._made: dict[int, tuple[RunningLevel, str, Kept | None]] = {
+            id(level): (level, digests[spec.program], self._source(spec))
+            for level in system.levels
+            for spec in (self.spec(level.name),)
+        }
         for level in system.levels:
             self._answer_by_hand(level)
 
@@ -81,8 +91,14 @@ class Session:
         """
         key = id(level)
         if key not in self._programs:
-            self._programs[key] = level, program_of(self.plant, self.spec(level.name))
+            self._programs[key] = level, program_of(self.plant, self.spec(level.name), self._made[key][2])
         return self._programs[key][1]
+
+    def _source(self, spec: LevelSpec) -> Kept | None:
+        try:
+            return kept(source_of(self.plant, spec))
+        except Refused:
+            return None
 
     # --- cycles ---
 
@@ -220,20 +236,59 @@ class Session:
 
     # --- other tables ---
 
-    def reload(self, name: str) -> str:
-        """Takes a level's tables as they are now, if they are proved and the present state lies in what was proved.
+    def reload(self, name: str, *, anyway: bool = False) -> list[str]:
+        """Takes a level's tables as they are now, between two cycles; what they do otherwise.
+
+        Args:
+            name: The level's.
+            anyway: Whether they are taken although the next cycle does otherwise than before, or nobody knows.
 
         Raises:
             Refused: They are not taken; the old ones run on.
         """
-        old = self.system.level(name)
-        made = reload(self.plant, self.spec(name), old)
+        old, made, judged = self._made_anew(name)
+        if judged is None:
+            return [f"level `{name}` runs these very tables: nothing changed"]
+        if judged.doubts and not anyway:
+            raise Refused(
+                Code.SHELL_OTHERWISE,
+                "\n".join(
+                    (f"level `{name}` keeps its tables: {judged.doubts[0]}", *judged.doubts[1:], *judged.said)
+                ),
+                f"`reload {name} anyway` takes them",
+            )
         self._keep()
-        self._answer_by_hand(made.level)
         self._programs[id(made.level)] = made.level, made.program
+        self._made[id(made.level)] = made.level, made.digest, made.sources
         self.system.levels = tuple(made.level if one is old else one for one in self.levels)
         gone = self.stops.ask_again(self.levels)
-        return "; ".join([f"level `{name}` runs its new tables: {made.said}", *gone])
+        taken = f"level `{name}` runs its new tables from cycle {self.system.tick + 1} on: {made.said}"
+        return [*judged.said, *judged.doubts, taken, *gone]
+
+    def difference(self, name: str) -> list[str]:
+        """What `reload` would take, and whether it would; nothing is taken.
+
+        Raises:
+            Refused: It would not take it, whatever is said.
+        """
+        _, made, judged = self._made_anew(name)
+        if judged is None:
+            return [f"level `{name}` runs these very tables: nothing changed"]
+        would = f"`reload {name}{' anyway' if judged.doubts else ''}` takes it: {made.said}"
+        return [*judged.said, *judged.doubts, would]
+
+    def _made_anew(self, name: str) -> tuple[RunningLevel, Reloaded, Judged | None]:
+        """The level that runs, that which would, and what is to be said of it; None where they are the same."""
+        old = self.system.level(name)
+        made = reload(self.plant, self.spec(name), old)
+        if self._made[id(old)][1:] == (made.digest, made.sources):
+            return old, made, None
+        self._answer_by_hand(made.level)
+        try:
+            program = self.program(old)
+        except Refused:
+            program = None
+        return old, made, judge(Running(old, program), made.level, made.program, self.memory)
 
     def _keep(self) -> None:
         self._past.append(history.kept(self.system, self.memory, self._answers))

@@ -1,12 +1,14 @@
-"""How a level starts that has lost its state: what stands in its buffers is old, and PAUSE goes down.
+"""How a level starts again: from its checkpoint, or anew: then what stands in its buffers is old, and PAUSE goes down.
 
-In: a signature and values: an initial state with the inputs as the buffers hold them now; its own orders that stand. Out: values to
-start from.
+In: a level, its buffers, its checkpoint; for a start anew a signature and values: an initial state with the inputs as the buffers hold
+them now; its own orders that stand. Out: values to start from.
 The convention of the tables: input `command` with `inc_command`, state `inc_command_seen`, orders named `to_NAME`, and the input
 `NAME` that echoes them.
 """
 
 from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
 
 from rcsc.system.buffers import Buffers
 from rcsc.system.levels import RunningLevel
@@ -23,6 +25,44 @@ FAILED = {
     "cur_state": "f_state",
     "cur_state.next": "f_state",
 }
+
+
+class Begun(StrEnum):
+    """From what state a level goes on that was started again."""
+
+    CHECKPOINT = "checkpoint"  # that of its last cycle
+    ANEW = "anew"  # that is lost, or ended in a fault: the state that `adopt` says
+
+
+@dataclass(frozen=True, slots=True)
+class Restarted:
+    """A level that was started again, between two cycles.
+
+    Attributes:
+        values: All leaves, from which its next cycle begins once it has taken its inputs.
+    """
+
+    level: str
+    begun: Begun
+    values: Values
+
+
+def restart(level: RunningLevel, buffers: Buffers, checkpoint: Values | None = None) -> Restarted:
+    """Puts a level where its process would begin again.
+
+    Args:
+        level: Whatever state it is in.
+        buffers: What it takes from and gives to.
+        checkpoint: All leaves and the trace after its last cycle; None where they are lost: then it starts anew.
+    """
+    if checkpoint is None:
+        level.restore(level.initial)
+        level.take(buffers)
+        level.restore(adopt(level.sign, level.executor.values(), standing(level, buffers)))
+    else:
+        level.restore(checkpoint)
+    begun = Begun.ANEW if checkpoint is None else Begun.CHECKPOINT
+    return Restarted(level.name, begun, level.values[: len(level.sign.leaves)])
 
 
 def standing(level: RunningLevel, buffers: Buffers) -> dict[int, Value]:

@@ -8,11 +8,13 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal, Protocol
 
+from rcsc.system.adopt import Restarted, restart
 from rcsc.system.buffers import Buffers, CommonMemory
 from rcsc.system.description import BadDescription, Description
 from rcsc.system.executors import CExecutor, Executor, PythonExecutor, build
 from rcsc.system.levels import Query, RunningLevel, running_level
 from rcsc.system.signature import FAULTS, Signature, Values, signature
+from rcsc.system.unproved import refuse_unproved
 
 Kind = Literal["c", "python"]
 
@@ -36,6 +38,7 @@ class System:
     Attributes:
         tick: Ticks done so far.
         watch: Called after each tick.
+        restarts: Levels that were started again before the present tick, in order; who watches the tick sees them.
     """
 
     description: Description
@@ -44,6 +47,7 @@ class System:
     buffers: Buffers = field(default_factory=CommonMemory)
     tick: int = 0
     watch: list[Callable[["System", tuple[RunningLevel, ...]], None]] = field(default_factory=list)
+    restarts: list[Restarted] = field(default_factory=list)
 
     def step(self) -> None:
         """One control tick.
@@ -66,8 +70,21 @@ class System:
         self.tick += 1
         for watch in self.watch:
             watch(self, due)
+        self.restarts.clear()
         for level in faulty:
             raise StateTableError(_said(level, self.tick))
+
+    def restart(self, name: str, checkpoint: Values | None = None) -> None:
+        """Has a level lose what it was doing, as one whose process is killed and started again, before the next tick.
+
+        Args:
+            name: The level's.
+            checkpoint: What it goes on from: all leaves and the trace; None where that is lost, too.
+
+        Raises:
+            KeyError: There is none of that name.
+        """
+        self.restarts.append(restart(self.level(name), self.buffers, checkpoint))
 
     def level(self, name: str) -> RunningLevel:
         """A level by its name.
@@ -128,9 +145,10 @@ def assemble(
     """The system, ready for its first tick.
 
     Raises:
-        BadDescription: It does not fit together.
+        BadDescription: It does not fit together, or its executors are made of tables that are not proved.
         NotBuilt: The C could not be built.
     """
+    refuse_unproved(system)
     signs = signatures(system)
     for name, sign in signs.items():
         if not any(one.name == name for one in sign.levels):

@@ -49,9 +49,7 @@ class PythonExecutor:
 
     def __init__(self, generated: Path, sign: Signature, level: LevelSign) -> None:
         name = f"rcsc_generated_{sign.program}"
-        spec = importlib.util.spec_from_file_location(
-            name, generated / "python" / f"{sign.program.rstrip('_')}.py"
-        )
+        spec = importlib.util.spec_from_file_location(name, generated / "python" / f"{sign.program}.py")
         if spec is None or spec.loader is None:
             raise NotBuilt(f"no Python module for `{sign.program}`")
         module = importlib.util.module_from_spec(spec)

@@ -47,6 +47,7 @@ class RunningLevel:
 
     Attributes:
         values: All leaves and the trace, as the last cycle left them, with inputs taken since.
+        initial: The same before the first cycle.
     """
 
     name: str
@@ -57,12 +58,13 @@ class RunningLevel:
     gives: tuple[Give, ...]
     fills: tuple[Fill, ...]
     values: Values = ()
+    initial: Values = field(init=False)
     _taken: dict[str, Values] = field(default_factory=dict)
     _asked: dict[int, Values] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Reads the initial state."""
-        self.values = self.executor.values()
+        self.values = self.initial = self.executor.values()
 
     def take(self, buffers: Buffers) -> None:
         """Copies the latest value of every input buffer, then has the database fill what depends on them."""

@@ -21,6 +21,7 @@ from rcsc.system.description import Description
 from rcsc.system.serve import FAULTY, Factory, Setting, fault_of, serve_level, serve_outside
 from rcsc.system.shared import Absent, SharedMemoryBuffers, layout
 from rcsc.system.signature import FAULTS
+from rcsc.system.unproved import refuse_unproved
 
 if TYPE_CHECKING:
     from multiprocessing.context import SpawnProcess
@@ -182,10 +183,12 @@ def run_processes(
         watch: Called some fifty times a second.
 
     Raises:
+        UnprovedExecutors: Executors are made of tables that are not proved.
         StateTableError: A level met a fault.
         ChildProcessError: A process ended by an exception, or was killed too often.
         KeyboardInterrupt: Ctrl-C, or SIGTERM.
     """
+    refuse_unproved(description)
     restarts = 0
     with _terminable(), Supervisor(description, kind, outside, queries=queries, rate=rate) as system:
         while not system.over:

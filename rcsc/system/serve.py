@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
-from rcsc.system.adopt import adopt, standing
+from rcsc.system.adopt import restart
 from rcsc.system.buffers import Buffers
 from rcsc.system.cell import Kind, Outside, signatures
 from rcsc.system.description import Description
@@ -102,9 +102,9 @@ def begin(level: RunningLevel, transport: Transport) -> None:
     if held is Absent.BLANK:
         return
     if isinstance(held, Absent) or fault_of(level.sign, held):
-        level.take(transport)
-        held = adopt(level.sign, level.executor.values(), standing(level, transport))
-    level.restore(held)
+        restart(level, transport)
+    else:
+        restart(level, transport, held)
 
 
 def cycle(level: RunningLevel, transport: Transport) -> int:

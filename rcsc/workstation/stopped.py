@@ -121,7 +121,7 @@ def tables_digest(system: Description) -> str:
             f"c/{program}.json",
             f"c/{program}.h",
             f"c/{program}.c",
-            f"python/{program.rstrip('_')}.py",
+            f"python/{program}.py",
         ):
             hashed.update(hashlib.sha256((system.generated / name).read_bytes()).digest())
     return hashed.hexdigest()

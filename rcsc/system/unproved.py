@@ -1,0 +1,35 @@
+"""Executors that were made by force, of tables that do not prove: the cell does not run them.
+
+In: a description. Out: the generated files that bear the mark (`plan.UNPROVED`).
+"""
+
+from pathlib import Path
+
+from rcsc.plan import UNPROVED
+from rcsc.system.description import BadDescription, Description
+
+
+class UnprovedExecutors(BadDescription):
+    """A generated file bears the mark; says which."""
+
+
+def marked(system: Description) -> tuple[Path, ...]:
+    """The generated files of the system's programs that bear the mark, wherever in their text."""
+    mark = UNPROVED.encode()
+    programs = dict.fromkeys(spec.program for spec in system.levels)
+    files = (
+        system.generated / file
+        for name in programs
+        for file in (f"c/{name}.c", f"c/{name}.h", f"c/{name}.json", f"python/{name.rstrip('_')}.py")
+    )
+    return tuple(path for path in files if path.is_file() and mark in path.read_bytes())
+
+
+def refuse_unproved(system: Description) -> None:
+    """Stops before anything moves.
+
+    Raises:
+        UnprovedExecutors: A generated file bears the mark.
+    """
+    if found := marked(system):
+        raise UnprovedExecutors(f"`{found[0]}` is made of tables that are not proved, to run a finding")
