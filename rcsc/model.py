@@ -205,6 +205,15 @@ def pending(name: str) -> VariableName:
     return VariableName(f"{name}.next")
 
 
+BEFORE = "was "
+"""What the name of a leaf begins with, in a property, where its value behind the cycle before is meant."""
+
+
+def earlier(name: str) -> VariableName:
+    """The name, in a property, of the value of a leaf behind the cycle before."""
+    return VariableName(f"{BEFORE}{name}")
+
+
 @dataclass(frozen=True, slots=True)
 class Declared:
     """A variable as declared, before flattening; `leaves` are its `Variable` names."""
@@ -459,7 +468,7 @@ class Procedure:
     span: Span = at()
 
 
-# --- assumptions and invariants ------------------------------------------------------
+# --- assumptions, invariants, properties ---------------------------------------------
 
 
 class Standing(StrEnum):
@@ -490,6 +499,25 @@ class Invariant:
 
     name: str
     condition: Expr
+    doc: str = ""
+    span: Span = at()
+
+
+@dataclass(frozen=True, slots=True)
+class Property:
+    """What holds behind every cycle of a level, in its environment; proved of the levels together (`compose`).
+
+    Nothing is emitted for it, and no table relies on it.
+
+    Attributes:
+        condition: About a cycle: leaves as it leaves them, inputs as it took them; and, under the names that `earlier`
+            gives, leaves as the cycle before left them (before the first: as the level begins).
+        text: As it was written, behind the colon.
+    """
+
+    name: str
+    condition: Expr
+    text: str
     doc: str = ""
     span: Span = at()
 
@@ -658,6 +686,7 @@ class Program:
     own_tables: tuple[TableName, ...]
     owners: tuple[Owner, ...]
     levels: tuple[Level, ...]
+    properties: tuple[Property, ...] = ()
 
     def variable(self, name: str) -> Variable:
         """The leaf called `name`; KeyError if there is none."""

@@ -38,6 +38,7 @@ def _deeper(inner: SearchStrategy[tree.Expr]) -> SearchStrategy[tree.Expr]:
     two = st.tuples(inner, inner)
     return st.one_of(
         st.builds(tree.Unary, st.sampled_from(["not", "-"]), inner),
+        st.builds(tree.Was, inner),
         st.builds(tree.Binary, BINARY, inner, inner),
         st.builds(tree.InSet, inner, several),
         st.builds(tree.InRange, inner, inner, inner),
@@ -213,6 +214,10 @@ def declarations() -> SearchStrategy[tree.Declaration]:
             **head,
         ),
         st.builds(tree.InvariantDecl, NAMES, expressions(), **head),
+        st.builds(tree.PropertyDecl, NAMES, expressions(), **head),
+        st.builds(
+            tree.PropertyDecl, NAMES, expressions(), st.sampled_from(["then", "until"]), expressions(), **head
+        ),
         st.builds(tree.ProcedureDecl, st.just("procedure"), NAMES, params, body=body, **head),
         st.builds(
             tree.ProcedureDecl, st.just("module"), NAMES, reads=touched, writes=touched, body=body, **head

@@ -98,6 +98,8 @@ CASES: dict[str, tuple[str, list[tuple[int, str, str]]]] = {
         [(4, "RCS301", "a[a[0].k] := b")],
     ),
     "clamp of an enumeration": ("enum e { a }\ninput s : e clamp", [(2, "RCS301", "s")]),
+    "the cycle before, in an invariant": ("state a : bool\ninvariant i : was a", [(2, "RCS315", "was a")]),
+    "property of nothing": ("property i : 1 = 1", [(1, "RCS316", "1 = 1")]),
     "invariant about an input": ("input a : bool\ninvariant i : a", [(2, "RCS301", "a")]),
     "type made of itself": ("record r { a : r }", [(1, "RCS301", "r")]),
     "units differ": (

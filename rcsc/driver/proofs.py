@@ -30,6 +30,7 @@ WORTH_A_PROCESS = 20_000
 
 def prove(root: str, program: Program, loaded: Loaded, options: Options, cache: Cache | None) -> Proof:
     """Prove a program's tables, procedures and invariants; with a cache only what is not known."""
+    from rcsc.prove.invariants import properties_elsewhere
     from rcsc.prove.program import prove_program
 
     cells = sum(len(table.lines) * len(table.columns) for table in program.tables)
@@ -41,11 +42,12 @@ def prove(root: str, program: Program, loaded: Loaded, options: Options, cache: 
     memory = _Memory(program, loaded, options, cache)
     known = {table.name: one for table in program.tables if (one := memory.table(table)) is not None}
     missing = [table for table in program.tables if table.name not in known]
+    elsewhere = tuple(properties_elsewhere(program))
     if not missing and memory.rest():
-        return _proof(root, program, (), known)
+        return _proof(root, program, elsewhere, known)
     verdict = prove_program(program, options, only=[table.name for table in missing])
     if not any(one.severity is Severity.ERROR for one in verdict.findings):
-        memory.keep(verdict.findings, verdict.tables)
+        memory.keep([one for one in verdict.findings if one not in elsewhere], verdict.tables)
     new = {one.table.name: _Kept(table_report(one), ()) for one in verdict.tables}
     return _proof(root, program, verdict.findings, {**known, **new})
 

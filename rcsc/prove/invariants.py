@@ -1,4 +1,4 @@
-"""Invariants and assumptions as a whole: true at first, and satisfiable together.
+"""Invariants and assumptions as a whole: true at first, and satisfiable together; and that properties are proved elsewhere.
 
 In: a program. Out: diagnostics. That every run keeps each invariant is shown with the run (`obligations`).
 """
@@ -12,6 +12,7 @@ from rcsc.model import (
     Expr,
     Kind,
     Program,
+    Property,
     Snapshot,
     Table,
     Value,
@@ -37,6 +38,20 @@ def at_first(program: Program) -> Iterator[Diagnostic]:
             helps = ("give a variable another initial value, or weaken the assumption",)
             label = Label(assumption.span)
             yield Diagnostic(Code.ASSUMPTION_INITIAL, message, label, help=helps, severity=Severity.WARNING)
+
+
+def properties_elsewhere(program: Program) -> Iterator[Diagnostic]:
+    """That properties are not proved of a program alone; one note for each file that declares some."""
+    files: dict[str, list[Property]] = {}
+    for one in program.properties:
+        files.setdefault(one.span.file, []).append(one)
+    for declared in files.values():
+        names = ", ".join(f"`{one.name}`" for one in declared)
+        what, is_ = ("property", "is") if len(declared) == 1 else ("properties", "are")
+        message = f"{what} {names} {is_} not proved here"
+        helps = ("`rcsc prove` proves what a level does in its environment, cycle after cycle",)
+        label = Label(declared[0].span)
+        yield Diagnostic(Code.PROPERTY_ELSEWHERE, message, label, help=helps, severity=Severity.NOTE)
 
 
 def _holds(condition: Expr, snapshot: Snapshot) -> bool | None:

@@ -16,7 +16,7 @@ from rcsc.model import Backing, Program, ProvedProgram, Table, TableName, seal_o
 from rcsc.prove import smt
 from rcsc.prove.certificate import program_certificate
 from rcsc.prove.discharge import Tally
-from rcsc.prove.invariants import assumptions_satisfiable, at_first
+from rcsc.prove.invariants import assumptions_satisfiable, at_first, properties_elsewhere
 from rcsc.prove.obligations import Obligations
 from rcsc.prove.options import Options
 from rcsc.prove.report import diagnostics
@@ -51,7 +51,7 @@ def prove_program(
 
     Tables may rely on the invariants: they are shown in the same step, by induction over cycles.
     """
-    found = list(at_first(program))
+    found = [*at_first(program), *properties_elsewhere(program)]
     owed = Obligations(program, options)
     wanted = [table for table in program.tables if only is None or table.name in only]
     found += owed.prove(wanted)

@@ -1,5 +1,7 @@
 """Expressions: names found, sub-expressions typed, paths followed to their leaves."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 from rcsc.diagnostics.codes import Code
@@ -25,6 +27,7 @@ from rcsc.model import (
     VariableName,
 )
 from rcsc.resolve.folding import fold
+from rcsc.resolve.leaves import one_earlier
 from rcsc.resolve.literals import integer, real
 from rcsc.resolve.operators import (
     Typed,
@@ -70,6 +73,8 @@ def _typed(scope: Scope, body: Body, written: tree.Expr, want: Scalar | None) ->
             return _path(scope, body, written)
         case tree.Unary():
             return _unary(scope, body, written)
+        case tree.Was(operand, span):
+            return _was(scope, body, operand, span, want)
         case tree.Binary():
             return _binary(scope, body, written)
         case tree.InSet():
@@ -242,6 +247,24 @@ def _unary(scope: Scope, body: Body, written: tree.Unary) -> Typed | None:
     if operand is None or not _number(scope, operand, written.operand):
         return None
     return applied(scope, Op.NEG, (operand,), operand.unit(), written.span)
+
+
+def _was(scope: Scope, body: Body, written: tree.Expr, span: Span, want: Scalar | None) -> Typed | None:
+    """The same expression of the values behind the cycle before."""
+    if scope.no_before:
+        scope.report(Code.NO_CYCLE_BEFORE, scope.no_before, span)
+        return None
+    with without_before(scope, "`was` goes back one cycle, not two"):
+        found = typed(scope, body, written, want)
+    return None if found is None else Typed(one_earlier(found.expr), found.bare)
+
+
+@contextmanager
+def without_before(scope: Scope, why: str) -> Iterator[None]:
+    """Inside, `was` is refused for the reason given; an empty one allows it."""
+    outer, scope.no_before = scope.no_before, why
+    yield
+    scope.no_before = outer
 
 
 def _number(scope: Scope, operand: Typed, written: tree.Expr) -> bool:

@@ -1,6 +1,7 @@
 """The leaves that expressions and statements read and write."""
 
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 
 from rcsc.model import (
     Among,
@@ -21,6 +22,7 @@ from rcsc.model import (
     ToElement,
     ToLeaf,
     VariableName,
+    earlier,
 )
 
 
@@ -39,6 +41,21 @@ def read_by(expr: Expr) -> Iterator[VariableName]:
             yield from read_by(subject)
         case Literal() | ReadLocal():
             return
+
+
+def one_earlier(expr: Expr) -> Expr:
+    """The same expression of the values behind the cycle before (`model.earlier`)."""
+    match expr:
+        case Read(name=name):
+            return replace(expr, name=earlier(name))
+        case Select(leaves=leaves, index=index):
+            return replace(expr, leaves=tuple(map(earlier, leaves)), index=one_earlier(index))
+        case Apply(args=args):
+            return replace(expr, args=tuple(map(one_earlier, args)))
+        case Among(subject=subject):
+            return replace(expr, subject=one_earlier(subject))
+        case Literal() | ReadLocal():
+            return expr
 
 
 def expressions(statement: Statement) -> Iterator[Expr]:

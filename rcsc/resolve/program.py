@@ -13,6 +13,7 @@ from rcsc.model import (
     Kind,
     Level,
     Program,
+    Property,
     Standing,
     Table,
     TableName,
@@ -24,6 +25,7 @@ from rcsc.resolve.leaves import read_by
 from rcsc.resolve.levels import level
 from rcsc.resolve.names import Names
 from rcsc.resolve.owners import Owners
+from rcsc.resolve.properties import made_property
 from rcsc.resolve.scope import Body, Scope
 from rcsc.resolve.tables import table
 from rcsc.source import Sources
@@ -94,6 +96,7 @@ class _Resolver:
         )
         assumptions = self._assumptions(all_)
         invariants = self._invariants(all_)
+        properties = self._properties(all_)
         tables = self._tables(all_, {a.name for a in assumptions})
         levels = self._levels(all_, {table.name for table in tables}, owners)
         if scope.found:
@@ -114,6 +117,7 @@ class _Resolver:
             own,
             owners.all(),
             levels,
+            properties,
         )
 
     def _assumptions(self, all_: list[tree.Declaration]) -> tuple[Assumption, ...]:
@@ -145,6 +149,11 @@ class _Resolver:
                 )
             made.append(Invariant(one.name.text, condition, " ".join(one.doc), one.name.span))
         return tuple(made)
+
+    def _properties(self, all_: list[tree.Declaration]) -> tuple[Property, ...]:
+        written = (d for d in all_ if isinstance(d, tree.PropertyDecl))
+        made = (made_property(self.scope, d) for d in written if self.scope.claim(d.name, "assumption"))
+        return tuple(one for one in made if one is not None)
 
     def _levels(
         self, all_: list[tree.Declaration], tables: set[TableName], owners: Owners

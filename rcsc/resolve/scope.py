@@ -35,6 +35,7 @@ class Scope:
         cell: The table cell that is being resolved.
         depth: How deep the expression that is being resolved nests.
         made: Statements made so far; a copy of a record or an array is one a scalar.
+        no_before: Why `was` cannot stand in the expression that is being resolved; empty where it can.
     """
 
     found: list[Diagnostic] = field(default_factory=list)
@@ -57,6 +58,7 @@ class Scope:
     cell: Span | None = None
     depth: int = 0
     made: int = 0
+    no_before: str = "`was` stands in a property only"
 
     def report(
         self, code: Code, message: str, span: Span, *helps: str, related: tuple[Label, ...] = ()

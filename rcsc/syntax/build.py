@@ -133,6 +133,13 @@ class Build:
         head = self._head(node)
         return tree.InvariantDecl(self._name(node.children[0]), self.expr(node.children[1]), **head)
 
+    def _property_decl(self, node: Node) -> tree.PropertyDecl:
+        head = self._head(node)
+        name, condition, last = node.children
+        word = self._rule(last)  # the rule is called as the word is
+        other = self.expr(last.children[0]) if word else None
+        return tree.PropertyDecl(self._name(name), self.expr(condition), word, other, **head)
+
     def _procedure_decl(self, node: Node) -> tree.ProcedureDecl:
         return self._procedure(node, "procedure")
 
@@ -253,6 +260,9 @@ class Build:
             return tree.Unary("not" if rule == "negate" else "-", self.expr(parts[-1]), span)
         built: tree.Expr = getattr(self, f"_{rule}")(parts, span)
         return built
+
+    def _was(self, parts: list[Any], span: Span) -> tree.Expr:
+        return tree.Was(self.expr(parts[0]), span)
 
     def _in_set(self, parts: list[Any], span: Span) -> tree.Expr:
         return tree.InSet(self.expr(parts[0]), tuple(self.expr(part) for part in parts[1:]), span)

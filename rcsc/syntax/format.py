@@ -11,7 +11,7 @@ from rcsc.syntax import tree
 from rcsc.syntax.spell import spell_condition, spell_expr, spell_type
 
 _LONE = (tree.Use, tree.UnitDecl, tree.ConstDecl, tree.TypeDecl, tree.VariableDecl, tree.AssumeDecl, tree.InvariantDecl,
-         tree.EnumDecl, tree.OwnerDecl)  # fmt: skip
+         tree.PropertyDecl, tree.EnumDecl, tree.OwnerDecl)  # fmt: skip
 
 
 def format_text(source: Source) -> str | tuple[Diagnostic, ...]:
@@ -70,10 +70,8 @@ def _declaration(one: tree.Declaration) -> Iterator[str]:
             yield from _record(one)
         case tree.VariableDecl():
             yield _variable(one)
-        case tree.AssumeDecl(name, condition, state):
-            yield f"assume {name.text}{f' {state}' if state else ''} : {spell_expr(condition)}"
-        case tree.InvariantDecl(name, condition):
-            yield f"invariant {name.text} : {spell_expr(condition)}"
+        case tree.AssumeDecl() | tree.InvariantDecl() | tree.PropertyDecl():
+            yield _claim(one)
         case tree.ProcedureDecl():
             yield from _procedure(one)
         case tree.OwnerDecl(name, members):
@@ -83,6 +81,19 @@ def _declaration(one: tree.Declaration) -> Iterator[str]:
             yield from _table(one)
         case tree.LevelDecl():
             yield from _level(one)
+
+
+def _claim(one: tree.AssumeDecl | tree.InvariantDecl | tree.PropertyDecl) -> str:
+    said = spell_expr(one.condition)
+    match one:
+        case tree.AssumeDecl(name, _, state):
+            return f"assume {name.text}{f' {state}' if state else ''} : {said}"
+        case tree.InvariantDecl(name):
+            return f"invariant {name.text} : {said}"
+        case tree.PropertyDecl(name, _, word, other):
+            return f"property {name.text} : {said}" + (
+                f" {word} {spell_expr(other)}" if other is not None else ""
+            )
 
 
 def _record(one: tree.RecordDecl) -> Iterator[str]:

@@ -14,7 +14,7 @@ DEEPEST = 100
 
 _TOKEN = re.compile(r'#[^\r\n]*|"[^"\\\n]*"|[(\[{)\]}]')
 _DECLARATION = re.compile(
-    r"^[ \t]*(?:use|unit|const|enum|type|record|input|state|output|assume|invariant|procedure|module|extern"
+    r"^[ \t]*(?:use|unit|const|enum|type|record|input|state|output|assume|invariant|property|procedure|module|extern"
     r"|owner|table|level)\b",
     re.MULTILINE,
 )

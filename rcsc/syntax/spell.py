@@ -31,6 +31,8 @@ def _expr(expr: tree.Expr) -> tuple[str, int]:
             return f"not {spell_expr(operand, _NOT)}", _NOT
         case tree.Unary(_, operand):
             return f"-{spell_expr(operand, _MINUS)}", _MINUS
+        case tree.Was(operand):
+            return f"was {spell_expr(operand, _POSTFIX)}", _MINUS
         case tree.Binary(op, left, right):
             return _binary(op, left, right)
         case tree.InSet(subject, members):

@@ -105,6 +105,14 @@ class Unary:
 
 
 @dataclass(frozen=True, slots=True)
+class Was:
+    """`was a`: the value behind the cycle before; in properties only."""
+
+    operand: "Expr"
+    span: Span = at()
+
+
+@dataclass(frozen=True, slots=True)
 class Binary:
     """`op` is one of `implies or and = /= < <= > >= + - * / mod`."""
 
@@ -150,6 +158,7 @@ Expr: TypeAlias = (
     | FieldOf
     | IndexOf
     | Unary
+    | Was
     | Binary
     | InSet
     | InRange
@@ -484,6 +493,22 @@ class InvariantDecl:
 
 
 @dataclass(frozen=True, slots=True)
+class PropertyDecl:
+    """`property name : expr [then|until expr]`.
+
+    `word` is "", "then" or "until"; `other` stands behind it.
+    """
+
+    name: Name
+    condition: Expr
+    word: str = ""
+    other: Expr | None = None
+    span: Span = at()
+    comments: tuple[str, ...] = ()
+    doc: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class Parameter:
     """`name : type` of a procedure."""
 
@@ -578,6 +603,7 @@ Declaration: TypeAlias = (
     | VariableDecl
     | AssumeDecl
     | InvariantDecl
+    | PropertyDecl
     | ProcedureDecl
     | OwnerDecl
     | TableDecl
