@@ -13,6 +13,7 @@ from rcsc.cli.diff import diff
 from rcsc.cli.graph import graph, table
 from rcsc.cli.logs import log, replay
 from rcsc.cli.options import PATHS, proving, showing
+from rcsc.cli.promela import promela
 from rcsc.cli.prove import prove
 from rcsc.cli.script import run
 from rcsc.cli.shell import shell
@@ -278,5 +279,5 @@ def completion(shell: str) -> int:
     return 0
 
 
-for _command in (campaign, db, diff, graph, log, prove, replay, run, shell, table):
+for _command in (campaign, db, diff, graph, log, promela, prove, replay, run, shell, table):
     commands.add_command(_command)

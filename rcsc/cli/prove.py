@@ -1,16 +1,31 @@
 """`rcsc prove`: the levels of a system proved together."""
 
+import importlib.util
+import io
 import json
 import os
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from rcsc.cli.cell import Stopped, stop, system_path
+from rcsc.cli.show import UnwritableError
+
+_WIDTH = 118
+"""Columns of a time line."""
+_HARD = "\ue000"
+"""A space at which a time line does not break, while it is laid out; of private use, since every other one may."""
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rich.table import Table
+
+    from rcsc.compose.finding import Finding
     from rcsc.compose.level import LevelProof
+    from rcsc.compose.look import Told
     from rcsc.compose.system import SystemProof
     from rcsc.compose.transition import Stepper
 
@@ -22,7 +37,9 @@ Examples:
   rcsc prove                                   the system in system.toml, here or in tables/
   rcsc prove tables/system.toml --level task   one level in its environment
   rcsc prove --certificate proof               the invariants as SMT-LIB, for another solver
-  rcsc prove --level task --without-deferral   what section 9 warns of: the shortest trace""",
+  rcsc prove --level task --without-deferral   what section 9 warns of: the shortest trace
+  rcsc prove --log found                       each trace as a log, for `rcsc replay`
+  rcsc prove --case tests/found/a.json         a frozen finding, again""",
 )
 @click.argument(
     "system", required=False, type=click.Path(exists=True, dir_okay=False, path_type=Path), metavar="[SYSTEM]"
@@ -34,15 +51,29 @@ Examples:
               help="Levels proved at once.")  # fmt: skip
 @click.option("--trace", "cycles", type=click.IntRange(min=0, max=40), default=8, show_default=True, metavar="N",
               help="For what is not proved, look for a trace of at most N cycles; 0 does not look.")  # fmt: skip
+@click.option("--log", "logs", type=click.Path(file_okay=False, path_type=Path), default=None, metavar="DIR",
+              help="Keep each trace in DIR as a log that `rcsc replay` steps, with the executors that ran it.")  # fmt: skip
+@click.option("--freeze", type=click.Path(file_okay=False, path_type=Path), default=None, metavar="DIR",
+              help="Keep each trace in DIR as a case for --case: a test that fails until the tables are mended.")  # fmt: skip
+@click.option("--case", "cases", multiple=True, type=click.Path(dir_okay=False, path_type=Path), metavar="FILE",
+              help="Run a frozen case on the tables as they are, and nothing else (repeatable).")  # fmt: skip
 @click.option("--without-deferral", is_flag=True,
               help="As if every next state were taken at once, not when its command is echoed: a demonstration.")  # fmt: skip
+@click.option("--first-match", is_flag=True,
+              help="As if of several lines that match the first ran: a demonstration.")  # fmt: skip
+@click.option("--without-default", is_flag=True,
+              help="As if every DEFAULT line were declared unreachable: shows what falls to them.")  # fmt: skip
 @click.option("--certificate", type=click.Path(file_okay=False, path_type=Path), default=None, metavar="DIR",
               help="Write each level's questions to DIR as SMT-LIB: each is to be answered `unsat`.")  # fmt: skip
+@click.option("--certify", "confirms", is_flag=True,
+              help="Put the same questions to cvc5, which has no part in the proof.")  # fmt: skip
+@click.option("--no-cache", is_flag=True, help="Prove everything anew.")
 @click.option("--invariants", is_flag=True, help="Print the invariant of each level, too.")
 @click.option("--json", "as_json", is_flag=True, help="The result as JSON.")
 def prove(  # noqa: PLR0913, PLR0917  # as many as there are options
-    system: Path | None, only: tuple[str, ...], timeout: float, jobs: int, cycles: int, without_deferral: bool,
-    certificate: Path | None, invariants: bool, as_json: bool,
+    system: Path | None, only: tuple[str, ...], timeout: float, jobs: int, cycles: int, logs: Path | None,
+    freeze: Path | None, cases: tuple[Path, ...], without_deferral: bool, first_match: bool, without_default: bool,
+    certificate: Path | None, confirms: bool, no_cache: bool, invariants: bool, as_json: bool,
 ) -> int:  # fmt: skip
     """Prove that the levels of SYSTEM work together, however late each sees and answers what another says.
 
@@ -50,12 +81,17 @@ def prove(  # noqa: PLR0913, PLR0917  # as many as there are options
     answer of the database. What it assumes of a neighbour is proved of that neighbour. Printed: each
     assumption with its new standing, what is guaranteed between levels, and for what fails the shortest run that shows it.
     """
-    from rcsc.compose.level import Effort
+    from rcsc.cache import open_cache
+    from rcsc.compose.search import Effort
     from rcsc.compose.system import NoProgramError, prove_steppers, steppers
-    from rcsc.compose.trace import undeferred
+    from rcsc.compose.variants import VARIANTS
     from rcsc.diagnostics.codes import Code
     from rcsc.system.description import BadDescription
 
+    if confirms and importlib.util.find_spec("cvc5") is None:
+        raise click.UsageError("--certify needs the extra `certify`: pip install 'rcsc[certify]'")
+    if cases:
+        return _again(cases)
     path = system_path(system)
     try:
         made = steppers(path)
@@ -66,27 +102,64 @@ def prove(  # noqa: PLR0913, PLR0917  # as many as there are options
     unknown = [name for name in only if name not in made]
     if unknown:
         raise click.UsageError(f"there is no level `{unknown[0]}`; there are {', '.join(made)}")
-    if without_deferral:
-        made = {name: one.of(undeferred(one.program)) for name, one in made.items()}
+    asked = {
+        "without-deferral": without_deferral,
+        "first-match": first_match,
+        "without-default": without_default,
+    }
+    variants = tuple(name for name, wanted in asked.items() if wanted)
+    for name in variants:
+        made = {level: one.of(VARIANTS[name](one.program)) for level, one in made.items()}
     effort = Effort(timeout_ms=int(timeout * 1000))
-    proof = prove_steppers(made, effort, jobs, only or tuple(made), None if as_json else _say_level)
+    cache = None if no_cache else open_cache(path.parent)
+    proof = prove_steppers(made, effort, jobs, only or tuple(made), None if as_json else _say_level, cache)
     if certificate is not None:
         _write(certificate, made, proof)
-    if as_json:
-        click.echo(json.dumps(_as_json(proof), indent=2))
-    else:
+    if not as_json:
         if invariants:
             _say_invariants(proof)
         _say_agreements(proof)
-    return _findings(made, proof, cycles) if not proof.proved else 0
+        _say_whole(made, proof)
+    keep = _Keep(path, logs, freeze, variants)
+    told = _look(made, proof, cycles, keep, None if as_json else _say_told)
+    if as_json:
+        click.echo(json.dumps(_as_json(proof, made, told), indent=2))
+    _say_not_agreed(proof)
+    refused = _refused(made, proof, quiet=as_json) if confirms else []
+    if refused or any(one.bug for one in told):
+        return 3
+    return 0 if proof.proved else 1
+
+
+def _refused(made: "dict[str, Stepper]", proof: "SystemProof", *, quiet: bool) -> list[str]:
+    """Questions that cvc5 does not answer as Z3 did; says how many there were."""
+    from rcsc.cli.proved import confirmed
+    from rcsc.diagnostics.codes import Code
+
+    refused = []
+    for one in proof.levels:
+        answers = confirmed(made[one.level], one)
+        wrong = [name for name, same in answers.items() if not same]
+        refused += wrong
+        good = len(answers) - len(wrong)
+        click.echo(f"level {one.level}: cvc5 says the same of {good} of {len(answers)} questions", err=quiet)
+        for name in wrong:
+            click.echo(
+                f"error[{Code.SOLVERS_DISAGREE.value}]: level `{one.level}`: cvc5 does not confirm `{name}`",
+                err=True,
+            )
+    return refused
 
 
 def _say_level(proof: "LevelProof") -> None:
     """One level: its assumptions first, then what else is proved of it."""
+    from rcsc.cli.proved import in_context
     from rcsc.compose.goals import Sort
     from rcsc.compose.level import Verdict
+    from rcsc.compose.system import besides
 
-    click.echo(click.style(f"level {proof.level}", bold=True) + f"  {proof.seconds:.1f} s")
+    found_before = ", by an earlier run" if proof.cached else ""
+    click.echo(click.style(f"level {proof.level}", bold=True) + f"  {proof.seconds:.1f} s{found_before}")
     for sort in Sort:
         found = [(goal, verdict) for goal, verdict in proof.found if goal.sort is sort]
         if sort is Sort.ASSUMPTION:
@@ -97,16 +170,24 @@ def _say_level(proof: "LevelProof") -> None:
                     else f"monitored: {verdict.value} of the levels together"
                 )
                 click.echo(f"  {goal.table:28} {goal.name:24} {standing}")
-        elif found:
-            good = sum(1 for _, verdict in found if verdict is Verdict.PROVED)
-            click.echo(f"  {sort.value}: {good} of {len(found)} proved")
+        elif sort in {Sort.INVARIANT, Sort.PROPERTY}:
             for goal, verdict in found:
-                if verdict is not Verdict.PROVED:
+                click.echo(f"  {sort.value:28} {goal.name:24} {verdict.value}")
+        elif found:
+            beside = [goal.name for goal in besides(proof) if goal.sort is sort]
+            good = sum(1 for _, verdict in found if verdict is Verdict.PROVED)
+            click.echo(f"  {sort.value}: {good} of {len(found) - len(beside)} proved")
+            for goal, verdict in found:
+                if verdict is not Verdict.PROVED and goal.name not in beside:
                     click.echo(f"    {goal.table or goal.name}: {verdict.value}")
+            if beside:
+                click.echo(f"    beside the number, so that nobody relies on it: {', '.join(beside)}")
     many = len(proof.clauses)
     click.echo(
         f"  invariant: {many} clauses over {len(proof.features)} features; {proof.walked} states walked, {proof.learnt} learnt"
     )
+    for line in in_context(proof):
+        click.echo(f"  {line}")
 
 
 def _say_invariants(proof: "SystemProof") -> None:
@@ -118,47 +199,179 @@ def _say_invariants(proof: "SystemProof") -> None:
             click.echo(f"  {shown(one.features, clause)}")
 
 
+def _say_whole(made: "dict[str, Stepper]", proof: "SystemProof") -> None:
+    from rcsc.cli.proved import assumptions, reaction
+
+    for line in (*reaction(made, proof), assumptions(proof), f"{proof.seconds:.1f} s in all"):
+        click.echo(line)
+
+
 def _say_agreements(proof: "SystemProof") -> None:
     if proof.agreements:
         click.echo("between the levels")
     for one in proof.agreements:
-        standing = "kept by" if one.outside else "proved" if one.holds else "NOT proved"
+        standing = "kept by: " if one.outside else "" if one.holds else "NOT "
         click.echo(f"  {one.level} assumes that {one.assumed}")
-        click.echo(f"    {standing}: {one.reason}")
-    click.echo(f"{proof.seconds:.1f} s in all")
+        click.echo(f"    {standing}{one.reason}")
 
 
-def _findings(made: "dict[str, Stepper]", proof: "SystemProof", cycles: int) -> int:
-    """What is not proved, each with its shortest trace where there is one; the exit status."""
-    from rcsc.compose.system import essential
-    from rcsc.compose.trace import NotReproducedError, shortest, time_line
+@dataclass(frozen=True, slots=True)
+class _Keep:
+    """Where findings are kept: the system's description, folders of logs and of cases, and the rules that are off."""
+
+    system: Path
+    logs: Path | None
+    cases: Path | None
+    variants: tuple[str, ...]
+
+
+def _look(
+    made: "dict[str, Stepper]",
+    proof: "SystemProof",
+    cycles: int,
+    keep: _Keep,
+    say: "Callable[[dict[str, Stepper], Told, int], None] | None",
+) -> "list[Told]":
+    """What is not proved, each with its shortest trace where there is one."""
+    from rcsc.compose.look import Looking, look
+    from rcsc.system.description import description
+    from rcsc.system.executors import NotBuilt
+
+    looking = Looking(description(keep.system), cycles, altered=bool(keep.variants), log=keep.logs)
+    found = []
+    try:
+        for one in look(made, proof, looking):
+            found.append(one)
+            if keep.cases is not None and one.finding is not None and not one.beside:
+                _freeze(made, one.finding, keep.cases, keep)
+            if say is not None:
+                say(made, one, cycles)
+    except OSError as error:
+        raise UnwritableError(
+            str(error.filename or keep.logs), error.strerror or "no reason given"
+        ) from error
+    except NotBuilt as error:
+        stop(error)
+    return found
+
+
+def _freeze(made: "dict[str, Stepper]", finding: "Finding", folder: Path, keep: _Keep) -> None:
+    from rcsc.compose.frozen import frozen
+    from rcsc.compose.look import file_name
+    from rcsc.files import write_atomically
+    from rcsc.system.description import description
+
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / f"{description(keep.system).name}_{file_name(finding)}.json"
+    write_atomically(path, frozen(finding, made, keep.system, path, keep.variants).encode())
+
+
+def _again(cases: tuple[Path, ...]) -> int:
+    """Runs frozen cases."""
+    from rcsc.compose.frozen import BadCaseError, case_breaks, read_case
     from rcsc.diagnostics.codes import Code
 
-    bug = False
-    for level in proof.levels:
-        for goal in essential(level):
-            where = f"level `{level.level}`" + (f", table `{goal.table}`" if goal.table else "")
-            click.echo(f"error[{Code.NOT_COMPOSED.value}]: {where}: not proved: {goal.shown}", err=True)
-            try:
-                trace = shortest(made[level.level], goal, cycles) if cycles else None
-            except NotReproducedError:
-                click.echo(
-                    f"error[{Code.NOT_REPRODUCED.value}]: {where}: the trace found does not run", err=True
-                )
-                bug = True
-                continue
-            if trace is None:
-                click.echo(f"  = note: no run of {cycles} cycles or fewer shows it", err=True)
-                continue
-            click.echo(f"  = note: broken in {len(trace.steps)} cycles, run by the interpreter", err=True)
-            for line in time_line(made[level.level], trace):
-                click.echo(f"  {line}", err=True)
+    wrong = 0
+    for path in cases:
+        try:
+            case = read_case(path)
+            breaks = case_breaks(case)
+        except BadCaseError as error:
+            raise Stopped(Code.BAD_CASE, str(error)) from error
+        said = f"level `{case.level}`: {case.goal.shown}: {'broken' if breaks else 'kept'}"
+        if breaks is case.expects_broken:
+            click.echo(f"{path}: {said}")
+        else:
+            wrong += 1
+            click.echo(f"error[{Code.FOUND_AGAIN.value}]: {path}: {said}", err=True)
+    return 1 if wrong else 0
+
+
+def _say_told(made: "dict[str, Stepper]", told: "Told", cycles: int) -> None:
+    """One thing that is not proved; runs of as many cycles were looked for."""
+    from rcsc.diagnostics.codes import Code
+
+    where = f"level `{told.level}`" + (f", table `{told.goal.table}`" if told.goal.table else "")
+    if told.bug:
+        click.echo(
+            f"error[{Code.NOT_REPRODUCED.value}]: {where}: the trace found does not run: {told.goal.shown}",
+            err=True,
+        )
+    else:
+        click.echo(f"error[{Code.NOT_COMPOSED.value}]: {where}: not proved: {told.goal.shown}", err=True)
+    if stated := _stated(made, told):
+        click.echo(f"  = note: it says: {stated}", err=True)
+    for line in told.beside:
+        click.echo(f"  = note: {line}", err=True)
+    if told.finding is not None and not told.beside:
+        _say_finding(made, told.finding)
+    elif told.guessed:
+        click.echo("  = note: a trace that was found does not run: arithmetic was left open", err=True)
+    elif cycles and not told.beside:
+        click.echo(f"  = note: no run of {cycles} cycles or fewer shows it", err=True)
+    for line in told.helps:
+        click.echo(f"  = help: {line}", err=True)
+    if told.others:
+        click.echo(f"  = note: no such run shows both of lines {', '.join(told.others)}", err=True)
+    if told.log is not None:
+        folder = told.log.parent / "generated"
+        click.echo(f"  = log: rcsc replay {told.log} --generated {folder}", err=True)
+
+
+def _stated(made: "dict[str, Stepper]", told: "Told") -> str:
+    """What a property says, as it is written; empty for what is none."""
+    from rcsc.compose.goals import Sort
+
+    if told.goal.sort is not Sort.PROPERTY:
+        return ""
+    return next(one.text for one in made[told.level].program.properties if one.name == told.goal.name)
+
+
+def _say_finding(made: "dict[str, Stepper]", finding: "Finding") -> None:
+    """The time line."""
+    from rich.console import Console
+
+    begins = ", after a restart" if finding.restarted else ""
+    legal = "" if finding.legal else "; numbers have gone round, or a neighbour was restarted"
+    run_by = "as the interpreter, the Python and the C executors run it"
+    click.echo(f"  = note: broken in cycle {finding.broken_at}{begins}, {run_by}{legal}", err=True)
+    with io.StringIO() as text:
+        Console(file=text, width=_WIDTH, no_color=True, highlight=False).print(_time_line(made, finding))
+        click.echo(
+            "\n".join(f"  {line.rstrip()}" for line in text.getvalue().replace(_HARD, " ").splitlines()),
+            err=True,
+        )
+
+
+def _time_line(made: "dict[str, Stepper]", finding: "Finding") -> "Table":
+    """A row a cycle: the line that matched, the inputs that changed, what else changed, and what went wrong."""
+    from rich import box
+    from rich.table import Table
+
+    from rcsc.compose.finding import rows
+
+    several = len(finding.levels) > 1
+    table = Table(box=box.ASCII2, show_lines=True, pad_edge=False)
+    for heading in ("cycle", *(("level",) if several else ()), "table: line", "takes", "leaves"):
+        table.add_column(heading, overflow="fold")
+    for row in rows(made, finding):
+        takes, leaves = (
+            ", ".join(f"{name} = {said}".replace(" ", _HARD) for name, said in changed.items())
+            for changed in (row.takes, row.leaves)
+        )
+        ran = f"{row.table}: {row.line}" + (f"\n! {row.wrong}" if row.wrong else "")
+        table.add_row(str(row.tick), *((row.level,) if several else ()), ran, takes, leaves)
+    return table
+
+
+def _say_not_agreed(proof: "SystemProof") -> None:
+    from rcsc.diagnostics.codes import Code
+
     for one in proof.agreements:
         if not one.holds:
             click.echo(
                 f"error[{Code.NOT_AGREED.value}]: level `{one.level}` assumes that {one.assumed}", err=True
             )
-    return 3 if bug else 1
 
 
 def _write(folder: Path, made: "dict[str, Stepper]", proof: "SystemProof") -> None:
@@ -171,9 +384,12 @@ def _write(folder: Path, made: "dict[str, Stepper]", proof: "SystemProof") -> No
             write_atomically(folder / f"{one.level} {name}.smt2".replace(" ", "_"), text.encode())
 
 
-def _as_json(proof: "SystemProof") -> dict[str, Any]:
+def _as_json(proof: "SystemProof", made: "dict[str, Stepper]", told: "list[Told]") -> dict[str, Any]:
+    from rcsc.cli.proved import as_json
+
     return {
         "proved": proof.proved,
+        "findings": [_told_as_json(made, one) for one in told],
         "levels": [
             {
                 "level": one.level,
@@ -187,6 +403,7 @@ def _as_json(proof: "SystemProof") -> dict[str, Any]:
                     for goal, verdict in one.found
                 ],
                 "clauses": len(one.clauses),
+                **as_json(one),
             }
             for one in proof.levels
         ],
@@ -200,4 +417,27 @@ def _as_json(proof: "SystemProof") -> dict[str, Any]:
             }
             for one in proof.agreements
         ],
+    }
+
+
+def _told_as_json(made: "dict[str, Stepper]", told: "Told") -> dict[str, Any]:
+    from dataclasses import asdict
+
+    from rcsc.compose.finding import rows
+
+    found = told.finding
+    return {
+        "level": told.level,
+        "what": told.goal.sort.value,
+        "table": told.goal.table,
+        "name": told.goal.name,
+        "says": _stated(made, told),
+        "lines": list(told.goal.lines),
+        "reproduces": found is not None and not told.beside,
+        "beside": list(told.beside),
+        "restarted": found is not None and found.restarted,
+        "time_line": [] if found is None else [asdict(row) for row in rows(made, found)],
+        "helps": list(told.helps),
+        "others": list(told.others),
+        "log": "" if told.log is None else str(told.log),
     }

@@ -5,6 +5,7 @@ What is proved, of each level alone in its environment (`level`):
 - every assumption of its tables holds in every cycle in which the table runs; exactly one line matches; DEFAULT is
   not reached where it is said to be unreachable; no state is written directly while another is pending;
 - a command number is taken up once, and no other command replaces an order before its echo, but for a new command;
+- what its program itself states: invariants, and properties over a cycle and the one before (`properties`);
 - what it guarantees its neighbours: its report echoes the number and the command of the order that it took in that
   very cycle (so that none is lost and none echoed that was not run); its orders change only together with their
   numbers, and numbers come one after the other.
@@ -44,7 +45,10 @@ What it rests on besides:
 - What stands outside the levels (workstation, robot, hand, camera) keeps to the same contract by its own means; it is
   listed, not proved.
 
-Modules, in the order the data flows: `contract` (who is whose environment), `transition` (a cycle as nodes), `keyed`
-(nodes as terms), `goals`, `features` (what an invariant may speak of), `walk` (states to begin with), `projection`
-(the invariant), `level`, `system`, `trace` (the shortest failing run, run by the interpreter).
+Modules, in the order the data flows: `contract` (who is whose environment), `transition` (a cycle as nodes), `goals`, `properties`,
+`features` (what an invariant may speak of), `walk` (states to begin with); the search, which is not trusted: `bits` (nodes
+as clauses of propositional logic), `sat`, `frames` (the invariant), `search`; what it finds is asked anew: `keyed` (nodes as
+terms), `confirm`, `level`; then `system`. What is not proved: `variants` (other rules), `trace` (the shortest failing
+run, run by the interpreter), `simplest`, `finding` (its time line), `together` (two levels as they are), `weakest` (what would
+mend it), `rerun` (by the executors, as a log), `frozen` (as a case), `look`.
 """

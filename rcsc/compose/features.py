@@ -16,20 +16,23 @@ from dataclasses import dataclass, field
 from rcsc.compose.contract import COMMAND
 from rcsc.compose.transition import GHOST, Cycle, Leaves, Stepper
 from rcsc.interpret import call, holds
+from rcsc.meaning import spelled
 from rcsc.model import (
+    COMPARISONS,
     Apply,
     Bool,
     Call,
     Enum,
     Expr,
+    If,
     Kind,
+    Literal,
     OneTable,
     Op,
     Procedure,
     Program,
     Read,
     Scalar,
-    Test,
     Value,
     key_of,
     pending,
@@ -41,6 +44,8 @@ from rcsc.prove.values import Node
 from rcsc.questions import parts
 from rcsc.resolve.leaves import everything, expressions, read_by
 
+CLOSELY = 1
+"""Up to here, what is not proved is looked at with more features."""
 MOST_VALUES = 32
 """Members up to which an enumeration is a feature."""
 
@@ -57,14 +62,14 @@ class Feature:
     kind: Scalar
     other: str = ""
     module: Procedure | None = field(default=None, repr=False)
-    test: Test | None = field(default=None, repr=False)
+    condition: Expr | None = field(default=None, repr=False)
     parts: bool = False
 
     @property
     def name(self) -> str:
         """In the tables' words."""
-        if self.test is not None:
-            return f"({self.leaf} {self.test.text})"
+        if self.condition is not None:
+            return f"({self.leaf})"
         if self.module is not None:
             return f"({self.leaf} is as `{self.module.name}` computes it)"
         return f"({self.leaf} = {self.other})" if self.other else self.leaf
@@ -76,8 +81,8 @@ class Feature:
 
     def node(self, leaves: Leaves) -> Node:
         """Its value in a state."""
-        if self.test is not None:
-            return Run({}, {}, dict(leaves)).evaluate(self.test.condition)
+        if self.condition is not None:
+            return Run({}, {}, dict(leaves)).evaluate(self.condition)
         if self.module is not None:
             kinds = {name: node.kind for name, node in leaves.items()}
             run = Run({self.module.name: self.module}, kinds, dict(leaves))
@@ -102,8 +107,15 @@ def cone(cycle: Cycle, goals: Iterable[Node]) -> frozenset[str]:
     return frozenset(found)
 
 
-def features(stepper: Stepper, cycle: Cycle, goals: Iterable[Node]) -> tuple[Feature, ...]:
-    """The features in the cone of the goals, in declared order."""
+def features(stepper: Stepper, cycle: Cycle, goals: Iterable[Node], closely: int = 0) -> tuple[Feature, ...]:
+    """The features in the cone of the goals, in declared order.
+
+    Args:
+        stepper: The level.
+        cycle: From anywhere.
+        goals: What is to be proved.
+        closely: At 1 (`CLOSELY`) there are also those by which procedures decide, behind the others.
+    """
     inside = cone(cycle, goals)
     program, kinds = stepper.program, stepper.kinds
     read = _read(stepper)
@@ -122,6 +134,8 @@ def features(stepper: Stepper, cycle: Cycle, goals: Iterable[Node]) -> tuple[Fea
     found += [Feature(one, Bool(), other) for one, other in pairs if {one, other} <= inside and one in kinds]
     found += [Feature(leaf, Bool(), module=module) for leaf, module in computed.items()]
     found += _cells(stepper, {*inside, *computed})
+    if closely:
+        found += _branches(stepper, inside, {one.leaf for one in found})
     return tuple(found)
 
 
@@ -130,8 +144,8 @@ def point(stepper: Stepper, chosen: tuple[Feature, ...], state: Mapping[str, Val
     again: dict[str, dict[str, Value]] = {}
     found = []
     for one in chosen:
-        if one.test is not None:
-            found.append(int(holds(one.test, state)))
+        if one.condition is not None:
+            found.append(int(holds(one.condition, state)))
         elif one.module is not None:
             if one.module.name not in again:
                 again[one.module.name] = dict(state)
@@ -181,35 +195,58 @@ def _computed(stepper: Stepper) -> Iterator[tuple[str, Procedure]]:
     variables = {str(v.name): v for v in stepper.program.variables}
     for name in stepper.level.preprocess:
         module = stepper.procedures[name]
-        used = {
-            str(read)
-            for one in everything(module.body)
-            for expr in expressions(one)
-            for read in read_by(expr)
-        }
-        calls = any(isinstance(one, Call) for one in everything(module.body))
+        if module.extern is not None:
+            continue
         own = set(map(str, module.writes))
-        free = all(
-            variables[leaf].kind is Kind.INPUT or _flag(stepper.program, leaf) or leaf in own for leaf in used
-        )
-        if free and not calls and module.extern is None:
-            for leaf in module.writes:
-                yield str(leaf), module
+        run = Run(stepper.procedures, stepper.kinds, stepper.anywhere())
+        run.execute((Call(module.name),))
+        for leaf in map(str, module.writes):
+            used = values.variables([run.leaf(leaf)])
+            if all(
+                one in own or variables[one].kind is Kind.INPUT or _flag(stepper.program, one) for one in used
+            ):
+                yield leaf, module
 
 
 def _cells(stepper: Stepper, inside: Container[str]) -> Iterator[Feature]:
-    """Conditions of cells on one leaf of many values: which of its classes it is in."""
-    seen = set()
-    kinds = stepper.kinds
+    """Conditions of cells on leaves of many values."""
+    kinds, seen = stepper.kinds, set()
     for table in stepper.program.tables:
-        for line in table.lines:
-            for test in line.tests:
-                if test is None or test.box is None:
+        for column, tests in zip(
+            table.columns, zip(*(line.tests for line in table.lines), strict=True), strict=True
+        ):
+            for test in tests:
+                if test is None or all(_small(kinds[leaf]) for leaf in test.variables):
                     continue
-                leaf = str(test.variables[0])
-                if not _small(kinds[leaf]) and leaf in inside and (leaf, test.box) not in seen:
-                    seen.add((leaf, test.box))
-                    yield Feature(leaf, Bool(), test=test)
+                name = spelled(test.condition)
+                if name not in seen and all(leaf in inside for leaf in test.variables):
+                    seen.add(name)
+                    yield Feature(f"{column.heading} {test.text}", Bool(), condition=test.condition)
+
+
+def _branches(stepper: Stepper, inside: Container[str], there: Container[str]) -> Iterator[Feature]:
+    """What procedures decide by: leaves of few values, and comparisons of others with a constant."""
+    kinds, seen = stepper.kinds, set()
+    for condition in _decisions(stepper.program):
+        for name in dict.fromkeys(map(str, read_by(condition))):
+            if name in inside and _small(kinds[name]) and name not in there and name not in seen:
+                seen.add(name)
+                yield Feature(name, kinds[name])
+        for part in parts(condition):
+            match part:
+                case Apply(op=op, args=(Read(name=leaf), Literal())) if op in COMPARISONS:
+                    name = spelled(part)
+                    if name not in seen and leaf in inside and not _small(kinds[leaf]):
+                        seen.add(name)
+                        yield Feature(name, Bool(), condition=part)
+
+
+def _decisions(program: Program) -> Iterator[Expr]:
+    """Conditions of two-way choices."""
+    for procedure in program.procedures:
+        for one in everything(procedure.body):
+            if isinstance(one, If):
+                yield one.condition
 
 
 def compared(program: Program) -> Iterator[tuple[str, str]]:

@@ -8,11 +8,14 @@ what is claimed of the level itself, and what it guarantees its neighbours, whic
 from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import StrEnum
+from itertools import combinations
+from typing import TypeAlias
 
 from rcsc.compose.contract import COMMAND, ECHO, ECHOED, NUMBER, Below, leaves_under
-from rcsc.compose.transition import Cycle, Stepper, successor
-from rcsc.model import pending
-from rcsc.prove import values
+from rcsc.compose.properties import invariants, properties
+from rcsc.compose.transition import Cycle, Stepper, TableAt, successor
+from rcsc.model import Line, Table, pending
+from rcsc.prove import boxes, values
 from rcsc.prove.values import Node
 
 FLAG = "new_command"
@@ -31,7 +34,17 @@ class Sort(StrEnum):
     NEXT_NUMBER = "numbers are used one after the other"
     WAITS = "no other command replaces an order before its echo, but for a new command"
     ONCE = "a command number is taken up once"
+    ANSWERED = "no new command is passed over"
+    SAME_ORDER = "no other order comes under the number that was taken last"
+    OF_ITS_ORDER = "what is reported under the number of the last order is about that order"
+    PAUSES = "a PAUSE is passed on in the cycle that takes it"
     DEFERRED = "no state is written directly while another is pending"
+    INVARIANT = "invariant"
+    PROPERTY = "property"
+
+
+Key: TypeAlias = tuple[Sort, str, str]
+"""What tells the goals of a level apart."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,26 +53,41 @@ class Goal:
 
     Attributes:
         table: Whose it is; empty where it is the level's.
-        name: Of the assumption, the buffer, or the leaf.
+        name: Of the assumption, the buffer, or the leaf; of a pair of lines, both.
         holds: The condition.
+        lines: The two lines that it is about (`pairs`).
     """
 
     sort: Sort
     table: str
     name: str
     holds: Node
+    lines: tuple[str, ...] = ()
+
+    @property
+    def key(self) -> Key:
+        """The same for the same goal in any cycle."""
+        return self.sort, self.table, self.name
 
     @property
     def shown(self) -> str:
         """In one line, without the table."""
-        if self.sort is Sort.ASSUMPTION:
-            return f"assumption `{self.name}`"
+        if self.sort in {Sort.ASSUMPTION, Sort.INVARIANT, Sort.PROPERTY}:
+            return f"{self.sort.value} `{self.name}`"
+        if self.lines:
+            return "lines {} do not both match".format(" and ".join(f"`{line}`" for line in self.lines))
         return f"{self.sort.value}: `{self.name}`" if self.name else self.sort.value
 
 
 def goals(stepper: Stepper, cycle: Cycle) -> tuple[Goal, ...]:
     """All goals of a level, its tables' first."""
-    return (*_tables(cycle), *_upward(stepper, cycle), *_downward(stepper, cycle), *_own(stepper, cycle))
+    return (
+        *_tables(cycle),
+        *_upward(stepper, cycle),
+        *_downward(stepper, cycle),
+        *_own(stepper, cycle),
+        *_stated(stepper, cycle),
+    )
 
 
 def _tables(cycle: Cycle) -> Iterator[Goal]:
@@ -73,6 +101,35 @@ def _tables(cycle: Cycle) -> Iterator[Goal]:
         elif at.table.default.unreachable:
             yield Goal(Sort.NO_DEFAULT, name, "", some)
         yield Goal(Sort.ONE_LINE, name, "", values.follows(at.chosen, values.negation(at.several())))
+
+
+def pairs(cycle: Cycle) -> tuple[Goal, ...]:
+    """That no two lines match, pair by pair: what there is to look for where `ONE_LINE` is not proved."""
+    found = []
+    for at in cycle.tables:
+        for one, two in may_meet(at.table):
+            first, second = (str(at.table.lines[place].name) for place in (one, two))
+            never = values.negation(values.both(at.matches[one], at.matches[two]))
+            goal = values.follows(at.chosen, never)
+            found.append(
+                Goal(Sort.ONE_LINE, str(at.table.name), f"{first} and {second}", goal, (first, second))
+            )
+    return tuple(found)
+
+
+def may_meet(table: Table) -> list[tuple[int, int]]:
+    """The pairs of lines whose cells do not part them; all of them where a cell is about several leaves."""
+    every = combinations(range(len(table.lines)), 2)
+    if not boxes.applies(table):
+        return list(every)
+    lines = boxes.lines_of(table)
+    return [
+        (one, two)
+        for one, two in every
+        if all(
+            boxes.meet(lines[one][name], lines[two][name]) for name in lines[one].keys() & lines[two].keys()
+        )
+    ]
 
 
 def _upward(stepper: Stepper, cycle: Cycle) -> Iterator[Goal]:
@@ -101,6 +158,7 @@ def _downward(stepper: Stepper, cycle: Cycle) -> Iterator[Goal]:
             command = f"{below.order}.{COMMAND}"
             kept = values.equal(cycle.before[command], cycle.after[command])
             yield Goal(Sort.WAITS, "", below.order, values.follows(_waiting(stepper, cycle, below), kept))
+            yield Goal(Sort.PAUSES, "", below.order, _passes_on_a_pause(stepper, cycle, below))
 
 
 def _waiting(stepper: Stepper, cycle: Cycle, below: Below) -> Node:
@@ -118,14 +176,62 @@ def _waiting(stepper: Stepper, cycle: Cycle, below: Below) -> Node:
     )
 
 
+def _passes_on_a_pause(stepper: Stepper, cycle: Cycle, below: Below) -> Node:
+    """Where a new order is the first command, PAUSE or its like, so is the order that stands below behind the cycle."""
+    above = stepper.links.above
+    assert above is not None
+    taken, passed = f"{above.order}.{COMMAND}", f"{below.order}.{COMMAND}"
+    new = values.negation(
+        values.equal(cycle.before[f"{above.order}.{NUMBER}"], cycle.taken[f"{above.order}.{NUMBER}"])
+    )
+    paused = values.equal(cycle.taken[taken], values.constant(stepper.kinds[taken], 0))
+    passes = values.equal(cycle.after[passed], values.constant(stepper.kinds[passed], 0))
+    return values.follows(values.both(new, paused), passes)
+
+
 def _own(stepper: Stepper, cycle: Cycle) -> Iterator[Goal]:
     above = stepper.links.above
     if above is not None and FLAG in cycle.before:
         same = values.equal(cycle.before[f"{above.order}.{NUMBER}"], cycle.taken[f"{above.order}.{NUMBER}"])
         rises = values.both(cycle.after[FLAG], values.negation(cycle.before[FLAG]))
         yield Goal(Sort.ONCE, "", FLAG, values.follows(same, values.negation(rises)))
+        for at in cycle.tables:
+            if overlooking := _overlooking(at.table):
+                yield _answered(stepper, cycle, at, overlooking)
     for variable in stepper.program.variables:
         if variable.deferred_until is not None:
             untouched = values.equal(cycle.after[variable.name], cycle.middle[variable.name])
             agreed = values.equal(cycle.after[variable.name], cycle.after[pending(variable.name)])
             yield Goal(Sort.DEFERRED, "", str(variable.name), values.either(untouched, agreed))
+
+
+def _stated(stepper: Stepper, cycle: Cycle) -> Iterator[Goal]:
+    """What the program itself states."""
+    for name, holds in invariants(stepper.program, cycle):
+        yield Goal(Sort.INVARIANT, "", name, holds)
+    for name, holds in properties(stepper.program, cycle):
+        yield Goal(Sort.PROPERTY, "", name, holds)
+
+
+def _overlooking(table: Table) -> tuple[int, ...]:
+    """The lines that do not look for a new command, of a table in which some line does."""
+    looks = [_looks(table, line) for line in table.lines]
+    return tuple(at for at, one in enumerate(looks) if not one) if any(looks) else ()
+
+
+def _looks(table: Table, line: Line) -> bool:
+    """Whether the line has a cell on the flag."""
+    cells = zip(table.columns, line.tests, strict=True)
+    return any(test is not None and column.variable == FLAG for column, test in cells)
+
+
+def _answered(stepper: Stepper, cycle: Cycle, at: TableAt, overlooking: tuple[int, ...]) -> Goal:
+    """Where such a line runs while the flag stands, the flag outlasts it.
+
+    If it is down as soon as the level sees the same once more, no line will answer the command, and what this line
+    reports is taken for the answer.
+    """
+    again = stepper.cycle(cycle.after, taken=cycle.taken).middle[FLAG]
+    missed = values.any_of(at.matches[line] for line in overlooking)
+    flagged = values.all_of((cycle.middle[FLAG], at.chosen, values.negation(at.several()), missed))
+    return Goal(Sort.ANSWERED, str(at.table.name), FLAG, values.follows(flagged, again))

@@ -6,8 +6,9 @@ In: nodes (`prove.values`). Out: terms, and the ranges of the variables they rea
 - A real is its *key* (`model.real_key`): an integer that orders as the doubles do. Equality and order, least,
   greatest, opposite and absolute value of reals are therefore exact.
 - Any other operation (arithmetic of reals, products and quotients of variables) gives *any* value within the bounds of the
-  node, the same one for the same node; a comparison with what may be a NaN gives any truth value. So the terms allow
-  whatever the executors can do, and more: what is proved of them holds, and a trace found in them is run before it is believed.
+  node, the same one for the same operation on the same operands; a comparison with what may be a NaN gives any truth
+  value. So the terms allow whatever the executors can do, and more: what is proved of them holds, and a trace found in
+  them is run before it is believed.
 """
 
 import math
@@ -52,6 +53,9 @@ class Keyed:
     guessed: int = 0
     _terms: dict[Node, Term] = field(default_factory=dict)
     _variables: dict[str, Term] = field(default_factory=dict)
+    _open: dict[tuple[str, Scalar, tuple[int, ...]], Term] = field(default_factory=dict)
+    _numbers: dict[tuple[object, ...], int] = field(default_factory=dict)
+    _number_of: dict[Node, int] = field(default_factory=dict)
 
     def term(self, node: Node) -> Term:
         """The term of a node; parts first, without recursion."""
@@ -148,13 +152,29 @@ class Keyed:
 
     def _any(self, node: Node) -> Term:
         """Any value within the bounds of the node."""
-        self.guessed += 1
-        found = _fresh(f"any!{self.guessed}", node.kind)
+        key = node.op, node.kind, tuple(self._written(arg) for arg in node.args)
+        found = self._open.get(key)
+        if found is None:
+            self.guessed += 1
+            found = self._open[key] = _fresh(f"any!{self.guessed}", node.kind)
         if not isinstance(node.kind, Bool) and math.isfinite(node.low) and math.isfinite(node.high):
             real = isinstance(node.kind, Real)
             ends = (real_key(node.low), real_key(node.high)) if real else (int(node.low), int(node.high))
             self._within(found, *ends, node.kind)
         return found
+
+    def _written(self, node: Node) -> int:
+        """A number for the node that every node has which is written the same."""
+        for one in parts_first(node):
+            if one not in self._number_of:
+                if one.op == "narrowed":
+                    self._number_of[one] = self._number_of[one.args[0]]
+                    continue
+                value = one.low if one.op == "constant" else None
+                parts = tuple(self._number_of[arg] for arg in one.args)
+                key = one.op, one.kind, one.name, value, parts
+                self._number_of[one] = self._numbers.setdefault(key, len(self._numbers))
+        return self._number_of[node]
 
 
 def _literal(kind: Scalar, value: int | float) -> Term:

@@ -6,34 +6,26 @@ does within its contract, and every cycle that begins in it fulfils the goals.
 """
 
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
-from random import Random
 
-from rcsc.compose.contract import COMMAND
-from rcsc.compose.features import Feature, compared, features, point
+from rcsc.compose.confirm import Confirmation
+from rcsc.compose.context import Context, context
+from rcsc.compose.ends import Ending, endings, ways_round
+from rcsc.compose.features import Feature
+from rcsc.compose.frames import Clause
 from rcsc.compose.goals import Goal, Sort, goals
 from rcsc.compose.keyed import Keyed
-from rcsc.compose.projection import Clause, Inference, NotInferredError, Point
+from rcsc.compose.sat import GaveUpError
+from rcsc.compose.search import Effort, Found, search, strengthened
 from rcsc.compose.transition import Cycle, Stepper
-from rcsc.compose.walk import Walk
 from rcsc.prove import smt, values
 from rcsc.prove.smt import Answer, Solver, Term
 
 
-@dataclass(frozen=True, slots=True)
-class Effort:
-    """How much is spent.
-
-    Attributes:
-        walks: Random walks before the search, each of `cycles` cycles.
-        timeout_ms: For each question; past it the answer is *undecided*, never *proved*.
-    """
-
-    walks: int = 120
-    cycles: int = 150
-    timeout_ms: int = 20_000
+class NotConfirmedError(Exception):
+    """Another solver does not say the same, or gave up: nothing may rest on what was found."""
 
 
 class Verdict(StrEnum):
@@ -55,7 +47,10 @@ class LevelProof:
         features: What the clauses speak of.
         clauses: The invariant: combinations that never stand; empty where none was found.
         walked: States seen on walks; `learnt`, those that the solver added.
-        seconds: Wall time, for the report.
+        seconds: Wall time of the search, for the report.
+        cached: Whether an earlier run made it.
+        context: What was found of its lines; None where something is not proved.
+        endings: Whether its commands end, table by table.
     """
 
     level: str
@@ -65,6 +60,9 @@ class LevelProof:
     walked: int
     learnt: int
     seconds: float = field(compare=False)
+    cached: bool = field(default=False, compare=False)
+    context: Context | None = None
+    endings: tuple[Ending, ...] = ()
 
     def verdict(self, sort: Sort, table: str = "", name: str = "") -> Verdict:
         """Of one goal.
@@ -84,57 +82,60 @@ class LevelProof:
 
 
 def prove_level(stepper: Stepper, effort: Effort | None = None) -> LevelProof:
-    """Proves every goal of a level that can be proved with the invariants found."""
+    """Proves every goal of a level that can be proved with the invariants found, and looks at its lines in their context."""
     effort = effort or Effort()
     begun = time.perf_counter()
-    cycle = stepper.cycle(stepper.anywhere())
+    cycle, firsts = stepper.cycle(stepper.anywhere()), tuple(_firsts(stepper).values())
     wanted = goals(stepper, cycle)
-    chosen = features(
-        stepper, cycle, [*(goal.holds for goal in wanted if _matters(stepper, goal)), cycle.contract]
-    )
-    walked = dict.fromkeys(_states(stepper, chosen, effort))
-    firsts = tuple(_firsts(stepper).values())
-    cases = [at.chosen for at in cycle.tables]
-    inference = Inference(chosen, firsts, cycle, cases, Keyed(), effort.timeout_ms)
+    seen: Context | None = None
+    ends: tuple[Ending, ...] = ()
     try:
-        clauses = inference.invariant(walked)
-        _confirm(inference, clauses)
-    except NotInferredError:
-        clauses = []
+        found = search(stepper, firsts, cycle, wanted, effort)
+        asked = _asked_anew(found.features, firsts, cycle, effort.timeout_ms)
+        looks = effort.looks and not any(wanted[at].sort is not Sort.NUMBERED for at in found.open)
+        if looks and (others := ways_round(stepper, asked, found.clauses)):
+            found = strengthened(stepper, firsts, cycle, found, others, effort)
+        _confirm(asked, found.clauses)
+        verdicts = list(_verdicts(stepper, asked, found, wanted))
+        if looks:
+            seen, ends = context(stepper, asked, found.clauses), endings(stepper, asked, found.clauses)
+    except (GaveUpError, NotConfirmedError):
+        found = Found()
         verdicts = [(goal, Verdict.UNDECIDED) for goal in wanted]
-    else:
-        verdicts = list(_verdicts(stepper, inference, clauses, wanted))
-    seconds = time.perf_counter() - begun
     return LevelProof(
-        stepper.level.name, tuple(verdicts), chosen, tuple(clauses), len(walked), inference.found, seconds
+        stepper.level.name,
+        tuple(verdicts),
+        found.features,
+        found.clauses,
+        found.walked,
+        found.learnt,
+        time.perf_counter() - begun,
+        context=seen,
+        endings=ends,
     )
 
 
-def _confirm(inference: Inference, clauses: list[Clause]) -> None:
-    """Asks anew, in fresh solvers, whether the clauses are an invariant: the search is not to be trusted.
+def _asked_anew(
+    features: tuple[Feature, ...], firsts: tuple[Cycle, ...], cycle: Cycle, timeout_ms: int
+) -> Confirmation:
+    return Confirmation(features, firsts, cycle, [at.chosen for at in cycle.tables], Keyed(), timeout_ms)
+
+
+def _confirm(asked: Confirmation, clauses: Sequence[Clause]) -> None:
+    """Asks anew, of another solver, whether the clauses are an invariant: the search is not to be trusted.
 
     Raises:
-        NotInferredError: They are not, or a solver gave up.
+        NotConfirmedError: They are not, or the solver gave up.
     """
-    questions = [inference.first_question(clauses, first) for first in inference.firsts]
-    questions += [inference.step_question(clauses, case) for case in inference.cases]
-    if any(question.check() is not Answer.UNSATISFIABLE for question in questions):
-        raise NotInferredError
+    if any(question.check() is not Answer.UNSATISFIABLE for question in _questions(asked, clauses)):
+        raise NotConfirmedError
 
 
-def _matters(stepper: Stepper, goal: Goal) -> bool:
-    """Whether its cone is looked at for features: not that of fields which the level does not compare with the last ones."""
-    if goal.sort is not Sort.NUMBERED:
-        return True
-    return goal.name.endswith(f".{COMMAND}") or any(goal.name in pair for pair in compared(stepper.program))
-
-
-def _states(stepper: Stepper, chosen: tuple[Feature, ...], effort: Effort) -> Iterable[Point]:
-    """The features of states that walks reach."""
-    for seed in range(max(1, effort.walks)):
-        walk = Walk(stepper.program, stepper.level, stepper.links, Random(seed))  # noqa: S311  # repeatable on purpose
-        for state in walk.states(effort.cycles):
-            yield point(stepper, chosen, state)
+def _questions(asked: Confirmation, clauses: Sequence[Clause]) -> Iterable[Solver]:
+    for first in asked.firsts:
+        yield asked.first_question(clauses, first)
+    for case in asked.cases:
+        yield asked.step_question(clauses, case)
 
 
 def _firsts(stepper: Stepper) -> dict[str, Cycle]:
@@ -146,14 +147,17 @@ def _firsts(stepper: Stepper) -> dict[str, Cycle]:
 
 
 def _verdicts(
-    stepper: Stepper, inference: Inference, clauses: list[Clause], wanted: tuple[Goal, ...]
+    stepper: Stepper, inference: Confirmation, found: Found, wanted: tuple[Goal, ...]
 ) -> Iterable[tuple[Goal, Verdict]]:
     """Asks for each goal whether a first cycle, or a cycle from the invariant, can break it."""
     keyed = inference.keyed
     every = [wanted, *(goals(stepper, first) for first in inference.firsts)]
     asked = [[keyed.term(values.negation(goal.holds)) for goal in each] for each in every]
-    solvers = [inference.known(clauses), *(inference.beginning(first) for first in inference.firsts)]
+    solvers = [inference.known(found.clauses), *(inference.beginning(first) for first in inference.firsts)]
     for at, goal in enumerate(wanted):
+        if at in found.open:
+            yield goal, Verdict.NOT_PROVED
+            continue
         answers = {_asked(solver, terms[at]) for solver, terms in zip(solvers, asked, strict=True)}
         if answers == {Answer.UNSATISFIABLE}:
             yield goal, Verdict.PROVED
@@ -173,25 +177,30 @@ def certificate(stepper: Stepper, proof: LevelProof, timeout_ms: int = 20_000) -
     """Questions in SMT-LIB, each to be answered `unsat` by any solver, that together show what was proved.
 
     `first` and `restart`: such a cycle leads into the invariant; `step TABLE`: a later cycle in which this table runs keeps
-    it; `goals first`, `goals restart` and `goals`: such cycles, and every cycle from the invariant, fulfil the goals that are proved.
+    it; `goals first`, `goals restart`: such cycles fulfil the goals that are proved; `goals SORT`: every cycle from the
+    invariant fulfils those of one sort.
     """
     cycle, firsts = stepper.cycle(stepper.anywhere()), _firsts(stepper)
-    cases = [at.chosen for at in cycle.tables]
-    inference = Inference(proof.features, tuple(firsts.values()), cycle, cases, Keyed(), timeout_ms)
-    clauses = list(proof.clauses)
-    found = {name: inference.first_question(clauses, first).script() for name, first in firsts.items()}
+    asked = _asked_anew(proof.features, tuple(firsts.values()), cycle, timeout_ms)
+    clauses = proof.clauses
+    found = {name: asked.first_question(clauses, first).script() for name, first in firsts.items()}
     for at in cycle.tables:
-        found[f"step {at.table.name}"] = inference.step_question(clauses, at.chosen).script()
-    proved = {
-        (goal.sort, goal.table, goal.name) for goal, verdict in proof.found if verdict is Verdict.PROVED
-    }
-    for name, one in (*firsts.items(), ("", cycle)):
-        wanted = [goal for goal in goals(stepper, one) if (goal.sort, goal.table, goal.name) in proved]
-        bad = smt.any_of([inference.keyed.term(values.negation(goal.holds)) for goal in wanted])
-        solver = inference.known(clauses) if one is cycle else inference.beginning(one)
-        solver.add(*inference.keyed.ranges, bad)
-        found[f"goals {name}".strip()] = solver.script()
+        found[f"step {at.table.name}"] = asked.step_question(clauses, at.chosen).script()
+    proved = {goal.key for goal, verdict in proof.found if verdict is Verdict.PROVED}
+    for name, first in firsts.items():
+        wanted = [goal for goal in goals(stepper, first) if goal.key in proved]
+        found[f"goals {name}"] = _none_broken(asked, asked.beginning(first), wanted)
+    every = [goal for goal in goals(stepper, cycle) if goal.key in proved]
+    for sort in dict.fromkeys(goal.sort for goal in every):
+        wanted = [goal for goal in every if goal.sort is sort]
+        found[f"goals {sort.name.lower()}"] = _none_broken(asked, asked.known(clauses), wanted)
     return found
+
+
+def _none_broken(asked: Confirmation, solver: Solver, wanted: Sequence[Goal]) -> str:
+    bad = smt.any_of([asked.keyed.term(values.negation(goal.holds)) for goal in wanted])
+    solver.add(*asked.keyed.ranges, bad)
+    return solver.script()
 
 
 def shown(chosen: tuple[Feature, ...], clause: Clause) -> str:

@@ -12,9 +12,12 @@ from dataclasses import dataclass, field, replace
 from multiprocessing import get_context
 from pathlib import Path
 
+from rcsc.cache import Cache
 from rcsc.compose.contract import COMMAND, ECHO, ECHOED, NUMBER, Links, links
 from rcsc.compose.goals import Goal, Sort, goals
-from rcsc.compose.level import Effort, LevelProof, Verdict, prove_level
+from rcsc.compose.kept import keep, recall
+from rcsc.compose.level import LevelProof, Verdict, prove_level
+from rcsc.compose.search import Effort
 from rcsc.compose.transition import Stepper
 from rcsc.model import Program
 from rcsc.prove.values import TRUE
@@ -60,8 +63,16 @@ class SystemProof:
 
 
 def essential(proof: LevelProof) -> tuple[Goal, ...]:
-    """Goals that failed; a field that is not numbered is no failure, but nobody may assume that it is."""
-    return tuple(goal for goal in proof.open if goal.sort is not Sort.NUMBERED)
+    """Goals that failed; a field that is not numbered is no failure, but nobody may assume that it is; a command is."""
+    beside = besides(proof)
+    return tuple(goal for goal in proof.open if goal not in beside)
+
+
+def besides(proof: LevelProof) -> tuple[Goal, ...]:
+    """Fields of orders that change under the same number, commands apart."""
+    return tuple(
+        goal for goal in proof.open if goal.sort is Sort.NUMBERED and not goal.name.endswith(f".{COMMAND}")
+    )
 
 
 def steppers(path: Path) -> dict[str, Stepper]:
@@ -140,11 +151,15 @@ def prove_steppers(
     jobs: int,
     only: tuple[str, ...],
     said: Callable[[LevelProof], None] | None = None,
+    cache: Cache | None = None,
 ) -> SystemProof:
-    """Proves these levels; `said` is called with each as it is done. Agreements are looked at only for all of them."""
+    """Proves these levels, but for those that the cache has; `said` is called with each as it is done.
+
+    Agreements are looked at only for all levels.
+    """
     begun = time.perf_counter()
     proofs: dict[str, LevelProof] = {}
-    for name, proof in _each(made, effort or Effort(), jobs, only):
+    for name, proof in _each_unless_kept(made, effort or Effort(), jobs, only, cache):
         proofs[name] = proof
         if said is not None:
             said(proof)
@@ -152,11 +167,28 @@ def prove_steppers(
     return SystemProof(tuple(proofs.values()), agreed, time.perf_counter() - begun)
 
 
+def _each_unless_kept(
+    made: Mapping[str, Stepper], effort: Effort, jobs: int, only: tuple[str, ...], cache: Cache | None
+) -> Iterator[tuple[str, LevelProof]]:
+    """Each level's proof, in order."""
+    known = {name: recall(cache, made[name], effort) for name in only} if cache is not None else {}
+    new = _each(made, effort, jobs, tuple(name for name in only if known.get(name) is None))
+    for name in only:
+        kept = known.get(name)
+        if kept is not None:
+            yield name, kept
+            continue
+        _, proof = next(new)
+        if cache is not None:
+            keep(cache, made[name], effort, proof)
+        yield name, proof
+
+
 def _each(
     made: Mapping[str, Stepper], effort: Effort, jobs: int, only: tuple[str, ...]
 ) -> Iterator[tuple[str, LevelProof]]:
     """Each level's proof; in processes where there are several jobs."""
-    if jobs == 1 or len(only) == 1:
+    if jobs == 1 or len(only) <= 1:
         for name in only:
             yield name, prove_level(made[name], effort)
         return
@@ -207,8 +239,12 @@ def _of_above(
     above = stepper.links.above
     if above is None:
         return []
-    fields = ", ".join(f"`{leaf}`" for leaf in above.numbered) or "nothing"
-    words = f"while the number of `{above.order}` stays, so do {fields}"
+    fields = ", ".join(f"`{leaf}`" for leaf in above.numbered)
+    words = (
+        f"while the number of `{above.order}` stays, so do {fields}"
+        if fields
+        else f"the numbers of `{above.order}` come one after the other"
+    )
     if above.outside:
         return [Agreement(name, words, f"`{above.name}` stands outside the levels", True, outside=True)]
     upper = next(one for one in made[above.name].links.below if one.name == name)

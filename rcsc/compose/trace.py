@@ -1,24 +1,40 @@
 """The shortest way from the first cycle to where a goal is broken, run before it is shown.
 
-In: a stepper and a goal. Out: a `Trace`: what the environment gave in each cycle, and what the reference interpreter, which is the
+In: a stepper and goals. Out: `Trace`s: what the environment gave in each cycle, and what the reference interpreter, which is the
 meaning of the language, made of it. The solver finds the inputs; the interpreter is run on them from the initial values, and only what it
 does is shown. Where it does not break the goal, the trace is not believed: `NotReproducedError`.
+
+Of the shortest runs one of the simplest is given, always the same: an input stays as it was in the cycle before where it can, and has the
+least value that fits where it cannot.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TypeAlias
 
-from rcsc.compose.goals import Goal, Sort, goals
-from rcsc.compose.keyed import Keyed, value_in
-from rcsc.compose.transition import GHOST, Cycle, Leaves, Stepper
-from rcsc.interpret import Fault, Outcome, cycle, initial
-from rcsc.model import Bool, Kind, Literal, Program, Value, spell
+from rcsc.compose.contract import COMMAND, ECHO, ECHOED, NUMBER, Below
+from rcsc.compose.goals import Goal, Key, Sort, goals, pairs
+from rcsc.compose.properties import invariant_kept, property_kept
+from rcsc.compose.sat import GaveUpError
+from rcsc.compose.simplest import Bounded, Simplest, constant_of
+from rcsc.compose.transition import GHOST, Cycle, Leaves, Stepper, successor
+from rcsc.interpret import Fault, Outcome, cycle, initial, matching_lines
+from rcsc.model import Int, Kind, Op, Value, spell, value_of_key
 from rcsc.prove import values
-from rcsc.prove.smt import Answer, Solver
+from rcsc.prove.values import Node
 
 
 class NotReproducedError(Exception):
-    """The interpreter does not do what the solver said: a bug in rcsc, or an operation that was left open (`guessed`)."""
+    """The interpreter does not do what the solver said: a bug in rcsc, or an operation that was left open.
+
+    Attributes:
+        guessed: Whether an operation was left open (`keyed`), so that it need not be a bug.
+        beside: What the solver said and what the interpreter did, where they differ, a line each.
+    """
+
+    def __init__(self, goal: str, *, guessed: bool = False, beside: tuple[str, ...] = ()) -> None:
+        super().__init__(goal)
+        self.guessed, self.beside = guessed, beside
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,8 +46,9 @@ class Step:
         table: That ran; `line`, empty where none matched.
         fault: What ended the cycle early.
         failed: Monitored assumptions that did not hold.
-        before: Every leaf at its start, inputs taken.
+        before: Every leaf at its start, inputs as last taken.
         after: Every leaf at its end.
+        matched: Every line that matched, DEFAULT left out.
     """
 
     taken: Mapping[str, Value]
@@ -41,84 +58,258 @@ class Step:
     failed: tuple[str, ...]
     before: Mapping[str, Value]
     after: Mapping[str, Value]
+    matched: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class Trace:
-    """A run that breaks a goal in its last cycle; no shorter one does."""
+    """A run that breaks a goal in its last cycle; no shorter one does.
+
+    Attributes:
+        goal: What it breaks, in words.
+        restarted: Whether it begins where a restart does, and not with the initial values.
+        legal: Whether its environment did only what a neighbour that began with it can do (`Search.legal`).
+    """
 
     goal: str
     steps: tuple[Step, ...]
+    restarted: bool = False
+    legal: bool = False
 
 
-def shortest(stepper: Stepper, goal: Goal, most: int = 10, timeout_ms: int = 20_000) -> Trace | None:
+@dataclass(frozen=True, slots=True)
+class Search:
+    """How to look for traces.
+
+    Attributes:
+        most: Cycles.
+        restarted: Begin as after a restart.
+        legal: The superior's numbers come one after the other, and each report is of an order of this run, none older than the one
+            before: narrower than the contract, which leaves room for numbers that have gone round and for what stood in the buffers
+            before a restart. A trace found so is one that two levels can do that begin together.
+    """
+
+    most: int = 10
+    restarted: bool = False
+    legal: bool = False
+
+
+Found: TypeAlias = Trace | NotReproducedError
+
+
+def shortest(stepper: Stepper, goal: Goal, most: int = 10, *, legal: bool = False) -> Trace | None:
     """The shortest trace of at most `most` cycles; None where there is none, or the solver gave up.
 
     Raises:
         NotReproducedError: The interpreter does not break the goal there.
     """
-    keyed, leaves = Keyed(), stepper.first()
-    solver = Solver(timeout_ms)
-    cycles: list[Cycle] = []
-    asserted = 0
-    for number in range(1, most + 1):
-        one = stepper.cycle(leaves, f" {number}")
-        cycles.append(one)
-        leaves = one.after
-        wrong = keyed.term(values.negation(_same(goals(stepper, one), goal).holds))
-        solver.add(keyed.term(one.contract))
-        solver.add(*keyed.ranges[asserted:])
-        asserted = len(keyed.ranges)
-        answer = solver.check(wrong)
-        if answer is Answer.SATISFIABLE:
-            inputs = [_taken(stepper.program, cycle_, keyed, solver) for cycle_ in cycles]
-            return replayed(stepper, goal, inputs)
-        if answer is Answer.UNKNOWN:
-            return None
-    return None
-
-
-def _same(every: tuple[Goal, ...], goal: Goal) -> Goal:
-    return next(one for one in every if (one.sort, one.table, one.name) == (goal.sort, goal.table, goal.name))
-
-
-def _taken(program: Program, one: Cycle, keyed: Keyed, solver: Solver) -> dict[str, Value]:
-    """The inputs of a cycle in the model; what no condition reads is as it was at first."""
-    found = {}
-    for variable in program.variables:
-        if variable.kind is Kind.INPUT:
-            node = one.taken[variable.name]
-            found[str(variable.name)] = (
-                value_in(solver, keyed.term(node), variable.type) if keyed.met(node) else variable.initial
-            )
+    found = traces(stepper, (goal,), Search(most, legal=legal)).get(goal.key)
+    if isinstance(found, NotReproducedError):
+        raise found
     return found
 
 
-def replayed(stepper: Stepper, goal: Goal, inputs: list[dict[str, Value]]) -> Trace:
+def traces(stepper: Stepper, wanted: Sequence[Goal], search: Search) -> dict[Key, Found]:
+    """For each goal for which there is one the shortest trace, all found in one search."""
+    run = _Unrolled(stepper, search)
+    waiting = {goal.key: goal for goal in wanted}
+    found: dict[Key, Found] = {}
+    for _ in range(search.most):
+        if not waiting:
+            break
+        one = run.further()
+        here = {goal.key: _wrong(goal, one) for goal in (*goals(stepper, one), *pairs(one))}
+        for key, goal in list(waiting.items()):
+            try:
+                if run.reaches(here[key]):
+                    found[key] = run.told(goal, here[key])
+                    del waiting[key]
+            except GaveUpError:
+                del waiting[key]
+    return found
+
+
+def _wrong(goal: Goal, one: Cycle) -> Node:
+    """That the cycle breaks the goal: what it leaves counts only where it does not end early."""
+    wrong = values.negation(goal.holds)
+    early = goal.sort in {Sort.ASSUMPTION, Sort.ONE_LINE, Sort.SOME_LINE, Sort.NO_DEFAULT}
+    return wrong if early else values.both(wrong, one.goes_on)
+
+
+@dataclass(slots=True)
+class _Unrolled:
+    """Cycles one after the other."""
+
+    stepper: Stepper
+    search: Search
+    cycles: list[Cycle] = field(default_factory=list)
+    _run: Bounded = field(default_factory=Bounded)
+    _now: Leaves = field(init=False)
+    _start: Leaves = field(init=False)
+    _orders: dict[str, list[tuple[Node, Node]]] = field(default_factory=dict)
+    _echoed: dict[str, Node] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self._start = self.stepper.restarted() if self.search.restarted else self.stepper.first()
+        self._now = self._start
+
+    def further(self) -> Cycle:
+        """One cycle more."""
+        at = len(self.cycles) + 1
+        if self.cycles:  # a fault would have ended the run
+            self._run.add(self.cycles[-1].goes_on)
+        one = self.stepper.cycle(self._now, f" {at}")
+        self.cycles.append(one)
+        self._now = one.after
+        self._run.add(one.contract)
+        if self.search.legal:
+            self._run.add(values.all_of(self._legal(one, at)))
+        return one
+
+    def _legal(self, one: Cycle, at: int) -> Iterator[Node]:
+        above = self.stepper.links.above
+        if above is not None:
+            number = f"{above.order}.{NUMBER}"
+            before, now = one.before[number], one.taken[number]
+            yield values.either(values.equal(now, before), values.equal(now, successor(before)))
+        for below in self.stepper.links.below:
+            yield from self._answers(below, one, at)
+
+    def _answers(self, below: Below, one: Cycle, at: int) -> Iterator[Node]:
+        """The report is of one of the orders published so far; of which, is a number that does not fall."""
+        orders = self._orders.setdefault(below.order, [])
+        orders.append((one.before[f"{below.order}.{NUMBER}"], one.before[f"{below.order}.{COMMAND}"]))
+        kind = Int(0, self.search.most)
+        which = values.variable(f"{below.report} echoes {at}", kind)
+        yield values.compare(Op.LE, self._echoed.get(below.report, values.constant(kind, 0)), which)
+        yield values.compare(Op.LT, which, values.constant(kind, len(orders)))
+        self._echoed[below.report] = which
+        echo, echoed = one.taken[f"{below.report}.{ECHO}"], one.taken[f"{below.report}.{ECHOED}"]
+        for place, (number, command) in enumerate(orders):
+            it = values.both(values.equal(echo, number), values.equal(echoed, command))
+            yield values.follows(values.equal(which, values.constant(kind, place)), it)
+
+    def reaches(self, wrong: Node) -> bool:
+        """Whether the last cycle can be so.
+
+        Raises:
+            GaveUpError: The solver did not decide.
+        """
+        return self._run.holds([self._run.literal(wrong)])
+
+    def told(self, goal: Goal, wrong: Node) -> Found:
+        """The simplest run that ends so, as the interpreter runs it; or that it does not break the goal.
+
+        Raises:
+            GaveUpError: The solver did not decide.
+        """
+        settled = Simplest(self._run, [self._run.literal(wrong)])
+        start = self._begins(settled)
+        inputs = self._simplest(settled, start)
+        trace = _ran(self.stepper, goal, inputs, start, self.search)
+        if _breaks(self.stepper, goal, trace, len(inputs)):
+            return trace
+        beside = self._beside(trace) if self._run.holds(settled.given) else ()
+        return NotReproducedError(goal.shown, guessed=self._run.guessed, beside=beside)
+
+    def _simplest(self, settled: Simplest, start: Mapping[str, Value]) -> list[dict[str, Value]]:
+        """The inputs of each cycle; one stays as it was where it can, and so does what no condition reads."""
+        found: list[dict[str, Value]] = []
+        inputs = [str(v.name) for v in self.stepper.program.variables if v.kind is Kind.INPUT]
+        before = [start[name] for name in inputs]
+        for one in self.cycles:
+            before = settled.settle([one.taken[name] for name in inputs], before)
+            found.append(dict(zip(inputs, before, strict=True)))
+        return found
+
+    def _begins(self, settled: Simplest) -> dict[str, Value]:
+        """Every leaf before the first cycle."""
+        begun = dict(initial(self.stepper.program))
+        if self.search.restarted:
+            names = list(begun)
+            nodes = [self._start[name] for name in names]
+            known = [constant_of(node, begun[name]) for name, node in zip(names, nodes, strict=True)]
+            begun = dict(zip(names, settled.settle(nodes, known), strict=True))
+        return begun
+
+    def _beside(self, trace: Trace) -> tuple[str, ...]:
+        """Where the solver's run and the interpreter's part: the first cycle in which they do."""
+        for number, (one, step) in enumerate(zip(self.cycles, trace.steps, strict=False), 1):
+            said = {
+                name: value_of_key(kind, self._run.key(one.after[name]))
+                for name, kind in self.stepper.kinds.items()
+                if name in step.after and self._run.met(one.after[name])
+            }
+            other = [
+                f"cycle {number}: `{name}` = {spell(kind, said[name])} by the solver, {spell(kind, step.after[name])} as it ran"
+                for name, kind in self.stepper.kinds.items()
+                if name in said and said[name] != step.after[name]
+            ]
+            if other:
+                return tuple(other)
+        return ("every leaf that the solver spoke of is the same in both",)
+
+
+# --- the run -------------------------------------------------------------------------------
+
+
+def replayed(stepper: Stepper, goal: Goal, inputs: Sequence[Mapping[str, Value]]) -> Trace:
     """The run on these inputs, from the initial values.
 
     Raises:
         NotReproducedError: It does not break the goal in its last cycle.
     """
-    now = dict(initial(stepper.program))
+    trace = _ran(stepper, goal, inputs, initial(stepper.program), Search())
+    if not _breaks(stepper, goal, trace, len(inputs)):
+        raise NotReproducedError(goal.shown)
+    return trace
+
+
+def _ran(
+    stepper: Stepper,
+    goal: Goal,
+    inputs: Sequence[Mapping[str, Value]],
+    start: Mapping[str, Value],
+    search: Search,
+) -> Trace:
+    return Trace(goal.shown, ran(stepper, start, inputs), search.restarted, search.legal)
+
+
+def ran(
+    stepper: Stepper, start: Mapping[str, Value], inputs: Sequence[Mapping[str, Value]]
+) -> tuple[Step, ...]:
+    """What the interpreter does, from `start` on these inputs, up to the first fault."""
+    now = dict(start)
     steps: list[Step] = []
     for taken in inputs:
-        before = {**now, **taken}
-        outcome = cycle(stepper.program, stepper.level, before)
-        steps.append(_step(stepper, now, taken, outcome))
-        now = outcome.snapshot
-        if outcome.fault is not Fault.OK:
+        steps.append(one_cycle(stepper, now, taken))
+        now = dict(steps[-1].after)
+        if steps[-1].fault is not Fault.OK:
             break
-    if len(steps) < len(inputs) or not broken(stepper, goal, steps[-1]):
-        raise NotReproducedError(goal.shown)
-    return Trace(goal.shown, tuple(steps))
+    return tuple(steps)
 
 
-def _step(stepper: Stepper, before: Mapping[str, Value], taken: dict[str, Value], outcome: Outcome) -> Step:
+def one_cycle(stepper: Stepper, before: Mapping[str, Value], taken: Mapping[str, Value]) -> Step:
+    """What the interpreter does in one cycle."""
+    return _step(stepper, before, taken, cycle(stepper.program, stepper.level, {**before, **taken}))
+
+
+def _breaks(stepper: Stepper, goal: Goal, trace: Trace, cycles: int) -> bool:
+    return len(trace.steps) == cycles and broken(stepper, goal, trace.steps[-1])
+
+
+def _step(
+    stepper: Stepper, before: Mapping[str, Value], taken: Mapping[str, Value], outcome: Outcome
+) -> Step:
     after = outcome.snapshot
     chosen = stepper.table_of(after)
     line = "" if outcome.line is None else str(outcome.line)
-    return Step(taken, chosen, line, outcome.fault, outcome.failed_assumptions, dict(before), after)
+    matched: tuple[str, ...] = () if outcome.line is None else (line,)
+    if outcome.fault is Fault.SEVERAL_LINES:
+        table = next(one for one in stepper.program.tables if one.name == chosen)
+        matched = tuple(map(str, matching_lines(table, after)))
+    failed = outcome.failed_assumptions
+    return Step(dict(taken), chosen, line, outcome.fault, failed, dict(before), after, matched)
 
 
 def broken(stepper: Stepper, goal: Goal, step: Step) -> bool:
@@ -129,12 +320,18 @@ def broken(stepper: Stepper, goal: Goal, step: Step) -> bool:
         case Sort.ASSUMPTION:
             return goal.name in step.failed
         case Sort.ONE_LINE:
-            return step.fault is Fault.SEVERAL_LINES
+            return step.fault is Fault.SEVERAL_LINES and set(goal.lines) <= set(step.matched)
         case Sort.SOME_LINE:
             return step.fault is Fault.NO_LINE
         case Sort.NO_DEFAULT:
             table = next(one for one in stepper.program.tables if one.name == goal.table)
             return table.default is not None and step.line == table.default.name
+        case Sort.INVARIANT:
+            kept = invariant_kept(stepper, goal.name, step.before, step.after)
+            return step.fault is Fault.OK and not kept
+        case Sort.PROPERTY:
+            kept = property_kept(stepper, goal.name, step.before, step.after)
+            return step.fault is Fault.OK and not kept
         case _:
             return _broken_between(stepper, goal, step)
 
@@ -143,10 +340,14 @@ def _broken_between(stepper: Stepper, goal: Goal, step: Step) -> bool:
     """A goal about what stands before and behind a cycle."""
     before, after = _constants(stepper, step.before), _constants(stepper, step.after)
     taken = {name: after[name] for name in step.taken}
-    middle = stepper.cycle(_constants(stepper, {**step.before, **step.taken})).middle
-    ran = Cycle(before, taken, values.TRUE, {**middle, **taken}, (), after)
-    holds = _same(goals(stepper, ran), goal).holds
+    here = stepper.cycle(_constants(stepper, {**step.before, **step.taken}), taken=taken)
+    one = Cycle(before, taken, values.TRUE, {**here.middle, **taken}, here.tables, after)
+    holds = _same(goals(stepper, one), goal).holds
     return holds.known and not holds.low
+
+
+def _same(every: tuple[Goal, ...], goal: Goal) -> Goal:
+    return next(one for one in every if one.key == goal.key)
 
 
 def _constants(stepper: Stepper, state: Mapping[str, Value]) -> Leaves:
@@ -155,34 +356,3 @@ def _constants(stepper: Stepper, state: Mapping[str, Value]) -> Leaves:
         for name, kind in stepper.kinds.items()
         if not name.startswith(GHOST)
     } | {name: values.constant(kind, 0) for name, kind in stepper.kinds.items() if name.startswith(GHOST)}
-
-
-def undeferred(program: Program) -> Program:
-    """The program with every deferred state taken at once: what section 9 warns of."""
-    at_once = tuple(
-        replace(v, deferred_until=Literal(value=True, type=Bool())) if v.deferred_until is not None else v
-        for v in program.variables
-    )
-    return replace(program, variables=at_once)
-
-
-def time_line(stepper: Stepper, trace: Trace) -> list[str]:
-    """The trace as text, a paragraph a cycle: the line that ran, then every leaf that is other than before, in declared order."""
-    kinds = stepper.kinds
-    lines = []
-    for number, step in enumerate(trace.steps, 1):
-        what = f"line `{step.line}`" if step.line else step.fault.name.lower().replace("_", " ")
-        failed = "".join(f"; assumption `{name}` fails" for name in step.failed)
-        lines.append(f"cycle {number}: table `{step.table}`, {what}{failed}")
-        for words, leaves, old in (
-            ("takes", step.taken, step.before),
-            ("leaves", {k: v for k, v in step.after.items() if k not in step.taken}, step.before),
-        ):
-            changed = [
-                f"{name} = {spell(kinds[name], value)}"
-                for name, value in leaves.items()
-                if old[name] != value
-            ]
-            if changed:
-                lines.append(f"  {words} {', '.join(changed)}")
-    return lines

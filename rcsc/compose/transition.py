@@ -62,6 +62,12 @@ class TableAt:
         """No line matches."""
         return values.all_of(map(values.negation, self.matches))
 
+    @property
+    def one_line(self) -> Node:
+        """A line runs."""
+        some = values.TRUE if self.table.default is not None else values.negation(self.none)
+        return values.both(some, values.negation(self.several()))
+
     def several(self) -> Node:
         """At least two lines match."""
         found, before = FALSE, FALSE
@@ -90,6 +96,11 @@ class Cycle:
     middle: Leaves
     tables: tuple[TableAt, ...]
     after: Leaves
+
+    @property
+    def goes_on(self) -> Node:
+        """One line matches, or DEFAULT runs: the cycle does not end in a fault."""
+        return values.all_of(values.follows(at.chosen, at.one_line) for at in self.tables)
 
 
 @dataclass(slots=True)
@@ -190,11 +201,11 @@ class Stepper:
             same = values.all_of(values.equal(before[leaf], taken[leaf]) for leaf in above.numbered)
             kept = values.both(kept, values.follows(values.equal(before[number], taken[number]), same))
         for below in self.links.below:
-            kept = values.both(kept, self._echo(below, before, taken))
+            kept = values.both(kept, self.echo(below, before, taken))
         return kept
 
     @staticmethod
-    def _echo(below: Below, before: Leaves, taken: Leaves) -> Node:
+    def echo(below: Below, before: Leaves, taken: Leaves) -> Node:
         """The last order's number with another command is not echoed, nor a number not yet sent; what is echoed stays so."""
         sent, last = before[f"{below.order}.{NUMBER}"], before[f"{below.report}.{ECHO}"]
         echo = taken[f"{below.report}.{ECHO}"]

@@ -1,0 +1,98 @@
+"""What `rcsc prove` says of lines in their context, of how commands end, and of the system as a whole."""
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from rcsc.compose.ends import Ending
+    from rcsc.compose.level import LevelProof
+    from rcsc.compose.system import SystemProof
+    from rcsc.compose.transition import Stepper
+
+
+def in_context(proof: "LevelProof") -> Iterator[str]:
+    """Of one level, line by line; nothing where something is not proved."""
+    seen = proof.context
+    if seen is None:
+        return
+    lines = ", ".join(f"{table} {line}" for table, line in seen.unreached)
+    yield f"lines never reached here: {lines or 'none'}"
+    again = "; ".join(f"{one.table} {one.line}: {', '.join(one.leaves)}" for one in seen.repeated)
+    yield f"what a line does when it matches again before its order is echoed: {again or 'nothing'}"
+    if seen.restless:
+        yield "order after order may be given on inputs that stay the same"
+    if proof.endings:
+        yield "given that every order is answered,"
+        yield from (f"  {one.table} {_ends(one)}" for one in proof.endings)
+
+
+def _ends(one: "Ending") -> str:
+    if one.changes is None:
+        return "is not shown to end: its states may go round"
+    changes = "one change" if one.changes == 1 else f"{one.changes} changes"
+    said = f"ends after at most {changes} of state"
+    if one.endless:
+        lines = ", ".join(f"`{line}`" for line in one.endless)
+        return f"is not shown to end: line {lines} waits for what it reads"
+    if one.counted:
+        said += " and what is counted: " + ", ".join(
+            f"line `{line}` by `{counter}`" for line, counter in one.counted
+        )
+    return said
+
+
+def assumptions(proof: "SystemProof") -> str:
+    """How many there are, and how they stand."""
+    from rcsc.compose.goals import Sort
+    from rcsc.compose.level import Verdict
+
+    verdicts = [
+        verdict for one in proof.levels for goal, verdict in one.found if goal.sort is Sort.ASSUMPTION
+    ]
+    good = sum(verdict is Verdict.PROVED for verdict in verdicts)
+    rest = len(verdicts) - good
+    return f"assumptions of tables: {good} proved" + (f", {rest} not proved" if rest else ", none left")
+
+
+def reaction(made: "Mapping[str, Stepper]", proof: "SystemProof") -> Iterator[str]:
+    """The way of a PAUSE from the top down, as far as it is proved that it is passed on at once."""
+    from rcsc.compose.goals import Sort
+    from rcsc.compose.level import Verdict
+
+    proofs = {one.level: one for one in proof.levels}
+    tops = [
+        name
+        for name, one in made.items()
+        if one.links.above is not None and one.links.above.outside and one.links.below
+    ]
+    for top in tops if set(proofs) == set(made) else ():
+        reached: dict[str, int] = {top: 1}
+        for name in made:
+            for below in made[name].links.below if name in reached else ():
+                if proofs[name].verdict(Sort.PAUSES, "", below.order) is Verdict.PROVED:
+                    reached[below.name] = reached[name] + 1
+        lowest = {name: cycles - 1 for name, cycles in reached.items() if name != top}
+        said = ", ".join(f"`{name}` in {cycles}" for name, cycles in lowest.items())
+        yield f"a PAUSE of `{top}` is ordered of {said} cycles of levels, besides what buffers take"
+
+
+def confirmed(stepper: "Stepper", proof: "LevelProof") -> "dict[str, bool]":
+    """Each question of the certificate, and whether cvc5 refutes it within two minutes."""
+    from rcsc.compose.level import certificate
+    from rcsc.smtlib import cvc5_refutes
+
+    return {
+        name: cvc5_refutes(text, timeout_ms=120_000) for name, text in certificate(stepper, proof).items()
+    }
+
+
+def as_json(proof: "LevelProof") -> dict[str, Any]:
+    """Context and endings of one level."""
+    from dataclasses import asdict
+
+    return {
+        "context": None if proof.context is None else asdict(proof.context),
+        "endings": [{**asdict(one), "proved": one.proved} for one in proof.endings],
+    }

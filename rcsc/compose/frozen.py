@@ -1,0 +1,217 @@
+"""A finding, frozen: a case in JSON that is run again on the tables as they are then.
+
+In: a finding. Out: its text; and back: whether the same inputs break the same goal now. A case names values in the tables' words, and only
+those that change, so that it outlives changes that do not concern it.
+
+What a case expects is `kept` where it stands for a fault that is to be mended (it fails until it is), `broken` where it shows a
+hazard that is to stay visible: that of another rule than the language's, or of a published table.
+"""
+
+import json
+import os
+from collections.abc import Callable, Container, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rcsc.compose.finding import Finding
+from rcsc.compose.goals import Goal, Sort
+from rcsc.compose.system import NoProgramError, steppers
+from rcsc.compose.together import broken_in, exchange
+from rcsc.compose.trace import Step, broken, one_cycle
+from rcsc.compose.transition import Stepper
+from rcsc.compose.variants import VARIANTS
+from rcsc.interpret import Fault, initial
+from rcsc.model import Bool, Enum, Kind, Program, Real, Scalar, Value, key_bounds, key_of, spell
+from rcsc.prove import values
+from rcsc.system.description import BadDescription
+
+FORMAT = 1
+
+
+class BadCaseError(Exception):
+    """A case cannot be read, or names what the tables do not have; says what."""
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """A case as it is written.
+
+    Attributes:
+        system: The description's path.
+        variants: Under which other rules (`variants.VARIANTS`).
+        level: Whose goal it is, with its sort, table, name and lines.
+        start: For each level the leaves that do not begin as they do initially.
+        ticks: For each tick, for each level that runs, the inputs that change.
+    """
+
+    system: Path
+    variants: tuple[str, ...]
+    level: str
+    goal: Goal
+    start: Mapping[str, Mapping[str, str]]
+    ticks: tuple[Mapping[str, Mapping[str, str]], ...]
+    expects_broken: bool
+
+
+def frozen(
+    finding: Finding, made: Mapping[str, Stepper], system: Path, case: Path, variants: tuple[str, ...] = ()
+) -> str:
+    """The text of the case that will stand at `case`."""
+    goal = finding.goal
+    exchanged = exchange(made, finding.levels)
+    document = {
+        "format": FORMAT,
+        "system": os.path.relpath(system, case.parent).replace("\\", "/"),
+        "variants": list(variants),
+        "expect": "broken" if variants else "kept",
+        "goal": {
+            "level": finding.level,
+            "what": goal.sort.name.lower(),
+            "table": goal.table,
+            "name": goal.name,
+            "lines": list(goal.lines),
+        },
+        "start": {
+            name: said for name in finding.levels if (said := _not_initial(made[name], finding.start(name)))
+        },
+        "ticks": [
+            {name: _changed(made[name], step, exchanged[name]) for name, step in steps.items()}
+            for steps in finding.ticks
+        ],
+    }
+    return json.dumps(document, indent=1) + "\n"
+
+
+def _not_initial(stepper: Stepper, start: Mapping[str, Value]) -> dict[str, str]:
+    begun = initial(stepper.program)
+    return {name: spell(stepper.kinds[name], start[name]) for name in begun if begun[name] != start[name]}
+
+
+def _changed(stepper: Stepper, step: Step, exchanged: Container[str]) -> dict[str, str]:
+    """The inputs that change, but for those that another level of the run gives."""
+    return {
+        name: spell(stepper.kinds[name], value)
+        for name, value in step.taken.items()
+        if step.before[name] != value and name not in exchanged
+    }
+
+
+# --- back ----------------------------------------------------------------------------------
+
+
+def read_case(path: Path) -> Case:
+    """Reads a case.
+
+    Raises:
+        BadCaseError: It is none.
+    """
+    try:
+        said: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        if said["format"] != FORMAT:
+            raise BadCaseError(f"`{path}` has format {said['format']}, not {FORMAT}")
+        about = said["goal"]
+        sort, lines = Sort[about["what"].upper()], tuple(about["lines"])
+        return Case(
+            path.parent / said["system"],
+            tuple(said["variants"]),
+            about["level"],
+            Goal(sort, about["table"], about["name"], values.TRUE, lines),
+            said["start"],
+            tuple(said["ticks"]),
+            {"broken": True, "kept": False}[said["expect"]],
+        )
+    except OSError as error:
+        raise BadCaseError(f"`{path}` cannot be read: {error.strerror}") from error
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise BadCaseError(f"`{path}` is no frozen finding: {error}") from error
+
+
+def case_breaks(case: Case) -> bool:
+    """Whether the goal is broken in some tick; a fault ends the run.
+
+    Raises:
+        BadCaseError: The case names what the tables do not have.
+    """
+    made = _made(case)
+    now = {name: _begun(stepper, case.start.get(name, {})) for name, stepper in made.items()}
+    exchanged = exchange(made, tuple(made))
+    given = {name: {leaf: now[name][leaf] for leaf in leaves} for name, leaves in exchanged.items()}
+    for tick in case.ticks:
+        steps = {}
+        for name, said in tick.items():
+            taken = _taken(made[name], now[name], said) | given[name]
+            steps[name] = one_cycle(made[name], now[name], taken)
+        now |= {name: dict(step.after) for name, step in steps.items()}
+        for name, leaves in exchanged.items():
+            given[name] |= {leaf: now[of][source] for leaf, (of, source) in leaves.items() if of in steps}
+        if case.level in steps and _is_broken(made, case, steps[case.level]):
+            return True
+        if any(step.fault is not Fault.OK for step in steps.values()):
+            return False
+    return False
+
+
+def _made(case: Case) -> dict[str, Stepper]:
+    try:
+        made = steppers(case.system)
+        change: list[Callable[[Program], Program]] = [VARIANTS[name] for name in case.variants]
+    except (BadDescription, NoProgramError) as error:
+        raise BadCaseError(str(error)) from error
+    except KeyError as error:
+        raise BadCaseError(f"there is no rule {error}") from error
+    names = {case.level, *case.start, *(name for tick in case.ticks for name in tick)}
+    if unknown := sorted(names - made.keys()):
+        raise BadCaseError(f"there is no level `{unknown[0]}`")
+    made = {name: stepper for name, stepper in made.items() if name in names}
+    for one in change:
+        made = {name: stepper.of(one(stepper.program)) for name, stepper in made.items()}
+    return made
+
+
+def _begun(stepper: Stepper, said: Mapping[str, str]) -> dict[str, Value]:
+    return {**initial(stepper.program), **_values(stepper, said)}
+
+
+def _taken(stepper: Stepper, now: Mapping[str, Value], said: Mapping[str, str]) -> dict[str, Value]:
+    inputs = {str(v.name) for v in stepper.program.variables if v.kind is Kind.INPUT}
+    if wrong := sorted(said.keys() - inputs):
+        raise BadCaseError(f"level `{stepper.level.name}` has no input `{wrong[0]}`")
+    return {name: now[name] for name in inputs} | _values(stepper, said)
+
+
+def _values(stepper: Stepper, said: Mapping[str, str]) -> dict[str, Value]:
+    found = {}
+    for name, text in said.items():
+        if name not in stepper.kinds:
+            raise BadCaseError(f"level `{stepper.level.name}` has no variable `{name}`")
+        found[name] = _value(name, stepper.kinds[name], text)
+    return found
+
+
+def _value(name: str, kind: Scalar, text: str) -> Value:
+    """The value that `spell` would write so."""
+    try:
+        value: Value
+        if isinstance(kind, Bool):
+            value = {"false": False, "true": True}[text]
+        elif isinstance(kind, Enum):
+            value = kind.members.index(text)
+        else:
+            value = float(text) if isinstance(kind, Real) else int(text)
+        low, high = key_bounds(kind)
+        if low <= key_of(kind, value) <= high:
+            return value
+    except (KeyError, ValueError):
+        pass
+    raise BadCaseError(f"`{name}` cannot be `{text}`")
+
+
+def _is_broken(made: Mapping[str, Stepper], case: Case, step: Step) -> bool:
+    stepper = made[case.level]
+    if case.goal.sort in {Sort.SAME_ORDER, Sort.OF_ITS_ORDER}:
+        return broken_in(stepper, case.goal, step)
+    try:
+        return broken(stepper, case.goal, step)
+    except StopIteration as error:
+        raise BadCaseError(f"level `{case.level}` has no goal `{case.goal.shown}`") from error

@@ -1,0 +1,82 @@
+"""Proofs of levels that an earlier run made, taken from the cache.
+
+In: a stepper, an effort, a cache. Out: the same `LevelProof`, or nothing. The key is all that a proof depends on: the program as
+resolved, the level, its links, the effort; and rcsc itself with its solvers (`rcsc.cache`). Where anything was left undecided nothing
+is kept: another run may decide it.
+"""
+
+import hashlib
+from dataclasses import asdict
+from typing import Any
+
+from rcsc.cache import Cache
+from rcsc.compose.context import Again, Context
+from rcsc.compose.ends import Ending
+from rcsc.compose.features import CLOSELY, Feature
+from rcsc.compose.goals import goals
+from rcsc.compose.level import LevelProof, Verdict
+from rcsc.compose.properties import every_feature
+from rcsc.compose.search import Effort, read
+from rcsc.compose.transition import Stepper
+
+
+def recall(cache: Cache, stepper: Stepper, effort: Effort) -> LevelProof | None:
+    """The proof of the level, if it is kept."""
+    kept = cache.load(*_key(stepper, effort))
+    if kept is None:
+        return None
+    cycle = stepper.cycle(stepper.anywhere())
+    wanted = goals(stepper, cycle)
+    if [list(goal.key) for goal in wanted] != [one["goal"] for one in kept["found"]]:
+        return None
+    for closely in range(CLOSELY + 1):
+        chosen = every_feature(stepper, cycle, read(stepper, cycle, wanted), closely)
+        if [one.name for one in chosen] == kept["features"]:
+            verdicts = (Verdict(one["verdict"]) for one in kept["found"])
+            return _proof(kept, tuple(zip(wanted, verdicts, strict=True)), chosen, stepper)
+    return None
+
+
+def _proof(
+    kept: dict[str, Any], found: tuple[Any, ...], chosen: tuple[Feature, ...], stepper: Stepper
+) -> LevelProof:
+    clauses = tuple(tuple((at, value) for at, value in clause) for clause in kept["clauses"])
+    return LevelProof(
+        stepper.level.name, found, chosen, clauses, kept["walked"], kept["learnt"], kept["seconds"], cached=True,
+        context=_context(kept["context"]), endings=tuple(_ending(one) for one in kept["endings"]),
+    )  # fmt: skip
+
+
+def _context(kept: dict[str, Any] | None) -> Context | None:
+    if kept is None:
+        return None
+    unreached = tuple((table, line) for table, line in kept["unreached"])
+    repeated = tuple(Again(one["table"], one["line"], tuple(one["leaves"])) for one in kept["repeated"])
+    return Context(unreached, repeated, kept["restless"])
+
+
+def _ending(kept: dict[str, Any]) -> Ending:
+    counted = tuple((line, counter) for line, counter in kept["counted"])
+    return Ending(kept["table"], kept["changes"], counted, tuple(kept["endless"]))
+
+
+def keep(cache: Cache, stepper: Stepper, effort: Effort, proof: LevelProof) -> None:
+    """Keeps the proof, unless something was left undecided."""
+    if any(verdict is Verdict.UNDECIDED for _, verdict in proof.found):
+        return
+    value = {
+        "found": [{"goal": list(goal.key), "verdict": verdict.value} for goal, verdict in proof.found],
+        "features": [one.name for one in proof.features],
+        "clauses": proof.clauses,
+        "walked": proof.walked,
+        "learnt": proof.learnt,
+        "seconds": proof.seconds,
+        "context": None if proof.context is None else asdict(proof.context),
+        "endings": [asdict(one) for one in proof.endings],
+    }
+    cache.store(value, *_key(stepper, effort))
+
+
+def _key(stepper: Stepper, effort: Effort) -> tuple[str, ...]:
+    said = repr((stepper.program, stepper.level.name, stepper.links, effort))
+    return "composed", hashlib.sha256(said.encode()).hexdigest()

@@ -1,0 +1,67 @@
+"""A SAT solver behind a small typed face; the only importer of `pysat`, and only when a question is asked.
+
+In: clauses of literals. Out: whether they hold together, a model, or which assumptions cannot hold together. Only the search
+rests on it: what it finds is asked anew of Z3, from other terms (`level`).
+"""
+
+from collections.abc import Iterable
+from functools import cache
+from typing import Any
+
+BUDGET = 400_000
+"""Conflicts after which a question is given up: an effort that is the same on every machine."""
+
+
+class GaveUpError(Exception):
+    """The solver did not decide; nothing may rest on the question."""
+
+
+@cache
+def _pysat() -> Any:
+    from pysat import solvers
+
+    return solvers
+
+
+class Sat:
+    """One incremental solver.
+
+    Attributes:
+        queries: How often it was asked.
+    """
+
+    def __init__(self, clauses: Iterable[list[int]]) -> None:
+        self._solver: Any = _pysat().Glucose4(bootstrap_with=clauses)
+        self._model: list[int] = []
+        self.queries = 0
+
+    def add(self, clause: list[int]) -> None:
+        """Asserts that one of the literals holds."""
+        self._solver.add_clause(clause)
+
+    def holds(self, assuming: Iterable[int]) -> bool:
+        """Whether everything asserted, and these literals, hold together.
+
+        Raises:
+            GaveUpError: After `BUDGET` conflicts.
+        """
+        self.queries += 1
+        self._solver.conf_budget(BUDGET)
+        answer = self._solver.solve_limited(assumptions=list(assuming))
+        if answer is None:
+            raise GaveUpError
+        if answer:
+            self._model = self._solver.get_model()
+        return bool(answer)
+
+    def value(self, literal: int) -> bool:
+        """Of a literal, in the last model."""
+        return (self._model[abs(literal) - 1] > 0) == (literal > 0)
+
+    def core(self) -> frozenset[int]:
+        """Assumptions of the last question, answered no, that cannot hold together."""
+        return frozenset(self._solver.get_core() or ())
+
+    def close(self) -> None:
+        """Frees its memory, which Python does not see."""
+        self._solver.delete()

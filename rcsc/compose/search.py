@@ -1,0 +1,152 @@
+"""Looks for the invariant of a level: first with the features that most levels need, then, for what is left, with more.
+
+In: a stepper, its cycles and goals. Out: `Found`. What is found is not to be trusted before it is confirmed (`confirm`).
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from random import Random
+
+from rcsc.compose.contract import COMMAND
+from rcsc.compose.features import CLOSELY, Feature, compared, point
+from rcsc.compose.frames import Clause, Frames, Point, Posed, Reached
+from rcsc.compose.goals import Goal, Sort, goals
+from rcsc.compose.properties import every_feature
+from rcsc.compose.transition import Cycle, Stepper
+from rcsc.compose.walk import Walk
+from rcsc.prove.values import TRUE, Node
+
+
+@dataclass(frozen=True, slots=True)
+class Effort:
+    """How much is spent.
+
+    Attributes:
+        walks: Random walks before the search, each of `cycles` cycles.
+        timeout_ms: For each question to Z3; past it the answer is *undecided*, never *proved*.
+        looks: Whether the lines are looked at in their context, too (`context`, `ends`).
+    """
+
+    walks: int = 24
+    cycles: int = 100
+    timeout_ms: int = 20_000
+    looks: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """What a search found.
+
+    Attributes:
+        features: What the clauses speak of.
+        clauses: The invariant: combinations that never stand.
+        open: Goals that were searched for, by position, for which the features do not suffice.
+        walked: States seen on walks; `learnt`, those that the solver added.
+    """
+
+    features: tuple[Feature, ...] = ()
+    clauses: tuple[Clause, ...] = ()
+    open: frozenset[int] = frozenset()
+    walked: int = 0
+    learnt: int = 0
+
+
+def search(
+    stepper: Stepper, firsts: Sequence[Cycle], cycle: Cycle, wanted: Sequence[Goal], effort: Effort
+) -> Found:
+    """An invariant from which as many goals follow as can be.
+
+    Raises:
+        GaveUpError: The solver did.
+    """
+    matter = [at for at, goal in enumerate(wanted) if _matters(stepper, goal)]
+    reads = read(stepper, cycle, wanted)
+    found = Found(open=frozenset(matter))
+    for closely in range(CLOSELY + 1):
+        chosen = every_feature(stepper, cycle, reads, closely)
+        if closely and len(chosen) == len(found.features):
+            break
+        left = sorted(found.open)
+        found = _with(chosen, stepper, firsts, cycle, effort, found, left)
+        if not any(wanted[at].sort is not Sort.NUMBERED for at in found.open):
+            break
+    return found
+
+
+def strengthened(
+    stepper: Stepper,
+    firsts: Sequence[Cycle],
+    cycle: Cycle,
+    found: Found,
+    wanted: Sequence[Node],
+    effort: Effort,
+) -> Found:
+    """What was found, with clauses added from which as many as can be of these conditions on a later cycle follow.
+
+    Raises:
+        GaveUpError: The solver did.
+    """
+    chosen, every = found.features, range(len(wanted))
+    posed = [Posed(chosen, one, dict.fromkeys(every, TRUE)) for one in firsts]
+    posed.append(Posed(chosen, cycle, dict(enumerate(wanted))))
+    made, _ = _searched(stepper, chosen, posed, found, every, effort)
+    return replace(made, open=found.open, walked=found.walked)
+
+
+def _with(  # what a search is of
+    chosen: tuple[Feature, ...],
+    stepper: Stepper,
+    firsts: Sequence[Cycle],
+    cycle: Cycle,
+    effort: Effort,
+    before: Found,
+    left: Sequence[int],
+) -> Found:
+    """One search, from the invariant that is known already, for the goals that are left."""
+    posed = [Posed(chosen, one, _conditions(stepper, one, left)) for one in (*firsts, cycle)]
+    made, left_open = _searched(stepper, chosen, posed, before, left, effort)
+    return replace(made, open=frozenset(left_open))
+
+
+def _searched(  # what a search is of
+    stepper: Stepper,
+    chosen: tuple[Feature, ...],
+    posed: Sequence[Posed],
+    before: Found,
+    left: Iterable[int],
+    effort: Effort,
+) -> tuple[Found, set[int]]:
+    walked = dict.fromkeys(_states(stepper, chosen, effort))
+    reached = Reached.of(walked, len(chosen))
+    weights = [2 if one.parts else int(one.size > 2) for one in chosen]
+    clauses, left_open = Frames(posed[:-1], posed[-1], reached, weights, before.clauses).search(left)
+    for one in posed:
+        one.sat.close()
+    learnt = before.learnt + reached.many - len(walked)
+    return Found(chosen, tuple(clauses), walked=len(walked), learnt=learnt), left_open
+
+
+def read(stepper: Stepper, cycle: Cycle, wanted: Sequence[Goal]) -> list[Node]:
+    """What is searched for, and what may be relied on: features are chosen from their cone."""
+    return [*(goal.holds for goal in wanted if _matters(stepper, goal)), cycle.contract]
+
+
+def _conditions(stepper: Stepper, cycle: Cycle, left: Iterable[int]) -> dict[int, Node]:
+    """Of these goals, in this cycle."""
+    every = goals(stepper, cycle)
+    return {at: every[at].holds for at in left}
+
+
+def _matters(stepper: Stepper, goal: Goal) -> bool:
+    """Whether it is searched for: not a field that the level does not compare with the last one, which nobody may rely on."""
+    if goal.sort is not Sort.NUMBERED:
+        return True
+    return goal.name.endswith(f".{COMMAND}") or any(goal.name in pair for pair in compared(stepper.program))
+
+
+def _states(stepper: Stepper, chosen: tuple[Feature, ...], effort: Effort) -> Iterable[Point]:
+    """The features of states that walks reach."""
+    for seed in range(max(1, effort.walks)):
+        walk = Walk(stepper.program, stepper.level, stepper.links, Random(seed))  # noqa: S311  # repeatable on purpose
+        for state in walk.states(effort.cycles):
+            yield point(stepper, chosen, state)

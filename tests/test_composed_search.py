@@ -1,0 +1,340 @@
+"""The search under the composed proof: nodes as bits, frames, and what is asked in the context of an invariant."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from itertools import product
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rcsc.cache import Cache
+from rcsc.compose.bits import Bits, few, key_of_bits
+from rcsc.compose.context import Again
+from rcsc.compose.ends import Phase, leads, longest
+from rcsc.compose.frames import Reached
+from rcsc.compose.goals import Goal
+from rcsc.compose.kept import keep, recall
+from rcsc.compose.keyed import Keyed
+from rcsc.compose.level import LevelProof, Verdict, prove_level
+from rcsc.compose.sat import Sat
+from rcsc.compose.search import Effort, Found, search
+from rcsc.compose.system import prove_steppers, steppers
+from rcsc.compose.transition import Cycle, Stepper
+from rcsc.interpret import divide
+from rcsc.model import Bool, Int, Op, Real, Scalar, real_key
+from rcsc.prove import values
+from rcsc.prove.smt import Answer, Solver
+from rcsc.prove.values import Node
+from tests.test_compose import LITTLE, SMALL, Edit, changed, swap
+
+INT = Int(-9, 9)
+NAMES: dict[str, Scalar] = {"i": INT, "j": INT, "b": Bool(), "c": Bool()}
+
+
+def numbers(deep: int) -> st.SearchStrategy[Node]:
+    leaf = st.one_of(
+        st.sampled_from(["i", "j"]).map(lambda name: values.variable(name, INT)),
+        st.sampled_from([-9, -1, 0, 1, 8, 9]).map(lambda value: values.constant(INT, value)),
+    )
+    if not deep:
+        return leaf
+    below = numbers(deep - 1)
+    two = st.sampled_from([Op.ADD, Op.SUB, Op.MIN, Op.MAX])
+    return st.one_of(
+        leaf,
+        st.builds(lambda op, a, b: values.arithmetic(op, (a, b), Int(-999, 999)), two, below, below),
+        st.builds(
+            lambda a, k: values.arithmetic(Op.MUL, (a, values.constant(INT, k)), Int(-9999, 9999)),
+            below, st.integers(-9, 9),
+        ),
+        st.builds(lambda op, a: values.arithmetic(op, (a,), Int(-999, 999)), st.sampled_from([Op.NEG, Op.ABS]), below),
+        st.builds(values.choice, truths(deep - 1), below, below),
+    )  # fmt: skip
+
+
+def truths(deep: int) -> st.SearchStrategy[Node]:
+    leaf = st.sampled_from(["b", "c"]).map(lambda name: values.variable(name, Bool()))
+    if not deep:
+        return leaf
+    below, compared = truths(deep - 1), numbers(deep - 1)
+    return st.one_of(
+        leaf,
+        st.builds(values.both, below, below),
+        st.builds(values.negation, below),
+        st.builds(values.choice, below, below, below),
+        st.builds(values.compare, st.sampled_from([Op.EQ, Op.NE, Op.LT, Op.LE]), compared, compared),
+        st.builds(values.compare, st.sampled_from([Op.EQ, Op.LT, Op.LE]), below, below),
+    )
+
+
+MEANING: dict[str, Callable[..., int]] = {
+    Op.ADD: lambda a, b: a + b, Op.SUB: lambda a, b: a - b, Op.MUL: lambda a, b: a * b, Op.MIN: min, Op.MAX: max,
+    Op.NEG: lambda a: -a, Op.ABS: abs, Op.NOT: lambda a: 1 - a, Op.AND: lambda a, b: a & b,
+    Op.EQ: lambda a, b: int(a == b), Op.LT: lambda a, b: int(a < b), Op.LE: lambda a, b: int(a <= b),
+    Op.MOD: lambda a, b: a - b * divide(a, b),
+    "choice": lambda when, a, b: a if when else b, "narrowed": lambda a: a,
+}  # fmt: skip
+
+
+def meant(node: Node, state: dict[str, int]) -> int:
+    if node.op == "variable":
+        return state[node.name]
+    if node.op == "constant":
+        return int(node.low)
+    return MEANING[node.op](*(meant(arg, state) for arg in node.args))
+
+
+STATES = st.fixed_dictionaries({
+    "i": st.integers(-9, 9), "j": st.integers(-9, 9), "b": st.integers(0, 1), "c": st.integers(0, 1),
+})  # fmt: skip
+
+
+@given(numbers(3), truths(3), STATES)
+def test_bits_say_what_the_nodes_mean(number: Node, truth: Node, state: dict[str, int]) -> None:
+    bits = Bits()  # nothing is only compared: the numbers themselves are read from a model
+    word, literal = bits.word(number), bits.literal(truth)
+    given_ = [
+        bits.equals(bits.word(values.variable(name, kind)), kind, state[name]) for name, kind in NAMES.items()
+    ]
+    sat = Sat(bits.clauses)
+    assert sat.holds(given_)
+    assert key_of_bits([sat.value(bit) for bit in word]) == meant(number, state)
+    assert sat.value(literal) == meant(truth, state)
+    wrong = -literal if meant(truth, state) else literal
+    assert not sat.holds([*given_, wrong])
+    sat.close()
+
+
+@given(truths(3))
+def test_what_is_only_compared_holds_for_the_same_questions(truth: Node) -> None:
+    """With as few bits as `few` gives, a truth value can be had exactly if some state has it."""
+    bits = Bits.of((truth,))
+    sat = Sat([*bits.clauses, [bits.literal(truth)], *bits.clauses])
+    reads = values.variables([truth])
+    domains = [range(2) if isinstance(reads[name].kind, Bool) else range(-9, 10) for name in reads]
+    possible = any(meant(truth, dict(zip(reads, one, strict=True))) for one in product(*domains))
+    assert sat.holds([]) or not possible  # ranges are forgotten: more may be possible, never less
+    sat.close()
+
+
+def test_numbers_that_are_only_compared_get_few_bits() -> None:
+    kind = Real(-1e6, 1e6)
+    a, b, c = (values.variable(name, kind) for name in "abc")
+    same = values.all_of(
+        (values.equal(a, b), values.equal(b, c), values.equal(c, values.constant(kind, 5.0)))
+    )
+    assert {one.width for one in few((same,)).values()} == {2}
+    assert few((values.both(same, values.compare(Op.LT, a, c)),)) == {}
+    wanted = values.equal(a, c)
+    bits = Bits.of((same, wanted))
+    literals = bits.literal(same), bits.literal(wanted)
+    sat = Sat(bits.clauses)
+    assert sat.holds(literals)
+    assert not sat.holds([literals[0], -literals[1]])
+    assert sat.holds([-literals[0], -literals[1]])
+    sat.close()
+
+
+@given(st.floats(-1e9, 1e9), st.floats(-1e9, 1e9))
+def test_reals_compare_as_their_keys_do(one: float, two: float) -> None:
+    kind = Real(-1e9, 1e9)
+    a, b = values.variable("a", kind), values.variable("b", kind)
+    below, same = values.compare(Op.LT, a, b), values.equal(a, b)
+    bits = Bits.of((below, same))
+    fixed = [bits.equals(bits.word(node), kind, real_key(value)) for node, value in ((a, one), (b, two))]
+    less, equal = bits.literal(below), bits.literal(same)
+    sat = Sat(bits.clauses)
+    assert sat.holds([*fixed, less if one < two else -less])
+    assert not sat.holds([*fixed, -less if one < two else less])
+    assert not sat.holds([*fixed, -equal if one == two else equal])
+    sat.close()
+
+
+@pytest.mark.parametrize("op", [Op.ADD, Op.MUL, Op.DIV])
+def test_an_open_operation_gives_the_same_for_the_same_operands(op: Op) -> None:
+    """In another cycle, too, whose nodes are others."""
+    kind = Real(1.0, 9.0)
+
+    def made(name: str) -> Node:
+        return values.arithmetic(
+            op, (values.variable("a", kind), values.variable(name, kind)), Real(-1e3, 1e3)
+        )
+
+    for other, answer in (("b", Answer.UNSATISFIABLE), ("c", Answer.SATISFIABLE)):
+        keyed, solver = Keyed(), Solver(10_000)
+        differ = keyed.term(values.negation(values.equal(made("b"), made(other))))
+        solver.add(*keyed.ranges, differ)
+        assert solver.check() is answer
+
+
+def test_known_states_answer_for_cubes() -> None:
+    reached = Reached.of([(0, 1, 2), (1, 1, 0)], 3)
+    assert reached.shows({0: 0, 2: 2})
+    assert not reached.shows({0: 0, 2: 0})
+    reached.add((0, 5, 0))
+    assert reached.shows({0: 0, 2: 0})
+    assert reached.many == 3
+
+
+# --- ways through phases -------------------------------------------------------------------
+
+
+@given(st.sets(st.tuples(st.integers(0, 4), st.integers(0, 4)), max_size=9))
+def test_the_longest_way_and_ways_round(pairs: set[tuple[int, int]]) -> None:
+    steps: set[tuple[Phase, Phase]] = {((a,), (b,)) for a, b in pairs}
+    ways = [list(way) for way in pairs]
+    reach = 1 if pairs else 0
+    for _ in range(6):  # longer than any way that does not go round
+        longer = [[*way, b] for way in ways for a, b in pairs if way[-1] == a]
+        if not longer:
+            break
+        ways, reach = longer, len(longer[0]) - 1
+    goes_round = reach > 5
+    assert longest(steps) == (None if goes_round else reach)
+    assert any(leads(steps, two, one) for one, two in steps) is goes_round
+
+
+# --- in the context of a small level -------------------------------------------------------
+
+
+def proved(folder: Path, level: str, **edits: Edit) -> LevelProof:
+    path = changed(folder, **edits) if edits else SMALL / "system.toml"
+    return prove_level(steppers(path)[level], LITTLE)
+
+
+def test_lines_of_the_small_levels_are_all_reached_and_say_the_same_again(tmp_path: Path) -> None:
+    for level in ("upper", "lower"):
+        found = proved(tmp_path, level)
+        assert found.context is not None
+        assert (found.context.unreached, found.context.repeated, found.context.restless) == ((), (), False)
+    # `go` of the lower level waits for its input: nothing there makes that come
+    lower = {one.table: (one.changes, one.endless) for one in proved(tmp_path, "lower").endings}
+    assert lower == {"pause": (0, ()), "go": (1, ("2",))}
+    assert {one.table: one.changes for one in proved(tmp_path, "upper").endings} == {"rest": 1, "work": 2}
+
+
+def test_a_line_that_is_dead_in_its_context_is_named(tmp_path: Path) -> None:
+    """It is alive in its table: nothing there says that PAUSE is never reported while going."""
+    line = "  | 6    | false               |       |                | executing | going     ||"
+    more = "  | 6a   | false               |       | pause          | failed    | going     || go | | |\n"
+    found = proved(tmp_path, "upper", upper=swap(line, f"{more}{line}"))
+    assert found.open == ()
+    assert found.context is not None
+    assert found.context.unreached == (("work", "6a"),)
+
+
+COUNTER = "state idle : bool = true"
+
+
+def test_a_line_that_counts_when_it_matches_again_is_named(tmp_path: Path) -> None:
+    def edit(text: str) -> str:
+        text = text.replace(COUNTER, f"{COUNTER}\nstate tries : int 0 .. 9")
+        text = text.replace(
+            "procedure begin {", "procedure again {\n  tries := min(tries + 1, 9)\n}\n\nprocedure begin {"
+        )
+        return text.replace("|| begin; nextstate(going) | go ", "|| begin; again; nextstate(going) | go ")
+
+    found = proved(tmp_path, "upper", upper=edit)
+    assert found.open == ()
+    assert found.context is not None
+    assert found.context.repeated == (Again("work", "1", ("tries",)),)
+
+
+def test_a_command_that_need_not_end_is_named(tmp_path: Path) -> None:
+    """After a failure it goes on, and gives the order again for ever."""
+    found = proved(
+        tmp_path, "upper", upper=swap("| f_state   ||                         | pause       | fail       |",
+                                      "| f_state   || nextstate(d_state)      | pause       | executing  |")
+    )  # fmt: skip
+    ends = {one.table: one for one in found.endings}
+    assert ends["work"].proved  # from a failure to done: one state more, and it ends
+    assert ends["work"].changes == 2  # new, going; failed, which is to be done
+    gone = "nextstate(d_state)      | pause       | done       |"
+    more = "| d_state   ||                         | pause       | done       |"
+
+    def edit(text: str) -> str:
+        text = text.replace(gone, gone.replace("done  ", "executing"))
+        return text.replace(more, "| d_state   || nextstate(going)        | go          | executing  |")
+
+    round_ = proved(tmp_path / "round", "upper", upper=edit)
+    assert [one.table for one in round_.endings if one.changes is None] == ["work"]
+
+
+DONE = "go             | done      | going     || nextstate(d_state)      | pause       | done       |"
+
+
+def test_a_level_that_waits_for_what_nobody_says_is_named(tmp_path: Path) -> None:
+    waits = "go             | done      | going     ||                         |             | executing  |"
+    found = proved(tmp_path, "upper", upper=swap(DONE, waits))
+    ends = {one.table: one for one in found.endings}
+    assert (ends["work"].endless, ends["work"].proved) == (("2",), False)
+
+
+# --- the cache -----------------------------------------------------------------------------
+
+
+@pytest.fixture
+def cache(tmp_path: Path) -> Cache:
+    return Cache(tmp_path / "cache", b"0" * 32, "tool")
+
+
+def test_a_proof_is_recalled_as_it_was_and_only_for_the_same_level(cache: Cache, tmp_path: Path) -> None:
+    upper = steppers(SMALL / "system.toml")["upper"]
+    proof = prove_level(upper, LITTLE)
+    assert recall(cache, upper, LITTLE) is None
+    keep(cache, upper, LITTLE, proof)
+    kept = recall(cache, upper, LITTLE)
+    assert kept is not None
+    assert kept.cached
+    assert (kept.clauses, kept.context, kept.endings) == (proof.clauses, proof.context, proof.endings)
+    assert [(goal.key, verdict) for goal, verdict in kept.found] == [
+        (goal.key, verdict) for goal, verdict in proof.found
+    ]
+    assert [one.name for one in kept.features] == [one.name for one in proof.features]
+    other = changed(tmp_path / "other", upper=swap(DONE, DONE.replace("d_state", "f_state")))
+    assert recall(cache, steppers(other)["upper"], LITTLE) is None
+    assert recall(cache, upper, Effort(walks=11, cycles=80)) is None
+
+
+def test_what_is_undecided_is_not_kept(cache: Cache) -> None:
+    upper = steppers(SMALL / "system.toml")["upper"]
+    proof = prove_level(upper, LITTLE)
+    given_up = LevelProof(
+        proof.level, tuple((goal, Verdict.UNDECIDED) for goal, _ in proof.found), (), (), 0, 0, 0.0
+    )
+    keep(cache, upper, LITTLE, given_up)
+    assert recall(cache, upper, LITTLE) is None
+
+
+def test_a_system_is_not_proved_twice(cache: Cache, monkeypatch: pytest.MonkeyPatch) -> None:
+    made = steppers(SMALL / "system.toml")
+    first = prove_steppers(made, LITTLE, 1, tuple(made), None, cache)
+
+    def never(*_: object) -> LevelProof:
+        raise AssertionError
+
+    monkeypatch.setattr("rcsc.compose.system.prove_level", never)
+    again = prove_steppers(made, LITTLE, 1, tuple(made), None, cache)
+    assert [one.clauses for one in again.levels] == [one.clauses for one in first.levels]
+    assert again.agreements == first.agreements
+    assert again.proved
+    assert all(one.cached for one in again.levels)
+    with pytest.raises(AssertionError):
+        prove_steppers(made, LITTLE, 1, tuple(made), None, None)
+
+
+def test_what_z3_does_not_confirm_is_not_proved(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The search is made to lie: it says that the level is never under way."""
+
+    def lying(
+        stepper: Stepper, firsts: Sequence[Cycle], cycle: Cycle, wanted: Sequence[Goal], effort: Effort
+    ) -> Found:
+        found = search(stepper, firsts, cycle, wanted, effort)
+        names = [one.name for one in found.features]
+        return replace(found, clauses=(*found.clauses, ((names.index("cur_state"), 2),)))
+
+    monkeypatch.setattr("rcsc.compose.level.search", lying)
+    proof = prove_level(steppers(SMALL / "system.toml")["upper"], LITTLE)
+    assert {verdict for _, verdict in proof.found} == {Verdict.UNDECIDED}
