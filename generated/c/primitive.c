@@ -95,8 +95,10 @@ static void primitive_do_measure(primitive_t *s)
             s->settled = (s->settled && (primitive_abs_f64((s->robot.plate[v_i] - s->to[v_i])) <= 1.5));
         }
     }
-    s->fits = (primitive_abs_f64((s->gripper.opening_mm - s->fingers.grip_mm)) <= s->fingers.tolerance_mm);
-    s->closed = (s->gripper.opening_mm < 1.0);
+    if ((((int64_t)s->robot.inc_command_echo == (int64_t)s->to_robot.inc_command) && ((int64_t)s->gripper.inc_command_echo == (int64_t)s->to_gripper.inc_command))) {
+        s->fits = (primitive_abs_f64((s->gripper.opening_mm - s->fingers.grip_mm)) <= s->fingers.tolerance_mm);
+        s->closed = (s->gripper.opening_mm < 1.0);
+    }
 }
 
 /* A new order takes the next number; the robot's poses follow one another under the number of `follow`. */

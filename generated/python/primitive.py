@@ -850,8 +850,9 @@ def _do_measure(s):
         s.settled = True
         for v_i in range(0, 9):
             s.settled = (s.settled and (abs(((s.robot_plate_0, s.robot_plate_1, s.robot_plate_2, s.robot_plate_3, s.robot_plate_4, s.robot_plate_5, s.robot_plate_6, s.robot_plate_7, s.robot_plate_8,)[v_i] - (s.to_0, s.to_1, s.to_2, s.to_3, s.to_4, s.to_5, s.to_6, s.to_7, s.to_8,)[v_i])) <= 1.5))
-    s.fits = (abs((s.gripper_opening_mm - s.fingers_grip_mm)) <= s.fingers_tolerance_mm)
-    s.closed = (s.gripper_opening_mm < 1.0)
+    if ((s.robot_inc_command_echo == s.to_robot_inc_command) and (s.gripper_inc_command_echo == s.to_gripper_inc_command)):
+        s.fits = (abs((s.gripper_opening_mm - s.fingers_grip_mm)) <= s.fingers_tolerance_mm)
+        s.closed = (s.gripper_opening_mm < 1.0)
 
 
 def _do_send(s):
