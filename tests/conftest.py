@@ -5,6 +5,7 @@ new ones and for longer: `HYPOTHESIS_PROFILE=long pytest`.
 """
 
 import os
+import shutil
 from pathlib import Path
 
 import pytest
@@ -21,3 +22,34 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci"))
 def repo() -> Path:
     """The checkout's root."""
     return Path(__file__).parents[1]
+
+
+TOOLS = ("chromium", "cmake", "pkg-config", "spin")
+"""What `needs` marks may name."""
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
+
+
+def _missing(tool: str) -> bool:
+    return not any(shutil.which(name) for name in (BROWSERS if tool == "chromium" else (tool,)))
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leaves out what needs a tool that is no Python package and not here; the end of the run says so.
+
+    `.ci/run` installs them all, and fails where it cannot.
+    """
+    left_out = [
+        item
+        for item in items
+        if any(_missing(tool) for mark in item.iter_markers("needs") for tool in mark.args)
+    ]
+    if left_out:
+        config.hook.pytest_deselected(items=left_out)
+        items[:] = [item for item in items if item not in left_out]
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Names the tools that are not here."""
+    missing = sorted(tool for tool in TOOLS if _missing(tool))
+    if missing:
+        terminalreporter.write_line(f"NOT RUN: tests that need {', '.join(missing)} (packages of Debian's)")

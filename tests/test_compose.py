@@ -290,6 +290,7 @@ NOT_NUMBERED = {
 }
 
 
+@pytest.mark.timeout(900)  # under load; some twenty seconds for the longest where there is none
 @pytest.mark.parametrize("level", ["task", "emove", "vision", "primitive", "gripper"])
 def test_the_shipped_levels_are_proved_in_their_environment(level: str) -> None:
     stepper = steppers(SHIPPED)[level]

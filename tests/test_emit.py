@@ -284,8 +284,8 @@ target_link_libraries(app task)
 """
 
 
+@pytest.mark.needs("pkg-config")
 def test_a_user_links_it_by_pkg_config(repo: Path, tmp_path: Path) -> None:
-    assert shutil.which("pkg-config"), "pkg-config is needed"
     shutil.copytree(repo / "generated/c", tmp_path / "c")
     (tmp_path / "app.c").write_text(MAIN)
     script = (
@@ -297,8 +297,8 @@ def test_a_user_links_it_by_pkg_config(repo: Path, tmp_path: Path) -> None:
     subprocess.run(["sh", "-eu", "-c", script], cwd=tmp_path, check=True)
 
 
+@pytest.mark.needs("cmake")
 def test_a_user_links_it_by_cmake(repo: Path, tmp_path: Path) -> None:
-    assert shutil.which("cmake"), "CMake is needed"
     (tmp_path / "app.c").write_text(MAIN)
     (tmp_path / "CMakeLists.txt").write_text(CMAKE.format(here=repo / "generated/c"))
     subprocess.run(["cmake", "-S", ".", "-B", "b"], cwd=tmp_path, check=True, capture_output=True)

@@ -378,6 +378,7 @@ def plotted(name: str) -> str:
     return f"[...document.querySelectorAll('.plot')].find(one => one.dataset.name === {json.dumps(name)})?.querySelector('.curve')"
 
 
+@pytest.mark.needs("chromium")
 def test_the_stick_figure_moves_as_it_is_published(live: Live, browser: Browser) -> None:
     browser.open(url(live))
     ends = []
@@ -400,6 +401,7 @@ def test_the_stick_figure_moves_as_it_is_published(live: Live, browser: Browser)
     assert browser.value("document.title") == "a <run>"
 
 
+@pytest.mark.needs("chromium")
 def test_rows_are_shown_with_what_became_of_them(live: Live, browser: Browser) -> None:
     live.row(2, "MOVE <BOXT>", "waiting")
     live.row(1, "VISE-OPEN", "done")
@@ -410,6 +412,7 @@ def test_rows_are_shown_with_what_became_of_them(live: Live, browser: Browser) -
     browser.wait(f"{shown}.endsWith('2|MOVE <BOXT>|failed')")
 
 
+@pytest.mark.needs("chromium")
 def test_the_user_types_a_name_and_it_is_plotted(live: Live, browser: Browser) -> None:
     browser.open(url(live))
     browser.wait("document.querySelectorAll('datalist option').length === 5")
@@ -432,6 +435,7 @@ def test_the_user_types_a_name_and_it_is_plotted(live: Live, browser: Browser) -
     assert browser.value(f"!!({plotted(STATE)})")
 
 
+@pytest.mark.needs("chromium")
 def test_a_name_that_is_not_there_is_said(live: Live, browser: Browser) -> None:
     browser.open(url(live))
     browser.wait("document.querySelectorAll('datalist option').length === 5")
@@ -441,6 +445,7 @@ def test_a_name_that_is_not_there_is_said(live: Live, browser: Browser) -> None:
     assert browser.value("document.querySelectorAll('#plots .plot').length") == 0
 
 
+@pytest.mark.needs("chromium")
 def test_the_tables_choose_what_is_plotted(live: Live, browser: Browser) -> None:
     browser.open(url(live))
     shown = "[...document.querySelectorAll('#asked-plots .plot')].map(one => one.dataset.name).join()"
@@ -454,6 +459,7 @@ def test_the_tables_choose_what_is_plotted(live: Live, browser: Browser) -> None
     browser.wait("document.querySelector('#asked').hidden")
 
 
+@pytest.mark.needs("chromium")
 def test_a_run_that_is_taken_back_is_drawn_anew(live: Live, browser: Browser) -> None:
     browser.open(url(live))
     browser.wait(plotted(Z))
@@ -463,6 +469,7 @@ def test_a_run_that_is_taken_back_is_drawn_anew(live: Live, browser: Browser) ->
     browser.wait(f"!{marks}.includes(',3 s')")
 
 
+@pytest.mark.needs("chromium")
 def test_the_page_says_that_the_run_is_over(browser: Browser) -> None:
     with Live(NAMES, DISPLAYS) as live:
         live.publish(0, values(0))
@@ -474,6 +481,7 @@ def test_the_page_says_that_the_run_is_over(browser: Browser) -> None:
     assert browser.value("document.querySelector('#clock').textContent") == "0.04 s, tick 1"
 
 
+@pytest.mark.needs("chromium")
 def test_a_picture_cannot_run_anything(live: Live, browser: Browser) -> None:
     browser.open(url(live))
     live.frame(
@@ -524,6 +532,7 @@ ATTEMPTS = {
 }  # fmt: skip
 
 
+@pytest.mark.needs("chromium")
 @pytest.mark.parametrize("attempt", ATTEMPTS)
 def test_another_page_gets_nowhere_with_the_token(
     live: Live, browser: Browser, foreign: str, attempt: str

@@ -413,6 +413,7 @@ def browser() -> Iterator[Browser]:
         yield running
 
 
+@pytest.mark.needs("chromium")
 def test_the_report_needs_nothing_else(browser: Browser, tmp_path: Path) -> None:
     report(tmp_path / "report.html", story())
     browser.open((tmp_path / "report.html").as_uri())
@@ -426,6 +427,7 @@ def test_the_report_needs_nothing_else(browser: Browser, tmp_path: Path) -> None
     assert browser.value(inside_page)
 
 
+@pytest.mark.needs("chromium")
 def test_the_report_is_read_by_night(browser: Browser, tmp_path: Path) -> None:
     report(tmp_path / "report.html", story())
 

@@ -73,6 +73,7 @@ def checked(model: Model, search: Search | None = None) -> Checked:
 # --- what is right, and what is not ---------------------------------------------------------
 
 
+@pytest.mark.needs("spin")
 @pytest.mark.parametrize(
     ("path", "levels"),
     [
@@ -110,6 +111,7 @@ UPPER_FAULTS: dict[str, tuple[Edit, Sort, str, str]] = {
 }  # fmt: skip
 
 
+@pytest.mark.needs("spin")
 @pytest.mark.parametrize("fault", UPPER_FAULTS)
 def test_a_fault_is_found_by_spin_as_by_the_prover_and_runs(fault: str, tmp_path: Path) -> None:
     edit, sort, table, name = UPPER_FAULTS[fault]
@@ -130,6 +132,7 @@ def test_a_fault_is_found_by_spin_as_by_the_prover_and_runs(fault: str, tmp_path
     )  # of the runs from the first cycle the prover's is the shortest
 
 
+@pytest.mark.needs("spin")
 def test_a_forgotten_deferral_is_found_with_both_levels_and_told_in_table_words() -> None:
     system = levels_of(SMALL / "system.toml")
     system["upper"] = system["upper"].of(undeferred(system["upper"].program))
@@ -142,6 +145,7 @@ def test_a_forgotten_deferral_is_found_with_both_levels_and_told_in_table_words(
     assert said.lines[-2].endswith("table `work`, and no further") or "no further" in said.lines[-1]
 
 
+@pytest.mark.needs("spin")
 def test_the_contract_is_checked_where_both_levels_stand_in_the_model(tmp_path: Path) -> None:
     edit = swap("ref_command_echo := command.input_command", "ref_command_echo := go")
     system = changed(tmp_path, lower=edit)
@@ -153,6 +157,7 @@ def test_the_contract_is_checked_where_both_levels_stand_in_the_model(tmp_path: 
     assert not checked(emit(system, ("upper",), WINDOW)).failed  # of the level above alone it is assumed
 
 
+@pytest.mark.needs("spin")
 def test_whether_commands_end_is_asked_of_those_that_nobody_else_must_answer() -> None:
     shipped, small = levels_of(SHIPPED), levels_of(SMALL / "system.toml")
     assert [one.levels for one in wanted(shipped) if one.progress] == [("gripper",), ("vision",)]
@@ -166,6 +171,7 @@ def test_whether_commands_end_is_asked_of_those_that_nobody_else_must_answer() -
 # --- the translation ------------------------------------------------------------------------
 
 
+@pytest.mark.needs("spin")
 @pytest.mark.parametrize(
     ("path", "levels"),
     [
@@ -202,6 +208,7 @@ def test_any_run_of_the_model_is_a_run_of_the_interpreter(
     assert len(seen) >= 7
 
 
+@pytest.mark.needs("spin")
 def test_the_outside_echoes_the_last_order_or_an_older_one_and_never_the_next(tmp_path: Path) -> None:
     """Numbers are told from the last order on, so that 0 is its number, and 1 would be one that was not sent."""
     model = emit(levels_of(SMALL / "system.toml"), ("upper",), WINDOW)
@@ -273,6 +280,7 @@ def test_names_of_promela_s_own_are_not_used() -> None:
 # --- what stops it --------------------------------------------------------------------------
 
 
+@pytest.mark.needs("spin")
 def test_what_was_not_looked_through_is_not_called_exhaustive() -> None:
     model = emit(levels_of(SMALL / "system.toml"), ("upper",), WINDOW)
     assert not checked(model, Search(depth=100)).exhaustive
@@ -280,6 +288,7 @@ def test_what_was_not_looked_through_is_not_called_exhaustive() -> None:
     assert (bitstate.exhaustive, bitstate.bitstate, bitstate.failed) == (False, True, False)
 
 
+@pytest.mark.needs("spin")
 def test_what_spin_refuses_is_a_bug_of_ours() -> None:
     model = emit(levels_of(SMALL / "system.toml"), ("lower",), WINDOW)
     broken = Model(model.levels, model.text + "proctype {", model.aims, model.told, model.domains, {}, ())
@@ -290,6 +299,7 @@ def test_what_spin_refuses_is_a_bug_of_ours() -> None:
 # --- the command line -----------------------------------------------------------------------
 
 
+@pytest.mark.needs("spin")
 def test_rcsc_promela_says_what_was_looked_through(capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["promela", str(SMALL / "system.toml"), "--levels", "lower"]) == 0
     said = capsys.readouterr().out
@@ -298,6 +308,7 @@ def test_rcsc_promela_says_what_was_looked_through(capsys: pytest.CaptureFixture
     assert "do commands end?  no" in said
 
 
+@pytest.mark.needs("spin")
 def test_rcsc_promela_shows_the_run(capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ["--levels", "upper", "--without-deferral"]
     assert run(["promela", str(SMALL / "system.toml"), *arguments]) == 1
