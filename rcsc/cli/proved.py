@@ -52,6 +52,8 @@ def assumptions(proof: "SystemProof") -> str:
         verdict for one in proof.levels for goal, verdict in one.found if goal.sort is Sort.ASSUMPTION
     ]
     good = sum(verdict is Verdict.PROVED for verdict in verdicts)
+    if not verdicts:
+        return "the tables assume nothing"
     rest = len(verdicts) - good
     return f"assumptions of tables: {good} proved" + (f", {rest} not proved" if rest else ", none left")
 
@@ -61,21 +63,27 @@ def reaction(made: "Mapping[str, Stepper]", proof: "SystemProof") -> Iterator[st
     from rcsc.compose.goals import Sort
     from rcsc.compose.level import Verdict
 
-    proofs = {one.level: one for one in proof.levels}
+    passes = {
+        (one.level, goal.name): verdict
+        for one in proof.levels
+        for goal, verdict in one.found
+        if goal.sort is Sort.PAUSES
+    }
     tops = [
         name
         for name, one in made.items()
         if one.links.above is not None and one.links.above.outside and one.links.below
     ]
-    for top in tops if set(proofs) == set(made) else ():
+    for top in tops if {one.level for one in proof.levels} == set(made) else ():
         reached: dict[str, int] = {top: 1}
         for name in made:
             for below in made[name].links.below if name in reached else ():
-                if proofs[name].verdict(Sort.PAUSES, "", below.order) is Verdict.PROVED:
+                if passes.get((name, below.order)) is Verdict.PROVED:
                     reached[below.name] = reached[name] + 1
         lowest = {name: cycles - 1 for name, cycles in reached.items() if name != top}
-        said = ", ".join(f"`{name}` in {cycles}" for name, cycles in lowest.items())
-        yield f"a PAUSE of `{top}` is ordered of {said} cycles of levels, besides what buffers take"
+        if lowest:
+            said = ", ".join(f"of `{name}` in {cycles}" for name, cycles in lowest.items())
+            yield f"a PAUSE of `{top}` is ordered {said} cycles of levels, besides what buffers take"
 
 
 def confirmed(stepper: "Stepper", proof: "LevelProof") -> "dict[str, bool]":

@@ -14,7 +14,7 @@ from typing import TypeAlias
 from rcsc.compose.contract import COMMAND, ECHO, ECHOED, NUMBER, Below, leaves_under
 from rcsc.compose.properties import invariants, properties
 from rcsc.compose.transition import Cycle, Stepper, TableAt, successor
-from rcsc.model import Line, Table, pending
+from rcsc.model import Line, OneTable, Table, pending
 from rcsc.prove import boxes, values
 from rcsc.prove.values import Node
 
@@ -158,7 +158,10 @@ def _downward(stepper: Stepper, cycle: Cycle) -> Iterator[Goal]:
             command = f"{below.order}.{COMMAND}"
             kept = values.equal(cycle.before[command], cycle.after[command])
             yield Goal(Sort.WAITS, "", below.order, values.follows(_waiting(stepper, cycle, below), kept))
-            yield Goal(Sort.PAUSES, "", below.order, _passes_on_a_pause(stepper, cycle, below))
+            if not isinstance(
+                stepper.level.tables, OneTable
+            ):  # one table for each command, the first for PAUSE
+                yield Goal(Sort.PAUSES, "", below.order, _passes_on_a_pause(stepper, cycle, below))
 
 
 def _waiting(stepper: Stepper, cycle: Cycle, below: Below) -> Node:
