@@ -5,10 +5,14 @@ What is proved, of each level alone in its environment (`level`):
 - every assumption of its tables holds in every cycle in which the table runs; exactly one line matches; DEFAULT is
   not reached where it is said to be unreachable; no state is written directly while another is pending;
 - a command number is taken up once, and no other command replaces an order before its echo, but for a new command;
+- no new command is passed over by a line that does not look for one; a PAUSE is passed on in the cycle that takes it;
 - what its program itself states: invariants, and properties over a cycle and the one before (`properties`);
 - what it guarantees its neighbours: its report echoes the number and the command of the order that it took in that
   very cycle (so that none is lost and none echoed that was not run); its orders change only together with their
   numbers, and numbers come one after the other.
+
+Besides, of its lines in their context: which are never reached, what one does that matches again (`context`), and that every
+command ends if every order is answered (`ends`).
 
 What it assumes of its environment, the contract (`transition`), in words:
 
@@ -48,7 +52,7 @@ What it rests on besides:
 Modules, in the order the data flows: `contract` (who is whose environment), `transition` (a cycle as nodes), `goals`, `properties`,
 `features` (what an invariant may speak of), `walk` (states to begin with); the search, which is not trusted: `bits` (nodes
 as clauses of propositional logic), `sat`, `frames` (the invariant), `search`; what it finds is asked anew: `keyed` (nodes as
-terms), `confirm`, `level`; then `system`. What is not proved: `variants` (other rules), `trace` (the shortest failing
+terms), `confirm`, `context`, `ends`, `level`; then `kept` (the cache), `system`. What is not proved: `variants` (other rules), `trace` (the shortest failing
 run, run by the interpreter), `simplest`, `finding` (its time line), `together` (two levels as they are), `weakest` (what would
 mend it), `rerun` (by the executors, as a log), `frozen` (as a case), `look`.
 """
