@@ -384,6 +384,13 @@ def test_rcsc_prove_certify_asks_cvc5(
     assert "error[RCS901]: level `lower`: cvc5 does not confirm" in capsys.readouterr().err
 
 
+def test_rcsc_certify_covers_a_system(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    assert run(["certify", str(SMALL / "system.toml")]) == 0
+    assert "level upper: cvc5 says the same of" in capsys.readouterr().out
+    assert run(["certify", str(SMALL / "system.toml"), "--write", str(tmp_path / "a.json")]) == 2
+    assert "rcsc prove --certificate" in capsys.readouterr().err
+
+
 def test_rcsc_prove_refuses_a_level_that_there_is_not(capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["prove", str(SMALL / "system.toml"), "--level", "middle"]) == 2
     assert "there is no level `middle`" in capsys.readouterr().err

@@ -199,7 +199,8 @@ def test(
 Examples:
   rcsc certify acquire.rcs                    prove, then re-check the proof
   rcsc certify acquire.rcs --write a.json     and keep the certificate
-  rcsc certify acquire.rcs --against a.json   re-check one that was kept; nothing is proved""",
+  rcsc certify acquire.rcs --against a.json   re-check one that was kept; nothing is proved
+  rcsc certify tables/system.toml             the levels together, again by cvc5""",
 )
 @click.argument("source", metavar="FILE", type=click.Path(exists=True, dir_okay=False))
 @click.option("--write", type=click.Path(dir_okay=False, path_type=Path), default=None, metavar="CERTIFICATE",
@@ -214,11 +215,19 @@ def certify(
     """Re-check the proof of FILE's tables with a small checker that shares no code with the prover.
 
     The checker reads the source anew and asks no solver for tables of boxes. It says what the proof rests on.
+    Where FILE describes a system, it is `rcsc prove --certify`: cvc5 answers every question of the levels together.
     """
     from rcsc import driver
 
     if write is not None and against is not None:
         raise click.UsageError("--write and --against do not go together")
+    if source.endswith(".toml"):
+        from rcsc.cli.prove import prove
+
+        if write is not None or against is not None:
+            raise click.UsageError("the certificate of a system is written by `rcsc prove --certificate`")
+        found: int = click.get_current_context().invoke(prove, system=Path(source), confirms=True)
+        return found
     made = driver.certify(_settings(options, use_cache, output, (source,)), write, against)
     return _finish(made.report, "certify", output, made.closing)
 
