@@ -49,10 +49,11 @@ What it rests on besides:
 - What stands outside the levels (workstation, robot, hand, camera) keeps to the same contract by its own means; it is
   listed, not proved.
 
-Modules, in the order the data flows: `contract` (who is whose environment), `transition` (a cycle as nodes), `goals`, `properties`,
-`features` (what an invariant may speak of), `walk` (states to begin with); the search, which is not trusted: `bits` (nodes
-as clauses of propositional logic), `sat`, `frames` (the invariant), `search`; what it finds is asked anew: `keyed` (nodes as
-terms), `confirm`, `context`, `ends`, `level`; then `kept` (the cache), `system`. What is not proved: `variants` (other rules), `trace` (the shortest failing
-run, run by the interpreter), `simplest`, `finding` (its time line), `together` (two levels as they are), `weakest` (what would
-mend it), `rerun` (by the executors, as a log), `frozen` (as a case), `look`.
+Modules, in the order the data flows: `contract` (who is whose environment), `transition` (a cycle as nodes), `goals`,
+`properties`, `features` (what an invariant may speak of), `walk` (states to begin with); the search, which is not trusted:
+`bits` (nodes as clauses of propositional logic), `sat`, `frames` (the invariant), `search`; what it finds is asked anew:
+`keyed` (nodes as terms), `confirm`, `context`, `ends`, `level`; then `kept` (the cache), `system`. What is not proved:
+`variants` (other rules), `trace` (the shortest failing run, run by the interpreter), `simplest`, `finding` (its time line),
+`together` (two levels as they are), `weakest` (what would mend it), `rerun` (by the executors, as a log), `frozen` (as a
+case), `look`. `promela` is another translation, for Spin.
 """
