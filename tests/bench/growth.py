@@ -1,0 +1,182 @@
+"""How the proof of the levels together grows: `python -m tests.bench.growth`.
+
+Chains of n levels and m tables, in the shape of the shipped ones: every level has a PAUSE table and a table for each other command, each of
+which orders two commands of the level below, one after the other; states are deferred, orders numbered, DEFAULT declared unreachable.
+Printed: seconds and questions to the solvers, of a level and of the system, what is not proved (`open`), and the ratio to the row before.
+Levels are proved one by one: the questions of a system are the sum of its levels' (`tests/test_hierarchies.py`).
+"""
+
+import argparse
+import sys
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from unittest.mock import patch
+
+from rcsc.compose.level import prove_level
+from rcsc.compose.sat import Sat
+from rcsc.compose.search import Effort
+from rcsc.compose.system import agreements, essential, steppers
+from rcsc.prove.smt import Solver
+from tests.hierarchies_made import BOTTOM, RIGHT, Hierarchy, Line, MadeLevel, MadeTable
+from tests.hierarchies_text import written
+
+DEEPER = tuple((20,) * levels for levels in (1, 2, 4, 7, 10))
+"""Tables of each level, from the top down: the same for all, and more and more levels."""
+WIDER = tuple((tables, 3) for tables in (4, 8, 16, 32, 40))
+"""More and more tables in the upper one of two levels; enumerations of more than `features.MOST_VALUES` members are not followed."""
+
+
+@dataclass
+class Asked:
+    """Questions put to the solvers."""
+
+    many: int = 0
+
+
+@contextmanager
+def asked() -> Iterator[Asked]:
+    """Counts the questions that are asked meanwhile, of the SAT solver and of Z3."""
+    found = Asked()
+    holds, check = Sat.holds, Solver.check
+
+    def counted_holds(self: Sat, *args: object) -> bool:
+        found.many += 1
+        return holds(self, *args)  # type: ignore[arg-type]  # handed on as it comes
+
+    def counted_check(self: Solver, *args: object) -> object:
+        found.many += 1
+        return check(self, *args)  # type: ignore[arg-type]  # likewise
+
+    with patch.object(Sat, "holds", counted_holds), patch.object(Solver, "check", counted_check):
+        yield found
+
+
+@dataclass(frozen=True)
+class Cost:
+    """What the proof of one level took."""
+
+    level: str
+    tables: int
+    seconds: float
+    questions: int
+    open: int
+
+
+def chain(tables: Sequence[int]) -> Hierarchy:
+    """Levels with so many tables each, from the top down: PAUSE and at least one other."""
+    made: list[MadeLevel] = []
+    for at, many in reversed(list(enumerate(tables))):
+        commands = ("pause", *(f"c{number}" for number in range(1, many)))
+        made.insert(0, _upper(at, commands, made[0]) if made else _lowest(at, commands))
+    return Hierarchy(tuple(made))
+
+
+def _lowest(at: int, commands: tuple[str, ...]) -> MadeLevel:
+    new, old = ("new_command", "true"), ("new_command", "false")
+    going = (old, ("cur_state", "s1"))
+    lines = (
+        Line("1", (new,), ("state(s1)",), "", "executing"),
+        Line("2", (*going, ("there", "false")), (), "", "executing"),
+        Line("3", (*going, ("there", "true")), ("state(d_state)",), "", "done"),
+        Line("4", (old, ("cur_state", "/= s1")), (), "", "done"),
+    )
+    rest = MadeTable("rest", (Line("1", (("when", "true"),), ("state(d_state)",), "", "done"),))
+    tables = (rest, *(MadeTable(f"{command}_table", lines) for command in commands[1:]))
+    return MadeLevel(f"l{at}", "", commands, (), tables, tuple((name, RIGHT[name]) for name in BOTTOM))
+
+
+def _upper(at: int, commands: tuple[str, ...], under: MadeLevel) -> MadeLevel:
+    calm = Line("1", (("when", "true"),), ("begin", "nextstate(d_state)"), "pause", "done")
+    tables = [MadeTable("rest", (calm,))]
+    others = under.commands[1:]
+    for number, command in enumerate(commands[1:]):
+        plan = (others[number % len(others)], others[(number + 1) % len(others)])
+        tables.append(_in_turn(f"{command}_table", plan))
+    return MadeLevel(f"l{at}", under.name, commands, under.commands, tuple(tables), tuple(RIGHT.items()))
+
+
+def _in_turn(name: str, plan: tuple[str, str]) -> MadeTable:
+    """First the one order, then the other."""
+    old = ("new_command", "false")
+    lines = [Line("0", (("new_command", "true"),), ("begin", "nextstate(s1)"), plan[0], "executing")]
+    for at, (order, call, then, said) in enumerate(
+        ((plan[0], "nextstate(s2)", plan[1], "executing"), (plan[1], "nextstate(d_state)", "pause", "done")),
+        1,
+    ):
+        here = (old, ("ref_command_in", order), ("cur_state", f"s{at}"))
+        lines += [
+            Line(f"{at}a", (*here, ("status_in", "executing")), (), "", "executing"),
+            Line(f"{at}b", (*here, ("status_in", "failed")), ("nextstate(f_state)",), "pause", "failed"),
+            Line(f"{at}c", (*here, ("status_in", "done")), (call,), then, said),
+        ]
+    lines.append(Line("8", (old, ("cur_state", "d_state")), (), "pause", "done"))
+    lines.append(Line("9", (old, ("cur_state", "f_state")), (), "pause", "failed"))
+    return MadeTable(name, tuple(lines), "DEFAULT unreachable")
+
+
+def costs(made: Hierarchy, effort: Effort | None = None) -> list[Cost]:
+    """What each level of a system took.
+
+    Raises:
+        AssertionError: The levels are proved, and do not agree: they would be other levels than they are meant to be.
+    """
+    with tempfile.TemporaryDirectory(prefix="rcsc-growth-") as folder:
+        known = steppers(written(made, Path(folder)))
+    found, proofs = [], {}
+    for level in made.levels:
+        begun = time.perf_counter()
+        with asked() as questions:
+            proofs[level.name] = prove_level(known[level.name], effort)
+        seconds = time.perf_counter() - begun
+        left = len(essential(proofs[level.name]))
+        found.append(Cost(level.name, len(level.tables), seconds, questions.many, left))
+    assert any(one.open for one in found) or all(one.holds for one in agreements(known, proofs))
+    return found
+
+
+def rows(sizes: Sequence[Sequence[int]]) -> Iterator[str]:
+    """A line for each size."""
+    yield (
+        f"{'levels':>6} {'tables':>6} {'seconds':>8} {'questions':>9} {'s a level':>9} "
+        f"{'of the dearest':>14} {'open':>5} {'tables x':>8} {'seconds x':>9} {'questions x':>11}"
+    )
+    last: tuple[int, float, int] | None = None
+    for size in sizes:
+        levels, tables = len(size), sum(size)
+        found = costs(chain(size))
+        seconds, questions = sum(one.seconds for one in found), sum(one.questions for one in found)
+        ratio = ""
+        if last is not None:
+            ratio = f"{tables / last[0]:>8.2f} {seconds / last[1]:>9.2f} {questions / last[2]:>11.2f}"
+        last = tables, seconds, questions
+        dearest, left = max(one.seconds for one in found), sum(one.open for one in found)
+        yield f"{levels:>6} {tables:>6} {seconds:>8.1f} {questions:>9} {seconds / levels:>9.2f} {dearest:>14.2f} {left:>5} {ratio}"
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Prints both tables, or one size level by level."""
+    parser = argparse.ArgumentParser(prog="python -m tests.bench.growth", description=__doc__)
+    parser.add_argument(
+        "--tables", type=int, nargs="+", default=(), help="one size only: the tables of each level"
+    )
+    given = parser.parse_args(arguments)
+    if given.tables:
+        for one in costs(chain(given.tables)):
+            print(
+                f"{one.level:6} {one.tables:4} tables {one.seconds:8.2f} s {one.questions:7} questions",
+                flush=True,
+            )
+        return 0
+    for sizes in (DEEPER, WIDER):
+        for row in rows(sizes):
+            print(row, flush=True)
+        print()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,356 @@
+"""Random small hierarchies: the composed proof against exhaustive enumeration, goal by goal.
+
+`python -m tests.hierarchies --count 10000 --jobs 2` prints what agreed and every disagreement with its seed; `--show SEED` prints one
+hierarchy, without the slips that its disagreement does not need. Exit status 1 where something disagrees.
+
+What is compared, of every level of every hierarchy: the goals themselves; each goal that is *proved* with every reachable state; each trace
+that is shown with the contract, with what the interpreter does on its inputs, and with the length of the shortest. That a goal is *not
+proved* although it holds is counted (`incomplete`), and is no disagreement. Where two neighbours agree, both run together with real buffers
+(`hierarchies_together`), and nothing that was proved of either may break.
+"""
+
+import argparse
+import json
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from multiprocessing import get_context
+from pathlib import Path
+from random import Random
+
+from rcsc.compose.goals import Goal, Sort
+from rcsc.compose.level import LevelProof, Verdict, prove_level
+from rcsc.compose.search import Effort
+from rcsc.compose.system import agreements, essential, steppers
+from rcsc.compose.trace import NotReproducedError, Trace, shortest
+from rcsc.compose.transition import Stepper
+from rcsc.prove.values import TRUE
+from tests.hierarchies_explored import Explored, TooManyError, explored
+from tests.hierarchies_level import Key, Reading, Role
+from tests.hierarchies_made import ODD, Hierarchy, hierarchy
+from tests.hierarchies_text import files, written
+from tests.hierarchies_together import Pair, broken_together
+from tests.hierarchies_world import allowed, broken, wanted
+
+LITTLE = Effort(walks=12, cycles=40)
+MOST_CYCLES = 7
+"""Of a trace that is looked for; longer ones are rare and cost much."""
+MOST_TOGETHER = 2000
+"""States of two levels together that are worth listing."""
+LIKELY = 800
+"""Product of the states of two levels up to which those of both are likely to be fewer."""
+
+
+@dataclass(frozen=True, slots=True)
+class Disagreement:
+    """Where the proof and the enumeration part; `what` is one of a few words."""
+
+    what: str
+    level: str
+    goal: str
+    more: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """What was found of one hierarchy.
+
+    Attributes:
+        counts: Levels, goals and traces, and how they agreed.
+    """
+
+    seed: int
+    counts: Counter[str] = field(default_factory=Counter)
+    disagreements: tuple[Disagreement, ...] = ()
+    incomplete: tuple[Disagreement, ...] = ()
+    seconds: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Known:
+    """A level with its proof and its states; None where they are too many."""
+
+    stepper: Stepper
+    role: Role
+    proof: LevelProof
+    truth: Explored | None
+
+
+def key_of(goal: Goal) -> Key:
+    """What names a goal."""
+    return goal.sort, goal.table, goal.name
+
+
+def judged(made: Hierarchy, seed: int = 0, traces: int = 1) -> Judged:
+    """Proves and enumerates every level of a hierarchy, and compares.
+
+    Args:
+        made: The hierarchy.
+        seed: Chooses the goals that are to be shown.
+        traces: How many of the goals that break are to be shown by a trace, of each level.
+    """
+    begun = time.perf_counter()
+    try:
+        found = _compared(made, seed, traces)
+    except Exception as error:  # noqa: BLE001  # a long run is not to end with it
+        raised = Disagreement("something raises", "", "", f"{type(error).__name__}: {error}")
+        found = Judged(seed, Counter({"hierarchies": 1}), (raised,))
+    return replace(found, seconds=time.perf_counter() - begun)
+
+
+def _compared(made: Hierarchy, seed: int, traces: int) -> Judged:
+    counts: Counter[str] = Counter()
+    random = Random(seed)  # noqa: S311  # repeatable on purpose
+    with tempfile.TemporaryDirectory(prefix="rcsc-hierarchy-") as folder:
+        made_steppers = steppers(written(made, Path(folder)))
+    known = {level.name: _known(made, level.name, made_steppers) for level in made.levels}
+    apart: list[Disagreement] = []
+    incomplete: list[Disagreement] = []
+    for one in known.values():
+        if one.truth is None:
+            counts["levels with too many states"] += 1
+            continue
+        counts["levels"] += 1
+        counts["states"] += one.truth.states
+        apart += _verdicts(one, one.truth, counts, incomplete)
+        apart += _traces(one, one.truth, counts, random, traces)
+    counts["hierarchies with a fault"] = int(
+        any(k.truth and (k.truth.least or k.truth.restarted) for k in known.values())
+    )
+    apart += _together(made, known, counts)
+    counts["hierarchies"] = 1
+    return Judged(seed, counts, tuple(apart), tuple(incomplete))
+
+
+def forget() -> None:
+    """Drops what is known of levels: for tests that change what judges them."""
+    _KNOWN.clear()
+
+
+_KNOWN: dict[tuple[str, ...], tuple[LevelProof, Explored | None]] = {}
+
+
+def _known(made: Hierarchy, name: str, made_steppers: dict[str, Stepper]) -> Known:
+    """A level's proof and its states; many hierarchies have a level in common."""
+    stepper = made_steppers[name]
+    level = next(one for one in made.levels if one.name == name)
+    role = Role(stepper.program, stepper.level, stepper.links, dict(level.said).get("next") in ODD)
+    text = files(made)
+    words = (text[f"{name}.rcs"], text["words.rcs"], repr(stepper.links))
+    if words not in _KNOWN:
+        try:
+            truth: Explored | None = explored(role)
+        except TooManyError:
+            truth = None
+        proof = prove_level(stepper, LITTLE)
+        found = tuple(
+            (replace(goal, holds=TRUE), verdict) for goal, verdict in proof.found
+        )  # without their many nodes
+        _KNOWN[words] = replace(proof, found=found), truth
+    return Known(stepper, role, *_KNOWN[words])
+
+
+def _verdicts(
+    one: Known, truth: Explored, counts: Counter[str], incomplete: list[Disagreement]
+) -> Iterator[Disagreement]:
+    """Each verdict with what is true."""
+    name = one.proof.level
+    found = {key_of(goal): verdict for goal, verdict in one.proof.found}
+    if (every := wanted(one.role)) != found.keys():
+        yield Disagreement("other goals", name, str(sorted(every ^ found.keys())))
+    for goal, verdict in one.proof.found:
+        breaks = truth.breaks(key_of(goal))
+        counts[f"{verdict.value}, {'breaks' if breaks else 'holds'}"] += 1
+        if breaks and verdict is Verdict.PROVED:
+            yield Disagreement(
+                "proved, but breaks", name, _shown(goal), f"in {truth.least.get(key_of(goal))} cycles"
+            )
+        elif not breaks and verdict is not Verdict.PROVED:
+            incomplete.append(
+                Disagreement(f"{verdict.value}, but holds", name, _shown(goal), goal.sort.value)
+            )
+
+
+def _shown(goal: Goal) -> str:
+    return f"{goal.table}: {goal.shown}" if goal.table else goal.shown
+
+
+def _traces(
+    one: Known, truth: Explored, counts: Counter[str], random: Random, many: int
+) -> Iterator[Disagreement]:
+    """Traces for some goals that break; and for one that is open and does not, that there is none."""
+    goals = [goal for goal, _ in one.proof.found]
+    breaking = [goal for goal in goals if truth.least.get(key_of(goal), MOST_CYCLES + 1) <= MOST_CYCLES]
+    for goal in random.sample(breaking, min(many, len(breaking))):
+        counts["traces"] += 1
+        yield from _trace(one, goal, truth.least[key_of(goal)])
+    sound = [
+        goal
+        for goal, verdict in one.proof.found
+        if verdict is not Verdict.PROVED and key_of(goal) not in truth.least
+    ]
+    for goal in sound[:1]:
+        counts["traces that there are not"] += 1
+        yield from _trace(one, goal, None)
+
+
+def _trace(one: Known, goal: Goal, least: int | None) -> Iterator[Disagreement]:
+    """The trace of a goal that breaks in `least` cycles, never if None, is one, and no longer."""
+    name, shown = one.proof.level, _shown(goal)
+    try:
+        trace = shortest(one.stepper, goal, least or 4)
+    except NotReproducedError:
+        yield Disagreement("trace does not run", name, shown, f"least {least}")
+        return
+    if trace is None:
+        if least is not None:
+            yield Disagreement("no trace found", name, shown, f"least {least}")
+        return
+    if least is None or len(trace.steps) != least:
+        yield Disagreement("trace of another length", name, shown, f"{len(trace.steps)}, least {least}")
+    if (why := _wrong(one.role, goal, trace)) is not None:
+        yield Disagreement("trace is none", name, shown, why)
+
+
+def _wrong(role: Role, goal: Goal, trace: Trace) -> str | None:
+    """Why a trace is none: run again, with the contract looked at."""
+    now = dict(role.start)
+    for number, step in enumerate(trace.steps, 1):
+        if not allowed(role, now, step.taken):
+            return f"cycle {number} is against the contract"
+        taken = dict(step.taken)
+        ran = role.run(Reading({**now, **taken}))
+        broke = key_of(goal) in set(broken(role, now, taken, ran))
+        if broke != (number == len(trace.steps)):
+            return f"cycle {number} {'breaks' if broke else 'does not break'} it"
+        now = ran.after
+    return None
+
+
+# --- neighbours together ------------------------------------------------------------------------
+
+
+def _together(made: Hierarchy, known: dict[str, Known], counts: Counter[str]) -> Iterator[Disagreement]:
+    """Neighbours that agree, with real buffers."""
+    names = [level.name for level in made.levels]
+    agreed = agreements({n: k.stepper for n, k in known.items()}, {n: k.proof for n, k in known.items()})
+    for above, below in pairwise(names):
+        both = {(above, f"proved of `{below}`"), (below, f"proved of `{above}`")}
+        holds = all(one.holds for one in agreed if (one.level, one.reason.split(":")[0]) in both)
+        if not holds or any(goal.sort is Sort.NUMBERED for goal in essential(known[above].proof)):
+            counts["pairs that do not agree"] += 1
+            continue
+        upper, lower = known[above], known[below]
+        if upper.truth is None or lower.truth is None or upper.truth.states * lower.truth.states > LIKELY:
+            counts["pairs with too many states"] += 1
+            continue
+        yield from _pair(upper, lower, counts, restarts=len(names) == 2)
+
+
+def _pair(upper: Known, lower: Known, counts: Counter[str], *, restarts: bool) -> Iterator[Disagreement]:
+    pair = Pair(upper.role, lower.role, _proved(upper.proof), _proved(lower.proof), restarts)
+    try:
+        said, states = broken_together(pair, most=MOST_TOGETHER)
+    except TooManyError:
+        counts["pairs with too many states"] += 1
+        return
+    counts["pairs together"] += 1
+    counts["states together"] += states
+    for words in said:
+        yield Disagreement("breaks together", upper.proof.level, words)
+
+
+def _proved(proof: LevelProof) -> frozenset[Key]:
+    return frozenset(key_of(goal) for goal, verdict in proof.found if verdict is Verdict.PROVED)
+
+
+# --- the command --------------------------------------------------------------------------------
+
+
+def judged_seed(seed: int) -> Judged:
+    """The hierarchy of a seed, judged; for a process of a pool."""
+    return judged(hierarchy(seed), seed)
+
+
+def smaller(seed: int) -> tuple[Hierarchy, Judged]:
+    """The hierarchy of a seed with only those slips without which it would not disagree."""
+    made, found = hierarchy(seed), judged(hierarchy(seed), seed, traces=99)
+    sought = {(one.what, one.level) for one in found.disagreements}
+    skipped: frozenset[int] = frozenset()
+    for number in range(3):
+        other = hierarchy(seed, skipped | {number})
+        again = judged(other, seed, traces=99)
+        if sought & {(one.what, one.level) for one in again.disagreements}:
+            made, found, skipped = other, again, skipped | {number}
+    return made, found
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """The command; 1 where something disagrees."""
+    parser = argparse.ArgumentParser(prog="python -m tests.hierarchies", description=__doc__)
+    parser.add_argument("--count", type=int, default=150)
+    parser.add_argument("--first", type=int, default=0, help="the first seed")
+    parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--out", type=Path, default=None, help="a file for the figures, as JSON")
+    parser.add_argument("--show", type=int, default=None, metavar="SEED")
+    asked = parser.parse_args(arguments)
+    if asked.show is not None:
+        return _show(asked.show)
+    return _run(range(asked.first, asked.first + asked.count), asked.jobs, asked.out)
+
+
+def _show(seed: int) -> int:
+    made, found = smaller(seed)
+    for name, text in files(made).items():
+        sys.stdout.write(f"--- {name}\n{text}")
+    sys.stdout.write(f"slips: {made.slips}\n{dict(found.counts)}\n")
+    for one in (*found.disagreements, *found.incomplete):
+        sys.stdout.write(f"{one}\n")
+    return int(bool(found.disagreements))
+
+
+def _run(seeds: range, jobs: int, out: Path | None) -> int:
+    begun = time.perf_counter()
+    counts: Counter[str] = Counter()
+    apart: list[tuple[int, Disagreement]] = []
+    open_: Counter[str] = Counter()
+    for at, one in enumerate(_each(seeds, jobs), 1):
+        counts += one.counts
+        apart += [(one.seed, found) for found in one.disagreements]
+        open_.update(f"{found.what}: {found.more}" for found in one.incomplete)
+        for found in one.disagreements:
+            sys.stdout.write(f"seed {one.seed}: {found}\n")
+        if at % 200 == 0:
+            sys.stdout.write(
+                f"{at} of {len(seeds)}, {time.perf_counter() - begun:.0f} s, {len(apart)} disagreements; {dict(sorted(counts.items()))}\n"
+            )
+            sys.stdout.flush()
+    seconds = time.perf_counter() - begun
+    said = {
+        "seeds": [seeds.start, seeds.stop],
+        "seconds": round(seconds, 1),
+        "counts": dict(sorted(counts.items())),
+        "disagreements": [[seed, found.what, found.level, found.goal, found.more] for seed, found in apart],
+        "incomplete": dict(open_.most_common()),
+    }
+    sys.stdout.write(json.dumps(said, indent=2) + "\n")
+    if out is not None:
+        out.write_text(json.dumps(said, indent=2) + "\n", encoding="utf-8")
+    return int(bool(apart))
+
+
+def _each(seeds: range, jobs: int) -> Iterator[Judged]:
+    if jobs == 1:
+        yield from map(judged_seed, seeds)
+        return
+    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
+        yield from pool.map(judged_seed, seeds, chunksize=10)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

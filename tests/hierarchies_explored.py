@@ -1,0 +1,153 @@
+"""Every state that a level can reach in its environment, and the least number of cycles in which each goal breaks.
+
+In: a role. Out: `Explored`. States are the same under other names for their numbers (`hierarchies_world`). What a cycle did not read, it
+would have done with any other value (`Reading`), and an input that the contract does not speak of is not remembered. Each
+cycle that leads to a new state, or breaks something, is run once more by the interpreter's own `cycle`.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from itertools import product
+
+from rcsc.interpret import Fault
+from rcsc.model import Enum, Program, Value
+from rcsc.system.adopt import adopt
+from rcsc.system.signature import Leaf, Signature
+from tests.hierarchies_level import Key, Ran, Reading, Role, State, number_type
+from tests.hierarchies_world import broken, canonical, offers
+
+
+class TooManyError(Exception):
+    """More states than are worth listing."""
+
+
+def restarts(role: Role) -> Iterator[dict[str, Value]]:
+    """The states with which a level begins anew, whatever stands in its buffers."""
+    remembered = [leaf for leaf in role.inputs if leaf in role.remembered]
+    choices = [
+        (0, 1) if role.program.variable(leaf).type == number_type(role) else role.domain(leaf)
+        for leaf in remembered
+    ]
+    for values in product(*choices):
+        now = role.start | dict(zip(remembered, values, strict=True))
+        yield adopted(role, now)
+
+
+def adopted(
+    role: Role, now: Mapping[str, Value], stands: Mapping[str, Value] | None = None
+) -> dict[str, Value]:
+    """A state as the system makes it when a level is started again; what its own buffers hold `stands`."""
+    sign = _signature(role.program)
+    still = {sign.index[leaf]: value for leaf, value in (stands or {}).items()}
+    return dict(zip(role.leaves, adopt(sign, tuple(now[leaf] for leaf in role.leaves), still), strict=True))
+
+
+def _signature(program: Program) -> Signature:
+    """What `adopt` is told of a program: names, kinds and members."""
+    leaves = tuple(
+        Leaf(
+            str(v.name), v.kind.value, "", "", "", v.type.members if isinstance(v.type, Enum) else (), None, None, "", v.initial, "",
+        )
+        for v in program.variables
+    )  # fmt: skip
+    index = {leaf.name: at for at, leaf in enumerate(leaves)}
+    return Signature(str(program.name), "", "", leaves, {}, (), (), index)
+
+
+@dataclass
+class Explored:
+    """What is true of a level.
+
+    Attributes:
+        least: Goals that break in a run from the first cycle, with the least number of cycles.
+        restarted: Goals that break in a run from a restart only.
+        states: How many there are, up to the names of numbers; `cycles`, how many were run.
+    """
+
+    least: dict[Key, int] = field(default_factory=dict)
+    restarted: set[Key] = field(default_factory=set)
+    states: int = 0
+    cycles: int = 0
+
+    def breaks(self, key: Key) -> bool:
+        """Whether a goal breaks in any run."""
+        return key in self.least or key in self.restarted
+
+
+def explored(role: Role, most: int = 4000, seen: set[State] | None = None) -> Explored:
+    """Every state that a level can reach, breadth first.
+
+    Args:
+        role: The level.
+        most: States after which it is given up.
+        seen: Takes the states, as `canonical` gives them.
+
+    Raises:
+        TooManyError: There are more than `most`.
+    """
+    found, seen = Explored(), set() if seen is None else seen
+
+    def first(key: Key, depth: int) -> None:
+        found.least.setdefault(key, depth)
+
+    def later(key: Key, _depth: int) -> None:
+        if key not in found.least:
+            found.restarted.add(key)
+
+    _search(role, [role.start], seen, found, first, most)
+    _search(role, restarts(role), seen, found, later, most)
+    found.states = len(seen)
+    return found
+
+
+def _search(
+    role: Role,
+    starts: Iterable[dict[str, Value]],
+    seen: set[State],
+    found: Explored,
+    say: Callable[[Key, int], None],
+    most: int,
+) -> None:
+    depth, wave = 1, [canonical(role, start) for start in starts]
+    while wave:
+        following = []
+        for before in wave:
+            for taken, ran in successors(role, before):
+                found.cycles += 1
+                keys = list(broken(role, before, taken, ran))
+                for key in keys:
+                    say(key, depth)
+                new = _new(role, ran, seen)
+                if keys or new is not None:
+                    role.confirmed({**before, **taken}, ran)
+                if new is not None:
+                    following.append(new)
+        if len(seen) > most:
+            raise TooManyError
+        depth, wave = depth + 1, following
+
+
+def _new(role: Role, ran: Ran, seen: set[State]) -> dict[str, Value] | None:
+    """The state that a cycle left, where it was not seen before; a fault ends a run."""
+    if ran.fault is not Fault.OK:
+        return None
+    state = canonical(role, ran.after)
+    key = tuple(state.values())
+    if key in seen:
+        return None
+    seen.add(key)
+    return state
+
+
+def successors(
+    role: Role, before: Mapping[str, Value], but: str = "", given: Mapping[str, Value] | None = None
+) -> Iterator[tuple[dict[str, Value], Ran]]:
+    """Each different thing that the next cycle can do: inputs that it does not read are not varied (`offers`)."""
+    left = list(offers(role, before, but, given))
+    while left:
+        taken = left[0]
+        now = Reading({**before, **taken})
+        ran = role.run(now)
+        yield taken, ran
+        used = [leaf for leaf in role.inputs if leaf in now.read or leaf in role.watched]
+        left = [one for one in left if any(one[leaf] != taken[leaf] for leaf in used)]
