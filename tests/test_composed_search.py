@@ -169,6 +169,14 @@ def test_an_open_operation_gives_the_same_for_the_same_operands(op: Op) -> None:
         assert solver.check() is answer
 
 
+def test_a_variable_that_no_clause_speaks_of_has_a_value() -> None:
+    """As a random hierarchy had one: a feature of the first cycle that nothing there depends on."""
+    sat = Sat([[1], [-2]])
+    assert sat.holds([])
+    assert [literal for literal in (1, -1, 2, -2, 7, -7) if sat.value(literal)] == [1, -2, -7]
+    sat.close()
+
+
 def test_known_states_answer_for_cubes() -> None:
     reached = Reached.of([(0, 1, 2), (1, 1, 0)], 3)
     assert reached.shows({0: 0, 2: 2})

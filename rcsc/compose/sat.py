@@ -55,8 +55,9 @@ class Sat:
         return bool(answer)
 
     def value(self, literal: int) -> bool:
-        """Of a literal, in the last model."""
-        return (self._model[abs(literal) - 1] > 0) == (literal > 0)
+        """Of a literal, in the last model; a variable that no clause speaks of is false there."""
+        at = abs(literal) - 1
+        return (at < len(self._model) and self._model[at] > 0) == (literal > 0)
 
     def core(self) -> frozenset[int]:
         """Assumptions of the last question, answered no, that cannot hold together."""
