@@ -4,8 +4,8 @@
 of a fault is kept in a folder by content, so that a run which is stopped goes on, and one after a change to a table asks only what is new.
 
 - *check*: `rcsc check` of the level's program fails.
-- *compose*: a goal that is proved of the shipped level in its environment (`prove_level`) is not proved any more, or one of a level below
-  that may assume less than before.
+- *compose*: a goal of the level in its environment is not proved (`prove_level`) which is proved of the shipped one, or which that has not;
+  or one of a level below that may assume less than before.
 - *campaign*: in three kinematic episodes, with an interruption, a weak hand and a restart among them, a property does not hold. The
   executors are made by force, since most faults do not prove.
 """
@@ -26,7 +26,7 @@ from pathlib import Path
 
 from rcsc import driver
 from rcsc.compose.goals import Goal, Sort
-from rcsc.compose.level import LevelProof, Verdict, prove_level
+from rcsc.compose.level import LevelProof, prove_level
 from rcsc.compose.search import Effort
 from rcsc.compose.system import NoProgramError, steppers
 from rcsc.compose.transition import Stepper
@@ -134,7 +134,7 @@ def by_compose(fault: Fault, sound: Mapping[str, "Standing"]) -> Answer:
     for level, before in sound.items():
         if level == fault.level or repr(made[level].links) != before.links:
             now = standing(made[level], prove_level(made[level], EFFORT), before.needed)
-            lost += [f"{level}: {goal}" for goal in sorted(before.proved - now.proved)]
+            lost += [f"{level}: {goal}" for goal in sorted(now.open - before.open)]
     return Answer(bool(lost), "; ".join(lost[:3]))
 
 
@@ -163,23 +163,21 @@ class Standing:
     """What is proved of a level, in words.
 
     Attributes:
-        proved: Goals, of fields that are not numbered only those that a level below counts on (`needed`).
+        open: Goals that are not proved; of fields that are not numbered only those that a level below counts on (`needed`).
         links: What its environment is, to see whether it changed.
     """
 
-    proved: frozenset[str]
+    open: frozenset[str]
     links: str
     needed: frozenset[str]
 
 
 def standing(stepper: Stepper, proof: LevelProof, needed: frozenset[str]) -> Standing:
-    """What a proof shows."""
-    proved = frozenset(
-        _words(goal)
-        for goal, verdict in proof.found
-        if verdict is Verdict.PROVED and (goal.sort is not Sort.NUMBERED or goal.name in needed)
+    """What a proof leaves open."""
+    left = frozenset(
+        _words(goal) for goal in proof.open if goal.sort is not Sort.NUMBERED or goal.name in needed
     )
-    return Standing(proved, repr(stepper.links), needed)
+    return Standing(left, repr(stepper.links), needed)
 
 
 def _words(goal: Goal) -> str:
@@ -219,7 +217,7 @@ def ground(name: str) -> str:
     """A digest of what an answer rests on: the code that gives it, the shipped tables, and how they are asked."""
     code = sorted(path for folder in READ_BY[name] for path in (REPO / folder).rglob("*.py"))
     tables = sorted(path for level in LEVELS for path in (REPO / "tables" / level).glob("*.rcs"))
-    how = {"check": "", "compose": repr(EFFORT), "campaign": repr(EPISODES)}[name]
+    how = {"check": "", "compose": f"open goals, {EFFORT!r}", "campaign": repr(EPISODES)}[name]
     return _digest(how.encode(), *(path.read_bytes() for path in (*code, *tables)))
 
 
