@@ -169,6 +169,19 @@ def test_an_open_operation_gives_the_same_for_the_same_operands(op: Op) -> None:
         assert solver.check() is answer
 
 
+def test_what_is_known_where_a_branch_is_taken_is_not_carried_elsewhere() -> None:
+    """Within `if r > 6` a square is at least 36; the same square elsewhere need not be."""
+    r = values.variable("r", Real(0.0, 10.0))
+    inside = values.narrowed(r, 6.0, 10.0)
+    large, any_ = (values.arithmetic(Op.MUL, (one, one), Real(0.0, 100.0)) for one in (inside, r))
+    keyed, solver = Keyed(), Solver(10_000)
+    terms = [keyed.term(values.compare(Op.LT, one, values.constant(one.kind, 50.0))) for one in (large, any_)]
+    less = values.compare(Op.LT, any_, values.constant(any_.kind, 25.0))
+    terms.append(keyed.term(less))
+    solver.add(*keyed.ranges, *terms)
+    assert solver.check() is Answer.SATISFIABLE
+
+
 def test_a_variable_that_no_clause_speaks_of_has_a_value() -> None:
     """As a random hierarchy had one: a feature of the first cycle that nothing there depends on."""
     sat = Sat([[1], [-2]])

@@ -6,8 +6,8 @@ In: nodes (`prove.values`). Out: terms, and the ranges of the variables they rea
 - A real is its *key* (`model.real_key`): an integer that orders as the doubles do. Equality and order, least,
   greatest, opposite and absolute value of reals are therefore exact.
 - Any other operation (arithmetic of reals, products and quotients of variables) gives *any* value within the bounds of the
-  node, the same one for the same operation on the same operands; a comparison with what may be a NaN gives any truth
-  value. So the terms allow whatever the executors can do, and more: what is proved of them holds, and a trace found in
+  node, the same one for the same operation on the same operands, where as much is known of them; a comparison with what may be a
+  NaN gives any truth value. So the terms allow whatever the executors can do, and more: what is proved of them holds, and a trace found in
   them is run before it is believed.
 """
 
@@ -164,15 +164,14 @@ class Keyed:
         return found
 
     def _written(self, node: Node) -> int:
-        """A number for the node that every node has which is written the same."""
+        """A number for the node that every node has which is written the same, and of which the same is known.
+
+        What is known holds only where the node is reached: one value for both that and another place would carry it there.
+        """
         for one in parts_first(node):
             if one not in self._number_of:
-                if one.op == "narrowed":
-                    self._number_of[one] = self._number_of[one.args[0]]
-                    continue
-                value = one.low if one.op == "constant" else None
                 parts = tuple(self._number_of[arg] for arg in one.args)
-                key = one.op, one.kind, one.name, value, parts
+                key = one.op, one.kind, one.name, one.low, one.high, parts
                 self._number_of[one] = self._numbers.setdefault(key, len(self._numbers))
         return self._number_of[node]
 
