@@ -5,8 +5,9 @@ hierarchy, without the slips that its disagreement does not need. Exit status 1 
 
 What is compared, of every level of every hierarchy: the goals themselves; each goal that is *proved* with every reachable state; each trace
 that is shown with the contract, with what the interpreter does on its inputs, and with the length of the shortest. That a goal is *not
-proved* although it holds is counted (`incomplete`), and is no disagreement. Where two neighbours agree, both run together with real buffers
-(`hierarchies_together`), and nothing that was proved of either may break.
+proved* although it holds is counted (`incomplete`), and is no disagreement. A command that is shown to end may not go on for ever in
+any run. Where two neighbours agree, both run together with real buffers (`hierarchies_together`), and nothing that was proved of either
+may break.
 """
 
 import argparse
@@ -15,7 +16,7 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
@@ -30,8 +31,9 @@ from rcsc.compose.system import agreements, essential, steppers
 from rcsc.compose.trace import NotReproducedError, Trace, shortest
 from rcsc.compose.transition import Stepper
 from rcsc.prove.values import TRUE
+from tests.hierarchies_endless import edges, endless
 from tests.hierarchies_explored import Explored, TooManyError, explored
-from tests.hierarchies_level import Key, Reading, Role
+from tests.hierarchies_level import Key, Reading, Role, State
 from tests.hierarchies_made import ODD, Hierarchy, hierarchy
 from tests.hierarchies_text import files, written
 from tests.hierarchies_together import Pair, broken_together
@@ -73,12 +75,13 @@ class Judged:
 
 @dataclass(frozen=True, slots=True)
 class Known:
-    """A level with its proof and its states; None where they are too many."""
+    """A level with its proof and its states, None where they are too many; and how each table's command may go on for ever."""
 
     stepper: Stepper
     role: Role
     proof: LevelProof
     truth: Explored | None
+    forever: Mapping[str, str] = field(default_factory=dict)
 
 
 def key_of(goal: Goal) -> Key:
@@ -118,6 +121,7 @@ def _compared(made: Hierarchy, seed: int, traces: int) -> Judged:
         counts["levels"] += 1
         counts["states"] += one.truth.states
         apart += _verdicts(one, one.truth, counts, incomplete)
+        apart += _endings(one, counts, incomplete)
         apart += _traces(one, one.truth, counts, random, traces)
     counts["hierarchies with a fault"] = int(
         any(k.truth and (k.truth.least or k.truth.restarted) for k in known.values())
@@ -132,7 +136,7 @@ def forget() -> None:
     _KNOWN.clear()
 
 
-_KNOWN: dict[tuple[str, ...], tuple[LevelProof, Explored | None]] = {}
+_KNOWN: dict[tuple[str, ...], tuple[LevelProof, Explored | None, Mapping[str, str]]] = {}
 
 
 def _known(made: Hierarchy, name: str, made_steppers: dict[str, Stepper]) -> Known:
@@ -143,15 +147,18 @@ def _known(made: Hierarchy, name: str, made_steppers: dict[str, Stepper]) -> Kno
     text = files(made)
     words = (text[f"{name}.rcs"], text["words.rcs"], repr(stepper.links))
     if words not in _KNOWN:
+        seen: set[State] = set()
         try:
-            truth: Explored | None = explored(role)
+            truth: Explored | None = explored(role, seen=seen)
         except TooManyError:
             truth = None
         proof = prove_level(stepper, LITTLE)
+        every = edges(role, seen) if truth is not None and proof.endings else []
+        forever = {one.table: endless(every, one.table, one.still) for one in proof.endings}
         found = tuple(
             (replace(goal, holds=TRUE), verdict) for goal, verdict in proof.found
         )  # without their many nodes
-        _KNOWN[words] = replace(proof, found=found), truth
+        _KNOWN[words] = replace(proof, found=found), truth, forever
     return Known(stepper, role, *_KNOWN[words])
 
 
@@ -173,6 +180,20 @@ def _verdicts(
         elif not breaks and verdict is not Verdict.PROVED:
             incomplete.append(
                 Disagreement(f"{verdict.value}, but holds", name, _shown(goal), goal.sort.value)
+            )
+
+
+def _endings(one: Known, counts: Counter[str], incomplete: list[Disagreement]) -> Iterator[Disagreement]:
+    """Whether commands end, with what is true: of tables of which something else is not proved, too."""
+    for ending in one.proof.endings:
+        goes_on = one.forever[ending.table]
+        said = "shown to end" if ending.proved else "not shown to end"
+        counts[f"{said}, {'goes on' if goes_on else 'ends'}"] += 1
+        if goes_on and ending.proved:
+            yield Disagreement("shown to end, but goes on", one.proof.level, ending.table, goes_on)
+        elif not goes_on and not ending.proved:
+            incomplete.append(
+                Disagreement("not shown to end, but ends", one.proof.level, ending.table, "a command")
             )
 
 

@@ -140,14 +140,18 @@ def _new(role: Role, ran: Ran, seen: set[State]) -> dict[str, Value] | None:
 
 
 def successors(
-    role: Role, before: Mapping[str, Value], but: str = "", given: Mapping[str, Value] | None = None
+    role: Role,
+    before: Mapping[str, Value],
+    but: str = "",
+    given: Mapping[str, Value] | None = None,
+    also: frozenset[str] = frozenset(),
 ) -> Iterator[tuple[dict[str, Value], Ran]]:
-    """Each different thing that the next cycle can do: inputs that it does not read are not varied (`offers`)."""
+    """Each different thing that the next cycle can do: inputs that it does not read are not varied (`offers`), but for those in `also`."""
     left = list(offers(role, before, but, given))
     while left:
         taken = left[0]
         now = Reading({**before, **taken})
         ran = role.run(now)
         yield taken, ran
-        used = [leaf for leaf in role.inputs if leaf in now.read or leaf in role.watched]
+        used = [leaf for leaf in role.inputs if leaf in now.read or leaf in role.watched | also]
         left = [one for one in left if any(one[leaf] != taken[leaf] for leaf in used)]

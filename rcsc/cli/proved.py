@@ -8,6 +8,7 @@ if TYPE_CHECKING:
 
     from rcsc.compose.ends import Ending
     from rcsc.compose.level import LevelProof
+    from rcsc.compose.rounds import Counted
     from rcsc.compose.system import SystemProof
     from rcsc.compose.transition import Stepper
 
@@ -24,7 +25,7 @@ def in_context(proof: "LevelProof") -> Iterator[str]:
     if seen.restless:
         yield "order after order may be given on inputs that stay the same"
     if proof.endings:
-        yield "given that every order is answered,"
+        yield "given that every order that is not replaced is answered some time, and stays so,"
         yield from (f"  {one.table} {_ends(one)}" for one in proof.endings)
 
 
@@ -35,12 +36,17 @@ def _ends(one: "Ending") -> str:
     said = f"ends after at most {changes} of state"
     if one.endless:
         lines = ", ".join(f"`{line}`" for line in one.endless)
-        return f"is not shown to end: line {lines} waits for what it reads"
+        return f"is not shown to end: {'line' if len(one.endless) == 1 else 'lines'} {lines} may run for ever"
     if one.counted:
-        said += " and what is counted: " + ", ".join(
-            f"line `{line}` by `{counter}`" for line, counter in one.counted
-        )
+        said += "; meanwhile " + ", ".join(map(_counted, one.counted))
+    if one.still:
+        said += "; if the values in {} stand still".format(", ".join(f"`{name}`" for name in one.still))
     return said
+
+
+def _counted(one: "Counted") -> str:
+    by = "" if one.least is None else f" by at least {one.least:.2g}"
+    return f"line `{one.line}` runs as long as `{one.counter}` rises{by}"
 
 
 def assumptions(proof: "SystemProof") -> str:

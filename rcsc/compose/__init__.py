@@ -12,7 +12,7 @@ What is proved, of each level alone in its environment (`level`):
   numbers, and numbers come one after the other.
 
 Besides, of its lines in their context: which are never reached, what one does that matches again (`context`), and that every
-command ends if every order is answered (`ends`).
+command ends if every order is answered (`ends`, `rounds`).
 
 What it assumes of its environment, the contract (`transition`), in words:
 
@@ -45,15 +45,17 @@ What it rests on besides:
   one that it finds echoed, and what it takes counts as seen. Such a beginning is proved like the first. For its
   neighbours it is an order that is superseded, or a report that failed; freshness then asks more: no order that the
   level gave before and that is not echoed yet may still be on its way, for it has the number that is now used again.
-- *Reals* and arithmetic are followed as far as `keyed` says; the rest may take any value.
+- *Reals* and arithmetic are followed as far as `keyed` says, and `measured` where a way has to end; the rest may take any value.
+- That commands *end* rests on more than the contract: an order that is not replaced is answered some time, and stays so; and
+  where it is said, the values in an input stand still meanwhile. Of a level below the first is what is shown of it in turn.
 - What stands outside the levels (workstation, robot, hand, camera) keeps to the same contract by its own means; it is
   listed, not proved.
 
 Modules, in the order the data flows: `contract` (who is whose environment), `transition` (a cycle as nodes), `goals`,
 `properties`, `features` (what an invariant may speak of), `walk` (states to begin with); the search, which is not trusted:
 `bits` (nodes as clauses of propositional logic), `sat`, `frames` (the invariant), `search`; what it finds is asked anew:
-`keyed` (nodes as terms), `confirm`, `context`, `ends`, `level`; then `kept` (the cache), `system`. What is not proved:
-`variants` (other rules), `trace` (the shortest failing run, run by the interpreter), `simplest`, `finding` (its time line),
-`together` (two levels as they are), `weakest` (what would mend it), `rerun` (by the executors, as a log), `frozen` (as a
-case), `look`. `promela` is another translation, for Spin.
+`keyed` and `measured` (nodes as terms), `confirm`, `context`, `rounds`, `ends`, `level`; then `kept` (the cache), `system`.
+What is not proved: `variants` (other rules), `trace` (the shortest failing run, run by the interpreter), `simplest`, `finding`
+(its time line), `together` (two levels as they are), `weakest` (what would mend it), `rerun` (by the executors, as a log),
+`frozen` (as a case), `look`. `promela` is another translation, for Spin.
 """

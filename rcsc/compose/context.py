@@ -46,15 +46,15 @@ def context(stepper: Stepper, asked: Confirmation, clauses: Sequence[Clause]) ->
     """Asks all of it."""
     cycle = asked.cycle
     again = stepper.cycle(cycle.after, taken=cycle.taken)
-    sent = _new_number(stepper, cycle)
+    sent = gives_an_order(stepper, cycle)
     return Context(
         tuple(_unreached(asked, clauses)),
         tuple(_repeated(stepper, asked, clauses, again, sent)),
-        _possible(asked, clauses, (sent, _new_number(stepper, again))),
+        _possible(asked, clauses, (sent, gives_an_order(stepper, again))),
     )
 
 
-def _new_number(stepper: Stepper, cycle: Cycle) -> Node:
+def gives_an_order(stepper: Stepper, cycle: Cycle) -> Node:
     """That the cycle gives an order."""
     numbers = [f"{below.order}.{NUMBER}" for below in stepper.links.below]
     return values.any_of(

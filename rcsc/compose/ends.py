@@ -1,36 +1,38 @@
 """That every command ends, given that what is below answers: no deadlock, and nothing that goes on for ever.
 
 In: a stepper, and what was confirmed of it. Out: an `Ending` for each table. A level is *answered* in a cycle when each
-subordinate echoes the last order and says of it *done* or *failed*; of the first command, PAUSE or its like, *done*. The
-argument, for a level that keeps one command and reports *executing*:
+subordinate echoes the last order and says of it *done* or *failed*; of the first command, PAUSE or its like, *done*. It is
+assumed that each order, if no other replaces it, is answered some time and stays so. The argument, for a level that keeps one
+command and reports *executing*:
 
 - Its *phase* is its pending next states, and the flags that its lines write. From phase to phase there is no way round (all
   steps are listed by the solver, from the invariant), so the phase changes at most `changes` times.
-- While the phase stays, an answered cycle may run a line again only `MOST` times, or only while a counter of the level rises
-  (`counted`), which ends at the end of its range.
+- While the phase stays, lines follow one another. A line that comes again and again stands on a way round among them. It
+  comes finitely often if there is a *counter*, a number of the level that rises whenever the line runs and never falls on that
+  way round: it ends at the end of its range. A real has to rise by a share of its range (`SMALLEST`), found in fractions
+  (`measured`). Lines that have one are taken out, and what is left is looked at again.
+- A line that gives orders must have one, at least for the cycles in which it does so. So orders end.
+- Then answers come, and stay. Among the lines that are left nothing may go round in answered cycles that give no order.
 
-So a level that does not end is one that is not answered: it ends if its subordinates, whenever an order stands, answer it.
-Lines for which neither is shown are named in `endless`: they wait for what they read. That a robot arrives is arithmetic,
-which is left open here (`keyed`).
+Lines for which this is not shown are named in `endless`: they wait for what they read.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from rcsc.compose.confirm import Confirmation
-from rcsc.compose.context import may, of_lines
-from rcsc.compose.contract import COMMAND, ECHO, NUMBER, STATUS
+from rcsc.compose.context import gives_an_order, of_lines
+from rcsc.compose.contract import COMMAND, ECHO, ECHOED, NUMBER, STATUS
 from rcsc.compose.frames import Clause
 from rcsc.compose.goals import FLAG
 from rcsc.compose.keyed import sort
+from rcsc.compose.rounds import Counted, Turn, lines_that_stop
 from rcsc.compose.transition import Cycle, Stepper, TableAt
-from rcsc.model import Bool, Enum, Int, Kind, Op, pending
+from rcsc.model import Bool, Enum, Kind, pending
 from rcsc.prove import smt, values
-from rcsc.prove.smt import Answer, Solver
+from rcsc.prove.smt import Answer
 from rcsc.prove.values import Node
 
-MOST = 3
-"""Answered cycles after which a line that runs again and again is looked at."""
 MOST_STEPS = 400
 DONE, EXECUTING = "done", "executing"
 
@@ -43,13 +45,15 @@ class Ending:
 
     Attributes:
         changes: How often the phase can change while the command lasts; None where it could go round.
-        counted: Lines that may run again for as long as a counter rises, with the counter.
+        counted: Lines that may run for as long as a counter rises.
+        still: Inputs whose values, echoes and statuses apart, are taken to stand still meanwhile.
         endless: Lines of which it is not shown that they end.
     """
 
     table: str
     changes: int | None
-    counted: tuple[tuple[str, str], ...] = ()
+    counted: tuple[Counted, ...] = ()
+    still: tuple[str, ...] = ()
     endless: tuple[str, ...] = ()
 
     @property
@@ -85,22 +89,15 @@ def reports(stepper: Stepper) -> bool:
 
 
 class _Flow:
-    """The questions of one level.
-
-    Attributes:
-        cycles: `MOST` cycles in a row, the first from anywhere in the invariant.
-    """
+    """The questions of one level."""
 
     def __init__(self, stepper: Stepper, asked: Confirmation, clauses: Sequence[Clause]) -> None:
         self.stepper, self.asked, self.clauses = stepper, asked, clauses
         self.keyed = asked.keyed
-        cycles = [asked.cycle]
-        for number in range(2, MOST + 1):
-            cycles.append(stepper.cycle(cycles[-1].after, f" {number}"))
-        self.cycles = cycles
+        self.rows: dict[tuple[str, ...], list[Cycle]] = {}
         self.leaves = self._phase()
-        self.before = [cycles[0].before[leaf] for leaf in self.leaves]
-        self.after = [cycles[0].after[leaf] for leaf in self.leaves]
+        self.before = [self.asked.cycle.before[leaf] for leaf in self.leaves]
+        self.after = [self.asked.cycle.after[leaf] for leaf in self.leaves]
 
     def _phase(self) -> list[str]:
         """Pending states, the flag of a new command, and flags that lines write."""
@@ -120,22 +117,22 @@ class _Flow:
 
     def ending(self, number: int) -> Ending:
         """Of one table."""
-        at = self.cycles[0].tables[number]
+        at = self.asked.cycle.tables[number]
         steps = self._steps(at)
         changes = None if steps is None else longest(steps)
-        counted, endless = [], []
-        for line, counter, ends in self._again(number):
-            if counter:
-                counted.append((line, counter))
-            elif not ends:
-                endless.append(line)
-        return Ending(str(at.table.name), changes, tuple(counted), tuple(endless))
+        found = lines_that_stop(
+            self.stepper.program,
+            self.asked,
+            self.clauses,
+            lambda still: self._turns(number, still),
+        )
+        return Ending(str(at.table.name), changes, found.counted, found.still, found.endless)
 
     def not_round(self, number: int) -> list[Node]:
         """That a step is not taken, for each that is on a way round."""
-        at = self.cycles[0].tables[number]
+        at = self.asked.cycle.tables[number]
         steps = self._steps(at) or set()
-        taken = values.both(at.chosen, self._goes_on(self.cycles[0]))
+        taken = values.both(at.chosen, self._goes_on(self.asked.cycle))
         return [
             values.negation(values.all_of((taken, *self._are(self.before, one), *self._are(self.after, two))))
             for one, two in sorted(steps)
@@ -177,20 +174,42 @@ class _Flow:
             found += [echoed, ended, values.follows(rests, done)]
         return values.all_of(found)
 
-    def _stays(self, cycle: Cycle) -> Node:
-        """The phase stays."""
-        return values.all_of(values.equal(cycle.before[leaf], cycle.after[leaf]) for leaf in self.leaves)
+    def _turns(self, number: int, still: tuple[str, ...]) -> tuple[Turn, Turn, Turn]:
+        """Of a table: three cycles in a row."""
+        one, two, three = (self._turn(cycle, number) for cycle in self._cycles(still))
+        return one, two, three
+
+    def _cycles(self, still: tuple[str, ...]) -> list[Cycle]:
+        """Three in a row, from anywhere in the invariant, in which these inputs keep their values."""
+        if still not in self.rows:
+            row = [self.asked.cycle]
+            kept = {leaf: taken for leaf, taken in row[0].taken.items() if _stands_still(leaf, still)}
+            for suffix in (" second", " third"):
+                free = {
+                    leaf: values.variable(f"{leaf}{suffix}", node.kind) for leaf, node in row[0].taken.items()
+                }
+                row.append(self.stepper.cycle(row[-1].after, taken={**free, **kept}))
+            self.rows[still] = row
+        return self.rows[still]
+
+    def _turn(self, cycle: Cycle, number: int) -> Turn:
+        """The cycle of a table, in which the command goes on, and the phase stays."""
+        same = values.all_of(values.equal(cycle.before[leaf], cycle.after[leaf]) for leaf in self.leaves)
+        at = cycle.tables[number]
+        stays = values.all_of((at.chosen, cycle.contract, self._goes_on(cycle), same))
+        orders = gives_an_order(self.stepper, cycle)
+        return Turn(at, cycle.before, cycle.after, stays, orders, self._answered(cycle))
 
     # --- from phase to phase ---
 
     def _steps(self, at: TableAt) -> set[tuple[Phase, Phase]] | None:
         """Every change of phase in a cycle that runs the table; None where they are too many, or the solver gave up."""
-        keyed, cycle = self.keyed, self.cycles[0]
-        wanted = values.all_of((at.chosen, self._goes_on(cycle), values.negation(self._stays(cycle))))
-        moves = [keyed.term(wanted)]
+        keyed, cycle = self.keyed, self.asked.cycle
+        stays = values.all_of(map(values.equal, self.before, self.after))
+        moves = keyed.term(values.all_of((at.chosen, self._goes_on(cycle), values.negation(stays))))
         ends = [keyed.term(node) for node in (*self.before, *self.after)]
         solver = self.asked.known(self.clauses)
-        solver.add(*keyed.ranges, *moves)
+        solver.add(*keyed.ranges, moves)
         found: set[tuple[Phase, Phase]] = set()
         while len(found) < MOST_STEPS:
             answer = solver.check()
@@ -208,47 +227,11 @@ class _Flow:
             solver.add(smt.negation(smt.all_of(same)))
         return None
 
-    # --- while the phase stays ---
 
-    def _again(self, number: int) -> Iterator[tuple[str, str, bool]]:
-        """Lines that may run in answered cycles while the phase stays, with what they count, and whether they stop."""
-        keyed, first = self.keyed, self.cycles[0]
-        loops = [self._loop(cycle, number) for cycle in self.cycles]
-        terms = [keyed.term(one) for one in loops]
-        table = first.tables[number]
-        matches = [[keyed.term(match) for match in cycle.tables[number].matches] for cycle in self.cycles]
-        counters = {
-            leaf: smt.negation(keyed.term(values.compare(Op.LT, first.before[leaf], first.after[leaf])))
-            for leaf in self._counters()
-        }
-        solver = self.asked.known(self.clauses)
-        solver.add(*keyed.ranges, terms[0])
-        for line, match in zip(table.table.lines, zip(*matches, strict=True), strict=True):
-            solver.push()
-            solver.add(match[0])
-            if may(solver):
-                counter = next((leaf for leaf, falls in counters.items() if not may(solver, falls)), "")
-                yield str(line.name), counter, bool(counter) or not self._on(solver, terms[1:], match[1:])
-            solver.pop()
-
-    @staticmethod
-    def _on(solver: Solver, loops: Sequence[smt.Term], matches: Sequence[smt.Term]) -> bool:
-        """Whether the line may run in all the following cycles, too."""
-        return may(solver, *loops, *matches)
-
-    def _loop(self, cycle: Cycle, number: int) -> Node:
-        at = cycle.tables[number]
-        return values.all_of(
-            (at.chosen, cycle.contract, self._goes_on(cycle), self._answered(cycle), self._stays(cycle))
-        )
-
-    def _counters(self) -> list[str]:
-        """Whole numbers that the level keeps, and what is pending of them."""
-        owned = [
-            v for v in self.stepper.program.variables if v.kind is Kind.STATE and isinstance(v.type, Int)
-        ]
-        later = [str(pending(v.name)) for v in owned if v.deferred_until is not None]
-        return list(dict.fromkeys([*(str(v.name) for v in owned), *later]))
+def _stands_still(leaf: str, still: tuple[str, ...]) -> bool:
+    """Whether it is a value, no echo or status, in one of these inputs."""
+    record, _, part = leaf.partition(".")
+    return record in still and part not in (NUMBER, ECHO, ECHOED, STATUS)
 
 
 def longest(steps: set[tuple[Phase, Phase]]) -> int | None:

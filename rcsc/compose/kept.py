@@ -16,6 +16,7 @@ from rcsc.compose.features import CLOSELY, Feature
 from rcsc.compose.goals import goals
 from rcsc.compose.level import LevelProof, Verdict
 from rcsc.compose.properties import every_feature
+from rcsc.compose.rounds import Counted
 from rcsc.compose.search import Effort, read
 from rcsc.compose.transition import Stepper
 
@@ -56,8 +57,8 @@ def _context(kept: dict[str, Any] | None) -> Context | None:
 
 
 def _ending(kept: dict[str, Any]) -> Ending:
-    counted = tuple((line, counter) for line, counter in kept["counted"])
-    return Ending(kept["table"], kept["changes"], counted, tuple(kept["endless"]))
+    counted = tuple(Counted(**one) for one in kept["counted"])
+    return Ending(kept["table"], kept["changes"], counted, tuple(kept["still"]), tuple(kept["endless"]))
 
 
 def keep(cache: Cache, stepper: Stepper, effort: Effort, proof: LevelProof) -> None:

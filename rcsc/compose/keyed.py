@@ -23,11 +23,10 @@ from rcsc.model import (
     Real,
     Scalar,
     Value,
-    key_bounds,
     real_key,
     value_of_key,
 )
-from rcsc.prove import smt
+from rcsc.prove import smt, values
 from rcsc.prove.smt import Term
 from rcsc.prove.values import Node, parts_first
 
@@ -72,15 +71,21 @@ class Keyed:
     def variable(self, name: str, kind: Scalar) -> Term:
         """The term of a variable, in its declared range."""
         if name not in self._variables:
-            found = _fresh(name, kind)
+            found = self.fresh(name, kind)
             if not isinstance(kind, Bool):
-                self._within(found, *key_bounds(kind), kind)
+                self.within(found, *values.bounds(kind), kind)
             self._variables[name] = found
         return self._variables[name]
 
     def fresh(self, name: str, kind: Scalar) -> Term:
         """A constant of the sort that values of the type have here; its range is not asserted."""
-        return _fresh(name, kind)
+        return smt.member(name) if isinstance(kind, Enum) else smt.variable(name, sort(kind))
+
+    def literal(self, kind: Scalar, value: int | float) -> Term:
+        """A constant."""
+        if isinstance(kind, Bool):
+            return smt.truth(bool(value))
+        return _key(kind, real_key(float(value)) if isinstance(kind, Real) else int(value))
 
     def equal(self, term: Term, node: Node) -> Term:
         """That the term is the node's value."""
@@ -92,15 +97,16 @@ class Keyed:
             return term if key else smt.negation(term)
         return smt.equal(term, _key(kind, key), KEY)
 
-    def _within(self, term: Term, low: int, high: int, kind: Scalar) -> None:
-        least, greatest = _key(kind, low), _key(kind, high)
+    def within(self, term: Term, low: int | float, high: int | float, kind: Scalar) -> None:
+        """Asserts that a number or member lies within finite bounds."""
+        least, greatest = self.literal(kind, low), self.literal(kind, high)
         self.ranges.append(smt.all_of([smt.at_most(least, term, KEY), smt.at_most(term, greatest, KEY)]))
 
     def _made(self, node: Node) -> Term:
         parts = [self._terms[part] for part in node.args]
         match node.op:
             case "constant":
-                return _literal(node.kind, node.low)
+                return self.literal(node.kind, node.low)
             case "variable":
                 return self.variable(node.name, node.kind)
             case "choice":
@@ -116,7 +122,7 @@ class Keyed:
         if op is Op.AND:
             return smt.all_of(parts)
         if not all(arg.ordered for arg in node.args):
-            return self._any(node)
+            return self.any(node)
         if op in COMPARISONS:
             compare = {Op.EQ: smt.equal, Op.LT: smt.below, Op.LE: smt.at_most}[op]
             return compare(parts[0], parts[1], sort(node.args[0].kind))
@@ -137,7 +143,7 @@ class Keyed:
                 else smt.choice(first, parts[1], parts[0])
             )
         if isinstance(node.args[0].kind, Real) or isinstance(node.kind, Real):
-            return self._any(node)
+            return self.of_reals(op, node, parts)
         if op in (Op.ADD, Op.SUB) or (op is Op.MUL and any(arg.known for arg in node.args)):
             return smt.integer_operation(op.value, parts[0], parts[1])
         if (
@@ -148,19 +154,21 @@ class Keyed:
         ):
             wrapped = smt.integer_operation("-", parts[0], parts[1])
             return smt.choice(smt.below(parts[0], parts[1], KEY), parts[0], wrapped)
-        return self._any(node)
+        return self.any(node)
 
-    def _any(self, node: Node) -> Term:
+    def of_reals(self, op: Op, node: Node, parts: list[Term]) -> Term:  # noqa: ARG002 - for those who know more
+        """An operation with a real in it."""
+        return self.any(node)
+
+    def any(self, node: Node) -> Term:
         """Any value within the bounds of the node."""
         key = node.op, node.kind, tuple(self._written(arg) for arg in node.args)
         found = self._open.get(key)
         if found is None:
             self.guessed += 1
-            found = self._open[key] = _fresh(f"any!{self.guessed}", node.kind)
+            found = self._open[key] = self.fresh(f"any!{self.guessed}", node.kind)
         if not isinstance(node.kind, Bool) and math.isfinite(node.low) and math.isfinite(node.high):
-            real = isinstance(node.kind, Real)
-            ends = (real_key(node.low), real_key(node.high)) if real else (int(node.low), int(node.high))
-            self._within(found, *ends, node.kind)
+            self.within(found, node.low, node.high, node.kind)
         return found
 
     def _written(self, node: Node) -> int:
@@ -176,18 +184,8 @@ class Keyed:
         return self._number_of[node]
 
 
-def _literal(kind: Scalar, value: int | float) -> Term:
-    if isinstance(kind, Bool):
-        return smt.truth(bool(value))
-    return _key(kind, real_key(float(value)) if isinstance(kind, Real) else int(value))
-
-
 def _key(kind: Scalar, key: int) -> Term:
     return smt.member_literal(key) if isinstance(kind, Enum) else smt.literal(KEY, key)
-
-
-def _fresh(name: str, kind: Scalar) -> Term:
-    return smt.member(name) if isinstance(kind, Enum) else smt.variable(name, sort(kind))
 
 
 def value_in(solver: smt.Solver, term: Term, kind: Scalar) -> Value:

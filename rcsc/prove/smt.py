@@ -8,6 +8,7 @@ import struct
 import sys
 from collections.abc import Sequence
 from enum import Enum, auto
+from fractions import Fraction
 from functools import cache
 from typing import Any, NewType
 
@@ -68,6 +69,21 @@ def member_literal(index: int) -> Term:
     return Term(_z3().BitVecVal(index, 16))
 
 
+def number(name: str) -> Term:
+    """A fresh constant for a real number, with no end to its digits."""
+    return Term(_z3().Real(name))
+
+
+def fraction(value: float) -> Term:
+    """A finite double as the number that it is."""
+    return Term(_z3().RealVal(str(Fraction(value))))
+
+
+def as_number(term: Term) -> Term:
+    """An integer among the real numbers."""
+    return Term(_z3().ToReal(term))
+
+
 def truth(value: bool) -> Term:
     """The constant true or false."""
     return Term(_z3().BoolVal(value))
@@ -122,7 +138,7 @@ def below(left: Term, right: Term, kind: Scalar) -> Term:
 
 
 def integer_operation(op: str, left: Term, right: Term) -> Term:
-    """`+ - * / mod` of mathematical integers; `/` rounds toward zero and `mod` goes with it."""
+    """`+ - * / mod` of mathematical integers, the first three also of real numbers; `/` rounds toward zero, `mod` goes with it."""
     z3: Any = _z3()
     a: Any = left
     b: Any = right
@@ -131,6 +147,12 @@ def integer_operation(op: str, left: Term, right: Term) -> Term:
     size = z3.If(a >= 0, a, -a) / z3.If(b >= 0, b, -b)
     quotient = z3.If((a >= 0) == (b > 0), size, -size)
     return Term(quotient if op == "/" else a - quotient * b)
+
+
+def quotient(left: Term, right: float) -> Term:
+    """A real number divided by one that is not zero."""
+    a: Any = left
+    return Term(a / _z3().RealVal(str(Fraction(right))))
 
 
 def double_operation(op: str, left: Term, right: Term) -> Term:

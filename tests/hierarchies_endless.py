@@ -1,0 +1,121 @@
+"""Runs of a level in which a command goes on for ever: looked for among every state that it can reach.
+
+In: a role, its states. Out: why a table's command need not end, or nothing. Written anew, to hold `rcsc.compose.ends` against it. A
+command goes on for ever where states can be gone round under one number, with *executing* reported in each cycle, and either an
+order is given on the way, so that there is always another one to be answered, or every cycle is quiet: all orders are answered,
+and none is given.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from rcsc.compose.contract import Below
+from rcsc.interpret import Fault
+from rcsc.model import Enum, Value
+from tests.hierarchies_explored import successors
+from tests.hierarchies_level import Ran, Role, State
+from tests.hierarchies_world import canonical
+
+ECHOED = ("inc_command", "inc_command_echo", "ref_command_echo", "status_report")
+
+
+@dataclass(frozen=True, slots=True)
+class Edge:
+    """A cycle in which the command goes on.
+
+    Attributes:
+        orders: It gives an order; `quiet`, all are answered and none is given.
+        values: What it read, echoes and statuses apart.
+    """
+
+    start: State
+    end: State
+    table: str
+    orders: bool
+    quiet: bool
+    values: tuple[tuple[str, Value], ...]
+
+
+def edges(role: Role, seen: set[State]) -> list[Edge]:
+    """Every cycle from these states in which the command goes on; whoever reports to nobody has none."""
+    above = role.links.above
+    if above is None:
+        return []
+    found = []
+    report = f"{above.report}.status_report"
+    statuses = {f"{below.report}.status_report" for below in role.links.below}
+    varied = statuses | {leaf for leaf in role.inputs if leaf.partition(".")[2] not in ECHOED}
+    for state in seen:
+        before = dict(zip(role.start, state, strict=True))
+        for taken, ran in successors(role, before, also=frozenset(varied)):
+            same = taken[f"{above.order}.inc_command"] == before[f"{above.order}.inc_command"]
+            if ran.fault is Fault.OK and same and _says(role, ran.after, report, "executing"):
+                found.append(_edge(role, state, before, taken, ran))
+    return found
+
+
+def _edge(role: Role, state: State, before: dict[str, Value], taken: dict[str, Value], ran: Ran) -> Edge:
+    sent = [f"{below.order}.inc_command" for below in role.links.below]
+    orders = any(ran.after[leaf] != before[leaf] for leaf in sent)
+    answered = all(_answered(role, below, before, taken) for below in role.links.below)
+    read = tuple((leaf, taken[leaf]) for leaf in role.inputs if leaf.partition(".")[2] not in ECHOED)
+    end = tuple(canonical(role, ran.after).values())
+    return Edge(state, end, ran.table, orders, answered and not orders, read)
+
+
+def _answered(role: Role, below: Below, before: Mapping[str, Value], taken: Mapping[str, Value]) -> bool:
+    """The last order is echoed, and ended: PAUSE by *done* alone."""
+    said = f"{below.report}.status_report"
+    if taken[f"{below.report}.inc_command_echo"] != before[f"{below.order}.inc_command"]:
+        return False
+    if before[f"{below.order}.input_command"] == 0:
+        return _says(role, taken, said, "done")
+    return not _says(role, taken, said, "executing")
+
+
+def _says(role: Role, now: Mapping[str, Value], leaf: str, member: str) -> bool:
+    kind = role.program.variable(leaf).type
+    assert isinstance(kind, Enum)
+    return now[leaf] == kind.members.index(member)
+
+
+def endless(every: list[Edge], table: str, still: tuple[str, ...]) -> str:
+    """How the table's command may go on for ever while these inputs keep their values; blank where it may not."""
+    for some in _apart([edge for edge in every if edge.table == table], still):
+        if _round([edge for edge in some if edge.quiet]):
+            return "round in quiet cycles"
+        onward: dict[State, set[State]] = {}
+        for edge in some:
+            onward.setdefault(edge.start, set()).add(edge.end)
+        if any(edge.orders and _leads(onward, edge.end, edge.start) for edge in some):
+            return "order after order"
+    return ""
+
+
+def _apart(every: list[Edge], still: tuple[str, ...]) -> Iterator[list[Edge]]:
+    """The edges by what the inputs are that keep their values."""
+    groups: dict[tuple[tuple[str, Value], ...], list[Edge]] = {}
+    for edge in every:
+        kept = tuple((leaf, value) for leaf, value in edge.values if leaf.partition(".")[0] in still)
+        groups.setdefault(kept, []).append(edge)
+    yield from groups.values()
+
+
+def _round(some: list[Edge]) -> bool:
+    """Whether the edges lead round: what is left when ends are taken away again and again."""
+    while some:
+        starts = {edge.start for edge in some}
+        left = [edge for edge in some if edge.end in starts]
+        if len(left) == len(some):
+            return True
+        some = left
+    return False
+
+
+def _leads(onward: dict[State, set[State]], start: State, end: State) -> bool:
+    seen, waiting = {start}, [start]
+    while waiting:
+        new = onward.get(waiting.pop(), set()) - seen
+        seen |= new
+        waiting += new
+    return end in seen
