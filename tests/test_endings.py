@@ -83,6 +83,13 @@ def test_a_line_that_counts_is_shown_to_stop(tmp_path: Path) -> None:
     assert (found.proved, found.counted, found.still) == (True, (Counted("2", "c"),), ())
 
 
+def test_a_counter_that_rises_only_now_and_then_is_none(tmp_path: Path) -> None:
+    counts = go(
+        WAY, "state c : int 0 .. 9", "on := c >= 9", "c := 0", "if there {\n    c := min(c + 1, 9)\n  }"
+    )
+    assert ending(tmp_path, counts).endless == ("2",)
+
+
 def test_default_may_go_on_for_ever_like_any_line(tmp_path: Path) -> None:
     lines = (
         "  | 3 | false | going | true | || state(d_state) | done |\n  | 5 | DEFAULT | | | || | executing |\n"
