@@ -9,8 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import jinja2
-
+from sim.pictures.page import PAGES
 from sim.pictures.plot import plot
 
 
@@ -100,15 +99,6 @@ class _Table:
     most: int
 
 
-_PAGES = jinja2.Environment(
-    loader=jinja2.PackageLoader("sim", "pictures"),
-    undefined=jinja2.StrictUndefined,
-    trim_blocks=True,
-    lstrip_blocks=True,
-    autoescape=True,
-)
-
-
 def report(path: Path, story: Story) -> None:
     """Writes the page.
 
@@ -120,7 +110,7 @@ def report(path: Path, story: Story) -> None:
 
 def page(story: Story) -> str:
     """The page; the same text for the same story."""
-    return _PAGES.get_template("report.html.jinja").render(
+    return PAGES.get_template("report.html.jinja").render(
         story=story,
         seconds=lambda tick: tick * story.tick_ms / 1000,
         plots=[(name, plot(points)) for name, points in story.series.items()],

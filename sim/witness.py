@@ -21,7 +21,8 @@ from rcsc.workstation.station import Result
 from sim.arm import margins_deg, solve
 from sim.physical import Physical
 from sim.pictures.solid import solid
-from sim.pictures.stick import Scene, outline, pads, stick
+from sim.pictures.stick import Scene, pads, stick
+from sim.pictures.things import outline
 from sim.plant import Latest, Plant
 from sim.report import Figure, Frame, Matched, Placement, Row, Story
 

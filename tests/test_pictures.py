@@ -20,7 +20,9 @@ from rcsc.database.pose import nine
 from sim.arm import LIMITS_DEG, plate, skeleton
 from sim.pictures.plot import plot, ticks
 from sim.pictures.solid import OVERVIEW, View, solid
-from sim.pictures.stick import FRONT, HIGH_MM, LOW_MM, SIDE, TOP, Outline, Scene, pads, stick
+from sim.pictures.stick import Scene, pads, stick
+from sim.pictures.things import Outline
+from sim.pictures.views import FRONT, HIGH_MM, LOW_MM, SIDE, TOP
 from sim.report import Figure, Frame, Matched, Placement, Row, Story, page, report
 from tests.browser import Browser
 

@@ -65,7 +65,8 @@ Examples:
   rcsc log run.mcap                                ticks, levels, and how often each line ran
   rcsc log run.mcap --csv run.csv --json run.json  every cycle, in the tables' words
   rcsc log run.mcap --plot task.cur_state,primitive.travelled_mm -o run.svg
-  rcsc log run.mcap --plot primitive.robot.plate[1] --against primitive.robot.plate[0] -o path.svg""",
+  rcsc log run.mcap --plot primitive.robot.plate[1] --against primitive.robot.plate[0] -o path.svg
+  rcsc log found/task_waits_to_emove.mcap --report waits.html   what `rcsc prove --log found` found, cycle by cycle""",
 )
 @FILE
 @click.option("--csv", type=_TO, default=None, metavar="OUT", help="Write a row a tick to OUT.")
@@ -78,10 +79,14 @@ Examples:
               help="Draw these, `level.leaf`, over time; needs -o and the extra `plot`.")  # fmt: skip
 @click.option("--against", default=None, metavar="VAR", help="Draw them over VAR instead.")
 @click.option("-o", "--output", type=_TO, default=None, metavar="PICTURE", help="Where: .svg, .png or .pdf.")
+@click.option("--report", type=_TO, default=None, metavar="PAGE",
+              help="Write a page about a finding of `rcsc prove --log`: its levels and the cell, cycle by cycle.")  # fmt: skip
+@click.option("--system", type=click.Path(exists=True, dir_okay=False, path_type=Path), default=None, metavar="FILE",
+              help="For --report: the system whose cell is drawn; else system.toml here or in tables/, if it is the log's.")  # fmt: skip
 @_told
-def log(
+def log(  # noqa: PLR0913  # as many as there are options
     *, file: Path, csv: Path | None, json_: Path | None, parquet: Path | None, plot: str | None,
-    against: str | None, output: Path | None,
+    against: str | None, output: Path | None, report: Path | None, system: Path | None,
 ) -> int:  # fmt: skip
     """Say what the run recorded in FILE did: its ticks, its levels, and which lines of which tables ran.
 
@@ -90,13 +95,23 @@ def log(
     from rcsc.log.read import read
 
     _check_plot(plot, against, output)
+    if system is not None and report is None:
+        raise click.UsageError("--system needs --report")
     found = read(file)
+    if report is not None and found.finding is None:
+        return _refuse(
+            file, Code.NO_FINDING, "the log keeps no finding of `rcsc prove`, of which a page could be made",
+            help_="`rcsc run SCRIPT --report PAGE` makes one of a run in the cell; `--plot` draws values of its log",
+        )  # fmt: skip
     exported = _exported(found, csv, json_, parquet)
     if plot is not None and output is not None:
         from rcsc.log.plot import plot as draw
 
         _written(output, lambda: draw(found, [one.strip() for one in plot.split(",")], output, against))
         exported.append(output)
+    if report is not None:
+        _report(report, found, system)
+        exported.append(report)
     for path in exported:
         click.echo(f"wrote {path}")
     if not exported:
@@ -137,6 +152,19 @@ def _written(path: Path, write: Callable[[], object]) -> None:
         raise UnwritableError(str(path), error.strerror or "no reason given") from error
 
 
+def _report(path: Path, found: "Log", system: Path | None) -> None:
+    """Draws a finding."""
+    from rcsc.cli.drawn import cell_of
+    from sim.trace import trace
+
+    finding = found.finding
+    assert finding is not None
+    cell, why_not = cell_of(found, system)
+    if cell is None:
+        click.echo(f"no cell is drawn: {why_not}")
+    _written(path, lambda: trace(path, found, finding, cell, why_not))
+
+
 def _summary(found: "Log") -> None:
     from rcsc.log.export import coverage
 
@@ -144,6 +172,9 @@ def _summary(found: "Log") -> None:
     seconds = count * found.tick_ms / 1000
     end = "" if found.complete else "; cut off: up to the last second is lost"
     click.echo(f"{found.facts['name']}: {count} ticks of {found.tick_ms} ms, {seconds:g} s{end}")
+    if (shown := found.finding) is not None:
+        where = f"level `{shown.level}`" + (f", table `{shown.table}`" if shown.table else "")
+        click.echo(f"a finding, broken in cycle {shown.broken_at}: {where}: {shown.goal}")
     for level in found.levels:
         _summed(level)
         for table in coverage(found):

@@ -38,7 +38,7 @@ Examples:
   rcsc prove tables/system.toml --level task   one level in its environment
   rcsc prove --certificate proof               the invariants as SMT-LIB, for another solver
   rcsc prove --level task --without-deferral   what section 9 warns of: the shortest trace
-  rcsc prove --log found                       each trace as a log, for `rcsc replay`
+  rcsc prove --log found                       each trace as a log, for `rcsc replay` and `rcsc log`
   rcsc prove --case tests/found/a.json         a frozen finding, again""",
 )
 @click.argument(
@@ -52,7 +52,7 @@ Examples:
 @click.option("--trace", "cycles", type=click.IntRange(min=0, max=40), default=8, show_default=True, metavar="N",
               help="For what is not proved, look for a trace of at most N cycles; 0 does not look.")  # fmt: skip
 @click.option("--log", "logs", type=click.Path(file_okay=False, path_type=Path), default=None, metavar="DIR",
-              help="Keep each trace in DIR as a log that `rcsc replay` steps, with the executors that ran it.")  # fmt: skip
+              help="Keep each trace in DIR as a log that `rcsc replay` steps and `rcsc log` draws, with its executors.")  # fmt: skip
 @click.option("--freeze", type=click.Path(file_okay=False, path_type=Path), default=None, metavar="DIR",
               help="Keep each trace in DIR as a case for --case: a test that fails until the tables are mended.")  # fmt: skip
 @click.option("--case", "cases", multiple=True, type=click.Path(dir_okay=False, path_type=Path), metavar="FILE",
@@ -316,6 +316,8 @@ def _say_told(made: "dict[str, Stepper]", told: "Told", cycles: int) -> None:
     if told.log is not None:
         folder = told.log.parent / "generated"
         click.echo(f"  = log: rcsc replay {told.log} --generated {folder}", err=True)
+        page = told.log.with_suffix(".html")
+        click.echo(f"  = picture: rcsc log {told.log} --report {page}", err=True)
 
 
 def _stated(made: "dict[str, Stepper]", told: "Told") -> str:

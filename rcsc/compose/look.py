@@ -182,7 +182,7 @@ class _Rerun:
         self._ready |= programs.keys()
         path = self.folder / f"{self._named(finding)}.mcap"
         try:
-            record(finding, self.made, system, path)
+            record(finding, self.made, system, path, altered=self.looking.altered)
         except ExecutorsDifferError as error:
             return replace(told, beside=error.beside)
         kept = path if self.looking.log is not None else None

@@ -12,11 +12,12 @@ from dataclasses import replace
 from pathlib import Path
 
 from rcsc.compose.contract import leaves_under
-from rcsc.compose.finding import Finding
+from rcsc.compose.finding import Finding, rows
 from rcsc.compose.trace import Step
 from rcsc.compose.transition import Stepper
 from rcsc.emit import emit_c, emit_python
 from rcsc.interpret import Fault
+from rcsc.log.finding import LoggedCycle, LoggedFinding
 from rcsc.log.write import Recorder
 from rcsc.lower import lower, lower_by_force
 from rcsc.model import Kind as VariableKind
@@ -76,8 +77,17 @@ def make(programs: Iterable[Program], folder: Path, *, altered: bool) -> tuple[s
 # --- the run, again ------------------------------------------------------------------------
 
 
-def record(finding: Finding, made: Mapping[str, Stepper], system: Description, path: Path) -> None:
+def record(
+    finding: Finding, made: Mapping[str, Stepper], system: Description, path: Path, *, altered: bool = False
+) -> None:
     """Runs a finding on the executors in `system.generated`, both kinds, and writes what they do as a log.
+
+    Args:
+        finding: The run.
+        made: The levels in it.
+        system: Their system.
+        path: Where the log goes.
+        altered: The programs are not what their tables say; the log says so.
 
     Raises:
         ExecutorsDifferError: They do something else than the interpreter did.
@@ -90,9 +100,27 @@ def record(finding: Finding, made: Mapping[str, Stepper], system: Description, p
         for _ in _cycles(finding, made, _begun(finding, alone, kind), kind):
             pass
     running = _begun(finding, alone, KINDS[0])
-    with Recorder(running, path) as recorder:
+    with Recorder(running, path, _logged(finding, made, altered)) as recorder:
         for ran in _cycles(finding, made, running, KINDS[0]):
             recorder(running, ran)
+
+
+def _logged(finding: Finding, made: Mapping[str, Stepper], altered: bool) -> LoggedFinding:
+    """What the log says of it besides the states."""
+    cycles = {
+        (row.tick, row.level): LoggedCycle(finding.ticks[row.tick - 1][row.level].matched, row.wrong)
+        for row in rows(made, finding)
+    }
+    return LoggedFinding(
+        finding.level,
+        finding.goal.table,
+        finding.goal.shown,
+        finding.broken_at,
+        finding.restarted,
+        finding.legal,
+        altered,
+        cycles,
+    )
 
 
 def part_of(system: Description, programs: Mapping[str, Program]) -> Description:

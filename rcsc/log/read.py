@@ -14,6 +14,7 @@ from mcap.records import Channel, Chunk, Footer, McapRecord, Message, Metadata
 from mcap.stream_reader import StreamReader, breakup_chunk
 from zstandard import ZstdError
 
+from rcsc.log.finding import FINDING, LoggedFinding, finding_of
 from rcsc.log.layout import (
     BUFFERS,
     LEVELS,
@@ -125,6 +126,7 @@ class Log:
         levels: From the top down.
         buffers: Those that no level fills, by name.
         complete: Whether the log was closed; otherwise up to a chunk is lost.
+        finding: What the run breaks; None where it is not kept for that.
     """
 
     facts: Mapping[str, str]
@@ -132,6 +134,7 @@ class Log:
     levels: tuple[LoggedLevel, ...]
     buffers: Mapping[str, Track]
     complete: bool
+    finding: LoggedFinding | None = None
 
     def system(self, generated: Path = _NOWHERE, database: Path = _NOWHERE) -> Description:
         """The description, with paths of here."""
@@ -269,7 +272,8 @@ class _Reading:
             for topic, channel in self.topics.items()
             if topic.startswith(BUFFERS)
         }
-        return Log(facts, self.metadata.get(PROGRAMS, {}), levels, buffers, self.complete)
+        found = finding_of(self.metadata[FINDING]) if FINDING in self.metadata else None
+        return Log(facts, self.metadata.get(PROGRAMS, {}), levels, buffers, self.complete, found)
 
     def _level(self, name: str) -> LoggedLevel:
         sign = self.signs[name]

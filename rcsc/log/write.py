@@ -11,6 +11,7 @@ from typing import Self
 
 from mcap.writer import CompressionType, Writer
 
+from rcsc.log.finding import FINDING, LoggedFinding, finding_facts
 from rcsc.log.layout import (
     BUFFERS,
     LEVELS,
@@ -45,8 +46,13 @@ class Recorder:
     again has a channel for that: each message is the state from which it goes on, at the tick of the cycle that it comes before.
     """
 
-    def __init__(self, system: System, path: Path) -> None:
+    def __init__(self, system: System, path: Path, finding: LoggedFinding | None = None) -> None:
         """Writes everything but the cycles, under another name first: a log that is there can be opened.
+
+        Args:
+            system: Whose cycles they will be.
+            path: Where to.
+            finding: What the run breaks, where it is kept for that.
 
         Raises:
             OSError: The file cannot be written.
@@ -57,7 +63,7 @@ class Recorder:
         self._file = beside.open("wb", buffering=1 << 20)
         self._writer = Writer(self._file, chunk_size=_ENDLESS, compression=CompressionType.ZSTD)
         try:
-            self._begin(system)
+            self._begin(system, finding)
             self._file.flush()
             beside.replace(path)
         except OSError:
@@ -65,10 +71,12 @@ class Recorder:
             beside.unlink(missing_ok=True)
             raise
 
-    def _begin(self, system: System) -> None:
+    def _begin(self, system: System, finding: LoggedFinding | None) -> None:
         self._writer.start(profile="rcsc", library="rcsc")
         self._writer.add_metadata(SYSTEM, system_facts(system.description))
         self._writer.add_metadata(PROGRAMS, fingerprints(system.description))
+        if finding is not None:
+            self._writer.add_metadata(FINDING, finding_facts(finding))
         self._levels = {
             level.name: (self._level_channel(level), level.sign.packed) for level in system.levels
         }

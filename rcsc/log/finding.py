@@ -1,0 +1,89 @@
+"""What a log says of the finding that it keeps: what the run breaks, and what no level's state holds of it.
+
+In: a `LoggedFinding`. Out: its text, a metadata record of the log; and back. The log of a run in the cell has none.
+"""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+FINDING = "rcsc.finding"
+"""Name of the metadata record."""
+
+
+@dataclass(frozen=True, slots=True)
+class LoggedCycle:
+    """One cycle of one level.
+
+    Attributes:
+        matched: Every line that matched, DEFAULT left out; a state tells one at the most.
+        wrong: What went wrong in it; empty for nothing.
+    """
+
+    matched: tuple[str, ...]
+    wrong: str
+
+
+@dataclass(frozen=True, slots=True)
+class LoggedFinding:
+    """A run that breaks something.
+
+    Attributes:
+        level: Whose goal it is.
+        table: That it is about; empty where it is about the whole level.
+        goal: Which, in words.
+        broken_at: The tick in which it is broken.
+        restarted: Whether it begins where a restart does, and not with the initial values.
+        legal: Whether the levels around do only what neighbours can that began with it.
+        altered: Whether its tables were looked at under another rule than the language's.
+        cycles: By tick and level.
+    """
+
+    level: str
+    table: str
+    goal: str
+    broken_at: int
+    restarted: bool
+    legal: bool
+    altered: bool
+    cycles: Mapping[tuple[int, str], LoggedCycle]
+
+
+def finding_facts(finding: LoggedFinding) -> dict[str, str]:
+    """As a metadata record: texts by name."""
+    cycles = [
+        [tick, level, list(one.matched), one.wrong] for (tick, level), one in sorted(finding.cycles.items())
+    ]
+    return {
+        "level": finding.level,
+        "table": finding.table,
+        "goal": finding.goal,
+        "broken_at": str(finding.broken_at),
+        "restarted": json.dumps(finding.restarted),
+        "legal": json.dumps(finding.legal),
+        "altered": json.dumps(finding.altered),
+        "cycles": json.dumps(cycles, separators=(",", ":"), ensure_ascii=False),
+    }
+
+
+def finding_of(facts: Mapping[str, str]) -> LoggedFinding:
+    """What `finding_facts` was made of.
+
+    Raises:
+        KeyError, TypeError, ValueError: The facts are none.
+    """
+    cycles = {
+        (int(tick), str(level)): LoggedCycle(tuple(map(str, matched)), str(wrong))
+        for tick, level, matched, wrong in json.loads(facts["cycles"])
+    }
+    restarted, legal, altered = (bool(json.loads(facts[name])) for name in ("restarted", "legal", "altered"))
+    return LoggedFinding(
+        facts["level"],
+        facts["table"],
+        facts["goal"],
+        int(facts["broken_at"]),
+        restarted,
+        legal,
+        altered,
+        cycles,
+    )
