@@ -466,6 +466,69 @@ def test_where_only_one_version_goes_wrong_is_a_change() -> None:
     assert [v.leaf for v in change.values] == ["the run"]
 
 
+# --- properties --------------------------------------------------------------------------------------
+
+COUNTED = """\
+enum stage { begun, done }
+input width : int 0 .. 9
+state count : int 0 .. 9
+state at : stage
+procedure up { count := min(count + 1, 9) }
+property rises : count >= was count
+property ends : at = done until width = 0
+table t {
+  | line | at   || procedures |
+  | a    | done || up         |
+  | b    | /= done ||         |
+}
+level l { period 40 [ms]  table t }
+"""
+
+
+def property_part(old: str, new: str, name: str = "rises") -> Part:
+    assert COUNTED.count(old) == 1
+    return part(differ(COUNTED, COUNTED.replace(old, new)), name, "property")
+
+
+def test_a_property_that_says_the_same_in_other_words_is_the_same() -> None:
+    made = property_part("count >= was count", "not was count > count")
+    assert (made.changed, made.basis) == (False, Basis.SOLVER)
+    assert property_part("count >= was count", "count >= was count # as it was").basis is Basis.DIGEST
+    found = differ(COUNTED, COUNTED.replace("{ begun, done }", "{ done, begun }"))
+    assert not part(found, "ends", "property").changed  # members are the same by name, here too
+
+
+def test_a_property_that_says_something_else_is_a_region_over_two_cycles() -> None:
+    made = property_part("count >= was count", "count >= was count or width = 0")
+    assert made.said == ("count >= was count -> count >= was count or width = 0",)
+    [change] = made.changes
+    assert (change.sort, change.before, change.after) == (Sort.CONDITION, "false", "true")
+    assert change.where.inputs == (45, 1000)  # width = 0, and 45 of 100 pairs that fall
+    assert dict(change.witness) == {"width": "0", "count": "0", "was count": "1"}
+
+
+def test_what_is_not_defined_does_not_hold() -> None:
+    [change] = property_part("count >= was count", "count >= was count and 10 / count >= 0").changes
+    assert regions((change,)) == {("true", "false", ("count = 0", "was count = 0"))}
+
+
+def test_a_property_that_is_new_or_gone_is_said_with_its_words() -> None:
+    line = "property ends : at = done until width = 0\n"
+    assert property_part(line, "", "ends").said == ("gone: at = done until width = 0",)
+    made = property_part(line, f"{line}property small : count <= width\n", "small")
+    assert made.said == ("new: count <= width",)
+
+
+def test_a_condition_about_a_variable_of_another_kind_cannot_be_compared() -> None:
+    before = COUNTED.replace("level l", "assume low : width <= 8 and count <= 9\nlevel l")
+    after = before.replace("input width : int 0 .. 9", "input width : real 0.0 .. 9.0")
+    after = after.replace("until width = 0", "until width = 0.0")
+    found = differ(before, after.replace("width <= 8 and", "width <= 8.0 and"))
+    for name, what in (("ends", "property"), ("low", "assumption")):
+        assert part(found, name, what).said == ("cannot be compared: `width` changed its kind",)
+    assert not part(found, "rises", "property").changed
+
+
 # --- declarations ------------------------------------------------------------------------------------
 
 
@@ -782,6 +845,24 @@ def test_json_and_markdown_say_the_same(folder: Path, capfd: pytest.CaptureFixtu
         in text
     )
     assert text.count("<details>") == text.count("</details>") == 1
+
+
+def test_a_property_changes_the_exit_status_in_every_form(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    one, two = tmp_path / "one.rcs", tmp_path / "two.rcs"
+    one.write_text(COUNTED, encoding="utf-8")
+    two.write_text(COUNTED.replace("count >= was count", "count > was count"), encoding="utf-8")
+    for form, said in (
+        ("text", "property `rises`  count >= was count -> count > was count\n    was true, is false"),
+        ("json", '"count >= was count -> count > was count"'),
+        ("markdown", "**property `rises`**: count >= was count -> count > was count"),
+    ):
+        assert run(["diff", str(one), str(two), "--format", form]) == 1
+        assert said in capfd.readouterr().out
+    two.write_text(COUNTED.replace("count >= was count", "was count <= count"), encoding="utf-8")
+    assert run(["diff", str(one), str(two)]) == 0
+    assert "property `rises`  proved: nothing changed" in capfd.readouterr().out
 
 
 def test_the_command_shows_which_lines_can_follow_which(

@@ -150,6 +150,7 @@ class _Rewriter:
             procedures=self.any(program.procedures),
             assumptions=self.any(program.assumptions),
             invariants=self.any(program.invariants),
+            properties=self.any(program.properties),
             tables=self.any(program.tables),
             levels=self.any(program.levels),
         )

@@ -66,7 +66,7 @@ def _steps(versions: Versions) -> Iterator[tuple[str, Callable[[], Iterable[Part
             yield "", lambda n=name, s=said: [Part("table", n, s)]  # type: ignore[misc]  # bound early
     yield "procedures", lambda: list(parts.procedures(versions))
     yield "levels", lambda: list(parts.levels(versions))
-    yield "assumptions and invariants", lambda: list(parts.conditions(versions))
+    yield "assumptions, invariants and properties", lambda: list(parts.conditions(versions))
 
 
 def difference(

@@ -94,7 +94,7 @@ class Part:
     """One table, procedure, level or condition that both versions have, or one alone.
 
     Attributes:
-        what: `table`, `procedure`, `preprocess`, `postprocess`, `assumption`, `invariant`, `level`.
+        what: `table`, `procedure`, `preprocess`, `postprocess`, `assumption`, `invariant`, `property`, `level`.
         said: What changed that is no region: a table that is new or gone, a period.
         changes: Of meaning.
         moved: The same effect by another line.

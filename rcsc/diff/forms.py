@@ -267,7 +267,7 @@ def _program_marked(program: ProgramDifference) -> Iterator[str]:
 
 
 def _part_marked(part: Part) -> Iterator[str]:
-    said = f": {', '.join(part.said)}" if part.said else ""
+    said = f": {_cell(', '.join(part.said))}" if part.said else ""
     yield from (f"**{part.what} `{part.name}`**{said}", "")
     if part.changes:
         yield from ("| before → after | where | what is left otherwise | inputs |", "|---|---|---|---|")

@@ -4,6 +4,7 @@ In: versions. Out: `Part`s.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
 from functools import partial
 
 from rcsc.diff.contrast import changes, contrast
@@ -12,6 +13,7 @@ from rcsc.diff.versions import Doing, Runner, Versions
 from rcsc.diff.words import number
 from rcsc.interpret import call, execute
 from rcsc.model import (
+    BEFORE,
     Assumption,
     Call,
     Expr,
@@ -22,14 +24,16 @@ from rcsc.model import (
     Procedure,
     ProcedureName,
     Program,
+    Property,
     Real,
     Scalar,
     Statement,
     Value,
 )
 from rcsc.prove import values
-from rcsc.prove.effect import Effect
+from rcsc.prove.effect import Effect, Meaning
 from rcsc.prove.values import TRUE, Node
+from rcsc.resolve.leaves import read_by
 
 
 def procedures(versions: Versions) -> Iterator[Part]:
@@ -164,7 +168,7 @@ def _sequence(
 
 
 def conditions(versions: Versions) -> Iterator[Part]:
-    """Assumptions, invariants, and when deferred values are taken.
+    """Assumptions, invariants, properties, and when deferred values are taken.
 
     Raises:
         UndecidedError: As `tables.table_part`.
@@ -181,12 +185,31 @@ def conditions(versions: Versions) -> Iterator[Part]:
                     yield Part(what, name, ("gone" if name not in two else "new",))
             else:
                 yield _condition(versions, what, name, (one[name], two[name]))
+    yield from _properties(versions)
     standing = {str(known.name): known.standing for known in before.assumptions}
     for assumption in after.assumptions:
         was = standing.get(str(assumption.name), assumption.standing)
         if was is not assumption.standing:
             said = f"{was.value}, now {assumption.standing.value}"
             yield Part("standing of assumption", str(assumption.name), (said,))
+
+
+def _properties(versions: Versions) -> Iterator[Part]:
+    """Each property, with its words where it is new, gone, or says something else."""
+    one, two = ({p.name: p for p in made.properties} for made in (versions.before, versions.after))
+    for name in dict.fromkeys((*one, *two)):
+        if name not in two or name not in one:
+            only = one[name] if name in one else two[name]
+            yield Part("property", name, (f"{'gone' if name in one else 'new'}: {_words(only)}",))
+            continue
+        part = _condition(versions, "property", name, (one[name].condition, two[name].condition))
+        said = (f"{_words(one[name])} -> {_words(two[name])}",) if part.changes else part.said
+        yield replace(part, said=said)
+
+
+def _words(stated: Property) -> str:
+    """What a property says, in one line."""
+    return " ".join(stated.text.split())
 
 
 def _named(conditions: Iterable[Assumption | Invariant]) -> dict[str, Expr]:
@@ -201,13 +224,23 @@ def _condition(versions: Versions, what: str, name: str, pair: tuple[Expr, Expr]
     """Where a condition was true and is not now, and the other way."""
     if repr(pair[0]) == repr(pair[1]):
         return Part(what, name, basis=Basis.DIGEST)
+    read = {leaf.removeprefix(BEFORE) for condition in pair for leaf in read_by(condition)}
+    if apart := sorted(versions.aligned.apart & read):
+        return Part(what, name, (f"cannot be compared: `{apart[0]}` changed its kind",))
     before = versions.queries
-    first, second = versions.meanings()
-    one, two = first.condition(pair[0]), second.condition(pair[1])
+    one, two = (
+        _holds(meaning, condition) for meaning, condition in zip(versions.meanings(), pair, strict=True)
+    )
     found: list[Change] = []
     for labels, region in ((("true", "false"), _but(one, two)), (("false", "true"), _but(two, one))):
         found += changes(versions, Sort.CONDITION, labels, versions.shared.one(region))
     return Part(what, name, (), tuple(found), (), Basis.SOLVER, versions.queries - before)
+
+
+def _holds(meaning: Meaning, condition: Expr) -> Node:
+    """That the condition is defined, and holds."""
+    holds = meaning.condition(condition)
+    return values.all_of((*(values.negation(bad) for bad in meaning.bad), holds))
 
 
 def _but(one: Node, two: Node) -> Node:

@@ -34,7 +34,7 @@ from rcsc.prove.options import Options
 from rcsc.prove.symbolic import Run
 from rcsc.prove.values import Node
 
-_ELSEWHERE = frozenset({"procedure", "assumption", "invariant", "standing of assumption"})
+_ELSEWHERE = frozenset({"procedure", "assumption", "invariant", "property", "standing of assumption"})
 """Parts that do nothing by themselves: what a changed procedure does is seen in the tables that call it."""
 
 

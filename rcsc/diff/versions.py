@@ -11,7 +11,19 @@ from rcsc.diff.difference import Where
 from rcsc.diff.digest import Digests
 from rcsc.diff.words import number, said
 from rcsc.interpret import initial
-from rcsc.model import COMPARISONS, Bool, Enum, Int, Op, Program, Real, Scalar, key_bounds, value_of_key
+from rcsc.model import (
+    COMPARISONS,
+    Bool,
+    Enum,
+    Int,
+    Op,
+    Program,
+    Real,
+    Scalar,
+    earlier,
+    key_bounds,
+    value_of_key,
+)
 from rcsc.model import Value as Scalars
 from rcsc.prove import trial, values
 from rcsc.prove.cover import Cover, Space
@@ -74,6 +86,8 @@ class Versions:
         self.shared = Shared()
         for name, kind in self.kinds.items():
             self.shared.start[name] = self.shared.one(values.variable(name, kind))
+            before = earlier(name)  # what a property calls it; no run begins with it
+            self.shared.start[before] = self.shared.one(values.variable(before, kind))
         self.order = {name: at for at, name in enumerate(self.kinds)}
         self.queries = 0
         self.stated: dict[Node, Node] = {}
