@@ -13,7 +13,7 @@ import os
 import secrets
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -95,10 +95,17 @@ class Cache:
 def open_cache(root: Path) -> Cache | None:
     """The cache of the project at `root`, or in `RCSC_CACHE_DIR`; None where no secret can be kept."""
     secret = secret_of_user()
-    if secret is None:
-        return None
+    return None if secret is None else Cache(_folder(root), secret, digest_of_tool())
+
+
+def cache_of(root: Path, like: Cache) -> Cache:
+    """The cache of another project; without asking again what rcsc is made of."""
+    return replace(like, folder=_folder(root))
+
+
+def _folder(root: Path) -> Path:
     named = os.environ.get("RCSC_CACHE_DIR")
-    return Cache(Path(named) if named else root / FOLDER, secret, digest_of_tool())
+    return Path(named) if named else root / FOLDER
 
 
 def secret_of_user() -> bytes | None:

@@ -476,7 +476,7 @@ class Standing(StrEnum):
 
     ASSUMED = "assumed"
     MONITORED = "monitored"  # checked by the executors each cycle
-    PROVED = "proved"  # from the levels together; not by this version
+    PROVED = "proved"  # from declared ranges and invariants; what the levels together show is not declared
 
 
 @dataclass(frozen=True, slots=True)

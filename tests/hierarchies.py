@@ -24,10 +24,11 @@ from multiprocessing import get_context
 from pathlib import Path
 from random import Random
 
+from rcsc.compose.agreed import agreements
 from rcsc.compose.goals import Goal, Sort
-from rcsc.compose.level import LevelProof, Verdict, prove_level
+from rcsc.compose.level import LevelProof, Verdict, essential, prove_level
 from rcsc.compose.search import Effort
-from rcsc.compose.system import agreements, essential, steppers
+from rcsc.compose.system import steppers
 from rcsc.compose.trace import NotReproducedError, Trace, shortest
 from rcsc.compose.transition import Stepper
 from rcsc.prove.values import TRUE

@@ -10,12 +10,13 @@ from random import Random
 import pytest
 
 from rcsc.cli import run
+from rcsc.compose.agreed import agreements
 from rcsc.compose.features import point
 from rcsc.compose.finding import of_trace, time_line
 from rcsc.compose.goals import Goal, Sort, goals
-from rcsc.compose.level import LevelProof, Verdict, certificate, prove_level
+from rcsc.compose.level import LevelProof, Verdict, certificate, essential, prove_level
 from rcsc.compose.search import Effort
-from rcsc.compose.system import NoProgramError, SystemProof, agreements, essential, prove_system, steppers
+from rcsc.compose.system import NoProgramError, SystemProof, prove_system, steppers
 from rcsc.compose.trace import Trace, broken, shortest
 from rcsc.compose.transition import Cycle, Stepper
 from rcsc.compose.variants import undeferred

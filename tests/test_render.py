@@ -17,7 +17,7 @@ from rcsc.diagnostics.diagnostic import Diagnostic, Label, MatchedLine, Severity
 from rcsc.diagnostics.github import annotation
 from rcsc.diagnostics.jsonform import diagnostic_from_json, diagnostic_to_json, report_to_json
 from rcsc.diagnostics.render import full, one_line, paint, plain
-from rcsc.diagnostics.report import Report, TableReport, Verdict
+from rcsc.diagnostics.report import InSystem, Report, SystemReport, TableReport, Verdict
 from rcsc.diagnostics.sarif import fingerprint, sarif, uri
 from rcsc.diagnostics.spelling import clip, escape, width
 from rcsc.source import Source, Span
@@ -174,8 +174,22 @@ def test_any_span_of_any_text_renders(text: str, start: int, length: int, messag
 
 REPORT = Report(
     (overlap(), replace(overlap(), severity=Severity.NOTE, witnesses=(), more=0)),
-    (TableReport("grip", FILE, Verdict.REFUTED, 2, "boxes", True, (("f", "monitored"),), 1.5, False),),
+    (
+        TableReport(
+            "grip",
+            FILE,
+            Verdict.REFUTED,
+            2,
+            "boxes",
+            True,
+            (("f", "proved"), ("g", "monitored")),
+            1.5,
+            False,
+            InSystem("system.toml", ("f",), ("g",), ("4", "9")),
+        ),
+    ),
     SOURCES,
+    (SystemReport("system.toml", "not proved"),),
 )
 
 

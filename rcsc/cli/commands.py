@@ -80,7 +80,8 @@ def check(paths: tuple[str, ...], options: "Options", use_cache: bool, output: O
 
     PATH is a file, a folder (all `*.rcs` below it) or `-`, standard input; without any it is this folder. For
     each finding the least input is shown as a column beside the lines that match it, then the region that it
-    stands for, and what would help. What was proved once is not proved again until something changes.
+    stands for, and what would help. What was proved once is not proved again until something changes. An assumption is shown
+    as assumed, as monitored, or as proved where `rcsc prove` has shown that the levels of these very files keep it.
     """
     from rcsc import driver
 

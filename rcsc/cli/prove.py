@@ -155,8 +155,7 @@ def _say_level(proof: "LevelProof") -> None:
     """One level: its assumptions first, then what else is proved of it."""
     from rcsc.cli.proved import in_context
     from rcsc.compose.goals import Sort
-    from rcsc.compose.level import Verdict
-    from rcsc.compose.system import besides
+    from rcsc.compose.level import Verdict, besides
 
     found_before = ", by an earlier run" if proof.cached else ""
     click.echo(click.style(f"level {proof.level}", bold=True) + f"  {proof.seconds:.1f} s{found_before}")

@@ -13,7 +13,7 @@ import click
 
 from rcsc.diagnostics.diagnostic import Severity
 from rcsc.diagnostics.render import OF_SEVERITY, Piece, Row, Style, full, one_line, paint, plain
-from rcsc.diagnostics.report import Report, TableReport, Verdict
+from rcsc.diagnostics.report import InSystem, Report, SystemReport, TableReport, Verdict
 from rcsc.diagnostics.spelling import escape, pad, width
 from rcsc.files import write_atomically
 
@@ -154,6 +154,9 @@ def summary(report: Report) -> Iterator[Row]:
                 Piece(pad(table.verdict.value, 9), _OF_VERDICT[table.verdict]),
                 Piece(f"  {backing(table)}"),
             )
+    for system in report.systems:
+        if system.wanted:
+            yield (Piece(_of_system(system), Style.NOTE),)
     if report.tables or report.found:
         yield tuple(_counts(report))
 
@@ -166,10 +169,33 @@ def backing(table: TableReport) -> str:
     if table.confirmed_by_z3:
         parts.append("confirmed by Z3")
     if table.assumptions:
-        stated = ", ".join(f"{escape(name)} ({standing})" for name, standing in table.assumptions)
-        parts.append(f"assuming {stated}")
+        parts.append(f"assuming {', '.join(_assumed(table))}")
+    if table.together is not None:
+        parts += _together(table.together)
     parts.append(f"{table.proof_ms:.1f} ms{' (earlier run)' if table.cached else ''}")
     return ", ".join(parts)
+
+
+def _assumed(table: TableReport) -> Iterator[str]:
+    """Each assumption with its state."""
+    left = () if table.together is None else table.together.not_proved
+    for name, standing in table.assumptions:
+        yield f"{escape(name)} ({standing}{', not proved of the levels together' if name in left else ''})"
+
+
+def _together(known: InSystem) -> Iterator[str]:
+    """What the levels together make of a table."""
+    system = escape(known.system)
+    if known.proved:
+        yield f"kept by the levels together, {system}"
+    if known.unreached:
+        noun = "line" if len(known.unreached) == 1 else "lines"
+        yield f"{noun} {', '.join(map(escape, known.unreached))} never reached in {system}"
+
+
+def _of_system(one: SystemReport) -> str:
+    command = f"`rcsc prove {escape(one.system)}`"
+    return f"whether the levels together keep what these tables assume is not known: {command} decides it"
 
 
 def _counts(report: Report) -> Iterator[Piece]:

@@ -2,7 +2,8 @@
 
 In: a stepper, and what was confirmed of it. Out: a `Context`:
 
-- *unreached*: lines that no reachable cycle runs. Dead in this system, though not in their table.
+- *unreached*: lines that no reachable cycle runs, a DEFAULT line too, but where that is a goal. Dead in this system, though not in
+  their table.
 - *repeated*: what else a line does that gives an order and then matches again, on the same inputs, before the order is echoed.
   Section 9 asks that there be nothing: each line is to say the same until its command is echoed.
 - *restless*: levels that would give order after order on inputs that stay the same.
@@ -16,8 +17,8 @@ from dataclasses import dataclass
 from rcsc.compose.confirm import Confirmation
 from rcsc.compose.contract import NUMBER
 from rcsc.compose.frames import Clause
-from rcsc.compose.transition import Cycle, Stepper
-from rcsc.model import Bool, Call, Kind, Statement
+from rcsc.compose.transition import Cycle, Stepper, TableAt
+from rcsc.model import Bool, Call, Default, Kind, Line, Statement
 from rcsc.prove import smt, values
 from rcsc.prove.smt import Answer, Solver, Term
 from rcsc.prove.values import Node
@@ -73,12 +74,19 @@ def _unreached(asked: Confirmation, clauses: Sequence[Clause]) -> Iterator[tuple
     lines = [
         (str(at.table.name), str(line.name), asked.keyed.term(values.both(at.chosen, match)))
         for at in asked.cycle.tables
-        for line, match in zip(at.table.lines, at.matches, strict=True)
+        for line, match in _lines(at)
     ]
     solver = asked.known(clauses)
     for table, line, runs in lines:
         if not may(solver, runs):
             yield table, line
+
+
+def _lines(at: TableAt) -> Iterator[tuple[Line | Default, Node]]:
+    """The lines of a table, each with when it runs."""
+    yield from zip(at.table.lines, at.matches, strict=True)
+    if at.table.default is not None and not at.table.default.unreachable:
+        yield at.table.default, at.none
 
 
 def may(solver: Solver, *terms: Term) -> bool:

@@ -2,22 +2,23 @@
 
 In: a stepper, an effort, a cache. Out: the same `LevelProof`, or nothing. The key is all that a proof depends on: the program as
 resolved, the level, its links, the effort; and rcsc itself with its solvers (`rcsc.cache`). Where anything was left undecided nothing
-is kept: another run may decide it.
+is kept: another run may decide it. What was found is kept once more without the effort and without what shows it (`standing`).
 """
 
 import hashlib
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
 from rcsc.cache import Cache
 from rcsc.compose.context import Again, Context
 from rcsc.compose.ends import Ending
 from rcsc.compose.features import CLOSELY, Feature
-from rcsc.compose.goals import goals
-from rcsc.compose.level import LevelProof, Verdict
+from rcsc.compose.goals import Goal, goals
+from rcsc.compose.level import LevelProof, Verdict, essential
 from rcsc.compose.properties import every_feature
 from rcsc.compose.rounds import Counted
 from rcsc.compose.search import Effort, read
+from rcsc.compose.standing import Verdicts, keep_verdicts
 from rcsc.compose.transition import Stepper
 
 
@@ -34,7 +35,9 @@ def recall(cache: Cache, stepper: Stepper, effort: Effort) -> LevelProof | None:
         chosen = every_feature(stepper, cycle, read(stepper, cycle, wanted), closely)
         if [one.name for one in chosen] == kept["features"]:
             verdicts = (Verdict(one["verdict"]) for one in kept["found"])
-            return _proof(kept, tuple(zip(wanted, verdicts, strict=True)), chosen, stepper)
+            proof = _proof(kept, tuple(zip(wanted, verdicts, strict=True)), chosen, stepper)
+            keep_verdicts(cache, content(stepper), _shortened(proof))  # they may have been pruned
+            return proof
     return None
 
 
@@ -76,8 +79,26 @@ def keep(cache: Cache, stepper: Stepper, effort: Effort, proof: LevelProof) -> N
         "endings": [asdict(one) for one in proof.endings],
     }
     cache.store(value, *_key(stepper, effort))
+    keep_verdicts(cache, content(stepper), _shortened(proof))
+
+
+def _shortened(proof: LevelProof) -> Verdicts:
+    """The proof without what shows it, for those who only ask what was found."""
+    proved = frozenset(goal.key for goal, verdict in proof.found if verdict is Verdict.PROVED)
+    unreached = () if proof.context is None else proof.context.unreached
+    return Verdicts(proved, tuple(map(_said, essential(proof))), unreached)
+
+
+def _said(goal: Goal) -> str:
+    return f"table `{goal.table}`: {goal.shown}" if goal.table else goal.shown
 
 
 def _key(stepper: Stepper, effort: Effort) -> tuple[str, ...]:
-    said = repr((stepper.program, stepper.level.name, stepper.links, effort))
-    return "composed", hashlib.sha256(said.encode()).hexdigest()
+    return "composed", content(stepper), hashlib.sha256(repr(effort).encode()).hexdigest()
+
+
+def content(stepper: Stepper) -> str:
+    """Digest of all that a proof of the level is about: the same wherever the files stand."""
+    tables = tuple(replace(one, file="") for one in stepper.program.tables)
+    program = replace(stepper.program, file="", tables=tables)
+    return hashlib.sha256(repr((program, stepper.level.name, stepper.links)).encode()).hexdigest()

@@ -12,6 +12,7 @@ from enum import StrEnum
 
 from rcsc.compose.confirm import Confirmation
 from rcsc.compose.context import Context, context
+from rcsc.compose.contract import COMMAND
 from rcsc.compose.ends import Ending, endings, ways_round
 from rcsc.compose.features import Feature
 from rcsc.compose.frames import Clause
@@ -79,6 +80,19 @@ class LevelProof:
     def open(self) -> tuple[Goal, ...]:
         """The goals that are not proved."""
         return tuple(goal for goal, verdict in self.found if verdict is not Verdict.PROVED)
+
+
+def essential(proof: LevelProof) -> tuple[Goal, ...]:
+    """Goals that failed; a field that is not numbered is no failure, but nobody may assume that it is; a command is."""
+    beside = besides(proof)
+    return tuple(goal for goal in proof.open if goal not in beside)
+
+
+def besides(proof: LevelProof) -> tuple[Goal, ...]:
+    """Fields of orders that change under the same number, commands apart."""
+    return tuple(
+        goal for goal in proof.open if goal.sort is Sort.NUMBERED and not goal.name.endswith(f".{COMMAND}")
+    )
 
 
 def prove_level(stepper: Stepper, effort: Effort | None = None) -> LevelProof:

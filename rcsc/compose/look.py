@@ -11,8 +11,9 @@ from pathlib import Path
 
 from rcsc.compose.finding import Finding, of_trace
 from rcsc.compose.goals import Goal, Key, Sort, pairs
+from rcsc.compose.level import essential
 from rcsc.compose.rerun import ExecutorsDifferError, make, record
-from rcsc.compose.system import SystemProof, essential
+from rcsc.compose.system import SystemProof
 from rcsc.compose.together import broken_together
 from rcsc.compose.trace import Found, NotReproducedError, Search, traces
 from rcsc.compose.transition import Stepper

@@ -13,37 +13,21 @@ from multiprocessing import get_context
 from pathlib import Path
 
 from rcsc.cache import Cache
-from rcsc.compose.contract import COMMAND, ECHO, ECHOED, NUMBER, Links, links
-from rcsc.compose.goals import Goal, Sort, goals
+from rcsc.compose.agreed import Agreement, agreements, other_end
+from rcsc.compose.contract import Links, links
+from rcsc.compose.goals import Goal, goals
 from rcsc.compose.kept import keep, recall
-from rcsc.compose.level import LevelProof, Verdict, prove_level
+from rcsc.compose.level import LevelProof, Verdict, essential, prove_level
 from rcsc.compose.search import Effort
 from rcsc.compose.transition import Stepper
 from rcsc.model import Program
+from rcsc.project import Loaded, load
 from rcsc.prove.values import TRUE
-from rcsc.system.description import description
+from rcsc.system.description import Description, description, places
 
 
 class NoProgramError(Exception):
     """A level's tables cannot be read; says which."""
-
-
-@dataclass(frozen=True, slots=True)
-class Agreement:
-    """One thing that a level assumes of a neighbour, and why it may.
-
-    Attributes:
-        level: Who assumes it.
-        assumed: In words.
-        reason: Whose guarantee it is, in words.
-        holds: Whether it is proved; where the neighbour stands outside the levels it is the neighbour's to keep.
-    """
-
-    level: str
-    assumed: str
-    reason: str
-    holds: bool
-    outside: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,19 +46,6 @@ class SystemProof:
         )
 
 
-def essential(proof: LevelProof) -> tuple[Goal, ...]:
-    """Goals that failed; a field that is not numbered is no failure, but nobody may assume that it is; a command is."""
-    beside = besides(proof)
-    return tuple(goal for goal in proof.open if goal not in beside)
-
-
-def besides(proof: LevelProof) -> tuple[Goal, ...]:
-    """Fields of orders that change under the same number, commands apart."""
-    return tuple(
-        goal for goal in proof.open if goal.sort is Sort.NUMBERED and not goal.name.endswith(f".{COMMAND}")
-    )
-
-
 def steppers(path: Path) -> dict[str, Stepper]:
     """A stepper for each level of the system described by the file, from the top down.
 
@@ -86,7 +57,16 @@ def steppers(path: Path) -> dict[str, Stepper]:
         NoProgramError: The tables of a level cannot be read.
     """
     system = description(path)
-    programs = {spec.name: program_of(path, spec.program) for spec in system.levels}
+    return steppers_of(system, {spec.name: program_of(path, spec.program) for spec in system.levels})
+
+
+def steppers_of(system: Description, programs: Mapping[str, Program]) -> dict[str, Stepper]:
+    """The same of programs that were read, one for each level.
+
+    Raises:
+        BadDescription: The description says something that cannot be.
+        NoProgramError: A program has no such level.
+    """
     every = {name: links(system, name, program) for name, program in programs.items()}
     found = {}
     for name, program in programs.items():
@@ -106,13 +86,8 @@ def _narrowed(mine: Links, every: Mapping[str, Links], programs: Mapping[str, Pr
 
     upper = next(one for one in every[above.name].below if one.name == mine.level)
     pairs = {leaf for pair in compared(programs[above.name]) for leaf in pair}
-    kept = tuple(leaf for leaf in above.numbered if _other(leaf, above.order, upper.order) in pairs)
+    kept = tuple(leaf for leaf in above.numbered if other_end(leaf, above.order, upper.order) in pairs)
     return replace(mine, above=replace(above, numbered=kept))
-
-
-def _other(leaf: str, record: str, other: str) -> str:
-    """The same field at the other end of the buffer."""
-    return other + leaf.removeprefix(record)
 
 
 def program_of(path: Path, name: str) -> Program:
@@ -121,15 +96,23 @@ def program_of(path: Path, name: str) -> Program:
     Raises:
         NoProgramError: It is not there, or does not resolve.
     """
-    from rcsc.project import load
+    return loaded_program(path, name)[0]
+
+
+def loaded_program(path: Path, name: str) -> tuple[Program, Loaded]:
+    """The same, with the files that it was read from.
+
+    Raises:
+        NoProgramError: It is not there, or does not resolve.
+    """
     from rcsc.resolve import resolve
 
-    for file in (path.parent / name / f"{name}.rcs", path.parent / f"{name}.rcs"):
+    for file in places(path, name):
         if file.is_file():
             loaded = load([str(file)])
             program = resolve(loaded.roots[0], loaded)
             if isinstance(program, Program) and not loaded.found:
-                return program
+                return program, loaded
             raise NoProgramError(f"`{file}` is not in order: see `rcsc check {file}`")
     raise NoProgramError(f"there is no program `{name}` beside {path}")
 
@@ -210,58 +193,3 @@ def _proved(stepper: Stepper, effort: Effort) -> LevelProof:
 def _again(stepper: Stepper, proof: LevelProof) -> tuple[tuple[Goal, Verdict], ...]:
     wanted = goals(stepper, stepper.cycle(stepper.anywhere()))
     return tuple((goal, verdict) for goal, (_, verdict) in zip(wanted, proof.found, strict=True))
-
-
-def agreements(made: Mapping[str, Stepper], proofs: Mapping[str, LevelProof]) -> list[Agreement]:
-    """What each level assumes of each neighbour, matched with what was proved there."""
-    found = []
-    for name, stepper in made.items():
-        found += _of_above(name, stepper, made, proofs)
-        for below in stepper.links.below:
-            words = f"what `{below.name}` reports under the number of the last order is about that order"
-            if below.outside:
-                found.append(
-                    Agreement(name, words, f"`{below.name}` stands outside the levels", True, outside=True)
-                )
-                continue
-            lower = made[below.name].links.above
-            assert lower is not None
-            echoes = proofs[below.name].verdict(Sort.ECHOES, "", lower.report) is Verdict.PROVED
-            begins = _begin(stepper, below.order, made[below.name], lower.order)
-            reason = f"proved of `{below.name}`: {Sort.ECHOES.value}; both begin with the same order"
-            found.append(Agreement(name, words, reason, echoes and begins))
-    return found
-
-
-def _of_above(
-    name: str, stepper: Stepper, made: Mapping[str, Stepper], proofs: Mapping[str, LevelProof]
-) -> list[Agreement]:
-    above = stepper.links.above
-    if above is None:
-        return []
-    fields = ", ".join(f"`{leaf}`" for leaf in above.numbered)
-    words = (
-        f"while the number of `{above.order}` stays, so do {fields}"
-        if fields
-        else f"the numbers of `{above.order}` come one after the other"
-    )
-    if above.outside:
-        return [Agreement(name, words, f"`{above.name}` stands outside the levels", True, outside=True)]
-    upper = next(one for one in made[above.name].links.below if one.name == name)
-    proof = proofs[above.name]
-    held = all(
-        proof.verdict(Sort.NUMBERED, "", _other(leaf, above.order, upper.order)) is Verdict.PROVED
-        for leaf in above.numbered
-    )
-    held = held and proof.verdict(Sort.NEXT_NUMBER, "", upper.order) is Verdict.PROVED
-    return [Agreement(name, words, f"proved of `{above.name}`: {Sort.NUMBERED.value}", held)]
-
-
-def _begin(upper: Stepper, order: str, lower: Stepper, record: str) -> bool:
-    """Before the first cycle the lower level's order is the upper's, and the upper sees it echoed."""
-    first = {str(v.name): v.initial for v in upper.program.variables}
-    other = {str(v.name): v.initial for v in lower.program.variables}
-    leaves = (f"{order}.{NUMBER}", f"{order}.{COMMAND}")
-    report = next(one.report for one in upper.links.below if one.order == order)
-    echoed = first[f"{report}.{ECHO}"] != first[leaves[0]] or first[f"{report}.{ECHOED}"] == first[leaves[1]]
-    return echoed and all(first[leaf] == other[_other(leaf, order, record)] for leaf in leaves)

@@ -4,12 +4,13 @@ The same form is what the cache keeps. Offsets count characters from 0; lines an
 """
 
 from collections.abc import Mapping
+from dataclasses import asdict
 from typing import Any
 
 from rcsc import __version__
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label, MatchedLine, Severity, WitnessColumn
-from rcsc.diagnostics.report import Report, TableReport, Verdict
+from rcsc.diagnostics.report import InSystem, Report, TableReport, Verdict
 from rcsc.source import Source, Sources, Span
 
 FORM = 1
@@ -32,6 +33,7 @@ def report_to_json(report: Report, command: str) -> Json:
         "counts": {f"{severity.value}s": report.count(severity) for severity in Severity},
         "diagnostics": [diagnostic_to_json(one, report.sources) for one in report.found],
         "tables": [table_to_json(table) for table in report.tables],
+        "systems": [asdict(one) for one in report.systems],
     }
 
 
@@ -47,7 +49,18 @@ def table_to_json(table: TableReport) -> Json:
         "assumptions": [{"name": name, "standing": standing} for name, standing in table.assumptions],
         "proof_ms": round(table.proof_ms, 3),
         "cached": table.cached,
+        "together": None if table.together is None else _listed(table.together),
     }
+
+
+def _listed(together: InSystem) -> Json:
+    return {name: list(one) if isinstance(one, tuple) else one for name, one in asdict(together).items()}
+
+
+def _together(form: Mapping[str, Any]) -> InSystem:
+    return InSystem(
+        form["system"], tuple(form["proved"]), tuple(form["not_proved"]), tuple(form["unreached"])
+    )
 
 
 def table_from_json(form: Mapping[str, Any], *, cached: bool) -> TableReport:
@@ -62,6 +75,7 @@ def table_from_json(form: Mapping[str, Any], *, cached: bool) -> TableReport:
         tuple((one["name"], one["standing"]) for one in form["assumptions"]),
         float(form["proof_ms"]),
         cached,
+        None if form["together"] is None else _together(form["together"]),
     )
 
 

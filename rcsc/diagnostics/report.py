@@ -17,6 +17,38 @@ class Verdict(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
+class InSystem:
+    """What is known of a table from the proof of the levels together.
+
+    Attributes:
+        system: The system's description.
+        proved: Assumptions that the levels keep, all of this content.
+        not_proved: Assumptions of which an earlier run could not show that.
+        unreached: Lines that no reachable cycle of this system runs, DEFAULT too.
+    """
+
+    system: str
+    proved: tuple[str, ...] = ()
+    not_proved: tuple[str, ...] = ()
+    unreached: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class SystemReport:
+    """What is known of a system that checked tables belong to.
+
+    Attributes:
+        system: Its description.
+        standing: `proved`, `not proved` or `unknown`.
+        wanted: Whether `rcsc prove` would say something of these tables that is not known.
+    """
+
+    system: str
+    standing: str
+    wanted: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class TableReport:
     """One table's verdict and what it rests on.
 
@@ -29,6 +61,7 @@ class TableReport:
         assumptions: Each assumption that the proof used, and its standing.
         proof_ms: What the proof took when it was made.
         cached: Whether it was made by an earlier run.
+        together: What the levels together make of it; None where nobody knows.
     """
 
     table: str
@@ -40,6 +73,7 @@ class TableReport:
     assumptions: tuple[tuple[str, str], ...] = ()
     proof_ms: float = 0.0
     cached: bool = False
+    together: InSystem | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,11 +84,13 @@ class Report:
         found: Sorted, each once.
         tables: In order of file and place.
         sources: Every text that a diagnostic points into.
+        systems: Those that the tables belong to, as far as they were looked at.
     """
 
     found: tuple[Diagnostic, ...]
     tables: tuple[TableReport, ...] = ()
     sources: Mapping[str, Source] = field(default_factory=dict)
+    systems: tuple[SystemReport, ...] = ()
 
     def count(self, severity: Severity) -> int:
         """How many diagnostics are of this severity."""

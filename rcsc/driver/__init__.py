@@ -24,10 +24,18 @@ TARGETS = ("python", "c")
 
 
 def check(settings: Settings) -> Report:
-    """Prove every table; an unchanged project is recognised without being parsed."""
-    from rcsc.driver.unchanged import recall, remember
+    """Prove every table; of those that a system's levels run, say what is known of the levels together."""
+    from rcsc.driver.together import with_levels
 
     cache = _cache(settings)
+    report = _checked(settings, cache)
+    return report if cache is None else with_levels(report, cache)
+
+
+def _checked(settings: Settings, cache: Cache | None) -> Report:
+    """Every table by itself; an unchanged project is recognised without being parsed."""
+    from rcsc.driver.unchanged import recall, remember
+
     whole = None if settings.stdin is not None else cache
     known = recall(whole, settings.paths, settings.options) if whole else None
     if known is not None:

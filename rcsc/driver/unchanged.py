@@ -6,6 +6,7 @@ file by content, and every place where a file would have been found first is sti
 
 import hashlib
 import os
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -30,13 +31,9 @@ def recall(cache: Cache, paths: tuple[str, ...], options: "Options") -> Report |
     kept = cache.load(*_key(paths, options))
     if kept is None or kept["roots"] != list(listed(paths)):
         return None
-    texts: dict[str, bytes] = {}
-    for name, digest in kept["looked_at"].items():
-        content = _content(name)
-        if _digest(content) != digest:
-            return None
-        if content is not None:
-            texts[name] = content
+    texts = as_before(kept["looked_at"])
+    if texts is None:
+        return None
     found = tuple(diagnostic_from_json(one) for one in kept["found"])
     tables = tuple(table_from_json(one, cached=True) for one in kept["tables"])
     named = {name for name in texts if name.endswith(".rcs")} if found else set()
@@ -52,17 +49,42 @@ def remember(
 
     if any(one.code in _PASSING or one.code.value[3] in "19" for one in report.found):
         return
-    contents = {name: _content(name) for name in _looked_at(loaded)}
-    for name, source in loaded.sources.items():
-        if (contents[name] or b"").decode("utf-8-sig", "replace") != source.text:
-            return  # changed while it was checked
+    looked_at = digests(loaded)
+    if looked_at is None:
+        return
     value: dict[str, Any] = {
         "roots": list(loaded.given),
-        "looked_at": {name: _digest(content) for name, content in contents.items()},
+        "looked_at": looked_at,
         "found": [diagnostic_to_json(one, report.sources) for one in report.found],
         "tables": [table_to_json(one) for one in report.tables],
     }
     cache.store(value, *_key(paths, options))
+
+
+def digests(loaded: Loaded) -> dict[str, str] | None:
+    """Of every file that was read, and that a file is not there where it would have been found; None where one has changed since."""
+    contents = {name: _content(name) for name in _looked_at(loaded)}
+    for name, source in loaded.sources.items():
+        if (contents[name] or b"").decode("utf-8-sig", "replace") != source.text:
+            return None  # changed while it was checked
+    return {name: _digest(content) for name, content in contents.items()}
+
+
+def as_before(looked_at: Mapping[str, str]) -> dict[str, bytes] | None:
+    """The contents of the files, if every one has the digest that it had; those that were not there are not there."""
+    texts: dict[str, bytes] = {}
+    for name, digest in looked_at.items():
+        content = _content(name)
+        if _digest(content) != digest:
+            return None
+        if content is not None:
+            texts[name] = content
+    return texts
+
+
+def digest_at(name: str) -> str:
+    """Of a file as it is now, or that it is not there."""
+    return _digest(_content(name))
 
 
 def _key(paths: tuple[str, ...], options: "Options") -> tuple[str, ...]:

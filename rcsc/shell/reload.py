@@ -25,7 +25,7 @@ from rcsc.shell.gate import witness
 from rcsc.shell.refusal import Refused
 from rcsc.shell.sources import Kept, kept, laid_out
 from rcsc.system.cell import Kind, executors
-from rcsc.system.description import BadDescription, Description, LevelSpec
+from rcsc.system.description import BadDescription, Description, LevelSpec, places
 from rcsc.system.executors import NotBuilt
 from rcsc.system.levels import Query, RunningLevel, running_level
 from rcsc.system.signature import Leaf, Signature, signature
@@ -70,13 +70,12 @@ def source_of(plant: Plant, spec: LevelSpec) -> Path:
     Raises:
         Refused: It is not where it is looked for.
     """
-    here, name = plant.path.parent, f"{spec.program}.rcs"
-    tried = (here / spec.program / name, here / name)
+    tried = places(plant.path, spec.program)
     found = next((one for one in tried if one.is_file()), None)
     if found is None:
-        places = " and ".join(f"`{one}`" for one in tried)
+        looked = " and ".join(f"`{one}`" for one in tried)
         raise Refused(
-            Code.SHELL_RELOAD, f"the tables of level `{spec.name}` are not there", f"looked for {places}"
+            Code.SHELL_RELOAD, f"the tables of level `{spec.name}` are not there", f"looked for {looked}"
         )
     return found
 

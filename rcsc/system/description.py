@@ -97,3 +97,8 @@ def description(path: Path) -> Description:
         raise BadDescription(f"{path} is not TOML: {error}") from error
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise BadDescription(f"{path} lacks {error}") from error
+
+
+def places(path: Path, program: str) -> tuple[Path, Path]:
+    """Where the program of a level is looked for, beside the description, in order."""
+    return path.parent / program / f"{program}.rcs", path.parent / f"{program}.rcs"

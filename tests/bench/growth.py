@@ -16,10 +16,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from unittest.mock import patch
 
-from rcsc.compose.level import prove_level
+from rcsc.compose.agreed import agreements
+from rcsc.compose.level import essential, prove_level
 from rcsc.compose.sat import Sat
 from rcsc.compose.search import Effort
-from rcsc.compose.system import agreements, essential, steppers
+from rcsc.compose.system import steppers
 from rcsc.prove.smt import Solver
 from tests.hierarchies_made import BOTTOM, RIGHT, Hierarchy, Line, MadeLevel, MadeTable
 from tests.hierarchies_text import written

@@ -1,0 +1,88 @@
+"""What a system is made of, as its files have it: read anew only when one of them changes.
+
+In: a system's description and the cache. Out: an `Outline`, or nothing where the system is not in order; `rcsc prove` says why.
+"""
+
+import os
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rcsc.cache import Cache
+from rcsc.compose.standing import Assumed, LevelOutline, Outline, TableOutline, outline_of
+from rcsc.driver.unchanged import as_before, digest_at, digests
+from rcsc.system.description import BadDescription, description, places
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from rcsc.compose.transition import Stepper
+    from rcsc.model import Program, Table
+
+
+def outlined(system: Path, cache: Cache) -> Outline | None:
+    """The system's outline; `system` is absolute."""
+    kept = cache.load("outline", str(system))
+    if kept is not None and as_before(kept["looked_at"]) is not None:
+        return outline_of(kept["outline"])
+    read = _read(system)
+    if read is None:
+        return None
+    made, looked_at = read
+    found = outline(made)
+    cache.store({"outline": asdict(found), "looked_at": looked_at}, "outline", str(system))
+    return found
+
+
+def _read(system: Path) -> "tuple[dict[str, Stepper], dict[str, str]] | None":
+    """Steppers of all levels, and what they were read from; None where they cannot be, or a file has changed meanwhile."""
+    from rcsc.compose.system import NoProgramError, loaded_program, steppers_of
+
+    looked_at = {str(system): digest_at(str(system))}
+    programs: dict[str, Program] = {}
+    try:
+        said = description(system)
+        for spec in said.levels:
+            programs[spec.name], loaded = loaded_program(system, spec.program)
+            files = digests(loaded)
+            if files is None:
+                return None
+            looked_at |= {str(one): digest_at(str(one)) for one in places(system, spec.program)} | files
+        made = steppers_of(said, programs)
+    except (BadDescription, NoProgramError):
+        return None
+    return (made, looked_at) if looked_at[str(system)] == digest_at(str(system)) else None
+
+
+def outline(made: "Mapping[str, Stepper]") -> Outline:
+    """What levels are made of."""
+    from rcsc.compose.agreed import promises
+    from rcsc.compose.kept import content
+
+    levels = tuple(
+        LevelOutline(
+            name,
+            content(one),
+            os.path.realpath(one.level.span.file),
+            one.level.span.start,
+            one.level.span.end,
+            tuple(map(_table, _run_by(one))),
+        )
+        for name, one in made.items()
+    )
+    assumed = tuple(Assumed(one.level, one.assumed, one.needs, one.begins) for one in promises(made))
+    return Outline(levels, assumed)
+
+
+def _run_by(stepper: "Stepper") -> "list[Table]":
+    """The tables that the level runs."""
+    from rcsc.model import OneTable
+
+    chosen = stepper.level.tables
+    names = {chosen.table} if isinstance(chosen, OneTable) else {table for _, table in chosen.tables}
+    return [one for one in stepper.program.tables if one.name in names]
+
+
+def _table(table: "Table") -> TableOutline:
+    default = "" if table.default is None else str(table.default.name)
+    return TableOutline(os.path.realpath(table.file), str(table.name), default)

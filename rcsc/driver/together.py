@@ -1,0 +1,209 @@
+"""What earlier proofs of the levels together say of the tables that were checked.
+
+In: a report, and the cache. Out: the same report, in which an assumption that the levels keep is *proved*, with warnings where they were
+found not to. No search is begun here. What a system is made of is kept with digests of its files (`outline`), so that while none of
+them changes nothing is read but these and the verdicts.
+"""
+
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from rcsc.cache import Cache, cache_of
+from rcsc.compose.standing import Assumed, Known, LevelOutline, Standing, any_kept, standing
+from rcsc.diagnostics.codes import Code
+from rcsc.diagnostics.diagnostic import Diagnostic, Label, Severity, sort_key
+from rcsc.diagnostics.report import InSystem, Report, SystemReport, TableReport
+from rcsc.driver.outline import outlined
+from rcsc.project import PROJECT_FILE
+from rcsc.source import Source, Span
+from rcsc.system.description import BadDescription, description, places
+
+SYSTEM_FILE = "system.toml"
+DECLARED_PROVED = "proved"
+"""The standing of what declared ranges and invariants ensure."""
+MOST_OPEN = 5
+"""Things that are shown of a level that is not proved; then how many more."""
+
+
+def with_levels(report: Report, cache: Cache) -> Report:
+    """The report, with what is known of the systems that its tables belong to."""
+    seen = _Seen(cache)
+    tables = tuple(seen.table(one) for one in report.tables)
+    found = {*map(seen.noted, report.found), *seen.warnings()}
+    sources = {**seen.sources, **report.sources}
+    systems = tuple(seen.systems.values())
+    return Report(tuple(sorted(found, key=sort_key)), tables, sources, systems)
+
+
+@dataclass(frozen=True, slots=True)
+class _Place:
+    """A level that runs a table.
+
+    Attributes:
+        default: The name of the table's DEFAULT line.
+    """
+
+    standing: Standing
+    level: LevelOutline
+    table: str
+    default: str
+
+    def known(self, assumption: str) -> Known:
+        """What is known of one of the table's assumptions."""
+        return self.standing.of_assumption(self.level.name, self.table, assumption)
+
+    @property
+    def unreached(self) -> tuple[str, ...]:
+        """The table's lines that never run here."""
+        return self.standing.unreached(self.level.name, self.table)
+
+
+class _Seen:
+    """Systems that were looked at for one report.
+
+    Attributes:
+        systems: What is to be said of each.
+        sources: Texts that the warnings point into.
+        levels: Those that run a table of the report; by description as shown, and name.
+        idle: Tables of the report whose DEFAULT never runs: with the description.
+    """
+
+    def __init__(self, cache: Cache) -> None:
+        self.cache = cache
+        self.systems: dict[str, SystemReport] = {}
+        self.sources: dict[str, Source] = {}
+        self.levels: dict[tuple[str, str], tuple[Standing, LevelOutline]] = {}
+        self.idle: dict[tuple[str, str], str] = {}
+        self._standings: dict[Path, Standing | None] = {}
+
+    def table(self, table: TableReport) -> TableReport:
+        """The table, with what the nearest system that runs it makes of it."""
+        for system in _systems_above(table.file):
+            name = _shown(str(system), table.file)
+            made = self._standing(system)
+            if made is None:
+                if _beside(system, table.file):
+                    self._say(name, Known.UNKNOWN, wanted=bool(_open(table)))
+                    return table
+                continue
+            if at := list(_places(made, table)):
+                return self._placed(table, name, at)
+        return table
+
+    def _standing(self, system: Path) -> Standing | None:
+        """What is known of a system; None where no level was ever proved, or it is not in order."""
+        if system not in self._standings:
+            own = cache_of(system.parent, self.cache)
+            made = outlined(system, own) if any_kept(own) else None
+            self._standings[system] = None if made is None else standing(own, made)
+        return self._standings[system]
+
+    def _placed(self, table: TableReport, system: str, at: list[_Place]) -> TableReport:
+        """A table that levels of a system run: what is known in all of them."""
+        for one in at:
+            self.levels.setdefault((system, one.level.name), (one.standing, one.level))
+        known = {name: {one.known(name) for one in at} for name in _open(table)}
+        proved = tuple(name for name, found in known.items() if found == {Known.PROVED})
+        not_proved = tuple(name for name, found in known.items() if Known.NOT_PROVED in found)
+        unreached = tuple(line for line in at[0].unreached if all(line in one.unreached for one in at))
+        if at[0].default in unreached:
+            self.idle[table.file, table.table] = system
+        self._say(system, at[0].standing.whole, wanted=len(proved) + len(not_proved) < len(known))
+        assumptions = tuple(
+            (name, Known.PROVED.value if name in proved else was) for name, was in table.assumptions
+        )
+        together = InSystem(system, proved, not_proved, unreached)
+        return replace(table, assumptions=assumptions, together=together)
+
+    def _say(self, system: str, whole: Known, *, wanted: bool) -> None:
+        before = self.systems.get(system)
+        wanted = wanted or (before is not None and before.wanted)
+        self.systems[system] = SystemReport(system, whole.value, wanted)
+
+    # --- findings ---
+
+    def noted(self, found: Diagnostic) -> Diagnostic:
+        """A finding; where inputs fall to a DEFAULT that never runs here, with that."""
+        if found.code is not Code.DEFAULT_COVERS or not found.witnesses:
+            return found
+        system = self.idle.get((found.primary.span.file, found.witnesses[0].table))
+        if system is None:
+            return found
+        note = f"none of them comes in {system}: proved of the levels together"
+        return replace(found, notes=(*found.notes, note))
+
+    def warnings(self) -> Iterator[Diagnostic]:
+        """What is not proved of the levels that run the tables."""
+        for (system, _), (made, level) in self.levels.items():
+            if made.of_level(level.name) is Known.NOT_PROVED:
+                yield self._not_proved(system, made, level)
+            for one in made.broken:
+                if one.level == level.name:
+                    yield self._not_kept(system, level, one)
+
+    def _not_proved(self, system: str, made: Standing, level: LevelOutline) -> Diagnostic:
+        still = made.known[level.name].open
+        more = [f"and {len(still) - MOST_OPEN} more"] if len(still) > MOST_OPEN else []
+        return Diagnostic(
+            Code.NOT_COMPOSED,
+            f"level `{level.name}` is not proved together with its neighbours in {system}",
+            self._label(system, level),
+            notes=(*(f"not proved: {one}" for one in still[:MOST_OPEN]), *more),
+            help=(f"`rcsc prove {system} --level {level.name}` looks for the shortest run that shows it",),
+            severity=Severity.WARNING,
+        )
+
+    def _not_kept(self, system: str, level: LevelOutline, what: Assumed) -> Diagnostic:
+        message = f"level `{level.name}` assumes that {what.words}, which its neighbour in {system} is not proved to keep"
+        helps = (f"`rcsc prove {system}` says of both what is proved",)
+        label = self._label(system, level)
+        return Diagnostic(Code.NOT_AGREED, message, label, help=helps, severity=Severity.WARNING)
+
+    def _label(self, system: str, level: LevelOutline) -> Label:
+        """The level's name where it is declared."""
+        file = _shown(level.file, system)
+        self.sources.setdefault(file, Source(file, Path(level.file).read_text(encoding="utf-8-sig")))
+        return Label(Span(file, level.start, level.end))
+
+
+# --- which system a table belongs to ---------------------------------------------------------
+
+
+def _systems_above(file: str) -> list[Path]:
+    """Descriptions beside the file and above it, up to the project's folder, or one up where there is no project."""
+    here = Path(os.path.dirname(file) or ".").resolve()
+    folders = [here, *here.parents]
+    root = next((at for at, one in enumerate(folders) if (one / PROJECT_FILE).is_file()), 1)
+    return [one / SYSTEM_FILE for one in folders[: root + 1] if (one / SYSTEM_FILE).is_file()]
+
+
+def _beside(system: Path, file: str) -> bool:
+    """Whether a file is, or stands with, the root file of a level."""
+    try:
+        said = description(system)
+    except BadDescription:
+        return False
+    real = Path(os.path.realpath(file))
+    tried = [places(system, spec.program) for spec in said.levels]
+    return any(real == beside or real.parent == inside.parent for inside, beside in tried)
+
+
+def _places(made: Standing, table: TableReport) -> Iterator[_Place]:
+    """The levels of a system that run a table."""
+    real = os.path.realpath(table.file)
+    for level in made.outline.levels:
+        for one in level.tables:
+            if (one.file, one.name) == (real, table.table):
+                yield _Place(made, level, one.name, one.default)
+
+
+def _open(table: TableReport) -> list[str]:
+    """Assumptions that the proof of the table rests on and has not shown."""
+    return [name for name, was in table.assumptions if was != DECLARED_PROVED]
+
+
+def _shown(path: str, like: str) -> str:
+    """A path as the user would write it who wrote `like`."""
+    return path if os.path.isabs(like) else os.path.relpath(path)

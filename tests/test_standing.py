@@ -1,0 +1,264 @@
+"""What `rcsc check` says of the levels together: only what was proved, of this very content, and nothing else."""
+
+import json
+import shutil
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rcsc.cache import Cache
+from rcsc.cli import run
+from rcsc.compose.standing import Known, Outline, Standing, outline_of, standing
+from rcsc.driver import outline
+
+SMALL = Path(__file__).parent / "data" / "composed"
+KEPT = "assuming in_step (proved), kept by the levels together, system.toml"
+DECIDES = "is not known: `rcsc prove system.toml` decides it"
+DONE = "| 4    | false       | /= going  |       ||                | done       |"
+
+Said = Callable[..., str]
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The small system, stood in."""
+    monkeypatch.delenv("RCSC_CACHE_DIR", raising=False)
+    shutil.copytree(SMALL, tmp_path, dirs_exist_ok=True, ignore=shutil.ignore_patterns(".rcsc-cache"))
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def check(capfd: pytest.CaptureFixture[str]) -> Said:
+    """`rcsc check` with these arguments, of `upper.rcs` where there are none; what it prints."""
+
+    def said(*args: str, status: int = 0) -> str:
+        capfd.readouterr()
+        assert run(["check", *(args or ("upper.rcs",))]) == status
+        return capfd.readouterr().out
+
+    return said
+
+
+def prove(*args: str) -> int:
+    return run(["prove", "system.toml", "--trace", "0", *args])
+
+
+def edit(name: str, *edits: tuple[str, str]) -> None:
+    path = Path(f"{name}.rcs")
+    text = path.read_text(encoding="utf-8")
+    for old, new in edits:
+        assert text.count(old) == 1, old
+        text = text.replace(old, new)
+    path.write_text(text, encoding="utf-8")
+
+
+def table(form: str, name: str = "work") -> dict[str, Any]:
+    found: dict[str, Any] = next(one for one in json.loads(form)["tables"] if one["table"] == name)
+    return found
+
+
+# --- what is proved, and of what ---------------------------------------------------------------
+
+
+@pytest.mark.usefixtures("here")
+def test_an_assumption_is_proved_where_the_levels_together_are(check: Said) -> None:
+    before = check()
+    assert "assuming in_step (monitored), " in before
+    assert before.count(DECIDES) == 1
+    assert prove() == 0
+    assert KEPT in check()
+    assert DECIDES not in check()
+    assert KEPT in check()  # from what the last check kept
+    form = check("--json", "upper.rcs")
+    assert table(form)["assumptions"] == [{"name": "in_step", "standing": "proved"}]
+    assert table(form)["together"]["proved"] == ["in_step"]
+    assert json.loads(form)["systems"] == [{"system": "system.toml", "standing": "proved", "wanted": False}]
+    properties = json.loads(check("--sarif", "upper.rcs"))["runs"][0]["properties"]
+    assert properties["tables"][0]["assumptions"] == [{"name": "in_step", "standing": "proved"}]
+
+
+@pytest.mark.usefixtures("here")
+@pytest.mark.parametrize(
+    ("name", "old", "new"),
+    [
+        ("upper", "|| nextstate(d_state)      | pause       | done       |", "|| nextstate(d_state)      | pause       | executing  |"),
+        ("lower", DONE, DONE.replace("done     ", "executing")),
+        ("system", '"upper.to_lower" = "lower.command"', '"upper.to_lower" = "hand.command"'),
+        ("words", "enum stage { d_state,", "enum stage { spare, d_state,"),
+    ],
+    ids=["a cell", "a cell of a neighbour", "the buffers", "a file that is used"],
+)  # fmt: skip
+def test_a_proof_is_of_its_content_alone(check: Said, name: str, old: str, new: str) -> None:
+    assert prove() == 0
+    assert KEPT in check()
+    path = Path("system.toml" if name == "system" else f"{name}.rcs")
+    kept = path.read_text(encoding="utf-8")
+    assert kept.count(old) == 1
+    text = kept.replace(old, new)
+    if name == "system":
+        text = text.replace('"lower.report" = "upper.lower"', '"hand.report" = "upper.lower"')
+    path.write_text(text, encoding="utf-8")
+    changed = check()
+    assert "assuming in_step (monitored), " in changed
+    assert changed.count(DECIDES) == 1
+    path.write_text(kept, encoding="utf-8")
+    assert KEPT in check()
+
+
+@pytest.mark.usefixtures("here")
+def test_words_that_mean_nothing_leave_a_proof_as_it_is(check: Said) -> None:
+    assert prove() == 0
+    edit("lower", ("table go {", "# Another word.\n\ntable go {"))
+    assert KEPT in check()
+
+
+def test_a_proof_holds_wherever_the_files_stand(
+    here: Path, check: Said, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("RCSC_CACHE_DIR", str(here / "cache"))
+    assert prove() == 0
+    moved = here / "moved"
+    moved.mkdir()
+    for file in ("system.toml", "upper.rcs", "lower.rcs", "words.rcs"):
+        shutil.move(here / file, moved / file)
+    assert KEPT.replace("system.toml", "moved/system.toml") in check("moved/upper.rcs")
+    assert f"kept by the levels together, {moved}/system.toml" in check(str(moved / "upper.rcs"))
+
+
+@pytest.mark.usefixtures("here")
+def test_one_level_alone_is_not_the_levels_together(check: Said) -> None:
+    assert prove("--level", "upper") == 0
+    assert DECIDES in check()
+    assert prove("--level", "lower") == 0
+    assert KEPT in check()
+
+
+@pytest.mark.usefixtures("here")
+def test_no_cache_and_no_levels_say_nothing(check: Said, tmp_path: Path) -> None:
+    assert prove() == 0
+    assert "in_step (monitored)" in check("--no-cache", "upper.rcs")
+    assert DECIDES not in check("--no-cache", "upper.rcs")
+    (tmp_path / "other").mkdir()
+    text = Path("upper.rcs").read_text(encoding="utf-8")
+    Path("other/alone.rcs").write_text(text.replace("level upper", "level alone"), encoding="utf-8")
+    shutil.copy("words.rcs", "other/words.rcs")
+    beside = check("other/alone.rcs")  # below a system that has no such level
+    assert "in_step (monitored)" in beside
+    assert "rcsc prove" not in beside
+
+
+@pytest.mark.usefixtures("here")
+def test_an_unchanged_system_is_not_read_again(check: Said, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert prove() == 0
+    assert KEPT in check()
+
+    def never(_: Path) -> None:
+        raise AssertionError
+
+    monkeypatch.setattr(outline, "_read", never)
+    assert KEPT in check()
+    edit("lower", (DONE, DONE.replace("done     ", "executing")))
+    assert run(["check", "upper.rcs"]) == 3  # it would have been
+
+
+# --- what is not proved -----------------------------------------------------------------------
+
+FAILED = next(
+    row
+    for row in (SMALL / "upper.rcs").read_text(encoding="utf-8").splitlines(keepends=True)
+    if row.startswith("  | 4 ")
+)
+HOPED = (
+    "table work assuming in_step",
+    "assume never_failed monitored : status_in /= failed\ntable work assuming in_step, never_failed",
+)
+
+
+@pytest.mark.usefixtures("here")
+def test_what_was_found_not_to_be_proved_is_a_warning(check: Said) -> None:
+    edit("upper", HOPED, (FAILED, ""))
+    assert prove() == 1
+    said = check()
+    assert (
+        "warning[RCS751]: level `upper` is not proved together with its neighbours in system.toml\n"
+        "   --> upper.rcs:"
+    ) in said
+    assert "= note: not proved: table `work`: assumption `never_failed`" in said
+    assert "never_failed (monitored, not proved of the levels together)" in said
+    assert "in_step (proved)" in said
+    form = check("--json", "upper.rcs")
+    assert json.loads(form)["systems"][0]["standing"] == "not proved"
+    assert table(form)["together"]["not_proved"] == ["never_failed"]
+    assert "::warning file=upper.rcs," in check("--github", "upper.rcs")
+    assert "RCS751" not in check("lower.rcs")  # another level's
+
+
+@pytest.mark.usefixtures("here")
+def test_nothing_is_proved_of_levels_that_do_not_agree(check: Said) -> None:
+    """The lower level echoes what it does not run: the proof of the upper one rests on that it does not."""
+    edit("lower", ("report.ref_command_echo := command.input_command", "report.ref_command_echo := pause"))
+    assert prove() == 1
+    said = check()
+    assert "in_step (monitored), " in said
+    assert "error" not in said.splitlines()[0]
+    assert (
+        "warning[RCS752]: level `upper` assumes that what `lower` reports under the number of the last"
+        in said
+    )
+    assert "warning[RCS751]: level `lower` is not proved" in check("lower.rcs")
+
+
+# --- lines that never run ------------------------------------------------------------------------
+
+
+def with_tries(text: str) -> str:
+    """A variable that is always 0, and a line that wants it to be: by itself the table sends the rest to DEFAULT."""
+    above, work = text.split("table work", 1)
+    work, below = work.split("}", 1)
+    cells = {"line": " tries ", "----": "---", "3   ": " 0 "}
+
+    def widened(row: str) -> str:
+        if not row.startswith("  |"):
+            return row
+        first, name, test, rest = row.split("|", 3)
+        return "|".join((first, name, test, cells.get(name[1:5], "   "), rest))
+
+    rows = "\n".join(map(widened, work.split("\n")))
+    above = above.replace(
+        "state begun", "state tries : int 0 .. 3\nproperty untried : tries = 0\nstate begun"
+    )
+    return f"{above}table work{rows}}}{below}".replace("DEFAULT unreachable", "DEFAULT")
+
+
+@pytest.mark.usefixtures("here")
+def test_a_default_that_no_run_of_the_system_reaches_is_said_to_be_so(check: Said) -> None:
+    path = Path("upper.rcs")
+    path.write_text(with_tries(path.read_text(encoding="utf-8")), encoding="utf-8")
+    assert "note[RCS407]" in check()
+    assert "none of them comes" not in check()
+    assert prove() == 0
+    assert "= note: none of them comes in system.toml: proved of the levels together" in check()
+    assert "line 7 never reached in system.toml" in check()
+    assert table(check("--json", "upper.rcs"))["together"]["unreached"] == ["7"]
+
+
+# --- what follows from what -------------------------------------------------------------------
+
+
+def test_an_outline_comes_back_as_it_was(here: Path) -> None:
+    read = outline._read(here / "system.toml")
+    assert read is not None
+    made = outline.outline(read[0])
+    assert standing_of(made).of_level("upper") is Known.UNKNOWN
+    form = json.loads(json.dumps(asdict(made)))
+    assert outline_of(form) == made
+    assert [one.name for one in made.levels] == ["upper", "lower"]
+    assert {level for one in made.assumed for level, _ in one.needs} == {"upper", "lower"}
+
+
+def standing_of(made: Outline) -> Standing:
+    return standing(Cache(Path("nowhere"), b"secret", "tool"), made)
