@@ -1,6 +1,7 @@
 """What a system is made of, as its files have it: read anew only when one of them changes.
 
-In: a system's description and the cache. Out: an `Outline`, or nothing where the system is not in order; `rcsc prove` says why.
+In: a system's description and the cache. Out: an `Outline` and what is known of it, or nothing where the system is not in order;
+`rcsc prove` says why.
 """
 
 import os
@@ -9,7 +10,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rcsc.cache import Cache
-from rcsc.compose.standing import Assumed, LevelOutline, Outline, TableOutline, outline_of
+from rcsc.compose.standing import (
+    Assumed,
+    LevelOutline,
+    Outline,
+    Standing,
+    TableOutline,
+    any_kept,
+    outline_of,
+    standing,
+)
 from rcsc.driver.unchanged import as_before, digest_at, digests
 from rcsc.system.description import BadDescription, description, places
 
@@ -18,6 +28,12 @@ if TYPE_CHECKING:
 
     from rcsc.compose.transition import Stepper
     from rcsc.model import Program, Table
+
+
+def known(system: Path, cache: Cache) -> Standing | None:
+    """What is known of a system as its files stand; None where no level was ever proved into the cache, or it is not in order."""
+    made = outlined(system.parent.resolve() / system.name, cache) if any_kept(cache) else None
+    return None if made is None else standing(cache, made)
 
 
 def outlined(system: Path, cache: Cache) -> Outline | None:

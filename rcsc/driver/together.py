@@ -11,11 +11,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from rcsc.cache import Cache, cache_of
-from rcsc.compose.standing import Assumed, Known, LevelOutline, Standing, any_kept, standing
+from rcsc.compose.standing import Assumed, Known, LevelOutline, Standing
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label, Severity, sort_key
 from rcsc.diagnostics.report import InSystem, Report, SystemReport, TableReport
-from rcsc.driver.outline import outlined
+from rcsc.driver.outline import known
 from rcsc.project import PROJECT_FILE
 from rcsc.source import Source, Span
 from rcsc.system.description import BadDescription, description, places
@@ -95,22 +95,22 @@ class _Seen:
     def _standing(self, system: Path) -> Standing | None:
         """What is known of a system; None where no level was ever proved, or it is not in order."""
         if system not in self._standings:
-            own = cache_of(system.parent, self.cache)
-            made = outlined(system, own) if any_kept(own) else None
-            self._standings[system] = None if made is None else standing(own, made)
+            self._standings[system] = known(system, cache_of(system.parent, self.cache))
         return self._standings[system]
 
     def _placed(self, table: TableReport, system: str, at: list[_Place]) -> TableReport:
         """A table that levels of a system run: what is known in all of them."""
         for one in at:
             self.levels.setdefault((system, one.level.name), (one.standing, one.level))
-        known = {name: {one.known(name) for one in at} for name in _open(table)}
-        proved = tuple(name for name, found in known.items() if found == {Known.PROVED})
-        not_proved = tuple(name for name, found in known.items() if Known.NOT_PROVED in found)
+        states = {name: {one.known(name) for one in at} for name in _open(table)}
+        proved = tuple(name for name, found in states.items() if found == {Known.PROVED})
+        not_proved = tuple(name for name, found in states.items() if Known.NOT_PROVED in found)
         unreached = tuple(line for line in at[0].unreached if all(line in one.unreached for one in at))
         if at[0].default in unreached:
             self.idle[table.file, table.table] = system
-        self._say(system, at[0].standing.whole, wanted=len(proved) + len(not_proved) < len(known))
+        made = at[0].standing
+        wanted = len(proved) + len(not_proved) < len(states) and not made.broken
+        self._say(system, made.whole, wanted=wanted)
         assumptions = tuple(
             (name, Known.PROVED.value if name in proved else was) for name, was in table.assumptions
         )

@@ -45,6 +45,7 @@ breaks, delete N        the breakpoints; one less
 undo [N]                go back to before the last cycle, or the last N
 reload [LEVEL] [anyway] prove and take a level's tables as they are now, with what they do otherwise; `anyway` even
                         where the present state is one in which the next cycle does otherwise
+reload [LEVEL] proved   the same, but first prove the levels together, which may take minutes, and take it only then
 diff [LEVEL]            the same, but take nothing
 expect CONDITION        fail unless it holds
 help, quit
@@ -246,9 +247,11 @@ class Commands:
         return [f"cycle {self.session.system.tick}: {', '.join(_at(one) for one in self.session.levels)}"]
 
     def _reload(self, rest: str) -> Said:
-        words = rest.split()
-        anyway = bool(words) and words[-1].casefold() == "anyway"
-        return self.session.reload(self._named(" ".join(words[:-1] if anyway else words)), anyway=anyway)
+        words, said = rest.split(), set[str]()
+        while words and words[-1].casefold() in {"anyway", "proved"}:
+            said.add(words.pop().casefold())
+        name = self._named(" ".join(words))
+        return self.session.reload(name, anyway="anyway" in said, prove="proved" in said)
 
     def _diff(self, rest: str) -> Said:
         return self.session.difference(self._named(rest))

@@ -6,23 +6,28 @@ printed here.
 
 from collections import deque
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from rcsc.diagnostics.codes import Code
 from rcsc.log.layout import fingerprints
 from rcsc.model import Program
 from rcsc.shell import history, names
+from rcsc.shell.composed import held_by, together
 from rcsc.shell.expressions import Question, question
 from rcsc.shell.gate import Judged, Running, judge
 from rcsc.shell.names import NamedLine
 from rcsc.shell.parts import run_part
 from rcsc.shell.refusal import Refused
-from rcsc.shell.reload import Plant, Reloaded, program_of, reload, source_of
-from rcsc.shell.sources import Kept, kept
+from rcsc.shell.reload import Plant, Reloaded, program_of, reload
 from rcsc.shell.stops import Stops, reached, stands
 from rcsc.system.cell import StateTableError, System
 from rcsc.system.description import BadDescription, Description, LevelSpec
 from rcsc.system.levels import Fill, Query, RunningLevel
 from rcsc.system.signature import FAULTS, Signature, Value, Values
+
+if TYPE_CHECKING:
+    from rcsc.shell.sources import Kept
 
 MOST_CYCLES = 100_000
 """After which `run` gives up: more than an hour of control time."""
@@ -52,7 +57,7 @@ class Session:
         # What runs is known by its executors' digest, and what it means by its sources, from before anybody edits them.
         digests = fingerprints(system.description)
         self._made: dict[int, tuple[RunningLevel, str, Kept | None]] = {
-            id(level): (level, digests[spec.program], self._source(spec))
+            id(level): (level, digests[spec.program], held_by(self.plant, spec))
             for level in system.levels
             for spec in (self.spec(level.name),)
         }
@@ -93,12 +98,6 @@ class Session:
         if key not in self._programs:
             self._programs[key] = level, program_of(self.plant, self.spec(level.name), self._made[key][2])
         return self._programs[key][1]
-
-    def _source(self, spec: LevelSpec) -> Kept | None:
-        try:
-            return kept(source_of(self.plant, spec))
-        except Refused:
-            return None
 
     # --- cycles ---
 
@@ -236,17 +235,18 @@ class Session:
 
     # --- other tables ---
 
-    def reload(self, name: str, *, anyway: bool = False) -> list[str]:
+    def reload(self, name: str, *, anyway: bool = False, prove: bool = False) -> list[str]:
         """Takes a level's tables as they are now, between two cycles; what they do otherwise.
 
         Args:
             name: The level's.
             anyway: Whether they are taken although the next cycle does otherwise than before, or nobody knows.
+            prove: Whether they are taken only if they are proved together with their neighbours; which is tried first.
 
         Raises:
             Refused: They are not taken; the old ones run on.
         """
-        old, made, judged = self._made_anew(name)
+        old, made, judged = self._made_anew(name, prove=prove)
         if judged is None:
             return [f"level `{name}` runs these very tables: nothing changed"]
         if judged.doubts and not anyway:
@@ -277,7 +277,7 @@ class Session:
         would = f"`reload {name}{' anyway' if judged.doubts else ''}` takes it: {made.said}"
         return [*judged.said, *judged.doubts, would]
 
-    def _made_anew(self, name: str) -> tuple[RunningLevel, Reloaded, Judged | None]:
+    def _made_anew(self, name: str, *, prove: bool = False) -> tuple[RunningLevel, Reloaded, Judged | None]:
         """The level that runs, that which would, and what is to be said of it; None where they are the same."""
         old = self.system.level(name)
         made = reload(self.plant, self.spec(name), old)
@@ -288,7 +288,10 @@ class Session:
             program = self.program(old)
         except Refused:
             program = None
-        return old, made, judge(Running(old, program), made.level, made.program, self.memory)
+        judged = judge(Running(old, program), made.level, made.program, self.memory)
+        runs = {one.name: made.sources if one is old else self._made[id(one)][2] for one in self.levels}
+        known = together(self.plant, name, runs, prove=prove)
+        return old, made, replace(judged, said=(*judged.said, known))
 
     def _keep(self) -> None:
         self._past.append(history.kept(self.system, self.memory, self._answers))
