@@ -212,6 +212,49 @@ def test_nothing_is_proved_of_levels_that_do_not_agree(check: Said) -> None:
     assert "warning[RCS751]: level `lower` is not proved" in check("lower.rcs")
 
 
+# --- properties ---------------------------------------------------------------------------------
+
+
+@pytest.mark.usefixtures("here")
+@pytest.mark.parametrize(
+    ("words", "proved"), [("status_report in {done, executing, failed}", True), ("begun", False)]
+)
+def test_properties_that_the_levels_keep_are_said_to_be_proved(check: Said, words: str, proved: bool) -> None:
+    edit("upper", ("level upper {", f"property stated : {words}\nlevel upper {{"))
+    note = "= note: proved of the levels together, system.toml"
+    help_ = "= help: `rcsc prove` proves what a level does"
+    before = check()
+    assert (note in before, help_ in before) == (False, True)
+    assert prove() == (0 if proved else 1)
+    said = check()
+    assert (note in said, help_ in said) == (proved, not proved)
+    assert "property `stated` is not proved here" in said
+    assert ("= note: not proved: property `stated`" in said) is not proved
+    edit("upper", (f"stated : {words}", f"stated : {words} and begun = begun"))
+    assert note not in check()
+
+
+@pytest.mark.usefixtures("here")
+@pytest.mark.parametrize(
+    "edits",
+    [
+        {"words": ("record lower_report {\n  inc_command_echo : number", "record lower_report {\n  echo : number")},
+        {"words": ("record lower_order {\n  inc_command : number", "record lower_order {\n  number : number")},
+        {"system": ('"lower.report" = "upper.lower"', '"lower.report" = "upper.nothing"')},
+        {"system": ("[buffers]", "[buffers")},
+        {"lower": ("table go {", "table gone {")},
+    ],
+)  # fmt: skip
+def test_a_system_that_is_not_in_order_does_not_stop_a_check(edits: dict[str, tuple[str, str]]) -> None:
+    assert prove() == 0
+    for name, (old, new) in edits.items():
+        path = Path("system.toml" if name == "system" else f"{name}.rcs")
+        text = path.read_text(encoding="utf-8")
+        assert text.count(old) == 1
+        path.write_text(text.replace(old, new), encoding="utf-8")
+    assert run(["check", "upper.rcs", "lower.rcs"]) in {0, 1}
+
+
 # --- lines that never run ------------------------------------------------------------------------
 
 

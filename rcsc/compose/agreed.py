@@ -87,7 +87,9 @@ def _of_below(name: str, stepper: Stepper, made: Mapping[str, Stepper]) -> Itera
             yield Promise(name, words, f"`{below.name}` stands outside the levels", outside=True)
             continue
         lower = made[below.name].links.above
-        assert lower is not None
+        if lower is None:
+            yield Promise(name, words, f"`{below.name}` takes no numbered orders", begins=False)
+            continue
         yield Promise(
             name,
             words,
@@ -130,5 +132,8 @@ def _begin(upper: Stepper, order: str, lower: Stepper, record: str) -> bool:
     other = {str(v.name): v.initial for v in lower.program.variables}
     leaves = (f"{order}.{NUMBER}", f"{order}.{COMMAND}")
     report = next(one.report for one in upper.links.below if one.order == order)
+    ends = {other_end(leaf, order, record) for leaf in leaves}
+    if not first.keys() >= {*leaves, f"{report}.{ECHOED}"} or not other.keys() >= ends:
+        return False  # a field is missing, or named otherwise
     echoed = first[f"{report}.{ECHO}"] != first[leaves[0]] or first[f"{report}.{ECHOED}"] == first[leaves[1]]
     return echoed and all(first[leaf] == other[other_end(leaf, order, record)] for leaf in leaves)

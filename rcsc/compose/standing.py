@@ -15,8 +15,8 @@ from rcsc.cache import Cache
 Key: TypeAlias = tuple[str, str, str]
 """Of a goal: sort, table and name, as `goals.Goal` has them."""
 
-ASSUMPTION = "assumption"
-"""The sort of a goal that is about an assumption of a table."""
+ASSUMPTION, PROPERTY = "assumption", "property"
+"""Sorts of goals: of an assumption of a table, of a property."""
 
 
 class Known(StrEnum):
@@ -94,6 +94,7 @@ class LevelOutline:
     Attributes:
         content: Digest of all that a proof of it is about.
         file: Real path of the file that declares it; `start` and `end`, where its name stands there.
+        properties: Each with the real path of the file that states it.
     """
 
     name: str
@@ -102,6 +103,7 @@ class LevelOutline:
     start: int
     end: int
     tables: tuple[TableOutline, ...]
+    properties: tuple[tuple[str, str], ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,7 +131,13 @@ class Outline:
 def outline_of(form: Mapping[str, Any]) -> Outline:
     """The inverse of `dataclasses.asdict`, by way of JSON."""
     levels = tuple(
-        LevelOutline(**{**one, "tables": tuple(TableOutline(**table) for table in one["tables"])})
+        LevelOutline(
+            **one
+            | {
+                "tables": tuple(TableOutline(**table) for table in one["tables"]),
+                "properties": tuple((name, file) for name, file in one["properties"]),
+            }
+        )
         for one in form["levels"]
     )
     assumed = tuple(
@@ -182,9 +190,9 @@ class Standing:
             return Known.UNKNOWN
         return Known.PROVED if key in verdicts.proved else Known.NOT_PROVED
 
-    def of_assumption(self, level: str, table: str, name: str) -> Known:
-        """Whether a table's assumption is proved of the levels together."""
-        found = self._goal(level, (ASSUMPTION, table, name))
+    def of_goal(self, level: str, key: Key) -> Known:
+        """Whether a goal of a level is proved of the levels together."""
+        found = self._goal(level, key)
         return Known.UNKNOWN if found is Known.PROVED and not self.sound else found
 
     def of_level(self, level: str) -> Known:

@@ -23,7 +23,7 @@ from rcsc.compose.transition import Stepper
 from rcsc.model import Program
 from rcsc.project import Loaded, load
 from rcsc.prove.values import TRUE
-from rcsc.system.description import Description, description, places
+from rcsc.system.description import BadDescription, Description, description, places
 
 
 class NoProgramError(Exception):
@@ -84,7 +84,11 @@ def _narrowed(mine: Links, every: Mapping[str, Links], programs: Mapping[str, Pr
         return mine
     from rcsc.compose.features import compared
 
-    upper = next(one for one in every[above.name].below if one.name == mine.level)
+    upper = next((one for one in every[above.name].below if one.name == mine.level), None)
+    if upper is None:
+        raise BadDescription(
+            f"`{mine.level}.{above.order}` is an order of `{above.name}`, which takes no report of it"
+        )
     pairs = {leaf for pair in compared(programs[above.name]) for leaf in pair}
     kept = tuple(leaf for leaf in above.numbered if other_end(leaf, above.order, upper.order) in pairs)
     return replace(mine, above=replace(above, numbered=kept))

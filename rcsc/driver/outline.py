@@ -83,6 +83,7 @@ def outline(made: "Mapping[str, Stepper]") -> Outline:
             one.level.span.start,
             one.level.span.end,
             tuple(map(_table, _run_by(one))),
+            tuple((each.name, os.path.realpath(each.span.file)) for each in one.program.properties),
         )
         for name, one in made.items()
     )

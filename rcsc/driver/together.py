@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from rcsc.cache import Cache, cache_of
-from rcsc.compose.standing import Assumed, Known, LevelOutline, Standing
+from rcsc.compose.standing import ASSUMPTION, PROPERTY, Assumed, Known, LevelOutline, Standing
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label, Severity, sort_key
 from rcsc.diagnostics.report import InSystem, Report, SystemReport, TableReport
@@ -52,7 +52,7 @@ class _Place:
 
     def known(self, assumption: str) -> Known:
         """What is known of one of the table's assumptions."""
-        return self.standing.of_assumption(self.level.name, self.table, assumption)
+        return self.standing.of_goal(self.level.name, (ASSUMPTION, self.table, assumption))
 
     @property
     def unreached(self) -> tuple[str, ...]:
@@ -125,7 +125,9 @@ class _Seen:
     # --- findings ---
 
     def noted(self, found: Diagnostic) -> Diagnostic:
-        """A finding; where inputs fall to a DEFAULT that never runs here, with that."""
+        """A finding; where inputs fall to a DEFAULT that never runs here, or properties are proved, with that."""
+        if found.code is Code.PROPERTY_ELSEWHERE:
+            return self._elsewhere(found)
         if found.code is not Code.DEFAULT_COVERS or not found.witnesses:
             return found
         system = self.idle.get((found.primary.span.file, found.witnesses[0].table))
@@ -133,6 +135,20 @@ class _Seen:
             return found
         note = f"none of them comes in {system}: proved of the levels together"
         return replace(found, notes=(*found.notes, note))
+
+    def _elsewhere(self, found: Diagnostic) -> Diagnostic:
+        """That properties of a file are not proved here: where they are, if each is in every level that states it."""
+        file = os.path.realpath(found.primary.span.file)
+        stated = [
+            (system, made.of_goal(level.name, (PROPERTY, "", name)))
+            for (system, _), (made, level) in self.levels.items()
+            for name, at in level.properties
+            if at == file
+        ]
+        if not stated or any(state is not Known.PROVED for _, state in stated):
+            return found
+        systems = ", ".join(dict.fromkeys(system for system, _ in stated))
+        return replace(found, notes=(*found.notes, f"proved of the levels together, {systems}"), help=())
 
     def warnings(self) -> Iterator[Diagnostic]:
         """What is not proved of the levels that run the tables."""
