@@ -4,12 +4,15 @@ from pathlib import Path
 
 import pytest
 
+from rcsc.cli import run
 from rcsc.compose.context import gives_an_order
 from rcsc.compose.ends import Ending
+from rcsc.compose.lap import Lap, laps
 from rcsc.compose.level import prove_level
 from rcsc.compose.measured import Measured
 from rcsc.compose.rounds import Counted, least_power, parts
 from rcsc.compose.system import steppers
+from rcsc.compose.trace import NotReproducedError, Search
 from rcsc.model import Op, Real
 from rcsc.prove import values
 from rcsc.prove.smt import Answer, Solver
@@ -141,6 +144,86 @@ def test_what_has_to_stand_still_is_said(tmp_path: Path) -> None:
     assert found.open == ()
     work = next(one for one in found.endings if one.table == "work")
     assert (work.proved, work.still) == (True, ("which",))
+
+
+# --- runs that go round --------------------------------------------------------------------------
+
+
+def lap(folder: Path, level: str, table: str, **edits: Edit) -> Lap | NotReproducedError | None:
+    stepper = steppers(changed(folder, **edits))[level]
+    return laps(stepper, (table,), Search(8, legal=True)).get(table)
+
+
+def test_a_line_that_waits_goes_round(tmp_path: Path) -> None:
+    """For what nobody brings: the shortest run is to take the command, and to wait; it is new no more, and to wait again."""
+    found = lap(
+        tmp_path,
+        "lower",
+        "go",
+        lower=go(
+            "  | 2 | false | going | false | || | executing |\n  | 3 | false | going | true | || | executing |\n"
+        ),
+    )
+    assert isinstance(found, Lap)
+    assert ([step.line for step in found.trace.steps], found.first) == (["1", "2", "2"], 3)
+
+
+def test_lines_that_take_turns_go_round_together(tmp_path: Path) -> None:
+    lines = (
+        "  | 2 | false | going | | true || | executing |\n  | 3 | false | going | | false || | executing |\n"
+    )
+    found = lap(tmp_path, "lower", "go", lower=go(lines, **TICK))
+    assert isinstance(found, Lap)
+    lines_run = [step.line for step in found.trace.steps]
+    assert (len(lines_run), found.first, set(lines_run[2:])) == (4, 3, {"2", "3"})
+
+
+def test_what_ends_goes_nowhere_round(tmp_path: Path) -> None:
+    counts = go(WAY, "state c : int 0 .. 3", "on := c >= 3", "c := 0", "c := min(c + 1, 3)")
+    assert lap(tmp_path / "counts", "lower", "go", lower=counts) is None
+    # a real's way is open to the solver; the interpreter does not come round
+    real = lap(tmp_path / "real", "lower", "go", lower=way("x := min(100.0, x + 30.0)"))
+    assert isinstance(real, NotReproducedError)
+    assert real.guessed
+
+
+def again(text: str) -> str:
+    """When the lower level is done the upper one rests, and then gives the order again."""
+    gone = "nextstate(d_state)      | pause       | done       |"
+    text = text.replace(gone, gone.replace("done  ", "executing"))
+    rests = "| d_state   ||                         | pause       | done       |"
+    return text.replace(rests, "| d_state   || nextstate(going)        | go          | executing  |")
+
+
+def test_order_after_order_goes_round(tmp_path: Path) -> None:
+    """Its numbers go on, and everything else is as before."""
+    found = lap(tmp_path, "upper", "work", upper=again)
+    assert isinstance(found, Lap)
+    steps = found.trace.steps[found.first - 1 :]
+    numbers = [step.after["to_lower.inc_command"] for step in steps]
+    assert len(set(numbers)) == 2
+    assert {step.line for step in steps} == {"2", "3"}
+
+
+def test_it_is_shown_drawn_and_frozen(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """By the command: a warning with a time line, a log, and a case that fails until the table is mended."""
+    path = changed(tmp_path / "round", upper=again)
+    found, cases = tmp_path / "found", tmp_path / "cases"
+    assert run(["prove", str(path), "--log", str(found), "--freeze", str(cases), "--no-cache"]) == 0
+    said = capsys.readouterr().err
+    assert "warning[RCS756]: level `upper`, table `work`: not shown: the command ends" in said
+    assert "goes round from cycle" in said
+    assert "so it may go on" in said
+    page, log = tmp_path / "page.html", found / "upper_work_ends.mcap"
+    assert run(["log", str(log), "--report", str(page)]) == 0
+    assert "so it may go on for ever" in page.read_text(encoding="utf-8")
+    (case,) = (one for one in cases.iterdir() if "upper_work_ends" in one.name)
+    assert run(["prove", "--case", str(case)]) == 1
+    assert "RCS753" in capsys.readouterr().err
+    path.with_name("upper.rcs").write_text(
+        (SMALL / "upper.rcs").read_text(encoding="utf-8"), encoding="utf-8"
+    )
+    assert run(["prove", "--case", str(case)]) == 0
 
 
 # --- the parts ----------------------------------------------------------------------------------

@@ -296,6 +296,8 @@ def _say_told(made: "dict[str, Stepper]", told: "Told", cycles: int) -> None:
             f"error[{Code.NOT_REPRODUCED.value}]: {where}: the trace found does not run: {told.goal.shown}",
             err=True,
         )
+    elif told.warns:
+        click.echo(f"warning[{Code.ENDLESS.value}]: {where}: not shown: {told.goal.shown}", err=True)
     else:
         click.echo(f"error[{Code.NOT_COMPOSED.value}]: {where}: not proved: {told.goal.shown}", err=True)
     if stated := _stated(made, told):
@@ -335,7 +337,12 @@ def _say_finding(made: "dict[str, Stepper]", finding: "Finding") -> None:
     begins = ", after a restart" if finding.restarted else ""
     legal = "" if finding.legal else "; numbers have gone round, or a neighbour was restarted"
     run_by = "as the interpreter, the Python and the C executors run it"
-    click.echo(f"  = note: broken in cycle {finding.broken_at}{begins}, {run_by}{legal}", err=True)
+    what = (
+        f"goes round from cycle {finding.lap} to cycle {finding.broken_at}"
+        if finding.lap
+        else f"broken in cycle {finding.broken_at}"
+    )
+    click.echo(f"  = note: {what}{begins}, {run_by}{legal}", err=True)
     with io.StringIO() as text:
         Console(file=text, width=_WIDTH, no_color=True, highlight=False).print(_time_line(made, finding))
         click.echo(
@@ -429,6 +436,7 @@ def _told_as_json(made: "dict[str, Stepper]", told: "Told") -> dict[str, Any]:
     found = told.finding
     return {
         "level": told.level,
+        "severity": "warning" if told.warns else "error",
         "what": told.goal.sort.value,
         "table": told.goal.table,
         "name": told.goal.name,
@@ -437,6 +445,7 @@ def _told_as_json(made: "dict[str, Stepper]", told: "Told") -> dict[str, Any]:
         "reproduces": found is not None and not told.beside,
         "beside": list(told.beside),
         "restarted": found is not None and found.restarted,
+        "lap": 0 if found is None else found.lap,
         "time_line": [] if found is None else [asdict(row) for row in rows(made, found)],
         "helps": list(told.helps),
         "others": list(told.others),

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 
 from rcsc.compose.confirm import Confirmation
 from rcsc.compose.context import gives_an_order, of_lines
-from rcsc.compose.contract import COMMAND, ECHO, ECHOED, NUMBER, STATUS
+from rcsc.compose.contract import COMMAND, ECHO, ECHOED, NUMBER, STATUS, Below
 from rcsc.compose.frames import Clause
 from rcsc.compose.goals import FLAG
 from rcsc.compose.keyed import sort
@@ -88,6 +88,31 @@ def reports(stepper: Stepper) -> bool:
     return all(isinstance(kind, Enum) and {DONE, EXECUTING} <= set(kind.members) for kind in kinds)
 
 
+def command_goes_on(stepper: Stepper, cycle: Cycle) -> Node:
+    """The level's command is still the same, and not ended."""
+    above = stepper.links.above
+    assert above is not None
+    number = f"{above.order}.{NUMBER}"
+    same = values.equal(cycle.before[number], cycle.taken[number])
+    return values.both(same, _says(stepper, f"{above.report}.{STATUS}", cycle.after, EXECUTING))
+
+
+def answered(stepper: Stepper, cycle: Cycle, below: Below) -> Node:
+    """The last order is echoed, and ended: the first command by *done* alone."""
+    command, status = f"{below.order}.{COMMAND}", f"{below.report}.{STATUS}"
+    echoed = values.equal(cycle.taken[f"{below.report}.{ECHO}"], cycle.before[f"{below.order}.{NUMBER}"])
+    rests = values.equal(cycle.before[command], values.constant(stepper.kinds[command], 0))
+    done = _says(stepper, status, cycle.taken, DONE)
+    ended = values.negation(_says(stepper, status, cycle.taken, EXECUTING))
+    return values.all_of((echoed, ended, values.follows(rests, done)))
+
+
+def _says(stepper: Stepper, leaf: str, leaves: Mapping[str, Node], member: str) -> Node:
+    kind = stepper.kinds[leaf]
+    assert isinstance(kind, Enum)
+    return values.equal(leaves[leaf], values.constant(kind, kind.members.index(member)))
+
+
 class _Flow:
     """The questions of one level."""
 
@@ -132,7 +157,7 @@ class _Flow:
         """That a step is not taken, for each that is on a way round."""
         at = self.asked.cycle.tables[number]
         steps = self._steps(at) or set()
-        taken = values.both(at.chosen, self._goes_on(self.asked.cycle))
+        taken = values.both(at.chosen, command_goes_on(self.stepper, self.asked.cycle))
         return [
             values.negation(values.all_of((taken, *self._are(self.before, one), *self._are(self.after, two))))
             for one, two in sorted(steps)
@@ -147,32 +172,6 @@ class _Flow:
         ]
 
     # --- conditions ---
-
-    def _status(self, leaf: str, cycle: Mapping[str, Node], member: str) -> Node:
-        kind = self.stepper.kinds[leaf]
-        assert isinstance(kind, Enum)
-        return values.equal(cycle[leaf], values.constant(kind, kind.members.index(member)))
-
-    def _goes_on(self, cycle: Cycle) -> Node:
-        """The command is still the same, and not ended."""
-        above = self.stepper.links.above
-        assert above is not None
-        number = f"{above.order}.{NUMBER}"
-        same = values.equal(cycle.before[number], cycle.taken[number])
-        return values.both(same, self._status(f"{above.report}.{STATUS}", cycle.after, EXECUTING))
-
-    def _answered(self, cycle: Cycle) -> Node:
-        found = []
-        for below in self.stepper.links.below:
-            command, status = f"{below.order}.{COMMAND}", f"{below.report}.{STATUS}"
-            echoed = values.equal(
-                cycle.taken[f"{below.report}.{ECHO}"], cycle.before[f"{below.order}.{NUMBER}"]
-            )
-            rests = values.equal(cycle.before[command], values.constant(self.stepper.kinds[command], 0))
-            done = self._status(status, cycle.taken, DONE)
-            ended = values.negation(self._status(status, cycle.taken, EXECUTING))
-            found += [echoed, ended, values.follows(rests, done)]
-        return values.all_of(found)
 
     def _turns(self, number: int, still: tuple[str, ...]) -> tuple[Turn, Turn, Turn]:
         """Of a table: three cycles in a row."""
@@ -196,9 +195,16 @@ class _Flow:
         """The cycle of a table, in which the command goes on, and the phase stays."""
         same = values.all_of(values.equal(cycle.before[leaf], cycle.after[leaf]) for leaf in self.leaves)
         at = cycle.tables[number]
-        stays = values.all_of((at.chosen, cycle.contract, self._goes_on(cycle), same))
+        stays = values.all_of((at.chosen, cycle.contract, command_goes_on(self.stepper, cycle), same))
         orders = gives_an_order(self.stepper, cycle)
-        return Turn(at, cycle.before, cycle.after, stays, orders, self._answered(cycle))
+        return Turn(
+            at,
+            cycle.before,
+            cycle.after,
+            stays,
+            orders,
+            values.all_of(answered(self.stepper, cycle, below) for below in self.stepper.links.below),
+        )
 
     # --- from phase to phase ---
 
@@ -206,7 +212,9 @@ class _Flow:
         """Every change of phase in a cycle that runs the table; None where they are too many, or the solver gave up."""
         keyed, cycle = self.keyed, self.asked.cycle
         stays = values.all_of(map(values.equal, self.before, self.after))
-        moves = keyed.term(values.all_of((at.chosen, self._goes_on(cycle), values.negation(stays))))
+        moves = keyed.term(
+            values.all_of((at.chosen, command_goes_on(self.stepper, cycle), values.negation(stays)))
+        )
         ends = [keyed.term(node) for node in (*self.before, *self.after)]
         solver = self.asked.known(self.clauses)
         solver.add(*keyed.ranges, moves)

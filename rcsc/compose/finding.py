@@ -4,7 +4,7 @@ In: traces. Out: `Finding`s; rows and lines of text, in the tables' words.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from rcsc.compose.goals import Goal, Sort
 from rcsc.compose.trace import Step, Trace, one_cycle
@@ -24,6 +24,7 @@ class Finding:
         after: Ticks behind the one in which it is broken, which show what comes of it.
         restarted: Whether it begins where a restart does, and not with the initial values.
         legal: Whether the levels around keep to more than the contract (`trace.Search.legal`).
+        lap: The cycle, from 1, before which all is as it is at the end, so that it may go on for ever; 0 where it is not about that.
     """
 
     level: str
@@ -32,6 +33,7 @@ class Finding:
     after: int = 0
     restarted: bool = False
     legal: bool = True
+    lap: int = 0
 
     @property
     def broken_at(self) -> int:
@@ -104,6 +106,7 @@ _WRONG = {
     Sort.DEFERRED: "`{}` is written directly while another value is pending",
     Sort.INVARIANT: "invariant `{}` does not hold",
     Sort.PROPERTY: "property `{}` is broken",
+    Sort.ENDS: "all is as it was before cycle {}: so it may go on for ever",
     Sort.SAME_ORDER: "another order under the number that was taken last: it is not seen as new",
     Sort.OF_ITS_ORDER: "what is reported under the number of the last order is not about it",
 }
@@ -112,8 +115,9 @@ _WRONG = {
 def rows(made: Mapping[str, Stepper], finding: Finding) -> tuple[Row, ...]:
     """The time line, a row for each cycle of each level."""
     where = finding.broken_at, finding.level
+    goal = replace(finding.goal, name=str(finding.lap)) if finding.lap else finding.goal
     return tuple(
-        _row(made[name], tick, step, finding.goal if (tick, name) == where else None)
+        _row(made[name], tick, step, goal if (tick, name) == where else None)
         for tick, steps in enumerate(finding.ticks, 1)
         for name, step in steps.items()
     )

@@ -16,6 +16,7 @@ from typing import Any
 
 from rcsc.compose.finding import Finding
 from rcsc.compose.goals import Goal, Sort
+from rcsc.compose.lap import lap_of
 from rcsc.compose.system import NoProgramError, steppers
 from rcsc.compose.together import broken_in, exchange
 from rcsc.compose.trace import Step, broken, one_cycle
@@ -137,6 +138,7 @@ def case_breaks(case: Case) -> bool:
     now = {name: _begun(stepper, case.start.get(name, {})) for name, stepper in made.items()}
     exchanged = exchange(made, tuple(made))
     given = {name: {leaf: now[name][leaf] for leaf in leaves} for name, leaves in exchanged.items()}
+    so_far: list[Step] = []
     for tick in case.ticks:
         steps = {}
         for name, said in tick.items():
@@ -145,8 +147,10 @@ def case_breaks(case: Case) -> bool:
         now |= {name: dict(step.after) for name, step in steps.items()}
         for name, leaves in exchanged.items():
             given[name] |= {leaf: now[of][source] for leaf, (of, source) in leaves.items() if of in steps}
-        if case.level in steps and _is_broken(made, case, steps[case.level]):
-            return True
+        if case.level in steps:
+            so_far.append(steps[case.level])
+            if _is_broken(made, case, so_far):
+                return True
         if any(step.fault is not Fault.OK for step in steps.values()):
             return False
     return False
@@ -207,8 +211,11 @@ def _value(name: str, kind: Scalar, text: str) -> Value:
     raise BadCaseError(f"`{name}` cannot be `{text}`")
 
 
-def _is_broken(made: Mapping[str, Stepper], case: Case, step: Step) -> bool:
-    stepper = made[case.level]
+def _is_broken(made: Mapping[str, Stepper], case: Case, steps: list[Step]) -> bool:
+    """Whether the last of the level's cycles breaks the goal."""
+    stepper, step = made[case.level], steps[-1]
+    if case.goal.sort is Sort.ENDS:
+        return lap_of(stepper, case.goal.table, steps) is not None
     if case.goal.sort in {Sort.SAME_ORDER, Sort.OF_ITS_ORDER}:
         return broken_in(stepper, case.goal, step)
     try:

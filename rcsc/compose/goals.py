@@ -41,6 +41,7 @@ class Sort(StrEnum):
     DEFERRED = "no state is written directly while another is pending"
     INVARIANT = "invariant"
     PROPERTY = "property"
+    ENDS = "the command ends"  # none of one cycle: `ends`, `lap`
 
 
 Key: TypeAlias = tuple[Sort, str, str]

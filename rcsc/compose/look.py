@@ -11,7 +11,8 @@ from pathlib import Path
 
 from rcsc.compose.finding import Finding, of_trace
 from rcsc.compose.goals import Goal, Key, Sort, pairs
-from rcsc.compose.level import essential
+from rcsc.compose.lap import Lap, goal_of, laps
+from rcsc.compose.level import LevelProof, essential
 from rcsc.compose.rerun import ExecutorsDifferError, make, record
 from rcsc.compose.system import SystemProof
 from rcsc.compose.together import broken_together
@@ -49,6 +50,11 @@ class Told:
     others: tuple[str, ...] = field(default=())
 
     @property
+    def warns(self) -> bool:
+        """Whether it is no error: a command that is not shown to end may wait for what is right to wait for."""
+        return self.goal.sort is Sort.ENDS
+
+    @property
     def bug(self) -> bool:
         """Whether it shows a fault of rcsc's own."""
         return bool(self.beside) and not self.guessed
@@ -84,6 +90,8 @@ def look(made: Mapping[str, Stepper], proof: SystemProof, looking: Looking) -> I
             for told in _level(made, one.level, essential(one), looking):
                 yield rerun.run(told)
             for told in _together(made, one.level, essential(one), looking):
+                yield rerun.run(told)
+            for told in _endless(made[one.level], one, looking):
                 yield rerun.run(told)
 
 
@@ -160,6 +168,23 @@ def _together(
                 yield Told(found.level, found.goal, found)
             elif found is not None:
                 yield Told(lower, wanted[0], beside=(str(found),), guessed=found.guessed)
+
+
+def _endless(stepper: Stepper, proof: LevelProof, looking: Looking) -> Iterator[Told]:
+    """Commands that are not shown to end, each with a run after which it may go on for ever."""
+    tables = [ending.table for ending in proof.endings if not ending.proved]
+    found: dict[str, Lap | NotReproducedError] = {}
+    for search in SEARCHES if looking.most else ():
+        found |= laps(
+            stepper, [one for one in tables if one not in found], replace(search, most=looking.most)
+        )
+    for table in tables:
+        goal = goal_of(table)
+        match found.get(table):
+            case Lap() as lap:
+                yield Told(proof.level, goal, replace(of_trace(stepper, goal, lap.trace), lap=lap.first))
+            case other:
+                yield _told(stepper, goal, other)
 
 
 @dataclass(slots=True)

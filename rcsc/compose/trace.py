@@ -111,7 +111,7 @@ def shortest(stepper: Stepper, goal: Goal, most: int = 10, *, legal: bool = Fals
 
 def traces(stepper: Stepper, wanted: Sequence[Goal], search: Search) -> dict[Key, Found]:
     """For each goal for which there is one the shortest trace, all found in one search."""
-    run = _Unrolled(stepper, search)
+    run = Unrolled(stepper, search)
     waiting = {goal.key: goal for goal in wanted}
     found: dict[Key, Found] = {}
     for _ in range(search.most):
@@ -137,8 +137,8 @@ def _wrong(goal: Goal, one: Cycle) -> Node:
 
 
 @dataclass(slots=True)
-class _Unrolled:
-    """Cycles one after the other."""
+class Unrolled:
+    """Cycles one after the other, from the first of a run."""
 
     stepper: Stepper
     search: Search
@@ -204,13 +204,29 @@ class _Unrolled:
             GaveUpError: The solver did not decide.
         """
         settled = Simplest(self._run, [self._run.literal(wrong)])
-        start = self._begins(settled)
-        inputs = self._simplest(settled, start)
+        start, inputs = self._settled(settled)
         trace = _ran(self.stepper, goal, inputs, start, self.search)
         if _breaks(self.stepper, goal, trace, len(inputs)):
             return trace
         beside = self._beside(trace) if self._run.holds(settled.given) else ()
-        return NotReproducedError(goal.shown, guessed=self._run.guessed, beside=beside)
+        return NotReproducedError(goal.shown, guessed=self.guessed, beside=beside)
+
+    def inputs(self, wrong: Node) -> tuple[dict[str, Value], list[dict[str, Value]]]:
+        """Every leaf before the simplest run that ends so, and the inputs of its cycles.
+
+        Raises:
+            GaveUpError: The solver did not decide.
+        """
+        return self._settled(Simplest(self._run, [self._run.literal(wrong)]))
+
+    @property
+    def guessed(self) -> bool:
+        """Whether an operation was left open."""
+        return self._run.guessed
+
+    def _settled(self, settled: Simplest) -> tuple[dict[str, Value], list[dict[str, Value]]]:
+        start = self._begins(settled)
+        return start, self._simplest(settled, start)
 
     def _simplest(self, settled: Simplest, start: Mapping[str, Value]) -> list[dict[str, Value]]:
         """The inputs of each cycle; one stays as it was where it can, and so does what no condition reads."""
@@ -338,12 +354,16 @@ def broken(stepper: Stepper, goal: Goal, step: Step) -> bool:
 
 def _broken_between(stepper: Stepper, goal: Goal, step: Step) -> bool:
     """A goal about what stands before and behind a cycle."""
+    holds = _same(goals(stepper, as_cycle(stepper, step)), goal).holds
+    return holds.known and not holds.low
+
+
+def as_cycle(stepper: Stepper, step: Step) -> Cycle:
+    """A cycle as it ran, all its nodes constants."""
     before, after = _constants(stepper, step.before), _constants(stepper, step.after)
     taken = {name: after[name] for name in step.taken}
     here = stepper.cycle(_constants(stepper, {**step.before, **step.taken}), taken=taken)
-    one = Cycle(before, taken, values.TRUE, {**here.middle, **taken}, here.tables, after)
-    holds = _same(goals(stepper, one), goal).holds
-    return holds.known and not holds.low
+    return Cycle(before, taken, values.TRUE, {**here.middle, **taken}, here.tables, after)
 
 
 def _same(every: tuple[Goal, ...], goal: Goal) -> Goal:
