@@ -11,6 +11,7 @@ import pytest
 
 from rcsc.cli import run
 from rcsc.compose.agreed import agreements
+from rcsc.compose.cubes import Reached
 from rcsc.compose.features import point
 from rcsc.compose.finding import of_trace, time_line
 from rcsc.compose.goals import Goal, Sort, goals
@@ -96,8 +97,8 @@ def test_no_state_that_the_interpreter_reaches_breaks_the_invariant(
     for seed in range(1000, 1012):  # other walks than those that the search began with
         walk = Walk(stepper.program, stepper.level, stepper.links, Random(seed))  # noqa: S311  # repeatable on purpose
         for state in walk.states(80):
-            here = set(enumerate(point(stepper, proof.features, state)))
-            assert not any(here.issuperset(clause) for clause in proof.clauses)
+            here = Reached.of([point(stepper, proof.features, state)], len(proof.features))
+            assert not any(here.shows(clause) for clause in proof.clauses)
 
 
 def test_the_proof_is_the_same_each_time(upper: tuple[Stepper, LevelProof]) -> None:

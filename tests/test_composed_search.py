@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 from rcsc.cache import Cache
 from rcsc.compose.bits import Bits, few, key_of_bits
 from rcsc.compose.context import Again
+from rcsc.compose.cubes import Masks, Pair, Reached, shown
 from rcsc.compose.ends import Phase, leads, longest
-from rcsc.compose.frames import Reached
+from rcsc.compose.features import Feature
 from rcsc.compose.goals import Goal
 from rcsc.compose.kept import keep, recall
 from rcsc.compose.keyed import Keyed
@@ -23,7 +24,7 @@ from rcsc.compose.search import Effort, Found, search
 from rcsc.compose.system import prove_steppers, steppers
 from rcsc.compose.transition import Cycle, Stepper
 from rcsc.interpret import divide
-from rcsc.model import Bool, Int, Op, Real, Scalar, real_key
+from rcsc.model import Bool, Enum, Int, Op, Real, Scalar, real_key
 from rcsc.prove import values
 from rcsc.prove.smt import Answer, Solver
 from rcsc.prove.values import Node
@@ -192,11 +193,38 @@ def test_a_variable_that_no_clause_speaks_of_has_a_value() -> None:
 
 def test_known_states_answer_for_cubes() -> None:
     reached = Reached.of([(0, 1, 2), (1, 1, 0)], 3)
-    assert reached.shows({0: 0, 2: 2})
-    assert not reached.shows({0: 0, 2: 0})
+    assert reached.shows(((0, 0), (2, 2)))
+    assert not reached.shows(((0, 0), (2, 0)))
+    assert reached.values(((1, 1),), 2) == {0, 2}
+    assert not reached.shows(((1, ~1),))
     reached.add((0, 5, 0))
-    assert reached.shows({0: 0, 2: 0})
+    assert reached.shows(((0, 0), (2, 0)))
+    assert reached.shows(((1, ~1), (2, 0)))
+    assert not reached.shows(((1, ~1), (2, ~0)))
     assert reached.many == 3
+
+
+SIZES = (2, 3, 70)
+PAIRS = st.one_of(*(st.tuples(st.just(at), st.integers(-size, size - 1)) for at, size in enumerate(SIZES)))
+
+
+@given(st.sets(PAIRS, max_size=5), st.sets(PAIRS, max_size=5))
+def test_a_cube_implies_what_is_implied_of_it(one: set[Pair], two: set[Pair]) -> None:
+    """As far as single pairs do; nothing else, however many values a feature has."""
+    masks, first, second = Masks.of(SIZES), tuple(sorted(one)), tuple(sorted(two))
+    follows = all(
+        pair in one or any(at == pair[0] and 0 <= value != ~pair[1] and pair[1] < 0 for at, value in one)
+        for pair in two
+    )
+    wanted = masks.of_cube(second)
+    assert (masks.implied(first) & wanted == wanted) is follows
+
+
+def test_a_clause_is_written_in_the_words_of_the_tables() -> None:
+    chosen = (Feature("state", Enum("stage", ("a", "b", "c", "d"))), Feature("new", Bool()))
+    assert shown(chosen, ((0, 2), (1, 0))) == "state = c and new = false"
+    assert shown(chosen, ((0, ~1), (1, 1))) == "state /= b and new = true"
+    assert shown(chosen, ((0, ~3), (0, ~0))) == "state is none of a, d"
 
 
 # --- ways through phases -------------------------------------------------------------------
@@ -346,15 +374,16 @@ def test_a_system_is_not_proved_twice(cache: Cache, monkeypatch: pytest.MonkeyPa
         prove_steppers(made, LITTLE, 1, tuple(made), None, None)
 
 
-def test_what_z3_does_not_confirm_is_not_proved(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The search is made to lie: it says that the level is never under way."""
+@pytest.mark.parametrize("lie", [2, ~0])
+def test_what_z3_does_not_confirm_is_not_proved(monkeypatch: pytest.MonkeyPatch, lie: int) -> None:
+    """The search is made to lie: it says that the level is never under way, or always done."""
 
     def lying(
         stepper: Stepper, firsts: Sequence[Cycle], cycle: Cycle, wanted: Sequence[Goal], effort: Effort
     ) -> Found:
         found = search(stepper, firsts, cycle, wanted, effort)
         names = [one.name for one in found.features]
-        return replace(found, clauses=(*found.clauses, ((names.index("cur_state"), 2),)))
+        return replace(found, clauses=(*found.clauses, ((names.index("cur_state"), lie),)))
 
     monkeypatch.setattr("rcsc.compose.level.search", lying)
     proof = prove_level(steppers(SMALL / "system.toml")["upper"], LITTLE)

@@ -190,7 +190,7 @@ def _say_level(proof: "LevelProof") -> None:
 
 
 def _say_invariants(proof: "SystemProof") -> None:
-    from rcsc.compose.level import shown
+    from rcsc.compose.cubes import shown
 
     for one in proof.levels:
         click.echo(f"invariant of level {one.level}: never")

@@ -53,7 +53,7 @@ What it rests on besides:
 
 Modules, in the order the data flows: `contract` (who is whose environment), `transition` (a cycle as nodes), `goals`,
 `properties`, `features` (what an invariant may speak of), `walk` (states to begin with); the search, which is not trusted:
-`bits` (nodes as clauses of propositional logic), `sat`, `frames` (the invariant), `search`; what it finds is asked anew:
+`bits` (nodes as clauses of propositional logic), `sat`, `cubes`, `frames` (the invariant), `search`; what it finds is asked anew:
 `keyed` and `measured` (nodes as terms), `confirm`, `context`, `rounds`, `ends`, `level`; then `kept` (the cache), `system`.
 What is not proved: `variants` (other rules), `trace` (the shortest failing run, run by the interpreter), `lap` (one that goes
 round), `simplest`, `finding` (its time line), `together` (two levels as they are), `weakest` (what would mend it), `rerun` (by

@@ -51,10 +51,8 @@ class Bits:
 
     def word(self, node: Node) -> Word:
         """The bits of a node: one for a truth value."""
-        if node not in self._words:
-            for one in parts_first(node):
-                if one not in self._words:
-                    self._words[one] = self._made(one)
+        for one in parts_first(node, known=self._words):
+            self._words[one] = self._made(one)
         return self._words[node]
 
     def literal(self, node: Node) -> Literal:

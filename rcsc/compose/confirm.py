@@ -36,10 +36,13 @@ class Confirmation:
     _literals: dict[tuple[bool, int, int], Term] = field(default_factory=dict)
     _nodes: dict[tuple[bool, int], Node] = field(default_factory=dict)
     _kept: dict[tuple[bool, Clause], Term] = field(default_factory=dict)
+    _denied: dict[Clause, Term] = field(default_factory=dict)
     _ended: dict[tuple[int, int], Term] = field(default_factory=dict)
 
     def literal(self, at: int, value: int, *, after: bool) -> Term:
-        """That a feature has a value before, or behind, the cycle."""
+        """That a feature has a value before, or behind, the cycle; of `~value`, that it has another."""
+        if value < 0:
+            return smt.negation(self.literal(at, ~value, after=after))
         key = after, at, value
         if key not in self._literals:
             node = self.node(at, after=after)
@@ -64,9 +67,15 @@ class Confirmation:
             self._kept[key] = smt.all_of([self.literal(at, value, after=after) for at, value in clause])
         return self._kept[key]
 
+    def _held(self, clause: Clause) -> Term:
+        """That the combination does not stand before the cycle."""
+        if clause not in self._denied:
+            self._denied[clause] = smt.negation(self.broken(clause, after=False))
+        return self._denied[clause]
+
     def known(self, clauses: Sequence[Clause]) -> Solver:
         """A solver in which one cycle starts where the clauses hold."""
-        held = [smt.negation(self.broken(clause, after=False)) for clause in clauses]
+        held = [self._held(clause) for clause in clauses]
         for at in range(len(self.features)):
             self.keyed.term(self.node(at, after=True))
         contract = self.keyed.term(self.cycle.contract)
@@ -107,6 +116,8 @@ class Confirmation:
         return smt.all_of([self._at(at, value) for at, value in clause])
 
     def _at(self, at: int, value: int) -> Term:
+        if value < 0:
+            return smt.negation(self._at(at, ~value))
         key = at, value
         if key not in self._ended:
             self._ended[key] = self.keyed.has(self._end(at), self.features[at].kind, value)

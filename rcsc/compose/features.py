@@ -1,11 +1,11 @@
-"""What the invariants may speak of: features of a state, each with a few values.
+"""What the invariants may speak of: features of a state, truth values or members of an enumeration of any size.
 
 In: one cycle from anywhere, and the nodes that are to be proved. Out: the `Feature`s in their cone. Nothing here names a table or
 a state; all of it is read from the model:
 
-- leaves of few values that conditions of tables, assumptions or the contract read, and flags;
+- truth values and enumerations that conditions of tables, assumptions or the contract read, and flags;
 - whether two leaves are equal that the level itself compares: an order and the last one, a number and the one seen;
-- which class of a wide leaf's values a cell of a table tells apart;
+- which class of a number's values a cell of a table tells apart;
 - whether a test variable still is what its module would compute now: a module that reads inputs only says the same again
   as long as its inputs stay, which is what makes a line that matches again do the same again.
 """
@@ -46,13 +46,11 @@ from rcsc.resolve.leaves import everything, expressions, read_by
 
 CLOSELY = 1
 """Up to here, what is not proved is looked at with more features."""
-MOST_VALUES = 32
-"""Members up to which an enumeration is a feature."""
 
 
 @dataclass(frozen=True, slots=True)
 class Feature:
-    """A leaf of few values; or, as a truth value, whether it equals another leaf, or what a module computes of it.
+    """A truth value or a member; or, as a truth value, whether it equals another leaf, or what a module computes of it.
 
     Attributes:
         parts: Whether it is one of those that part the states.
@@ -123,7 +121,7 @@ def features(stepper: Stepper, cycle: Cycle, goals: Iterable[Node], closely: int
     chosen = [
         name
         for name, kind in kinds.items()
-        if _small(kind) and (name in computed or (name in inside and (name in read or _flag(program, name))))
+        if listed(kind) and (name in computed or (name in inside and (name in read or _flag(program, name))))
     ]
     parting = {
         *_selector(stepper),
@@ -158,8 +156,9 @@ def point(stepper: Stepper, chosen: tuple[Feature, ...], state: Mapping[str, Val
     return tuple(found)
 
 
-def _small(kind: Scalar) -> bool:
-    return isinstance(kind, Bool) or (isinstance(kind, Enum) and len(kind.members) <= MOST_VALUES)
+def listed(kind: Scalar) -> bool:
+    """Whether the values can be gone through one by one: truth values, members."""
+    return isinstance(kind, Bool | Enum)
 
 
 def _flag(program: Program, name: str) -> bool:
@@ -209,14 +208,14 @@ def _computed(stepper: Stepper) -> Iterator[tuple[str, Procedure]]:
 
 
 def _cells(stepper: Stepper, inside: Container[str]) -> Iterator[Feature]:
-    """Conditions of cells on leaves of many values."""
+    """Conditions of cells on numbers."""
     kinds, seen = stepper.kinds, set()
     for table in stepper.program.tables:
         for column, tests in zip(
             table.columns, zip(*(line.tests for line in table.lines), strict=True), strict=True
         ):
             for test in tests:
-                if test is None or all(_small(kinds[leaf]) for leaf in test.variables):
+                if test is None or all(listed(kinds[leaf]) for leaf in test.variables):
                     continue
                 name = spelled(test.condition)
                 if name not in seen and all(leaf in inside for leaf in test.variables):
@@ -225,18 +224,18 @@ def _cells(stepper: Stepper, inside: Container[str]) -> Iterator[Feature]:
 
 
 def _branches(stepper: Stepper, inside: Container[str], there: Container[str]) -> Iterator[Feature]:
-    """What procedures decide by: leaves of few values, and comparisons of others with a constant."""
+    """What procedures decide by: truth values and members, and comparisons of numbers with a constant."""
     kinds, seen = stepper.kinds, set()
     for condition in _decisions(stepper.program):
         for name in dict.fromkeys(map(str, read_by(condition))):
-            if name in inside and _small(kinds[name]) and name not in there and name not in seen:
+            if name in inside and listed(kinds[name]) and name not in there and name not in seen:
                 seen.add(name)
                 yield Feature(name, kinds[name])
         for part in parts(condition):
             match part:
                 case Apply(op=op, args=(Read(name=leaf), Literal())) if op in COMPARISONS:
                     name = spelled(part)
-                    if name not in seen and leaf in inside and not _small(kinds[leaf]):
+                    if name not in seen and leaf in inside and not listed(kinds[leaf]):
                         seen.add(name)
                         yield Feature(name, Bool(), condition=part)
 

@@ -6,11 +6,12 @@ goals for which the features do not suffice.
 
 How: *frame* i is a set of clauses that hold behind every run of at most i cycles. A state of the last frame from which a cycle
 breaks a goal has to be excluded: it is asked whether a first cycle, or a cycle from the frame before, leads to it; if one does,
-that state is to be excluded first. If none does, the state is generalised, feature by feature, as long as that stays true, and
-a clause is added. When every clause of a frame holds in the next one, they are an invariant. This is property directed
-reachability (Bradley, "SAT-based model checking without unrolling", 2011; Een, Mishchenko and Brayton, "Efficient
-implementation of property directed reachability", 2011) on states as the features show them, without making that abstraction
-(Cimatti, Griggio, Mover and Tonetta, "IC3 modulo theories via implicit predicate abstraction", 2014).
+that state is to be excluded first. If none does, the state is generalised, feature by feature, as long as that stays true: a
+feature is left out, or, if it has many values, all but a few of them are excluded with the one, so that clauses do not grow in
+number with the members of an enumeration. A clause is added. When every clause of a frame holds in the next one, they are an
+invariant. This is property directed reachability (Bradley, "SAT-based model checking without unrolling", 2011; Een, Mishchenko
+and Brayton, "Efficient implementation of property directed reachability", 2011) on states as the features show them, without
+making that abstraction (Cimatti, Griggio, Mover and Tonetta, "IC3 modulo theories via implicit predicate abstraction", 2014).
 
 A goal that is reached so is not proved; it need not be false, since two states that the features do not tell apart are one here.
 """
@@ -19,31 +20,28 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from heapq import heappop, heappush
 
-import numpy as np
-import numpy.typing as npt
-
 from rcsc.compose.bits import Bits, Literal, Word, key_of_bits
+from rcsc.compose.cubes import Cube, Masks, Pair, Point, Reached
 from rcsc.compose.features import Feature
 from rcsc.compose.sat import Sat
 from rcsc.compose.transition import Cycle
 from rcsc.model import Bool
 from rcsc.prove.values import Node
 
-Point = tuple[int, ...]
-"""A value for each feature."""
-Clause = tuple[tuple[int, int], ...]
-"""Features, by position, and values that never stand together."""
-Cube = dict[int, int]
-"""Values of some features: what a clause forbids."""
-WIDE = 64
-"""More than the values of any feature."""
+Clause = Cube
+"""What never stands together."""
+MANY = 2
+"""Of a feature with more values a clause may name those that are allowed, and so forbid all others at once."""
+TRIES = 8
+"""How often it is asked, each time with one more value allowed, before a clause forbids a single one after all."""
 
 
 class Posed:
     """A cycle as clauses, with a literal for every value of every feature before and behind it.
 
     Attributes:
-        before: By feature and value; likewise `after`.
+        sizes: How many values each feature has.
+        before: By feature and value, had or not; likewise `after`.
         holds: The literal of each goal, by its position.
     """
 
@@ -52,6 +50,7 @@ class Posed:
         ends = [one.node(cycle.after) for one in features]
         bits = Bits.of((*starts, *ends, cycle.contract, *goals.values()))
         self._kinds = [one.kind for one in features]
+        self.sizes = [one.size for one in features]
         self._starts = [bits.word(node) for node in starts]
         self._ends = [bits.word(node) for node in ends]
         self.before = self._values(bits, features, self._starts)
@@ -62,14 +61,13 @@ class Posed:
         self._count = bits.count
 
     @staticmethod
-    def _values(
-        bits: Bits, features: Sequence[Feature], words: Sequence[Word]
-    ) -> dict[tuple[int, int], Literal]:
-        return {
+    def _values(bits: Bits, features: Sequence[Feature], words: Sequence[Word]) -> dict[Pair, Literal]:
+        found = {
             (at, value): bits.equals(word, one.kind, value)
             for at, (one, word) in enumerate(zip(features, words, strict=True))
             for value in range(one.size)
         }
+        return found | {(at, ~value): -literal for (at, value), literal in found.items()}
 
     def fresh(self) -> Literal:
         """A literal that nothing is said of yet."""
@@ -93,35 +91,6 @@ class Posed:
 
 
 @dataclass(slots=True)
-class Reached:
-    """States known to be reached, to answer at once that one of them cannot be excluded."""
-
-    _points: npt.NDArray[np.int16]
-
-    @classmethod
-    def of(cls, points: Iterable[Point], width: int) -> "Reached":
-        """Of these; `width` features each."""
-        every = list(points)
-        return cls(np.array(every, dtype=np.int16).reshape(len(every), width))
-
-    @property
-    def many(self) -> int:
-        """How many there are."""
-        return len(self._points)
-
-    def add(self, point: Point) -> None:
-        """One more."""
-        self._points = np.vstack([self._points, np.array([point], dtype=np.int16)])
-
-    def shows(self, cube: Mapping[int, int]) -> bool:
-        """Whether one of them has these values."""
-        shown = np.ones(len(self._points), dtype=bool)
-        for at, value in cube.items():
-            shown &= self._points[:, at] == value
-        return bool(shown.any())
-
-
-@dataclass(slots=True)
 class Frames:
     """The search, for one level.
 
@@ -141,9 +110,11 @@ class Frames:
     _held: list[Literal] = field(default_factory=lambda: [0])
     _open: set[int] = field(default_factory=set)
     _cores: list[list[tuple[int, Cube]]] = field(init=False)
+    _masks: Masks = field(init=False)
 
     def __post_init__(self) -> None:
         self._cores = [[] for _ in self.firsts]
+        self._masks = Masks.of(self.step.sizes)
 
     def search(self, wanted: Iterable[int]) -> tuple[list[Clause], set[int]]:
         """An invariant, and which goals it does not prove.
@@ -156,7 +127,7 @@ class Frames:
         """
         goals = set(wanted)
         for clause in self.known:
-            self.step.sat.add([-self.step.before[value] for value in clause])
+            self.step.sat.add([-self.step.before[pair] for pair in clause])
         self._begin(goals)
         self._deepen()
         while True:
@@ -164,8 +135,10 @@ class Frames:
             self._deepen()
             done = self._push()
             if done is not None:
-                found = [cube for frame in self._frames[done + 1 :] for cube in frame]
-                return [*self.known, *(tuple(sorted(cube.items())) for cube in found)], self._open
+                return [
+                    *self.known,
+                    *(cube for frame in self._frames[done + 1 :] for cube in frame),
+                ], self._open
 
     # --- goals ---
 
@@ -200,7 +173,7 @@ class Frames:
         count = 0
         while waiting:
             level, _, now = waiting[0]
-            cube = dict(enumerate(now))
+            cube = tuple(enumerate(now))
             if self.reached.shows(cube):
                 return False
             if self._excluded(cube, level):
@@ -220,62 +193,87 @@ class Frames:
         return True
 
     def _excluded(self, cube: Cube, level: int) -> bool:
-        return not self.step.sat.holds(
-            [*self._held[level:], *(self.step.before[value] for value in cube.items())]
-        )
+        return not self.step.sat.holds([*self._held[level:], *(self.step.before[pair] for pair in cube)])
 
     # --- generalisation ---
 
-    def _not_first(self, cube: Cube) -> Cube | None:
-        """Values of the cube with which no first cycle ends; None where one ends with all of them."""
-        kept: Cube = {}
-        bits = _mask(cube)
+    def _not_first(self, cube: Cube) -> set[Pair] | None:
+        """Pairs of the cube with which no first cycle ends; None where one ends with all of them."""
+        kept: set[Pair] = set()
+        implied = self._masks.implied(cube)
         for first, cores in zip(self.firsts, self._cores, strict=True):
-            found = next((core for mask, core in cores if mask & bits == mask), None)
+            found = next((core for mask, core in cores if mask & implied == mask), None)
             if found is None:
-                if first.sat.holds([first.after[value] for value in cube.items()]):
+                if first.sat.holds([first.after[pair] for pair in cube]):
                     self.reached.add(first.end())
                     return None
                 core = first.sat.core()
-                found = {at: value for at, value in cube.items() if first.after[at, value] in core}
-                cores.append((_mask(found), found))
-            kept |= found
+                found = tuple(pair for pair in cube if first.after[pair] in core)
+                cores.append((self._masks.of_cube(found), found))
+            kept |= set(found)
         return kept
 
-    def _not_next(self, cube: Cube, level: int) -> Cube | None:
-        """Values of the cube to which no cycle leads from the frame outside the cube; None where one leads to all."""
+    def _not_next(self, cube: Cube, level: int) -> set[Pair] | None:
+        """Pairs of the cube to which no cycle leads from the frame outside the cube; None where one leads to all."""
         if level == 0:
-            return {}
+            return set()
         step, switch = self.step, self.step.fresh()
-        step.sat.add([-switch, *(-step.before[value] for value in cube.items())])
-        led = step.sat.holds([*self._held[level:], switch, *(step.after[value] for value in cube.items())])
+        step.sat.add([-switch, *(-step.before[pair] for pair in cube)])
+        led = step.sat.holds([*self._held[level:], switch, *(step.after[pair] for pair in cube)])
         core = None if led else step.sat.core()
         step.sat.add([-switch])
         if core is None:
             return None
-        return {at: value for at, value in cube.items() if step.after[at, value] in core}
+        return {pair for pair in cube if step.after[pair] in core}
 
     def _inductive(self, cube: Cube, level: int) -> Cube | None:
-        """Values of the cube that no run of at most `level` cycles ends with; None where one may end with all of them."""
+        """Pairs of the cube that no run of at most `level` cycles ends with; None where one may end with all of them."""
         if self.reached.shows(cube):
             return None
         kept = self._not_first(cube)
         core = None if kept is None else self._not_next(cube, level - 1)
         if kept is None or core is None:
             return None
-        found = kept | core
-        return cube if not found or self.reached.shows(found) else found
+        return self._less(cube, kept | core)
 
     def _general(self, cube: Cube, level: int) -> Cube:
-        """As few values of the cube as are excluded like it."""
-        for at in self._in_order(cube):
-            less = {one: value for one, value in cube.items() if one != at}
-            if at in cube and less:
+        """As few pairs of the cube as are excluded like it, and of those the widest."""
+        for pair in self._in_order(cube):
+            less = tuple(one for one in cube if one != pair)
+            if pair in cube and less:
                 cube = self._inductive(less, level) or cube
+        for pair in self._in_order(cube):
+            if pair in cube and self.step.sizes[pair[0]] > MANY:
+                cube = self._wider(cube, pair, level) or cube
         return cube
 
-    def _in_order(self, cube: Cube) -> list[int]:
-        return sorted(cube, key=lambda at: (self.weights[at], at))
+    def _wider(self, cube: Cube, pair: Pair, level: int) -> Cube | None:
+        """The cube with all values of a feature but those that are found to be allowed; None where these are too many."""
+        at = pair[0]
+        others = tuple(one for one in cube if one != pair)
+        allowed: set[int] = set()
+        for _ in range(TRIES):
+            allowed |= self.reached.values(others, at)
+            if 2 * len(allowed) > self.step.sizes[at]:
+                return None
+            wide = tuple(sorted((*others, *((at, ~value) for value in allowed))))
+            kept = self._not_first(wide)
+            if kept is None:
+                continue
+            core = self._not_next(wide, level - 1)
+            if core is None:
+                allowed.add(self.step.end()[at])
+                continue
+            return self._less(wide, kept | core)
+        return None
+
+    def _less(self, cube: Cube, needed: set[Pair]) -> Cube:
+        """Those pairs of the cube that are needed, unless a known state is among what they say."""
+        found = tuple(sorted(needed))
+        return cube if not found or self.reached.shows(found) else found
+
+    def _in_order(self, cube: Cube) -> list[Pair]:
+        return sorted(cube, key=lambda pair: (self.weights[pair[0]], pair))
 
     # --- frames ---
 
@@ -287,10 +285,13 @@ class Frames:
         """Adds a clause to the last frame in which it can stand; says which."""
         while level < len(self._frames) - 1 and self._not_next(cube, level) is not None:
             level += 1
+        mask = self._masks.of_cube(cube)
         for lower in range(1, level + 1):
-            self._frames[lower] = [one for one in self._frames[lower] if not cube.items() <= one.items()]
+            self._frames[lower] = [
+                one for one in self._frames[lower] if mask & self._masks.implied(one) != mask
+            ]
         self._frames[level].append(cube)
-        self.step.sat.add([-self._held[level], *(-self.step.before[value] for value in cube.items())])
+        self.step.sat.add([-self._held[level], *(-self.step.before[pair] for pair in cube)])
         return level
 
     def _push(self) -> int | None:
@@ -307,9 +308,4 @@ class Frames:
     def _kept(self, cube: Cube, level: int) -> bool:
         """Whether a cycle from the frame keeps the clause."""
         step = self.step
-        return not step.sat.holds([*self._held[level:], *(step.after[value] for value in cube.items())])
-
-
-def _mask(cube: Cube) -> int:
-    """A cube as a set of bits: one is part of another where its bits are."""
-    return sum(1 << (at * WIDE + value) for at, value in cube.items())
+        return not step.sat.holds([*self._held[level:], *(step.after[pair] for pair in cube)])

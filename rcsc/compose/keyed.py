@@ -58,10 +58,8 @@ class Keyed:
 
     def term(self, node: Node) -> Term:
         """The term of a node; parts first, without recursion."""
-        if node not in self._terms:
-            for one in parts_first(node):
-                if one not in self._terms:
-                    self._terms[one] = self._made(one)
+        for one in parts_first(node, known=self._terms):
+            self._terms[one] = self._made(one)
         return self._terms[node]
 
     def met(self, node: Node) -> bool:
@@ -176,11 +174,10 @@ class Keyed:
 
         What is known holds only where the node is reached: one value for both that and another place would carry it there.
         """
-        for one in parts_first(node):
-            if one not in self._number_of:
-                parts = tuple(self._number_of[arg] for arg in one.args)
-                key = one.op, one.kind, one.name, one.low, one.high, parts
-                self._number_of[one] = self._numbers.setdefault(key, len(self._numbers))
+        for one in parts_first(node, known=self._number_of):
+            parts = tuple(self._number_of[arg] for arg in one.args)
+            key = one.op, one.kind, one.name, one.low, one.high, parts
+            self._number_of[one] = self._numbers.setdefault(key, len(self._numbers))
         return self._number_of[node]
 
 

@@ -215,8 +215,3 @@ def _none_broken(asked: Confirmation, solver: Solver, wanted: Sequence[Goal]) ->
     bad = smt.any_of([asked.keyed.term(values.negation(goal.holds)) for goal in wanted])
     solver.add(*asked.keyed.ranges, bad)
     return solver.script()
-
-
-def shown(chosen: tuple[Feature, ...], clause: Clause) -> str:
-    """A combination in the tables' words."""
-    return " and ".join(f"{chosen[at].name} = {chosen[at].shown(value)}" for at, value in clause)

@@ -11,7 +11,7 @@ cycle before a restart and one behind it. What is not defined (a division by zer
 
 from collections.abc import Iterable, Iterator, Mapping
 
-from rcsc.compose.features import MOST_VALUES, Feature, cone, features
+from rcsc.compose.features import Feature, cone, features, listed
 from rcsc.compose.transition import Cycle, Leaves, Stepper
 from rcsc.interpret import holds
 from rcsc.meaning import spelled
@@ -21,7 +21,6 @@ from rcsc.model import (
     Among,
     Apply,
     Bool,
-    Enum,
     Expr,
     Op,
     Program,
@@ -131,7 +130,7 @@ def _states(stepper: Stepper) -> list[Expr]:
 
 
 def _said(stepper: Stepper, inside: frozenset[str], there: set[str]) -> tuple[Feature, ...]:
-    """Leaves of few values, and comparisons of others, as far as they matter for a later cycle."""
+    """Truth values and members, and comparisons of numbers, as far as they matter for a later cycle."""
     found: dict[str, Feature] = {}
     for condition in _states(stepper):
         for part in parts(condition):
@@ -162,7 +161,7 @@ def _of_one_cycle(part: Expr) -> Expr:
 def _features_of(part: Expr, kinds: Mapping[str, Scalar]) -> Iterator[Feature]:
     """The features that one part makes; none where it is a whole made of others."""
     match part:
-        case Read(name=name) if _few(kinds[name]):
+        case Read(name=name) if listed(kinds[name]):
             yield Feature(str(name), kinds[name])
         case Apply(op=Op.EQ | Op.NE, args=(Read(name=one), Read(name=two))) if one != two:
             yield Feature(min(str(one), str(two)), Bool(), max(str(one), str(two)))
@@ -175,14 +174,10 @@ def _features_of(part: Expr, kinds: Mapping[str, Scalar]) -> Iterator[Feature]:
 
 
 def _condition(part: Expr, kinds: Mapping[str, Scalar]) -> Iterator[Feature]:
-    """A comparison of leaves of many values, where it is defined of every value."""
+    """A comparison of numbers, where it is defined of every value."""
     whole = all(
         not isinstance(one, Select) and not (isinstance(one, Apply) and one.op in _PARTIAL)
         for one in parts(part)
     )
-    if whole and not all(_few(kinds[leaf]) for leaf in read_by(part)):
+    if whole and not all(listed(kinds[leaf]) for leaf in read_by(part)):
         yield Feature(spelled(part), Bool(), condition=part)
-
-
-def _few(kind: Scalar) -> bool:
-    return isinstance(kind, Bool) or (isinstance(kind, Enum) and len(kind.members) <= MOST_VALUES)

@@ -8,8 +8,9 @@ from dataclasses import dataclass, replace
 from random import Random
 
 from rcsc.compose.contract import COMMAND
+from rcsc.compose.cubes import Point, Reached
 from rcsc.compose.features import CLOSELY, Feature, compared, point
-from rcsc.compose.frames import Clause, Frames, Point, Posed, Reached
+from rcsc.compose.frames import Clause, Frames, Posed
 from rcsc.compose.goals import Goal, Sort, goals
 from rcsc.compose.properties import every_feature
 from rcsc.compose.transition import Cycle, Stepper

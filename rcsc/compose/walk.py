@@ -11,7 +11,7 @@ from random import Random
 from rcsc.compose.contract import COMMAND, ECHO, ECHOED, NUMBER, STATUS, Links
 from rcsc.compose.transition import GHOST, NUMBERS
 from rcsc.interpret import Fault, cycle, initial
-from rcsc.model import Level, Program, Scalar, Value, key_bounds, value_of_key
+from rcsc.model import Enum, Level, Program, Scalar, Value, key_bounds, value_of_key
 
 
 @dataclass(slots=True)
@@ -51,10 +51,10 @@ class Walk:
             yield {**self.now, **self.ghosts}
 
     def _any(self, leaf: str) -> Value:
-        """A value, few different ones where there are many, so that some are equal."""
+        """A value; of numbers, few different ones where there are many, so that some are equal."""
         kind = self._kinds[leaf]
         low, high = key_bounds(kind)
-        if high - low < 64:
+        if isinstance(kind, Enum) or high - low < 64:
             return value_of_key(kind, self.random.randint(low, high))
         middle = 0 if low <= 0 <= high else low
         return value_of_key(

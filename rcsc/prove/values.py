@@ -7,7 +7,7 @@ A node of type Real whose bounds are infinite may also be a NaN. Source of the b
 """
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Container, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from rcsc.interpret import divide
@@ -248,15 +248,15 @@ def domain(found: Iterable[Node]) -> list[Term]:
     return [within(term_of(one), one.kind) for one in found if not isinstance(one.kind, Bool)]
 
 
-def parts_first(*nodes: Node) -> Iterator[Node]:
-    """Every node once, parts before wholes."""
+def parts_first(*nodes: Node, known: Container[Node] = ()) -> Iterator[Node]:
+    """Every node once, parts before wholes; but those that are known, and what only they are made of."""
     seen: set[Node] = set()
     stack = [(node, False) for node in reversed(nodes)]
     while stack:
         node, ready = stack.pop()
         if ready:
             yield node
-        elif node not in seen:
+        elif node not in seen and node not in known:
             seen.add(node)
             stack.append((node, True))
             stack.extend((part, False) for part in node.args if part not in seen)

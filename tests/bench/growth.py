@@ -27,8 +27,10 @@ from tests.hierarchies_text import written
 
 DEEPER = tuple((20,) * levels for levels in (1, 2, 4, 7, 10))
 """Tables of each level, from the top down: the same for all, and more and more levels."""
-WIDER = tuple((tables, 3) for tables in (4, 8, 16, 32, 40))
-"""More and more tables in the upper one of two levels; enumerations of more than `features.MOST_VALUES` members are not followed."""
+WIDER = tuple((tables, 3) for tables in (10, 20, 40, 60))
+"""More and more tables in the upper one of two levels."""
+BROADER = tuple((tables, tables) for tables in (10, 20, 40, 60))
+"""In both: with the commands of the upper level those that it orders."""
 
 
 @dataclass
@@ -159,7 +161,7 @@ def rows(sizes: Sequence[Sequence[int]]) -> Iterator[str]:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Prints both tables, or one size level by level."""
+    """Prints the tables, or one size level by level."""
     parser = argparse.ArgumentParser(prog="python -m tests.bench.growth", description=__doc__)
     parser.add_argument(
         "--tables", type=int, nargs="+", default=(), help="one size only: the tables of each level"
@@ -172,7 +174,7 @@ def main(arguments: list[str] | None = None) -> int:
                 flush=True,
             )
         return 0
-    for sizes in (DEEPER, WIDER):
+    for sizes in (DEEPER, WIDER, BROADER):
         for row in rows(sizes):
             print(row, flush=True)
         print()
