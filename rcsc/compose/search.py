@@ -17,13 +17,16 @@ from rcsc.compose.transition import Cycle, Stepper
 from rcsc.compose.walk import Walk
 from rcsc.prove.values import TRUE, Node
 
+A_TABLE = 4
+"""Walks for each table, at least, so that there are some of every command: what walks show need not be asked."""
+
 
 @dataclass(frozen=True, slots=True)
 class Effort:
     """How much is spent.
 
     Attributes:
-        walks: Random walks before the search, each of `cycles` cycles.
+        walks: Random walks before the search, each of `cycles` cycles; more of them where there are many tables (`A_TABLE`).
         timeout_ms: For each question to Z3; past it the answer is *undecided*, never *proved*.
         looks: Whether the lines are looked at in their context, too (`context`, `ends`).
     """
@@ -147,7 +150,7 @@ def _matters(stepper: Stepper, goal: Goal) -> bool:
 
 def _states(stepper: Stepper, chosen: tuple[Feature, ...], effort: Effort) -> Iterable[Point]:
     """The features of states that walks reach."""
-    for seed in range(max(1, effort.walks)):
+    for seed in range(max(1, effort.walks, A_TABLE * len(stepper.program.tables))):
         walk = Walk(stepper.program, stepper.level, stepper.links, Random(seed))  # noqa: S311  # repeatable on purpose
         for state in walk.states(effort.cycles):
             yield point(stepper, chosen, state)
