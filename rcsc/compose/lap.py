@@ -38,8 +38,11 @@ def laps(stepper: Stepper, tables: Sequence[str], search: Search) -> dict[str, L
     run = Unrolled(stepper, search)
     found: dict[str, Lap | NotReproducedError] = {}
     for _ in range(search.most):
+        waiting = [table for table in tables if table not in found]
+        if not waiting:
+            break
         run.further()
-        for table in (one for one in tables if one not in found):
+        for table in waiting:
             starts = range(1, len(run.cycles))
             every = [_comes_round(stepper, table, run.cycles[start:]) for start in starts]
             try:
