@@ -5,7 +5,8 @@ of a fault is kept in a folder by content, so that a run which is stopped goes o
 
 - *check*: `rcsc check` of the level's program fails.
 - *compose*: a goal of the level in its environment is not proved (`prove_level`) which is proved of the shipped one, or which that has not;
-  or one of a level below that may assume less than before.
+  or a command is not shown to end, or a line never reached, of which the shipped one has the contrary; or one of a level below that may
+  assume less than before.
 - *campaign*: in three kinematic episodes, with an interruption, a weak hand and a restart among them, a property does not hold. The
   executors are made by force, since most faults do not prove.
 """
@@ -30,6 +31,7 @@ from rcsc.compose.level import LevelProof, prove_level
 from rcsc.compose.search import Effort
 from rcsc.compose.system import NoProgramError, steppers
 from rcsc.compose.transition import Stepper
+from rcsc.diagnostics.diagnostic import Severity
 from rcsc.driver.work import Settings
 from rcsc.emit.write import write
 from rcsc.model import Program
@@ -122,7 +124,7 @@ def by_check(fault: Fault) -> Answer:
         tables_with(fault, Path(name))
         root = str(Path(name) / fault.level / f"{fault.level}.rcs")
         report = driver.check(Settings((root,), Options(solver="boxes"), use_cache=False))
-        codes = Counter(one.code.value for one in report.found)
+        codes = Counter(one.code.value for one in report.found if one.severity is Severity.ERROR)
         return Answer(report.failed, ", ".join(codes) if report.failed else "")
 
 
@@ -163,7 +165,8 @@ class Standing:
     """What is proved of a level, in words.
 
     Attributes:
-        open: Goals that are not proved; of fields that are not numbered only those that a level below counts on (`needed`).
+        open: Goals that are not proved; of fields that are not numbered only those that a level below counts on (`needed`); commands that
+            are not shown to end; lines that are never reached.
         links: What its environment is, to see whether it changed.
     """
 
@@ -177,7 +180,10 @@ def standing(stepper: Stepper, proof: LevelProof, needed: frozenset[str]) -> Sta
     left = frozenset(
         _words(goal) for goal in proof.open if goal.sort is not Sort.NUMBERED or goal.name in needed
     )
-    return Standing(left, repr(stepper.links), needed)
+    endless = frozenset(f"{one.table}: the command ends" for one in proof.endings if not one.proved)
+    seen = proof.context.unreached if proof.context is not None else ()
+    unreached = frozenset(f"{table}: line {line} is reached" for table, line in seen)
+    return Standing(left | endless | unreached, repr(stepper.links), needed)
 
 
 def _words(goal: Goal) -> str:

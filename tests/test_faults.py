@@ -103,11 +103,22 @@ def test_only_the_composed_proof_knows_that_two_lines_never_meet(sound: Mapping[
     assert not by_compose(fault, sound).caught
 
 
-def test_only_the_episodes_know_that_a_counter_must_count(sound: Mapping[str, Standing]) -> None:
+def test_the_composed_proof_and_the_episodes_know_that_a_counter_must_count(
+    sound: Mapping[str, Standing],
+) -> None:
     fault = gripper("a counter not incremented", "waited + 1", "waited + 0")
     assert by_check(fault) == Answer(False)
-    assert by_compose(fault, sound) == Answer(False)
+    never = "gripper: grasp: the command ends; gripper: position: the command ends"
+    assert by_compose(fault, sound) == Answer(True, never)
     assert by_campaign(fault) == Answer(True, "episode 3: ends in DONE or FAIL")
+
+
+def test_only_the_episodes_know_what_the_fingers_do(sound: Mapping[str, Standing]) -> None:
+    """They are told to move, and not where to."""
+    fault = gripper("an assignment dropped", "to_hand.opening_mm := command.opening_mm", "")
+    assert by_check(fault) == Answer(False)
+    assert by_compose(fault, sound) == Answer(False)
+    assert by_campaign(fault).caught
 
 
 def test_an_answer_is_asked_for_once_and_again_where_its_ground_is_another(tmp_path: Path) -> None:
