@@ -112,7 +112,7 @@ def test_the_proof_is_the_same_each_time(upper: tuple[Stepper, LevelProof]) -> N
 
 def test_another_solver_confirms_every_question(upper: tuple[Stepper, LevelProof]) -> None:
     questions = certificate(*upper)
-    assert {name.split()[0] for name in questions} == {"first", "restart", "step", "goals"}
+    assert {name.split()[0] for name in questions} == {"first", "restart", "step", "goals", "lines", "ends"}
     assert [name for name, text in questions.items() if not cvc5_refutes(text)] == []
 
 
@@ -379,7 +379,7 @@ def test_rcsc_prove_certify_asks_cvc5(
 ) -> None:
     asked = ["prove", str(SMALL / "system.toml"), "--level", "lower", "--certify"]
     assert run(asked) == 0
-    assert "level lower: cvc5 says the same of 10 of 10 questions" in capsys.readouterr().out
+    assert "level lower: cvc5 says the same of 16 of 16 questions" in capsys.readouterr().out
     monkeypatch.setattr("rcsc.smtlib.cvc5_refutes", lambda text, **_: "step" not in text and len(text) < 3000)
     assert run(asked) == 3
     assert "error[RCS901]: level `lower`: cvc5 does not confirm" in capsys.readouterr().err

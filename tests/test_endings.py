@@ -1,5 +1,6 @@
 """That commands end: what is shown to stop does, what may go on for ever is named, and by which numbers a line stops."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -8,15 +9,16 @@ from rcsc.cli import run
 from rcsc.compose.context import gives_an_order
 from rcsc.compose.ends import Ending
 from rcsc.compose.lap import Lap, laps
-from rcsc.compose.level import prove_level
+from rcsc.compose.level import certificate, prove_level
 from rcsc.compose.measured import Measured
 from rcsc.compose.rounds import Counted, least_power, parts
 from rcsc.compose.system import steppers
 from rcsc.compose.trace import NotReproducedError, Search
-from rcsc.model import Op, Real
-from rcsc.prove import values
+from rcsc.model import Int, Op, Real
+from rcsc.prove import smt, values
 from rcsc.prove.smt import Answer, Solver
 from rcsc.prove.values import Node
+from rcsc.smtlib import cvc5_refutes
 from tests.hierarchies_endless import Edge, edges, endless
 from tests.hierarchies_explored import explored
 from tests.hierarchies_level import Role, State
@@ -144,6 +146,47 @@ def test_what_has_to_stand_still_is_said(tmp_path: Path) -> None:
     assert found.open == ()
     work = next(one for one in found.endings if one.table == "work")
     assert (work.proved, work.still) == (True, ("which",))
+
+
+# --- another solver -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "edit",
+    [
+        way("x := min(100.0, x + 0.3)"),
+        go(WAY, "state c : int 0 .. 9", "on := c >= 9", "c := 0", "c := min(c + 1, 9)"),
+    ],
+)
+def test_another_solver_says_that_it_ends(edit: Edit, tmp_path: Path) -> None:
+    stepper = steppers(changed(tmp_path, lower=edit))["lower"]
+    proof = prove_level(stepper, LITTLE)
+    questions = certificate(stepper, proof)
+    assert {"lines 1", "ends pause 1", "ends go 1", "ends go 2"} <= questions.keys()
+    assert [name for name, text in questions.items() if not cvc5_refutes(text)] == []
+    # what is claimed beyond what is found again is not confirmed
+    false = replace(proof, endings=tuple(replace(one, counted=()) for one in proof.endings))
+    claimed = certificate(stepper, false)
+    assert [name for name, text in claimed.items() if not cvc5_refutes(text)] == [
+        "lines and endings as before"
+    ]
+
+
+def test_a_refutation_that_is_wrong_is_not_confirmed() -> None:
+    """What was asserted for good, and one of what was refuted besides: a script with a model if any of them was wrong."""
+    kind = Int(0, 9)
+    x = smt.variable("x", kind)
+    solver = Solver(1_000, remembers=True)
+    solver.add(smt.at_most(x, smt.literal(kind, 5), kind))
+    for at in (7, 8):
+        solver.push()
+        solver.add(smt.equal(x, smt.literal(kind, at), kind))
+        assert solver.check() is Answer.UNSATISFIABLE
+        solver.pop()
+    assert len(solver.refuted) == 2
+    assert cvc5_refutes(solver.refutations())
+    solver.refuted.append(smt.equal(x, smt.literal(kind, 5), kind))
+    assert not cvc5_refutes(solver.refutations())
 
 
 # --- runs that go round --------------------------------------------------------------------------

@@ -25,6 +25,7 @@ class Confirmation:
         firsts: The first cycle, from the initial values; and that after a restart.
         cycle: Any later one.
         cases: Conditions on a cycle, of which at least one holds; each is asked apart, which is quicker.
+        rested_on: Solvers whose refutations something rests on besides the goals: part of the certificate.
     """
 
     features: tuple[Feature, ...]
@@ -33,6 +34,7 @@ class Confirmation:
     cases: Sequence[Node]
     keyed: Keyed
     timeout_ms: int
+    rested_on: list[Solver] = field(default_factory=list)
     _literals: dict[tuple[bool, int, int], Term] = field(default_factory=dict)
     _nodes: dict[tuple[bool, int], Node] = field(default_factory=dict)
     _kept: dict[tuple[bool, Clause], Term] = field(default_factory=dict)
@@ -81,9 +83,15 @@ class Confirmation:
         contract = self.keyed.term(self.cycle.contract)
         for case in self.cases:
             self.keyed.term(case)
-        solver = Solver(self.timeout_ms)
+        solver = Solver(self.timeout_ms, remembers=True)
         solver.add(*self.keyed.ranges, contract, *held)
         return solver
+
+    def in_other_terms(self, keyed: Keyed) -> "Confirmation":
+        """The same, asked in other terms."""
+        return Confirmation(
+            self.features, self.firsts, self.cycle, self.cases, keyed, self.timeout_ms, self.rested_on
+        )
 
     def step_question(self, clauses: Sequence[Clause], case: Node) -> Solver:
         """That a cycle in this case breaks a clause: unsatisfiable, when they are an invariant."""

@@ -66,6 +66,7 @@ def gives_an_order(stepper: Stepper, cycle: Cycle) -> Node:
 def _possible(asked: Confirmation, clauses: Sequence[Clause], conditions: Sequence[Node]) -> bool:
     terms = [asked.keyed.term(one) for one in conditions]
     solver = asked.known(clauses)
+    asked.rested_on.append(solver)
     solver.add(*asked.keyed.ranges, *terms)
     return solver.check() is not Answer.UNSATISFIABLE
 
@@ -77,6 +78,7 @@ def _unreached(asked: Confirmation, clauses: Sequence[Clause]) -> Iterator[tuple
         for line, match in _lines(at)
     ]
     solver = asked.known(clauses)
+    asked.rested_on.append(solver)
     for table, line, runs in lines:
         if not may(solver, runs):
             yield table, line
@@ -118,6 +120,7 @@ def _repeated(
     ]
     gives = keyed.term(sent)
     solver = asked.known(clauses)
+    asked.rested_on.append(solver)
     solver.add(*keyed.ranges, gives)
     for table, line, twice in lines:
         solver.push()

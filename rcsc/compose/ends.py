@@ -17,7 +17,7 @@ command and reports *executing*:
 Lines for which this is not shown are named in `endless`: they wait for what they read.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from rcsc.compose.confirm import Confirmation
@@ -62,12 +62,12 @@ class Ending:
         return self.changes is not None and not self.endless
 
 
-def endings(stepper: Stepper, asked: Confirmation, clauses: Sequence[Clause]) -> tuple[Ending, ...]:
+def endings(stepper: Stepper, asked: Confirmation, clauses: Sequence[Clause]) -> Iterator[Ending]:
     """One for each table; none where the level has no superior that it reports to."""
-    if not reports(stepper):
-        return ()
-    flow = _Flow(stepper, asked, clauses)
-    return tuple(flow.ending(number) for number in range(len(asked.cycle.tables)))
+    if reports(stepper):
+        flow = _Flow(stepper, asked, clauses)
+        for number in range(len(asked.cycle.tables)):
+            yield flow.ending(number)
 
 
 def ways_round(stepper: Stepper, asked: Confirmation, clauses: Sequence[Clause]) -> list[Node]:
@@ -222,6 +222,7 @@ class _Flow:
         while len(found) < MOST_STEPS:
             answer = solver.check()
             if answer is Answer.UNSATISFIABLE:
+                self.asked.rested_on.append(solver)
                 return found
             if answer is Answer.UNKNOWN:
                 return None

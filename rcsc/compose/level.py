@@ -112,7 +112,7 @@ def prove_level(stepper: Stepper, effort: Effort | None = None) -> LevelProof:
         _confirm(asked, found.clauses)
         verdicts = list(_verdicts(stepper, asked, found, wanted))
         if looks:
-            seen, ends = context(stepper, asked, found.clauses), endings(stepper, asked, found.clauses)
+            seen, ends = context(stepper, asked, found.clauses), tuple(endings(stepper, asked, found.clauses))
     except (GaveUpError, NotConfirmedError):
         found = Found()
         verdicts = [(goal, Verdict.UNDECIDED) for goal in wanted]
@@ -192,7 +192,9 @@ def certificate(stepper: Stepper, proof: LevelProof, timeout_ms: int = 20_000) -
 
     `first` and `restart`: such a cycle leads into the invariant; `step TABLE`: a later cycle in which this table runs keeps
     it; `goals first`, `goals restart`: such cycles fulfil the goals that are proved; `goals SORT`: every cycle from the
-    invariant fulfils those of one sort.
+    invariant fulfils those of one sort; `lines N`: what is said of lines in their context; `ends TABLE N`: that steps which were
+    not found are not taken, that what counts rises, and that nothing else goes round. If lines or endings are not as the proof
+    has them when they are looked at again, one question is there that has a model.
     """
     cycle, firsts = stepper.cycle(stepper.anywhere()), _firsts(stepper)
     asked = _asked_anew(proof.features, tuple(firsts.values()), cycle, timeout_ms)
@@ -208,6 +210,28 @@ def certificate(stepper: Stepper, proof: LevelProof, timeout_ms: int = 20_000) -
     for sort in dict.fromkeys(goal.sort for goal in every):
         wanted = [goal for goal in every if goal.sort is sort]
         found[f"goals {sort.name.lower()}"] = _none_broken(asked, asked.known(clauses), wanted)
+    if proof.context is not None:
+        found |= _looked_again(stepper, proof, asked)
+    return found
+
+
+def _looked_again(stepper: Stepper, proof: LevelProof, asked: Confirmation) -> dict[str, str]:
+    """What `context` and `endings` rest on."""
+    seen = context(stepper, asked, proof.clauses)
+    found = {f"lines {number}": text for number, text in enumerate(_refuted(asked), 1)}
+    ends = []
+    for ending in endings(stepper, asked, proof.clauses):
+        ends.append(ending)
+        found |= {f"ends {ending.table} {number}": text for number, text in enumerate(_refuted(asked), 1)}
+    if (seen, tuple(ends)) != (proof.context, proof.endings):
+        found["lines and endings as before"] = "(set-logic ALL)\n(check-sat)\n"
+    return found
+
+
+def _refuted(asked: Confirmation) -> list[str]:
+    """What was refuted since the last time, a script for each solver."""
+    found = [one.refutations() for one in asked.rested_on if one.refuted]
+    asked.rested_on.clear()
     return found
 
 

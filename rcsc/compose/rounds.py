@@ -7,7 +7,7 @@ Sipma, "Linear ranking with reachability", 2005).
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TypeAlias
 
 from rcsc.compose.confirm import Confirmation
@@ -95,9 +95,10 @@ def lines_that_stop(
     """With as few inputs as possible that stand still; reals are followed only where something is left without."""
     first = found = _Rounds(program, asked, clauses, turns(()))
     still: tuple[str, ...] = ()
-    measured = replace(asked, keyed=Measured(), _literals={}, _nodes={}, _kept={}, _ended={})
+    rested_on = [found.solver]
     if found.endless and any(isinstance(kind, Real) for _, kind in owned(program)):
-        first = found = _Rounds(program, measured, clauses, turns(()), first)
+        first = found = _Rounds(program, asked.in_other_terms(Measured()), clauses, turns(()), first)
+        rested_on.append(found.solver)
     if found.endless:
         still = inputs(program)
         found = _Rounds(program, asked, clauses, turns(still), first)
@@ -106,6 +107,9 @@ def lines_that_stop(
         without = _Rounds(program, asked, clauses, turns(fewer), first)
         if not without.endless:
             found, still = without, fewer
+    if still:
+        rested_on.append(found.solver)
+    asked.rested_on += rested_on
     endless = tuple(first.turn.lines[line][0] for line in sorted(found.endless))
     one_each = {counted.line: counted for counted in reversed(found.counted)}
     return Stopped(tuple(reversed(one_each.values())), () if endless else still, endless)

@@ -96,12 +96,14 @@ def negation(term: Term) -> Term:
 
 def all_of(terms: Sequence[Term]) -> Term:
     """Every one; true when there are none."""
-    return Term(_z3().And(list(terms)))
+    return (
+        Term(_z3().And(list(terms))) if terms else truth(True)
+    )  # other solvers do not read `and` of nothing
 
 
 def any_of(terms: Sequence[Term]) -> Term:
     """At least one; false when there are none."""
-    return Term(_z3().Or(list(terms)))
+    return Term(_z3().Or(list(terms))) if terms else truth(False)
 
 
 def implication(left: Term, right: Term) -> Term:
@@ -203,27 +205,39 @@ def constants(term: Term) -> frozenset[str]:
 
 
 class Solver:
-    """One incremental solver."""
+    """One incremental solver.
 
-    def __init__(self, timeout_ms: int, memory_mb: int = 4_096) -> None:
+    Attributes:
+        queries: How often it was asked.
+        refuted: Where it remembers: of each answer that there is none, what was asserted besides what stands for good.
+    """
+
+    def __init__(self, timeout_ms: int, memory_mb: int = 4_096, *, remembers: bool = False) -> None:
         z3 = _z3()
         z3.set_param("memory_max_size", memory_mb)
         self._solver: Any = z3.Solver()
         self._solver.set("timeout", timeout_ms)
         self._solver.set("random_seed", 0)
         self.queries = 0
+        self.refuted: list[Term] = []
+        self._remembers = remembers
+        self._added: list[list[Term]] = []
 
     def add(self, *terms: Term) -> None:
         """Asserts the terms."""
         self._solver.add(*terms)
+        if self._added:
+            self._added[-1] += terms
 
     def push(self) -> None:
         """Remembers what is asserted."""
         self._solver.push()
+        self._added.append([])
 
     def pop(self) -> None:
         """Goes back to what was remembered."""
         self._solver.pop()
+        self._added.pop()
 
     def check(self, *assuming: Term) -> Answer:
         """Whether all asserted terms, and these, hold together for some values."""
@@ -236,6 +250,8 @@ class Solver:
             return Answer.UNKNOWN
         if "interrupted" in why:  # Z3 takes Ctrl-C for itself
             raise KeyboardInterrupt
+        if answer == z3.unsat and self._remembers:
+            self.refuted.append(all_of([*(term for terms in self._added for term in terms), *assuming]))
         if answer == z3.sat:
             return Answer.SATISFIABLE
         return Answer.UNSATISFIABLE if answer == z3.unsat else Answer.UNKNOWN
@@ -243,6 +259,14 @@ class Solver:
     def script(self) -> str:
         """What is asserted as an SMT-LIB 2 script, with `(check-sat)` at its end."""
         return f"(set-logic ALL)\n{self._solver.to_smt2()}"
+
+    def refutations(self) -> str:
+        """A script that has no model exactly if each answer that there is none was right; where there was one, and outside `push`."""
+        self.push()
+        self.add(any_of(self.refuted))
+        script = self.script()
+        self.pop()
+        return script
 
     def value(self, term: Term, kind: Scalar) -> Value:
         """The value of a constant in the model of the last satisfiable answer."""
