@@ -15,6 +15,8 @@ from rcsc.cli.show import UnwritableError
 
 _WIDTH = 118
 """Columns of a time line."""
+_LONG = 33
+"""Characters of an assignment that a column has room for, whatever the others hold."""
 _HARD = "\ue000"
 """A space at which a time line does not break, while it is laid out; of private use, since every other one may."""
 
@@ -364,12 +366,17 @@ def _time_line(made: "dict[str, Stepper]", finding: "Finding") -> "Table":
         table.add_column(heading, overflow="fold")
     for row in rows(made, finding):
         takes, leaves = (
-            ", ".join(f"{name} = {said}".replace(" ", _HARD) for name, said in changed.items())
+            ", ".join(_unbroken(f"{name} = {said}") for name, said in changed.items())
             for changed in (row.takes, row.leaves)
         )
         ran = f"{row.table}: {row.line}" + (f"\n! {row.wrong}" if row.wrong else "")
         table.add_row(str(row.tick), *((row.level,) if several else ()), ran, takes, leaves)
     return table
+
+
+def _unbroken(text: str) -> str:
+    """On one line, unless it is too long for a column: then it may break at its spaces, and not in a name."""
+    return text.replace(" ", _HARD) if len(text) <= _LONG else text
 
 
 def _say_not_agreed(proof: "SystemProof") -> None:
