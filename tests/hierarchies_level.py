@@ -187,10 +187,13 @@ class Role:
 
 
 def overlooking(table: Table) -> frozenset[str]:
-    """The lines that have no cell on the flag of a new command, where others have one."""
+    """The lines that have no cell on the flag of a new command, where others have one; DEFAULT has none."""
     places = [at for at, column in enumerate(table.columns) if column.variable == FLAG]
     blind = [str(line.name) for line in table.lines if all(line.tests[at] is None for at in places)]
-    return frozenset(blind if len(blind) < len(table.lines) else ())
+    if len(blind) == len(table.lines):
+        return frozenset()
+    default = table.default
+    return frozenset([*blind, *([] if default is None or default.unreachable else [str(default.name)])])
 
 
 def fields(role: Role, below: Below) -> Iterator[str]:

@@ -10,7 +10,7 @@ from typing import TypeAlias
 from rcsc.compose.contract import COMMAND, ECHO, ECHOED, NUMBER
 from rcsc.compose.goals import Key, Sort
 from rcsc.compose.level import LevelProof, Verdict
-from rcsc.compose.transition import Stepper
+from rcsc.compose.transition import NUMBERS, Stepper
 
 Need: TypeAlias = tuple[str, Key]
 """A level, and which of its goals."""
@@ -127,13 +127,18 @@ def other_end(leaf: str, record: str, other: str) -> str:
 
 
 def _begin(upper: Stepper, order: str, lower: Stepper, record: str) -> bool:
-    """Before the first cycle the lower level's order is the upper's, and the upper sees it echoed."""
+    """Before the first cycle the lower level's order is the upper's, and the upper sees it echoed, or none that is still to come."""
     first = {str(v.name): v.initial for v in upper.program.variables}
     other = {str(v.name): v.initial for v in lower.program.variables}
-    leaves = (f"{order}.{NUMBER}", f"{order}.{COMMAND}")
+    above = lower.links.above
+    numbered = () if above is None else above.numbered
+    ends = {leaf: other_end(leaf, record, order) for leaf in (f"{record}.{COMMAND}", *numbered)}
+    ends[f"{record}.{NUMBER}"] = number = f"{order}.{NUMBER}"
     report = next(one.report for one in upper.links.below if one.order == order)
-    ends = {other_end(leaf, order, record) for leaf in leaves}
-    if not first.keys() >= {*leaves, f"{report}.{ECHOED}"} or not other.keys() >= ends:
+    if not first.keys() >= {*ends.values(), f"{report}.{ECHOED}"} or not other.keys() >= ends.keys():
         return False  # a field is missing, or named otherwise
-    echoed = first[f"{report}.{ECHO}"] != first[leaves[0]] or first[f"{report}.{ECHOED}"] == first[leaves[1]]
-    return echoed and all(first[leaf] == other[other_end(leaf, order, record)] for leaf in leaves)
+    sent, echo = int(first[number]), int(first[f"{report}.{ECHO}"])
+    echoed = (sent - echo) % NUMBERS < NUMBERS // 2
+    if echo == sent:
+        echoed = first[f"{report}.{ECHOED}"] == first[f"{order}.{COMMAND}"]
+    return echoed and all(other[leaf] == first[end] for leaf, end in ends.items())

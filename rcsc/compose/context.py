@@ -46,7 +46,7 @@ class Context:
 def context(stepper: Stepper, asked: Confirmation, clauses: Sequence[Clause]) -> Context:
     """Asks all of it."""
     cycle = asked.cycle
-    again = stepper.cycle(cycle.after, taken=cycle.taken)
+    again = stepper.cycle(cycle.after, " again", taken=cycle.taken)
     sent = gives_an_order(stepper, cycle)
     return Context(
         tuple(_unreached(asked, clauses)),

@@ -5,9 +5,10 @@ orders, and which inputs the database fills. The names of the fields are those o
 order has `inc_command` and `input_command`, a report `inc_command_echo`, `ref_command_echo` and `status_report`.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
-from rcsc.model import Kind, Program
+from rcsc.model import Enum, Int, Kind, Program, Real, Scalar, Variable
 from rcsc.system.description import BadDescription, Description
 
 NUMBER, COMMAND = "inc_command", "input_command"
@@ -78,7 +79,7 @@ def links(system: Description, level: str, program: Program) -> Links:
     """The environment of a level, with every leaf of its order taken to be numbered.
 
     Raises:
-        BadDescription: An order has no report to answer it, or a report no order.
+        BadDescription: An order has no report to answer it, or a report no order; or there are two superiors.
     """
     inputs = {_variable(w.target): _owner(w.source) for w in system.wires if _owner(w.target) == level}
     outputs = {_variable(w.source): _owner(w.target) for w in system.wires if _owner(w.source) == level}
@@ -92,6 +93,8 @@ def links(system: Description, level: str, program: Program) -> Links:
         if f"{record}.{NUMBER}" in names:
             report = _one(back, names, ECHO, f"{level}.{record}", owner)
             order = leaves_under(program, record)
+            if above is not None:
+                raise BadDescription(f"`{level}` takes numbered orders in `{above.order}` and in `{record}`")
             numbered = tuple(leaf for leaf in order if leaf != f"{record}.{NUMBER}")
             above = Above(owner, record, report, owner not in levels, numbered)
             used |= {*order}
@@ -104,6 +107,57 @@ def links(system: Description, level: str, program: Program) -> Links:
     used |= {leaf for one in asked for leaf in one.leaves}
     free = tuple(str(v.name) for v in program.variables if v.kind is Kind.INPUT and v.name not in used)
     return Links(level, above, tuple(below), asked, free)
+
+
+def check_ends(system: Description, programs: Mapping[str, Program]) -> None:
+    """Both ends of each buffer have the same leaves, and what one level gives the other admits: what is said of one is true of both.
+
+    Raises:
+        BadDescription: They have not, or an input is filled twice, or something else than an input.
+    """
+    filled = [wire.target for wire in system.wires]
+    filled += [f"{spec.name}.{feed.into}" for spec in system.levels for feed in spec.feeds]
+    for end in filled:
+        if filled.count(end) > 1:
+            raise BadDescription(f"`{end}` is filled twice")
+        if any(one.kind is not Kind.INPUT for one in _at_end(programs, end)):
+            raise BadDescription(f"`{end}` is filled, and is no input")
+    for wire in system.wires:
+        given, taken = (
+            {str(one.name).removeprefix(_variable(end)): one.type for one in _at_end(programs, end)}
+            for end in (wire.source, wire.target)
+        )
+        if not given or not taken:
+            continue  # that end stands outside the levels
+        if list(given) != list(taken):
+            raise BadDescription(f"buffer `{wire.source}` = `{wire.target}`: the two ends have other fields")
+        for part, kind in given.items():
+            if not _admits(taken[part], kind):
+                raise BadDescription(
+                    f"buffer `{wire.source}` = `{wire.target}`: `{wire.target}{part}` does not admit all that is given"
+                )
+
+
+def _at_end(programs: Mapping[str, Program], end: str) -> tuple[Variable, ...]:
+    """The leaves of a buffer at one end; none where that stands outside the levels."""
+    if _owner(end) not in programs:
+        return ()
+    program = programs[_owner(end)]
+    leaves = leaves_under(program, _variable(end))
+    if not leaves:
+        raise BadDescription(f"program `{program.name}` has no variable `{_variable(end)}` ({end})")
+    return tuple(one for one in program.variables if one.name in leaves)
+
+
+def _admits(taken: Scalar, given: Scalar) -> bool:
+    """Whether every value of the one type means the same in the other."""
+    if isinstance(taken, Enum) and isinstance(given, Enum):
+        return taken.members == given.members
+    if (isinstance(taken, Int) and isinstance(given, Int)) or (
+        isinstance(taken, Real) and isinstance(given, Real)
+    ):
+        return taken.unit == given.unit and taken.low <= given.low and given.high <= taken.high
+    return taken == given
 
 
 def _one(back: list[str], names: set[str], field: str, where: str, owner: str) -> str:

@@ -5,6 +5,7 @@ subordinate echoes the last order and says of it *done* or *failed*; of the firs
 assumed that each order, if no other replaces it, is answered some time and stays so. The argument, for a level that keeps one
 command and reports *executing*:
 
+- Its *table* stays, or what selects it is no part of the command: then from table to table there is no way round.
 - Its *phase* is its pending next states, and the flags that its lines write. From phase to phase there is no way round (all
   steps are listed by the solver, from the invariant), so the phase changes at most `changes` times.
 - While the phase stays, lines follow one another. A line that comes again and again stands on a way round among them. It
@@ -21,14 +22,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from rcsc.compose.confirm import Confirmation
-from rcsc.compose.context import gives_an_order, of_lines
+from rcsc.compose.context import gives_an_order, may, of_lines
 from rcsc.compose.contract import COMMAND, ECHO, ECHOED, NUMBER, STATUS, Below
 from rcsc.compose.frames import Clause
 from rcsc.compose.goals import FLAG
 from rcsc.compose.keyed import sort
-from rcsc.compose.rounds import Counted, Turn, lines_that_stop
+from rcsc.compose.rounds import Counted, Turn, lines_that_stop, parts
 from rcsc.compose.transition import Cycle, Stepper, TableAt
-from rcsc.model import Bool, Enum, Kind, pending
+from rcsc.model import Bool, Enum, Kind, OneTable, Read, pending
 from rcsc.prove import smt, values
 from rcsc.prove.smt import Answer
 from rcsc.prove.values import Node
@@ -44,7 +45,7 @@ class Ending:
     """What was found of one table.
 
     Attributes:
-        changes: How often the phase can change while the command lasts; None where it could go round.
+        changes: How often the phase can change while the command lasts; None where it could go round, or the table could.
         counted: Lines that may run for as long as a counter rises.
         still: Inputs whose values, echoes and statuses apart, are taken to stand still meanwhile.
         endless: Lines of which it is not shown that they end.
@@ -123,6 +124,7 @@ class _Flow:
         self.leaves = self._phase()
         self.before = [self.asked.cycle.before[leaf] for leaf in self.leaves]
         self.after = [self.asked.cycle.after[leaf] for leaf in self.leaves]
+        self.round = self._tables_round()
 
     def _phase(self) -> list[str]:
         """Pending states, the flag of a new command, and flags that lines write."""
@@ -144,7 +146,7 @@ class _Flow:
         """Of one table."""
         at = self.asked.cycle.tables[number]
         steps = self._steps(at)
-        changes = None if steps is None else longest(steps)
+        changes = None if steps is None or number in self.round else longest(steps)
         found = lines_that_stop(
             self.stepper.program,
             self.asked,
@@ -187,7 +189,7 @@ class _Flow:
                 free = {
                     leaf: values.variable(f"{leaf}{suffix}", node.kind) for leaf, node in row[0].taken.items()
                 }
-                row.append(self.stepper.cycle(row[-1].after, taken={**free, **kept}))
+                row.append(self.stepper.cycle(row[-1].after, suffix, taken={**free, **kept}))
             self.rows[still] = row
         return self.rows[still]
 
@@ -205,6 +207,33 @@ class _Flow:
             orders,
             values.all_of(answered(self.stepper, cycle, below) for below in self.stepper.links.below),
         )
+
+    # --- from table to table ---
+
+    def _tables_round(self) -> set[int]:
+        """The tables that may follow one another round while the command goes on."""
+        above, chosen = self.stepper.links.above, self.stepper.level.tables
+        assert above is not None
+        if isinstance(chosen, OneTable):
+            return set()
+        if isinstance(chosen.selector, Read) and chosen.selector.name in above.numbered:
+            return set()  # the same under the same number: the contract
+        one, two, _ = self._cycles(())
+        term = self.keyed.term
+        goes_on = [
+            term(values.both(cycle.contract, command_goes_on(self.stepper, cycle))) for cycle in (one, two)
+        ]
+        runs = [[term(at.chosen) for at in cycle.tables] for cycle in (one, two)]
+        solver = self.asked.known(self.clauses)
+        self.asked.rested_on.append(solver)
+        solver.add(*self.keyed.ranges, *goes_on)
+        steps = {
+            (here, there)
+            for here, now in enumerate(runs[0])
+            for there, then in enumerate(runs[1])
+            if here != there and may(solver, now, then)
+        }
+        return {table for part in parts(steps) for table in part}
 
     # --- from phase to phase ---
 

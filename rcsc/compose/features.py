@@ -54,6 +54,7 @@ class Feature:
 
     Attributes:
         parts: Whether it is one of those that part the states.
+        procedures: Those that the module may call.
     """
 
     leaf: str
@@ -62,6 +63,7 @@ class Feature:
     module: Procedure | None = field(default=None, repr=False)
     condition: Expr | None = field(default=None, repr=False)
     parts: bool = False
+    procedures: Mapping[str, Procedure] = field(default_factory=dict, repr=False, compare=False)
 
     @property
     def name(self) -> str:
@@ -83,7 +85,7 @@ class Feature:
             return Run({}, {}, dict(leaves)).evaluate(self.condition)
         if self.module is not None:
             kinds = {name: node.kind for name, node in leaves.items()}
-            run = Run({self.module.name: self.module}, kinds, dict(leaves))
+            run = Run(self.procedures, kinds, dict(leaves))
             run.execute((Call(self.module.name),))
             return values.equal(leaves[self.leaf], run.leaf(self.leaf))
         return values.equal(leaves[self.leaf], leaves[self.other]) if self.other else leaves[self.leaf]
@@ -130,7 +132,10 @@ def features(stepper: Stepper, cycle: Cycle, goals: Iterable[Node], closely: int
     found = [Feature(name, kinds[name], parts=name in parting) for name in chosen]
     pairs = sorted({*compared(program), *_questions(stepper)})
     found += [Feature(one, Bool(), other) for one, other in pairs if {one, other} <= inside and one in kinds]
-    found += [Feature(leaf, Bool(), module=module) for leaf, module in computed.items()]
+    found += [
+        Feature(leaf, Bool(), module=module, procedures=stepper.procedures)
+        for leaf, module in computed.items()
+    ]
     found += _cells(stepper, {*inside, *computed})
     if closely:
         found += _branches(stepper, inside, {one.leaf for one in found})
@@ -194,11 +199,11 @@ def _computed(stepper: Stepper) -> Iterator[tuple[str, Procedure]]:
     variables = {str(v.name): v for v in stepper.program.variables}
     for name in stepper.level.preprocess:
         module = stepper.procedures[name]
-        if module.extern is not None:
-            continue
         own = set(map(str, module.writes))
         run = Run(stepper.procedures, stepper.kinds, stepper.anywhere())
         run.execute((Call(module.name),))
+        if run.fresh:
+            continue  # it asks what nobody can say again
         for leaf in map(str, module.writes):
             used = values.variables([run.leaf(leaf)])
             if all(

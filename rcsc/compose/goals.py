@@ -200,7 +200,7 @@ def _own(stepper: Stepper, cycle: Cycle) -> Iterator[Goal]:
         rises = values.both(cycle.after[FLAG], values.negation(cycle.before[FLAG]))
         yield Goal(Sort.ONCE, "", FLAG, values.follows(same, values.negation(rises)))
         for at in cycle.tables:
-            if overlooking := _overlooking(at.table):
+            if overlooking := _overlooking(at):
                 yield _answered(stepper, cycle, at, overlooking)
     for variable in stepper.program.variables:
         if variable.deferred_until is not None:
@@ -217,10 +217,14 @@ def _stated(stepper: Stepper, cycle: Cycle) -> Iterator[Goal]:
         yield Goal(Sort.PROPERTY, "", name, holds)
 
 
-def _overlooking(table: Table) -> tuple[int, ...]:
-    """The lines that do not look for a new command, of a table in which some line does."""
-    looks = [_looks(table, line) for line in table.lines]
-    return tuple(at for at, one in enumerate(looks) if not one) if any(looks) else ()
+def _overlooking(at: TableAt) -> tuple[Node, ...]:
+    """When lines match that do not look for a new command, of a table in which some line does; DEFAULT never looks."""
+    looks = [_looks(at.table, line) for line in at.table.lines]
+    if not any(looks):
+        return ()
+    blind = [match for match, one in zip(at.matches, looks, strict=True) if not one]
+    default = at.table.default
+    return (*blind, *([] if default is None or default.unreachable else [at.none]))
 
 
 def _looks(table: Table, line: Line) -> bool:
@@ -229,13 +233,13 @@ def _looks(table: Table, line: Line) -> bool:
     return any(test is not None and column.variable == FLAG for column, test in cells)
 
 
-def _answered(stepper: Stepper, cycle: Cycle, at: TableAt, overlooking: tuple[int, ...]) -> Goal:
+def _answered(stepper: Stepper, cycle: Cycle, at: TableAt, overlooking: tuple[Node, ...]) -> Goal:
     """Where such a line runs while the flag stands, the flag outlasts it.
 
     If it is down as soon as the level sees the same once more, no line will answer the command, and what this line
     reports is taken for the answer.
     """
-    again = stepper.cycle(cycle.after, taken=cycle.taken).middle[FLAG]
-    missed = values.any_of(at.matches[line] for line in overlooking)
+    again = stepper.cycle(cycle.after, " again", taken=cycle.taken).middle[FLAG]
+    missed = values.any_of(overlooking)
     flagged = values.all_of((cycle.middle[FLAG], at.chosen, values.negation(at.several()), missed))
     return Goal(Sort.ANSWERED, str(at.table.name), FLAG, values.follows(flagged, again))

@@ -14,20 +14,24 @@ from pathlib import Path
 
 from rcsc.cache import Cache
 from rcsc.compose.agreed import Agreement, agreements, other_end
-from rcsc.compose.contract import Links, links
+from rcsc.compose.contract import Links, check_ends, links
 from rcsc.compose.goals import Goal, goals
 from rcsc.compose.kept import keep, recall
 from rcsc.compose.level import LevelProof, Verdict, essential, prove_level
 from rcsc.compose.search import Effort
 from rcsc.compose.transition import Stepper
+from rcsc.diagnostics.codes import Code
 from rcsc.model import Program
 from rcsc.project import Loaded, load
 from rcsc.prove.values import TRUE
 from rcsc.system.description import BadDescription, Description, description, places
 
+SHOWN_HERE = frozenset({Code.ASSUMPTION_NOT_PROVED, Code.INVARIANT_BROKEN, Code.TWO_WRITERS})
+"""What is proved of the levels, or is no fault of a cycle as it runs."""
+
 
 class NoProgramError(Exception):
-    """A level's tables cannot be read; says which."""
+    """A level's tables cannot be read, or are not in order; says which."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +71,7 @@ def steppers_of(system: Description, programs: Mapping[str, Program]) -> dict[st
         BadDescription: The description says something that cannot be.
         NoProgramError: A program has no such level.
     """
+    check_ends(system, programs)
     every = {name: links(system, name, program) for name, program in programs.items()}
     found = {}
     for name, program in programs.items():
@@ -97,10 +102,20 @@ def _narrowed(mine: Links, every: Mapping[str, Links], programs: Mapping[str, Pr
 def program_of(path: Path, name: str) -> Program:
     """The program of a level, beside the description.
 
+    A cycle as nodes is the executors' only where nothing leaves its range and every operation is defined: that is shown of the
+    program by itself, given its assumptions and invariants, which are goals here.
+
     Raises:
-        NoProgramError: It is not there, or does not resolve.
+        NoProgramError: It is not there, does not resolve, or something in it may leave its range or not be defined.
     """
-    return loaded_program(path, name)[0]
+    from rcsc.prove.obligations import Obligations
+    from rcsc.prove.options import Options
+
+    program = loaded_program(path, name)[0]
+    for one in Obligations(program, Options()).prove(program.tables):
+        if one.code not in SHOWN_HERE:
+            raise NoProgramError(f"{one.message}: see `rcsc check {one.primary.span.file}`")
+    return program
 
 
 def loaded_program(path: Path, name: str) -> tuple[Program, Loaded]:

@@ -111,7 +111,7 @@ class _Pair:
         kinds = side.stepper.kinds
         taken = {leaf: values.variable(f"{side.name} {leaf} {tick}", kinds[leaf]) for leaf in side.inputs}
         taken |= {leaf: seen[leaf] for leaf in side.takes}
-        one = side.stepper.cycle(side.now, taken=taken)
+        one = side.stepper.cycle(side.now, f" of {side.name} {tick}", taken=taken)
         runs = side.runs[-1]
         kept = values.all_of((one.goes_on, one.contract, *_in_order(side.stepper, side.now, taken)))
         self._run.add(values.follows(runs, kept))

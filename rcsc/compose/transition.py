@@ -37,6 +37,8 @@ GHOST = "asked "
 
 SEEN = "inc_command_seen"
 """The number of the command being worked on; a level that restarts counts the one in its buffer as seen."""
+TAKEN = f"command.{NUMBER}"
+"""Where that one stands, by the convention of the tables: of an order under another name nothing is adopted."""
 Leaves = dict[str, Node]
 NUMBERS = 65536
 """Command numbers that there are (16 bits)."""
@@ -147,8 +149,8 @@ class Stepper:
             kind = self.kinds.get(name)
             if isinstance(kind, Enum) and member in kind.members:
                 start[name] = values.constant(kind, kind.members.index(member))
-        if (above := self.links.above) is not None and SEEN in start:
-            start[SEEN] = start[f"{above.order}.{NUMBER}"]
+        if SEEN in start and TAKEN in start:
+            start[SEEN] = start[TAKEN]
         outputs = [
             str(v.name) for v in self.program.variables if v.kind is Kind.OUTPUT and v.name.startswith(ORDER)
         ]
@@ -174,11 +176,14 @@ class Stepper:
         return str(dict(self.level.tables.tables)[evaluate(self.level.tables.selector, snapshot)])
 
     def cycle(self, before: Leaves, suffix: str = " taken", taken: Leaves | None = None) -> Cycle:
-        """One cycle from `before`; the inputs it takes, if not given, are fresh variables, named with the suffix."""
+        """One cycle from `before`; the inputs it takes, if not given, are fresh variables, named with the suffix.
+
+        What extern procedures give is named with it, too: cycles that one question is about need different suffixes.
+        """
         if taken is None:
             inputs = [v for v in self.program.variables if v.kind is Kind.INPUT]
             taken = {str(v.name): values.variable(f"{v.name}{suffix}", v.type) for v in inputs}
-        run = Run(self.procedures, self.kinds, dict(before))
+        run = Run(self.procedures, self.kinds, dict(before), suffix=suffix)
         run.state.leaves.update(taken)
         ghosts, answers = self._database(before, taken)
         contract = values.both(self._protocol(before, taken), answers)

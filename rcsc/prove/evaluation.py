@@ -108,6 +108,7 @@ class Evaluation:
         stops: Called where a cycle may end early (an extern procedure's result is refused).
         cell: Where the present action or condition is written.
         fresh: Values that the run has made up: results of extern procedures, locals without a value.
+        suffix: Behind their names, where several runs are followed by one question: each run has its own.
     """
 
     procedures: Mapping[str, Procedure]
@@ -121,6 +122,7 @@ class Evaluation:
     stops: Callable[["Evaluation", str], None] | None = None
     cell: Span = NOWHERE
     fresh: list[Node] = field(default_factory=list)
+    suffix: str = ""
     steps: int = 0
 
     # --- owing ---
@@ -212,7 +214,7 @@ class Evaluation:
 
     def any_value(self, name: str, kind: Scalar) -> Node:
         """A value of the type that nothing else is known of."""
-        self.fresh.append(values.variable(f"{name}!{len(self.fresh) + 1}", kind))
+        self.fresh.append(values.variable(f"{name}!{len(self.fresh) + 1}{self.suffix}", kind))
         return self.fresh[-1]
 
     def index(self, expr: Expr, length: int) -> Node:

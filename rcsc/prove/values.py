@@ -7,6 +7,7 @@ A node of type Real whose bounds are infinite may also be a NaN. Source of the b
 """
 
 import math
+import sys
 from collections.abc import Container, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
@@ -17,6 +18,7 @@ from rcsc.prove.encode import operation, within
 from rcsc.prove.smt import Term
 from rcsc.resolve import intervals
 
+_GREATEST = int(sys.float_info.max)
 CONSTANT, VARIABLE, CHOICE, NARROWED = "constant", "variable", "choice", "narrowed"
 
 
@@ -192,7 +194,7 @@ def _bounds(op: Op, args: tuple[Node, ...]) -> tuple[int | float, int | float]:
     if op is Op.TO_REAL:
         return float(one.low), float(one.high)
     if op is Op.TO_INT:
-        return (int(one.low), int(one.high)) if one.ordered else (-(2**1024), 2**1024)
+        return (int(one.low), int(one.high)) if one.ordered else (-_GREATEST, _GREATEST)
     if isinstance(one.kind, Real):
         kinds: tuple[Int | Real, ...] = tuple(Real(float(arg.low), float(arg.high)) for arg in args)
     else:
