@@ -35,7 +35,8 @@ from rcsc.prove.values import TRUE
 from tests.hierarchies_endless import edges, endless
 from tests.hierarchies_explored import Explored, TooManyError, explored
 from tests.hierarchies_level import Key, Reading, Role, State
-from tests.hierarchies_made import ODD, Hierarchy, hierarchy
+from tests.hierarchies_made import ODD, Hierarchy
+from tests.hierarchies_more import furnished
 from tests.hierarchies_text import files, written
 from tests.hierarchies_together import Pair, broken_together
 from tests.hierarchies_world import allowed, broken, wanted
@@ -296,16 +297,16 @@ def _proved(proof: LevelProof) -> frozenset[Key]:
 
 def judged_seed(seed: int) -> Judged:
     """The hierarchy of a seed, judged; for a process of a pool."""
-    return judged(hierarchy(seed), seed)
+    return judged(furnished(seed), seed)
 
 
 def smaller(seed: int) -> tuple[Hierarchy, Judged]:
     """The hierarchy of a seed with only those slips without which it would not disagree."""
-    made, found = hierarchy(seed), judged(hierarchy(seed), seed, traces=99)
+    made, found = furnished(seed), judged(furnished(seed), seed, traces=99)
     sought = {(one.what, one.level) for one in found.disagreements}
     skipped: frozenset[int] = frozenset()
     for number in range(3):
-        other = hierarchy(seed, skipped | {number})
+        other = furnished(seed, skipped | {number})
         again = judged(other, seed, traces=99)
         if sought & {(one.what, one.level) for one in again.disagreements}:
             made, found, skipped = other, again, skipped | {number}

@@ -80,14 +80,16 @@ def _says(role: Role, now: Mapping[str, Value], leaf: str, member: str) -> bool:
 
 
 def endless(every: list[Edge], table: str, still: tuple[str, ...]) -> str:
-    """How the table's command may go on for ever while these inputs keep their values; blank where it may not."""
-    for some in _apart([edge for edge in every if edge.table == table], still):
-        if _round([edge for edge in some if edge.quiet]):
+    """How a command that runs the table may go on for ever while these inputs keep their values; blank where it may not.
+
+    The table may take turns with others.
+    """
+    for some in _apart(every, still):
+        if any(edge.table == table for edge, _ in _round([edge for edge in some if edge.quiet])):
             return "round in quiet cycles"
-        onward: dict[State, set[State]] = {}
-        for edge in some:
-            onward.setdefault(edge.start, set()).add(edge.end)
-        if any(edge.orders and _leads(onward, edge.end, edge.start) for edge in some):
+        round_ = _round(some)
+        ordering = {part for edge, part in round_ if edge.orders}
+        if any(edge.table == table and part in ordering for edge, part in round_):
             return "order after order"
     return ""
 
@@ -101,21 +103,37 @@ def _apart(every: list[Edge], still: tuple[str, ...]) -> Iterator[list[Edge]]:
     yield from groups.values()
 
 
-def _round(some: list[Edge]) -> bool:
-    """Whether the edges lead round: what is left when ends are taken away again and again."""
-    while some:
-        starts = {edge.start for edge in some}
-        left = [edge for edge in some if edge.end in starts]
-        if len(left) == len(some):
-            return True
-        some = left
-    return False
+def _round(some: list[Edge]) -> list[tuple[Edge, int]]:
+    """The edges that lead round, each with a number for the states that lead to one another (Kosaraju)."""
+    onward: dict[State, list[State]] = {}
+    back: dict[State, list[State]] = {}
+    for edge in some:
+        onward.setdefault(edge.start, []).append(edge.end)
+        back.setdefault(edge.end, []).append(edge.start)
+    part: dict[State, int] = {}
+    for state in reversed(_left(onward)):
+        waiting = [] if state in part else [state]
+        number = len(part)
+        while waiting:
+            here = waiting.pop()
+            if here not in part:
+                part[here] = number
+                waiting += back.get(here, [])
+    return [(edge, part[edge.start]) for edge in some if part[edge.start] == part[edge.end]]
 
 
-def _leads(onward: dict[State, set[State]], start: State, end: State) -> bool:
-    seen, waiting = {start}, [start]
-    while waiting:
-        new = onward.get(waiting.pop(), set()) - seen
-        seen |= new
-        waiting += new
-    return end in seen
+def _left(onward: Mapping[State, list[State]]) -> list[State]:
+    """Every state, in the order in which a search that goes deep first leaves them."""
+    seen: set[State] = set()
+    order: list[State] = []
+    for start in onward:
+        waiting = [(start, False)]
+        while waiting:
+            state, done = waiting.pop()
+            if done:
+                order.append(state)
+            elif state not in seen:
+                seen.add(state)
+                waiting.append((state, True))
+                waiting += [(one, False) for one in onward.get(state, ()) if one not in seen]
+    return order

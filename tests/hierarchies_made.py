@@ -54,6 +54,7 @@ class MadeLevel:
         said: Pieces of its modules, by what they do (`RIGHT`).
         assumption: A condition, or blank.
         waits: Whether it has a counter; `field`, whether its order names a spot; `passes`, whether the subordinate's does.
+        more: What else it has (`hierarchies_more`).
     """
 
     name: str
@@ -66,6 +67,7 @@ class MadeLevel:
     waits: bool = False
     field: bool = False
     passes: bool = False
+    more: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,7 +151,7 @@ def _bottom(at: int, random: Random) -> MadeLevel:
     tables = [MadeTable("rest", (Line("1", (("when", "true"),), ("state(d_state)",), "", "done"),))]
     for command in commands[1:]:
         if random.random() < 0.35:
-            tables.append(_cut(f"{command}_table", domains_of(waits=waits), (), random))
+            tables.append(cut(f"{command}_table", domains_of(waits=waits), (), random))
         else:
             tables.append(_going(f"{command}_table", waits=waits))
     said = tuple((name, RIGHT[name]) for name in BOTTOM)
@@ -189,7 +191,7 @@ def _middle(at: int, under: MadeLevel | None, random: Random) -> MadeLevel:
     for command in commands[1:]:
         name = f"{command}_table"
         if random.random() < 0.25:
-            tables.append(_cut(name, domains_of(orders), orders, random))
+            tables.append(cut(name, domains_of(orders), orders, random))
         else:
             plan = tuple(random.choice(orders[1:]) for _ in range(random.choice((1, 1, 2))))
             tables.append(_working(name, plan, random))
@@ -254,7 +256,7 @@ def domains_of(orders: tuple[str, ...] = (), *, waits: bool = False) -> Domains:
     return found
 
 
-def _cut(name: str, domains: Domains, orders: tuple[str, ...], random: Random) -> MadeTable:
+def cut(name: str, domains: Domains, orders: tuple[str, ...], random: Random) -> MadeTable:
     """A table of boxes cut at random, so that exactly one line matches; what the lines do is random, too."""
     whole, boxes = domains, [domains]
     for _ in range(random.randint(1, 4)):

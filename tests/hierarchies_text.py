@@ -15,6 +15,7 @@ from tests.hierarchies_made import (
     MadeTable,
     domains_of,
 )
+from tests.hierarchies_more import columns_of, module_of, procedures_of, states_of, tables_of
 
 
 def written(made: Hierarchy, folder: Path) -> Path:
@@ -77,14 +78,13 @@ def program(level: MadeLevel) -> str:
     said = {name: _meant(text, level.below) for name, text in level.said}
     parts = [_declared(level, said), _modules(level, said), _procedures(level)]
     parts += [_table(table, level) for table in level.tables]
-    choices = "".join(
-        f"    {command} : {table.name}\n" for command, table in zip(level.commands, level.tables, strict=True)
-    )
     post = "send, answer" if level.below else "answer"
-    parts.append(
-        f"level {level.name} {{\n  period 40 [ms]\n  preprocess receive\n"
-        f"  table by command.input_command {{\n{choices}  }}\n  postprocess {post}\n}}\n"
-    )
+    also = module_of(level)
+    before = "receive, notice" if also else "receive"
+    parts += [
+        also,
+        f"level {level.name} {{\n  period 40 [ms]\n  preprocess {before}\n{tables_of(level)}  postprocess {post}\n}}\n",
+    ]
     return "\n".join(parts)
 
 
@@ -116,6 +116,7 @@ def _declared(level: MadeLevel, said: dict[str, str]) -> str:
         states.append("cur_state : stage")
     if level.waits:
         states.append(f"waited : int 0 .. {MOST_WAITED}")
+    states += states_of(level)
     lines += [f"state {one}" for one in states]
     lines.append(f"output report : {level.name}_report")
     if level.assumption:
@@ -167,12 +168,12 @@ def _procedures(level: MadeLevel) -> str:
         ]
     if level.waits:
         one.append(f"procedure wait {{\n  if waited < {MOST_WAITED} {{\n    waited := waited + 1\n  }}\n}}")
-    return "\n".join(one) + "\n"
+    return "\n".join([*one, *procedures_of(level)]) + "\n"
 
 
 def _table(table: MadeTable, level: MadeLevel) -> str:
     """A table; its columns are the variables that some line looks at."""
-    known = ["when", *domains_of(level.orders, waits=level.waits)]
+    known = ["when", *domains_of(level.orders, waits=level.waits), *columns_of(level)]
     columns = [name for name in known if any(line.cell(name) for line in table.lines)]
     head = ["line", *columns]
     rows = [[line.name, *(line.cell(name) for name in columns)] for line in table.lines]
