@@ -1,9 +1,9 @@
 """Runs of a level in which a command goes on for ever: looked for among every state that it can reach.
 
 In: a role, its states. Out: why a table's command need not end, or nothing. Written anew, to hold `rcsc.compose.ends` against it. A
-command goes on for ever where states can be gone round under one number, with *executing* reported in each cycle, and either an
-order is given on the way, so that there is always another one to be answered, or every cycle is quiet: all orders are answered,
-and none is given.
+command goes on for ever where states can be gone round under one number, with *executing* reported on the way (of PAUSE anything but
+*done*), and either an order is given on the way, so that there is always another one to be answered, or every cycle is quiet: all
+orders are answered, and none is given.
 """
 
 from collections.abc import Iterator, Mapping
@@ -21,9 +21,10 @@ ECHOED = ("inc_command", "inc_command_echo", "ref_command_echo", "status_report"
 
 @dataclass(frozen=True, slots=True)
 class Edge:
-    """A cycle in which the command goes on.
+    """A cycle in which the command is the same.
 
     Attributes:
+        unanswered: It reports *executing*, or of PAUSE anything but *done*.
         orders: It gives an order; `quiet`, all are answered and none is given.
         values: What it read, echoes and statuses apart.
     """
@@ -34,22 +35,22 @@ class Edge:
     orders: bool
     quiet: bool
     values: tuple[tuple[str, Value], ...]
+    unanswered: bool = True
 
 
 def edges(role: Role, seen: set[State]) -> list[Edge]:
-    """Every cycle from these states in which the command goes on; whoever reports to nobody has none."""
+    """Every cycle from these states in which the command is the same; whoever reports to nobody has none."""
     above = role.links.above
     if above is None:
         return []
     found = []
-    report = f"{above.report}.status_report"
     statuses = {f"{below.report}.status_report" for below in role.links.below}
     varied = statuses | {leaf for leaf in role.inputs if leaf.partition(".")[2] not in ECHOED}
     for state in seen:
         before = dict(zip(role.start, state, strict=True))
         for taken, ran in successors(role, before, also=frozenset(varied)):
             same = taken[f"{above.order}.inc_command"] == before[f"{above.order}.inc_command"]
-            if ran.fault is Fault.OK and same and _says(role, ran.after, report, "executing"):
+            if ran.fault is Fault.OK and same:
                 found.append(_edge(role, state, before, taken, ran))
     return found
 
@@ -60,7 +61,15 @@ def _edge(role: Role, state: State, before: dict[str, Value], taken: dict[str, V
     answered = all(_answered(role, below, before, taken) for below in role.links.below)
     read = tuple((leaf, taken[leaf]) for leaf in role.inputs if leaf.partition(".")[2] not in ECHOED)
     end = tuple(canonical(role, ran.after).values())
-    return Edge(state, end, ran.table, orders, answered and not orders, read)
+    return Edge(state, end, ran.table, orders, answered and not orders, read, _unanswered(role, taken, ran))
+
+
+def _unanswered(role: Role, taken: Mapping[str, Value], ran: Ran) -> bool:
+    above = role.links.above
+    assert above is not None
+    report = f"{above.report}.status_report"
+    paused = taken[f"{above.order}.input_command"] == 0 and not _says(role, ran.after, report, "done")
+    return paused or _says(role, ran.after, report, "executing")
 
 
 def _answered(role: Role, below: Below, before: Mapping[str, Value], taken: Mapping[str, Value]) -> bool:
@@ -85,11 +94,11 @@ def endless(every: list[Edge], table: str, still: tuple[str, ...]) -> str:
     The table may take turns with others.
     """
     for some in _apart(every, still):
-        if any(edge.table == table for edge, _ in _round([edge for edge in some if edge.quiet])):
+        quiet, round_ = _round([edge for edge in some if edge.quiet]), _round(some)
+        if any(edge.table == table and edge.unanswered for edge, _ in quiet):
             return "round in quiet cycles"
-        round_ = _round(some)
         ordering = {part for edge, part in round_ if edge.orders}
-        if any(edge.table == table and part in ordering for edge, part in round_):
+        if any(edge.table == table and edge.unanswered and part in ordering for edge, part in round_):
             return "order after order"
     return ""
 

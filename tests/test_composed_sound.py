@@ -9,9 +9,10 @@ import pytest
 from rcsc.compose.agreed import agreements
 from rcsc.compose.ends import Ending
 from rcsc.compose.goals import Sort
+from rcsc.compose.lap import Lap, laps
 from rcsc.compose.level import LevelProof, Verdict, prove_level
 from rcsc.compose.system import NoProgramError, prove_system, steppers
-from rcsc.compose.trace import one_cycle, ran
+from rcsc.compose.trace import Search, one_cycle, ran
 from rcsc.compose.transition import Stepper
 from rcsc.interpret import initial
 from rcsc.model import Value
@@ -284,3 +285,54 @@ def test_a_program_is_in_order_by_itself_before_anything_is_proved_of_the_levels
         NoProgramError, match=r"the value can lie outside 0 \.\. 9, the range of `c`: see `rcsc check"
     ):
         steppers(changed(tmp_path, lower=over))
+
+
+# --- answers that do not stay --------------------------------------------------------------------
+
+
+def done_now_and_then(text: str) -> str:
+    """Done, and executing again, in turns: whoever looks now and then may never see the one."""
+    lines = "  | 2 | false | going | | true || | executing |\n  | 3 | false | going | | false || | done |\n"
+    return go(lines, "state tick : bool", "tick := not tick\n  on := tick")(text)
+
+
+def test_an_answer_that_does_not_stay_is_none(tmp_path: Path) -> None:
+    """A superior is taken to see an answer some time: it has to stay until it does."""
+    stepper, proof = proved(tmp_path, done_now_and_then)
+    run = lines_run(stepper, 40, command__inc_command=1, command__input_command=1)
+    assert {line for _, line in run[2:]} == {"2", "3"}
+    assert ending(proof, "go").endless == ("2",)
+    found = laps(stepper, ("go",), Search(8, legal=True))["go"]
+    assert isinstance(found, Lap)
+    assert [step.line for step in found.trace.steps[found.first - 1 :]] in (["2", "3"], ["3", "2"])
+
+
+def test_a_pause_that_fails_is_not_answered(tmp_path: Path) -> None:
+    """Whoever orders PAUSE waits until it is done (`ends.answered`)."""
+
+    def fails(text: str) -> str:
+        before, _, after = text.partition("table pause")
+        after = after.replace("| done      ", "| failing   ")
+        made = "procedure failing {\n  status_report := failed\n}\n\n"
+        return f"{before}{made}table pause{after}"
+
+    _, proof = proved(tmp_path / "fails", fails)
+    assert ending(proof, "pause").endless == ("1",)
+    _, proof = proved(tmp_path / "done", lambda text: f"{text}\n")
+    assert ending(proof, "pause").proved
+
+
+def test_what_goes_round_while_the_command_is_answered_does_no_harm(tmp_path: Path) -> None:
+    """A flag that the line of the end toggles: its states go round, and *done* is reported all the time."""
+
+    def flips(status: str) -> Edit:
+        lines = "  | 2 | false | going | | || state(d_state) | done |\n"
+        edit = go(lines, "state flip : bool", work="flip := not flip")
+        return lambda text: edit(text).replace(
+            "/= going | | || | done |", f"/= going | | || work | {status} |"
+        )
+
+    _, proof = proved(tmp_path / "done", flips("done"))
+    assert ending(proof, "go").proved
+    _, proof = proved(tmp_path / "executing", flips("executing"))
+    assert ending(proof, "go").endless == ("4",)

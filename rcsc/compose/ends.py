@@ -1,19 +1,21 @@
-"""That every command ends, given that what is below answers: no deadlock, and nothing that goes on for ever.
+"""That every command is answered some time and stays so, given that what is below does: no deadlock, nothing that goes on for ever.
 
 In: a stepper, and what was confirmed of it. Out: an `Ending` for each table. A level is *answered* in a cycle when each
 subordinate echoes the last order and says of it *done* or *failed*; of the first command, PAUSE or its like, *done*. It is
-assumed that each order, if no other replaces it, is answered some time and stays so. The argument, for a level that keeps one
-command and reports *executing*:
+assumed that each order, if no other replaces it, is answered some time and stays so; and that is what is shown of the level: it
+is *unanswered* while it reports *executing*, or of PAUSE anything but *done*. The argument, for a level that keeps one command:
 
 - Its *table* stays, or what selects it is no part of the command: then from table to table there is no way round.
 - Its *phase* is its pending next states, and the flags that its lines write. From phase to phase there is no way round (all
-  steps are listed by the solver, from the invariant), so the phase changes at most `changes` times.
+  steps are listed by the solver, from the invariant), so the phase changes at most `changes` times; but for ways round on which
+  the command is answered in every cycle: whoever stays on one has answered for good.
 - While the phase stays, lines follow one another. A line that comes again and again stands on a way round among them. It
   comes finitely often if there is a *counter*, a number of the level that rises whenever the line runs and never falls on that
   way round: it ends at the end of its range. A real has to rise by a share of its range (`SMALLEST`), found in fractions
   (`measured`). Lines that have one are taken out, and what is left is looked at again.
 - A line that gives orders must have one, at least for the cycles in which it does so. So orders end.
-- Then answers come, and stay. Among the lines that are left nothing may go round in answered cycles that give no order.
+- Then answers come, and stay. Among the lines that are left none may go round in answered cycles that give no order, but those that
+  leave the command unanswered only finitely often.
 
 Lines for which this is not shown are named in `endless`: they wait for what they read.
 """
@@ -89,13 +91,24 @@ def reports(stepper: Stepper) -> bool:
     return all(isinstance(kind, Enum) and {DONE, EXECUTING} <= set(kind.members) for kind in kinds)
 
 
-def command_goes_on(stepper: Stepper, cycle: Cycle) -> Node:
-    """The level's command is still the same, and not ended."""
+def command_stays(stepper: Stepper, cycle: Cycle) -> Node:
+    """The level's command is still the same."""
     above = stepper.links.above
     assert above is not None
     number = f"{above.order}.{NUMBER}"
-    same = values.equal(cycle.before[number], cycle.taken[number])
-    return values.both(same, _says(stepper, f"{above.report}.{STATUS}", cycle.after, EXECUTING))
+    return values.equal(cycle.before[number], cycle.taken[number])
+
+
+def unanswered(stepper: Stepper, cycle: Cycle) -> Node:
+    """The level's report is none that its superior waits for: of the first command that is *done* alone."""
+    above = stepper.links.above
+    assert above is not None
+    command, status = f"{above.order}.{COMMAND}", f"{above.report}.{STATUS}"
+    rests = values.equal(cycle.taken[command], values.constant(stepper.kinds[command], 0))
+    done = _says(stepper, status, cycle.after, DONE)
+    return values.either(
+        _says(stepper, status, cycle.after, EXECUTING), values.both(rests, values.negation(done))
+    )
 
 
 def answered(stepper: Stepper, cycle: Cycle, below: Below) -> Node:
@@ -121,10 +134,14 @@ class _Flow:
         self.stepper, self.asked, self.clauses = stepper, asked, clauses
         self.keyed = asked.keyed
         self.rows: dict[tuple[str, ...], list[Cycle]] = {}
-        self.leaves = self._phase()
-        self.before = [self.asked.cycle.before[leaf] for leaf in self.leaves]
-        self.after = [self.asked.cycle.after[leaf] for leaf in self.leaves]
+        self._speak_of(self._phase())
         self.round = self._tables_round()
+
+    def _speak_of(self, leaves: list[str]) -> None:
+        """Makes these the phase."""
+        self.leaves = leaves
+        self.before = [self.asked.cycle.before[leaf] for leaf in leaves]
+        self.after = [self.asked.cycle.after[leaf] for leaf in leaves]
 
     def _phase(self) -> list[str]:
         """Pending states, the flag of a new command, and flags that lines write."""
@@ -145,8 +162,8 @@ class _Flow:
     def ending(self, number: int) -> Ending:
         """Of one table."""
         at = self.asked.cycle.tables[number]
-        steps = self._steps(at)
-        changes = None if steps is None or number in self.round else longest(steps)
+        steps = self._steps_of_phase(at)
+        changes = None if steps is None or number in self.round else self._changes(at, steps)
         found = lines_that_stop(
             self.stepper.program,
             self.asked,
@@ -156,15 +173,62 @@ class _Flow:
         return Ending(str(at.table.name), changes, found.counted, found.still, found.endless)
 
     def not_round(self, number: int) -> list[Node]:
-        """That a step is not taken, for each that is on a way round."""
+        """That a step is not taken, for each that is on a way round on which the command may be unanswered."""
         at = self.asked.cycle.tables[number]
-        steps = self._steps(at) or set()
-        taken = values.both(at.chosen, command_goes_on(self.stepper, self.asked.cycle))
+        steps = self._steps_of_phase(at) or set()
+        rounds = [part for part, waits in self._rounds(at, steps) if waits]
+        taken = values.both(at.chosen, command_stays(self.stepper, self.asked.cycle))
         return [
             values.negation(values.all_of((taken, *self._are(self.before, one), *self._are(self.after, two))))
             for one, two in sorted(steps)
-            if leads(steps, two, one)
+            if any(one in part and two in part for part in rounds)
         ]
+
+    def _steps_of_phase(self, at: TableAt) -> set[tuple[Phase, Phase]] | None:
+        """Every change of phase; flags that lines set and reset while the command is unanswered are no part of it."""
+        self._speak_of(self._phase())
+        steps = self._steps(at)
+        if steps is None:
+            return None
+        rounds = [part for part, waits in self._rounds(at, steps) if waits]
+        inside = [(one, two) for one, two in steps for part in rounds if one in part and two in part]
+        turning = {
+            leaf
+            for place, leaf in enumerate(self.leaves)
+            for one, two in inside
+            if one[place] != two[place] and isinstance(self.stepper.kinds[leaf], Bool) and leaf != FLAG
+        }
+        if not turning:
+            return steps
+        self._speak_of([leaf for leaf in self.leaves if leaf not in turning])
+        return self._steps(at)
+
+    def _changes(self, at: TableAt, steps: set[tuple[Phase, Phase]]) -> int | None:
+        """Steps on the longest way, those left out that lead round while the command is answered; None where others do."""
+        same: dict[Phase, Phase] = {}
+        for part, waits in self._rounds(at, steps):
+            if waits:
+                return None
+            same |= dict.fromkeys(part, min(part))
+        left = {(same.get(one, one), same.get(two, two)) for one, two in steps}
+        return longest({(one, two) for one, two in left if one != two})
+
+    def _rounds(self, at: TableAt, steps: set[tuple[Phase, Phase]]) -> Iterator[tuple[set[Phase], bool]]:
+        """Phases that lead to one another, and whether the command may be unanswered in a cycle from one of them to one."""
+        phases = sorted({phase for step in steps for phase in step})
+        places = {phase: place for place, phase in enumerate(phases)}
+        for part in parts({(places[one], places[two]) for one, two in steps}):
+            inside = {phases[place] for place in part}
+            cycle, solver = self.asked.cycle, self.asked.known(self.clauses)
+            ends = [
+                values.any_of(values.all_of(self._are(nodes, phase)) for phase in sorted(inside))
+                for nodes in (self.before, self.after)
+            ]
+            waits = (command_stays(self.stepper, cycle), unanswered(self.stepper, cycle))
+            term = self.keyed.term(values.all_of((at.chosen, *waits, *ends)))
+            solver.add(*self.keyed.ranges)
+            self.asked.rested_on.append(solver)
+            yield inside, may(solver, term)
 
     @staticmethod
     def _are(nodes: Sequence[Node], phase: Phase) -> list[Node]:
@@ -194,10 +258,10 @@ class _Flow:
         return self.rows[still]
 
     def _turn(self, cycle: Cycle, number: int) -> Turn:
-        """The cycle of a table, in which the command goes on, and the phase stays."""
+        """The cycle of a table, in which the command and the phase stay."""
         same = values.all_of(values.equal(cycle.before[leaf], cycle.after[leaf]) for leaf in self.leaves)
         at = cycle.tables[number]
-        stays = values.all_of((at.chosen, cycle.contract, command_goes_on(self.stepper, cycle), same))
+        stays = values.all_of((at.chosen, cycle.contract, command_stays(self.stepper, cycle), same))
         orders = gives_an_order(self.stepper, cycle)
         return Turn(
             at,
@@ -205,13 +269,14 @@ class _Flow:
             cycle.after,
             stays,
             orders,
+            unanswered(self.stepper, cycle),
             values.all_of(answered(self.stepper, cycle, below) for below in self.stepper.links.below),
         )
 
     # --- from table to table ---
 
     def _tables_round(self) -> set[int]:
-        """The tables that may follow one another round while the command goes on."""
+        """The tables that may follow one another round while the command stays."""
         above, chosen = self.stepper.links.above, self.stepper.level.tables
         assert above is not None
         if isinstance(chosen, OneTable):
@@ -221,7 +286,7 @@ class _Flow:
         one, two, _ = self._cycles(())
         term = self.keyed.term
         goes_on = [
-            term(values.both(cycle.contract, command_goes_on(self.stepper, cycle))) for cycle in (one, two)
+            term(values.both(cycle.contract, command_stays(self.stepper, cycle))) for cycle in (one, two)
         ]
         runs = [[term(at.chosen) for at in cycle.tables] for cycle in (one, two)]
         solver = self.asked.known(self.clauses)
@@ -242,7 +307,7 @@ class _Flow:
         keyed, cycle = self.keyed, self.asked.cycle
         stays = values.all_of(map(values.equal, self.before, self.after))
         moves = keyed.term(
-            values.all_of((at.chosen, command_goes_on(self.stepper, cycle), values.negation(stays)))
+            values.all_of((at.chosen, command_stays(self.stepper, cycle), values.negation(stays)))
         )
         ends = [keyed.term(node) for node in (*self.before, *self.after)]
         solver = self.asked.known(self.clauses)
@@ -292,14 +357,3 @@ def longest(steps: set[tuple[Phase, Phase]]) -> int | None:
     if not all(measure(phase, ()) for phase in onward):
         return None
     return max(length.values(), default=0)
-
-
-def leads(steps: set[tuple[Phase, Phase]], start: Phase, end: Phase) -> bool:
-    """Whether a way leads from one to the other."""
-    seen, waiting = {start}, [start]
-    while waiting:
-        here = waiting.pop()
-        new = {two for one, two in steps if one == here} - seen
-        seen |= new
-        waiting += new
-    return end in seen

@@ -1,7 +1,7 @@
 """The shortest run after which a command may go on for ever: it ends where it was before, and every order has its due.
 
-In: a stepper, tables whose commands are not shown to end. Out: `Lap`s. A lap is some cycles of one command, in each of which
-*executing* is reported, behind which every leaf is as before them, but for the numbers of orders; of each subordinate it gets an
+In: a stepper, tables whose commands are not shown to end. Out: `Lap`s. A lap is some cycles of one command, in some of which
+it is unanswered, behind which every leaf is as before them, but for the numbers of orders; of each subordinate it gets an
 order in the lap, or all cycles of the lap are answered. What the solver finds is run by the interpreter, the lap once more than it
 was found: its second time has to be like the first, with numbers that are as much later.
 """
@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rcsc.compose.contract import ECHO, NUMBER
-from rcsc.compose.ends import answered, command_goes_on
+from rcsc.compose.ends import answered, command_stays, unanswered
 from rcsc.compose.goals import Goal, Sort
 from rcsc.compose.sat import GaveUpError
 from rcsc.compose.trace import NotReproducedError, Search, Step, Trace, Unrolled, as_cycle, ran
@@ -58,7 +58,7 @@ def _comes_round(stepper: Stepper, table: str, cycles: Sequence[Cycle]) -> Node:
     first, last = cycles[0], cycles[-1]
     number = next(at for at, one in enumerate(first.tables) if one.table.name == table)
     goes = [
-        values.all_of((one.contract, one.goes_on, one.tables[number].chosen, command_goes_on(stepper, one)))
+        values.all_of((one.contract, one.goes_on, one.tables[number].chosen, command_stays(stepper, one)))
         for one in cycles
     ]
     same = [
@@ -73,7 +73,8 @@ def _comes_round(stepper: Stepper, table: str, cycles: Sequence[Cycle]) -> Node:
         due.append(values.either(ordered, values.all_of(answered(stepper, one, below) for one in cycles)))
         before, after = (values.equal(leaves[echo], leaves[sent]) for leaves in (first.before, last.after))
         due.append(values.equal(before, after))
-    return values.all_of((*goes, *same, *due))
+    waits = values.any_of(unanswered(stepper, one) for one in cycles)
+    return values.all_of((*goes, waits, *same, *due))
 
 
 def _moving(stepper: Stepper) -> set[str]:

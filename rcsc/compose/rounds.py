@@ -44,8 +44,9 @@ class Turn:
 
     Attributes:
         before: The leaves before it; `after`, behind it.
-        stays: The table runs, the command goes on, the phase stays.
+        stays: The table runs, the command stays, and so does the phase.
         orders: An order is given.
+        unanswered: The command is not answered.
         answered: The orders that stand are answered.
     """
 
@@ -54,6 +55,7 @@ class Turn:
     after: Leaves
     stays: Node
     orders: Node
+    unanswered: Node
     answered: Node
 
     @property
@@ -138,8 +140,11 @@ class _Rounds:
     Attributes:
         open: Lines to be looked at: those that a weaker look left.
         always: Steps that are left when lines that count are taken out, answered or not; `silent`, in quiet cycles.
-        restless: Lines that may give order after order.
+        restless: Lines that may give order after order; `unanswered`, that may go on so in quiet cycles.
     """
+
+    restless: set[int]
+    unanswered: set[int]
 
     def __init__(
         self,
@@ -153,6 +158,7 @@ class _Rounds:
         term = asked.keyed.term
         stay = [term(turn.stays) for turn in turns]
         self.orders, self.quiet = term(self.turn.orders), smt.all_of([term(turn.quiet) for turn in turns])
+        waits = term(self.turn.unanswered)
         self.last, self.now, self.next = ([term(match) for _, match in turn.lines] for turn in turns)
         self.numbers = [
             Number(name, kind, term(self.turn.before[name]), term(self.turn.after[name]))
@@ -169,20 +175,28 @@ class _Rounds:
         else:
             self.counted, self.always = list(weaker.counted), weaker.always
         self.always = self._uncounted(self.always, always)
-        self.restless: set[int] = {
-            line
-            for part in parts(self.always)
-            for line in sorted(part)
-            if (weaker is None or line in weaker.restless)
-            and not self._stops(line, part, always, self.orders)
-        }
+        self.restless = self._unstopped(
+            self.always, always, self.orders, None if weaker is None else weaker.restless
+        )
         silent = self.always if weaker is None else self.always & weaker.silent
         self.silent: set[Step] = self._uncounted(self._steps(self.quiet, silent), self.quiet)
+        self.unanswered = self._unstopped(
+            self.silent, self.quiet, waits, None if weaker is None else weaker.unanswered
+        )
 
     @property
     def endless(self) -> set[int]:
         """The lines that are left."""
-        return self.restless.union(*parts(self.silent))
+        return self.restless | self.unanswered
+
+    def _unstopped(self, steps: set[Step], when: Term, then: Term, among: set[int] | None) -> set[int]:
+        """The lines, of these if it is said, that may do so again and again on a way round."""
+        return {
+            line
+            for part in parts(steps)
+            for line in sorted(part)
+            if (among is None or line in among) and not self._stops(line, part, when, then)
+        }
 
     def _steps(self, when: Term, among: set[Step]) -> set[Step]:
         """The steps among these that may be taken."""
