@@ -194,6 +194,7 @@ class _Rounds:
         return {
             line
             for part in parts(steps)
+            if may(self.solver, smt.any_of([self.now[line] for line in sorted(part)]), when, then)
             for line in sorted(part)
             if (among is None or line in among) and not self._stops(line, part, when, then)
         }
