@@ -1,6 +1,7 @@
 """`rcsc promela`: the levels of a system as Promela models, and what Spin finds in them."""
 
 import os
+from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,7 +11,7 @@ import click
 from rcsc.cli.cell import Stopped, stop, system_path
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterable, Iterator, Mapping
 
     from rcsc.compose.promela.model import Model
     from rcsc.compose.promela.plan import Wanted
@@ -62,7 +63,8 @@ def promela(  # noqa: PLR0913, PLR0917  # as many as there are options
     """Check the levels of SYSTEM with Spin, in models that another translation makes of the same tables.
 
     No proof: a small instance is looked through, with few numbers, short counters and few values from outside; the header of each model
-    says which. Printed of each model: whether every state was looked at, and, where something is broken, the run that breaks it.
+    says which. Printed of each model: whether every state was looked at, what its tables state that it cannot speak of, and, where
+    something is broken, the run that breaks it; at the end, how many goals of each sort there were.
     """
     from rcsc.compose.promela.small import Breadth
     from rcsc.compose.promela.spin import Search
@@ -153,6 +155,7 @@ def _check(
             if isinstance(checked, Absent):
                 raise Stopped(Code.NO_SPIN, checked.reason)
             broken += _say(made, one, model, checked)
+    _say_goals(model for _, model, _ in waiting)
     return 1 if broken else 0
 
 
@@ -166,11 +169,13 @@ def _say(made: "Mapping[str, Stepper]", one: "Wanted", model: "Model", checked: 
     if not checked.failed:
         good = "they do" if model.progress else "nothing broken"
         click.echo(f"{head}  {how}, {checked.states}, in {checked.seconds:.1f} s: {good}")
+        _say_left_out(model)
         return False
     if model.progress:  # nothing that the tables promise
         click.echo(f"{head}  no: one goes on for as long as the outside never says what it waits for")
         return False
     click.echo(f"{head}  after {checked.states} states: broken")
+    _say_left_out(model)
     run = run_of(model, made, checked.trail)
     click.echo(f"error[{Code.NOT_COMPOSED.value}]: {run.aim.shown}: broken, as Spin finds", err=True)
     note = (
@@ -182,3 +187,20 @@ def _say(made: "Mapping[str, Stepper]", one: "Wanted", model: "Model", checked: 
     for line in run.lines:
         click.echo(f"  {line}", err=True)
     return True
+
+
+def _say_left_out(model: "Model") -> None:
+    """What the tables state and this model does not check; a model for progress checks nothing of it anyway."""
+    for out in () if model.progress else model.left_out:
+        click.echo(f"  not checked: {out.shown}")
+
+
+def _say_goals(models: "Iterable[Model]") -> None:
+    """How many different goals of each sort there were in the models, but for those that only ask whether commands end."""
+    from rcsc.compose.goals import Sort
+
+    every = {aim for model in models if not model.progress for aim in model.aims}
+    counts = Counter(aim.what for aim in every)
+    click.echo(f"{len(every)} goals:")
+    for sort in filter(counts.__getitem__, Sort):
+        click.echo(f"{counts[sort]:5}  {sort}")

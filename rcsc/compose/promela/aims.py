@@ -8,7 +8,7 @@ from rcsc.model import Expr
 
 CONTRACT_ABOVE = Sort.SAME_ORDER.value
 CONTRACT_BELOW = Sort.OF_ITS_ORDER.value
-INVARIANT = "invariant"
+CONTRACT = frozenset({CONTRACT_ABOVE, CONTRACT_BELOW})
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,8 +44,8 @@ class Aims:
     skipped: frozenset[Aim] = frozenset()
     met: list[Aim] = field(default_factory=list)
 
-    def check(self, aim: Aim, holds: Expr) -> Check:
-        """The statement that checks it."""
+    def check(self, aim: Aim, holds: Expr, *, apart: bool = False) -> Check:
+        """The statement that checks it; `apart` as there."""
         if aim not in self.met:
             self.met.append(aim)
-        return Check(self.met.index(aim), YES if aim in self.skipped else holds)
+        return Check(self.met.index(aim), YES if aim in self.skipped else holds, apart)

@@ -68,10 +68,15 @@ class Fork:
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """Goal number `goal` is broken where the condition does not hold."""
+    """Goal number `goal` is broken where the condition does not hold.
+
+    Attributes:
+        apart: The names that it compares are to have values to differ by, where they would have only one.
+    """
 
     goal: int
     holds: Expr
+    apart: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -192,6 +197,11 @@ class Flattener:
     def action(self, statement: Statement) -> Block:
         """A statement that stands outside every procedure."""
         return tuple(self._block((statement,), {}, "table"))
+
+    @property
+    def guessed(self) -> frozenset[str]:
+        """The names of what arithmetic on reals gives."""
+        return frozenset(map(self.name, self._unknown.values()))
 
     # --- statements ---
 

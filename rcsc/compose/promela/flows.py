@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 from rcsc.compose.promela.flat import Check, Flat, Forget, Fork, Match, Put, Tell
 from rcsc.interpret import OPERATORS
-from rcsc.model import COMPARISONS, Among, Apply, Bool, Expr, Int, Literal, Op, Read, Scalar, Value
+from rcsc.model import BEFORE, COMPARISONS, Among, Apply, Bool, Expr, Int, Literal, Op, Read, Scalar, Value
 
 EQUALITIES = frozenset({Op.EQ, Op.NE})
 MIRRORED = {Op.LT: Op.GT, Op.LE: Op.GE, Op.GT: Op.LT, Op.GE: Op.LE}
@@ -23,6 +23,7 @@ class Group:
         tests: Comparisons with constants: the operator as seen from the name, and the constant.
         given: Constants that are assigned.
         paired: It is asked which of two is the greater.
+        apart: A property compares two of it.
         counted: By how much a name is counted up or down.
         round: What it is counted round by (`mod`), if it is.
         computed: It takes part in other arithmetic.
@@ -32,6 +33,7 @@ class Group:
     tests: set[tuple[Op, Value]] = field(default_factory=set)
     given: set[Value] = field(default_factory=set)
     paired: bool = False
+    apart: bool = False
     counted: set[int] = field(default_factory=set)
     round: set[int] = field(default_factory=set)
     computed: bool = False
@@ -40,6 +42,10 @@ class Group:
     def told(self) -> tuple[Value, ...]:
         """The constants that it is compared with."""
         return tuple(sorted({value for _, value in self.tests}))
+
+    def goes_round(self, numbers: frozenset[str]) -> bool:
+        """Whether it is only counted round, or command numbers (of which `numbers` are), and compared."""
+        return not self.computed and bool(self.round or numbers.intersection(self.names))
 
     def told_apart(self, values: Iterable[Value]) -> list[Value]:
         """The first of each class of values that no test tells apart, in their order."""
@@ -57,6 +63,7 @@ class Flows:
     kinds: Mapping[str, Scalar]
     _parent: dict[str, str] = field(default_factory=dict)
     _facts: list[tuple[str, str | Op, Value]] = field(default_factory=list)
+    _apart: bool = False
 
     def groups(self, statements: Iterable[Flat]) -> dict[str, Group]:
         """Each name's group; those that hold truth values have none."""
@@ -108,8 +115,10 @@ class Flows:
                         self._condition(when)
                         self._block(body)
                     self._block(otherwise)
-                case Check(holds=holds):
+                case Check(holds=holds, apart=apart):
+                    self._apart = apart
                     self._condition(holds)
+                    self._apart = False
                 case Match(conditions=conditions):
                     for when in conditions:
                         self._condition(when)
@@ -159,7 +168,9 @@ class Flows:
                 self._say(name, MIRRORED.get(op, op), value)
             case Read(name=name), Read(name=second):
                 self._join(str(name), str(second))
-                if op not in EQUALITIES:
+                if self._apart:
+                    self._say(name, "apart")
+                if op not in EQUALITIES and not _of_one_leaf(name, second):
                     self._say(name, "paired")
             case Read(name=name), Apply(
                 op=Op.MOD, args=(Apply(op=Op.ADD, args=(Read(name=second), Literal())), Literal(value=many))
@@ -167,8 +178,8 @@ class Flows:
                 self._join(str(name), str(second))
                 self._say(name, "round", many)
             case _:
-                self._arithmetic(one)
-                self._arithmetic(other)
+                for side in (one, other):
+                    self._condition(side) if isinstance(side.type, Bool) else self._arithmetic(side)
 
     def _arithmetic(self, expr: Expr) -> None:
         match expr:
@@ -180,3 +191,9 @@ class Flows:
                     self._arithmetic(arg)
             case _:
                 pass
+
+
+def _of_one_leaf(one: str, other: str) -> bool:
+    """Whether one is what the other was a cycle before: closing the gaps of a counter keeps their order."""
+    first, second = (name.partition(":") for name in (one, other))
+    return first[0] == second[0] and first[2].removeprefix(BEFORE) == second[2].removeprefix(BEFORE)

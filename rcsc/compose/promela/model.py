@@ -16,9 +16,10 @@ from rcsc.compose.promela.needs import mentioned, needed
 from rcsc.compose.promela.sink import Sunk, sunk
 from rcsc.compose.promela.small import Breadth, Domain, Smaller
 from rcsc.compose.promela.spell import Nodes, Speller, drawn_flag, identifiers, rendered
+from rcsc.compose.promela.stated import LeftOut
 from rcsc.compose.promela.steps import Machine, Maker
 from rcsc.compose.transition import Stepper
-from rcsc.model import Expr, Kind, Read, Scalar, Value
+from rcsc.model import Expr, Kind, Read, Scalar, Value, earlier
 
 TOLD = "cycle"
 """First word of the line that a trail prints for each cycle; then the level, table, line, and each told name's value."""
@@ -42,6 +43,7 @@ class Model:
         domains: What the values stand for.
         leading: Numbers that others are counted from, by the name of each number.
         copies: What is drawn in the place of what.
+        left_out: What the programs state and the instance cannot speak of.
     """
 
     levels: tuple[str, ...]
@@ -52,6 +54,7 @@ class Model:
     leading: Mapping[str, str]
     copies: tuple[Sunk, ...]
     progress: bool = False
+    left_out: tuple[LeftOut, ...] = ()
 
 
 def emit(
@@ -73,8 +76,20 @@ def emit(
     """
     aims = Aims(skipped)
     inside = {name: system[name] for name in levels}
-    machines = [Maker(system[name], system, inside, aims).machine() for name in levels]
-    return _Writer(machines, breadth or Breadth(), aims, progress).model()
+    makers = [Maker(system[name], system, inside, aims) for name in levels]
+    return _Writer(_machines(makers), breadth or Breadth(), aims, progress).model()
+
+
+def _machines(makers: Iterable[Maker]) -> list[Machine]:
+    """Drafted first: what the programs state is said of what the whole model does."""
+    drafts = [(one, one.draft()) for one in makers]
+    kinds: dict[str, Scalar] = {STALE: BOOL}
+    for one, _ in drafts:
+        kinds |= one.flat.kinds
+    blocks = [block for _, draft in drafts for block in (draft.take, draft.cycle, draft.restart)]
+    groups = Flows(kinds).groups([one for block in blocks for one in block])
+    numbers = frozenset(name for one, _ in drafts for name in one.around.numbers)
+    return [one.machine(draft, groups, numbers) for one, draft in drafts]
 
 
 @dataclass(slots=True)
@@ -137,7 +152,7 @@ class _Writer:
         leading = {name: lead for lead, _ in self._rings() for name in self.groups[lead].names}
         return Model(
             tuple(one.level for one in self.machines), text, tuple(self.aims.met), told, self.domains, leading,
-            self.copies, self.progress,
+            self.copies, self.progress, tuple(out for one in self.machines for out in one.left_out),
         )  # fmt: skip
 
     def _header(self) -> Iterator[str]:
@@ -151,15 +166,19 @@ class _Writer:
                 yield f" * {name}: {domain.words}"
         for number, aim in enumerate(self.aims.met):
             yield f" * check {number}: {aim.shown}"
+        for machine in self.machines:
+            yield from (f" * not checked: {out.shown}" for out in machine.left_out)
         yield " */"
 
     def _declared(self) -> Iterator[str]:
+        """Leaves begin with their values; whatever else is drawn has none before the first cycle, which is as free as any other."""
+        leaves = {one.flat.name(v.name) for one in self.machines for v in one.flat.program.variables}
         for name, spelled in self.names.items():
             domain = self.domains[name]
             start = domain.encoded(self.starts[name]) if name in self.between else 0
             yield f"{_type(domain)} {spelled} = {start}; /* {name} */"
             if name in self.lazy:
-                yield f"bit {drawn_flag(spelled)} = {int(name in self.between)};"
+                yield f"bit {drawn_flag(spelled)} = {int(name in self.between and name in leaves)};"
         yield from (f"bit scratch_{at};" for at in range(self.scratch))
 
     def _process(self, at: int) -> Iterator[str]:
@@ -216,6 +235,7 @@ class _Writer:
     def _told(self, machine: Machine) -> tuple[str, ...]:
         own = machine.flat.program.variables
         inputs = {machine.flat.name(v.name) for v in own if v.kind is Kind.INPUT}
+        inputs |= {machine.flat.name(earlier(v.name)) for v in own if v.kind is Kind.INPUT}
         prefix = f"{machine.level}:"
         return tuple(
             name for name in self.names if name.startswith(prefix) and (name in inputs or name in self.lazy)

@@ -5,8 +5,8 @@ as far as a run shows it, and what is not found is no proof:
 
 - *Numbers* that are only counted round and compared for equality go round after few (`Breadth.numbers`).
 - *Counters* that are only counted and compared with constants have the gaps between these closed (`Breadth.gap`).
-- *Data* from outside takes one value for each class that conditions tell apart, at least `Breadth.values`, at most `Breadth.most`; so do
-  enumerations, but those of the protocol (commands, statuses), which take every value.
+- *Data* from outside takes one value for each class that conditions tell apart, at least `Breadth.values` (two where a property compares
+  it with other data), at most `Breadth.most`; so do enumerations, but those of the protocol (commands, statuses), which take every value.
 - *Reals* are those few values, and what is computed of them is any of them (`flat`).
 """
 
@@ -113,7 +113,7 @@ class Smaller:
         if any(isinstance(kind, Real) for kind in kinds):
             return self._reals(group)
         if all(isinstance(kind, Int) for kind in kinds):
-            if not group.computed and (group.round or self.numbers.intersection(group.names)):
+            if group.goes_round(self.numbers):
                 return self._numbers(group)
             wide = any(isinstance(kind, Int) and kind.high - kind.low >= NARROW for kind in kinds)
             if wide and group.counted and not group.computed and not group.paired:
@@ -170,7 +170,7 @@ class Smaller:
         near = [start, *told, *(v + 1 for v in told), *(v - 1 for v in told), low]
         chosen = group.told_apart(v for v in near if low <= v <= high)[: self.breadth.most]
         fill = (v for v in (*sorted(int(g) for g in group.given), *range(low, high + 1)) if low <= v <= high)
-        least = max(self.breadth.values, 2 if group.paired else 1)
+        least = max(self.breadth.values, 2 if group.paired or group.apart else 1)
         return sorted(int(v) for v in _filled(chosen, fill, least))
 
     def _reals(self, group: Group) -> dict[str, Domain]:
@@ -197,7 +197,7 @@ class Smaller:
         near = [v for v in (*told, *middles) if kind.low <= v <= kind.high]
         chosen = group.told_apart(near)[: self.breadth.most] if told else []
         fill = (v for v in (*given, 0.0, 1.0, *middles, kind.low, kind.high) if kind.low <= v <= kind.high)
-        least = max(self.breadth.values, 2 if group.paired else 1)
+        least = max(self.breadth.values, 2 if group.paired or group.apart else 1)
         return sorted(float(v) for v in _filled(chosen, fill, least))
 
 

@@ -1,15 +1,16 @@
 """What one level does in a cycle, and what is checked of it there, as flat statements.
 
-In: a level (`transition.Stepper`: program, level, links) and the levels of the same model. Out: a `Machine`. The goals are those of
-`compose.goals`, said once more: of what the cycle does, not of nodes.
+In: a level (`transition.Stepper`: program, level, links) and the levels of the same model. Out: a `Machine`. A `Draft` is the same without
+what the program itself states, which depends on what the drafts of all levels say together (`stated`).
 """
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
-from rcsc.compose.contract import COMMAND, ECHO, ECHOED, NUMBER, STATUS, leaves_under
-from rcsc.compose.goals import FLAG, Sort
-from rcsc.compose.promela.aims import INVARIANT, Aim, Aims
+from rcsc.compose.contract import COMMAND, NUMBER, STATUS
+from rcsc.compose.goals import Sort
+from rcsc.compose.promela.aims import Aims
+from rcsc.compose.promela.checks import SMALL, Checks
 from rcsc.compose.promela.environment import Environment, successor
 from rcsc.compose.promela.flat import (
     BOOL,
@@ -28,11 +29,20 @@ from rcsc.compose.promela.flat import (
     read,
     same,
 )
+from rcsc.compose.promela.flows import Group
+from rcsc.compose.promela.stated import LeftOut, Stating, computed
 from rcsc.compose.transition import SEEN, Stepper
-from rcsc.model import Action, Apply, Enum, Expr, Int, Kind, Line, Literal, OneTable, Op, Table, pending
+from rcsc.model import Action, Apply, Enum, Expr, Kind, Line, Literal, OneTable, Op, Table, pending
 from rcsc.system.adopt import ECHOES, FAILED, ORDER
 
-SMALL = Int(0, 255)
+
+@dataclass(frozen=True, slots=True)
+class Draft:
+    """A level without what its program states: what it reads of levels in the model, the cycle but for its end, and its restart."""
+
+    take: Block
+    cycle: Block
+    restart: Block
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +56,7 @@ class Machine:
         full: Names that are given any value of their type.
         numbers: Command numbers.
         ended: The superior's command is not under way; for progress.
+        left_out: What its program states and the instance cannot speak of.
     """
 
     level: str
@@ -57,6 +68,7 @@ class Machine:
     full: frozenset[str]
     numbers: tuple[str, ...]
     ended: Expr
+    left_out: tuple[LeftOut, ...]
 
     @property
     def table(self) -> str:
@@ -84,34 +96,48 @@ class Maker:
     aims: Aims
     flat: Flattener = field(init=False)
     around: Environment = field(init=False)
+    checks: Checks = field(init=False)
 
     def __post_init__(self) -> None:
         self.flat = Flattener(self.stepper.level.name, self.stepper.program)
         self.around = Environment(self.flat, self.stepper, self.inside, self.aims)
+        self.checks = Checks(self.flat, self.stepper, self.around, self.system, self.aims)
 
-    def machine(self) -> Machine:
-        """The level, ready to be written."""
+    def draft(self) -> Draft:
+        """The level without what its program states."""
         self.flat.new("table", SMALL)
         self.flat.new("line", SMALL)
         self.flat.new("many", SMALL)
         nowhere = tuple(Put(self.flat.name(one), Literal(0, SMALL)) for one in ("table", "line"))
-        cycle: Block = (
-            *nowhere, *self._remembered(), *self.around.begin(), *self._settle(),
-            *self._modules(self.stepper.level.preprocess), *self._seen(), *self._tables(),
-            *self._modules(self.stepper.level.postprocess), *self._afterwards(), *self.around.end(),
-            Tell(self.flat.name("table"), self.flat.name("line")),
+        begun = (*nowhere, *self.checks.remembered(), *self.around.begin())
+        look = (*self._settle(), *self._modules(self.stepper.level.preprocess))
+        cycle = (
+            *begun, *look, *self.checks.seen(), *self._tables(), *self._modules(self.stepper.level.postprocess),
+            *self.checks.afterwards(look), *self.around.end(),
         )  # fmt: skip
-        cycle += (
-            Forget(
-                tuple(
-                    sorted(self.flat.lazy - {self.flat.name(v.name) for v in self.stepper.program.variables})
-                )
-            ),
-        )
         restart = () if len(self.inside) > 1 else (*self.around.anew(), *self._anew())
+        return Draft(tuple(self.around.taken()), cycle, restart)
+
+    def machine(self, draft: Draft, groups: Mapping[str, Group], numbers: frozenset[str]) -> Machine:
+        """The level, ready to be written.
+
+        Args:
+            draft: Its own.
+            groups: Of the drafts of all levels of the model.
+            numbers: Command numbers of all of them.
+        """
+        known = computed(self.flat, draft.cycle)
+        stated = Stating(self.flat, self.aims, groups, numbers, known).stated()
+        own = {self.flat.name(v.name) for v in self.stepper.program.variables}
+        cycle = (
+            *stated.before, *draft.cycle, *stated.behind,
+            Tell(self.flat.name("table"), self.flat.name("line")), Forget(tuple(sorted(self.flat.lazy - own))),
+        )  # fmt: skip
+        take = (*stated.earlier, *draft.take) if draft.take else ()
         return Machine(
-            self.stepper.level.name, self.flat, self.stepper, tuple(self.around.taken()), cycle, restart,
-            frozenset(self.around.full), tuple(self.around.numbers), self._ended(),
+            self.stepper.level.name, self.flat, self.stepper, take,
+            cycle if take else (*stated.earlier, *cycle), draft.restart,
+            frozenset(self.around.full), tuple(self.around.numbers), self._ended(), stated.left_out,
         )  # fmt: skip
 
     # --- the cycle, in the order of `interpret.cycle` ---
@@ -155,7 +181,7 @@ class Maker:
             if assumption.name in table.assumptions:
                 before, holds = self.flat.condition(assumption.condition, "table")
                 yield from before
-                yield self._goal(Sort.ASSUMPTION, holds, str(table.name), str(assumption.name))
+                yield self.checks.goal(Sort.ASSUMPTION, holds, str(table.name), str(assumption.name))
         conditions = []
         for one in table.lines:
             before, when = self._line(one)
@@ -164,8 +190,9 @@ class Maker:
         yield Match(tuple(conditions), str(line.name), str(many.name))
         if table.default is None or table.default.unreachable:
             sort = Sort.SOME_LINE if table.default is None else Sort.NO_DEFAULT
-            yield self._goal(sort, Apply(Op.GE, (many, Literal(1, SMALL)), BOOL), str(table.name))
-        yield self._goal(Sort.ONE_LINE, Apply(Op.LE, (many, Literal(1, SMALL)), BOOL), str(table.name))
+            yield self.checks.goal(sort, Apply(Op.GE, (many, Literal(1, SMALL)), BOOL), str(table.name))
+        yield self.checks.goal(Sort.ONE_LINE, Apply(Op.LE, (many, Literal(1, SMALL)), BOOL), str(table.name))
+        yield from self.checks.chosen(table, line, many)
         yield Fork(
             tuple(
                 (same(line, Literal(number, SMALL)), self._actions(one.actions))
@@ -186,85 +213,6 @@ class Maker:
 
     def _actions(self, actions: Iterable[Action]) -> Block:
         return tuple(one for action in actions for one in self.flat.action(action.statement))
-
-    # --- goals ---
-
-    def _goal(self, sort: Sort, holds: Expr, table: str = "", name: str = "") -> Flat:
-        return self.aims.check(Aim(self.flat.level, sort.value, table, name), holds)
-
-    def _remembered(self) -> Iterable[Flat]:
-        """The orders and the flag before the cycle."""
-        leaves = [
-            leaf
-            for below in self.stepper.links.below
-            for leaf in leaves_under(self.stepper.program, below.order)
-        ]
-        if self._has(FLAG):
-            leaves.append(FLAG)
-        for leaf in leaves:
-            yield Put(str(self.flat.old(leaf).name), self.flat.leaf(leaf))
-
-    def _seen(self) -> Iterable[Flat]:
-        """Deferred states as the table sees them."""
-        for variable in self.stepper.program.variables:
-            if variable.deferred_until is not None:
-                seen = self.flat.new(f"{variable.name} at the table", variable.type)
-                yield Put(str(seen.name), self.flat.leaf(variable.name))
-
-    def _afterwards(self) -> Iterable[Flat]:
-        """What `compose.goals` says of a whole cycle."""
-        yield from self._echoes()
-        for below in self.stepper.links.below:
-            yield from self._orders(below.order, below.report, below.name)
-        above = self.stepper.links.above
-        if above is not None and self._has(FLAG):
-            rises = both(self.flat.leaf(FLAG), negation(self.flat.old(FLAG)))
-            yield self._goal(Sort.ONCE, negation(both(self._same_number(), rises)), "", FLAG)
-        for variable in self.stepper.program.variables:
-            if variable.deferred_until is not None:
-                now = self.flat.leaf(variable.name)
-                seen = self.flat.new(f"{variable.name} at the table", variable.type)
-                kept = either(same(now, seen), same(now, self.flat.leaf(pending(variable.name))))
-                yield self._goal(Sort.DEFERRED, kept, "", str(variable.name))
-        for one in self.stepper.program.invariants:
-            before, holds = self.flat.condition(one.condition, "invariant")
-            yield from before
-            yield self.aims.check(Aim(self.flat.level, INVARIANT, "", one.name), holds)
-
-    def _echoes(self) -> Iterable[Flat]:
-        if (above := self.stepper.links.above) is None:
-            return
-        number = same(self.flat.leaf(f"{above.report}.{ECHO}"), self.flat.leaf(f"{above.order}.{NUMBER}"))
-        command = same(self.flat.leaf(f"{above.report}.{ECHOED}"), self.flat.leaf(f"{above.order}.{COMMAND}"))
-        yield self._goal(Sort.ECHOES, both(number, command), "", above.report)
-
-    def _orders(self, order: str, report: str, below: str) -> Iterable[Flat]:
-        number, old = self.flat.leaf(f"{order}.{NUMBER}"), self.flat.old(f"{order}.{NUMBER}")
-        stands = same(number, old)
-        for leaf in self._relied_on(order, below):
-            kept = same(self.flat.leaf(leaf), self.flat.old(leaf))
-            yield self._goal(Sort.NUMBERED, either(negation(stands), kept), "", leaf)
-        yield self._goal(Sort.NEXT_NUMBER, either(stands, same(number, successor(old))), "", order)
-        if self.stepper.links.above is not None:
-            command = f"{order}.{COMMAND}"
-            kept = same(self.flat.leaf(command), self.flat.old(command))
-            waiting = both(self._same_number(), negation(same(self.flat.leaf(f"{report}.{ECHO}"), old)))
-            yield self._goal(Sort.WAITS, either(negation(waiting), kept), "", order)
-
-    def _relied_on(self, order: str, below: str) -> Iterable[str]:
-        """The fields that the subordinate assumes to stand still under a number; the command always."""
-        lower = self.system[below].links.above if below in self.system else None
-        if lower is None:
-            return (f"{order}.{COMMAND}",)
-        return tuple(order + leaf.removeprefix(lower.order) for leaf in lower.numbered)
-
-    def _same_number(self) -> Expr:
-        above = self.stepper.links.above
-        assert above is not None
-        return same(self.flat.leaf(f"{above.order}.{NUMBER}"), self.around.last_number(above))
-
-    def _has(self, leaf: str) -> bool:
-        return self.flat.name(leaf) in self.flat.kinds
 
     # --- beginnings and ends ---
 
@@ -294,4 +242,7 @@ class Maker:
         status = self.flat.leaf(f"{above.report}.{STATUS}")
         assert isinstance(status.type, Enum)
         done = Apply(Op.NE, (status, Literal(status.type.members.index("executing"), status.type)), BOOL)
-        return either(negation(self._same_number()), done)
+        return either(negation(self.checks.same_number()), done)
+
+    def _has(self, leaf: str) -> bool:
+        return self.flat.name(leaf) in self.flat.kinds

@@ -9,13 +9,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from rcsc.compose.contract import ECHO, NUMBER, leaves_under
-from rcsc.compose.goals import Sort
-from rcsc.compose.promela.aims import Aim
+from rcsc.compose.goals import Sort, goals
+from rcsc.compose.promela.aims import CONTRACT, Aim
 from rcsc.compose.promela.model import BROKEN, NONE, RESTARTED, TAKEN, TOLD, Model
 from rcsc.compose.promela.sink import Sunk
+from rcsc.compose.trace import broken, one_cycle
 from rcsc.compose.transition import NUMBERS, SEEN, Stepper
 from rcsc.interpret import Fault, Outcome, cycle, evaluate, initial
-from rcsc.model import Enum, Kind, Read, Table, Value, spell
+from rcsc.model import BEFORE, Enum, Kind, Read, Table, Value, spell
 from rcsc.resolve.leaves import read_by
 from rcsc.system.adopt import ECHOES, FAILED, ORDER
 
@@ -93,7 +94,7 @@ def _words(model: Model, system: Mapping[str, Stepper], events: Sequence[Told]) 
         said = [
             f"{name.partition(':')[2]} = {_value(model, name, code)}"
             for name, code in event.values
-            if before.get(name) != code
+            if before.get(_leaf(name)) != code and (name == _leaf(name) or not model.domains[name].size)
         ]
         before |= dict(event.values)
         if said:
@@ -130,28 +131,58 @@ def rerun(model: Model, system: Mapping[str, Stepper], events: Sequence[Told], a
         aim: What the last cycle breaks; none where it breaks nothing.
     """
     states = {name: dict(initial(system[name].program)) for name in model.levels}
+    behind = {name: dict(state) for name, state in states.items()}
     drawn = _later(model, events)
+    remembered = _remembered(model, events)
     split = any(event.word == TAKEN for event in events)
     number = 0
     outcome: Outcome | None = None
+    before: Mapping[str, Value] = {}
     for at, event in enumerate(events):
         stepper, now = system[event.level], states[event.level]
         if event.word == RESTARTED:
             _restart(stepper, now)
+            now |= {
+                name.partition(":")[2]: model.domains[name].decoded(code)
+                for name, code in remembered[at].items()
+            }
+            behind[event.level] = dict(now)
             continue
         if event.word == TAKEN or not split:
             _copy(model, system, states, event.level)
         if event.word == TAKEN:
             continue
         number += 1
-        now |= _inputs(model, stepper, now, {**drawn[at], **dict(event.values)})
+        now |= _inputs(model, stepper, now, {**drawn[at], **remembered[at], **dict(event.values)})
         outcome = cycle(stepper.program, stepper.level, now)
+        before, behind[event.level] = behind[event.level], dict(outcome.snapshot)
         states[event.level] = outcome.snapshot
         if (at < len(events) - 1 or aim is None) and not _same(stepper, event, outcome):
             return f"the interpreter goes another way in cycle {number}: {_did(stepper, outcome)}"
-    if aim is not None and (outcome is None or not _breaks(system[aim.level], aim, outcome)):
+    if aim is not None and (outcome is None or not _breaks(system[aim.level], aim, before, outcome)):
         return "the interpreter does not break it in the last cycle"
     return ""
+
+
+def _remembered(model: Model, events: Sequence[Told]) -> list[dict[str, int]]:
+    """For each event what a property says in the level's next cycle that was then: a value may be asked for so late."""
+    after: dict[str, dict[str, int]] = {}
+    found: list[dict[str, int]] = []
+    for event in reversed(events):
+        found.append(after.get(event.level, {}))
+        if event.word == TOLD:
+            after[event.level] = {
+                _leaf(name): code
+                for name, code in event.values
+                if name != _leaf(name) and not model.domains[name].size
+            }
+    return found[::-1]
+
+
+def _leaf(name: str) -> str:
+    """The leaf itself, of a name of what it was."""
+    level, _, leaf = name.partition(":")
+    return f"{level}:{leaf.removeprefix(BEFORE)}"
 
 
 def _later(model: Model, events: Sequence[Told]) -> list[dict[str, int]]:
@@ -281,8 +312,8 @@ def _did(stepper: Stepper, outcome: Outcome) -> str:
     return f"table `{_ran(stepper, outcome)}`, {what}"
 
 
-def _breaks(stepper: Stepper, aim: Aim, outcome: Outcome) -> bool:
-    """Whether the last cycle does; of what is said of a whole cycle, whether it ran to its end."""
+def _breaks(stepper: Stepper, aim: Aim, before: Mapping[str, Value], outcome: Outcome) -> bool:
+    """Whether the last cycle does; of the contract between levels, which is no goal of one, whether it ran to its end."""
     if aim.table and aim.table != _ran(stepper, outcome):
         return False
     match aim.what:
@@ -296,5 +327,16 @@ def _breaks(stepper: Stepper, aim: Aim, outcome: Outcome) -> bool:
         case Sort.NO_DEFAULT:
             table = next(one for one in stepper.program.tables if one.name == aim.table)
             return table.default is not None and outcome.line == table.default.name
-        case _:
+        case _ if aim.what in CONTRACT:
             return outcome.fault is Fault.OK
+        case _:
+            return outcome.fault is Fault.OK and _broken(stepper, aim, before, outcome)
+
+
+def _broken(stepper: Stepper, aim: Aim, before: Mapping[str, Value], outcome: Outcome) -> bool:
+    """Whether the cycle that the interpreter ran breaks the goal as `compose.goals` says it."""
+    inputs = {str(v.name) for v in stepper.program.variables if v.kind is Kind.INPUT}
+    step = one_cycle(stepper, before, {name: outcome.snapshot[name] for name in inputs})
+    every = goals(stepper, stepper.cycle(stepper.anywhere()))
+    found = [one for one in every if (one.sort, one.table, one.name) == (aim.what, aim.table, aim.name)]
+    return any(broken(stepper, one, step) for one in found)
