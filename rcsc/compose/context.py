@@ -17,8 +17,8 @@ from dataclasses import dataclass
 from rcsc.compose.confirm import Confirmation
 from rcsc.compose.contract import NUMBER
 from rcsc.compose.frames import Clause
-from rcsc.compose.transition import Cycle, Stepper, TableAt
-from rcsc.model import Bool, Call, Default, Kind, Line, Statement
+from rcsc.compose.transition import Cycle, Stepper
+from rcsc.model import Bool, Call, Default, Kind, Statement
 from rcsc.prove import smt, values
 from rcsc.prove.smt import Answer, Solver, Term
 from rcsc.prove.values import Node
@@ -75,20 +75,14 @@ def _unreached(asked: Confirmation, clauses: Sequence[Clause]) -> Iterator[tuple
     lines = [
         (str(at.table.name), str(line.name), asked.keyed.term(values.both(at.chosen, match)))
         for at in asked.cycle.tables
-        for line, match in _lines(at)
+        for line, match in at.lines
+        if not (isinstance(line, Default) and line.unreachable)  # a goal
     ]
     solver = asked.known(clauses)
     asked.rested_on.append(solver)
     for table, line, runs in lines:
         if not may(solver, runs):
             yield table, line
-
-
-def _lines(at: TableAt) -> Iterator[tuple[Line | Default, Node]]:
-    """The lines of a table, each with when it runs."""
-    yield from zip(at.table.lines, at.matches, strict=True)
-    if at.table.default is not None and not at.table.default.unreachable:
-        yield at.table.default, at.none
 
 
 def may(solver: Solver, *terms: Term) -> bool:

@@ -40,6 +40,7 @@ MOST_STEPS = 400
 DONE, EXECUTING = "done", "executing"
 
 Phase = tuple[int, ...]
+Way = tuple[Phase, Phase]
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,22 +64,6 @@ class Ending:
     def proved(self) -> bool:
         """Whether the command ends, given answers."""
         return self.changes is not None and not self.endless
-
-
-def endings(stepper: Stepper, asked: Confirmation, clauses: Sequence[Clause]) -> Iterator[Ending]:
-    """One for each table; none where the level has no superior that it reports to."""
-    if reports(stepper):
-        flow = _Flow(stepper, asked, clauses)
-        for number in range(len(asked.cycle.tables)):
-            yield flow.ending(number)
-
-
-def ways_round(stepper: Stepper, asked: Confirmation, clauses: Sequence[Clause]) -> list[Node]:
-    """That steps between phases are not taken, one by one, of which some lead round: what there is to be shown if none does."""
-    if not reports(stepper):
-        return []
-    flow = _Flow(stepper, asked, clauses)
-    return [one for number in range(len(asked.cycle.tables)) for one in flow.not_round(number)]
 
 
 def reports(stepper: Stepper) -> bool:
@@ -127,23 +112,96 @@ def _says(stepper: Stepper, leaf: str, leaves: Mapping[str, Node], member: str) 
     return values.equal(leaves[leaf], values.constant(kind, kind.members.index(member)))
 
 
-class _Flow:
-    """The questions of one level."""
+@dataclass(frozen=True, slots=True)
+class _Phases:
+    """The phases that a command of a table goes through.
+
+    Attributes:
+        leaves: What tells them apart.
+        steps: Every change from one to another; None where they are too many, or the solver gave up.
+        rounds: Phases that lead to one another, and whether the command may be unanswered in a cycle from one of them to one.
+    """
+
+    leaves: tuple[str, ...]
+    steps: set[Way] | None
+    rounds: tuple[tuple[set[Phase], bool], ...] = ()
+
+    @property
+    def waiting(self) -> list[Way]:
+        """Steps on a way round on which the command may be unanswered."""
+        parts_ = [part for part, waits in self.rounds if waits]
+        return sorted(way for way in self.steps or () if any(part.issuperset(way) for part in parts_))
+
+    @property
+    def changes(self) -> int | None:
+        """Steps on the longest way, those left out that lead round while the command is answered; None where others do."""
+        if self.steps is None or any(waits for _, waits in self.rounds):
+            return None
+        same = {phase: min(part) for part, _ in self.rounds for phase in part}
+        left = {(same.get(one, one), same.get(two, two)) for one, two in self.steps}
+        return longest({(one, two) for one, two in left if one != two})
+
+
+class Flow:
+    """The questions of one level, from an invariant; none where it has no superior that it reports to."""
 
     def __init__(self, stepper: Stepper, asked: Confirmation, clauses: Sequence[Clause]) -> None:
         self.stepper, self.asked, self.clauses = stepper, asked, clauses
         self.keyed = asked.keyed
         self.rows: dict[tuple[str, ...], list[Cycle]] = {}
-        self._speak_of(self._phase())
-        self.round = self._tables_round()
+        self.found: dict[int, _Phases] = {}
 
-    def _speak_of(self, leaves: list[str]) -> None:
-        """Makes these the phase."""
-        self.leaves = leaves
-        self.before = [self.asked.cycle.before[leaf] for leaf in leaves]
-        self.after = [self.asked.cycle.after[leaf] for leaf in leaves]
+    @property
+    def tables(self) -> tuple[TableAt, ...]:
+        """Those that are asked about."""
+        return self.asked.cycle.tables if reports(self.stepper) else ()
 
-    def _phase(self) -> list[str]:
+    def endings(self) -> Iterator[Ending]:
+        """One for each table."""
+        round_ = self._tables_round() if self.tables else set()
+        for number in range(len(self.tables)):
+            yield self._ending(number, goes_round=number in round_)
+
+    def _ending(self, number: int, *, goes_round: bool) -> Ending:
+        changes = self._phases(number).changes
+        found = lines_that_stop(
+            self.stepper.program, self.asked, self.clauses, lambda still: self._turns(number, still)
+        )
+        table = str(self.tables[number].table.name)
+        return Ending(table, None if goes_round else changes, found.counted, found.still, found.endless)
+
+    def ways_round(self) -> list[Node]:
+        """That steps between phases are not taken, one by one, of which some lead round: what there is to be shown if none does."""
+        found = []
+        for number, at in enumerate(self.tables):
+            phases = self._phases(number)
+            taken = values.both(at.chosen, command_stays(self.stepper, self.asked.cycle))
+            before, after = self._ends(phases.leaves)
+            found += [
+                values.negation(values.all_of((taken, *_are(before, one), *_are(after, two))))
+                for one, two in phases.waiting
+            ]
+        return found
+
+    # --- from phase to phase ---
+
+    def _phases(self, number: int) -> _Phases:
+        """Of a table; flags that lines set and reset while the command is unanswered tell none apart."""
+        if number not in self.found:
+            at = self.asked.cycle.tables[number]
+            phases = self._phases_by(at, self._pending_and_flags())
+            turning = {
+                leaf
+                for place, leaf in enumerate(phases.leaves)
+                for one, two in phases.waiting
+                if one[place] != two[place] and isinstance(self.stepper.kinds[leaf], Bool) and leaf != FLAG
+            }
+            if turning:
+                phases = self._phases_by(at, tuple(leaf for leaf in phases.leaves if leaf not in turning))
+            self.found[number] = phases
+        return self.found[number]
+
+    def _pending_and_flags(self) -> tuple[str, ...]:
         """Pending states, the flag of a new command, and flags that lines write."""
         variables = self.stepper.program.variables
         found = [
@@ -157,72 +215,28 @@ class _Flow:
             for v in variables
             if v.kind is Kind.STATE and isinstance(v.type, Bool) and (v.name == FLAG or v.name in written)
         ]
-        return [*found, *flags]
+        return (*found, *flags)
 
-    def ending(self, number: int) -> Ending:
-        """Of one table."""
-        at = self.asked.cycle.tables[number]
-        steps = self._steps_of_phase(at)
-        changes = None if steps is None or number in self.round else self._changes(at, steps)
-        found = lines_that_stop(
-            self.stepper.program,
-            self.asked,
-            self.clauses,
-            lambda still: self._turns(number, still),
-        )
-        return Ending(str(at.table.name), changes, found.counted, found.still, found.endless)
+    def _ends(self, leaves: Sequence[str]) -> tuple[list[Node], list[Node]]:
+        """What tells phases apart, before the cycle and behind it."""
+        cycle = self.asked.cycle
+        return [cycle.before[leaf] for leaf in leaves], [cycle.after[leaf] for leaf in leaves]
 
-    def not_round(self, number: int) -> list[Node]:
-        """That a step is not taken, for each that is on a way round on which the command may be unanswered."""
-        at = self.asked.cycle.tables[number]
-        steps = self._steps_of_phase(at) or set()
-        rounds = [part for part, waits in self._rounds(at, steps) if waits]
-        taken = values.both(at.chosen, command_stays(self.stepper, self.asked.cycle))
-        return [
-            values.negation(values.all_of((taken, *self._are(self.before, one), *self._are(self.after, two))))
-            for one, two in sorted(steps)
-            if any(one in part and two in part for part in rounds)
-        ]
+    def _phases_by(self, at: TableAt, leaves: tuple[str, ...]) -> _Phases:
+        steps = self._steps(at, leaves)
+        return _Phases(leaves, steps, () if steps is None else tuple(self._rounds(at, leaves, steps)))
 
-    def _steps_of_phase(self, at: TableAt) -> set[tuple[Phase, Phase]] | None:
-        """Every change of phase; flags that lines set and reset while the command is unanswered are no part of it."""
-        self._speak_of(self._phase())
-        steps = self._steps(at)
-        if steps is None:
-            return None
-        rounds = [part for part, waits in self._rounds(at, steps) if waits]
-        inside = [(one, two) for one, two in steps for part in rounds if one in part and two in part]
-        turning = {
-            leaf
-            for place, leaf in enumerate(self.leaves)
-            for one, two in inside
-            if one[place] != two[place] and isinstance(self.stepper.kinds[leaf], Bool) and leaf != FLAG
-        }
-        if not turning:
-            return steps
-        self._speak_of([leaf for leaf in self.leaves if leaf not in turning])
-        return self._steps(at)
-
-    def _changes(self, at: TableAt, steps: set[tuple[Phase, Phase]]) -> int | None:
-        """Steps on the longest way, those left out that lead round while the command is answered; None where others do."""
-        same: dict[Phase, Phase] = {}
-        for part, waits in self._rounds(at, steps):
-            if waits:
-                return None
-            same |= dict.fromkeys(part, min(part))
-        left = {(same.get(one, one), same.get(two, two)) for one, two in steps}
-        return longest({(one, two) for one, two in left if one != two})
-
-    def _rounds(self, at: TableAt, steps: set[tuple[Phase, Phase]]) -> Iterator[tuple[set[Phase], bool]]:
-        """Phases that lead to one another, and whether the command may be unanswered in a cycle from one of them to one."""
+    def _rounds(
+        self, at: TableAt, leaves: tuple[str, ...], steps: set[Way]
+    ) -> Iterator[tuple[set[Phase], bool]]:
         phases = sorted({phase for step in steps for phase in step})
         places = {phase: place for place, phase in enumerate(phases)}
         for part in parts({(places[one], places[two]) for one, two in steps}):
             inside = {phases[place] for place in part}
             cycle, solver = self.asked.cycle, self.asked.known(self.clauses)
             ends = [
-                values.any_of(values.all_of(self._are(nodes, phase)) for phase in sorted(inside))
-                for nodes in (self.before, self.after)
+                values.any_of(values.all_of(_are(nodes, phase)) for phase in sorted(inside))
+                for nodes in self._ends(leaves)
             ]
             waits = (command_stays(self.stepper, cycle), unanswered(self.stepper, cycle))
             term = self.keyed.term(values.all_of((at.chosen, *waits, *ends)))
@@ -230,14 +244,38 @@ class _Flow:
             self.asked.rested_on.append(solver)
             yield inside, may(solver, term)
 
-    @staticmethod
-    def _are(nodes: Sequence[Node], phase: Phase) -> list[Node]:
-        return [
-            values.equal(node, values.constant(node.kind, value))
-            for node, value in zip(nodes, phase, strict=True)
-        ]
+    def _steps(self, at: TableAt, leaves: tuple[str, ...]) -> set[Way] | None:
+        """Every change of phase in a cycle that runs the table; None where they are too many, or the solver gave up."""
+        keyed, cycle = self.keyed, self.asked.cycle
+        before, after = self._ends(leaves)
+        stays = values.all_of(map(values.equal, before, after))
+        moves = keyed.term(
+            values.all_of((at.chosen, command_stays(self.stepper, cycle), values.negation(stays)))
+        )
+        nodes = (*before, *after)
+        terms = [keyed.term(node) for node in nodes]
+        solver = self.asked.known(self.clauses)
+        solver.add(*keyed.ranges, moves)
+        found: set[Way] = set()
+        while len(found) < MOST_STEPS:
+            answer = solver.check()
+            if answer is Answer.UNSATISFIABLE:
+                self.asked.rested_on.append(solver)
+                return found
+            if answer is Answer.UNKNOWN:
+                return None
+            point = [
+                int(solver.value(term, sort(node.kind))) for node, term in zip(nodes, terms, strict=True)
+            ]
+            found.add((tuple(point[: len(leaves)]), tuple(point[len(leaves) :])))
+            same = [
+                keyed.has(term, node.kind, value)
+                for node, term, value in zip(nodes, terms, point, strict=True)
+            ]
+            solver.add(smt.negation(smt.all_of(same)))
+        return None
 
-    # --- conditions ---
+    # --- three cycles in a row ---
 
     def _turns(self, number: int, still: tuple[str, ...]) -> tuple[Turn, Turn, Turn]:
         """Of a table: three cycles in a row."""
@@ -259,7 +297,8 @@ class _Flow:
 
     def _turn(self, cycle: Cycle, number: int) -> Turn:
         """The cycle of a table, in which the command and the phase stay."""
-        same = values.all_of(values.equal(cycle.before[leaf], cycle.after[leaf]) for leaf in self.leaves)
+        leaves = self._phases(number).leaves
+        same = values.all_of(values.equal(cycle.before[leaf], cycle.after[leaf]) for leaf in leaves)
         at = cycle.tables[number]
         stays = values.all_of((at.chosen, cycle.contract, command_stays(self.stepper, cycle), same))
         orders = gives_an_order(self.stepper, cycle)
@@ -300,35 +339,12 @@ class _Flow:
         }
         return {table for part in parts(steps) for table in part}
 
-    # --- from phase to phase ---
 
-    def _steps(self, at: TableAt) -> set[tuple[Phase, Phase]] | None:
-        """Every change of phase in a cycle that runs the table; None where they are too many, or the solver gave up."""
-        keyed, cycle = self.keyed, self.asked.cycle
-        stays = values.all_of(map(values.equal, self.before, self.after))
-        moves = keyed.term(
-            values.all_of((at.chosen, command_stays(self.stepper, cycle), values.negation(stays)))
-        )
-        ends = [keyed.term(node) for node in (*self.before, *self.after)]
-        solver = self.asked.known(self.clauses)
-        solver.add(*keyed.ranges, moves)
-        found: set[tuple[Phase, Phase]] = set()
-        while len(found) < MOST_STEPS:
-            answer = solver.check()
-            if answer is Answer.UNSATISFIABLE:
-                self.asked.rested_on.append(solver)
-                return found
-            if answer is Answer.UNKNOWN:
-                return None
-            nodes = (*self.before, *self.after)
-            point = [int(solver.value(term, sort(node.kind))) for node, term in zip(nodes, ends, strict=True)]
-            found.add((tuple(point[: len(self.before)]), tuple(point[len(self.before) :])))
-            same = [
-                keyed.has(term, node.kind, value)
-                for node, term, value in zip(nodes, ends, point, strict=True)
-            ]
-            solver.add(smt.negation(smt.all_of(same)))
-        return None
+def _are(nodes: Sequence[Node], phase: Phase) -> list[Node]:
+    return [
+        values.equal(node, values.constant(node.kind, value))
+        for node, value in zip(nodes, phase, strict=True)
+    ]
 
 
 def _stands_still(leaf: str, still: tuple[str, ...]) -> bool:
@@ -337,7 +353,7 @@ def _stands_still(leaf: str, still: tuple[str, ...]) -> bool:
     return record in still and part not in (NUMBER, ECHO, ECHOED, STATUS)
 
 
-def longest(steps: set[tuple[Phase, Phase]]) -> int | None:
+def longest(steps: set[Way]) -> int | None:
     """Steps on the longest way; None where a way goes round."""
     onward: dict[Phase, list[Phase]] = {}
     for one, two in sorted(steps):

@@ -61,11 +61,8 @@ def _comes_round(stepper: Stepper, table: str, cycles: Sequence[Cycle]) -> Node:
         values.all_of((one.contract, one.goes_on, one.tables[number].chosen, command_stays(stepper, one)))
         for one in cycles
     ]
-    same = [
-        values.equal(first.before[leaf], last.after[leaf])
-        for leaf in first.before
-        if leaf not in _moving(stepper)
-    ]
+    moving = _moving(stepper)
+    same = [values.equal(first.before[leaf], last.after[leaf]) for leaf in first.before if leaf not in moving]
     due = []
     for below in stepper.links.below:
         sent, echo = f"{below.order}.{NUMBER}", f"{below.report}.{ECHO}"

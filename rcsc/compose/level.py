@@ -13,7 +13,7 @@ from enum import StrEnum
 from rcsc.compose.confirm import Confirmation
 from rcsc.compose.context import Context, context
 from rcsc.compose.contract import COMMAND
-from rcsc.compose.ends import Ending, endings, ways_round
+from rcsc.compose.ends import Ending, Flow
 from rcsc.compose.features import Feature
 from rcsc.compose.frames import Clause
 from rcsc.compose.goals import Goal, Sort, goals
@@ -107,12 +107,14 @@ def prove_level(stepper: Stepper, effort: Effort | None = None) -> LevelProof:
         found = search(stepper, firsts, cycle, wanted, effort)
         asked = _asked_anew(found.features, firsts, cycle, effort.timeout_ms)
         looks = effort.looks and not any(wanted[at].sort is not Sort.NUMBERED for at in found.open)
-        if looks and (others := ways_round(stepper, asked, found.clauses)):
+        flow = Flow(stepper, asked, found.clauses)
+        if looks and (others := flow.ways_round()):
             found = strengthened(stepper, firsts, cycle, found, others, effort)
+            flow = Flow(stepper, asked, found.clauses)
         _confirm(asked, found.clauses)
         verdicts = list(_verdicts(stepper, asked, found, wanted))
         if looks:
-            seen, ends = context(stepper, asked, found.clauses), tuple(endings(stepper, asked, found.clauses))
+            seen, ends = context(stepper, asked, found.clauses), tuple(flow.endings())
     except (GaveUpError, NotConfirmedError):
         found = Found()
         verdicts = [(goal, Verdict.UNDECIDED) for goal in wanted]
@@ -216,11 +218,11 @@ def certificate(stepper: Stepper, proof: LevelProof, timeout_ms: int = 20_000) -
 
 
 def _looked_again(stepper: Stepper, proof: LevelProof, asked: Confirmation) -> dict[str, str]:
-    """What `context` and `endings` rest on."""
+    """What `context` and `Flow.endings` rest on."""
     seen = context(stepper, asked, proof.clauses)
     found = {f"lines {number}": text for number, text in enumerate(_refuted(asked), 1)}
     ends = []
-    for ending in endings(stepper, asked, proof.clauses):
+    for ending in Flow(stepper, asked, proof.clauses).endings():
         ends.append(ending)
         found |= {f"ends {ending.table} {number}": text for number, text in enumerate(_refuted(asked), 1)}
     if (seen, tuple(ends)) != (proof.context, proof.endings):

@@ -59,14 +59,6 @@ class Turn:
     answered: Node
 
     @property
-    def lines(self) -> list[tuple[str, Node]]:
-        """Each line with its condition, DEFAULT last."""
-        matches = zip(self.at.table.lines, self.at.matches, strict=True)
-        found = [(str(line.name), match) for line, match in matches]
-        default = self.at.table.default
-        return found if default is None else [*found, (str(default.name), self.at.none)]
-
-    @property
     def quiet(self) -> Node:
         """Answered, and no order is given."""
         return values.both(self.answered, values.negation(self.orders))
@@ -112,7 +104,7 @@ def lines_that_stop(
     if still:
         rested_on.append(found.solver)
     asked.rested_on += rested_on
-    endless = tuple(first.turn.lines[line][0] for line in sorted(found.endless))
+    endless = tuple(str(first.turn.at.lines[line][0].name) for line in sorted(found.endless))
     one_each = {counted.line: counted for counted in reversed(found.counted)}
     return Stopped(tuple(reversed(one_each.values())), () if endless else still, endless)
 
@@ -159,7 +151,7 @@ class _Rounds:
         stay = [term(turn.stays) for turn in turns]
         self.orders, self.quiet = term(self.turn.orders), smt.all_of([term(turn.quiet) for turn in turns])
         waits = term(self.turn.unanswered)
-        self.last, self.now, self.next = ([term(match) for _, match in turn.lines] for turn in turns)
+        self.last, self.now, self.next = ([term(match) for _, match in turn.at.lines] for turn in turns)
         self.numbers = [
             Number(name, kind, term(self.turn.before[name]), term(self.turn.after[name]))
             for name, kind in owned(program)
@@ -259,7 +251,7 @@ class _Rounds:
     def _rising(self, line: int, part: Part, runs: Term, among: list[Number]) -> Iterator[Counted]:
         """The numbers that always rise with the line and never fall within the part."""
         others = smt.any_of([self.now[other] for other in sorted(part)])
-        name = self.turn.lines[line][0]
+        name = str(self.turn.at.lines[line][0].name)
         for one in among:
             if may(self.solver, others, smt.below(one.after, one.before, KEY)):
                 continue

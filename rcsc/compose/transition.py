@@ -13,10 +13,12 @@ from rcsc.model import (
     Action,
     Bool,
     Call,
+    Default,
     Enum,
     Int,
     Kind,
     Level,
+    Line,
     OneTable,
     Op,
     Procedure,
@@ -58,6 +60,12 @@ class TableAt:
     chosen: Node
     matches: tuple[Node, ...]
     assumptions: Mapping[str, Node]
+
+    @property
+    def lines(self) -> list[tuple[Line | Default, Node]]:
+        """Each line with its condition, DEFAULT last."""
+        found: list[tuple[Line | Default, Node]] = list(zip(self.table.lines, self.matches, strict=True))
+        return found if self.table.default is None else [*found, (self.table.default, self.none)]
 
     @property
     def none(self) -> Node:
