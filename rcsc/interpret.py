@@ -231,13 +231,13 @@ def call(program: Program, name: str, args: list[Value], snapshot: dict[str, Val
 def _call_extern(
     program: Program, procedure: Procedure, args: list[Value], snapshot: dict[str, Value]
 ) -> None:
-    """The user's function takes the reads and the arguments, and gives the writes in order."""
+    """The user's function takes the reads and the arguments, and gives the writes in order: one as it is or in a tuple."""
     assert procedure.extern is not None
     module, _, function = procedure.extern.python.partition(":")
     results = getattr(importlib.import_module(module), function)(
         *[snapshot[name] for name in procedure.reads], *args
     )
-    given = results if isinstance(results, tuple) else (results,)
+    given = results if isinstance(results, tuple) else (results,) if procedure.writes else ()
     for name, value in zip(procedure.writes, given, strict=True):
         admitted = _admitted(program.variable(name), value)
         if admitted is None:

@@ -5,7 +5,11 @@ from pathlib import Path
 
 import pytest
 
+from rcsc.emit.write import write
 from rcsc.model import Program
+from rcsc.system.executors import CExecutor, PythonExecutor
+from rcsc.system.executors import build as build_executors
+from rcsc.system.signature import signature
 from rcsc.testing.agree import (
     Compared,
     Disagreement,
@@ -85,6 +89,82 @@ def test_cycles_in_which_an_assumption_fails_are_met() -> None:
 def test_shipped_executors_agree(path: str, repo: Path) -> None:
     found, _, sanitized = disagreements(shipped(path, repo))
     assert (found, sanitized) == ([], None)
+
+
+I8, I64, U64 = 2**7, 2**63 - 1, 2**64 - 1
+LOOPS = [(I64 - 1, I64), (I64, I64), (U64 - 2, U64), (U64, U64), (-I64 - 1, -I64 + 1), (-I64 - 1, -I64 - 1),
+         (I64 - 1, I64 + 2), (I64 + 1, I64 + 1), (-3, -1), (-2, 2), (5, 5), (5, 4), (U64, U64 - 1), (I8 - 2, I8),
+         (2**31 - 2, 2**31), (2**32 - 2, 2**32)]  # fmt: skip
+LOOPED = """
+input go : bool
+input stop : int 0 .. 3
+output rounds : int 0 .. 99
+output low : int -9223372036854775808 .. 9223372036854775807
+output high : int 0 .. 18446744073709551615
+extern procedure ask reads stop writes low python "answers:ask" c "ask"
+{loops}
+table t {{ # each line runs all of them, so that their counts add up
+  | line | go    || procedures |
+  | a    | true  || rounds := 0; {calls} |
+  | b    | false || {calls} |
+}}
+"""
+
+
+def looped() -> str:
+    """A procedure for each of `LOOPS`: plain, around another loop, around a call that may fail; each keeps its counter."""
+    made = []
+    for at, (low, high) in enumerate(LOOPS):
+        kept = "high" if low >= 0 else "low"
+        body = f"{kept} := i rounds := (rounds + 1) mod 100"
+        made += [
+            f"procedure p{at} {{ for i in {low} .. {high} {{ {body} }} for i in {low} .. {high} {{ }} }}",
+            f"procedure q{at} {{ for j in {low} .. {high} {{ for i in {low} .. {high} {{ {body} }} }} }}",
+            f"procedure r{at} {{ for i in {low} .. {high} {{ {body} ask }} }}",
+        ]
+    calls = "; ".join(f"{kind}{at}" for at in range(len(LOOPS)) for kind in "pqr")
+    return LOOPED.format(loops="\n".join(made), calls=calls)
+
+
+def test_a_loop_runs_to_the_last_value_of_its_type() -> None:
+    found, compared, sanitized = disagreements(program_of(looped()), examples=20)
+    assert (found, sanitized) == ([], None)
+    assert compared.cycles > 20
+
+
+MANY = 70
+"""More monitored assumptions than one word of the trace holds."""
+MONITORED = (
+    "input x : int 0 .. 9\n"
+    + "".join(f"assume a{at} monitored : x /= {at % 9}\n" for at in range(MANY))
+    + f"table t assuming {', '.join(f'a{at}' for at in reversed(range(MANY)))} {{\n| line | x ||\n| l | ||\n}}\n"
+    + "level l { period 10 [ms] table t }\n"
+)
+
+
+def test_every_monitored_assumption_has_a_bit_of_its_own() -> None:
+    found, compared, sanitized = disagreements(program_of(MONITORED), examples=15)
+    assert (found, sanitized) == ([], None)
+    assert compared.broken > 2
+
+
+@pytest.mark.parametrize("kind", ["c", "python"])
+def test_a_cell_names_each_failed_assumption(kind: str, tmp_path: Path) -> None:
+    write(emitted(program_of(MONITORED)), str(tmp_path))
+    [symbols] = (tmp_path / "c").glob("*.json")
+    sign = signature(symbols)
+    [level] = sign.levels
+    made = (
+        CExecutor(build_executors(tmp_path, [sign]), sign, level)
+        if kind == "c"
+        else PythonExecutor(tmp_path, sign, level)
+    )
+    for x in range(10):
+        made.put(0, (x,))
+        assert made.cycle() == 0
+        values = made.values()
+        assert sign.failures(values) == tuple(f"a{at}" for at in range(MANY) if at % 9 == x)
+        assert sign.packed.unpack(sign.packed.pack(*values)) == values
 
 
 def swap(old: str, new: str) -> Change:

@@ -217,9 +217,7 @@ def _traced(step: Step, monitored: Sequence[str]) -> str:
 
 
 def _did(level: RunningLevel, values: Values) -> str:
-    failed = int(values[len(level.sign.leaves) + 3])
-    names = [name for at, name in enumerate(level.sign.monitored) if failed >> at & 1]
-    return _said(level.line, Fault(level.fault), names)
+    return _said(level.line, Fault(level.fault), level.sign.failures(values))
 
 
 def _said(line: str, fault: Fault, failed: Sequence[str]) -> str:

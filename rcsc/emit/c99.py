@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from rcsc.emit.ctext import CText, c_type, constant, integer, locals_of, wide_type
 from rcsc.emit.environment import render
-from rcsc.emit.names import Names, c_word, comment, names_of, short
+from rcsc.emit.names import FAILED_BITS, Names, c_word, comment, names_of, short
 from rcsc.model import (
     Admit,
     Array,
@@ -69,6 +69,7 @@ class CFile:
     enums: tuple[Struct, ...]
     structs: tuple[Struct, ...]
     fields: tuple[Field, ...]
+    failed: tuple[str, ...]
     externs: tuple[str, ...]
     helpers: tuple[Function, ...]
     privates: tuple[Function, ...]
@@ -116,6 +117,7 @@ class _Maker:
             tuple(self._enum(enum) for enum in self.program.enums),
             tuple(self._record(record) for record in self.program.records),
             tuple(self._fields()),
+            self.names.failed,
             tuple(self._externs()),
             tuple(self._helpers()),
             (*procedures, *shared),
@@ -304,7 +306,7 @@ class _Maker:
     def _admit(self) -> Function:
         """Admits into a copy, so that a refused cycle changes nothing."""
         lines = [f"    {self.p}_t before = *s;", "    s->line = -1;", "    s->fault = 0;", "    s->fault_at = -1;",
-                 "    s->assumptions_failed = 0;"]  # fmt: skip
+                 *(f"    s->{word} = 0;" for word in self.names.failed)]  # fmt: skip
         body = [
             line
             for at, variable in enumerate(self.program.variables)
@@ -313,8 +315,8 @@ class _Maker:
         ]
         lines += body
         lines += ["    if (s->fault != 0) {", "        before.line = -1;", "        before.fault = s->fault;",
-                  "        before.fault_at = s->fault_at;", "        before.assumptions_failed = 0;", "        *s = before;",
-                  "    }"]  # fmt: skip
+                  "        before.fault_at = s->fault_at;", *(f"        before.{word} = 0;" for word in self.names.failed),
+                  "        *s = before;", "    }"]  # fmt: skip
         return Function("Admits every input; a refused one leaves everything else as it was.",
                         f"void {self.p}_admit({self.p}_t *s)", tuple(lines))  # fmt: skip
 
@@ -512,7 +514,7 @@ class _Maker:
             assumption = self.program.assumptions[self.plan.monitored[place]]
             yield f"    /* {comment(assumption.name)} */"
             yield f"    if (!({self.text.expr(assumption.condition)})) {{"
-            yield f"        s->assumptions_failed = s->assumptions_failed | (UINT64_C(1) << {place}u);"
+            yield f"        {self._mark_failed(place)}"
             yield "    }"
         yield f"    s->line = {self.p}_{name}_line(s);"
         yield "    switch (s->line) {"
@@ -528,6 +530,11 @@ class _Maker:
         yield "        s->fault = 3;"
         yield "        break;"
         yield "    }"
+
+    def _mark_failed(self, place: int) -> str:
+        word, bit = divmod(place, FAILED_BITS)
+        failed = f"s->{self.names.failed[word]}"
+        return f"{failed} = {failed} | (UINT64_C(1) << {bit}u);"
 
     # --- steps and cycles ---
 
@@ -586,7 +593,7 @@ class _Maker:
             "    s->line = -1;",
             "    s->fault = 0;",
             "    s->fault_at = -1;",
-            "    s->assumptions_failed = 0;",
+            *(f"    s->{word} = 0;" for word in self.names.failed),
         ]
         for variable in self.program.variables:
             value = constant(variable.type, variable.initial)
@@ -717,6 +724,7 @@ def _symbols(plan: Plan, names: Names) -> str:
         "source": f"{p}.c",
         "init": f"{p}_init",
         "python": {"module": f"{p}.py", "class": "State"},
+        **({"failed": names.failed} if len(names.failed) > 1 else {}),
         "leaves": [
             {
                 "name": v.name,

@@ -12,6 +12,7 @@ from rcsc.emit.names import Names
 from rcsc.model import (
     I64_MAX,
     I64_MIN,
+    U64_MAX,
     Among,
     Apply,
     Assign,
@@ -109,6 +110,11 @@ def element_path(paths: list[str], index: str) -> str:
     at = next(i for i, (a, b) in enumerate(zip(first, second, strict=False)) if a != b)
     head = first[: first.rindex("[", 0, at + 1)]
     return head + f"[{index}]" + re.sub(r"^\[\d+\]", "", first[len(head) :])
+
+
+def _one(kind: str) -> str:
+    """The 1 that a counter of this type goes up by."""
+    return "UINT64_C(1)" if kind == "uint64_t" else "INT64_C(1)"
 
 
 def _shared(kinds: tuple[Scalar, ...]) -> str:
@@ -262,15 +268,37 @@ class CText:
                 yield f"{pad}}}"
             case Case():
                 yield from self._case(statement, indent)
-            case For(name=name, low=low, high=high, body=body):
-                if low <= high:
-                    guard = " && (s->fault == 0)" if self._may_fail(statement) else ""
-                    begin = f"v_{name} = {integer(low)}"
-                    yield f"{pad}for ({begin}; (v_{name} <= {integer(high)}){guard}; v_{name} = v_{name} + INT64_C(1)) {{"
-                    yield from self.block(body, indent + 1)
-                    yield f"{pad}}}"
+            case For():
+                yield from self._for(statement, indent)
             case Call(procedure=name, args=args):
                 yield pad + self.call(name, args)
+
+    def _for(self, loop: For, indent: int) -> Iterator[str]:
+        """A loop; one to the last value of its type ends without counting past it."""
+        if loop.low > loop.high:
+            return
+        pad, v = "    " * indent, f"v_{loop.name}"
+        begin = f"{v} = {integer(loop.low)}"
+        guard = " && (s->fault == 0)" if self._may_fail(loop) else ""
+        kind = wide_type(Int(loop.low, loop.high))
+        step = f"{v} = {v} + {_one(kind)}"
+        if loop.high < (U64_MAX if kind == "uint64_t" else I64_MAX):
+            yield f"{pad}for ({begin}; ({v} <= {integer(loop.high)}){guard}; {step}) {{"
+            yield from self.block(loop.body, indent + 1)
+            yield f"{pad}}}"
+            return
+        inner, more = pad + "    ", f"more_{loop.name}"
+        yield f"{pad}{{"
+        yield f"{inner}bool {more} = true;"
+        yield f"{inner}{begin};"
+        yield f"{inner}while ({more}{guard}) {{"
+        yield from self.block(loop.body, indent + 2)
+        yield f"{inner}    {more} = {v} < {integer(loop.high)};"
+        yield f"{inner}    if ({more}) {{"
+        yield f"{inner}        {step};"
+        yield f"{inner}    }}"
+        yield f"{inner}}}"
+        yield f"{pad}}}"
 
     def call(self, name: str, args: tuple[Expr, ...] = ()) -> str:
         """A call of a procedure."""

@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-from rcsc.model import Program
+from rcsc.model import Program, Standing
 
 C_WORDS = frozenset(
     """auto break case char const continue default do double else enum extern float for goto if inline int long
@@ -26,6 +26,7 @@ C_WORDS = frozenset(
 PYTHON_WORDS = frozenset(keyword.kwlist) | frozenset(keyword.softkwlist) | frozenset(dir(builtins))
 LONGEST = 100
 MOST_SAID = 400
+FAILED_BITS = 64
 
 
 def short(name: str) -> str:
@@ -85,6 +86,7 @@ class Names:
         program: In front of all C names, and the files' name.
         attributes: Of each leaf, in Python.
         paths: Of each leaf, in the C struct.
+        failed: Words of the trace for the monitored assumptions that failed.
     """
 
     program: str
@@ -93,6 +95,13 @@ class Names:
     tables: dict[str, str]
     levels: dict[str, str]
     procedures: dict[str, str]
+    failed: tuple[str, ...]
+
+
+def failed_words(monitored: int) -> tuple[str, ...]:
+    """Members of the trace that hold one bit for each monitored assumption, 64 in each; there is at least one."""
+    more = range(2, (monitored + FAILED_BITS - 1) // FAILED_BITS + 1)
+    return ("assumptions_failed", *(f"assumptions_failed_{number}" for number in more))
 
 
 def names_of(program: Program) -> Names:
@@ -110,6 +119,7 @@ def names_of(program: Program) -> Names:
         tables,
         _unique((level.name for level in program.levels), used),
         _unique((p.name for p in program.procedures), Taken()),
+        failed_words(sum(a.standing is Standing.MONITORED for a in program.assumptions)),
     )
 
 

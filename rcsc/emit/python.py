@@ -6,7 +6,7 @@ from itertools import groupby
 from math import prod
 
 from rcsc.emit.environment import render
-from rcsc.emit.names import comment, names_of, python_word
+from rcsc.emit.names import FAILED_BITS, comment, names_of, python_word
 from rcsc.emit.pytext import PyText, constant
 from rcsc.model import Admit, Int, Kind, Level, OneTable, Procedure, Real, Variable, key_bounds, pending
 from rcsc.plan import WORD, Coded, Cuts, Direct, Group, Index, Plan, PlanTable, Truth, grouped
@@ -43,6 +43,7 @@ class PyFile:
     mark: str
     enums: tuple[PyEnum, ...]
     attributes: tuple[tuple[str, str, str], ...]  # name, initial value, doc
+    failed: tuple[str, ...]
     imports: tuple[str, ...]
     constants: tuple[tuple[str, tuple[str, ...]], ...]
     functions: tuple[PyFunction, ...]
@@ -88,6 +89,7 @@ class _Maker:
             self.plan.mark,
             enums,
             attributes,
+            self.names.failed,
             self._imports(),
             tuple(self.constants),
             tuple(functions),
@@ -119,14 +121,16 @@ class _Maker:
         given = [self.text.place(name) for name in procedure.reads] + [
             f"v_{p.name}" for p in procedure.params
         ]
-        yield f"    given = {module}.{function}({', '.join(given)})"
-        if len(procedure.writes) != 1:
+        kept = "given = " if procedure.writes else ""
+        yield f"    {kept}{module}.{function}({', '.join(given)})"
+        if procedure.writes:
+            yield "    if not isinstance(given, tuple):"
+            yield "        given = (given,)"
             yield f"    if len(given) != {len(procedure.writes)}:"
             yield "        raise ValueError(given)"
         for at, name in enumerate(procedure.writes):
             position = next(i for i, v in enumerate(self.program.variables) if v.name == name)
-            value = "given" if len(procedure.writes) == 1 else f"given[{at}]"
-            yield f"    w{at} = {value}"
+            yield f"    w{at} = given[{at}]"
             yield from self._admitted(variables[name], f"w{at}", f"raise _Refused({position})", 1)
             yield f"    {self.text.place(name)} = w{at}"
 
@@ -149,7 +153,11 @@ class _Maker:
 
     def _admit(self) -> PyFunction:
         """Looks at every input before it changes any."""
-        lines = ["    s.line = -1", "    s.fault_at = -1", "    s.assumptions_failed = 0"]
+        lines = [
+            "    s.line = -1",
+            "    s.fault_at = -1",
+            *(f"    s.{word} = 0" for word in self.names.failed),
+        ]
         inputs = [(at, v) for at, v in enumerate(self.program.variables) if v.kind is Kind.INPUT]
         stores = []
         for number, (at, variable) in enumerate(inputs):
@@ -262,7 +270,8 @@ class _Maker:
         for place in table.monitored:
             assumption = self.program.assumptions[self.plan.monitored[place]]
             yield f"    if not {self.text.expr(assumption.condition)}:  # {comment(assumption.name)}"
-            yield f"        s.assumptions_failed |= 1 << {place}"
+            word, bit = divmod(place, FAILED_BITS)
+            yield f"        s.{self.names.failed[word]} |= 1 << {bit}"
         yield f"    line = {name}_line(s)"
         yield "    if line < 0:"
         yield "        s.fault = 2 if line == -1 else 3"

@@ -15,7 +15,7 @@ from typing import Any
 
 from rcsc.system.adopt import Begun
 from rcsc.system.description import Description, Feed, LevelSpec, Wire
-from rcsc.system.signature import FORMATS, Leaf, LevelSign, Signature
+from rcsc.system.signature import FAILED, FORMATS, Leaf, LevelSign, Signature
 
 FORMAT = "1"
 SYSTEM, PROGRAMS = "rcsc.system", "rcsc.programs"
@@ -33,14 +33,21 @@ _TRACE_FIELDS = (
     "int32 line # place of the line in its table, from 0; -1 for none",
     "int32 fault # 0 for none",
     "int32 fault_at # place of the leaf that was refused; -1 for none",
-    "uint64 assumptions_failed # one bit an assumption that is monitored",
 )
+_FAILED_FIELD = "uint64 {} # one bit an assumption that is monitored"
 
 
-def message_definition(leaves: Sequence[Leaf], *, trace: bool) -> str:
-    """The fields of a message, one a line, an enumeration's members as constants before it."""
+def message_definition(leaves: Sequence[Leaf], failed: Sequence[str] | None = None) -> str:
+    """The fields of a message, one a line, an enumeration's members as constants before it.
+
+    Args:
+        leaves: What the message holds.
+        failed: Words of failed assumptions; with them the trace comes after the leaves.
+    """
     rows = [row for leaf in leaves for row in _field(leaf)]
-    return "\n".join((*rows, *(_TRACE_FIELDS if trace else ()))) + "\n"
+    if failed is not None:
+        rows += [*_TRACE_FIELDS, *map(_FAILED_FIELD.format, failed)]
+    return "\n".join(rows) + "\n"
 
 
 def _field(leaf: Leaf) -> Iterable[str]:
@@ -102,6 +109,7 @@ def signature_of(text: str) -> Signature:
         levels,
         tuple(said["monitored"]),
         {leaf.name: at for at, leaf in enumerate(leaves)},
+        tuple(said.get("failed", FAILED)),
     )
 
 

@@ -36,8 +36,7 @@ def refused_of(sign: Signature, values: Values) -> str:
 
 def failed_of(sign: Signature, values: Values) -> str:
     """The assumptions that did not hold, by spaces."""
-    bits = int(values[len(sign.leaves) + 3])
-    return " ".join(name for at, name in enumerate(sign.monitored) if bits >> at & 1)
+    return " ".join(sign.failures(values))
 
 
 def traced(sign: Signature, level: LevelSign, values: Values) -> dict[str, str]:

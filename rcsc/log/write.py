@@ -95,7 +95,7 @@ class Recorder:
         self._writer.flush()  # type: ignore[no-untyped-call]  # mcap leaves it untyped
 
     def _level_channel(self, level: RunningLevel) -> int:
-        definition = message_definition(level.sign.leaves, trace=True)
+        definition = message_definition(level.sign.leaves, level.sign.failed)
         schema = self._writer.register_schema(f"rcsc/{level.name}", "ros1msg", definition.encode())
         said = {SIGNATURE: signature_text(level.sign)}
         return self._writer.register_channel(LEVELS + level.name, "ros1", schema, said)
@@ -103,7 +103,7 @@ class Recorder:
     def _buffer_channel(
         self, source: str, leaves: tuple[Leaf, ...], target: str
     ) -> tuple[int, struct.Struct]:
-        definition = message_definition(leaves, trace=False)
+        definition = message_definition(leaves)
         name = f"rcsc/{source.replace('.', '_')}"
         schema = self._writer.register_schema(name, "ros1msg", definition.encode())
         channel = self._writer.register_channel(BUFFERS + source, "ros1", schema, {"target": target})
@@ -131,7 +131,7 @@ class Recorder:
         self._write(channel, tick, packed.pack(*restarted.values))
 
     def _restart_channel(self, level: RunningLevel, begun: Begun) -> tuple[int, struct.Struct]:
-        definition = message_definition(level.sign.leaves, trace=False)
+        definition = message_definition(level.sign.leaves)
         schema = self._writer.register_schema(f"rcsc/{level.name}_restart", "ros1msg", definition.encode())
         channel = self._writer.register_channel(restart_topic(begun, level.name), "ros1", schema)
         return channel, struct.Struct(message_format(level.sign.leaves))

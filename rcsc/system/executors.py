@@ -19,7 +19,7 @@ from operator import attrgetter
 from pathlib import Path
 from typing import Protocol
 
-from rcsc.system.signature import FORMATS, TRACE, LevelSign, Signature, Value, Values
+from rcsc.system.signature import FORMATS, LevelSign, Signature, Value, Values
 
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared")
 
@@ -57,7 +57,7 @@ class PythonExecutor:
         self._state = module.State()
         self._cycle = getattr(module, level.cycle.removeprefix(f"{sign.program}_"))
         self._names = [leaf.attribute for leaf in sign.leaves]
-        self._get = attrgetter(*self._names, *TRACE)
+        self._get = attrgetter(*self._names, *sign.trace)
 
     def cycle(self) -> int:
         """Run one cycle; the fault, 0 for none."""
@@ -124,7 +124,9 @@ def _built(compiler: str, generated: Path, signs: Sequence[Signature], layout: s
 def _layout(sign: Signature) -> str:
     """Where each leaf lies in the program's struct, said by the compiler itself."""
     p, kind = sign.program, sign.struct_name
-    places = [f"(unsigned)offsetof({kind}, {one})" for one in (*(leaf.place for leaf in sign.leaves), *TRACE)]
+    places = [
+        f"(unsigned)offsetof({kind}, {one})" for one in (*(leaf.place for leaf in sign.leaves), *sign.trace)
+    ]
     return (
         f'#include <stddef.h>\n#include "{p}.h"\n'
         f"const unsigned rcsc_{p}_places[] = {{{', '.join(places)}, (unsigned)sizeof({kind})}};\n"
@@ -136,14 +138,14 @@ class CExecutor:
 
     def __init__(self, library: Library, sign: Signature, level: LevelSign) -> None:
         self._library = library  # keeps the file that is mapped
-        count = len(sign.leaves) + len(TRACE)
+        count = len(sign.leaves) + len(sign.trace)
         places = list((ctypes.c_uint * (count + 1)).in_dll(library.handle, f"rcsc_{sign.program}_places"))
         self._memory = ctypes.create_string_buffer(places[-1])
         self._address = ctypes.byref(self._memory)
         self._cycle = getattr(library.handle, level.cycle)
         self._cycle.restype = ctypes.c_int32
         getattr(library.handle, sign.init)(self._address)
-        formats = [*(FORMATS[leaf.c_type] for leaf in sign.leaves), "i", "i", "i", "Q"]
+        formats = [*(FORMATS[leaf.c_type] for leaf in sign.leaves), *sign.trace_format]
         self._places, self._formats = places, formats
         order = sorted(range(count), key=places.__getitem__)
         self._whole = _padded([(places[at], formats[at]) for at in order], places[-1])

@@ -18,8 +18,10 @@ FORMATS = {
     "bool": "?", "uint8_t": "B", "int8_t": "b", "uint16_t": "H", "int16_t": "h", "uint32_t": "I", "int32_t": "i",
     "uint64_t": "Q", "int64_t": "q", "double": "d",
 }  # fmt: skip
-TRACE = ("line", "fault", "fault_at", "assumptions_failed")
-TRACE_FORMAT = "iiiQ"
+TRACE = ("line", "fault", "fault_at")
+"""What a cycle leaves beside the leaves; the words of failed assumptions come after it."""
+FAILED = ("assumptions_failed",)
+"""The words of failed assumptions, 64 in each, where the symbol file names no others."""
 FAULTS = ("none", "input refused", "no line matches", "several lines match", "extern refused")
 
 
@@ -91,11 +93,27 @@ class Signature:
     levels: tuple[LevelSign, ...]
     monitored: tuple[str, ...]
     index: Mapping[str, int] = field(default_factory=dict)
+    failed: tuple[str, ...] = FAILED
+
+    @property
+    def trace(self) -> tuple[str, ...]:
+        """The members of the trace, in order."""
+        return (*TRACE, *self.failed)
+
+    @property
+    def trace_format(self) -> str:
+        """The trace's members as `struct` calls them."""
+        return "i" * len(TRACE) + "Q" * len(self.failed)
+
+    def failures(self, values: Values) -> tuple[str, ...]:
+        """The monitored assumptions that failed in the cycle that left these values."""
+        words = [int(word) for word in values[len(self.leaves) + len(TRACE) :]]
+        return tuple(name for at, name in enumerate(self.monitored) if words[at // 64] >> at % 64 & 1)
 
     @property
     def packed(self) -> struct.Struct:
         """Leaves and trace as canonical bytes."""
-        return struct.Struct("<" + "".join(FORMATS[leaf.c_type] for leaf in self.leaves) + TRACE_FORMAT)
+        return struct.Struct("<" + "".join(FORMATS[leaf.c_type] for leaf in self.leaves) + self.trace_format)
 
     def record(self, name: str) -> range:
         """Positions of the leaves of a variable: a record's or array's are next to each other.
@@ -163,6 +181,7 @@ def signature(path: Path) -> Signature:
             levels,
             tuple(said["monitored"]),
             {leaf.name: at for at, leaf in enumerate(leaves)},
+            tuple(said.get("failed", FAILED)),
         )
     except (KeyError, TypeError, json.JSONDecodeError) as error:
         raise ValueError(f"{path} is no symbol file of rcsc's: {error}") from error

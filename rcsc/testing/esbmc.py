@@ -127,7 +127,6 @@ STEP = re.compile(
     r"\s*(?P<admit>\w+)\(s\);\s*if \(s->fault == 0\) \{"
     r"\s*(?P<settle>\w+)\(s\);\s*(?P<run>\w+)\(s\);\s*\}\s*return s->fault;\s*"
 )
-CLEAR = "a.line = -1; a.fault = 0; a.fault_at = -1; a.assumptions_failed = 0;"
 KNOWN = "__ESBMC_assume(ref_ranges(&a, 0)); __ESBMC_assume(ref_invariants(&a));"
 
 
@@ -146,7 +145,7 @@ def part_harness(program: Program, symbols: Symbols, target: Target, part: str, 
         body += ['__ESBMC_assert(a.fault == ((refused == REF_NONE) ? 0 : 1), "fault code");']
         body += ['__ESBMC_assert(a.fault_at == refused, "reading refused");']
     else:
-        body = [f"__ESBMC_assume(ref_admit(&a) == REF_NONE); {CLEAR}"]
+        body = [f"__ESBMC_assume(ref_admit(&a) == REF_NONE); {symbols.trace.clear('a')}"]
         if part == "settle":
             body += [f"{struct} b = a; ref_deferred(&b); {function}(&a);", *same]
         else:

@@ -66,8 +66,9 @@ class PythonExecutor:
 
     def seen(self, fault: int, state: Any) -> Seen:
         """The state after a cycle in the common words."""
-        names = monitored(self.program)
-        failed = tuple(name for at, name in enumerate(names) if state.assumptions_failed >> at & 1)
+        words = [getattr(state, word) for word in self.symbols.trace.failed_paths]
+        names = enumerate(monitored(self.program))
+        failed = tuple(name for at, name in names if words[at // 64] >> at % 64 & 1)
         at = self.symbols.leaf_at(state.fault_at) if fault in (Fault.ADMIT, Fault.EXTERN) else ""
         line = state.line if fault in (Fault.OK, Fault.EXTERN) else -1
         if fault != state.fault:

@@ -211,9 +211,9 @@ class Writer:
                 yield from self.statements(orelse)
                 yield "} }"
             case For(name=name, low=low, high=high, body=body):
-                yield f"for (int64_t i_{name} = {low}; i_{name} <= {high}; i_{name}++) {{"
-                wide = c_type(Int(low, high))
-                yield f"const {wide} v_{name} = ({wide})i_{name}; (void)v_{name};"
+                wide, first = c_type(Int(low, high)), constant(Int(low, high), low)
+                yield f"for (int64_t i_{name} = 0; i_{name} < {max(high - low + 1, 0)}; i_{name}++) {{"
+                yield f"const {wide} v_{name} = ({wide})({first} + ({wide})i_{name}); (void)v_{name};"
                 yield from self.statements(body)
                 yield "}"
             case Call(procedure=procedure, args=args):

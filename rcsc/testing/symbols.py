@@ -32,7 +32,7 @@ class Trace:
 
     line_path: str = "line"
     fault_at_path: str = "fault_at"
-    failed_path: str = "assumptions_failed"
+    failed_paths: tuple[str, ...] = ("assumptions_failed",)
 
     def line(self, who: str) -> str:
         """The line taken."""
@@ -42,9 +42,14 @@ class Trace:
         """The leaf that was refused."""
         return f"{who}.{self.fault_at_path}"
 
+    def clear(self, who: str) -> str:
+        """Statements that make the trace what it is before a cycle."""
+        zeros = "".join(f" {who}.{path} = 0;" for path in self.failed_paths)
+        return f"{self.line(who)} = -1; {who}.fault = 0; {self.fault_at(who)} = -1;{zeros}"
+
     def failed(self, who: str, number: int) -> str:
         """Whether monitored assumption `number` failed."""
-        return f"((({who}.{self.failed_path}) >> {number}) & 1u)"
+        return f"((({who}.{self.failed_paths[number // 64]}) >> {number % 64}) & 1u)"
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,4 +141,5 @@ def _symbols(document: Mapping[str, Any]) -> Symbols:
         positions={name: at for at, name in enumerate(leaves)},
         module=document["python"]["module"],
         state_class=document["python"]["class"],
+        trace=Trace(failed_paths=tuple(document.get("failed", Trace().failed_paths))),
     )
