@@ -23,7 +23,6 @@ from rcsc.model import (
     Expr,
     For,
     If,
-    Int,
     Kind,
     Level,
     LineName,
@@ -36,6 +35,7 @@ from rcsc.model import (
     Read,
     ReadLocal,
     Real,
+    Scalar,
     Select,
     Snapshot,
     Standing,
@@ -96,6 +96,10 @@ def divide(a: int, b: int) -> int:
     return quotient if (a < 0) == (b < 0) else -quotient
 
 
+# What each operator means, for every stage: folding and interval bounds compute with these functions, and executors, solvers
+# and reference are held against them. Reals are IEEE 754 binary64, rounded to nearest even. Comparisons with a NaN are false,
+# but `/=`, which is true. `min` and `max` keep their first operand where it is a NaN, and drop a second one. `abs` and
+# `-` act on the sign, of zeros too. `int` is undefined of a NaN or an infinity, and `/` and `mod` of a divisor that is zero.
 OPERATORS: Mapping[Op, Callable[..., Any]] = {
     Op.NOT: operator.not_,
     Op.NEG: operator.neg,
@@ -108,13 +112,25 @@ OPERATORS: Mapping[Op, Callable[..., Any]] = {
     Op.ADD: operator.add,
     Op.SUB: operator.sub,
     Op.MUL: operator.mul,
+    Op.DIV: lambda a, b: a / b if isinstance(a, float) else divide(a, b),
     Op.MOD: lambda a, b: a - b * divide(a, b),
     Op.ABS: abs,
-    Op.MIN: min,
-    Op.MAX: max,
+    Op.MIN: lambda a, b: b if b < a else a,  # noqa: FURB136 - says which it is where a NaN is among them
+    Op.MAX: lambda a, b: b if b > a else a,  # noqa: FURB136 - as above
     Op.TO_INT: int,
     Op.TO_REAL: float,
 }
+
+
+def operated(op: Op, kind: Scalar, *operands: Value) -> Value:
+    """The value of an operator other than `and`, `or` and `implies`; the first operand is of type `kind`.
+
+    Raises:
+        ArithmeticError, ValueError: It has none: a divisor that is zero, or a real without a whole number.
+    """
+    reals = isinstance(kind, Real)
+    result: Value = OPERATORS[op](*map(float, operands)) if reals else OPERATORS[op](*operands)
+    return result
 
 
 def evaluate(expr: Expr, snapshot: Snapshot, local: Mapping[str, Value] | None = None) -> Value:
@@ -149,15 +165,7 @@ def _applied(op: Op, args: tuple[Expr, ...], snapshot: Snapshot, local: Mapping[
         return bool(first) or bool(evaluate(args[1], snapshot, local))
     if op is Op.IMPLIES:
         return not first or bool(evaluate(args[1], snapshot, local))
-    rest = [evaluate(arg, snapshot, local) for arg in args[1:]]
-    if op is Op.DIV:
-        return (
-            divide(int(first), int(rest[0]))
-            if isinstance(args[0].type, Int)
-            else float(first) / float(rest[0])
-        )
-    result: Value = OPERATORS[op](first, *rest)
-    return result
+    return operated(op, args[0].type, first, *(evaluate(arg, snapshot, local) for arg in args[1:]))
 
 
 def holds(condition: Expr | Test, snapshot: Snapshot) -> bool:

@@ -36,13 +36,15 @@ _ON_INTEGERS = {
 _ON_DOUBLES = {
     Op.EQ: "fp.eq", Op.LT: "fp.lt", Op.LE: "fp.leq", Op.GT: "fp.gt", Op.GE: "fp.geq", Op.NEG: "fp.neg",
     Op.ADD: "fp.add RNE", Op.SUB: "fp.sub RNE", Op.MUL: "fp.mul RNE", Op.DIV: "fp.div RNE", Op.ABS: "fp.abs",
-    Op.MIN: "fp.min", Op.MAX: "fp.max",
+    Op.MIN: "fmin", Op.MAX: "fmax",
 }  # fmt: skip
-_PRELUDE = """(set-logic ALL)
+PRELUDE = """(set-logic ALL)
 (define-fun tdiv ((a Int) (b Int)) Int (ite (= (>= a 0) (> b 0)) (div (abs a) (abs b)) (- (div (abs a) (abs b)))))
 (define-fun tmod ((a Int) (b Int)) Int (- a (* b (tdiv a b))))
-(define-fun imin ((a Int) (b Int)) Int (ite (<= a b) a b))
-(define-fun imax ((a Int) (b Int)) Int (ite (>= a b) a b))
+(define-fun imin ((a Int) (b Int)) Int (ite (< b a) b a))
+(define-fun imax ((a Int) (b Int)) Int (ite (> b a) b a))
+(define-fun fmin ((a Float64) (b Float64)) Float64 (ite (fp.lt b a) b a))
+(define-fun fmax ((a Float64) (b Float64)) Float64 (ite (fp.gt b a) b a))
 """
 
 
@@ -57,7 +59,7 @@ def script(program: Program, conditions: Sequence[Expr]) -> str:
         for leaf in part.leaves
     }
     names = {str(v.name): f"v{i}" for i, v in enumerate(program.variables)}
-    text = [_PRELUDE, *(_declared(names[v.name], v.type) for v in program.variables if v.name in read)]
+    text = [PRELUDE, *(_declared(names[v.name], v.type) for v in program.variables if v.name in read)]
     text += [f"(assert {term(condition, names)})\n" for condition in conditions]
     return "".join([*text, "(check-sat)\n"])
 

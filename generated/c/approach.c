@@ -30,10 +30,10 @@ static inline int32_t approach_bit32(uint32_t m)
 }
 #endif
 
-/* The lesser of two. */
+/* The lesser of two; the first where it is no number. */
 static inline int64_t approach_min_i64(int64_t a, int64_t b)
 {
-    return (a <= b) ? a : b;
+    return (b < a) ? b : a;
 }
 
 /* A value that was proved to fit. */

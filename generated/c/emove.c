@@ -30,22 +30,22 @@ static inline int32_t emove_bit32(uint32_t m)
 }
 #endif
 
-/* The greater of two. */
+/* The greater of two; the first where it is no number. */
 static inline double emove_max_f64(double a, double b)
 {
-    return (a >= b) ? a : b;
+    return (b > a) ? b : a;
 }
 
-/* The lesser of two. */
+/* The lesser of two; the first where it is no number. */
 static inline double emove_min_f64(double a, double b)
 {
-    return (a <= b) ? a : b;
+    return (b < a) ? b : a;
 }
 
-/* The lesser of two. */
+/* The lesser of two; the first where it is no number. */
 static inline int64_t emove_min_i64(int64_t a, int64_t b)
 {
-    return (a <= b) ? a : b;
+    return (b < a) ? b : a;
 }
 
 /* A value that was proved to fit. */

@@ -33,19 +33,19 @@ static inline int32_t primitive_bit32(uint32_t m)
 /* The absolute value. */
 static inline double primitive_abs_f64(double a)
 {
-    return (a < 0.0) ? (-a) : a;
+    return (a <= 0.0) ? (0.0 - a) : a;
 }
 
-/* The greater of two. */
+/* The greater of two; the first where it is no number. */
 static inline double primitive_max_f64(double a, double b)
 {
-    return (a >= b) ? a : b;
+    return (b > a) ? b : a;
 }
 
-/* The lesser of two. */
+/* The lesser of two; the first where it is no number. */
 static inline double primitive_min_f64(double a, double b)
 {
-    return (a <= b) ? a : b;
+    return (b < a) ? b : a;
 }
 
 /* A value that was proved to fit. */

@@ -33,7 +33,7 @@ static inline int32_t vision_bit32(uint32_t m)
 /* The absolute value. */
 static inline double vision_abs_f64(double a)
 {
-    return (a < 0.0) ? (-a) : a;
+    return (a <= 0.0) ? (0.0 - a) : a;
 }
 
 /* A value that was proved to fit. */

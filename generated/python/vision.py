@@ -233,11 +233,11 @@ def _mod(a, b):
 
 
 def _min(a, b):
-    return a if a <= b else b
+    return b if b < a else a
 
 
 def _max(a, b):
-    return a if a >= b else b
+    return b if b > a else a
 
 
 def _refused(s, position):

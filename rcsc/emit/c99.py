@@ -91,6 +91,33 @@ def emit_c(plan: Plan) -> dict[str, str]:
     }
 
 
+def helper(program: str, name: str) -> Function:
+    """A function of one operator or conversion, by its name in `CText.helpers`; what it means is `interpret.OPERATORS`'s."""
+    types = {"f64": "double"} | {
+        f"{sign}{bits}": f"{'u' if sign == 'u' else ''}int{bits}_t"
+        for sign in "iu"
+        for bits in (8, 16, 32, 64)
+    }
+    if "_of_" in name:
+        target, source = (types[short] for short in name.split("_of_"))
+        head = f"{target} {program}_{name}({source} a)"
+        return Function("A value that was proved to fit.", head, (f"    return ({target})a;",))
+    op, short = name.split("_")
+    kind = types[short]
+    if op == "abs":
+        bodies = {
+            "double": "    return (a <= 0.0) ? (0.0 - a) : a;",  # of -0.0 too
+            "int64_t": "    return (a < INT64_C(0)) ? (-a) : a;",
+            "uint64_t": "    return a;",
+        }
+        return Function("The absolute value.", f"{kind} {program}_{name}({kind} a)", (bodies[kind],))
+    sign, word = ("<", "lesser") if op == "min" else (">", "greater")
+    head = f"{kind} {program}_{name}({kind} a, {kind} b)"
+    return Function(
+        f"The {word} of two; the first where it is no number.", head, (f"    return (b {sign} a) ? b : a;",)
+    )
+
+
 class _Maker:
     """Builds the view of one plan."""
 
@@ -180,36 +207,8 @@ class _Maker:
     # --- helpers ---
 
     def _helpers(self) -> Iterator[Function]:
-        types = {"i64": "int64_t", "u64": "uint64_t", "f64": "double"}
-        for name in sorted(self.text.helpers):
-            if "_of_" in name:
-                yield self._conversion(name)
-                continue
-            op, short = name.split("_")
-            kind = types[short]
-            if op == "abs":
-                zero = "0.0" if kind == "double" else "INT64_C(0)"
-                body = "    return a;" if kind == "uint64_t" else f"    return (a < {zero}) ? (-a) : a;"
-                yield Function("The absolute value.", f"{kind} {self.p}_{name}({kind} a)", (body,))
-            else:
-                sign = "<=" if op == "min" else ">="
-                word = "lesser" if op == "min" else "greater"
-                body = f"    return (a {sign} b) ? a : b;"
-                yield Function(f"The {word} of two.", f"{kind} {self.p}_{name}({kind} a, {kind} b)", (body,))
+        yield from (helper(self.p, name) for name in sorted(self.text.helpers))
         yield from self.cuts
-
-    def _conversion(self, name: str) -> Function:
-        types = {"f64": "double"} | {
-            f"{sign}{bits}": f"{'u' if sign == 'u' else ''}int{bits}_t"
-            for sign in "iu"
-            for bits in (8, 16, 32, 64)
-        }
-        target, source = (types[short] for short in name.split("_of_"))
-        return Function(
-            "A value that was proved to fit.",
-            f"{target} {self.p}_{name}({source} a)",
-            (f"    return ({target})a;",),
-        )
 
     # --- procedures ---
 

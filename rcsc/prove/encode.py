@@ -91,12 +91,11 @@ def operation(op: Op, kind: Scalar, terms: list[Term]) -> Term:
         case Op.NEG:
             return smt.minus(terms[0], kind)
         case Op.ABS:
-            negative = smt.below(terms[0], _zero(kind), kind)
-            return smt.choice(negative, smt.minus(terms[0], kind), terms[0])
+            return smt.absolute(terms[0], kind)
         case Op.MIN:
-            return smt.choice(smt.at_most(terms[0], terms[1], kind), terms[0], terms[1])
+            return smt.choice(smt.below(terms[1], terms[0], kind), terms[1], terms[0])
         case Op.MAX:
-            return smt.choice(smt.at_most(terms[1], terms[0], kind), terms[0], terms[1])
+            return smt.choice(smt.below(terms[0], terms[1], kind), terms[1], terms[0])
         case Op.TO_REAL:
             return smt.to_double(terms[0])
         case Op.TO_INT:
@@ -104,10 +103,6 @@ def operation(op: Op, kind: Scalar, terms: list[Term]) -> Term:
         case _:
             arithmetic = smt.double_operation if isinstance(kind, Real) else smt.integer_operation
             return arithmetic(op.value, terms[0], terms[1])
-
-
-def _zero(kind: Scalar) -> Term:
-    return smt.literal(kind, 0.0 if isinstance(kind, Real) else 0)
 
 
 def within(term: Term, kind: Scalar) -> Term:

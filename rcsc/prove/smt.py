@@ -170,6 +170,13 @@ def minus(term: Term, kind: Scalar) -> Term:
     return Term(_z3().fpNeg(a) if isinstance(kind, Real) else -a)
 
 
+def absolute(term: Term, kind: Scalar) -> Term:
+    """The value without its sign."""
+    z3: Any = _z3()
+    a: Any = term
+    return Term(z3.fpAbs(a) if isinstance(kind, Real) else z3.If(a < 0, -a, a))
+
+
 def to_double(term: Term) -> Term:
     """The nearest double of an integer."""
     z3: Any = _z3()

@@ -3,12 +3,11 @@
 In: conditions. Out: values for which all hold, or nothing, which proves nothing. The same conditions give the same values.
 """
 
-import math
 from collections.abc import Mapping, Sequence
 from random import Random
 
-from rcsc.interpret import OPERATORS, divide
-from rcsc.model import Bool, Int, Op, Real, Value, key_bounds, key_of, real_key, value_of_key
+from rcsc.interpret import operated
+from rcsc.model import Bool, Op, Real, Value, key_bounds, key_of, real_key, value_of_key
 from rcsc.prove.values import CHOICE, CONSTANT, NARROWED, VARIABLE, Node, parts_first
 
 SAMPLES = 400
@@ -98,12 +97,7 @@ def _value(node: Node, parts: list[Value | None], point: Mapping[str, Value]) ->
 
 
 def _computed(node: Node, parts: list[Value]) -> Value | None:
-    op = Op(node.op)
     try:
-        if op is Op.DIV:
-            whole = isinstance(node.args[0].kind, Int)
-            return divide(int(parts[0]), int(parts[1])) if whole else parts[0] / parts[1]
-        value: Value = OPERATORS[op](*parts)
+        return operated(Op(node.op), node.args[0].kind, *parts)
     except (ArithmeticError, ValueError):
         return None
-    return None if isinstance(value, float) and math.isnan(value) else value

@@ -7,6 +7,7 @@ those of the extreme operands, computed in the same arithmetic.
 import math
 from itertools import product
 
+from rcsc.interpret import divide
 from rcsc.model import Int, Op, Real, Scalar, Unit
 
 WIDEST = 2**200
@@ -17,15 +18,9 @@ def apply(op: Op, kinds: tuple[Int | Real, ...], unit: Unit) -> Scalar:
     """The type of `op` over operands of these types."""
     if isinstance(kinds[0], Int):
         low, high = _integers(op, [k for k in kinds if isinstance(k, Int)])
-        return Int(max(low, -WIDEST), min(high, WIDEST), unit)
+        return Int(min(max(low, -WIDEST), WIDEST), min(max(high, -WIDEST), WIDEST), unit)
     bounds = _reals(op, [k for k in kinds if isinstance(k, Real)])
     return Real(*bounds, unit) if bounds else Real(-math.inf, math.inf, unit)
-
-
-def truncated(a: int, b: int) -> int:
-    """Quotient rounded toward zero, as in C."""
-    quotient = abs(a) // abs(b)
-    return quotient if (a < 0) == (b < 0) else -quotient
 
 
 def _integers(op: Op, kinds: list[Int]) -> tuple[int, int]:
@@ -46,7 +41,7 @@ def _integers(op: Op, kinds: list[Int]) -> tuple[int, int]:
             return min(corners), max(corners)
         case Op.DIV:
             divisors = [d for d in (b.low, b.high, -1, 1) if d and b.low <= d <= b.high]
-            corners = [truncated(x, d) for x, d in product((a.low, a.high), divisors)] or [0]
+            corners = [divide(x, d) for x, d in product((a.low, a.high), divisors)] or [0]
             return min(*corners, corners[0]), max(*corners, corners[0])
         case Op.MOD:
             most = max(abs(b.low), abs(b.high), 1) - 1

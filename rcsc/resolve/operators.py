@@ -81,9 +81,9 @@ def applied(scope: Scope, op: Op, operands: tuple[Typed, ...], unit: Unit, span:
     point = (
         Int(int(value), int(value), unit)
         if isinstance(made.type, Int)
-        else Real(float(value), float(value), unit)
+        else Real(value + 0.0, value + 0.0, unit)
     )
-    return Typed(Literal(value, point, span), bare)
+    return Typed(Literal(value + 0.0 if isinstance(value, float) else value, point, span), bare)
 
 
 def scaled(scope: Scope, op: Op, left: Typed, right: Typed, span: Span) -> Typed | None:

@@ -46,7 +46,7 @@ static int ref_sign(double x) {
 EXTREMES = """
 static {T} ref_min_{T}({T} a, {T} b) {{ return (b < a) ? b : a; }}
 static {T} ref_max_{T}({T} a, {T} b) {{ return (b > a) ? b : a; }}
-static {T} ref_abs_{T}({T} a) {{ return (a < 0) ? -a : a; }}
+static {T} ref_abs_{T}({T} a) {{ return (a <= 0) ? (0 - a) : a; }}
 """
 
 
