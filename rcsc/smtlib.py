@@ -9,6 +9,7 @@ import struct
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+from rcsc.children import interruptible
 from rcsc.model import (
     Among,
     Apply,
@@ -109,8 +110,9 @@ def cvc5_refutes(text: str, timeout_ms: int = 10_000) -> bool:
     symbols = reader.getSymbolManager()
     answer = ""
     try:
-        while not (command := reader.nextCommand()).isNull():
-            answer = command.invoke(solver, symbols)
+        with interruptible():
+            while not (command := reader.nextCommand()).isNull():
+                answer = command.invoke(solver, symbols)
     except RuntimeError:
         return False
     return answer.strip() == "unsat"

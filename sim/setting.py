@@ -3,11 +3,11 @@
 In: an episode and the path of a system. Out: what `sim.loop` puts together.
 """
 
-import tempfile
 from collections.abc import Iterable
 from functools import lru_cache
 from pathlib import Path
 
+from rcsc.children import scratch
 from rcsc.database.ask import Database
 from rcsc.database.build import BadData
 from rcsc.database.pose import about_z
@@ -50,10 +50,10 @@ def rows_of(rows: tuple[str, ...]) -> tuple[Row, ...]:
     Raises:
         BadScript: One says nothing that a workstation can do.
     """
-    with tempfile.NamedTemporaryFile("w", suffix=".csv", encoding="utf-8") as file:
-        file.write(script(rows))
-        file.flush()
-        return read_script(Path(file.name))
+    with scratch("rows") as folder:
+        path = folder / "rows.csv"
+        path.write_text(script(rows), encoding="utf-8")
+        return read_script(path)
 
 
 def operator_of(episode: Episode, database: Database, task: Signature) -> Operator:

@@ -54,8 +54,17 @@ def _bug(error: Exception) -> int:
     import click
 
     from rcsc import __version__
+    from rcsc.children import WorkerEndedError
     from rcsc.diagnostics.spelling import escape
 
+    if isinstance(error, WorkerEndedError):
+        click.echo(
+            f"error[RCS904]: {error}\n"
+            "  = note: nothing is known of what it was to decide\n"
+            "  = help: if memory was short, `--jobs 1` takes less of it",
+            err=True,
+        )
+        return BUG
     frames = traceback.extract_tb(error.__traceback__)
     place = f"{os.path.basename(frames[-1].filename)}:{frames[-1].lineno}" if frames else "?"
     what = escape(f"{type(error).__name__}: {error}")[:300]

@@ -134,9 +134,8 @@ def check(system: Path | None) -> int:
 
 def _built(system: Path | None, output: Path | None, *, writes: bool) -> Path:
     """Makes the database where it harms nobody, has the arm go everywhere in it, and only then writes it; where to."""
-    import tempfile
-
     from rcsc.cache import open_cache
+    from rcsc.children import scratch
     from rcsc.database.ask import open_database
     from rcsc.database.build import BadData
     from rcsc.database.build import build as build_database
@@ -150,8 +149,8 @@ def _built(system: Path | None, output: Path | None, *, writes: bool) -> Path:
         said = description(path)
         parts = parts_of(signatures(said))
         target = output or database_path(said)
-        with tempfile.TemporaryDirectory() as scratch:
-            tried = Path(scratch) / "cell.sqlite"
+        with scratch("db") as folder:
+            tried = folder / "cell.sqlite"
             build_database(said.database, tried, parts)
             checked(open_database(tried), open_cache(path.parent) if writes else None)
         if writes:

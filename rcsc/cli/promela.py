@@ -1,5 +1,6 @@
 """`rcsc promela`: the levels of a system as Promela models, and what Spin finds in them."""
 
+import contextlib
 import os
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
@@ -8,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from rcsc import children
 from rcsc.cli.cell import Stopped, stop, system_path
 
 if TYPE_CHECKING:
@@ -143,7 +145,7 @@ def _check(
 
     click.echo(f"a small instance, no proof: {breadth}")
     broken = 0
-    with ThreadPoolExecutor(jobs) as pool:
+    with _searchers(jobs) as pool:
         waiting = [
             (one, model, pool.submit(check, model, search)) for one, model in _models(made, models, breadth)
         ]
@@ -157,6 +159,20 @@ def _check(
             broken += _say(made, one, model, checked)
     _say_goals(model for _, model, _ in waiting)
     return 1 if broken else 0
+
+
+@contextlib.contextmanager
+def _searchers(jobs: int) -> "Iterator[ThreadPoolExecutor]":
+    """Threads that each wait for a search; an interrupt ends the searches."""
+    pool = ThreadPoolExecutor(jobs)
+    try:
+        yield pool
+    except BaseException:
+        pool.shutdown(wait=False, cancel_futures=True)
+        children.kill_programs()
+        raise
+    finally:
+        pool.shutdown()
 
 
 def _say(made: "Mapping[str, Stepper]", one: "Wanted", model: "Model", checked: "Checked") -> bool:

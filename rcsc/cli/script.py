@@ -265,12 +265,11 @@ def _say(number: int, text: str, state: str, ticks: int) -> None:
 
 def _apart(made: "Run", asked: Asked) -> int:
     """The same with a process for each level."""
-    import tempfile
-
+    from rcsc.children import scratch
     from rcsc.diagnostics.codes import Code
 
-    with tempfile.TemporaryDirectory(prefix="rcsc-run-") as scratch:
-        rows = _rows_apart(asked, made.station.at, Path(scratch) / "results")
+    with scratch("run") as folder:
+        rows = _rows_apart(asked, made.station.at, folder / "results")
     if not asked.quiet:
         click.echo(f"each level in a process of its own, {asked.rate:g} times as fast as the clock")
     if rows and rows[-1][2] != "done":

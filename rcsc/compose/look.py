@@ -4,11 +4,11 @@ In: steppers and the proof of their levels. Out: `Told`, one for each thing that
 each pair.
 """
 
-import tempfile
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from rcsc.children import scratch
 from rcsc.compose.finding import Finding, of_trace
 from rcsc.compose.goals import Goal, Key, Sort, pairs
 from rcsc.compose.lap import Lap, goal_of, laps
@@ -84,8 +84,8 @@ def look(made: Mapping[str, Stepper], proof: SystemProof, looking: Looking) -> I
         NotBuilt: The C executors could not be built.
         OSError: A log cannot be written.
     """
-    with tempfile.TemporaryDirectory(prefix="rcsc-findings-") as scratch:
-        rerun = _Rerun(made, looking, looking.log or Path(scratch))
+    with scratch("findings") as kept:
+        rerun = _Rerun(made, looking, looking.log or kept)
         for one in proof.levels:
             for told in _level(made, one.level, essential(one), looking):
                 yield rerun.run(told)

@@ -23,6 +23,15 @@ def _pysat() -> Any:
     return solvers
 
 
+@cache
+def _interrupted() -> type[Exception]:
+    """What the solver raises when Ctrl-C stops it; nothing else raises it in a search."""
+    import pysolvers
+
+    found: type[Exception] = pysolvers.error
+    return found
+
+
 class Sat:
     """One incremental solver.
 
@@ -47,7 +56,10 @@ class Sat:
         """
         self.queries += 1
         self._solver.conf_budget(BUDGET)
-        answer = self._solver.solve_limited(assumptions=list(assuming))
+        try:
+            answer = self._solver.solve_limited(assumptions=list(assuming))
+        except _interrupted() as error:  # it takes Ctrl-C for itself
+            raise KeyboardInterrupt from error
         if answer is None:
             raise GaveUpError
         if answer:

@@ -7,11 +7,10 @@ they begin in agreement.
 
 import time
 from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field, replace
-from multiprocessing import get_context
 from pathlib import Path
 
+from rcsc import children
 from rcsc.cache import Cache
 from rcsc.compose.agreed import Agreement, agreements, other_end
 from rcsc.compose.contract import Links, check_ends, links
@@ -194,13 +193,11 @@ def _each(
         for name in only:
             yield name, prove_level(made[name], effort)
         return
-    pool = ProcessPoolExecutor(min(jobs, len(only)), mp_context=get_context("spawn"))
-    try:
+    with children.pool(min(jobs, len(only))) as pool:
         waiting = {name: pool.submit(_proved, made[name], effort) for name in only}
         for name, one in waiting.items():
-            yield name, replace(one.result(), found=_again(made[name], one.result()))
-    finally:
-        pool.shutdown(wait=True, cancel_futures=True)
+            proof = children.answer(one)
+            yield name, replace(proof, found=_again(made[name], proof))
 
 
 def _proved(stepper: Stepper, effort: Effort) -> LevelProof:

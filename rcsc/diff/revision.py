@@ -6,11 +6,11 @@ Git is asked through its command line.
 
 import os
 import shutil
-import subprocess  # git is asked, and given lists of arguments, never a shell's line
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
+from rcsc import children
 from rcsc.project import PROJECT_FILE
 
 _REGULAR, _LINK = ("100644", "100755"), "120000"
@@ -104,8 +104,8 @@ def _git(*args: str, stdin: bytes = b"") -> bytes:
     program = shutil.which("git")
     if program is None:
         raise NotComparedError("git is not installed", "give two files or folders instead of revisions")
-    ran = subprocess.run([program, *args], input=stdin, capture_output=True, check=False)
-    if ran.returncode:
-        why = ran.stderr.decode(errors="replace").strip().splitlines()
+    ran = children.run([program, *args], stdin=stdin)
+    if ran.status != 0:
+        why = ran.err.strip().splitlines()
         raise NotComparedError(why[0].removeprefix("fatal: ") if why else f"git {args[0]} failed")
-    return ran.stdout
+    return ran.raw

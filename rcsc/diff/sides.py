@@ -4,11 +4,11 @@ In: arguments as the user gave them. Out: `Side`s, and pairs of programs.
 """
 
 import os
-import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from rcsc.children import scratch
 from rcsc.diagnostics.diagnostic import Diagnostic, Label, Severity
 from rcsc.diff.revision import NotComparedError, lay_out
 from rcsc.model import Program
@@ -77,8 +77,8 @@ def read(asked: Given) -> Side:
     """
     if not asked.revision:
         return _read(asked, asked.paths, "", "")
-    with tempfile.TemporaryDirectory(prefix="rcsc-diff-") as scratch:
-        top = os.path.realpath(scratch)
+    with scratch("diff") as place:
+        top = os.path.realpath(place)
         stands = lay_out(asked.revision, Path(top))
         here = "" if asked.from_top else stands
         paths = tuple(os.path.normpath(os.path.join(top, here, path)) for path in asked.paths)

@@ -6,12 +6,13 @@ extra `graph` installs, which gives the same places on every machine, else `dot`
 
 import json
 import shutil
-import subprocess  # a fixed program, arguments and text made here
 import sysconfig
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+from rcsc import children
 
 PACKAGE = "graphviz-pure"
 MOST_SECONDS = 120
@@ -117,17 +118,13 @@ def _blank(arrow: Arrow) -> str:
 def _run(text: str) -> str:
     program = _program()
     try:
-        done = subprocess.run(
-            [program, "-Tjson0"],
-            input=text,
-            capture_output=True,
-            encoding="utf-8",
-            timeout=MOST_SECONDS,
-            check=True,
-        )
-    except (OSError, subprocess.SubprocessError) as error:
+        done = children.run([program, "-Tjson0"], stdin=text.encode(), timeout_s=MOST_SECONDS)
+    except OSError as error:
         raise NoLayoutError(f"the layout program failed: {error}") from error
-    return done.stdout
+    if done.status != 0:
+        why = "it took too long" if done.status is None else f"it ended with status {done.status}"
+        raise NoLayoutError(f"the layout program failed: {why}")
+    return done.out
 
 
 def _program() -> str:

@@ -3,13 +3,10 @@
 The only place where a `ProvedProgram` is made, and only when nothing is wrong and nothing undecided.
 """
 
-import signal
 from collections.abc import Collection, Mapping
-from concurrent.futures import Future, ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, replace
-from multiprocessing import active_children, get_context
 
+from rcsc import children
 from rcsc.diagnostics.diagnostic import Diagnostic, Severity, sort_key
 from rcsc.meaning import relying
 from rcsc.model import Backing, Program, ProvedProgram, Table, TableName, seal_of_proof
@@ -107,30 +104,11 @@ def _left_open(table: Table, why: Undecided) -> TableVerdict:
 def _in_processes(program: Program, tables: list[Table], options: Options) -> list[TableVerdict]:
     """Each table in a process of a pool; none outlives this call, also when it is interrupted."""
     one_each = replace(options, jobs=1)
-    pool = ProcessPoolExecutor(
-        min(options.jobs, len(tables)), mp_context=get_context("spawn"), initializer=_leave_interrupts
-    )
-    try:
+    with children.pool(min(options.jobs, len(tables))) as pool:
         waiting = [pool.submit(_verdict, program, table, one_each) for table in tables]
-        return [_result(one, table) for one, table in zip(waiting, tables, strict=True)]
-    except BaseException:
-        for child in active_children():
-            child.terminate()
-        raise
-    finally:
-        pool.shutdown(wait=True, cancel_futures=True)
-
-
-def _leave_interrupts() -> None:
-    """Ctrl-C is the parent's business."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-
-def _result(waiting: Future[TableVerdict], table: Table) -> TableVerdict:
-    try:
-        return replace(waiting.result(), table=table)
-    except BrokenProcessPool:
-        return _left_open(table, Undecided("the process that proved it has ended early"))
+        return [
+            replace(children.answer(one), table=table) for one, table in zip(waiting, tables, strict=True)
+        ]
 
 
 def _certificate(program: Program, verdicts: tuple[TableVerdict, ...], tally: Tally) -> Mapping[str, object]:

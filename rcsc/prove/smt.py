@@ -253,8 +253,8 @@ class Solver:
         try:
             answer = self._solver.check(*assuming)
             why = self._solver.reason_unknown() if answer == z3.unknown else ""
-        except (z3.Z3Exception, MemoryError):
-            return Answer.UNKNOWN
+        except (z3.Z3Exception, MemoryError) as error:
+            answer, why = z3.unknown, str(error)
         if "interrupted" in why:  # Z3 takes Ctrl-C for itself
             raise KeyboardInterrupt
         if answer == z3.unsat and self._remembers:

@@ -4,11 +4,11 @@ In: a running level, the system's description and where it stands. Out: `Reloade
 old level runs on. Whether it is taken is for `gate` to judge.
 """
 
-import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from rcsc.children import scratch
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Severity
 from rcsc.diagnostics.render import one_line
@@ -111,13 +111,13 @@ def reload(plant: Plant, spec: LevelSpec, old: RunningLevel) -> Reloaded:
     """
     source = source_of(plant, spec)
     sources = kept(source)
-    with tempfile.TemporaryDirectory(prefix="rcsc-reload-") as scratch:
-        made = compile_(_settings(source), Path(scratch), TARGETS, only_check=False)
+    with scratch("reload") as place:
+        made = compile_(_settings(source), place, TARGETS, only_check=False)
         if made.report.failed:
             raise _refused(spec.name, f"it is not proved: {_why(made.report)}")
         program = _resolved(source)
         try:
-            there = replace(plant.system, generated=Path(scratch))
+            there = replace(plant.system, generated=place)
             sign = signature(there.generated / "c" / f"{spec.program}.json")
             executor = executors(there, {spec.name: sign}, plant.kind)[spec.name]
             level = running_level(spec, there, sign, executor, plant.queries)

@@ -5,12 +5,12 @@ In: a root file. Out: `Kept`, and the same files laid out elsewhere.
 
 import os
 import re
-import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from rcsc.children import scratch
 from rcsc.project import PROJECT_FILE, project_root
 
 # A line that uses a file; whether it is in order is for whoever reads the file.
@@ -54,9 +54,9 @@ def kept(source: Path) -> Kept:
 @contextmanager
 def laid_out(held: Kept) -> Iterator[Path]:
     """The root file among the others, in a folder that is gone afterwards."""
-    with tempfile.TemporaryDirectory(prefix="rcsc-reload-") as scratch:
+    with scratch("reload") as place:
         for name, text in held.texts.items():
-            path = Path(scratch) / name
+            path = place / name
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_bytes(text)
-        yield Path(scratch) / held.root
+        yield place / held.root

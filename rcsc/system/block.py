@@ -6,12 +6,9 @@ that lives, so that one left behind by a maker that was killed can be told from 
 """
 
 import contextlib
-import fcntl
 import os
 import secrets
-import sys
 import threading
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from multiprocessing import resource_tracker
@@ -19,9 +16,10 @@ from multiprocessing.shared_memory import SharedMemory
 from pathlib import Path
 from typing import Self
 
+from rcsc import children
+
 PREFIX = "rcsc-"
 FOLDER = Path("/dev/shm")  # noqa: S108  # where Linux keeps them
-YOUNG_S = 10.0
 TRACKING = ("register", "unregister")
 _untracking = threading.Lock()
 
@@ -68,14 +66,18 @@ class Block:
     @classmethod
     def create(cls, size: int) -> Self:
         """A new block of zeros; its maker removes it."""
-        sweep()
-        name = f"{PREFIX}{os.getpid()}-{secrets.token_hex(6)}"
-        with _untracked():
-            made = cls(name, SharedMemory(name, create=True, size=size))
-        if FOLDER.is_dir():
-            made._lock = os.open(FOLDER / name, os.O_RDWR)
-            fcntl.flock(made._lock, fcntl.LOCK_EX)
-        return made
+        children.sweep(FOLDER, PREFIX)
+        while True:
+            name = f"{PREFIX}{os.getpid()}-{secrets.token_hex(6)}"
+            children.hold(FOLDER / name)
+            with _untracked():
+                made = cls(name, SharedMemory(name, create=True, size=size))
+            lock = children.lock(FOLDER / name)
+            if lock is not None:
+                made._lock = lock
+                return made
+            made.close()
+            children.let_go(FOLDER / name)
 
     @classmethod
     def attach(cls, name: str) -> Self:
@@ -117,23 +119,4 @@ class Block:
         """Removes it; who has it still sees it. Nothing, where another process did."""
         with _untracked(), contextlib.suppress(FileNotFoundError):
             self._memory.unlink()
-
-
-def sweep() -> None:
-    """Removes blocks whose makers were killed."""
-    if not sys.platform.startswith("linux") or not FOLDER.is_dir():
-        return
-    for path in FOLDER.glob(f"{PREFIX}*"):
-        with contextlib.suppress(OSError):
-            # Its maker may not have come to lock a young one yet.
-            if time.time() - path.stat().st_ctime > YOUNG_S:
-                _remove_unlocked(path)
-
-
-def _remove_unlocked(path: Path) -> None:
-    opened = os.open(path, os.O_RDWR)
-    try:
-        fcntl.flock(opened, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        path.unlink()
-    finally:
-        os.close(opened)
+        children.let_go(FOLDER / self.name)

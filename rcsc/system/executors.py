@@ -9,9 +9,7 @@ import hashlib
 import importlib.util
 import shutil
 import struct
-import subprocess
 import sys
-import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -19,6 +17,7 @@ from operator import attrgetter
 from pathlib import Path
 from typing import Protocol
 
+from rcsc import children
 from rcsc.system.signature import FORMATS, LevelSign, Signature, Value, Values
 
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared")
@@ -109,15 +108,15 @@ def build(generated: Path, signs: Sequence[Signature]) -> Library:
 
 
 def _built(compiler: str, generated: Path, signs: Sequence[Signature], layout: str) -> Library:
-    with tempfile.TemporaryDirectory(prefix="rcsc-executors-") as folder:
-        shim = Path(folder) / "layout.c"
+    with children.scratch("executors") as folder:
+        shim = folder / "layout.c"
         shim.write_text(layout, encoding="utf-8")
-        library = Path(folder) / "executors.so"
+        library = folder / "executors.so"
         sources = [str(generated / "c" / f"{sign.program}.c") for sign in signs]
         command = [compiler, *FLAGS, f"-I{generated / 'c'}", "-o", str(library), str(shim), *sources]
-        ran = subprocess.run(command, capture_output=True, text=True, check=False)
-        if ran.returncode != 0:
-            raise NotBuilt(ran.stderr.strip().splitlines()[0] if ran.stderr else "the compiler failed")
+        ran = children.run(command)
+        if ran.status != 0:
+            raise NotBuilt(ran.err.strip().splitlines()[0] if ran.err.strip() else "the compiler failed")
         return Library(ctypes.CDLL(str(library)))  # it stays mapped when the folder is gone
 
 

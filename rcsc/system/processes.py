@@ -8,7 +8,6 @@ What it sees is at times older or newer than in one process; tables that keep th
 """
 
 import contextlib
-import multiprocessing
 import os
 import signal
 import time
@@ -16,6 +15,7 @@ from collections.abc import Callable, Iterator, Mapping
 from types import FrameType
 from typing import TYPE_CHECKING, Any, Self
 
+from rcsc import children
 from rcsc.system.cell import Kind, StateTableError, signatures
 from rcsc.system.description import Description
 from rcsc.system.serve import FAULTY, Factory, Setting, fault_of, serve_level, serve_outside
@@ -83,10 +83,8 @@ class Supervisor:
             if name in self._signs
             else (serve_outside, (self._setting, self._outside[name]))
         )
-        made = multiprocessing.get_context("spawn").Process(
-            target=work[0], args=work[1], name=name, daemon=True
-        )
-        with _interrupts_held():
+        made = children.process(name, work[0], *work[1])
+        with children.interrupts_held():
             made.start()
         self._running[name] = made
 
@@ -133,7 +131,7 @@ class Supervisor:
 
     def close(self) -> None:
         """Ends all, and removes the shared memory."""
-        with _interrupts_held():
+        with children.interrupts_held():
             for process in self._running.values():
                 process.terminate()
             for name in self._running:
@@ -151,16 +149,6 @@ class Supervisor:
         at = int(values[len(sign.leaves) + 2])
         where = f": `{sign.leaves[at].name}` = {sign.leaves[at].shown(values[at])}" if at >= 0 else ""
         return f"level `{name}`: {FAULTS[fault_of(sign, values)]}{where}"
-
-
-@contextlib.contextmanager
-def _interrupts_held() -> Iterator[None]:
-    """Ctrl-C comes later; a process started meanwhile never gets it, and ends when it is told."""
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def run_processes(

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 from random import Random
-from tempfile import TemporaryDirectory
 
+from rcsc.children import scratch
 from rcsc.model import Program, Snapshot
 from rcsc.testing.esbmc import Said, prove_function
 from rcsc.testing.externs import c_stand_ins
@@ -295,8 +295,7 @@ def prepared(
     if isinstance(compiler, Absent):
         yield None
         return
-    with TemporaryDirectory(prefix="rcsc-mutants-") as scratch:
-        place = Path(scratch)
+    with scratch("mutants") as place:
         write_c(files, place)
         (place / "shim.c").write_text(shim_c(program, symbols), "utf-8")
         (place / "extra.c").write_text(c_stand_ins(program, symbols), "utf-8")

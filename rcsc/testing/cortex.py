@@ -11,9 +11,8 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from math import prod
-from pathlib import Path
-from tempfile import TemporaryDirectory
 
+from rcsc.children import scratch
 from rcsc.model import Program, Real, Table, Variable, key_bounds, value_of_key
 from rcsc.testing.edges import leaf_edges
 from rcsc.testing.reference import constant
@@ -183,8 +182,7 @@ def run_cortex(
     if isinstance(tools, Absent):
         return tools
     table = program.tables[number]
-    with TemporaryDirectory(prefix="rcsc-cortex-") as scratch:
-        place = Path(scratch)
+    with scratch("cortex") as place:
         (place / "rcsc.ld").write_text(LINKER, "utf-8")
         (place / "image.c").write_text(image_c(program, symbols, number), "utf-8")
         sources = ["image.c", *write_c(files, place)]

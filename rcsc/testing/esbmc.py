@@ -13,15 +13,15 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from time import perf_counter
 
+from rcsc.children import Ran, scratch
 from rcsc.model import Program, Real
 from rcsc.testing.matcher_text import ShapeError, function_body
 from rcsc.testing.reference_file import monitored, reference_c
 from rcsc.testing.symbols import Symbols
 from rcsc.testing.targets import Target, call_of, is_matcher, reference_of
-from rcsc.testing.tools import Absent, Ran, esbmc, run_command, write_c
+from rcsc.testing.tools import Absent, esbmc, run_command, write_c
 
 CHECKS = (
     "--overflow-check",
@@ -224,8 +224,7 @@ def ask(
         return EsbmcVerdict(function, Said.ABSENT, 0, 0.0, binary.reason)
     began = perf_counter()
     verdict = EsbmcVerdict(function, Said.TOO_LARGE, 0, 0.0)
-    with TemporaryDirectory(prefix="rcsc-esbmc-") as scratch:
-        place = Path(scratch)
+    with scratch("esbmc") as place:
         sources = write_c(files, place) if with_sources else write_c(files, place)[:0]
         (place / "harness.c").write_text(text, "utf-8")
         for solver in SOLVERS:

@@ -25,8 +25,8 @@ from itertools import product
 from math import prod
 from pathlib import Path
 from random import Random
-from tempfile import TemporaryDirectory
 
+from rcsc.children import scratch
 from rcsc.model import Box, Program, Real, Table, Variable, key_bounds, real_key, value_of_key
 from rcsc.testing.edges import companions, leaf_edges, relational_tests
 from rcsc.testing.matcher_c import self_test_c
@@ -296,8 +296,7 @@ def check_matcher(
         parts = matcher_text(source, symbols.lines[table.name], symbols.struct)
     except ShapeError as error:
         return (f"the emitted C has not the shape that the check is about: {error}",)
-    with TemporaryDirectory(prefix="rcsc-matcher-") as scratch:
-        place = Path(scratch)
+    with scratch("matcher") as place:
         write_c(files, place)
         (place / "check.c").write_text(self_test_c(program, symbols, table, parts), "utf-8")
         ran = run_command([compiler, *FLAGS, "-o", "check.so", "check.c"], place, 300.0)

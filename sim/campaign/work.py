@@ -9,15 +9,14 @@ import ctypes
 import faulthandler
 import os
 import signal
-import tempfile
 import threading
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from multiprocessing import parent_process
 from pathlib import Path
 from types import FrameType
 
+from rcsc.children import scratch
 from rcsc.database.build import BadData
 from rcsc.system.description import BadDescription
 from rcsc.system.executors import NotBuilt
@@ -131,8 +130,8 @@ def fails_in(rig: Rig, name: str, episode: Episode) -> bool:
 
 def logged(rig: Rig, episode: Episode, name: str) -> Shrunk:
     """The counterexample with its log, which is of what happened up to where it broke off."""
-    with tempfile.TemporaryDirectory(prefix="rcsc-campaign-") as folder:
-        path = Path(folder) / "log.mcap"
+    with scratch("campaign") as folder:
+        path = folder / "log.mcap"
         outcome = attempt(rig, episode, path)
         found = next((one for one in outcome.findings if one.property == name), Finding(name, 0, outcome.end))
         return Shrunk(episode, found, path.read_bytes() if path.is_file() else b"")
@@ -148,17 +147,8 @@ _GRACE = 2.0
 
 
 def own_process() -> None:
-    """Begins a worker's process: it leaves interrupts to the campaign, and ends when the campaign does."""
+    """Marks this process as a campaign's worker, which may be ended."""
     _OWN.set()
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_outlive_nobody, daemon=True).start()
-
-
-def _outlive_nobody() -> None:
-    parent = parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)
 
 
 @contextlib.contextmanager

@@ -11,8 +11,8 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
+from rcsc.children import scratch
 from rcsc.compose.promela.model import BROKEN, RESTARTED, TAKEN, TOLD, Model
 from rcsc.testing.tools import Absent, c_compiler, run_command
 
@@ -89,8 +89,7 @@ def check(model: Model, search: Search | None = None) -> Checked | Absent:
     if isinstance(found, Absent):
         return found
     search = search or Search()
-    with TemporaryDirectory(prefix="rcsc-spin-") as name:
-        place = Path(name)
+    with scratch("spin") as place:
         (place / MODEL).write_text(model.text, encoding="utf-8")
         _run([found[0], "-a", MODEL], place)
         kind = ["-DNP"] if model.progress else ["-DSAFETY"]
