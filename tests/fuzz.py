@@ -25,7 +25,7 @@ from rcsc.resolve import compile_text
 REPO = Path(__file__).parents[1]
 SLOWEST_S = 30.0
 MEMORY_MB = 2048
-OPTIONS = Options(timeout_ms=500, solver="boxes")
+OPTIONS = Options(steps=1_000_000, solver="boxes")
 
 WORDS = (
     "table level state input output enum record array of int real bool .. | || := ( ) { } [ ] in and or not implies "

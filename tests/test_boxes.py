@@ -4,7 +4,8 @@ import re
 from itertools import pairwise, product
 from typing import Any
 
-from hypothesis import assume, given
+import pytest
+from hypothesis import given, reject
 from hypothesis import strategies as st
 
 from rcsc.interpret import matching_lines
@@ -12,9 +13,11 @@ from rcsc.model import Program, key_bounds, key_of, value_of_key
 from rcsc.prove import boxes
 from rcsc.prove.options import Options
 from rcsc.prove.repair import closing_line, parting_cell
+from rcsc.prove.report import diagnostics
 from rcsc.prove.table import prove_table
-from rcsc.prove.verdict import DeadLine, Gap, Overlap, Region
+from rcsc.prove.verdict import DeadLine, Gap, Overlap, Region, Undecided
 from rcsc.resolve import compile_text
+from tests.bench import families
 
 HEAD = """enum colour { red, green, blue }
 input a : bool
@@ -46,8 +49,8 @@ def written(rows: list[list[str]]) -> str:
 
 def program_of(text: str) -> Program:
     program = compile_text(text)
-    assume(isinstance(program, Program))
-    assert isinstance(program, Program)
+    if not isinstance(program, Program):
+        reject()
     return program
 
 
@@ -117,6 +120,44 @@ def test_findings_are_those_of_brute_force(text: str) -> None:
             covered |= points
     dead = {f.line for f in found if isinstance(f, DeadLine)}
     assert dead == {at for at in range(len(table.lines)) if not any(at in lines for lines in right.values())}
+
+
+@pytest.mark.parametrize(
+    ("lines", "variables", "widened", "fault"),
+    [
+        (2000, 24, 1, "ok"),
+        (2000, 24, 3, "gap"),
+        (256, 20, 1, "ok"),
+        (1024, 20, 1, "ok"),
+        (1024, 20, 5, "gap"),
+    ],
+)
+def test_gaps_are_found_beside_overlaps_in_large_tables(
+    lines: int, variables: int, widened: int, fault: families.Fault
+) -> None:
+    program = program_of(families.box(lines, variables, lines, fault, widened))
+    table = boxes.Boxes.of(program, program.tables[0])
+    assert next(table.overlaps(), None) is not None
+    gap = table.gap(disjoint=False)  # within its budget
+    assert (gap is not None) == (fault == "gap")
+    if gap is not None:
+        assert not matching_lines(program.tables[0], gap.witnesses[0])
+
+
+def test_a_search_for_gaps_that_takes_too_long_is_undecided(monkeypatch: pytest.MonkeyPatch) -> None:
+    program = program_of(families.box(40, 9, 1, "gap", 10))
+    monkeypatch.setattr(boxes, "BUDGET", 30)
+    found = prove_table(program, program.tables[0], Options(solver="boxes")).found
+    assert any(isinstance(one, Undecided) for one in found)
+    assert not any(isinstance(one, Gap) for one in found)
+
+
+def test_a_report_of_very_many_overlaps_ends() -> None:
+    rows = [[f"l{at}", "", "", ""] for at in range(300)]
+    program = program_of(written(rows))
+    found = prove_table(program, program.tables[0], Options(solver="boxes"))
+    assert len(found.found) == boxes.MOST_PAIRS
+    assert "at least" in diagnostics(program, found)[-1].message
 
 
 def maximal(program: Program, region: Region, bare: set[Point]) -> None:

@@ -105,9 +105,7 @@ def test_1_findings_with_the_witness_its_region_and_a_repair(rcsc: Rcsc) -> None
     assert "0 proved, 1 refuted" in ran.out
 
 
-@pytest.mark.parametrize(
-    "args", [["check", "--frob"], ["frob"], ["check", "--timeout", "0"], ["explain", "1"]]
-)
+@pytest.mark.parametrize("args", [["check", "--frob"], ["frob"], ["check", "--steps", "0"], ["explain", "1"]])
 def test_2_usage(rcsc: Rcsc, args: list[str]) -> None:
     ran = rcsc(*args)
     assert ran.status == 2

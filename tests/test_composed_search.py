@@ -165,7 +165,7 @@ def test_an_open_operation_gives_the_same_for_the_same_operands(op: Op) -> None:
         )
 
     for other, answer in (("b", Answer.UNSATISFIABLE), ("c", Answer.SATISFIABLE)):
-        keyed, solver = Keyed(), Solver(10_000)
+        keyed, solver = Keyed(), Solver()
         differ = keyed.term(values.negation(values.equal(made("b"), made(other))))
         solver.add(*keyed.ranges, differ)
         assert solver.check() is answer
@@ -176,7 +176,7 @@ def test_what_is_known_where_a_branch_is_taken_is_not_carried_elsewhere() -> Non
     r = values.variable("r", Real(0.0, 10.0))
     inside = values.narrowed(r, 6.0, 10.0)
     large, any_ = (values.arithmetic(Op.MUL, (one, one), Real(0.0, 100.0)) for one in (inside, r))
-    keyed, solver = Keyed(), Solver(10_000)
+    keyed, solver = Keyed(), Solver()
     terms = [keyed.term(values.compare(Op.LT, one, values.constant(one.kind, 50.0))) for one in (large, any_)]
     less = values.compare(Op.LT, any_, values.constant(any_.kind, 25.0))
     terms.append(keyed.term(less))

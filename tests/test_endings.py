@@ -176,7 +176,7 @@ def test_a_refutation_that_is_wrong_is_not_confirmed() -> None:
     """What was asserted for good, and one of what was refuted besides: a script with a model if any of them was wrong."""
     kind = Int(0, 9)
     x = smt.variable("x", kind)
-    solver = Solver(1_000, remembers=True)
+    solver = Solver(remembers=True)
     solver.add(smt.at_most(x, smt.literal(kind, 5), kind))
     for at in (7, 8):
         solver.push()
@@ -287,7 +287,7 @@ def test_no_power_is_none() -> None:
 
 
 def refuted(node: Node) -> bool:
-    keyed, solver = Measured(), Solver(10_000)
+    keyed, solver = Measured(), Solver()
     term = keyed.term(node)
     solver.add(*keyed.ranges, term)
     return solver.check() is Answer.UNSATISFIABLE

@@ -6,10 +6,12 @@ import pytest
 
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic
-from rcsc.model import Program
+from rcsc.model import Int, Program
+from rcsc.prove import smt
+from rcsc.prove.encode import within
 from rcsc.prove.options import Options
 from rcsc.prove.program import ProgramVerdict, prove_program
-from rcsc.prove.smt import Answer, Solver
+from rcsc.prove.smt import Answer, Limits, Solver, Term
 from rcsc.resolve import compile_text
 from rcsc.source import Source
 
@@ -308,7 +310,7 @@ def test_a_solver_that_breaks_proves_nothing(monkeypatch: pytest.MonkeyPatch, er
 
 def test_a_time_out_is_reported_and_ends_the_asking() -> None:
     hard = "if s * s * s + low * low = 3 * low * s and s > 1000 { m := a * a + b }"
-    found = body(hard, Options(solver="boxes", timeout_ms=1))
+    found = body(hard, Options(solver="boxes", steps=1))
     assert found
     assert set(codes(found)) <= {"RCS409", "RCS410", "RCS413"}
 
@@ -364,3 +366,27 @@ def test_processes_give_the_same_verdicts() -> None:
     assert one.findings == two.findings
     assert [v.found for v in one.tables] == [v.found for v in two.tables]
     assert codes(one.findings) == ["RCS401", "RCS402"]
+
+
+def test_what_the_processor_time_ended_is_undecided() -> None:
+    solver = Solver(Limits(steps=2**31, cpu_s=0.3))
+    kind = Int(2, 10**12)
+    x, y, z = (smt.variable(name, kind) for name in "xyz")
+
+    def cubed(term: Term) -> Term:
+        return smt.integer_operation("*", term, smt.integer_operation("*", term, term))
+
+    solver.add(*(within(one, kind) for one in (x, y, z)))
+    solver.add(smt.equal(smt.integer_operation("+", cubed(x), cubed(y)), cubed(z), kind))  # nobody finds one
+    before = smt.cut_short()
+    assert solver.check() is Answer.UNKNOWN
+    assert smt.cut_short() == before + 1
+    assert Solver().check() is Answer.SATISFIABLE  # the next question begins anew
+
+
+def test_a_table_of_which_a_question_was_cut_short_is_undecided(monkeypatch: pytest.MonkeyPatch) -> None:
+    ended = iter(range(100))
+    monkeypatch.setattr(smt, "cut_short", lambda: next(ended))
+    verdict = proved("input a : bool\ntable t {\n| line | a ||\n| x | true ||\n| y | false ||\n}\n")
+    assert verdict.proved is None
+    assert codes(verdict.findings) == ["RCS409"]

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from rcsc.cli.options import steps_option
 from rcsc.cli.show import Color, Output, Progress, UnwritableError, show
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label
@@ -55,15 +56,14 @@ Exit status: 0 same meaning, 1 changed, 2 usage, an error, or not decided.""",
               help="Write it to FILE instead of standard output.")  # fmt: skip
 @click.option("--color", type=click.Choice([color.value for color in Color]), default="auto", show_default=True,
               help="Colour the text; `auto` on a terminal, unless NO_COLOR is set.")  # fmt: skip
-@click.option("--timeout", type=click.FloatRange(min=0, min_open=True), default=5.0, show_default=True, metavar="SECONDS",
-              help="Time limit of each question to the solver; past it nothing is called proved.")  # fmt: skip
+@steps_option(20)
 @click.option("--memory", type=click.IntRange(min=64), default=4096, show_default=True, metavar="MB",
               help="Memory limit of the solver.")  # fmt: skip
 @click.option("--follow", is_flag=True,
               help="For a changed table also: which line can match in the cycle after which, what is new and what is gone.")  # fmt: skip
 @click.option("-q", "--quiet", is_flag=True, help="Only what changed, no summary and no progress.")
 def diff(  # noqa: PLR0913, PLR0917  # as many as there are options
-    paths: tuple[str, ...], revision: str | None, form: str, file: Path | None, color: str, timeout: float,
+    paths: tuple[str, ...], revision: str | None, form: str, file: Path | None, color: str, steps: int,
     memory: int, follow: bool, quiet: bool,
 ) -> int:  # fmt: skip
     """Show the inputs for which another line, effect or fault follows in B than in A, and prove that there are no others.
@@ -76,7 +76,7 @@ def diff(  # noqa: PLR0913, PLR0917  # as many as there are options
     from rcsc.prove.options import Options
 
     asked = _asked(paths, revision)
-    options = Options(timeout_ms=max(1, round(timeout * 1000)), memory_mb=memory)
+    options = Options(steps=steps, memory_mb=memory)
     progress = Progress(wanted=not quiet)
     try:
         found = _found(asked, options, progress, follow)
@@ -90,7 +90,7 @@ def diff(  # noqa: PLR0913, PLR0917  # as many as there are options
     if found.undecided:
         left = ", ".join(what for program in found.programs for what in program.undecided)
         return _refuse(
-            Code.UNDECIDED, f"the solver gave up on {left}", "give each query more time with `--timeout`"
+            Code.UNDECIDED, f"the solver gave up on {left}", "give each query more steps with `--steps`"
         )
     return CHANGED if found.changed else SAME
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from rcsc.cli.options import steps_option
 from rcsc.cli.show import Output, UnwritableError, show
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label, sort_key
@@ -20,8 +21,7 @@ if TYPE_CHECKING:
     from rcsc.prove.options import Options
 
 _ENDINGS = {"svg": ".svg", "dot": ".dot", "mermaid": ".mmd", "scxml": ".scxml"}
-_TIMEOUT = click.option("--timeout", type=click.FloatRange(min=0, min_open=True), default=5.0, show_default=True,
-                        metavar="SECONDS", help="Time limit of each question to the solver.")  # fmt: skip
+_STEPS = steps_option(20)
 _OUT = click.option("-o", "--output", "out", type=click.Path(path_type=Path), default=None, metavar="FILE",
                     help="Write to FILE instead of standard output.")  # fmt: skip
 
@@ -60,8 +60,8 @@ Examples:
 @click.option("--state", default="", metavar="NAME",
               help="The variable whose values are the states; else cur_state, else the only one that fits.")  # fmt: skip
 @_OUT
-@_TIMEOUT
-def graph(named: str, form: str | None, lines: bool, state: str, out: Path | None, timeout: float) -> int:
+@_STEPS
+def graph(named: str, form: str | None, lines: bool, state: str, out: Path | None, steps: int) -> int:
     """Draw the state graph of TABLE: a name, FILE.rcs, FILE.rcs:NAME, or a folder for all of its tables.
 
     An arrow is a line of the table, from each state in which it can match (Z3, under the table's assumptions) to the state that its
@@ -72,7 +72,7 @@ def graph(named: str, form: str | None, lines: bool, state: str, out: Path | Non
         found = _found(named, running=lines)
         if len(found) > 1 and out is None:
             raise click.UsageError(f"{named} has {len(found)} tables: name one, or a folder with -o")
-        _draw_all(found, form or _form_of(out), lines, state, out, _options(timeout))
+        _draw_all(found, form or _form_of(out), lines, state, out, _options(steps))
     except _WrongError as error:
         return error.shown("graph")
     return 0
@@ -112,10 +112,10 @@ def _draw_all(
         raise _WrongError(tuple(wrong), texts)
 
 
-def _options(timeout_s: float) -> "Options":
+def _options(steps: int) -> "Options":
     from rcsc.prove.options import Options
 
-    return Options(timeout_ms=max(1, round(timeout_s * 1000)))
+    return Options(steps=steps)
 
 
 def _form_of(out: Path | None) -> str:
@@ -206,9 +206,9 @@ Examples:
 @click.option("--in", "place", type=click.Path(exists=True, dir_okay=False), default=None, metavar="FILE",
               help="Write all of FILE.rcs, with the table in place of the one of its name.")  # fmt: skip
 @_OUT
-@_TIMEOUT
+@_STEPS
 def table(
-    drawn: str, form: str | None, other: str | None, place: str | None, out: Path | None, timeout: float
+    drawn: str, form: str | None, other: str | None, place: str | None, out: Path | None, steps: int
 ) -> int:
     """Make the table that GRAPH says, in DOT, Mermaid or SCXML as `rcsc graph` writes them, or `-`.
 
@@ -218,7 +218,7 @@ def table(
     try:
         made = _tabled(drawn, form)
         if other is not None:
-            _prove(made, other, _options(timeout))
+            _prove(made, other, _options(steps))
         _write(made.text() if place is None else _placed(made, place), out)
     except _WrongError as error:
         return error.shown("table")

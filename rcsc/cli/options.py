@@ -21,17 +21,24 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
+def steps_option(default: float) -> Callable[[Command], Command]:
+    """Adds `--steps`, in millions; the command gets `steps`, in single ones."""
+    return click.option(
+        "--steps",
+        type=click.FloatRange(min=0, min_open=True),
+        default=default,
+        show_default=True,
+        metavar="MILLIONS",
+        callback=lambda _context, _option, millions: max(1, round(millions * 1_000_000)),
+        help="Budget of each question to the solver, in its own steps, which are the same on every machine: a million takes "
+        "some tenths of a second. Past it the answer is `undecided`, never `proved`.",
+    )
+
+
 def proving(command: Command) -> Command:
     """Adds the options that say how to prove; the command gets them as `options` and `use_cache`."""
 
-    @click.option(
-        "--timeout",
-        type=click.FloatRange(min=0, min_open=True),
-        default=5.0,
-        show_default=True,
-        metavar="SECONDS",
-        help="Time limit of each question to the solver; past it the answer is `undecided`, never `proved`.",
-    )
+    @steps_option(20)
     @click.option(
         "--memory",
         type=click.IntRange(min=64),
@@ -60,7 +67,7 @@ def proving(command: Command) -> Command:
     @wraps(command)
     def wrapped(
         *args: Any,
-        timeout: float,
+        steps: int,
         memory: int,
         solver: Literal["auto", "both", "boxes"],
         jobs: int,
@@ -70,7 +77,7 @@ def proving(command: Command) -> Command:
         from rcsc.prove.options import Options
 
         options = Options(
-            timeout_ms=max(1, round(timeout * 1000)),
+            steps=steps,
             memory_mb=memory,
             solver=solver,
             jobs=jobs or cores(),

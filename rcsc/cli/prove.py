@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from rcsc.cli.cell import Stopped, stop, system_path
+from rcsc.cli.options import steps_option
 from rcsc.cli.show import UnwritableError
 
 _WIDTH = 118
@@ -47,8 +48,7 @@ Examples:
     "system", required=False, type=click.Path(exists=True, dir_okay=False, path_type=Path), metavar="[SYSTEM]"
 )
 @click.option("--level", "only", multiple=True, metavar="NAME", help="Only this level (repeatable).")
-@click.option("--timeout", type=click.FloatRange(min=0, min_open=True), default=20.0, show_default=True,
-              metavar="SECONDS", help="Time limit of each question to the solver.")  # fmt: skip
+@steps_option(80)
 @click.option("--jobs", "-j", type=click.IntRange(min=1), default=min(2, os.cpu_count() or 1), show_default=True,
               help="Levels proved at once.")  # fmt: skip
 @click.option("--trace", "cycles", type=click.IntRange(min=0, max=40), default=8, show_default=True, metavar="N",
@@ -73,7 +73,7 @@ Examples:
 @click.option("--invariants", is_flag=True, help="Print the invariant of each level, too.")
 @click.option("--json", "as_json", is_flag=True, help="The result as JSON.")
 def prove(  # noqa: PLR0913, PLR0917  # as many as there are options
-    system: Path | None, only: tuple[str, ...], timeout: float, jobs: int, cycles: int, logs: Path | None,
+    system: Path | None, only: tuple[str, ...], steps: int, jobs: int, cycles: int, logs: Path | None,
     freeze: Path | None, cases: tuple[Path, ...], without_deferral: bool, first_match: bool, without_default: bool,
     certificate: Path | None, confirms: bool, no_cache: bool, invariants: bool, as_json: bool,
 ) -> int:  # fmt: skip
@@ -88,6 +88,7 @@ def prove(  # noqa: PLR0913, PLR0917  # as many as there are options
     from rcsc.compose.system import NoProgramError, prove_steppers, steppers
     from rcsc.compose.variants import VARIANTS
     from rcsc.diagnostics.codes import Code
+    from rcsc.prove.smt import Limits
     from rcsc.system.description import BadDescription
 
     if confirms and importlib.util.find_spec("cvc5") is None:
@@ -112,7 +113,7 @@ def prove(  # noqa: PLR0913, PLR0917  # as many as there are options
     variants = tuple(name for name, wanted in asked.items() if wanted)
     for name in variants:
         made = {level: one.of(VARIANTS[name](one.program)) for level, one in made.items()}
-    effort = Effort(timeout_ms=int(timeout * 1000))
+    effort = Effort(limits=Limits.of(steps))
     cache = None if no_cache else open_cache(path.parent)
     proof = prove_steppers(made, effort, jobs, only or tuple(made), None if as_json else _say_level, cache)
     if certificate is not None:

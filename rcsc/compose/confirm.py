@@ -13,7 +13,7 @@ from rcsc.compose.keyed import Keyed
 from rcsc.compose.transition import Cycle
 from rcsc.model import Bool
 from rcsc.prove import smt, values
-from rcsc.prove.smt import Solver, Term
+from rcsc.prove.smt import Limits, Solver, Term
 from rcsc.prove.values import Node
 
 
@@ -33,7 +33,7 @@ class Confirmation:
     cycle: Cycle
     cases: Sequence[Node]
     keyed: Keyed
-    timeout_ms: int
+    limits: Limits
     rested_on: list[Solver] = field(default_factory=list)
     _literals: dict[tuple[bool, int, int], Term] = field(default_factory=dict)
     _nodes: dict[tuple[bool, int], Node] = field(default_factory=dict)
@@ -83,14 +83,14 @@ class Confirmation:
         contract = self.keyed.term(self.cycle.contract)
         for case in self.cases:
             self.keyed.term(case)
-        solver = Solver(self.timeout_ms, remembers=True)
+        solver = Solver(self.limits, remembers=True)
         solver.add(*self.keyed.ranges, contract, *held)
         return solver
 
     def in_other_terms(self, keyed: Keyed) -> "Confirmation":
         """The same, asked in other terms."""
         return Confirmation(
-            self.features, self.firsts, self.cycle, self.cases, keyed, self.timeout_ms, self.rested_on
+            self.features, self.firsts, self.cycle, self.cases, keyed, self.limits, self.rested_on
         )
 
     def step_question(self, clauses: Sequence[Clause], case: Node) -> Solver:
@@ -111,7 +111,7 @@ class Confirmation:
     def beginning(self, first: Cycle) -> Solver:
         """A solver in which a first cycle runs."""
         contract = self.keyed.term(first.contract)
-        solver = Solver(self.timeout_ms)
+        solver = Solver(self.limits)
         solver.add(*self.keyed.ranges, contract)
         return solver
 

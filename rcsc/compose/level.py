@@ -19,10 +19,10 @@ from rcsc.compose.frames import Clause
 from rcsc.compose.goals import Goal, Sort, goals
 from rcsc.compose.keyed import Keyed
 from rcsc.compose.sat import GaveUpError
-from rcsc.compose.search import Effort, Found, search, strengthened
+from rcsc.compose.search import LIMITS, Effort, Found, search, strengthened
 from rcsc.compose.transition import Cycle, Stepper
 from rcsc.prove import smt, values
-from rcsc.prove.smt import Answer, Solver, Term
+from rcsc.prove.smt import Answer, Limits, Solver, Term
 
 
 class NotConfirmedError(Exception):
@@ -98,14 +98,14 @@ def besides(proof: LevelProof) -> tuple[Goal, ...]:
 def prove_level(stepper: Stepper, effort: Effort | None = None) -> LevelProof:
     """Proves every goal of a level that can be proved with the invariants found, and looks at its lines in their context."""
     effort = effort or Effort()
-    begun = time.perf_counter()
+    begun, cut_before = time.perf_counter(), smt.cut_short()
     cycle, firsts = stepper.cycle(stepper.anywhere()), tuple(_firsts(stepper).values())
     wanted = goals(stepper, cycle)
     seen: Context | None = None
     ends: tuple[Ending, ...] = ()
     try:
         found = search(stepper, firsts, cycle, wanted, effort)
-        asked = _asked_anew(found.features, firsts, cycle, effort.timeout_ms)
+        asked = _asked_anew(found.features, firsts, cycle, effort.limits)
         looks = effort.looks and not any(wanted[at].sort is not Sort.NUMBERED for at in found.open)
         flow = Flow(stepper, asked, found.clauses)
         if looks and (others := flow.ways_round()):
@@ -115,8 +115,9 @@ def prove_level(stepper: Stepper, effort: Effort | None = None) -> LevelProof:
         verdicts = list(_verdicts(stepper, asked, found, wanted))
         if looks:
             seen, ends = context(stepper, asked, found.clauses), tuple(flow.endings())
+        _uncut(cut_before)
     except (GaveUpError, NotConfirmedError):
-        found = Found()
+        found, seen, ends = Found(), None, ()
         verdicts = [(goal, Verdict.UNDECIDED) for goal in wanted]
     return LevelProof(
         stepper.level.name,
@@ -131,10 +132,20 @@ def prove_level(stepper: Stepper, effort: Effort | None = None) -> LevelProof:
     )
 
 
+def _uncut(before: int) -> None:
+    """Nothing is said where the processor time ended a question: another machine might have found something else.
+
+    Raises:
+        GaveUpError: It did.
+    """
+    if smt.cut_short() > before:
+        raise GaveUpError
+
+
 def _asked_anew(
-    features: tuple[Feature, ...], firsts: tuple[Cycle, ...], cycle: Cycle, timeout_ms: int
+    features: tuple[Feature, ...], firsts: tuple[Cycle, ...], cycle: Cycle, limits: Limits
 ) -> Confirmation:
-    return Confirmation(features, firsts, cycle, [at.chosen for at in cycle.tables], Keyed(), timeout_ms)
+    return Confirmation(features, firsts, cycle, [at.chosen for at in cycle.tables], Keyed(), limits)
 
 
 def _confirm(asked: Confirmation, clauses: Sequence[Clause]) -> None:
@@ -189,7 +200,7 @@ def _asked(solver: Solver, term: Term) -> Answer:
     return answer
 
 
-def certificate(stepper: Stepper, proof: LevelProof, timeout_ms: int = 20_000) -> dict[str, str]:
+def certificate(stepper: Stepper, proof: LevelProof, limits: Limits = LIMITS) -> dict[str, str]:
     """Questions in SMT-LIB, each to be answered `unsat` by any solver, that together show what was proved.
 
     `first` and `restart`: such a cycle leads into the invariant; `step TABLE`: a later cycle in which this table runs keeps
@@ -199,7 +210,7 @@ def certificate(stepper: Stepper, proof: LevelProof, timeout_ms: int = 20_000) -
     has them when they are looked at again, one question is there that has a model.
     """
     cycle, firsts = stepper.cycle(stepper.anywhere()), _firsts(stepper)
-    asked = _asked_anew(proof.features, tuple(firsts.values()), cycle, timeout_ms)
+    asked = _asked_anew(proof.features, tuple(firsts.values()), cycle, limits)
     clauses = proof.clauses
     found = {name: asked.first_question(clauses, first).script() for name, first in firsts.items()}
     for at in cycle.tables:

@@ -10,6 +10,8 @@ from typing import Any
 
 BUDGET = 400_000
 """Conflicts after which a question is given up: an effort that is the same on every machine."""
+QUESTIONS, CONFLICTS = 200_000, 4_000_000
+"""Of one solver in all, after which a search is given up, likewise; TASK's asks some 4,000 and meets 30,000 conflicts."""
 
 
 class GaveUpError(Exception):
@@ -52,10 +54,13 @@ class Sat:
         """Whether everything asserted, and these literals, hold together.
 
         Raises:
-            GaveUpError: After `BUDGET` conflicts.
+            GaveUpError: After `BUDGET` conflicts; after `QUESTIONS` questions or `CONFLICTS` conflicts in all.
         """
         self.queries += 1
-        self._solver.conf_budget(BUDGET)
+        left = CONFLICTS - self._solver.accum_stats()["conflicts"]
+        if self.queries > QUESTIONS or left <= 0:
+            raise GaveUpError
+        self._solver.conf_budget(min(BUDGET, left))
         try:
             answer = self._solver.solve_limited(assumptions=list(assuming))
         except _interrupted() as error:  # it takes Ctrl-C for itself

@@ -15,8 +15,11 @@ from rcsc.compose.goals import Goal, Sort, goals
 from rcsc.compose.properties import every_feature
 from rcsc.compose.transition import Cycle, Stepper
 from rcsc.compose.walk import Walk
+from rcsc.prove.smt import Limits
 from rcsc.prove.values import TRUE, Node
 
+LIMITS = Limits.of(80_000_000)
+"""A question about a cycle is larger than one about a table."""
 A_TABLE = 4
 """Walks for each table, at least, so that there are some of every command: what walks show need not be asked."""
 
@@ -27,13 +30,13 @@ class Effort:
 
     Attributes:
         walks: Random walks before the search, each of `cycles` cycles; more of them where there are many tables (`A_TABLE`).
-        timeout_ms: For each question to Z3; past it the answer is *undecided*, never *proved*.
+        limits: For each question to Z3; past them the answer is *undecided*, never *proved*.
         looks: Whether the lines are looked at in their context, too (`context`, `ends`).
     """
 
     walks: int = 24
     cycles: int = 100
-    timeout_ms: int = 20_000
+    limits: Limits = LIMITS
     looks: bool = True
 
 

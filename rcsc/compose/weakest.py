@@ -64,7 +64,7 @@ def around(program: Program, table: Table, seen: Snapshot) -> Region:
     decided = boxes.Boxes.of(program, table)
     kinds = {str(v.name): v.type for v in program.variables}
     cell = {name: (key_of(kinds[name], seen[name]),) * 2 for name in decided.names}
-    found = boxes.Search(decided, frozenset()).grown(cell, ())
+    found = boxes.Search.of(decided, disjoint=True).grown(cell, ())
     return decided.narrowed(found)
 
 
@@ -76,12 +76,15 @@ def weakest_condition(program: Program, table: Table) -> str:
         regions.append(decided.both(first, second).region or {})
         if len(regions) > MOST_REGIONS:
             return ""
-    search = boxes.Search(decided, decided.apart(disjoint=not regions))
+    search = boxes.Search.of(decided, disjoint=not regions)
     gaps: list[Mapping[str, Box]] = []
-    while (cell := search.least(gaps)) is not None:
-        gaps.append(search.grown(cell, gaps))
-        if len(regions) + len(gaps) > MOST_REGIONS:
-            return ""
+    try:
+        while (cell := search.least(gaps)) is not None:
+            gaps.append(search.grown(cell, gaps))
+            if len(regions) + len(gaps) > MOST_REGIONS:
+                return ""
+    except boxes.BudgetError:
+        return ""
     every = [*regions, *(decided.narrowed(gap) for gap in gaps)]
     return " and ".join(f"not ({_conditions(program, region)})" for region in every)
 

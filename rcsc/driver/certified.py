@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from rcsc.model import Program, Table
 
 MOST_PROBLEMS = 10
-REFUTING_MS = 10_000
 
 
 def kept(path: Path) -> Mapping[str, object] | Diagnostic:
@@ -98,7 +97,7 @@ def refuter(
     from rcsc.prove.smt import Answer, Solver
 
     frame, ranges = declared(program.variables)
-    solver = Solver(REFUTING_MS)
+    solver = Solver()
     solver.add(*ranges, *(encode(condition, frame) for condition in asked))
     return "z3 alone (cvc5 is not installed)" if solver.check() is Answer.UNSATISFIABLE else ""
 

@@ -76,7 +76,7 @@ def proofs(options: Options) -> Proofs:
 
     def solver(program: Program, condition: Expr) -> Snapshot | Missing:
         frame, ranges = declared(program.variables)
-        asked = Solver(options.timeout_ms, options.memory_mb)
+        asked = Solver(options.limits)
         asked.add(*ranges, encode(condition, frame))
         answer = asked.check()
         if answer is Answer.SATISFIABLE:

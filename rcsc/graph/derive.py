@@ -75,7 +75,7 @@ def derive(
 
 def _undecided(table: Table) -> Diagnostic:
     message = f"the steps of table `{table.name}` are not decided within the limits"
-    return Diagnostic(Code.UNDECIDED, message, Label(table.span), help=("raise `--timeout`",))
+    return Diagnostic(Code.UNDECIDED, message, Label(table.span), help=("raise `--steps`",))
 
 
 def _state(program: Program, table: Table, wanted: str) -> Variable | Diagnostic:

@@ -26,7 +26,7 @@ def derive_lines(program: Program, table: Table, file: tree.File, options: Optio
         follows = following(program, table, options)
     except UnansweredError:
         message = f"which lines of table `{table.name}` can follow which is not decided within the limits"
-        return Diagnostic(Code.UNDECIDED, message, Label(table.span), help=("raise `--timeout`",))
+        return Diagnostic(Code.UNDECIDED, message, Label(table.span), help=("raise `--steps`",))
     written = next(
         one for one in file.declarations if isinstance(one, tree.TableDecl) and one.name.text == table.name
     )

@@ -108,7 +108,7 @@ def _findings(verdict: Comparison, program: Program, table: Table) -> tuple[Diag
             return ()
         case NotDecided():
             message = f"whether the graph says table `{table.name}` is not decided within the limits"
-            return (Diagnostic(Code.UNDECIDED, message, Label(table.span), help=("raise `--timeout`",)),)
+            return (Diagnostic(Code.UNDECIDED, message, Label(table.span), help=("raise `--steps`",)),)
         case Differs(witness=witness, first=first, second=second, changed=changed):
             shown = [
                 (v, value) for v, value in witness if any(v.name == one.name for one in program.variables)

@@ -24,7 +24,7 @@ class Asked:
     def __init__(self, program: Program, table: Table, options: Options) -> None:
         self.program, self.table = program, table
         self.frame, domain = declared(program.variables)
-        self.solver = Solver(options.timeout_ms, options.memory_mb)
+        self.solver = Solver(options.limits)
         self.solver.add(*domain)
         wanted = set(table.assumptions)
         self.solver.add(*[encode(a.condition, self.frame) for a in program.assumptions if a.name in wanted])

@@ -10,12 +10,17 @@ all keys of a class are alike. Source: `notes/performance.md`, A.3.
 from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import islice
 from math import prod
 
 from rcsc.model import Box, Program, Table, key_bounds, value_of_key
 from rcsc.prove.verdict import Gap, Overlap, Region, Witness
 
 MOST_GAPS = 3
+MOST_PAIRS = 10_000
+"""Overlapping pairs that are told apart; a report shows a few."""
+BUDGET = 5_000_000
+"""Of a search for gaps: lines, pairs and classes looked at, which is the same on every machine."""
 BoxLine = Mapping[str, Box]
 
 
@@ -77,6 +82,10 @@ def lines_of(table: Table) -> list[dict[str, Box]]:
     return lines
 
 
+class BudgetError(Exception):
+    """A search for gaps looked at more than `BUDGET`; whether there is one (or another one) is open."""
+
+
 @dataclass(slots=True)
 class Boxes:
     """One table as boxes.
@@ -108,6 +117,12 @@ class Boxes:
 
     def overlaps(self) -> Iterator[tuple[int, int]]:
         """Every pair of lines that some input matches both of, first line first."""
+        for at, others in self.meeting():
+            for other in bits_of(others):
+                yield at, other
+
+    def meeting(self) -> Iterator[tuple[int, int]]:
+        """Each line that overlaps a later one, with the mask of those later ones."""
         everyone = (1 << len(self.lines)) - 1
         for at in self.dead():
             everyone &= ~(1 << at)
@@ -124,10 +139,8 @@ class Boxes:
                 if not others:
                     break
                 others &= meets[name, box]
-            while others:
-                lowest = others & -others
-                yield at, lowest.bit_length() - 1
-                others ^= lowest
+            if others:
+                yield at, others
 
     def _by_box(self) -> dict[str, dict[Box, int]]:
         """For each variable its distinct boxes, with the lines that state them as bytes, then integers."""
@@ -162,15 +175,20 @@ class Boxes:
 
     def both(self, first: int, second: int) -> Overlap:
         """The overlap of two lines: its least witness, and the whole region where both match."""
-        one, two = self.lines[first], self.lines[second]
-        region: dict[str, Box] = {}
-        for name in self.names:
-            if name in one or name in two:
-                whole = (self.extents[name],)
-                region[name] = meet(one.get(name, whole), two.get(name, whole))
+        region = common(self.lines[first], self.lines[second])
+        assert region is not None  # they overlap
         return Overlap(
             first, second, self.witness({n: box[0][0] for n, box in region.items()}), self.narrowed(region)
         )
+
+    def piece(self, sign: int, box: BoxLine) -> "Piece":
+        """A box as it is counted."""
+        sizes = [1]
+        for name in reversed(self.names):
+            low, high = self.extents[name]
+            sizes.append(sizes[-1] * (size(box[name]) if name in box else high - low + 1))
+        sizes.reverse()
+        return Piece(sign, box, sizes)
 
     def witness(self, keys: Mapping[str, int]) -> Witness:
         """The values of these keys; the least of every other variable."""
@@ -187,44 +205,29 @@ class Boxes:
         """How many inputs there are."""
         return prod(high - low + 1 for low, high in self.extents.values())
 
-    def covered(self) -> int:
-        """How many inputs the lines match together, where no two overlap."""
-        full = {name: high - low + 1 for name, (low, high) in self.extents.items()}
-        whole = prod(full.values())
-        sizes: dict[tuple[str, Box], int] = {}
-        total = 0
-        for boxes in self.lines:
-            above = below = 1
-            for name, box in boxes.items():
-                if (name, box) not in sizes:
-                    sizes[name, box] = size(box)
-                above *= sizes[name, box]
-                below *= full[name]
-            total += whole * above // below
-        return total
-
     def gap(self, disjoint: bool) -> Gap | None:
-        """What no line matches: up to three witnesses with regions, and the count where lines are disjoint."""
-        count = None
-        if disjoint:
-            missing = self.volume() - self.covered()
-            if not missing:
-                return None
-            count = (missing, self.volume())
+        """What no line matches: up to three witnesses with regions, and the count where lines are disjoint.
+
+        Raises:
+            BudgetError: Whether there is anything was not found out.
+        """
+        search = Search.of(self, disjoint)
+        missing = search.missing()
+        if not missing:
+            return None
+        count = (missing, self.volume()) if search.exact else None
         shown: list[dict[str, Box]] = []
         witnesses = []
-        search = Search(self, self.apart(disjoint))
-        while len(shown) < MOST_GAPS and (cell := search.least(shown)) is not None:
-            shown.append(search.grown(cell, shown))
-            witnesses.append(self.witness({name: low for name, (low, _) in cell.items()}))
+        try:
+            while len(shown) < MOST_GAPS and (cell := search.least(shown)) is not None:
+                shown.append(search.grown(cell, shown))
+                witnesses.append(self.witness({name: low for name, (low, _) in cell.items()}))
+        except BudgetError:
+            if not witnesses:
+                raise
         if not witnesses:
             return None
         return Gap(tuple(witnesses), tuple(self.narrowed(region) for region in shown), count)
-
-    def apart(self, disjoint: bool) -> frozenset[int]:
-        """Lines no two of which overlap: all but the later one of each overlapping pair."""
-        everyone = frozenset(range(len(self.lines)))
-        return everyone if disjoint else everyone - {second for _, second in self.overlaps()}
 
     def classes(self, name: str) -> "Classes":
         """The keys of a variable, cut where some line's box begins or ends."""
@@ -250,28 +253,66 @@ class Classes:
 Cell = dict[str, tuple[int, int]]
 
 
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """A box that counts as many inputs as it has, or (with `sign` -1) takes as many away.
+
+    Attributes:
+        sizes: For each position in the table's variables, how many inputs it has in those from there on; last 1.
+    """
+
+    sign: int
+    box: BoxLine
+    sizes: Sequence[int]
+
+
 @dataclass(slots=True)
 class Search:
     """Looks for the least input that no line matches.
 
+    A slice that the lines fill has nothing to look for: that is what keeps the search short. How many inputs lines fill together
+    is counted by inclusion and exclusion. Lines no two of which overlap are counted as they are; of every other line what it adds
+    to them: its size, less what it shares with each of them, less what it and another such line both add, and so on. For
+    `a` = 0 .. 6, `b` = 5 .. 9 of 0 .. 9 that is 7 + (5 - 2) = 10, all there are. Where this takes too many terms, lines are left
+    out of the count; what is counted is then too little, which only makes the search longer.
+
     Attributes:
-        apart: Lines no two of which overlap. Where they, and regions shown before, already add up to a whole
-            slice, there is nothing to look for in it: that is what keeps the search short.
+        pieces: The terms of the count.
+        exact: Whether every line is in it.
     """
 
     table: Boxes
-    apart: frozenset[int]
+    pieces: Sequence[Piece]
+    exact: bool
     _without: set[tuple[int, frozenset[int]]] = field(default_factory=set)
-    _sizes: dict[int, list[int]] = field(default_factory=dict)
+    _looked_at: int = 0
 
-    def least(self, shown: Sequence[Mapping[str, Box]]) -> Cell | None:
-        """The least cell of classes outside all lines and outside the regions shown; None where there is none."""
+    @classmethod
+    def of(cls, table: Boxes, disjoint: bool) -> "Search":
+        """The search of a table; `disjoint` where no two of its lines overlap."""
+        counting = Counting(table, {} if disjoint else dict(table.meeting()))
+        return cls(table, counting.pieces, counting.exact)
+
+    def missing(self) -> int:
+        """How many inputs no line matches, where the count is exact; else as many or fewer."""
+        filled = sum(piece.sign * piece.sizes[0] for piece in self.pieces)
+        return self.table.volume() - filled
+
+    def least(self, shown: Sequence[BoxLine]) -> Cell | None:
+        """The least cell of classes outside all lines and outside the regions shown; None where there is none.
+
+        Raises:
+            BudgetError: It was not found within `BUDGET`.
+        """
         lines = [*self.table.lines, *shown]
         self._without = set()
         alive = [at for at, boxes in enumerate(lines) if all(boxes.values())]
-        return self._search(0, alive, lines)
+        regions = [self.table.piece(1, region) for region in shown]  # they meet no line and not each other
+        return self._search(0, alive, lines, [*self.pieces, *regions])
 
-    def _search(self, depth: int, alive: list[int], lines: Sequence[Mapping[str, Box]]) -> Cell | None:
+    def _search(
+        self, depth: int, alive: list[int], lines: Sequence[BoxLine], pieces: Sequence[Piece]
+    ) -> Cell | None:
         names = self.table.names[depth:]
         if not alive:
             return {name: (self.table.extents[name][0],) * 2 for name in names}
@@ -281,53 +322,37 @@ class Search:
         if memory in self._without:
             return None
         name = names[0]
-        for low, high in self._short(depth, alive, lines):
+        for low, high in self._short(depth, pieces):
+            self._looked_at += len(alive) + len(pieces)
+            if self._looked_at > BUDGET:
+                raise BudgetError
             inside = [at for at in alive if name not in lines[at] or _holds(lines[at][name], low)]
-            found = self._search(depth + 1, inside, lines)
+            counted = [one for one in pieces if name not in one.box or _holds(one.box[name], low)]
+            found = self._search(depth + 1, inside, lines, counted)
             if found is not None:
                 return {name: (low, high), **found}
         self._without.add(memory)
         return None
 
-    def _short(
-        self, depth: int, alive: list[int], lines: Sequence[Mapping[str, Box]]
-    ) -> Iterator[tuple[int, int]]:
-        """Classes of the variable at `depth` that the lines apart do not fill, counted in one sweep."""
+    def _short(self, depth: int, pieces: Sequence[Piece]) -> Iterator[tuple[int, int]]:
+        """Classes of the variable at `depth` that the pieces do not fill, counted in one sweep."""
         name = self.table.names[depth]
         extents = [self.table.extents[other] for other in self.table.names[depth + 1 :]]
         whole = prod(high - low + 1 for low, high in extents)
         everywhere, change = 0, dict[int, int]()
-        for at in alive:
-            if self._is_apart(at):
-                inside = self._rest(at, lines[at])[depth + 1]
-                if name not in lines[at]:
-                    everywhere += inside
-                for low, high in lines[at].get(name, ()):
-                    change[low] = change.get(low, 0) + inside
-                    change[high + 1] = change.get(high + 1, 0) - inside
+        for piece in pieces:
+            inside = piece.sign * piece.sizes[depth + 1]
+            if name not in piece.box:
+                everywhere += inside
+            for low, high in piece.box.get(name, ()):
+                change[low] = change.get(low, 0) + inside
+                change[high + 1] = change.get(high + 1, 0) - inside
         classes = self.table.classes(name)
+        self._looked_at += len(classes.starts)
         for low, high in zip(classes.starts, classes.ends, strict=True):
             everywhere += change.get(low, 0)
             if everywhere != whole:
                 yield low, high
-
-    def _rest(self, at: int, boxes: Mapping[str, Box]) -> list[int]:
-        """For each depth how many inputs the line matches in the variables from there on."""
-        known = self._sizes.get(at)
-        if known is None:
-            known = [1]
-            for name in reversed(self.table.names):
-                low, high = self.table.extents[name]
-                known.append(known[-1] * (size(boxes[name]) if name in boxes else high - low + 1))
-            known.reverse()
-            if at < len(self.table.lines):
-                self._sizes[at] = known
-        return known
-
-    def _is_apart(self, at: int) -> bool:
-        return at in self.apart or at >= len(
-            self.table.lines
-        )  # regions shown meet no line and not each other
 
     def grown(self, cell: Cell, shown: Sequence[Mapping[str, Box]]) -> dict[str, Box]:
         """A maximal region around the cell that no line and no region shown touches, grown in declared order."""
@@ -348,6 +373,97 @@ class Search:
                 if not any(name not in boxes or _holds(boxes[name], low) for boxes in close)
             )
         return region
+
+
+class Counting:
+    """What lines fill together, by inclusion and exclusion (`Search`).
+
+    Attributes:
+        pieces: Boxes with signs, whose sizes add up to it.
+        exact: Whether every line is counted.
+    """
+
+    def __init__(self, table: Boxes, met: Mapping[int, int]) -> None:
+        """Count the lines of a table; `met` has for each the mask of later ones that it overlaps."""
+        self.table, self.lines = table, table.lines
+        self._most = 4 * len(self.lines) + 256
+        self._near, crossing = _crossing(met)
+        self._apart = ((1 << len(self.lines)) - 1) & ~sum(1 << at for at in crossing)
+        self._added: list[tuple[Piece, int]] = []  # with the lines apart that it may meet
+        self.pieces = [table.piece(1, self.lines[at]) for at in bits_of(self._apart)]
+        counted = [self._count(at) for at in reversed(crossing)]  # first those that meet few
+        self.exact = all(counted)
+
+    def _count(self, at: int) -> bool:
+        """Counts a line more, unless that takes too many terms; says whether it did."""
+        if at not in self._near:
+            return False
+        room = self._most - len(self.pieces)
+        added = list(islice(self._alone(at), room + 1))
+        shared = (
+            self.table.piece(-piece.sign, both)
+            for piece, near in added
+            for other in bits_of(near)
+            if (both := common(piece.box, self.lines[other])) is not None
+        )
+        new = [*(piece for piece, _ in added), *islice(shared, room + 1)]
+        if len(new) > room:
+            return False
+        self.pieces += new
+        self._added += added
+        return True
+
+    def _alone(self, at: int) -> Iterator[tuple[Piece, int]]:
+        """What the line adds to those that were counted beside the lines apart."""
+        yield self.table.piece(1, self.lines[at]), self._near[at] & self._apart
+        for piece, near in self._added:
+            both = common(piece.box, self.lines[at])
+            if both is not None:
+                yield self.table.piece(-piece.sign, both), near & self._near[at]
+
+
+def common(one: BoxLine, two: BoxLine) -> dict[str, Box] | None:
+    """The inputs of both; None where there are none."""
+    found = dict(one)
+    for name, box in two.items():
+        found[name] = meet(found[name], box) if name in found else box
+        if not found[name]:
+            return None
+    return found
+
+
+def _crossing(met: Mapping[int, int]) -> tuple[dict[int, int], list[int]]:
+    """Which lines each line overlaps, and lines without which no two do: always the one that overlaps most others.
+
+    Where very many pairs overlap these are the later line of each, and the first answer is left empty.
+    """
+    if sum(others.bit_count() for others in met.values()) > 50 * MOST_PAIRS:
+        later = 0
+        for others in met.values():
+            later |= others
+        return {}, list(bits_of(later))
+    near: dict[int, int] = {}
+    for at, others in met.items():
+        near[at] = near.get(at, 0) | others
+        for other in bits_of(others):
+            near[other] = near.get(other, 0) | 1 << at
+    left, found = dict(near), list[int]()
+    while left:
+        most = max(left, key=lambda at: (left[at].bit_count(), at))
+        for other in bits_of(left.pop(most)):
+            left[other] &= ~(1 << most)
+            if not left[other]:
+                del left[other]
+        found.append(most)
+    return near, found
+
+
+def bits_of(mask: int) -> Iterator[int]:
+    """Positions of the bits that are set, from the lowest."""
+    while mask:
+        lowest = mask & -mask
+        yield lowest.bit_length() - 1
+        mask ^= lowest
 
 
 def _holds(box: Box, key: int) -> bool:

@@ -13,7 +13,7 @@ from rcsc.source import Span
 
 MOST_WITNESSES = 3
 
-_PATIENCE = ("give each query more time with `--timeout`, or narrow the declared ranges",)
+_PATIENCE = ("give each query more steps with `--steps`, or narrow the declared ranges",)
 _HELP: dict[Code, tuple[str, ...]] = {
     Code.OVERFLOW: ("narrow the declared ranges, or guard the operation with `if`",),
     Code.DIVISION_BY_ZERO: ("guard the division with `if`, or exclude zero from the divisor's range",),

@@ -81,7 +81,7 @@ class Space:
 
     def solver(self, *nodes: Node) -> Solver:
         """A solver that knows the domain, what is given, and these."""
-        made = Solver(self.options.timeout_ms, self.options.memory_mb)
+        made = Solver(self.options.limits)
         made.add(*values.domain(self.nodes.values()), *map(values.term_of, (*self.given, *nodes)))
         return made
 

@@ -146,7 +146,7 @@ class _Question:
         return answer
 
     def _fresh(self) -> Solver:
-        solver = Solver(self.asker.options.timeout_ms, self.asker.options.memory_mb)
+        solver = Solver(self.asker.options.limits)
         solver.add(*self.base)
         return solver
 

@@ -134,7 +134,7 @@ class _Cycles:
             self._before_table(run)
             known = [*facts, lines[at], *self._facts(run)]
             nexts = self._lines(run)
-            solver = Solver(self.options.timeout_ms, self.options.memory_mb)
+            solver = Solver(self.options.limits)
             solver.add(
                 *values.domain(values.variables([*known, *nexts]).values()),
                 *loosened(known + nexts, self.loose),

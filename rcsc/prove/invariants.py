@@ -71,7 +71,7 @@ def assumptions_satisfiable(program: Program, table: Table, options: Options) ->
     from rcsc.prove.smt import Solver
 
     frame, domain = declared(program.variables)
-    solver = Solver(options.timeout_ms, options.memory_mb)
+    solver = Solver(options.limits)
     solver.add(*domain, *(encode(condition, frame) for condition in conditions))
     return solver.check()
 

@@ -83,6 +83,16 @@ def _verdicts(
 
 
 def _verdict(program: Program, table: Table, options: Options) -> TableVerdict:
+    """One table; where the solver was cut short, which another machine might not have done, it is left open."""
+    before = smt.cut_short()
+    verdict = _uncut_verdict(program, table, options)
+    if smt.cut_short() > before:
+        left = Undecided("a question to the solver took more processor time than it may")
+        verdict = replace(verdict, found=(*verdict.found, left), certificate=None)
+    return verdict
+
+
+def _uncut_verdict(program: Program, table: Table, options: Options) -> TableVerdict:
     """One table, its assumptions not contradictory; exhausted memory leaves it open."""
     try:
         verdict = prove_table(program, table, options)

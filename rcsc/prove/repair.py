@@ -97,9 +97,10 @@ def closing_line(program: Program, table: Table, found: Gap) -> str | None:
         return None
     decided = boxes.Boxes.of(program, table)
     decided.lines.append(dict(region.items()))
-    if any(len(decided.lines) - 1 in pair for pair in decided.overlaps()):
+    pairs = list(decided.overlaps())
+    if any(len(decided.lines) - 1 in pair for pair in pairs):
         return None
     row = " | ".join(["new", *cells])
-    closes = found.count is not None and decided.covered() == decided.volume()
+    closes = not boxes.Search.of(decided, disjoint=not pairs).missing()
     what = "closes the gap" if closes else "closes this part of the gap"
     return f"a line `| {row} || ... |` {what} and overlaps no other: proved"

@@ -6,7 +6,7 @@ from math import prod
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label, MatchedLine, Severity, WitnessColumn
 from rcsc.model import Program, Scalar, Table, key_bounds, spell
-from rcsc.prove import words
+from rcsc.prove import boxes, words
 from rcsc.prove.boxes import size
 from rcsc.prove.certificate import must_cover
 from rcsc.prove.repair import closing_line, parting_cell
@@ -32,7 +32,10 @@ def diagnostics(program: Program, verdict: TableVerdict) -> list[Diagnostic]:
     overlaps = [one for one in verdict.found if isinstance(one, Overlap)]
     shown = [_overlap(program, table, one) for one in overlaps[:MOST_PAIRS]]
     if len(overlaps) > MOST_PAIRS:
-        message = f"and {len(overlaps) - MOST_PAIRS} more pairs of lines of table `{table.name}` overlap"
+        least = "at least " if len(overlaps) == boxes.MOST_PAIRS else ""
+        message = (
+            f"and {least}{len(overlaps) - MOST_PAIRS} more pairs of lines of table `{table.name}` overlap"
+        )
         shown.append(Diagnostic(Code.OVERLAP, message, Label(table.span)))
     return shown + list(_others(program, verdict))
 
@@ -54,7 +57,7 @@ def _others(program: Program, verdict: TableVerdict) -> Iterator[Diagnostic]:
                 )
                 yield Diagnostic(Code.CONTRADICTORY_ASSUMPTIONS, message, Label(table.span))
             case Undecided(what):
-                helps = ("give each query more time with `--timeout`, or simplify the conditions",)
+                helps = ("give each query more steps with `--steps`, or simplify the conditions",)
                 message = f"table `{table.name}` could not be decided: {what}"
                 yield Diagnostic(Code.UNDECIDED, message, Label(table.span), help=helps)
             case SolversDisagree(what):

@@ -154,7 +154,7 @@ class _Question:
             return Answer.UNSATISFIABLE, None, {}
         self.questions += 1
         found = values.variables([*self.known, wrong])
-        solver = Solver(self.options.timeout_ms, self.options.memory_mb)
+        solver = Solver(self.options.limits)
         solver.add(*values.domain(found.values()), *map(values.term_of, [*self.known, wrong]))
         return solver.check(), solver, found
 

@@ -6,7 +6,9 @@ In: terms built by the functions here. Out: `Answer`s. A time-out, exhausted mem
 
 import struct
 import sys
+import time
 from collections.abc import Sequence
+from dataclasses import dataclass
 from enum import Enum, auto
 from fractions import Fraction
 from functools import cache
@@ -26,11 +28,44 @@ class Answer(Enum):
     UNKNOWN = auto()
 
 
+STEPS = 20_000_000
+"""Steps of Z3 (its `rlimit`) a question: some seconds, and the same verdict on every machine."""
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What one question may cost.
+
+    Attributes:
+        steps: Z3's own count of what it does (`rlimit`): the budget, which does not depend on the machine.
+        memory_mb: For all questions of the process.
+        cpu_s: Seconds of processor time, a backstop against what Z3 does without counting it; `cut_short` tells of it.
+    """
+
+    steps: int = STEPS
+    memory_mb: int = 4_096
+    cpu_s: float = 60.0
+
+    @classmethod
+    def of(cls, steps: int, memory_mb: int = 4_096) -> "Limits":
+        """Limits whose backstop leaves the steps several times what they take."""
+        return cls(steps, memory_mb, max(60.0, 3e-6 * steps))
+
+
 @cache
 def _z3() -> Any:
     import z3
 
     return z3
+
+
+_cut: list[int] = []
+"""Processor time, in seconds, of each question of this process that the backstop ended."""
+
+
+def cut_short() -> int:
+    """How many questions of this process were ended by the processor time that they took: no verdict that saw one is kept."""
+    return len(_cut)
 
 
 def troubles() -> tuple[type[BaseException], ...]:
@@ -219,11 +254,13 @@ class Solver:
         refuted: Where it remembers: of each answer that there is none, what was asserted besides what stands for good.
     """
 
-    def __init__(self, timeout_ms: int, memory_mb: int = 4_096, *, remembers: bool = False) -> None:
+    def __init__(self, limits: Limits = Limits(), *, remembers: bool = False) -> None:
         z3 = _z3()
-        z3.set_param("memory_max_size", memory_mb)
+        z3.set_param("memory_max_size", limits.memory_mb)
         self._solver: Any = z3.Solver()
-        self._solver.set("timeout", timeout_ms)
+        self._solver.set("rlimit", limits.steps)
+        self._cpu_s = self._patience_s = limits.cpu_s
+        self._wait()
         self._solver.set("random_seed", 0)
         self.queries = 0
         self.refuted: list[Term] = []
@@ -251,8 +288,7 @@ class Solver:
         z3 = _z3()
         self.queries += 1
         try:
-            answer = self._solver.check(*assuming)
-            why = self._solver.reason_unknown() if answer == z3.unknown else ""
+            answer, why = self._answer(assuming)
         except (z3.Z3Exception, MemoryError) as error:
             answer, why = z3.unknown, str(error)
         if "interrupted" in why:  # Z3 takes Ctrl-C for itself
@@ -262,6 +298,28 @@ class Solver:
         if answer == z3.sat:
             return Answer.SATISFIABLE
         return Answer.UNSATISFIABLE if answer == z3.unsat else Answer.UNKNOWN
+
+    def _answer(self, assuming: tuple[Term, ...]) -> tuple[Any, str]:
+        """Z3's answer and why there is none; asked again where other processes took the time that it was given."""
+        z3 = _z3()
+        while True:
+            used_s, passed_s = time.thread_time(), time.monotonic()
+            answer = self._solver.check(*assuming)
+            if answer != z3.unknown:
+                return answer, ""
+            used_s, passed_s = time.thread_time() - used_s, time.monotonic() - passed_s
+            why = str(self._solver.reason_unknown())
+            if passed_s < 0.9 * self._patience_s or "interrupted" in why:
+                return answer, why
+            if used_s >= 0.9 * self._cpu_s:
+                _cut.append(round(used_s))
+                return answer, why
+            self._patience_s *= 4
+            self._wait()
+
+    def _wait(self) -> None:
+        """Has Z3 end a question after so much time as passes, which on a busy machine is more than it gets."""
+        self._solver.set("timeout", max(1, round(1000 * self._patience_s)))
 
     def script(self) -> str:
         """What is asserted as an SMT-LIB 2 script, with `(check-sat)` at its end."""

@@ -75,7 +75,7 @@ class Steps:
     def __post_init__(self) -> None:
         self.program = relying(self.program)
         self.table = next(one for one in self.program.tables if one.name == self.table.name)
-        self._solver = Solver(self.options.timeout_ms, self.options.memory_mb)
+        self._solver = Solver(self.options.limits)
         before = values.variable(self.state.name, self.state.type)
         self._start[self.state.name] = before
         if self.state.deferred_until is not None:

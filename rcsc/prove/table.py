@@ -1,6 +1,7 @@
 """One table, decided by whatever suits it, confirmed by Z3, certified."""
 
 import time
+from itertools import islice
 from typing import TYPE_CHECKING
 
 from rcsc.model import AssumptionName, Backing, Program, Table
@@ -38,10 +39,13 @@ def prove_table(program: Program, table: Table, options: Options) -> TableVerdic
 
 def _by_boxes(program: Program, table: Table) -> tuple[Found, ...]:
     decided = boxes.Boxes.of(program, table)
-    pairs = list(decided.overlaps())
+    pairs = list(islice(decided.overlaps(), boxes.MOST_PAIRS))
     found: list[Found] = [DeadLine(at) for at in decided.dead()]
     found.extend(decided.both(first, second) for first, second in pairs)
-    gap = decided.gap(disjoint=not pairs)
+    try:
+        gap = decided.gap(disjoint=not pairs)
+    except boxes.BudgetError:
+        return (*found, Undecided("whether every input is matched by some line; first mend the overlaps"))
     if gap is not None:
         found.append(gap)
     return tuple(found)

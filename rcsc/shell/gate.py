@@ -27,8 +27,8 @@ from rcsc.system.buffers import Buffers
 from rcsc.system.levels import RunningLevel
 from rcsc.system.signature import FAULTS, Signature, Values
 
-REACH_MS = 1000
-"""Limit of a question whether some input leads to a change; in doubt it is said to."""
+REACH_STEPS = 5_000_000
+"""Budget of a question whether some input leads to a change; in doubt it is said to."""
 MOST_LEAVES = 12
 """Leaves that are shown of a cycle."""
 
@@ -199,7 +199,7 @@ def _difference(found: ProgramDifference) -> Iterator[str]:
 
 def _met(found: ProgramDifference, new: RunningLevel, program: Program) -> tuple[Met, ...]:
     now = {leaf.name: value for leaf, value in zip(new.sign.leaves, new.values, strict=False)}
-    return within_reach(found, program, model_of(program, new), now, Options(timeout_ms=REACH_MS))
+    return within_reach(found, program, model_of(program, new), now, Options(steps=REACH_STEPS))
 
 
 def _reach(found: ProgramDifference, met: Sequence[Met]) -> Iterator[str]:

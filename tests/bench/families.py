@@ -71,11 +71,13 @@ def _regions(over: list[Axis], lines: int, rng: random.Random) -> list[Region]:
     return waiting
 
 
-def box(lines: int, variables: int, seed: int, fault: Fault = "ok") -> str:
-    """A table of boxes."""
+def box(lines: int, variables: int, seed: int, fault: Fault = "ok", widened: int = 0) -> str:
+    """A table of boxes; so many of its lines leave a cell blank that was not, which makes them overlap others."""
     rng = random.Random(seed)
     over = axes(variables, rng)
     regions = _regions(over, lines, rng)
+    for at in rng.sample(range(lines), widened):
+        regions[at].pop(rng.choice(sorted(regions[at])))
     if fault == "gap":
         del regions[rng.randrange(len(regions))]
     if fault == "overlap":
