@@ -1,6 +1,7 @@
 """Interpreter = Python = C, over drawn inputs and sequences of cycles; each difference is found once planted."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -17,57 +18,92 @@ from rcsc.testing.agree import (
     run_init,
     run_sanitized,
 )
-from rcsc.testing.externs import c_stand_ins, python_stand_ins
+from rcsc.testing.esbmc import Said, prove_function
+from rcsc.testing.externs import python_stand_ins, with_c_stand_ins
 from rcsc.testing.hunt import hunt_lines, hunt_sessions
-from rcsc.testing.native import build
+from rcsc.testing.native import Native, build
 from rcsc.testing.python_executor import python_executor
+from rcsc.testing.suite import SuiteOptions, run_suite
 from rcsc.testing.symbols import symbols_of
 from rcsc.testing.targets import is_matcher, targets
-from rcsc.testing.tools import BuildFailed, c_compiler
+from rcsc.testing.tools import Absent, BuildFailed, c_compiler
 from tests.emitted import EXTERN, RICH, SHIPPED, emitted, program_of, shipped
 
 pytestmark = pytest.mark.skipif(not isinstance(c_compiler(), str), reason="no C compiler")
 
+QUICK = SuiteOptions(examples=30, esbmc_s=0.0, cortex=False, mutants=0)
 Change = Callable[[str], str]
+Everything = tuple[list[Disagreement], Compared, Absent | BuildFailed | Disagreement | None]
+"""What was found, what was compared, what the sanitizers say."""
 
 
 def unchanged(text: str) -> str:
     return text
 
 
-def disagreements(
-    program: Program, c: Change = unchanged, python: Change = unchanged, examples: int = 60
-) -> tuple[list[Disagreement], Compared, BuildFailed | Disagreement | None]:
-    """What every executor function does on drawn inputs, with planted changes of the emitted texts."""
+@contextmanager
+def executors_of(
+    program: Program, c: Change = unchanged, python: Change = unchanged, checked: bool = False
+) -> Iterator[Executors]:
+    """Every executor of the program, with planted changes of the emitted texts."""
     change = {".c": c, ".py": python}
     files = {path: change.get(Path(path).suffix, unchanged)(text) for path, text in emitted(program).items()}
     symbols = symbols_of(program, files)
-    stand_ins = c_stand_ins(program, symbols)
-    native = build(program, symbols, {**files, "stand_ins.c": stand_ins} if stand_ins else files)
-    assert not isinstance(native, BuildFailed), native.text
-    assert not hasattr(native, "reason")
-    compared, found = Compared(), []
-    with native, python_stand_ins(program):
-        executors = Executors(
-            program, native, python_executor(program, symbols, files), tuple(targets(program, symbols))
-        )
-        for target in executors.targets:
-            if target.kind == "init":
-                one = run_init(executors, target)
-            elif is_matcher(target):
-                one = hunt_lines(executors, target, compared, examples)
-            else:
-                one = hunt_sessions(executors, target, compared, examples)
-            found += [one] if one else []
-        sanitized = run_sanitized(executors, compared)
-        assert not hasattr(sanitized, "reason")
-    return found, compared, sanitized
+    with python_stand_ins(program) as stand_ins:
+        files = with_c_stand_ins(program, stand_ins.program, symbols, files)
+        native = build(stand_ins.program, symbols, files, checked=checked)
+        assert isinstance(native, Native), native
+        with native:
+            python_side = python_executor(program, symbols, files, stand_ins)
+            yield Executors(stand_ins.program, native, python_side, tuple(targets(program, symbols)))
 
 
-@pytest.mark.parametrize("text", [RICH, EXTERN], ids=["rich", "extern"])
-def test_all_executors_agree(text: str) -> None:
-    program = program_of(text)
-    found, compared, sanitized = disagreements(program)
+def found_of(
+    executors: Executors, compared: Compared, examples: int, kind: str = ""
+) -> Iterator[Disagreement]:
+    """What the executors' functions (of one kind, or all) do otherwise on drawn inputs."""
+    for target in executors.targets:
+        if kind not in ("", target.kind):
+            continue
+        if target.kind == "init":
+            one = run_init(executors, target)
+        elif is_matcher(target):
+            one = hunt_lines(executors, target, compared, examples)
+        else:
+            one = hunt_sessions(executors, target, compared, examples)
+        yield from (one,) if one else ()
+
+
+def disagreements(program: Program, c: Change = unchanged, examples: int = 60) -> Everything:
+    """All that is found, and what the sanitizers say."""
+    compared = Compared()
+    with executors_of(program, c, checked=True) as executors:
+        found = list(found_of(executors, compared, examples))
+        return found, compared, run_sanitized(executors, compared)
+
+
+def first(
+    text: str, kind: str = "step", c: Change = unchanged, python: Change = unchanged
+) -> Disagreement | None:
+    """What is found first in the functions of a kind."""
+    with executors_of(program_of(text), c, python) as executors:
+        return next(found_of(executors, Compared(), 300, kind), None)
+
+
+@pytest.fixture(scope="module")
+def rich() -> Everything:
+    return disagreements(program_of(RICH), examples=150)
+
+
+@pytest.fixture(scope="module")
+def extern() -> Everything:
+    return disagreements(program_of(EXTERN))
+
+
+@pytest.mark.parametrize("name", ["rich", "extern"])
+def test_all_executors_agree(name: str, request: pytest.FixtureRequest) -> None:
+    found, compared, sanitized = request.getfixturevalue(name)
+    program = program_of({"rich": RICH, "extern": EXTERN}[name])
     assert found == []
     assert sanitized is None
     assert compared.cycles > 200
@@ -76,13 +112,13 @@ def test_all_executors_agree(text: str) -> None:
         assert set(compared.lines[table.name]) >= names, "not every line was taken"
 
 
-def test_faults_of_every_kind_are_met() -> None:
-    assert disagreements(program_of(RICH))[1].faults[1] > 10
-    assert disagreements(program_of(EXTERN))[1].faults[4] > 10
+def test_faults_of_every_kind_are_met(rich: Everything, extern: Everything) -> None:
+    assert rich[1].faults[1] > 10
+    assert extern[1].faults[4] > 10
 
 
-def test_cycles_in_which_an_assumption_fails_are_met() -> None:
-    assert disagreements(program_of(RICH), examples=150)[1].broken > 2
+def test_cycles_in_which_an_assumption_fails_are_met(rich: Everything) -> None:
+    assert rich[1].broken > 2
 
 
 @pytest.mark.parametrize("path", SHIPPED)
@@ -178,23 +214,30 @@ def swap(old: str, new: str) -> Change:
 
 
 C_FAULTS = {
-    "admission of an integer": ("< (-INT64_C(3000000000))", "< (-INT64_C(3000000009))"),
-    "clamp": ("s->width = (uint8_t)INT64_C(100);", "s->width = (uint8_t)INT64_C(99);"),
+    "admission of an integer": ("< (-INT64_C(3000000000))", "< (-INT64_C(3000000009))", "step"),
+    "clamp": ("s->width = (uint8_t)INT64_C(100);", "s->width = (uint8_t)INT64_C(99);", "step"),
     "array element": (
         "s->kept[(int64_t)s->at] = (uint16_t)INT64_C(0);",
         "s->kept[0] = (uint16_t)INT64_C(0);",
+        "step",
     ),
-    "deferral": ("s->phase = s->phase_next;", ";"),
-    "monitor": ("(UINT64_C(1) << 0u)", "(UINT64_C(1) << 1u)"),
-    "initial value": ("    s->count = (uint8_t)INT64_C(0);\n", "    s->count = (uint8_t)INT64_C(1);\n"),
-    "division": ("/ INT64_C(7)", "/ INT64_C(70000)"),
+    "deferral": ("s->phase = s->phase_next;", ";", "step"),
+    "monitor": ("(UINT64_C(1) << 0u)", "(UINT64_C(1) << 1u)", "step"),
+    "initial value": (
+        "    s->count = (uint8_t)INT64_C(0);\n",
+        "    s->count = (uint8_t)INT64_C(1);\n",
+        "init",
+    ),
+    "division": ("/ INT64_C(7)", "/ INT64_C(70000)", "cycle"),
 }
 
 
 @pytest.mark.parametrize("fault", list(C_FAULTS))
 def test_a_fault_in_the_c_is_found(fault: str) -> None:
-    found, _, _ = disagreements(program_of(RICH), c=swap(*C_FAULTS[fault]), examples=300)
-    assert {one.executor for one in found} == {"C"}
+    old, new, kind = C_FAULTS[fault]
+    found = first(RICH, kind, c=swap(old, new))
+    assert found is not None
+    assert found.executor == "C"
 
 
 PYTHON_FAULTS = {
@@ -206,37 +249,106 @@ PYTHON_FAULTS = {
 
 @pytest.mark.parametrize("fault", list(PYTHON_FAULTS))
 def test_a_fault_in_the_python_is_found(fault: str) -> None:
-    found, _, _ = disagreements(program_of(RICH), python=swap(*PYTHON_FAULTS[fault]), examples=150)
-    assert {one.executor for one in found} == {"Python"}
+    found = first(RICH, python=swap(*PYTHON_FAULTS[fault]))
+    assert found is not None
+    assert found.executor == "Python"
 
 
 def test_what_is_found_is_small() -> None:
-    found, _, _ = disagreements(program_of(RICH), c=swap(*C_FAULTS["clamp"]), examples=150)
-    step = next(one for one in found if one.function.endswith("work_step"))
+    step = first(RICH, c=swap(*C_FAULTS["clamp"][:2]))
+    assert step is not None
+    assert step.function.endswith("work_step")
     assert step.cycle == len(step.session.readings) == 1
     assert "`width` = 99 where 100 is right" in step.words
 
 
 def test_the_sign_of_zero_is_compared() -> None:
-    found, _, _ = disagreements(program_of(RICH), c=swap(" + 0.0;", ";"), examples=300)
-    assert any("smooth" in word or "force" in word for one in found for word in one.words)
+    found = first(RICH, c=swap(" + 0.0;", ";"))
+    assert found is not None
+    assert any("smooth" in word or "force" in word for word in found.words)
 
 
 def test_undefined_behaviour_is_found_though_the_result_is_right() -> None:
     planted = swap(
         "    s->fault = 0;\n", "    s->fault = 0;\n    { volatile int n = 2147483647; n = n + 1; }\n"
     )
-    found, _, sanitized = disagreements(program_of(RICH), c=planted)
-    assert found == []
+    compared = Compared()
+    with executors_of(program_of(RICH), planted, checked=True) as executors:
+        assert list(found_of(executors, compared, 10, "step")) == []
+        sanitized = run_sanitized(executors, compared)
     assert isinstance(sanitized, BuildFailed)
     assert "signed integer overflow" in sanitized.text
 
 
-def test_an_extern_result_outside_its_range_is_refused_by_all() -> None:
-    found, compared, _ = disagreements(program_of(EXTERN), examples=120)
-    assert found == []
-    broken = swap("parts_height(", "(void)s; parts_height(")
-    assert disagreements(program_of(EXTERN), c=broken)[0] == []
-    unchecked = swap("s->fault = 4;", "s->fault = 0;")
-    assert {one.executor for one in disagreements(program_of(EXTERN), c=unchecked)[0]} == {"C"}
-    assert compared.faults[0] > 0
+def test_an_extern_result_outside_its_range_is_refused_by_all(extern: Everything) -> None:
+    assert extern[0] == []
+    assert extern[1].faults[0] > 0
+    unchecked = first(EXTERN, c=swap("s->fault = 4;", "s->fault = 0;"))
+    assert unchecked is not None
+    assert unchecked.executor == "C"
+
+
+SINGLE = """
+input part : int 0 .. 3
+state height_mm : real 0.0 .. 100.0
+output o : bool
+extern procedure look_up reads part writes height_mm python "{python}" c "{c}"
+table t {{
+  | line | part   || procedures | o     |
+  | a    | 0 .. 1 || look_up    | true  |
+  | b    | 2 .. 3 || look_up    | false |
+}}
+level l {{ period 40
+  table t }}
+"""
+USERS = (
+    ("parts_db:height", "parts_height"),
+    ("os:_exit", "exit"),
+    ("math:floor", "memcpy"),
+    ("a.b:c", "abort"),
+)
+
+
+@pytest.mark.parametrize(("python", "c"), USERS)
+def test_nothing_of_the_users_is_called(python: str, c: str) -> None:
+    """Names of libraries, too, are only names: what they stand for would end this process, or is not there."""
+    import os
+
+    kept = os._exit
+    result = run_suite(program := program_of(SINGLE.format(python=python, c=c)), emitted(program), QUICK)
+    assert result.found == ()
+    assert result.programs[0].faults[4] > 10
+    assert result.programs[0].tables[0].cells > 0
+    assert os._exit is kept
+
+
+CALLS = """
+input part : int 0 .. 3
+state n : int 0 .. 3
+extern procedure pong(k : int 0 .. 31) reads part, n writes n python "a.b:other" c "other"
+procedure twice {{ pong(2); for i in 0 .. {last} {{ pong(i) }} }}
+table t {{
+  | line | part   || procedures |
+  | a    | 0 .. 1 || twice      |
+  | b    | 2 .. 3 || pong(1)    |
+}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("last", "old", "new", "said"),
+    [
+        (2, "", "", Said.PROVED),
+        (2, "do_pong(s, INT64_C(2))", "do_pong(s, INT64_C(3))", Said.REFUTED),  # other arguments
+        (2, "case__do_pong(s, INT64_C(2));", ";", Said.REFUTED),  # a call less
+        (2, "s->fault = 4;", "s->fault = 0;", Said.REFUTED),  # what is refused is taken
+        (30, "", "", Said.TOO_LARGE),  # more calls than are recorded: not known, and said so
+    ],
+)
+def test_esbmc_knows_nothing_of_what_an_extern_gives(last: int, old: str, new: str, said: Said) -> None:
+    program = program_of(CALLS.format(last=last))
+    files = emitted(program)
+    symbols = symbols_of(program, files)
+    files = {path: swap(old, new)(text) if path.endswith(".c") else text for path, text in files.items()}
+    step = next(target for target in targets(program, symbols) if target.kind == "step")
+    assert prove_function(program, symbols, files, step, 30.0).said is said

@@ -13,6 +13,7 @@ from typing import Protocol
 
 from rcsc.interpret import Fault, Outcome, cycle, holds, matching_lines, run_table
 from rcsc.model import LineName, Program, Snapshot, Table, Value, key_bounds, value_of_key
+from rcsc.testing.externs import begin
 from rcsc.testing.native import Native, Result
 from rcsc.testing.reference_file import all_lines, monitored
 from rcsc.testing.sessions import Seen, Session, differences
@@ -20,6 +21,8 @@ from rcsc.testing.targets import Target
 from rcsc.testing.tools import Absent, BuildFailed
 
 NONE, SEVERAL = -1, -2
+WHOLE = 1
+"""Mode in which each row sets every leaf; see `shim`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +49,7 @@ class Compared:
     Attributes:
         broken: Cycles in which an assumption did not hold.
         lines: By table, how often each line was taken by a step or cycle that all executors agreed on.
-        kept: Sessions that ran, for the sanitized program.
+        kept: Sessions that ran, with function and mode, for the sanitized program.
         matched: Snapshots that the matchers were given.
     """
 
@@ -56,14 +59,18 @@ class Compared:
     broken: int = 0
     faults: Counter[int] = field(default_factory=Counter)
     lines: dict[str, Counter[str]] = field(default_factory=dict)
-    kept: list[tuple[int, Session, list[Seen]]] = field(default_factory=list)
+    kept: list[tuple[int, int, Session, list[Seen]]] = field(default_factory=list)
     matched: list[tuple[int, list[Snapshot]]] = field(default_factory=list)
 
     @property
-    def replays(self) -> list[tuple[int, bool, list[Snapshot]]]:
-        """All of it again, for `code_mutants`: function, whether rows set every leaf, rows."""
-        sessions = [(which, False, rows_of(session)) for which, session, _ in self.kept]
-        return [*sessions, *((which, True, snapshots) for which, snapshots in self.matched)]
+    def replays(self) -> list[tuple[int, int, list[Snapshot]]]:
+        """All of it again, for `code_mutants`: function, mode (see `shim`), rows."""
+        matched = ((which, WHOLE, snapshots) for which, snapshots in self.matched)
+        return [*self.sessions_again(), *matched]
+
+    def sessions_again(self) -> list[tuple[int, int, list[Snapshot]]]:
+        """The sessions alone."""
+        return [(which, mode, rows_of(session)) for which, mode, session, _ in self.kept]
 
 
 class PythonRuns(Protocol):
@@ -144,6 +151,7 @@ def broken_cycle(
     for readings in good.readings:
         state = meaning({**state, **readings}).snapshot
     one = Session(state, (session.readings[len(good.readings)],))
+    mode = 2 * begin(program, one.start)
     try:
         outcome = meaning({**state, **one.readings[0]})
     except (ZeroDivisionError, IndexError, KeyError, OverflowError, ValueError):
@@ -151,7 +159,7 @@ def broken_cycle(
     if not in_range(program, outcome.snapshot):
         return None
     right = seen_by_interpreter(outcome)
-    [row] = executors.native.run(executors.number(target), False, rows_of(one))
+    [row] = executors.native.run(executors.number(target), mode, rows_of(one))
     others = {"C": seen_in_c(program, executors.native, row), "Python": executors.python.run(target, one)[0]}
     for name, seen in others.items():
         words = differences(program, right, seen)
@@ -172,7 +180,8 @@ def in_range(program: Program, snapshot: Snapshot) -> bool:
 
 def within(executors: Executors, target: Target, session: Session) -> Session:
     """The session up to the first cycle in which the table's assumptions do not hold."""
-    rows = executors.native.run(executors.number(target) + 1, False, rows_of(session))
+    mode = 2 * begin(executors.program, session.start)
+    rows = executors.native.run(executors.number(target) + 1, mode, rows_of(session))
     good = next((at for at, row in enumerate(rows) if row.outside), len(rows))
     return Session(session.start, session.readings[:good])
 
@@ -195,7 +204,8 @@ def run_session(
     """
     program = executors.program
     meaning, state = interpreter(program, target), session.start
-    in_c = executors.native.run(executors.number(target), False, rows_of(session))
+    mode = 2 * begin(program, session.start)
+    in_c = executors.native.run(executors.number(target), mode, rows_of(session))
     in_python = executors.python.run(target, session)
     expected: list[Seen] = []
     for number, readings in enumerate(session.readings):
@@ -209,14 +219,14 @@ def run_session(
         state = right.snapshot
         _count(program, target, compared, right)
     compared.sessions += 1
-    compared.kept.append((executors.number(target), session, expected))
+    compared.kept.append((executors.number(target), mode, session, expected))
     return None
 
 
 def run_init(executors: Executors, target: Target) -> Disagreement | None:
     """Compares the initial states."""
     start = {str(v.name): v.initial for v in executors.program.variables}
-    [row] = executors.native.run(executors.number(target), True, [start])
+    [row] = executors.native.run(executors.number(target), WHOLE, [start])
     for name, snapshot in (("C", row.snapshot), ("Python", executors.python.initial())):
         right, seen = (Seen(0, "", NONE, (), values) for values in (start, snapshot))
         words = differences(executors.program, right, seen)
@@ -249,8 +259,8 @@ def run_lines(
     """Compares the matchers on snapshots, whether or not assumptions hold in them."""
     table = executors.program.tables[target.number]
     number = executors.number(target)
-    in_c = executors.native.run(number, True, snapshots)
-    reference = executors.native.run(number + 1, True, snapshots)
+    in_c = executors.native.run(number, WHOLE, snapshots)
+    reference = executors.native.run(number + 1, WHOLE, snapshots)
     for snapshot, row, plain in zip(snapshots, in_c, reference, strict=True):
         right = line_number(table, matching_lines(table, snapshot))
         others = {
@@ -269,11 +279,10 @@ def run_lines(
 
 def run_sanitized(executors: Executors, compared: Compared) -> Disagreement | BuildFailed | Absent | None:
     """All sessions again in the program with sanitizers, which stop it at the first finding."""
-    sessions = [(which, False, rows_of(session)) for which, session, _ in compared.kept]
-    made = executors.native.run_checked(sessions)
+    made = executors.native.run_checked(compared.sessions_again())
     if not isinstance(made, list):
         return made
-    for (which, session, expected), rows in zip(compared.kept, made, strict=True):
+    for (which, _, session, expected), rows in zip(compared.kept, made, strict=True):
         for at, (right, row) in enumerate(zip(expected, rows, strict=True)):
             seen = seen_in_c(executors.program, executors.native, row)
             words = differences(executors.program, right, seen)

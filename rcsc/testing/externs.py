@@ -1,16 +1,23 @@
-"""Stand-ins for extern procedures, the same in C and in Python, so that admission of their results is tested.
+"""Stand-ins for extern procedures, the same in C and in Python: nothing of the user's is imported, linked or called.
 
-In: a program. Out: C definitions, and Python modules that are in place while a context lasts. A stand-in
-gives edges of what it writes, some outside the declared range, chosen by a hash of what it was given.
+In: a program and its emitted files. Out: the program, the C and the Python modules in which every extern is a
+stand-in. A stand-in gives edges of what it writes, some outside the declared range (the executors must
+refuse them), chosen by a hash of what it was given and of the script, a number that each session has.
 """
 
+import builtins
+import re
 import struct
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from itertools import count
+from pathlib import Path
 from types import ModuleType
+from zlib import crc32
 
-from rcsc.model import Procedure, Program, Real, Scalar, Value, Variable, value_of_key
+from rcsc.model import Extern, Procedure, Program, Real, Scalar, Snapshot, Value, Variable, value_of_key
 from rcsc.testing.edges import leaf_edges, outside
 from rcsc.testing.reference import constant
 from rcsc.testing.symbols import Symbols
@@ -19,6 +26,24 @@ SEED, FACTOR, MASK = 2166136261, 16777619, 0xFFFF_FFFF
 """Source: FNV-1a, 32 bits, by words instead of bytes."""
 
 MOST_RESULTS = 24
+SCRIPTS = 64
+STAND_INS = "rcsc_stand_ins.c"
+
+
+@dataclass(slots=True)
+class Script:
+    """Which answers the Python stand-ins give; those in C have `rcsc_script`."""
+
+    number: int = 0
+
+
+SCRIPT = Script()
+
+
+def begin(program: Program, start: Snapshot) -> int:
+    """Sets the script of the session that begins in `start`; its number, which the C is to be given."""
+    SCRIPT.number = crc32(repr(sorted(start.items())).encode()) % SCRIPTS if externs(program) else 0
+    return SCRIPT.number
 
 
 def externs(program: Program) -> tuple[Procedure, ...]:
@@ -44,7 +69,7 @@ def word(kind: Scalar, value: Value) -> int:
 def chosen(words: list[int], salt: int, count: int) -> int:
     """Which result is given."""
     state = SEED ^ salt
-    for one in words:
+    for one in (SCRIPT.number, *words):
         state = ((state ^ one) * FACTOR) & MASK
     return (state >> 8) % count
 
@@ -59,45 +84,122 @@ def python_function(program: Program, procedure: Procedure) -> object:
     kinds = given_kinds(program, procedure)
     choices = [results(program, program.variable(name)) for name in procedure.writes]
 
-    def stand_in(*args: Value) -> tuple[Value, ...]:
+    def stand_in(*args: Value) -> Value | tuple[Value, ...]:
         words = [word(kind, arg) for kind, arg in zip(kinds, args, strict=True)]
-        return tuple(values[chosen(words, salt, len(values))] for salt, values in enumerate(choices))
+        given = tuple(values[chosen(words, salt, len(values))] for salt, values in enumerate(choices))
+        return given[0] if len(given) == 1 else given
 
     return stand_in
 
 
+@dataclass(frozen=True, slots=True)
+class PythonStandIns:
+    """The stand-ins in Python.
+
+    Attributes:
+        program: The program, its externs being the stand-ins; what is to be given to the interpreter and to
+            what writes the reference C.
+        modules: What the emitted Python finds where it imports the user's modules, by dotted name.
+    """
+
+    program: Program
+    modules: Mapping[str, ModuleType] = field(hash=False)
+
+    def load(self, text: str, name: str) -> ModuleType:
+        """The emitted Python as a module of its own that sees stand-ins where it imports the user's."""
+        module = ModuleType(name)
+
+        def imported(wanted: str, *args: object) -> object:
+            plain = len(args) < 3 or not args[2]  # `from x import y` is the executor's own
+            if plain and wanted in self.modules:
+                return self.modules[wanted.partition(".")[0]]
+            return builtins.__import__(wanted, *args)  # type: ignore[arg-type]  # handed on as it came
+
+        module.__dict__["__builtins__"] = {**vars(builtins), "__import__": imported}
+        exec(compile(text, name, "exec"), module.__dict__)  # noqa: S102  # it is what is tested
+        return module
+
+
+NUMBER = count()
+
+
 @contextmanager
-def python_stand_ins(program: Program) -> Iterator[None]:
-    """Puts the stand-ins where the program's Python functions are looked for, and takes them away again."""
-    before = dict(sys.modules)
-    for procedure in externs(program):
-        module_name, _, function = (
-            procedure.extern.python.partition(":") if procedure.extern else ("", "", "")
-        )
-        parts = module_name.split(".")
-        for at in range(1, len(parts) + 1):
-            name = ".".join(parts[:at])
-            if not getattr(sys.modules.get(name), "rcsc_stand_in", False):
-                sys.modules[name] = ModuleType(name)
-                sys.modules[name].rcsc_stand_in = True  # type: ignore[attr-defined]  # a mark of ours
-                if at > 1:
-                    setattr(sys.modules[".".join(parts[: at - 1])], parts[at - 1], sys.modules[name])
-        setattr(sys.modules[module_name], function, python_function(program, procedure))
+def python_stand_ins(program: Program) -> Iterator[PythonStandIns]:
+    """Stand-ins for the program's externs, for the interpreter while the context lasts.
+
+    They are found under a module name that no user has; the user's own modules stay what they are, and stay
+    unimported.
+    """
+    place = f"<rcsc stand-ins {next(NUMBER)}>"
+    own = ModuleType(place)
+    modules: dict[str, ModuleType] = {}
+    changed = []
+    stand_in_c = {p.extern.c: f"rcsc_stand_in_{at}" for at, p in enumerate(externs(program)) if p.extern}
+    for number, procedure in enumerate(program.procedures):
+        if procedure.extern is not None:
+            function = python_function(program, procedure)
+            setattr(own, f"f{number}", function)
+            _put(modules, procedure.extern.python, function)
+            changed.append(
+                replace(procedure, extern=Extern(f"{place}:f{number}", stand_in_c[procedure.extern.c]))
+            )
+        else:
+            changed.append(procedure)
+    sys.modules[place] = own
     try:
-        yield
+        yield PythonStandIns(replace(program, procedures=tuple(changed)), modules)
     finally:
-        for name in [name for name, module in sys.modules.items() if getattr(module, "rcsc_stand_in", False)]:
-            if name in before:
-                sys.modules[name] = before[name]
-            else:
-                del sys.modules[name]
+        del sys.modules[place]
+
+
+def _put(modules: dict[str, ModuleType], where: str, function: object) -> None:
+    """Puts a function where `package.module:function` says, among modules that are ours."""
+    name, _, attribute = where.partition(":")
+    parts = name.split(".")
+    for at in range(1, len(parts) + 1):
+        dotted = ".".join(parts[:at])
+        modules.setdefault(dotted, ModuleType(dotted))
+        if at > 1:
+            setattr(modules[".".join(parts[: at - 1])], parts[at - 1], modules[dotted])
+    setattr(modules[name], attribute, function)
+
+
+def with_c_stand_ins(
+    before: Program, after: Program, symbols: Symbols, files: Mapping[str, str]
+) -> dict[str, str]:
+    """The emitted files with the externs' C: one file more, and calls of it where the user's was called.
+
+    Only calls and declarations are renamed, so that even a function called `exit` is a stand-in.
+
+    Args:
+        before: The program as it is.
+        after: The program of `python_stand_ins`.
+        symbols: Names in the emitted C.
+        files: The emitted files, text by path.
+    """
+    names = {
+        mine.extern.c: other.extern.c
+        for mine, other in zip(before.procedures, after.procedures, strict=True)
+        if mine.extern and other.extern
+    }
+    if not names:
+        return dict(files)
+    calls = re.compile(rf"(?<![\w.>])({'|'.join(names)})(?=\()")
+    emitted = (symbols.header, symbols.source)
+    changed = {
+        path: calls.sub(lambda call: names[call[1]], text)
+        for path, text in files.items()
+        if Path(path).name in emitted
+    }
+    return {**files, **changed, STAND_INS: c_stand_ins(after, symbols)}
 
 
 def c_stand_ins(program: Program, symbols: Symbols) -> str:
     """The stand-ins in C; empty where there are none."""
-    lines = ["#include <string.h>", f'#include "{symbols.header}"']
+    lines = ["#include <stdint.h>", "#include <string.h>", f'#include "{symbols.header}"']
     lines += ["static uint32_t word_of_double(double x) { uint64_t w; memcpy(&w, &x, sizeof w);"]
     lines += ["return (uint32_t)(w ^ (w >> 32)); }"]
+    lines += ["uint32_t rcsc_script;"]
     for procedure in externs(program):
         lines += _c_function(program, symbols, procedure)
     return "\n".join(lines) + "\n" if externs(program) else ""
@@ -113,7 +215,7 @@ def _c_function(program: Program, symbols: Symbols, procedure: Procedure) -> Ite
     yield f"void {function}({', '.join([*given, *taken]) or 'void'}) {{"
     for salt, name in enumerate(procedure.writes):
         variable = program.variable(name)
-        yield f"uint32_t h{salt} = {SEED ^ salt}u;"
+        yield f"uint32_t h{salt} = ({SEED ^ salt}u ^ rcsc_script) * {FACTOR}u;"
         for at, kind in enumerate(kinds):
             text = f"word_of_double(a{at})" if isinstance(kind, Real) else f"(uint32_t)a{at}"
             yield f"h{salt} = (h{salt} ^ {text}) * {FACTOR}u;"

@@ -29,6 +29,7 @@ from random import Random
 from rcsc.children import scratch
 from rcsc.model import Box, Program, Real, Table, Variable, key_bounds, real_key, value_of_key
 from rcsc.testing.edges import companions, leaf_edges, relational_tests
+from rcsc.testing.externs import STAND_INS
 from rcsc.testing.matcher_c import self_test_c
 from rcsc.testing.matcher_text import EVERY_KEY, Component, Lookup, MatcherText, ShapeError, matcher_text
 from rcsc.testing.native import to_word
@@ -297,9 +298,9 @@ def check_matcher(
     except ShapeError as error:
         return (f"the emitted C has not the shape that the check is about: {error}",)
     with scratch("matcher") as place:
-        write_c(files, place)
+        beside = [name for name in write_c(files, place) if name == STAND_INS]
         (place / "check.c").write_text(self_test_c(program, symbols, table, parts), "utf-8")
-        ran = run_command([compiler, *FLAGS, "-o", "check.so", "check.c"], place, 300.0)
+        ran = run_command([compiler, *FLAGS, "-o", "check.so", "check.c", *beside], place, 300.0)
         if ran.status != 0:
             return ("the self-test does not compile", *ran.err.strip().splitlines()[:MOST_SHOWN])
         checker = _Checker(program, symbols, table, parts, ctypes.CDLL(str(place / "check.so")))

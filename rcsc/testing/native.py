@@ -87,13 +87,13 @@ class Native:
             found.extend(to_word(v.type, snapshot[v.name]) for v in self.program.variables)
         return found
 
-    def run(self, which: int, whole: bool, snapshots: Sequence[Snapshot]) -> list[Result]:
+    def run(self, which: int, mode: int, snapshots: Sequence[Snapshot]) -> list[Result]:
         """Runs a session of function `which` in the shared object; see `shim`."""
         given, width = self.rows(snapshots), words(self.program)
         made = array("q", bytes(8 * width * len(snapshots)))
         pointer = ctypes.POINTER(ctypes.c_int64)
         address = [ctypes.cast(a.buffer_info()[0], pointer) for a in (given, made)]
-        self.library.rcsc_session(which, int(whole), ctypes.c_int64(len(snapshots)), *address)
+        self.library.rcsc_session(which, mode, ctypes.c_int64(len(snapshots)), *address)
         return self.results(made)
 
     def results(self, made: "array[int]") -> list[Result]:
@@ -111,15 +111,15 @@ class Native:
         return Result(row[0], row[1], row[2], row[3], bool(row[4]), failed, snapshot)
 
     def run_checked(
-        self, sessions: Sequence[tuple[int, bool, Sequence[Snapshot]]]
+        self, sessions: Sequence[tuple[int, int, Sequence[Snapshot]]]
     ) -> list[list[Result]] | BuildFailed | Absent:
         """The same sessions in the sanitized program; any finding of the sanitizers stops it."""
         if self.checked is None:
             return Absent("the C compiler has no address and undefined behaviour sanitizers")
         place = self.checked.parent
         with (place / "in.bin").open("wb") as file:
-            for which, whole, snapshots in sessions:
-                array("q", [which, int(whole), len(snapshots)]).tofile(file)
+            for which, mode, snapshots in sessions:
+                array("q", [which, mode, len(snapshots)]).tofile(file)
                 self.rows(snapshots).tofile(file)
         ran = run_command([str(self.checked), "in.bin", "out.bin"], place, COMPILE_S)
         if ran.status != 0:

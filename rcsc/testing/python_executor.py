@@ -12,6 +12,7 @@ from typing import Any
 
 from rcsc.interpret import Fault
 from rcsc.model import Program, Snapshot, Value
+from rcsc.testing.externs import PythonStandIns
 from rcsc.testing.reference_file import monitored
 from rcsc.testing.sessions import Seen, Session
 from rcsc.testing.symbols import Symbols
@@ -83,15 +84,17 @@ class PythonExecutor:
         return int(self.function(target)(self.state(snapshot)))
 
 
-def python_executor(program: Program, symbols: Symbols, files: Mapping[str, str]) -> PythonExecutor:
+def python_executor(
+    program: Program, symbols: Symbols, files: Mapping[str, str], stand_ins: PythonStandIns | None = None
+) -> PythonExecutor:
     """The emitted Python of a program, ready to run.
 
     Args:
         program: The program.
         symbols: Names in its emitted files.
         files: The emitted files, text by path.
+        stand_ins: Of the program's externs, where it has any.
     """
     text = next(text for path, text in files.items() if Path(path).name == symbols.module)
-    module = ModuleType(f"rcsc_tested_{symbols.program}")
-    exec(compile(text, symbols.module, "exec"), module.__dict__)  # noqa: S102  # it is what is tested
+    module = (stand_ins or PythonStandIns(program, {})).load(text, f"rcsc_tested_{symbols.program}")
     return PythonExecutor(program, symbols, module)

@@ -4,12 +4,14 @@ In: a program and its symbols. Out: the text of a C file that includes the emitt
 C, and moves every leaf in and out as one 64-bit word in declared order (a double by its bits).
 
 One call runs a session: a start state, then rows of words; in each row only the inputs are set (or, where
-`whole` is 1, every leaf), the function runs, and trace and leaves are copied out.
+`mode` is odd, every leaf), the function runs, and trace and leaves are copied out. Half of `mode` is the script of
+the stand-ins, where there are any (see `externs`).
 """
 
 from collections.abc import Iterator
 
 from rcsc.model import Kind, Program, Real
+from rcsc.testing.externs import externs
 from rcsc.testing.reference_file import monitored, reference_c
 from rcsc.testing.symbols import Symbols
 from rcsc.testing.targets import Target, call_of, reference_of, targets
@@ -23,10 +25,10 @@ static double of_word(int64_t w) { double x; memcpy(&x, &w, sizeof x); return x;
 """
 
 SESSION = """
-void rcsc_session(int32_t which, int32_t whole, int64_t rows, const int64_t *in, int64_t *out) {{
-  {struct} s; {init}(&s);
+void rcsc_session(int32_t which, int32_t mode, int64_t rows, const int64_t *in, int64_t *out) {{
+  {struct} s; {init}(&s); {script}
   for (int64_t row = 0; row < rows; row++) {{
-    set_leaves(&s, &in[row * {leaves}], whole || row == 0);
+    set_leaves(&s, &in[row * {leaves}], (mode & 1) || row == 0);
     run(which, &s, &out[row * {words}]);
   }}
 }}
@@ -109,7 +111,9 @@ def _run(program: Program, symbols: Symbols) -> Iterator[str]:
 
 def shim_c(program: Program, symbols: Symbols) -> str:
     """The whole shim; a function's number is twice its target's position, the reference's one more."""
+    scripted = bool(externs(program))
     shape = {
+        "script": "rcsc_script = (uint32_t)mode >> 1;" if scripted else "",
         "struct": symbols.struct,
         "init": symbols.init,
         "leaves": len(program.variables),
@@ -121,6 +125,7 @@ def shim_c(program: Program, symbols: Symbols) -> str:
         "#include <string.h>",
         f'#include "{symbols.header}"',
     ]
+    head += ["extern uint32_t rcsc_script;"] if scripted else []
     parts = [*head, reference_c(program, symbols), WORDS]
     parts += [*set_leaves_c(program, symbols), *_copy(program, symbols), *_run(program, symbols)]
     return "\n".join([*parts, SESSION.format(**shape), MAIN.format(**shape)]) + "\n"

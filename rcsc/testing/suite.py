@@ -26,7 +26,7 @@ from rcsc.testing.agree import (
 from rcsc.testing.code_mutants import Noticed, judge_code, portable_agrees
 from rcsc.testing.cortex import CortexRun, run_cortex
 from rcsc.testing.esbmc import EsbmcVerdict, Said, prove_function
-from rcsc.testing.externs import c_stand_ins, python_stand_ins
+from rcsc.testing.externs import PythonStandIns, python_stand_ins, with_c_stand_ins
 from rcsc.testing.figures import ProgramFigures, SuiteResult, TableFigures, counted, tally
 from rcsc.testing.matcher import Checked, check_matcher
 from rcsc.testing.mutants import Caught, Prover, judge_table
@@ -300,25 +300,29 @@ def run_suite(
         proofs: The prover and its solver; without them table mutants are left out, and conditions over
             several variables may stay without a vector.
     """
-    symbols = symbols_of(program, files)
-    stand_ins = c_stand_ins(program, symbols)
-    native = build(program, symbols, {**files, "rcsc_stand_ins.c": stand_ins} if stand_ins else files)
+    with python_stand_ins(program) as stand_ins:
+        symbols = symbols_of(program, files)
+        tested = with_c_stand_ins(program, stand_ins.program, symbols, files)
+        native = build(stand_ins.program, symbols, tested)
+        if isinstance(native, Native):
+            with native:
+                return _run(stand_ins, tested, options or SuiteOptions(), proofs or Proofs(), native)
     if isinstance(native, Absent):
         return SuiteResult((), (Diagnostic(Code.NO_C_COMPILER, native.reason, _place(program)),))
-    if isinstance(native, BuildFailed):
-        message = f"the C generated from `{program.name}` does not compile"
-        found = Diagnostic(
-            Code.EXECUTORS_DISAGREE, message, _place(program), notes=tuple(native.text.splitlines())
-        )
-        return SuiteResult((), (found,))
-    with native, python_stand_ins(program):
-        return _run(program, files, options or SuiteOptions(), proofs or Proofs(), native)
+    message = f"the C generated from `{program.name}` does not compile"
+    notes = tuple(native.text.splitlines())
+    return SuiteResult((), (Diagnostic(Code.EXECUTORS_DISAGREE, message, _place(program), notes=notes),))
 
 
 def _run(
-    program: Program, files: Mapping[str, str], options: SuiteOptions, proofs: Proofs, native: Native
+    stand_ins: PythonStandIns,
+    files: Mapping[str, str],
+    options: SuiteOptions,
+    proofs: Proofs,
+    native: Native,
 ) -> SuiteResult:
-    python = python_executor(program, native.symbols, files)
+    program = stand_ins.program
+    python = python_executor(program, native.symbols, files, stand_ins)
     executors = Executors(program, native, python, tuple(targets(program, native.symbols)))
     suite = Suite(program, native.symbols, files, options, proofs, executors)
     figures = suite.run()
