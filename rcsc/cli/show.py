@@ -3,6 +3,7 @@
 import json
 import os
 import sys
+from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from enum import StrEnum
@@ -13,7 +14,7 @@ import click
 
 from rcsc.diagnostics.diagnostic import Severity
 from rcsc.diagnostics.render import OF_SEVERITY, Piece, Row, Style, full, one_line, paint, plain
-from rcsc.diagnostics.report import InSystem, Report, SystemReport, TableReport, Verdict
+from rcsc.diagnostics.report import NOT_PROVED, InSystem, Report, SystemReport, TableReport, Verdict
 from rcsc.diagnostics.spelling import escape, pad, width
 from rcsc.files import write_atomically
 
@@ -57,6 +58,7 @@ class UnwritableError(Exception):
 
 _OF_VERDICT = {
     Verdict.PROVED: Style.HELP,
+    Verdict.CONDITIONAL: Style.WARNING,
     Verdict.REFUTED: Style.ERROR,
     Verdict.UNDECIDED: Style.WARNING,
 }
@@ -146,12 +148,13 @@ def _coloured(output: Output) -> bool:
 def summary(report: Report) -> Iterator[Row]:
     """What backs each table's verdict, then the counts."""
     names = max((width(escape(table.table)) for table in report.tables), default=0)
+    words = max((9, *(len(table.verdict.value) for table in report.tables)))
     for file, tables in groupby(report.tables, key=lambda table: table.file):
         yield (Piece(escape(file), Style.STRONG),)
         for table in tables:
             yield (
                 Piece(f"  {pad(escape(table.table), names)}  "),
-                Piece(pad(table.verdict.value, 9), _OF_VERDICT[table.verdict]),
+                Piece(pad(table.verdict.value, words), _OF_VERDICT[table.verdict]),
                 Piece(f"  {backing(table)}"),
             )
     for system in report.systems:
@@ -170,6 +173,11 @@ def backing(table: TableReport) -> str:
         parts.append("confirmed by Z3")
     if table.assumptions:
         parts.append(f"assuming {', '.join(_assumed(table))}")
+    doubtful = [f"`{escape(name)}`" for name, standing in table.assumptions if standing == NOT_PROVED]
+    if doubtful and table.verdict is Verdict.CONDITIONAL:
+        parts.append(
+            f"rests on {' and '.join(doubtful)}, which {'is' if len(doubtful) == 1 else 'are'} not proved"
+        )
     if table.together is not None:
         parts += _together(table.together)
     parts.append(f"{table.proof_ms:.1f} ms{' (earlier run)' if table.cached else ''}")
@@ -209,7 +217,8 @@ def _counts(report: Report) -> Iterator[Piece]:
 
 
 def _verdicts(report: Report) -> Iterator[Piece]:
-    of = {verdict: sum(table.verdict is verdict for table in report.tables) for verdict in Verdict}
+    always = (Verdict.PROVED, Verdict.REFUTED, Verdict.UNDECIDED)
+    of = dict.fromkeys(always, 0) | dict(Counter(table.verdict for table in report.tables))
     noun = "table" if len(report.tables) == 1 else "tables"
     yield Piece(f"{len(report.tables)} {noun}: ")
     for number, (verdict, count) in enumerate(of.items()):

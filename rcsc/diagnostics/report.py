@@ -1,7 +1,7 @@
 """What a command found and what backs it: the one value that every output form shows."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 from rcsc.diagnostics.diagnostic import Diagnostic, Severity
@@ -9,11 +9,16 @@ from rcsc.source import Source
 
 
 class Verdict(StrEnum):
-    """What is known of a table; anything but `proved` makes `rcsc` exit with 1."""
+    """What is known of a table, best first; anything but `proved` makes `rcsc` exit with 1."""
 
     PROVED = "proved"
-    REFUTED = "refuted"
+    CONDITIONAL = "conditional"  # proved from something that is not proved itself
     UNDECIDED = "undecided"
+    REFUTED = "refuted"
+
+
+NOT_PROVED = "not proved"
+"""The standing of an invariant, or of an assumption declared `proved`, that this run does not prove."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +63,7 @@ class TableReport:
         lines: How many lines it has, DEFAULT not counted.
         method: `boxes`, `tree` or `z3`; empty where nothing was decided.
         confirmed_by_z3: Whether Z3 was asked the same and agreed.
-        assumptions: Each assumption that the proof used, and its standing.
+        assumptions: Each assumption and invariant that the proof used, and its standing.
         proof_ms: What the proof took when it was made.
         cached: Whether it was made by an earlier run.
         together: What the levels together make of it; None where nobody knows.
@@ -74,6 +79,38 @@ class TableReport:
     proof_ms: float = 0.0
     cached: bool = False
     together: InSystem | None = None
+
+
+def resting(table: TableReport, unproved: Collection[str]) -> TableReport:
+    """The report where these invariants and assumptions are not proved: what rests on one of them is conditional."""
+    assumptions = tuple((name, NOT_PROVED if name in unproved else was) for name, was in table.assumptions)
+    if table.verdict is Verdict.PROVED and any(standing == NOT_PROVED for _, standing in assumptions):
+        return replace(table, verdict=Verdict.CONDITIONAL, assumptions=assumptions)
+    return replace(table, assumptions=assumptions)
+
+
+def merged(tables: Iterable[TableReport]) -> tuple[TableReport, ...]:
+    """One report a table, in the order in which they are met: the worst of what several programs make of it.
+
+    A table is part of every program that uses its file, and may rely on other invariants in each. Where all
+    prove it, what it rests on in any of them is listed.
+    """
+    worst: dict[tuple[str, str], TableReport] = {}
+    for table in tables:
+        key = (table.file, table.table)
+        worst[key] = _worse(worst[key], table) if key in worst else table
+    return tuple(worst.values())
+
+
+def _worse(one: TableReport, two: TableReport) -> TableReport:
+    order = list(Verdict)
+    kept = two if order.index(two.verdict) > order.index(one.verdict) else one
+    other = one if kept is two else two
+    if other.verdict is not kept.verdict:
+        return kept
+    known = dict(kept.assumptions)
+    more = tuple((name, standing) for name, standing in other.assumptions if name not in known)
+    return replace(kept, assumptions=(*kept.assumptions, *more))
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from rcsc.cache import Cache, open_cache
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label, sort_key
-from rcsc.diagnostics.report import Report
+from rcsc.diagnostics.report import Report, merged
 from rcsc.driver.work import Effort, Made, Proof, Settings
 from rcsc.source import Span
 
@@ -142,10 +142,10 @@ def _proofs(loaded: "Loaded", settings: Settings, cache: Cache | None) -> Iterat
 
 
 def _report(loaded: "Loaded", proofs: tuple[Proof, ...], found: tuple[Diagnostic, ...] = ()) -> Report:
-    """Everything found, each once, and each table once."""
+    """Everything found, each once, and each table once, with the worst verdict of all programs that it is in."""
     every = {*loaded.found, *found, *(one for proof in proofs for one in proof.found)}
-    tables = {(table.file, table.table): table for proof in proofs for table in proof.tables}
-    return Report(tuple(sorted(every, key=sort_key)), tuple(tables.values()), loaded.sources)
+    tables = merged(table for proof in proofs for table in proof.tables)
+    return Report(tuple(sorted(every, key=sort_key)), tables, loaded.sources)
 
 
 def _executors(

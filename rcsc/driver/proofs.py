@@ -6,14 +6,14 @@ assumptions, invariants, levels. So when one table changes, its neighbours are n
 """
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from rcsc.cache import Cache
 from rcsc.diagnostics.diagnostic import Diagnostic, Label, Severity, sort_key
 from rcsc.diagnostics.jsonform import diagnostic_from_json, diagnostic_to_json, table_from_json, table_to_json
-from rcsc.diagnostics.report import TableReport, Verdict
+from rcsc.diagnostics.report import TableReport, Verdict, resting
 from rcsc.driver.work import Proof
 from rcsc.meaning import digest
 from rcsc.model import Program, Table
@@ -37,7 +37,7 @@ def prove(root: str, program: Program, loaded: Loaded, options: Options, cache: 
     options = options if cells >= WORTH_A_PROCESS else replace(options, jobs=1)
     if cache is None:
         verdict = prove_program(program, options)
-        tables = tuple(table_report(one) for one in verdict.tables)
+        tables = tuple(resting(table_report(one), verdict.unproved) for one in verdict.tables)
         return Proof(root, verdict.findings, program, tables, verdict.proved, verdict.certificate)
     memory = _Memory(program, loaded, options, cache)
     known = {table.name: one for table in program.tables if (one := memory.table(table)) is not None}
@@ -49,7 +49,7 @@ def prove(root: str, program: Program, loaded: Loaded, options: Options, cache: 
     if not any(one.severity is Severity.ERROR for one in verdict.findings):
         memory.keep([one for one in verdict.findings if one not in elsewhere], verdict.tables)
     new = {one.table.name: _Kept(table_report(one), ()) for one in verdict.tables}
-    return _proof(root, program, verdict.findings, {**known, **new})
+    return _proof(root, program, verdict.findings, {**known, **new}, verdict.unproved)
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,10 +60,17 @@ class _Kept:
     notes: tuple[Diagnostic, ...]
 
 
-def _proof(root: str, program: Program, found: Sequence[Diagnostic], known: dict[Any, _Kept]) -> Proof:
+def _proof(
+    root: str,
+    program: Program,
+    found: Sequence[Diagnostic],
+    known: dict[Any, _Kept],
+    unproved: Collection[str] = (),
+) -> Proof:
     tables = [known[table.name] for table in program.tables]
     every = {*found, *(note for one in tables for note in one.notes)}
-    return Proof(root, tuple(sorted(every, key=sort_key)), program, tuple(one.report for one in tables))
+    reports = tuple(resting(one.report, unproved) for one in tables)
+    return Proof(root, tuple(sorted(every, key=sort_key)), program, reports)
 
 
 class _Memory:

@@ -14,7 +14,7 @@ from rcsc.cache import Cache, cache_of
 from rcsc.compose.standing import ASSUMPTION, PROPERTY, Assumed, Known, LevelOutline, Standing
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label, Severity, sort_key
-from rcsc.diagnostics.report import InSystem, Report, SystemReport, TableReport
+from rcsc.diagnostics.report import NOT_PROVED, InSystem, Report, SystemReport, TableReport
 from rcsc.driver.outline import known
 from rcsc.project import PROJECT_FILE
 from rcsc.source import Source, Span
@@ -217,7 +217,7 @@ def _places(made: Standing, table: TableReport) -> Iterator[_Place]:
 
 def _open(table: TableReport) -> list[str]:
     """Assumptions that the proof of the table rests on and has not shown."""
-    return [name for name, was in table.assumptions if was != DECLARED_PROVED]
+    return [name for name, was in table.assumptions if was not in (DECLARED_PROVED, NOT_PROVED)]
 
 
 def _shown(path: str, like: str) -> str:

@@ -58,6 +58,18 @@ def called_by_lines(program: Program) -> set[str]:
     return {str(statement.procedure) for statement in actions if isinstance(statement, Call)}
 
 
+def defined_alone(program: Program, table: Table) -> bool:
+    """Whether the declared ranges alone show every condition of the table to be defined, without a solver."""
+    run = Run(
+        {str(one.name): one for one in program.procedures}, {v.name: v.type for v in program.variables}, {}
+    )
+    tests = {id(test): test for line in table.lines for test in line.tests if test is not None}
+    for test in tests.values():
+        if _computes(test.condition):
+            run.evaluate(test.condition)
+    return not run.obligations
+
+
 @dataclass(slots=True)
 class Obligations:
     """Proves what one program owes.

@@ -3,18 +3,27 @@
 The only place where a `ProvedProgram` is made, and only when nothing is wrong and nothing undecided.
 """
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 
 from rcsc import children
 from rcsc.diagnostics.diagnostic import Diagnostic, Severity, sort_key
 from rcsc.meaning import relying
-from rcsc.model import Backing, Program, ProvedProgram, Table, TableName, seal_of_proof
+from rcsc.model import (
+    AssumptionName,
+    Backing,
+    Program,
+    ProvedProgram,
+    Standing,
+    Table,
+    TableName,
+    seal_of_proof,
+)
 from rcsc.prove import smt
 from rcsc.prove.certificate import program_certificate
 from rcsc.prove.discharge import Tally
 from rcsc.prove.invariants import assumptions_satisfiable, at_first, properties_elsewhere
-from rcsc.prove.obligations import Obligations
+from rcsc.prove.obligations import Obligations, defined_alone
 from rcsc.prove.options import Options
 from rcsc.prove.report import diagnostics
 from rcsc.prove.smt import Answer
@@ -32,6 +41,7 @@ class ProgramVerdict:
         tables: One verdict a table.
         certificate: Of all tables; None where something is not proved.
         tally: How the obligations of procedures and conditions were settled.
+        unproved: Invariants, and assumptions declared `proved`, that are not proved: what rests on one is not, either.
     """
 
     findings: tuple[Diagnostic, ...]
@@ -39,6 +49,7 @@ class ProgramVerdict:
     tables: tuple[TableVerdict, ...]
     certificate: Mapping[str, object] | None
     tally: Tally
+    unproved: frozenset[str] = frozenset()
 
 
 def prove_program(
@@ -52,20 +63,50 @@ def prove_program(
     owed = Obligations(program, options)
     wanted = [table for table in program.tables if only is None or table.name in only]
     found += owed.prove(wanted)
+    unproved = _unproved(program, found)
     assuming = relying(program)
     known = {table.name for table in wanted}
     tables = [table for table in assuming.tables if table.name in known]
-    verdicts = _verdicts(assuming, tables, options, owed.undefined)
+    made = _verdicts(assuming, tables, options, owed.undefined)
+    verdicts = tuple(_with_invariants(program, verdict) for verdict in made)
     for verdict in verdicts:
         if verdict.table.name not in owed.undefined:
             found += diagnostics(assuming, verdict)
     findings = tuple(sorted(dict.fromkeys(found), key=sort_key))
     wrong = any(one.severity is Severity.ERROR for one in findings)
     if wrong or only is not None:
-        return ProgramVerdict(findings, None, verdicts, None, owed.tally)
+        return ProgramVerdict(findings, None, verdicts, None, owed.tally, unproved)
     backings = tuple((verdict.table.name, verdict.backing) for verdict in verdicts)
     proved = ProvedProgram(program, backings, seal_of_proof())
     return ProgramVerdict(findings, proved, verdicts, _certificate(program, verdicts, owed.tally), owed.tally)
+
+
+def _unproved(program: Program, found: Iterable[Diagnostic]) -> frozenset[str]:
+    """Invariants and assumptions declared `proved` of which these findings leave the proof incomplete.
+
+    Invariants are shown by one induction in which every run rests on all of them, and on what it owes itself: any
+    error breaks it. An assumption that is proved rests on the invariants.
+    """
+    errors = [one for one in found if one.severity is Severity.ERROR]
+    spans = {one.primary.span for one in errors}
+    broken = bool(errors and program.invariants)
+    claimed = (one for one in program.assumptions if one.standing is Standing.PROVED)
+    return frozenset(
+        (
+            *(one.name for one in program.invariants if broken),
+            *(str(one.name) for one in claimed if broken or one.span in spans),
+        )
+    )
+
+
+def _with_invariants(program: Program, verdict: TableVerdict) -> TableVerdict:
+    """The verdict, resting on every invariant where the ranges alone do not show its conditions to be defined."""
+    if not program.invariants or defined_alone(program, verdict.table):
+        return verdict
+    named = dict(verdict.backing.assumptions)
+    more = {AssumptionName(one.name): Standing.PROVED for one in program.invariants}
+    backing = replace(verdict.backing, assumptions=tuple((named | more).items()))
+    return replace(verdict, backing=backing)
 
 
 def _verdicts(
