@@ -7,10 +7,12 @@ enough to believe: it follows the manual's "What a cycle does" word for word and
 import importlib
 import math
 import operator
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Any
+from typing import Any, TypeAlias
 
 from rcsc.model import (
     Action,
@@ -85,6 +87,11 @@ class Outcome:
 
 class ExternError(Exception):
     """An extern procedure gave a value outside its declared range, for the leaf named."""
+
+
+Answers: TypeAlias = Callable[[Procedure, list[Value]], tuple[Value, ...]]
+"""What stands in for extern procedures: takes one with its reads and arguments, and gives its writes in order."""
+_ANSWERS: ContextVar[Answers | None] = ContextVar("answers", default=None)
 
 
 # --- expressions ---------------------------------------------------------------------
@@ -240,17 +247,31 @@ def _call_extern(
     program: Program, procedure: Procedure, args: list[Value], snapshot: dict[str, Value]
 ) -> None:
     """The user's function takes the reads and the arguments, and gives the writes in order: one as it is or in a tuple."""
-    assert procedure.extern is not None
-    module, _, function = procedure.extern.python.partition(":")
-    results = getattr(importlib.import_module(module), function)(
-        *[snapshot[name] for name in procedure.reads], *args
-    )
-    given = results if isinstance(results, tuple) else (results,) if procedure.writes else ()
+    given = (_ANSWERS.get() or _of_user)(procedure, [*(snapshot[name] for name in procedure.reads), *args])
     for name, value in zip(procedure.writes, given, strict=True):
         admitted = _admitted(program.variable(name), value)
         if admitted is None:
             raise ExternError(name)
         snapshot[name] = admitted
+
+
+def _of_user(procedure: Procedure, args: list[Value]) -> tuple[Value, ...]:
+    assert procedure.extern is not None
+    module, _, function = procedure.extern.python.partition(":")
+    results = getattr(importlib.import_module(module), function)(*args)
+    if isinstance(results, tuple):
+        return results
+    return (results,) if procedure.writes else ()
+
+
+@contextmanager
+def answering(answers: Answers) -> Iterator[None]:
+    """Inside, no extern procedure is called: `answers` gives the results, in range or not."""
+    before = _ANSWERS.set(answers)
+    try:
+        yield
+    finally:
+        _ANSWERS.reset(before)
 
 
 # --- cycles --------------------------------------------------------------------------

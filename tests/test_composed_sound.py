@@ -1,32 +1,29 @@
 """Levels of which something false was once proved: each is as small as shows it, and the interpreter is the judge."""
 
+import json
 from dataclasses import replace
-from itertools import count
 from pathlib import Path
 
 import pytest
 
+from rcsc.cli import run
 from rcsc.compose.agreed import agreements
 from rcsc.compose.ends import Ending
+from rcsc.compose.finding import of_trace
+from rcsc.compose.frozen import BadCaseError, case_breaks, read_case
 from rcsc.compose.goals import Sort
 from rcsc.compose.lap import Lap, laps
 from rcsc.compose.level import LevelProof, Verdict, prove_level
+from rcsc.compose.look import Looking, look
 from rcsc.compose.system import NoProgramError, prove_system, steppers
-from rcsc.compose.trace import Search, one_cycle, ran
+from rcsc.compose.trace import Search, one_cycle, ran, ran_on, shortest
 from rcsc.compose.transition import Stepper
-from rcsc.interpret import initial
+from rcsc.interpret import Fault, initial
 from rcsc.model import Value
-from rcsc.system.description import BadDescription
+from rcsc.system.description import BadDescription, description
 from tests.hierarchies_level import Reading, Role
 from tests.test_compose import LITTLE, SMALL, Edit, changed, swap
 from tests.test_endings import WAY, go
-
-_ASKED = count()
-
-
-def ask(_there: bool) -> bool:
-    """Another answer each time."""
-    return bool(next(_ASKED) % 2)
 
 
 def proved(folder: Path, edit: Edit) -> tuple[Stepper, LevelProof]:
@@ -59,14 +56,17 @@ def asking(text: str) -> str:
     states = "state tick : bool\nstate raw : bool"
     text = go(TOGGLES, states, "on := raw /= tick\n  tick := raw")(text)
     text = text.replace("module receive reads command,", "module receive reads command, raw,")
-    said = f'extern procedure ask reads there writes raw python "{__name__}:ask" c "ask"\n\nmodule receive'
-    return text.replace("module receive", said, 1).replace("preprocess receive", "preprocess ask, receive")
+    said = 'extern procedure ask reads there writes raw python "no_such_module:ask" c "ask"\n\nmodule receive'
+    return text.replace("module receive", said, 1).replace("postprocess answer", "postprocess answer, ask")
 
 
 def test_an_extern_procedure_may_give_something_else_in_the_next_cycle(tmp_path: Path) -> None:
     stepper, proof = proved(tmp_path, asking)
-    run = lines_run(stepper, 40, command__inc_command=1, command__input_command=1)
-    assert run[2:] == [("go", "2")] * 38  # for ever, where it answers so
+    start = initial(stepper.program)
+    taken: dict[str, Value] = {"command.inc_command": 1, "command.input_command": 1, "there": False}
+    turns = [(taken, (("ask", (at % 2 == 0,)),)) for at in range(40)]  # another answer each time
+    lines = [(step.table, step.line) for step in ran_on(stepper, start, turns)]
+    assert set(lines[1:]) == {("go", "2")}  # for ever, where it answers so
     assert not ending(proof, "go").proved
 
 
@@ -80,7 +80,7 @@ def nested(text: str) -> str:
 
 
 def nested_extern(text: str) -> str:
-    said = f'extern procedure inner reads there writes on python "{__name__}:ask" c "ask"'
+    said = 'extern procedure inner reads there writes on python "no_such_module:ask" c "ask"'
     return nested(text).replace("module inner reads c writes on {\n  on := c >= 9\n}", said)
 
 
@@ -90,14 +90,21 @@ def whole_of_what_overflows(text: str) -> str:
     return text.replace("module receive reads command,", "module receive reads command, r,")
 
 
-@pytest.mark.parametrize(
-    ("edit", "ends"), [(nested, True), (nested_extern, False), (whole_of_what_overflows, False)]
-)
+@pytest.mark.parametrize(("edit", "ends"), [(nested, True), (whole_of_what_overflows, False)])
 def test_what_the_preprocess_may_do_is_followed(edit: Edit, ends: bool, tmp_path: Path) -> None:
-    """Calls, extern ones too, and the whole part of what may be no number."""
+    """Calls, and the whole part of what may be no number."""
     _, proof = proved(tmp_path, edit)
     assert proof.open == ()
     assert ending(proof, "go").proved == ends
+
+
+def test_a_refusal_in_the_preprocess_passes_over_a_new_command(tmp_path: Path) -> None:
+    """The flag is up when the module calls the procedure, and down in the cycle after the one that ended there."""
+    stepper, proof = proved(tmp_path, nested_extern)
+    assert [(goal.sort, goal.table) for goal in proof.open] == [(Sort.ANSWERED, "go")]
+    found = shortest(stepper, proof.open[0], 3)
+    assert found is not None
+    assert (found.steps[-1].fault, found.steps[-1].line) == (Fault.EXTERN, "")
 
 
 # --- what selects the table ----------------------------------------------------------------------
@@ -119,8 +126,8 @@ def by_turns(text: str) -> str:
 
 def test_tables_that_take_turns_under_one_command_are_named(tmp_path: Path) -> None:
     stepper, proof = proved(tmp_path, by_turns)
-    run = lines_run(stepper, 40, command__inc_command=1)
-    assert {table for table, _ in run[:2]} == {"go", "pause"} == {table for table, _ in run[-2:]}
+    lines = lines_run(stepper, 40, command__inc_command=1)
+    assert {table for table, _ in lines[:2]} == {"go", "pause"} == {table for table, _ in lines[-2:]}
     assert all(not ending(proof, table).proved for table in ("go", "pause"))
 
 
@@ -299,8 +306,8 @@ def done_now_and_then(text: str) -> str:
 def test_an_answer_that_does_not_stay_is_none(tmp_path: Path) -> None:
     """A superior is taken to see an answer some time: it has to stay until it does."""
     stepper, proof = proved(tmp_path, done_now_and_then)
-    run = lines_run(stepper, 40, command__inc_command=1, command__input_command=1)
-    assert {line for _, line in run[2:]} == {"2", "3"}
+    lines = lines_run(stepper, 40, command__inc_command=1, command__input_command=1)
+    assert {line for _, line in lines[2:]} == {"2", "3"}
     assert ending(proof, "go").endless == ("2",)
     found = laps(stepper, ("go",), Search(8, legal=True))["go"]
     assert isinstance(found, Lap)
@@ -336,3 +343,121 @@ def test_what_goes_round_while_the_command_is_answered_does_no_harm(tmp_path: Pa
     assert ending(proof, "go").proved
     _, proof = proved(tmp_path / "executing", flips("executing"))
     assert ending(proof, "go").endless == ("4",)
+
+
+# --- extern procedures that are refused ------------------------------------------------------------
+
+
+SOLO = 'name = "one"\ngenerated = ".rcsc-cache/g"\ndata = "system.toml"\ntick_ms = 40\n[[level]]\nname = "solo"\n[buffers]\n'
+
+
+def solo(folder: Path, text: str) -> Path:
+    """A system of one level without neighbours."""
+    (folder / "system.toml").write_text(SOLO, encoding="utf-8")
+    (folder / "solo.rcs").write_text(text, encoding="utf-8")
+    return folder / "system.toml"
+
+
+def asks(result: str, states: str, where: str = "line") -> str:
+    """A level that keeps two states equal in each cycle, between them an extern procedure that gives `result`."""
+    first, last = (f"{part} one" if where == part else "" for part in ("preprocess", "postprocess"))
+    line = "one" if where == "line" else ""
+    return f"""{states}
+input go : bool
+state a : bool
+state b : bool
+extern procedure ext reads go writes {result} python "no_such_module:f" c "extf"
+module one reads go writes a, b, {result} {{ a := go; ext; b := go }}
+property together : a = b
+property in_range : a or not a
+table t {{
+  | line | go    || procedures |
+  |------|-------||------------|
+  | yes  | true  || {line}     |
+  | no   | false || {line}     |
+}}
+level solo {{ period 40 [ms] {first} table t {last} }}
+"""
+
+
+RESULTS = {
+    "a number": ("h", "state h : int -3 .. 9"),
+    "all of a byte": ("h", "state h : int 0 .. 255"),
+    "a truth value": ("h", "state h : bool"),
+    "a member": ("h", "enum part { none, box }\nstate h : part"),
+    "a real": ("h", "state h : real -1.0 .. 1.0"),
+    "the second of two": ("h, i", "state h : int 0 .. 9\nstate i : int 0 .. 9"),
+}
+
+
+@pytest.mark.parametrize("result", RESULTS)
+def test_a_result_that_is_refused_ends_the_cycle_whatever_its_type(result: str, tmp_path: Path) -> None:
+    path = solo(tmp_path, asks(*RESULTS[result]))
+    made = steppers(path)
+    proof = prove_system(path, LITTLE)
+    stated = {goal.name: verdict for goal, verdict in proof.levels[0].found if goal.sort is Sort.PROPERTY}
+    assert stated == {"together": Verdict.NOT_PROVED, "in_range": Verdict.PROVED}
+    [told] = look(made, proof, Looking(description(path), 4))
+    assert told.finding is not None
+    assert not told.beside
+    assert told.finding.broken.fault is Fault.EXTERN
+    assert told.in_c is (result not in {"all of a byte", "a truth value"})  # no C function can give more
+
+
+@pytest.mark.parametrize("where", ["preprocess", "line", "postprocess"])
+def test_a_cycle_ends_where_the_result_is_refused(where: str, tmp_path: Path) -> None:
+    """Wherever the procedure is called: and only there does what comes after it not run."""
+    path = solo(tmp_path, asks(*RESULTS["a number"], where))
+    stepper = steppers(path)["solo"]
+    found = shortest(stepper, next(goal for goal in prove_level(stepper, LITTLE).open), 3)
+    assert found is not None
+    last = found.steps[-1]
+    assert (last.after["a"], last.after["b"], last.after["h"]) == (True, False, last.before["h"])
+    assert last.line == ("" if where == "preprocess" else "yes")
+
+
+def test_the_prover_calls_no_code_of_the_user(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Not where it proves, nor where it looks for runs, nor where it runs them, freezes them and runs the case."""
+    (tmp_path / "of_the_user.py").write_text("import os\nos._exit(0)\n", encoding="utf-8")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    text = asks(*RESULTS["a number"]).replace("no_such_module", "of_the_user")
+    path = solo(tmp_path, text)
+    found, kept = tmp_path / "found", tmp_path / "cases"
+    assert run(["prove", str(path), "--log", str(found), "--freeze", str(kept), "--jobs", "2"]) == 1
+    [log] = found.glob("*.mcap")
+    assert run(["replay", str(log), "--generated", str(found / "generated")]) == 0
+    [case] = kept.glob("*.json")
+    assert run(["prove", "--case", str(case)]) == 1  # as it expects the property to be kept
+    path.with_name("solo.rcs").write_text(text.replace("a := go; ext;", "ext; a := go;"), encoding="utf-8")
+    assert run(["prove", "--case", str(case)]) == 0
+
+
+def test_a_case_that_says_what_no_extern_procedure_gives_is_none(tmp_path: Path) -> None:
+    path = solo(tmp_path, asks(*RESULTS["a number"]))
+    kept = tmp_path / "cases"
+    assert run(["prove", str(path), "--freeze", str(kept)]) == 1
+    [case] = kept.glob("*.json")
+    form = json.loads(case.read_text(encoding="utf-8"))
+    for wrong in (["ext", []], ["one", [1]], ["ext", ["x"]], ["ext", [None]], "ext"):
+        form["answers"][0]["solo"] = [wrong]
+        case.write_text(json.dumps(form), encoding="utf-8")
+        with pytest.raises(BadCaseError, match="extern procedure that gives"):
+            case_breaks(read_case(case))
+
+
+def starts_by_asking(text: str) -> str:
+    """The line that takes a new command asks first; where that is refused, the flag is down when the next cycle comes."""
+    said = 'state h : int 0 .. 9\nextern procedure ask reads there writes h python "no_such_module:f" c "ask"\n\nprocedure state'
+    text = text.replace("procedure state", said, 1)
+    return text.replace("|| state(going)   |", "|| ask; state(going) |")
+
+
+def test_a_new_command_whose_line_is_cut_short_is_passed_over(tmp_path: Path) -> None:
+    stepper, proof = proved(tmp_path, starts_by_asking)
+    assert proof.verdict(Sort.ANSWERED, "go", "new_command") is Verdict.NOT_PROVED
+    goal = next(one for one in proof.open if one.sort is Sort.ANSWERED)
+    found = shortest(stepper, goal, 3)
+    assert found is not None
+    assert found.steps[-1].fault is Fault.EXTERN
+    finding = of_trace(stepper, goal, found)
+    assert finding.ticks[-1]["lower"].line == "4"  # done, though it never began

@@ -21,10 +21,19 @@ from rcsc.compose.goals import Goal, Key, Sort, goals, may_meet, pairs
 from rcsc.compose.rerun import ExecutorsDifferError, make, record
 from rcsc.compose.system import steppers
 from rcsc.compose.together import broken_together
-from rcsc.compose.trace import Found, NotReproducedError, Search, Trace, broken, shortest, traces
+from rcsc.compose.trace import (
+    Found,
+    NotReproducedError,
+    Search,
+    Trace,
+    broken,
+    seen_by_table,
+    shortest,
+    traces,
+)
 from rcsc.compose.transition import Stepper
 from rcsc.compose.variants import VARIANTS, defaults_reported, first_match, undeferred
-from rcsc.compose.weakest import helps, seen_by_table, weakest_condition
+from rcsc.compose.weakest import helps, weakest_condition
 from rcsc.interpret import Fault, holds, matching_lines
 from rcsc.log.read import read
 from rcsc.log.replay import Replay
@@ -734,6 +743,7 @@ def test_a_line_that_no_table_has_is_proposed_where_none_matches() -> None:
     assert trace is not None
     finding = of_trace(stepper, goal, trace)
     seen = seen_by_table(stepper, finding.broken)
+    assert seen is not None
     assert matching_lines(table_of(stepper.program, "acquire"), seen) == []
     [why, row] = helps(stepper, finding)
     assert why.startswith("no line matches while new_command = false")

@@ -308,7 +308,7 @@ def _say_told(made: "dict[str, Stepper]", told: "Told", cycles: int) -> None:
     for line in told.beside:
         click.echo(f"  = note: {line}", err=True)
     if told.finding is not None and not told.beside:
-        _say_finding(made, told.finding)
+        _say_finding(made, told.finding, in_c=told.in_c)
     elif told.guessed:
         click.echo("  = note: a trace that was found does not run: arithmetic was left open", err=True)
     elif cycles and not told.beside:
@@ -333,13 +333,17 @@ def _stated(made: "dict[str, Stepper]", told: "Told") -> str:
     return next(one.text for one in made[told.level].program.properties if one.name == told.goal.name)
 
 
-def _say_finding(made: "dict[str, Stepper]", finding: "Finding") -> None:
+def _say_finding(made: "dict[str, Stepper]", finding: "Finding", *, in_c: bool) -> None:
     """The time line."""
     from rich.console import Console
 
     begins = ", after a restart" if finding.restarted else ""
     legal = "" if finding.legal else "; numbers have gone round, or a neighbour was restarted"
-    run_by = "as the interpreter, the Python and the C executors run it"
+    run_by = (
+        "as the interpreter, the Python and the C executors run it"
+        if in_c
+        else "as the interpreter and the Python executor run it (no C function can give what is refused)"
+    )
     what = (
         f"goes round from cycle {finding.lap} to cycle {finding.broken_at}"
         if finding.lap

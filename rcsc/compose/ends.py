@@ -3,7 +3,7 @@
 In: a stepper, and what was confirmed of it. Out: an `Ending` for each table. A level is *answered* in a cycle when each
 subordinate echoes the last order and says of it *done* or *failed*; of the first command, PAUSE or its like, *done*. It is
 assumed that each order, if no other replaces it, is answered some time and stays so; and that is what is shown of the level: it
-is *unanswered* while it reports *executing*, or of PAUSE anything but *done*. The argument, for a level that keeps one command:
+is *unanswered* while it reports neither; a fourth status answers nothing. The argument, for a level that keeps one command:
 
 - Its *table* stays, or what selects it is no part of the command: then from table to table there is no way round.
 - Its *phase* is its pending next states, and the flags that its lines write. From phase to phase there is no way round (all
@@ -37,7 +37,8 @@ from rcsc.prove.smt import Answer
 from rcsc.prove.values import Node
 
 MOST_STEPS = 400
-DONE, EXECUTING = "done", "executing"
+DONE, FAILED = "done", "failed"
+"""What a report says of a command that is answered; whatever else it says, the command goes on."""
 
 Phase = tuple[int, ...]
 Way = tuple[Phase, Phase]
@@ -67,13 +68,13 @@ class Ending:
 
 
 def reports(stepper: Stepper) -> bool:
-    """Whether the level has a superior, and all reports say what is done and what is executing."""
+    """Whether the level has a superior, and all reports can say that a command is done."""
     above = stepper.links.above
     if above is None:
         return False
     kinds = [stepper.kinds.get(f"{above.report}.{STATUS}")]
     kinds += [stepper.kinds.get(f"{below.report}.{STATUS}") for below in stepper.links.below]
-    return all(isinstance(kind, Enum) and {DONE, EXECUTING} <= set(kind.members) for kind in kinds)
+    return all(isinstance(kind, Enum) and DONE in kind.members for kind in kinds)
 
 
 def command_stays(stepper: Stepper, cycle: Cycle) -> Node:
@@ -85,15 +86,16 @@ def command_stays(stepper: Stepper, cycle: Cycle) -> Node:
 
 
 def unanswered(stepper: Stepper, cycle: Cycle) -> Node:
-    """The level's report is none that its superior waits for: of the first command that is *done* alone."""
+    """The level's report is none that its superior waits for: *done* or *failed*; of the first command *done* alone."""
     above = stepper.links.above
     assert above is not None
     command, status = f"{above.order}.{COMMAND}", f"{above.report}.{STATUS}"
     rests = values.equal(cycle.taken[command], values.constant(stepper.kinds[command], 0))
     done = _says(stepper, status, cycle.after, DONE)
-    return values.either(
-        _says(stepper, status, cycle.after, EXECUTING), values.both(rests, values.negation(done))
+    ended = values.either(
+        done, values.both(values.negation(rests), _says(stepper, status, cycle.after, FAILED))
     )
+    return values.negation(ended)
 
 
 def answered(stepper: Stepper, cycle: Cycle, below: Below) -> Node:
@@ -102,13 +104,17 @@ def answered(stepper: Stepper, cycle: Cycle, below: Below) -> Node:
     echoed = values.equal(cycle.taken[f"{below.report}.{ECHO}"], cycle.before[f"{below.order}.{NUMBER}"])
     rests = values.equal(cycle.before[command], values.constant(stepper.kinds[command], 0))
     done = _says(stepper, status, cycle.taken, DONE)
-    ended = values.negation(_says(stepper, status, cycle.taken, EXECUTING))
-    return values.all_of((echoed, ended, values.follows(rests, done)))
+    ended = values.either(
+        done, values.both(values.negation(rests), _says(stepper, status, cycle.taken, FAILED))
+    )
+    return values.both(echoed, ended)
 
 
 def _says(stepper: Stepper, leaf: str, leaves: Mapping[str, Node], member: str) -> Node:
     kind = stepper.kinds[leaf]
     assert isinstance(kind, Enum)
+    if member not in kind.members:
+        return values.FALSE
     return values.equal(leaves[leaf], values.constant(kind, kind.members.index(member)))
 
 

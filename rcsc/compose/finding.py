@@ -3,14 +3,14 @@
 In: traces. Out: `Finding`s; rows and lines of text, in the tables' words.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 from rcsc.compose.goals import Goal, Sort
 from rcsc.compose.trace import Step, Trace, one_cycle
 from rcsc.compose.transition import Stepper
 from rcsc.interpret import Fault
-from rcsc.model import Value, spell
+from rcsc.model import Value, key_bounds, key_of, spell
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +59,7 @@ def of_trace(stepper: Stepper, goal: Goal, trace: Trace) -> Finding:
     """The run of one level; what is passed over shows in the next cycle, in which the level sees the same again."""
     steps = list(trace.steps)
     if goal.sort is Sort.ANSWERED:
-        steps.append(one_cycle(stepper, steps[-1].after, steps[-1].taken))
+        steps.append(one_cycle(stepper, steps[-1].after, steps[-1].taken, steps[-1].answers))
     ticks = tuple({stepper.level.name: step} for step in steps)
     after = len(steps) - len(trace.steps)
     return Finding(stepper.level.name, goal, ticks, after, trace.restarted, trace.legal)
@@ -130,12 +130,26 @@ def _row(stepper: Stepper, tick: int, step: Step, broken: Goal | None) -> Row:
         name: spell(kinds[name], value) for name, value in step.after.items() if step.before[name] != value
     }
     takes = {name: said for name, said in changed.items() if name in step.taken}
+    takes |= dict(_answers(stepper, step))
     leaves = {name: said for name, said in changed.items() if name not in step.taken}
     wrong = [f"assumption `{name}` fails" for name in step.failed]
     wrong += [_FAULTS[step.fault]] if step.fault in _FAULTS else []
     wrong += [_WRONG[broken.sort].format(broken.name)] if broken is not None and broken.sort in _WRONG else []
     line = " and ".join(step.matched) or "none"
     return Row(tick, stepper.level.name, step.table, line, takes, leaves, "; ".join(wrong))
+
+
+def _answers(stepper: Stepper, step: Step) -> Iterator[tuple[str, str]]:
+    """What extern procedures give, call by call; a value that is refused is in no type's words."""
+    for procedure, given in step.answers:
+        writes = next(one.writes for one in stepper.program.procedures if one.name == procedure)
+        for leaf, value in zip(writes, given, strict=True):
+            low, high = key_bounds(stepper.kinds[leaf])
+            inside = value == value and low <= key_of(stepper.kinds[leaf], value) <= high  # noqa: PLR0124  # no NaN
+            yield (
+                f"{leaf} from {procedure}",
+                spell(stepper.kinds[leaf], value) if inside else f"{value}, refused",
+            )
 
 
 def time_line(made: Mapping[str, Stepper], finding: Finding) -> list[str]:

@@ -8,13 +8,15 @@ hazard that is to stay visible: that of another rule than the language's, or of 
 """
 
 import json
+import math
 import os
-from collections.abc import Callable, Container, Mapping
+from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from rcsc.compose.finding import Finding
+from rcsc.compose.given import Answer
 from rcsc.compose.goals import Goal, Sort
 from rcsc.compose.lap import lap_of
 from rcsc.compose.system import NoProgramError, steppers
@@ -22,7 +24,7 @@ from rcsc.compose.together import broken_in, exchange
 from rcsc.compose.trace import Step, broken, one_cycle
 from rcsc.compose.transition import Stepper
 from rcsc.compose.variants import VARIANTS
-from rcsc.interpret import Fault, initial
+from rcsc.interpret import initial
 from rcsc.model import Bool, Enum, Kind, Program, Real, Scalar, Value, key_bounds, key_of, spell
 from rcsc.prove import values
 from rcsc.system.description import BadDescription
@@ -43,7 +45,7 @@ class Case:
         variants: Under which other rules (`variants.VARIANTS`).
         level: Whose goal it is, with its sort, table, name and lines.
         start: For each level the leaves that do not begin as they do initially.
-        ticks: For each tick, for each level that runs, the inputs that change.
+        ticks: For each tick, for each level that runs, the inputs that change; `answers`, what its extern procedures give.
     """
 
     system: Path
@@ -53,6 +55,7 @@ class Case:
     start: Mapping[str, Mapping[str, str]]
     ticks: tuple[Mapping[str, Mapping[str, str]], ...]
     expects_broken: bool
+    answers: tuple[Mapping[str, Sequence[Any]], ...] = ()
 
 
 def frozen(
@@ -81,7 +84,20 @@ def frozen(
             for steps in finding.ticks
         ],
     }
+    if any(step.answers for steps in finding.ticks for step in steps.values()):
+        document["answers"] = [
+            {
+                name: [[one, list(map(_number, given))] for one, given in step.answers]
+                for name, step in steps.items()
+            }
+            for steps in finding.ticks
+        ]
     return json.dumps(document, indent=1) + "\n"
+
+
+def _number(value: Value) -> Value | str:
+    """A result of an extern procedure, in range or not, as JSON has it: what is no number in words."""
+    return value if isinstance(value, bool | int) or math.isfinite(value) else str(value)
 
 
 def _not_initial(stepper: Stepper, start: Mapping[str, Value]) -> dict[str, str]:
@@ -121,6 +137,7 @@ def read_case(path: Path) -> Case:
             said["start"],
             tuple(said["ticks"]),
             {"broken": True, "kept": False}[said["expect"]],
+            tuple(said.get("answers", ())),
         )
     except OSError as error:
         raise BadCaseError(f"`{path}` cannot be read: {error.strerror}") from error
@@ -139,11 +156,13 @@ def case_breaks(case: Case) -> bool:
     exchanged = exchange(made, tuple(made))
     given = {name: {leaf: now[name][leaf] for leaf in leaves} for name, leaves in exchanged.items()}
     so_far: list[Step] = []
-    for tick in case.ticks:
+    answers = (*case.answers, *({} for _ in case.ticks[len(case.answers) :]))
+    for tick, answered in zip(case.ticks, answers, strict=False):
         steps = {}
         for name, said in tick.items():
             taken = _taken(made[name], now[name], said) | given[name]
-            steps[name] = one_cycle(made[name], now[name], taken)
+            results = tuple(_answer(made[name], one) for one in answered.get(name, ()))
+            steps[name] = one_cycle(made[name], now[name], taken, results)
         now |= {name: dict(step.after) for name, step in steps.items()}
         for name, leaves in exchanged.items():
             given[name] |= {leaf: now[of][source] for leaf, (of, source) in leaves.items() if of in steps}
@@ -151,9 +170,22 @@ def case_breaks(case: Case) -> bool:
             so_far.append(steps[case.level])
             if _is_broken(made, case, so_far):
                 return True
-        if any(step.fault is not Fault.OK for step in steps.values()):
+        if any(step.ends_the_run for step in steps.values()):
             return False
     return False
+
+
+def _answer(stepper: Stepper, said: Any) -> Answer:
+    """One call's results, as the case has them."""
+    try:
+        name, results = said
+        procedure = next(one for one in stepper.program.procedures if one.name == name and one.extern)
+        given = tuple(float(one) if isinstance(one, str) else one for one in results)
+        if len(given) == len(procedure.writes) and all(isinstance(one, bool | int | float) for one in given):
+            return str(name), given
+    except (TypeError, ValueError, StopIteration):
+        pass
+    raise BadCaseError(f"level `{stepper.level.name}` has no extern procedure that gives `{said}`")
 
 
 def _made(case: Case) -> dict[str, Stepper]:

@@ -14,9 +14,10 @@ from typing import TypeAlias
 from rcsc.compose.contract import COMMAND, ECHO, ECHOED, NUMBER, Below, leaves_under
 from rcsc.compose.properties import invariants, properties
 from rcsc.compose.transition import Cycle, Stepper, TableAt, successor
-from rcsc.model import Line, OneTable, Table, pending
+from rcsc.model import Line, OneTable, Program, Table, pending
 from rcsc.prove import boxes, values
 from rcsc.prove.values import Node
+from rcsc.resolve.leaves import read_by
 
 FLAG = "new_command"
 """True until the level's own answer to a new command is echoed (sections 8.3 and 9)."""
@@ -139,7 +140,14 @@ def _upward(stepper: Stepper, cycle: Cycle) -> Iterator[Goal]:
         return
     number = values.equal(cycle.after[f"{above.report}.{ECHO}"], cycle.taken[f"{above.order}.{NUMBER}"])
     command = values.equal(cycle.after[f"{above.report}.{ECHOED}"], cycle.taken[f"{above.order}.{COMMAND}"])
-    yield Goal(Sort.ECHOES, "", above.report, values.both(number, command))
+    as_before = (
+        values.all_of(  # where an extern procedure is refused it may be as late as if the level had not run
+            values.equal(cycle.before[leaf], cycle.after[leaf])
+            for leaf in leaves_under(stepper.program, above.report)
+        )
+    )
+    late = values.both(cycle.refused, as_before)
+    yield Goal(Sort.ECHOES, "", above.report, values.either(values.both(number, command), late))
 
 
 def _downward(stepper: Stepper, cycle: Cycle) -> Iterator[Goal]:
@@ -200,7 +208,8 @@ def _own(stepper: Stepper, cycle: Cycle) -> Iterator[Goal]:
         rises = values.both(cycle.after[FLAG], values.negation(cycle.before[FLAG]))
         yield Goal(Sort.ONCE, "", FLAG, values.follows(same, values.negation(rises)))
         for at in cycle.tables:
-            if overlooking := _overlooking(at):
+            overlooking = _overlooking(at)
+            if overlooking or (overlooking is not None and _asks(stepper.program)):
                 yield _answered(stepper, cycle, at, overlooking)
     for variable in stepper.program.variables:
         if variable.deferred_until is not None:
@@ -217,29 +226,35 @@ def _stated(stepper: Stepper, cycle: Cycle) -> Iterator[Goal]:
         yield Goal(Sort.PROPERTY, "", name, holds)
 
 
-def _overlooking(at: TableAt) -> tuple[Node, ...]:
-    """When lines match that do not look for a new command, of a table in which some line does; DEFAULT never looks."""
-    looks = [_looks(at.table, line) for line in at.table.lines]
+def _asks(program: Program) -> bool:
+    """Whether a cycle can end early because an extern procedure is refused."""
+    return any(one.extern is not None for one in program.procedures)
+
+
+def _overlooking(at: TableAt) -> tuple[Node, ...] | None:
+    """When lines match that do not look for a new command; None of a table in which none does. DEFAULT never looks."""
+    looks = [looks_for(FLAG, line) for line in at.table.lines]
     if not any(looks):
-        return ()
+        return None
     blind = [match for match, one in zip(at.matches, looks, strict=True) if not one]
     default = at.table.default
     return (*blind, *([] if default is None or default.unreachable else [at.none]))
 
 
-def _looks(table: Table, line: Line) -> bool:
-    """Whether the line has a cell on the flag."""
-    cells = zip(table.columns, line.tests, strict=True)
-    return any(test is not None and column.variable == FLAG for column, test in cells)
+def looks_for(leaf: str, line: Line) -> bool:
+    """Whether some cell of the line reads the leaf, alone or in an expression."""
+    return any(test is not None and leaf in map(str, read_by(test.condition)) for test in line.tests)
 
 
 def _answered(stepper: Stepper, cycle: Cycle, at: TableAt, overlooking: tuple[Node, ...]) -> Goal:
-    """Where such a line runs while the flag stands, the flag outlasts it.
+    """Where such a line runs while the flag stands, or the cycle ends before a line is done, the flag outlasts it.
 
     If it is down as soon as the level sees the same once more, no line will answer the command, and what this line
     reports is taken for the answer.
     """
     again = stepper.cycle(cycle.after, " again", taken=cycle.taken).middle[FLAG]
     missed = values.any_of(overlooking)
-    flagged = values.all_of((cycle.middle[FLAG], at.chosen, values.negation(at.several()), missed))
+    passed = values.all_of((at.chosen, values.negation(at.several()), missed))
+    passed = values.either(passed, values.both(at.selected, cycle.interrupted))
+    flagged = values.both(cycle.middle[FLAG], passed)
     return Goal(Sort.ANSWERED, str(at.table.name), FLAG, values.follows(flagged, again))

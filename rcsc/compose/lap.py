@@ -13,7 +13,7 @@ from rcsc.compose.contract import ECHO, NUMBER
 from rcsc.compose.ends import answered, command_stays, unanswered
 from rcsc.compose.goals import Goal, Sort
 from rcsc.compose.sat import GaveUpError
-from rcsc.compose.trace import NotReproducedError, Search, Step, Trace, Unrolled, as_cycle, ran
+from rcsc.compose.trace import NotReproducedError, Search, Step, Trace, Unrolled, as_cycle, ran_on
 from rcsc.compose.transition import NUMBERS, Cycle, Stepper
 from rcsc.interpret import Fault
 from rcsc.prove import values
@@ -58,7 +58,15 @@ def _comes_round(stepper: Stepper, table: str, cycles: Sequence[Cycle]) -> Node:
     first, last = cycles[0], cycles[-1]
     number = next(at for at, one in enumerate(first.tables) if one.table.name == table)
     goes = [
-        values.all_of((one.contract, one.goes_on, one.tables[number].chosen, command_stays(stepper, one)))
+        values.all_of(
+            (
+                one.contract,
+                one.goes_on,
+                values.negation(one.refused),
+                one.tables[number].chosen,
+                command_stays(stepper, one),
+            )
+        )
         for one in cycles
     ]
     moving = _moving(stepper)
@@ -81,8 +89,8 @@ def _moving(stepper: Stepper) -> set[str]:
 
 
 def _told(stepper: Stepper, table: str, run: Unrolled, wrong: Node) -> Lap | NotReproducedError:
-    start, inputs = run.inputs(wrong)
-    steps = ran(stepper, start, inputs)
+    start, given = run.inputs(wrong)
+    steps = ran_on(stepper, start, given)
     first = lap_of(stepper, table, steps)
     shown = goal_of(table).shown
     if first is None:
@@ -117,11 +125,14 @@ def _again(stepper: Stepper, lap: Sequence[Step]) -> tuple[Step, ...]:
         - int(before[f"{below.order}.{NUMBER}"])
         for below in stepper.links.below
     }
-    inputs = [
-        {
-            leaf: (int(value) + later[leaf]) % NUMBERS if leaf in later else value
-            for leaf, value in step.taken.items()
-        }
+    given = [
+        (
+            {
+                leaf: (int(value) + later[leaf]) % NUMBERS if leaf in later else value
+                for leaf, value in step.taken.items()
+            },
+            step.answers,
+        )
         for step in lap
     ]
-    return ran(stepper, after, inputs)
+    return ran_on(stepper, after, given)

@@ -145,7 +145,7 @@ def _uncut(before: int) -> None:
 def _asked_anew(
     features: tuple[Feature, ...], firsts: tuple[Cycle, ...], cycle: Cycle, limits: Limits
 ) -> Confirmation:
-    return Confirmation(features, firsts, cycle, [at.chosen for at in cycle.tables], Keyed(), limits)
+    return Confirmation(features, firsts, cycle, cycle.cases, Keyed(), limits)
 
 
 def _confirm(asked: Confirmation, clauses: Sequence[Clause]) -> None:
@@ -213,8 +213,9 @@ def certificate(stepper: Stepper, proof: LevelProof, limits: Limits = LIMITS) ->
     asked = _asked_anew(proof.features, tuple(firsts.values()), cycle, limits)
     clauses = proof.clauses
     found = {name: asked.first_question(clauses, first).script() for name, first in firsts.items()}
-    for at in cycle.tables:
-        found[f"step {at.table.name}"] = asked.step_question(clauses, at.chosen).script()
+    names = [*(f"step {at.table.name}" for at in cycle.tables), "step of no table"]
+    for name, case in zip(names, cycle.cases, strict=False):
+        found[name] = asked.step_question(clauses, case).script()
     proved = {goal.key for goal, verdict in proof.found if verdict is Verdict.PROVED}
     for name, first in firsts.items():
         wanted = [goal for goal in goals(stepper, first) if goal.key in proved]

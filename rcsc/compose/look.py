@@ -13,7 +13,7 @@ from rcsc.compose.finding import Finding, of_trace
 from rcsc.compose.goals import Goal, Key, Sort, pairs
 from rcsc.compose.lap import Lap, goal_of, laps
 from rcsc.compose.level import LevelProof, essential
-from rcsc.compose.rerun import ExecutorsDifferError, make, record
+from rcsc.compose.rerun import ExecutorsDifferError, make, only_in_python, record
 from rcsc.compose.system import SystemProof
 from rcsc.compose.together import broken_together
 from rcsc.compose.trace import Found, NotReproducedError, Search, traces
@@ -38,6 +38,7 @@ class Told:
         helps: What would mend the table.
         log: Where the run is kept.
         others: Pairs of lines of the same table that no run shows.
+        in_c: Whether the C executor ran it, too; it cannot where an extern procedure has to give what no C function can.
     """
 
     level: str
@@ -48,6 +49,7 @@ class Told:
     helps: tuple[str, ...] = ()
     log: Path | None = None
     others: tuple[str, ...] = field(default=())
+    in_c: bool = True
 
     @property
     def warns(self) -> bool:
@@ -212,7 +214,8 @@ class _Rerun:
         except ExecutorsDifferError as error:
             return replace(told, beside=error.beside)
         kept = path if self.looking.log is not None else None
-        return replace(told, helps=helps(self.made[told.level], finding), log=kept)
+        in_c = not only_in_python(finding, self.made)
+        return replace(told, helps=helps(self.made[told.level], finding), log=kept, in_c=in_c)
 
     def _named(self, finding: Finding) -> str:
         name = file_name(finding)

@@ -16,6 +16,7 @@ from rcsc.compose.finding import Finding, rows
 from rcsc.compose.trace import Step
 from rcsc.compose.transition import Stepper
 from rcsc.emit import emit_c, emit_python
+from rcsc.emit.ctext import c_type, wide_type
 from rcsc.interpret import Fault
 from rcsc.log.finding import LoggedCycle, LoggedFinding
 from rcsc.log.write import Recorder
@@ -25,6 +26,7 @@ from rcsc.model import Program, spell
 from rcsc.project import project_root
 from rcsc.prove.options import Options
 from rcsc.prove.program import prove_program
+from rcsc.system import answers
 from rcsc.system.buffers import CommonMemory
 from rcsc.system.cell import Kind, System, executors, signatures
 from rcsc.system.description import Description, LevelSpec, Wire
@@ -61,7 +63,7 @@ def make(programs: Iterable[Program], folder: Path, *, altered: bool) -> tuple[s
         OSError: The folder cannot be written.
     """
     forced = []
-    for program in programs:
+    for program in map(told_what_externs_give, programs):
         root = project_root(program.file)
         proved = None if altered else prove_program(program, Options()).proved
         plan = lower_by_force(program, root) if proved is None else lower(proved, root)
@@ -70,8 +72,51 @@ def make(programs: Iterable[Program], folder: Path, *, altered: bool) -> tuple[s
         for name, text in (emit_python(plan) | emit_c(plan)).items():
             path = folder / name
             path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_bytes(text.encode())
+            said = text + "".join(_stand_ins(program)) if path.suffix == ".c" else text
+            path.write_bytes(said.encode())
     return tuple(forced)
+
+
+def told_what_externs_give(program: Program) -> Program:
+    """The program, its extern procedures in Python those of `system.answers`: the user's functions are called by no finding."""
+    return replace(
+        program,
+        procedures=tuple(
+            one
+            if one.extern is None
+            else replace(one, extern=replace(one.extern, python=f"{answers.MODULE}:{answers.OF}{one.name}"))
+            for one in program.procedures
+        ),
+    )
+
+
+def _stand_ins(program: Program) -> Iterator[str]:
+    """The same in C, behind the program's own text."""
+    externs = [one for one in program.procedures if one.extern is not None]
+    if externs:
+        yield answers.HEAD
+    kinds = {str(v.name): c_type(v.type) for v in program.variables}
+    for one in externs:
+        assert one.extern is not None
+        given = [kinds[name] for name in one.reads] + [wide_type(each.type) for each in one.params]
+        yield answers.stand_in(
+            one.extern.c,
+            [(kind, f"a{at}") for at, kind in enumerate(given)],
+            [(kinds[name], f"r{at}") for at, name in enumerate(one.writes)],
+        )
+
+
+def only_in_python(finding: Finding, made: Mapping[str, Stepper]) -> bool:
+    """Whether an extern procedure gives what no C function can: a refused value of a type that C's own does not exceed."""
+    for steps in finding.ticks:
+        for name, step in steps.items():
+            program = made[name].program
+            for procedure, given in step.answers:
+                writes = next(one.writes for one in program.procedures if one.name == procedure)
+                kinds = [c_type(program.variable(leaf).type) for leaf in writes]
+                if not all(map(answers.fits, kinds, given)):
+                    return True
+    return False
 
 
 # --- the run, again ------------------------------------------------------------------------
@@ -96,7 +141,7 @@ def record(
     """
     programs = {name: made[name].program for name in finding.levels}
     alone = part_of(system, programs)
-    for kind in KINDS[1:]:
+    for kind in () if only_in_python(finding, made) else KINDS[1:]:
         for _ in _cycles(finding, made, _begun(finding, alone, kind), kind):
             pass
     running = _begun(finding, alone, KINDS[0])
@@ -108,7 +153,11 @@ def record(
 def _logged(finding: Finding, made: Mapping[str, Stepper], altered: bool) -> LoggedFinding:
     """What the log says of it besides the states."""
     cycles = {
-        (row.tick, row.level): LoggedCycle(finding.ticks[row.tick - 1][row.level].matched, row.wrong)
+        (row.tick, row.level): LoggedCycle(
+            finding.ticks[row.tick - 1][row.level].matched,
+            row.wrong,
+            finding.ticks[row.tick - 1][row.level].answers,
+        )
         for row in rows(made, finding)
     }
     return LoggedFinding(
@@ -179,6 +228,7 @@ def _cycles(
         ran = tuple(level for level in running.levels if level.name in steps)
         for level in ran:
             _take(running, level, made[level.name], steps[level.name])
+            answers.told(level.executor, steps[level.name].answers)
             level.run()
             beside = tuple(_beside(level, steps[level.name], made[level.name], kind, tick))
             if beside:

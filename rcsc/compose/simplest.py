@@ -8,10 +8,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from rcsc.compose.bits import Bits, Literal, key_of_bits
+from rcsc.compose.given import Answer, least, refused
 from rcsc.compose.keyed import Keyed
 from rcsc.compose.sat import Sat
-from rcsc.model import Bool, Op, Scalar, Value, key_bounds, key_of, value_of_key
+from rcsc.compose.transition import Cycle
+from rcsc.model import Bool, Op, Program, Scalar, Value, key_bounds, key_of, value_of_key
 from rcsc.prove import values
+from rcsc.prove.evaluation import ExternResults
 from rcsc.prove.values import Node
 
 
@@ -101,6 +104,25 @@ class Simplest:
         return [
             self._least(node) if node in free else value for node, value in zip(nodes, wanted, strict=True)
         ]
+
+    def answers(self, program: Program, cycle: Cycle) -> tuple[Answer, ...]:
+        """What the extern procedures that the cycle calls give: least values, and refused ones only where it has to be."""
+        for call in cycle.calls:
+            self.run.literal(call.path)
+        return tuple(self._answer(program, call) for call in cycle.calls if self._made(call.path))
+
+    def _made(self, path: Node) -> bool:
+        return bool(path.low) if path.known else bool(self.settle([path], [False])[0])
+
+    def _answer(self, program: Program, call: ExternResults) -> Answer:
+        writes = next(one.writes for one in program.procedures if one.name == call.procedure)
+        given = self.settle(call.results, [least(node.kind) for node in call.results])
+        wrong = self.settle(call.refusals, [False] * len(call.refusals))
+        results = [
+            refused(program.variable(name)) if broken else value
+            for name, value, broken in zip(writes, given, wrong, strict=True)
+        ]
+        return call.procedure, tuple(results)
 
     def _keep(self, wanted: Sequence[tuple[Node, Value]]) -> set[Node]:
         """Halves what cannot be had together; the nodes that have their value now."""

@@ -16,8 +16,8 @@ from rcsc.compose.goals import Goal, Sort
 from rcsc.compose.sat import GaveUpError
 from rcsc.compose.simplest import Bounded, Simplest
 from rcsc.compose.trace import NotReproducedError, Search, Step, one_cycle
-from rcsc.compose.transition import Leaves, Stepper, successor
-from rcsc.interpret import Fault, initial
+from rcsc.compose.transition import Cycle, Leaves, Stepper, successor
+from rcsc.interpret import initial
 from rcsc.model import Bool, Kind, Value
 from rcsc.prove import values
 from rcsc.prove.values import Node
@@ -31,7 +31,7 @@ class _Side:
         takes: Each leaf that comes from the other level, and how that one calls it.
         now: Its leaves behind the last tick.
         taken: For each tick the inputs that it takes if it runs.
-        runs: For each tick whether it does.
+        runs: For each tick whether it does; `cycles`, what it does then.
     """
 
     name: str
@@ -40,6 +40,7 @@ class _Side:
     now: Leaves = field(init=False)
     taken: list[Leaves] = field(default_factory=list)
     runs: list[Node] = field(default_factory=list)
+    cycles: list[Cycle] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.now = self.stepper.first()
@@ -116,6 +117,7 @@ class _Pair:
         kept = values.all_of((one.goes_on, one.contract, *_in_order(side.stepper, side.now, taken)))
         self._run.add(values.follows(runs, kept))
         side.taken.append(taken)
+        side.cycles.append(one)
         for other in self.sides:
             for leaf, source in other.takes.items():
                 if other is not side:
@@ -174,11 +176,12 @@ class _Pair:
                     taken = dict(zip(side.inputs, free, strict=True)) | {
                         leaf: seen[leaf] for leaf in side.takes
                     }
-                    steps[side.name] = one_cycle(side.stepper, now[side.name], taken)
+                    answers = settled.answers(side.stepper.program, side.cycles[at])
+                    steps[side.name] = one_cycle(side.stepper, now[side.name], taken, answers)
                     now[side.name] = dict(steps[side.name].after)
                     self._publish(side, now[side.name], held)
             yield steps
-            if any(step.fault is not Fault.OK for step in steps.values()):
+            if any(step.ends_the_run for step in steps.values()):
                 return
 
     def _publish(self, side: _Side, after: Mapping[str, Value], held: dict[str, Value]) -> None:

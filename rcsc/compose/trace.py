@@ -9,17 +9,30 @@ least value that fits where it cannot.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 
 from rcsc.compose.contract import COMMAND, ECHO, ECHOED, NUMBER, Below
+from rcsc.compose.given import Answer, scripted
 from rcsc.compose.goals import Goal, Key, Sort, goals, pairs
 from rcsc.compose.properties import invariant_kept, property_kept
 from rcsc.compose.sat import GaveUpError
 from rcsc.compose.simplest import Bounded, Simplest, constant_of
 from rcsc.compose.transition import GHOST, Cycle, Leaves, Stepper, successor
-from rcsc.interpret import Fault, Outcome, cycle, initial, matching_lines
-from rcsc.model import Int, Kind, Op, Value, spell, value_of_key
+from rcsc.interpret import (
+    ExternError,
+    Fault,
+    Outcome,
+    admit,
+    call,
+    cycle,
+    execute,
+    holds,
+    initial,
+    matching_lines,
+    settle,
+)
+from rcsc.model import Action, Default, Int, Kind, Line, Op, Snapshot, Standing, Value, spell, value_of_key
 from rcsc.prove import values
 from rcsc.prove.values import Node
 
@@ -45,10 +58,11 @@ class Step:
         taken: The inputs.
         table: That ran; `line`, empty where none matched.
         fault: What ended the cycle early.
-        failed: Monitored assumptions that did not hold.
+        failed: Assumptions of the table that did not hold, monitored or not.
         before: Every leaf at its start, inputs as last taken.
         after: Every leaf at its end.
         matched: Every line that matched, DEFAULT left out.
+        answers: What each call of an extern procedure gave, in order.
     """
 
     taken: Mapping[str, Value]
@@ -59,6 +73,16 @@ class Step:
     before: Mapping[str, Value]
     after: Mapping[str, Value]
     matched: tuple[str, ...] = ()
+    answers: tuple[Answer, ...] = ()
+
+    @property
+    def ends_the_run(self) -> bool:
+        """Whether it ended in a fault that the proofs exclude; a refused result is none, and the next cycle runs."""
+        return self.fault not in {Fault.OK, Fault.EXTERN}
+
+
+Given: TypeAlias = tuple[Mapping[str, Value], tuple[Answer, ...]]
+"""What the environment gives in a cycle: the inputs, and the results of extern procedures."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -204,15 +228,15 @@ class Unrolled:
             GaveUpError: The solver did not decide.
         """
         settled = Simplest(self._run, [self._run.literal(wrong)])
-        start, inputs = self._settled(settled)
-        trace = _ran(self.stepper, goal, inputs, start, self.search)
-        if _breaks(self.stepper, goal, trace, len(inputs)):
+        start, given = self._settled(settled)
+        trace = _ran(self.stepper, goal, given, start, self.search)
+        if _breaks(self.stepper, goal, trace, len(given)):
             return trace
         beside = self._beside(trace) if self._run.holds(settled.given) else ()
-        return NotReproducedError(goal.shown, guessed=self.guessed, beside=beside)
+        return NotReproducedError(goal.shown, guessed=self.guessed or self._asks, beside=beside)
 
-    def inputs(self, wrong: Node) -> tuple[dict[str, Value], list[dict[str, Value]]]:
-        """Every leaf before the simplest run that ends so, and the inputs of its cycles.
+    def inputs(self, wrong: Node) -> tuple[dict[str, Value], list[Given]]:
+        """Every leaf before the simplest run that ends so, and what its cycles are given.
 
         Raises:
             GaveUpError: The solver did not decide.
@@ -224,18 +248,24 @@ class Unrolled:
         """Whether an operation was left open."""
         return self._run.guessed
 
-    def _settled(self, settled: Simplest) -> tuple[dict[str, Value], list[dict[str, Value]]]:
+    @property
+    def _asks(self) -> bool:
+        """Whether extern procedures are called: a goal may speak of what they give in the cycle after the last."""
+        return any(one.calls for one in self.cycles)
+
+    def _settled(self, settled: Simplest) -> tuple[dict[str, Value], list[Given]]:
         start = self._begins(settled)
         return start, self._simplest(settled, start)
 
-    def _simplest(self, settled: Simplest, start: Mapping[str, Value]) -> list[dict[str, Value]]:
-        """The inputs of each cycle; one stays as it was where it can, and so does what no condition reads."""
-        found: list[dict[str, Value]] = []
-        inputs = [str(v.name) for v in self.stepper.program.variables if v.kind is Kind.INPUT]
+    def _simplest(self, settled: Simplest, start: Mapping[str, Value]) -> list[Given]:
+        """What each cycle is given; an input stays as it was where it can, and so does what no condition reads."""
+        found: list[Given] = []
+        program = self.stepper.program
+        inputs = [str(v.name) for v in program.variables if v.kind is Kind.INPUT]
         before = [start[name] for name in inputs]
         for one in self.cycles:
             before = settled.settle([one.taken[name] for name in inputs], before)
-            found.append(dict(zip(inputs, before, strict=True)))
+            found.append((dict(zip(inputs, before, strict=True)), settled.answers(program, one)))
         return found
 
     def _begins(self, settled: Simplest) -> dict[str, Value]:
@@ -269,8 +299,8 @@ class Unrolled:
 # --- the run -------------------------------------------------------------------------------
 
 
-def replayed(stepper: Stepper, goal: Goal, inputs: Sequence[Mapping[str, Value]]) -> Trace:
-    """The run on these inputs, from the initial values.
+def replayed(stepper: Stepper, goal: Goal, inputs: Sequence[Given]) -> Trace:
+    """The run on what the environment gives, from the initial values.
 
     Raises:
         NotReproducedError: It does not break the goal in its last cycle.
@@ -284,30 +314,89 @@ def replayed(stepper: Stepper, goal: Goal, inputs: Sequence[Mapping[str, Value]]
 def _ran(
     stepper: Stepper,
     goal: Goal,
-    inputs: Sequence[Mapping[str, Value]],
+    given: Sequence[Given],
     start: Mapping[str, Value],
     search: Search,
 ) -> Trace:
-    return Trace(goal.shown, ran(stepper, start, inputs), search.restarted, search.legal)
+    return Trace(goal.shown, ran_on(stepper, start, given), search.restarted, search.legal)
 
 
 def ran(
     stepper: Stepper, start: Mapping[str, Value], inputs: Sequence[Mapping[str, Value]]
 ) -> tuple[Step, ...]:
-    """What the interpreter does, from `start` on these inputs, up to the first fault."""
+    """What the interpreter does, from `start` on these inputs, up to the first fault that ends a run."""
+    return ran_on(stepper, start, [(taken, ()) for taken in inputs])
+
+
+def ran_on(stepper: Stepper, start: Mapping[str, Value], given: Sequence[Given]) -> tuple[Step, ...]:
+    """The same with results of extern procedures."""
     now = dict(start)
     steps: list[Step] = []
-    for taken in inputs:
-        steps.append(one_cycle(stepper, now, taken))
+    for taken, answers in given:
+        steps.append(one_cycle(stepper, now, taken, answers))
         now = dict(steps[-1].after)
-        if steps[-1].fault is not Fault.OK:
+        if steps[-1].ends_the_run:
             break
     return tuple(steps)
 
 
-def one_cycle(stepper: Stepper, before: Mapping[str, Value], taken: Mapping[str, Value]) -> Step:
-    """What the interpreter does in one cycle."""
-    return _step(stepper, before, taken, cycle(stepper.program, stepper.level, {**before, **taken}))
+def one_cycle(
+    stepper: Stepper,
+    before: Mapping[str, Value],
+    taken: Mapping[str, Value],
+    answers: tuple[Answer, ...] = (),
+) -> Step:
+    """What the interpreter does in one cycle, in which extern procedures give these answers."""
+    with scripted(stepper.program, answers):
+        outcome = cycle(stepper.program, stepper.level, {**before, **taken})
+    return _step(stepper, before, taken, outcome, answers)
+
+
+@dataclass(slots=True)
+class Halfway:
+    """A cycle up to its postprocess.
+
+    Attributes:
+        middle: Every leaf as the table saw it: inputs taken, deferred values settled, preprocess run, as far as it came.
+        matched: Whether it came to the table.
+        acted: Whether its line, if one ran, was done.
+    """
+
+    middle: dict[str, Value]
+    matched: bool = False
+    acted: bool = False
+
+
+def halfway(stepper: Stepper, step: Step) -> Halfway:
+    """The first part of a cycle, as the interpreter runs it again."""
+    program = stepper.program
+    now = admit(program, {**step.before, **step.taken})
+    assert not isinstance(now, str)
+    settle(program, now)
+    found = Halfway(now)
+    try:
+        with scripted(program, step.answers):
+            for name in stepper.level.preprocess:
+                call(program, name, [], now)
+            found.matched, found.middle = True, dict(now)
+            execute(program, [action.statement for action in _actions(stepper, step)], now, {})
+            found.acted = True
+    except ExternError:
+        pass
+    return found
+
+
+def _actions(stepper: Stepper, step: Step) -> tuple[Action, ...]:
+    """What the line that ran does."""
+    table = next(one for one in stepper.program.tables if one.name == step.table)
+    lines: list[Line | Default] = [*table.lines, *([] if table.default is None else [table.default])]
+    return next((one.actions for one in lines if one.name == step.line), ())
+
+
+def seen_by_table(stepper: Stepper, step: Step) -> Snapshot | None:
+    """Every leaf as the table saw it; None where the cycle ended before."""
+    found = halfway(stepper, step)
+    return found.middle if found.matched else None
 
 
 def _breaks(stepper: Stepper, goal: Goal, trace: Trace, cycles: int) -> bool:
@@ -315,7 +404,11 @@ def _breaks(stepper: Stepper, goal: Goal, trace: Trace, cycles: int) -> bool:
 
 
 def _step(
-    stepper: Stepper, before: Mapping[str, Value], taken: Mapping[str, Value], outcome: Outcome
+    stepper: Stepper,
+    before: Mapping[str, Value],
+    taken: Mapping[str, Value],
+    outcome: Outcome,
+    answers: tuple[Answer, ...],
 ) -> Step:
     after = outcome.snapshot
     chosen = stepper.table_of(after)
@@ -324,8 +417,32 @@ def _step(
     if outcome.fault is Fault.SEVERAL_LINES:
         table = next(one for one in stepper.program.tables if one.name == chosen)
         matched = tuple(map(str, matching_lines(table, after)))
-    failed = outcome.failed_assumptions
-    return Step(dict(taken), chosen, line, outcome.fault, failed, dict(before), after, matched)
+    found = Step(
+        dict(taken),
+        chosen,
+        line,
+        outcome.fault,
+        outcome.failed_assumptions,
+        dict(before),
+        after,
+        matched,
+        answers,
+    )
+    return replace(found, failed=(*found.failed, *_also_failed(stepper, found)))
+
+
+def _also_failed(stepper: Stepper, step: Step) -> tuple[str, ...]:
+    """Assumptions of the table that no executor looks at, and that did not hold."""
+    table = next(one for one in stepper.program.tables if one.name == step.table)
+    others = [
+        one
+        for one in stepper.program.assumptions
+        if one.name in table.assumptions
+        and one.standing is not Standing.MONITORED
+        and one.name not in step.failed
+    ]
+    seen = seen_by_table(stepper, step) if others else None
+    return () if seen is None else tuple(str(one.name) for one in others if not holds(one.condition, seen))
 
 
 def broken(stepper: Stepper, goal: Goal, step: Step) -> bool:
@@ -344,10 +461,10 @@ def broken(stepper: Stepper, goal: Goal, step: Step) -> bool:
             return table.default is not None and step.line == table.default.name
         case Sort.INVARIANT:
             kept = invariant_kept(stepper, goal.name, step.before, step.after)
-            return step.fault is Fault.OK and not kept
+            return not step.ends_the_run and not kept
         case Sort.PROPERTY:
             kept = property_kept(stepper, goal.name, step.before, step.after)
-            return step.fault is Fault.OK and not kept
+            return not step.ends_the_run and not kept
         case _:
             return _broken_between(stepper, goal, step)
 
@@ -362,8 +479,19 @@ def as_cycle(stepper: Stepper, step: Step) -> Cycle:
     """A cycle as it ran, all its nodes constants."""
     before, after = _constants(stepper, step.before), _constants(stepper, step.after)
     taken = {name: after[name] for name in step.taken}
-    here = stepper.cycle(_constants(stepper, {**step.before, **step.taken}), taken=taken)
-    return Cycle(before, taken, values.TRUE, {**here.middle, **taken}, here.tables, after)
+    half = halfway(stepper, step)
+    middle = _constants(stepper, half.middle)
+    return Cycle(
+        before,
+        taken,
+        values.TRUE,
+        {**middle, **taken},
+        stepper.tables(middle, matched=half.matched),
+        after,
+        values.truth(step.fault is Fault.EXTERN),
+        values.truth(not half.matched),
+        values.truth(not half.acted),
+    )
 
 
 def _same(every: tuple[Goal, ...], goal: Goal) -> Goal:

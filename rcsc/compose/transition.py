@@ -26,10 +26,11 @@ from rcsc.model import (
     Scalar,
     Snapshot,
     Table,
+    TableName,
     pending,
 )  # fmt: skip
 from rcsc.prove import values
-from rcsc.prove.evaluation import State
+from rcsc.prove.evaluation import ExternResults, State
 from rcsc.prove.symbolic import Run
 from rcsc.prove.values import FALSE, TRUE, Node
 from rcsc.system.adopt import ECHOES, FAILED, ORDER
@@ -51,7 +52,7 @@ class TableAt:
     """A table in one cycle.
 
     Attributes:
-        chosen: When it is the one that runs.
+        chosen: When it is the one that runs; `selected`, that would, if the cycle did not end before.
         matches: When each of its lines matches, in order.
         assumptions: When each of its assumptions holds, by name.
     """
@@ -60,6 +61,7 @@ class TableAt:
     chosen: Node
     matches: tuple[Node, ...]
     assumptions: Mapping[str, Node]
+    selected: Node
 
     @property
     def lines(self) -> list[tuple[Line | Default, Node]]:
@@ -98,6 +100,10 @@ class Cycle:
         middle: Every leaf that the table sees.
         tables: Each table that may run.
         after: Every leaf and ghost behind the cycle.
+        refused: An extern procedure's result is refused, so that the cycle ends there; `unmatched`, before the table is
+            looked at; `interrupted`, before its line is done.
+        calls: Of extern procedures, in the order in which they can be made.
+        settled: Every leaf before the preprocess, and `acted`, before the postprocess.
     """
 
     before: Leaves
@@ -106,6 +112,18 @@ class Cycle:
     middle: Leaves
     tables: tuple[TableAt, ...]
     after: Leaves
+    refused: Node = FALSE
+    unmatched: Node = FALSE
+    interrupted: Node = FALSE
+    calls: tuple[ExternResults, ...] = ()
+    settled: Leaves = field(default_factory=dict)
+    acted: Leaves = field(default_factory=dict)
+
+    @property
+    def cases(self) -> tuple[Node, ...]:
+        """Conditions on the cycle, of which one holds: which table runs, or that none does."""
+        none = (self.unmatched,) if self.unmatched is not FALSE else ()
+        return (*(at.chosen for at in self.tables), *none)
 
     @property
     def goes_on(self) -> Node:
@@ -191,18 +209,30 @@ class Stepper:
         if taken is None:
             inputs = [v for v in self.program.variables if v.kind is Kind.INPUT]
             taken = {str(v.name): values.variable(f"{v.name}{suffix}", v.type) for v in inputs}
-        run = Run(self.procedures, self.kinds, dict(before), suffix=suffix)
+        run = Run(self.procedures, self.kinds, dict(before), suffix=suffix, refusals=True)
         run.state.leaves.update(taken)
         ghosts, answers = self._database(before, taken)
         contract = values.both(self._protocol(before, taken), answers)
         self._settle(run)
+        settled = {**before, **run.state.leaves}
         run.execute(Call(self.procedures[name].name) for name in self.level.preprocess)
         middle = {**before, **run.state.leaves}
+        unmatched = run.ended
         tables = tuple(self._tables(run))
         self._lines(run, tables)
+        acted, interrupted = {**before, **run.state.leaves}, run.ended
         run.execute(Call(self.procedures[name].name) for name in self.level.postprocess)
         after = {**before, **run.state.leaves, **ghosts}
-        return Cycle(before, taken, contract, middle, tables, after)
+        calls = tuple(run.answered)
+        return Cycle(
+            before, taken, contract, middle, tables, after,
+            run.ended, unmatched, interrupted, calls, settled, acted,
+        )  # fmt: skip
+
+    def tables(self, middle: Leaves, *, matched: bool) -> tuple[TableAt, ...]:
+        """Each table that may run on these leaves; none does where the cycle ends before it is matched."""
+        run = Run(self.procedures, self.kinds, dict(middle), ended=values.truth(not matched))
+        return tuple(self._tables(run))
 
     # --- the environment ---
 
@@ -254,16 +284,8 @@ class Stepper:
             run.write(variable.name, value, when)
 
     def _tables(self, run: Run) -> Iterable[TableAt]:
-        by_name = {table.name: table for table in self.program.tables}
-        if isinstance(self.level.tables, OneTable):
-            choices: list[tuple[Node, Table]] = [(TRUE, by_name[self.level.tables.table])]
-        else:
-            selector = run.evaluate(self.level.tables.selector)
-            choices = [
-                (values.equal(selector, values.constant(selector.kind, value)), by_name[name])
-                for value, name in self.level.tables.tables
-            ]
-        for chosen, table in choices:
+        goes_on = values.negation(run.ended)
+        for table, selected in self._choices(run):
             assumptions = {
                 str(one.name): run.evaluate(one.condition)
                 for one in self.program.assumptions
@@ -273,7 +295,21 @@ class Stepper:
                 values.all_of(run.evaluate(test.condition) for test in line.tests if test is not None)
                 for line in table.lines
             )
-            yield TableAt(table, chosen, matches, assumptions)
+            yield TableAt(table, values.both(selected, goes_on), matches, assumptions, selected)
+
+    def _choices(self, run: Run) -> Iterable[tuple[Table, Node]]:
+        """Each table that may run, once, and when it does."""
+        by_name = {table.name: table for table in self.program.tables}
+        if isinstance(self.level.tables, OneTable):
+            yield by_name[self.level.tables.table], TRUE
+            return
+        selector = run.evaluate(self.level.tables.selector)
+        chosen: dict[TableName, Node] = {}
+        for value, name in self.level.tables.tables:
+            here = values.equal(selector, values.constant(selector.kind, value))
+            chosen[name] = values.either(chosen.get(name, FALSE), here)
+        for name, when in chosen.items():
+            yield by_name[name], when
 
     def _lines(self, run: Run, tables: tuple[TableAt, ...]) -> None:
         """Runs the line that matches, the first where there are several, of the table that is chosen."""

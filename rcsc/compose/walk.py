@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from random import Random
 
 from rcsc.compose.contract import COMMAND, ECHO, ECHOED, NUMBER, STATUS, Links
+from rcsc.compose.given import at_random
 from rcsc.compose.transition import GHOST, NUMBERS
 from rcsc.interpret import Fault, cycle, initial
 from rcsc.model import Enum, Level, Program, Scalar, Value, key_bounds, value_of_key
@@ -44,8 +45,9 @@ class Walk:
         """The state behind each cycle; ends early where a cycle meets a fault, which is for the proof to find."""
         for _ in range(cycles):
             self._take()
-            outcome = cycle(self.program, self.level, self.now)
-            if outcome.fault is not Fault.OK:
+            with at_random(self.program, self.random):
+                outcome = cycle(self.program, self.level, self.now)
+            if outcome.fault not in {Fault.OK, Fault.EXTERN}:
                 return
             self.now = outcome.snapshot
             yield {**self.now, **self.ghosts}

@@ -7,9 +7,9 @@ from collections.abc import Iterator, Mapping
 
 from rcsc.compose.finding import Finding
 from rcsc.compose.goals import Sort
-from rcsc.compose.trace import Step
+from rcsc.compose.trace import Step, seen_by_table
 from rcsc.compose.transition import Stepper
-from rcsc.interpret import admit, call, matching_lines, settle
+from rcsc.interpret import matching_lines
 from rcsc.model import Box, Program, Scalar, Snapshot, Table, key_of
 from rcsc.prove import boxes, words
 from rcsc.prove.repair import closing_line, parting_cell
@@ -34,6 +34,8 @@ def helps(stepper: Stepper, finding: Finding) -> tuple[str, ...]:
 
 def _said(stepper: Stepper, table: Table, step: Step) -> Iterator[str]:
     seen = seen_by_table(stepper, step)
+    if seen is None:
+        return
     matching = [at for at, line in enumerate(table.lines) if line.name in matching_lines(table, seen)]
     if len(matching) > 1:
         cell = parting_cell(stepper.program, table, Overlap(matching[0], matching[1], {}))
@@ -47,16 +49,6 @@ def _said(stepper: Stepper, table: Table, step: Step) -> Iterator[str]:
         yield f"line `{table.lines[matching[0]].name}` matches all the same, and no other"
     if (weakest := weakest_condition(stepper.program, table)) and step.failed:
         yield f"exactly one line matches under no more than this: {weakest}: proved"
-
-
-def seen_by_table(stepper: Stepper, step: Step) -> Snapshot:
-    """Every leaf as the table saw it: inputs taken, deferred values settled, preprocess run."""
-    now = admit(stepper.program, {**step.before, **step.taken})
-    assert not isinstance(now, str)
-    settle(stepper.program, now)
-    for name in stepper.level.preprocess:
-        call(stepper.program, name, [], now)
-    return now
 
 
 def around(program: Program, table: Table, seen: Snapshot) -> Region:

@@ -4,8 +4,12 @@ In: a `LoggedFinding`. Out: its text, a metadata record of the log; and back. Th
 """
 
 import json
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
+
+from rcsc.system.signature import Value
 
 FINDING = "rcsc.finding"
 """Name of the metadata record."""
@@ -18,10 +22,12 @@ class LoggedCycle:
     Attributes:
         matched: Every line that matched, DEFAULT left out; a state tells one at the most.
         wrong: What went wrong in it; empty for nothing.
+        answers: What each call of an extern procedure gave.
     """
 
     matched: tuple[str, ...]
     wrong: str
+    answers: tuple[tuple[str, tuple[Value, ...]], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +58,8 @@ class LoggedFinding:
 def finding_facts(finding: LoggedFinding) -> dict[str, str]:
     """As a metadata record: texts by name."""
     cycles = [
-        [tick, level, list(one.matched), one.wrong] for (tick, level), one in sorted(finding.cycles.items())
+        [tick, level, list(one.matched), one.wrong, [[name, _numbers(given)] for name, given in one.answers]]
+        for (tick, level), one in sorted(finding.cycles.items())
     ]
     return {
         "level": finding.level,
@@ -66,6 +73,18 @@ def finding_facts(finding: LoggedFinding) -> dict[str, str]:
     }
 
 
+def _numbers(given: Sequence[Value]) -> list[Value | str]:
+    """As JSON has them: what is no number in words."""
+    return [str(one) if isinstance(one, float) and not math.isfinite(one) else one for one in given]
+
+
+def _answer(said: Sequence[Any]) -> tuple[str, tuple[Value, ...]]:
+    name, given = said
+    if not all(isinstance(one, bool | int | float | str) for one in given):
+        raise ValueError(said)
+    return str(name), tuple(float(one) if isinstance(one, str) else one for one in given)
+
+
 def finding_of(facts: Mapping[str, str]) -> LoggedFinding:
     """What `finding_facts` was made of.
 
@@ -73,8 +92,10 @@ def finding_of(facts: Mapping[str, str]) -> LoggedFinding:
         KeyError, TypeError, ValueError: The facts are none.
     """
     cycles = {
-        (int(tick), str(level)): LoggedCycle(tuple(map(str, matched)), str(wrong))
-        for tick, level, matched, wrong in json.loads(facts["cycles"])
+        (int(tick), str(level)): LoggedCycle(
+            tuple(map(str, matched)), str(wrong), tuple(_answer(one) for each in answers for one in each)
+        )
+        for tick, level, matched, wrong, *answers in json.loads(facts["cycles"])
     }
     restarted, legal, altered = (bool(json.loads(facts[name])) for name in ("restarted", "legal", "altered"))
     return LoggedFinding(

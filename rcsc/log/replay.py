@@ -17,6 +17,7 @@ from rcsc.log.layout import fingerprints
 from rcsc.log.read import Log, LoggedLevel
 from rcsc.log.words import line_of, words
 from rcsc.system.adopt import Begun
+from rcsc.system.answers import Answers, told
 from rcsc.system.cell import Kind, executors, signatures
 from rcsc.system.description import BadDescription
 from rcsc.system.executors import Executor
@@ -91,7 +92,7 @@ class _Again:
             (then.index[leaf.name], at) for at, leaf in enumerate(self.sign.leaves) if leaf.name in then.index
         )
 
-    def cycle(self, at: int) -> Cycle | None:
+    def cycle(self, at: int, answers: Answers) -> Cycle | None:
         """Run the cycle whose record has this place; None for the state that recording started from."""
         if at < 1:
             return None
@@ -99,6 +100,7 @@ class _Again:
         recorded = track.layout.unpack(track.packed[at])
         restart = self.logged.restarted(at)
         self._put(track.layout.unpack(track.packed[at - 1]) if restart is None else restart.values, recorded)
+        told(self.executor, answers)
         self.executor.cycle()
         now = self.executor.values()
         equal = self.same and self.packed.pack(*now) == track.packed[at]
@@ -195,11 +197,16 @@ class Replay:
             raise IndexError(tick)
         self.tick = tick
         found = (
-            level.cycle(at)
+            level.cycle(at, self._answers(tick, level.logged.name))
             for level in self._levels
             if (at := level.logged.track.place(tick)) >= 0 and level.logged.track.ticks[at] == tick
         )
         return Moment(tick, tuple(cycle for cycle in found if cycle is not None))
+
+    def _answers(self, tick: int, level: str) -> Answers:
+        """What extern procedures gave in a cycle of a finding; where the log keeps none, they are called."""
+        told = None if self.log.finding is None else self.log.finding.cycles.get((tick, level))
+        return () if told is None else told.answers
 
     def forward(self) -> Moment:
         """The next tick.

@@ -69,6 +69,22 @@ class Obligation:
     good: Node
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class ExternResults:
+    """A call of an extern procedure.
+
+    Attributes:
+        path: When it is made.
+        results: What it gives, in the order in which it writes.
+        refusals: Whether each is refused, if it comes to that; FALSE where it cannot be.
+    """
+
+    procedure: str
+    path: Node
+    results: tuple[Node, ...]
+    refusals: tuple[Node, ...]
+
+
 @dataclass(slots=True)
 class State:
     """Values at one point of a run.
@@ -109,6 +125,9 @@ class Evaluation:
         cell: Where the present action or condition is written.
         fresh: Values that the run has made up: results of extern procedures, locals without a value.
         suffix: Behind their names, where several runs are followed by one question: each run has its own.
+        refusals: Whether results of extern procedures may be refused; else a run goes on as if none were.
+        ended: That one was refused: what would be written later stays as it is.
+        answered: What extern procedures give, in the order in which they can be called.
     """
 
     procedures: Mapping[str, Procedure]
@@ -124,6 +143,9 @@ class Evaluation:
     fresh: list[Node] = field(default_factory=list)
     suffix: str = ""
     steps: int = 0
+    refusals: bool = False
+    ended: Node = FALSE
+    answered: list[ExternResults] = field(default_factory=list)
 
     # --- owing ---
 

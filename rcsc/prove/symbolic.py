@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from rcsc.diagnostics.codes import Code
 from rcsc.model import (
     Assign,
+    Bool,
     Call,
     Case,
     Expr,
@@ -27,7 +28,7 @@ from rcsc.model import (
     spell,
 )
 from rcsc.prove import values
-from rcsc.prove.evaluation import Evaluation, State
+from rcsc.prove.evaluation import Evaluation, ExternResults, State
 from rcsc.prove.values import FALSE, TRUE, Node
 from rcsc.source import Span
 
@@ -81,6 +82,8 @@ class Run(Evaluation):
         """Writes a leaf, where `when` holds."""
         if when is not TRUE:
             value = values.choice(when, value, self.leaf(leaf))
+        if self.ended is not FALSE:
+            value = values.choice(self.ended, self.leaf(leaf), value)
         self.state.leaves[leaf] = value
         self.state.wrote[leaf] = values.either(self.state.wrote.get(leaf, FALSE), when)
 
@@ -169,10 +172,24 @@ class Run(Evaluation):
 
     def _extern(self, procedure: Procedure) -> None:
         """Its results are admitted one after the other; the cycle ends at the first that is refused."""
+        path = values.both(self.path, values.negation(self.ended))
+        given, refused = list[Node](), list[Node]()
         for name in procedure.writes:
             if self.stops is not None:
                 self.stops(self, procedure.name)
-            self.write(name, self.any_value(f"{name} from {procedure.name}", self.kinds[name]), TRUE)
+            value = self.any_value(f"{name} from {procedure.name}", self.kinds[name])
+            given.append(value)
+            refused.append(self._refusal(f"{name} refused from {procedure.name}"))
+            self.write(name, value, TRUE)
+        self.answered.append(ExternResults(str(procedure.name), path, tuple(given), tuple(refused)))
+
+    def _refusal(self, name: str) -> Node:
+        """That the result is refused, where a run follows that: from here on the cycle has ended then."""
+        if not self.refusals:
+            return FALSE
+        refused = self.any_value(name, Bool())
+        self.ended = values.either(self.ended, values.both(self.path, refused))
+        return refused
 
 
 def _joined(condition: Node, one: dict[str, Node], two: dict[str, Node], otherwise: Node) -> dict[str, Node]:

@@ -157,6 +157,14 @@ class CExecutor:
         fault: int = self._cycle(self._address)
         return fault
 
+    def write(self, name: str, value: ctypes.Array[ctypes.c_uint64] | ctypes.c_uint32) -> None:
+        """Sets a variable of the library, where it has one of that name."""
+        try:
+            there = type(value).in_dll(self._library.handle, name)
+        except ValueError:
+            return
+        ctypes.memmove(ctypes.byref(there), ctypes.byref(value), ctypes.sizeof(value))
+
     def values(self) -> Values:
         """All leaves, then the trace."""
         found = self._whole.unpack(self._memory)
