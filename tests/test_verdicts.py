@@ -1,17 +1,26 @@
 """What a verdict on a table claims: the worst of all programs that it is in, and what it rests on."""
 
 import json
-from itertools import permutations
+from itertools import combinations, permutations, product
 from pathlib import Path
+from typing import Literal
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
+from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.jsonform import report_to_json
 from rcsc.diagnostics.report import NOT_PROVED, Report, TableReport, Verdict, merged, resting
 from rcsc.diagnostics.sarif import sarif
 from rcsc.driver import check
 from rcsc.driver.work import Settings
+from rcsc.interpret import holds, matching_lines
+from rcsc.model import Program, Value
 from rcsc.prove.options import Options
+from rcsc.prove.program import prove_program
+from rcsc.prove.verdict import ContradictoryAssumptions, DeadLine, Gap, Overlap
+from rcsc.resolve import compile_text
 
 HERE = {
     "lib": "state a : int 0 .. 9\ninput g : bool\ntable t {\n  | line | a ||\n  | l | <= 4 ||\n  | h | 5 .. 8 ||\n}\n",
@@ -111,3 +120,110 @@ def test_an_assumption_that_does_not_follow_is_not_proved(tmp_path: Path) -> Non
     wrong = {"assumption": "assume low proved : n < 8", "head": "assuming low", "high": "5 .. 7"}
     (tmp_path / "p.rcs").write_text(INVARIANT.format(**PLAIN | wrong))
     assert verdicts(checked(tmp_path))["rests"] is Verdict.CONDITIONAL
+
+
+# --- boxes, regions and Z3 treat assumptions alike -------------------------------------------
+
+RANGES: dict[str, tuple[Value, ...]] = {"p": (False, True), "x": (0, 1, 2), "y": (0, 1, 2, 3)}
+CELLS = {
+    "p": ("", "true", "false"),
+    "x": ("", "0", "< 2", "/= 1", ">= 1", "2"),
+    "y": ("", "0 .. 1", "> 1", "/= 2", "in {0, 3}", "x"),
+}
+ASSUMED = (
+    "p",
+    "not p",
+    "x < 2",
+    "y /= 0",
+    "x = y",
+    "x < y",
+    "p implies x = 0",
+    "x + y <= 3",
+    "y > 3 - x",
+    "p or y > 1",
+)
+
+
+@st.composite
+def tables(draw: st.DrawFn) -> str:
+    """A small table; its lines often split one column, so that it is often right but for what is assumed."""
+    count = draw(st.integers(1, 3))
+    rows = [tuple(draw(st.sampled_from(CELLS[name])) for name in RANGES) for _ in range(count)]
+    if draw(st.booleans()):
+        rows = [("true", *row[1:]) if at == 0 else ("false", "", "") for at, row in enumerate(rows[:2])]
+    default = draw(st.sampled_from(["", "  | d | DEFAULT | | ||\n", "  | d | DEFAULT unreachable | | ||\n"]))
+    assumed = draw(st.lists(st.sampled_from(ASSUMED), max_size=2, unique=True))
+    standing = draw(st.sampled_from(["assumed", "monitored"]))
+    names = [f"a{at}" for at in range(len(assumed))]
+    head = "".join(f"assume {name} {standing} : {text}\n" for name, text in zip(names, assumed, strict=True))
+    lines = "".join(f"  | l{at} | {' | '.join(row)} ||\n" for at, row in enumerate(rows))
+    assuming = f"assuming {', '.join(names)} " if names else ""
+    return (
+        "input p : bool\ninput x : int 0 .. 2\ninput y : int 0 .. 3\n"
+        f"{head}table t {assuming}{{\n  | line | p | x | y ||\n{lines}{default}}}\n"
+    )
+
+
+def brute(program: Program) -> set[object]:
+    """What is wrong with the table under its assumptions, by trying every input."""
+    [table] = program.tables
+    every = [dict(zip(RANGES, values, strict=True)) for values in product(*RANGES.values())]
+    inputs = [one for one in every if all(holds(a.condition, one) for a in program.assumptions)]
+    if not inputs:
+        return {"contradiction"}
+    matched = [matching_lines(table, one) for one in inputs]
+    found: set[object] = {pair for names in matched for pair in combinations(names, 2)}
+    found |= {line.name for line in table.lines if all(line.name not in names for names in matched)}
+    return found | ({"gap"} if [] in matched else set())
+
+
+def told(program: Program, options: Options) -> tuple[set[object], list[object], set[tuple[Code, str]]]:
+    """The same from a verdict: with the witnesses of gaps, and what is said of it."""
+    verdict = prove_program(program, options)
+    [table] = verdict.tables
+    names = [line.name for line in table.table.lines]
+    found: set[object] = set()
+    for one in table.found:
+        match one:
+            case Overlap(first, second):
+                found.add((names[first], names[second]))
+            case DeadLine(line):
+                found.add(names[line])
+            case Gap():
+                found.add("gap")
+            case ContradictoryAssumptions():
+                found.add("contradiction")
+            case _:
+                found.add(one)
+    gaps: list[object] = [one.witnesses[0] for one in table.found if isinstance(one, Gap)]
+    for witness in gaps:
+        assert isinstance(witness, dict)
+        snapshot = {name: values[0] for name, values in RANGES.items()} | witness
+        assert matching_lines(program.tables[0], snapshot) == []
+    return found, gaps, {(one.code, one.message) for one in verdict.findings}
+
+
+@given(tables())
+@settings(max_examples=60, deadline=None)
+def test_every_way_of_deciding_finds_what_trying_all_inputs_finds(text: str) -> None:
+    program = compile_text(text)
+    if not isinstance(program, Program):  # a cell that nothing satisfies is an error of its own
+        return
+    by_boxes, auto, both = (told(program, Options(solver=how)) for how in ("boxes", "auto", "both"))
+    assert by_boxes == auto == both
+    assert by_boxes[0] == brute(program)
+    default = program.tables[0].default
+    dead = default is not None and not default.unreachable and not {"gap", "contradiction"} & by_boxes[0]
+    assert any(code is Code.DEFAULT_DEAD for code, _ in by_boxes[2]) == dead
+
+
+@pytest.mark.parametrize("solver", ["boxes", "auto", "both"])
+def test_what_an_assumption_kills_is_told(solver: Literal["boxes", "auto", "both"]) -> None:
+    """Boxes prove both tables without the assumption, under which a line, and DEFAULT, are dead."""
+    head = "input v : bool\nassume up assumed : v\ntable t assuming up {\n  | line | v ||\n  | l | true ||\n"
+    for last, code in (("  | m | false ||\n", Code.DEAD_LINE), ("  | d | DEFAULT ||\n", Code.DEFAULT_DEAD)):
+        program = compile_text(f"{head}{last}}}\n")
+        assert isinstance(program, Program)
+        [found] = prove_program(program, Options(solver=solver)).findings
+        assert found.code is code
+        assert found.notes == ("under `up`",)

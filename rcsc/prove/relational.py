@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from itertools import combinations
 
 from rcsc.interpret import matching_lines
-from rcsc.model import AssumptionName, Program, Read, Snapshot, Table, Value, value_of_key
+from rcsc.model import AssumptionName, Program, Read, Snapshot, Table, Value, key_of, value_of_key
 from rcsc.prove.asked import Asked, shown
 from rcsc.prove.atoms import Formula, Universe, assumptions_of, lines_of, some
 from rcsc.prove.certificate import must_cover, tree_certificate
@@ -50,6 +50,20 @@ def decide(program: Program, table: Table, options: Options) -> Decided:
     return _Decision(program, table, options).decided()
 
 
+def under_assumptions(
+    program: Program, table: Table, options: Options, settled: tuple[Found, ...]
+) -> tuple[Found, ...]:
+    """What is found under the assumptions of a table that is right without them: dead lines, and what falls to DEFAULT.
+
+    Args:
+        program: Where the assumptions are declared.
+        table: It has no overlap, and no gap but inputs that fall to its DEFAULT line, for any input.
+        options: Limits.
+        settled: That gap, where there is one.
+    """
+    return _Decision(program, table, options).under_assumptions(settled)
+
+
 class _Decision:
     """One table being decided.
 
@@ -78,12 +92,9 @@ class _Decision:
 
     def decided(self) -> Decided:
         """Everything about the table."""
-        if self.table.assumptions:
-            possible = self.satisfiable(self.assumed)
-            if possible is not Answer.SATISFIABLE:
-                contradictory = possible is Answer.UNSATISFIABLE
-                wrong: Found = ContradictoryAssumptions() if contradictory else Undecided("the assumptions")
-                return Decided((wrong,), None, ())
+        wrong = self.contradiction()
+        if wrong:
+            return Decided(wrong, None, ())
         kept = tuple(range(len(self.assumptions)))
         search = self.search(kept)
         if search.proved:
@@ -98,6 +109,38 @@ class _Decision:
             else None
         )
         return Decided(found, certificate, names if search.proved else self.table.assumptions)
+
+    def under_assumptions(self, settled: tuple[Found, ...]) -> tuple[Found, ...]:
+        """Dead lines, and a gap that DEFAULT takes, under the assumptions."""
+        wrong = self.contradiction()
+        if wrong:
+            return wrong
+        gaps = [found for one in settled if isinstance(one, Gap) for found in self.narrowed_gap(one)]
+        return (*self.dead(), *gaps)
+
+    def contradiction(self) -> tuple[Found, ...]:
+        """That the assumptions cannot hold together, or that nobody could tell."""
+        if not self.table.assumptions:
+            return ()
+        possible = self.satisfiable(self.assumed)
+        if possible is Answer.SATISFIABLE:
+            return ()
+        return (
+            ContradictoryAssumptions() if possible is Answer.UNSATISFIABLE else Undecided("the assumptions"),
+        )
+
+    def narrowed_gap(self, gap: Gap) -> list[Found]:
+        """The gap under the assumptions: one of its witnesses that they allow, else whatever the solver finds."""
+        singles = self.universe.single
+        columns = {str(v.name): (v, column) for v, column in zip(self.variables, self.columns, strict=True)}
+        for witness in gap.witnesses:
+            here = [(*columns[name], value) for name, value in witness.items() if name in columns]
+            keys = [(singles[column], key_of(v.type, value)) for v, column, value in here]
+            pinned = [self.universe.atom(form, ((key, key),)) for form, key in keys]
+            point = least(self.universe, [*pinned, *self.assumed], self.columns)
+            if not isinstance(point, Unsettled):
+                return [Gap((self.snapshot(point),), (None,))]
+        return self.gap(Search())
 
     def search(self, kept: Sequence[int], budget: int = 60_000, *, alone: bool = False) -> Search:
         """The tree under some of the assumptions; `alone` without the solver, to the first finding."""

@@ -93,14 +93,17 @@ def closing_line(program: Program, table: Table, found: Gap) -> str | None:
         if cell is None:
             return None
         cells.append(cell)
-    if any(name not in {c.variable for c in table.columns} for name in region):
-        return None
+    if not set(region) <= {str(c.variable) for c in table.columns} & set(map(str, table.variables)):
+        return None  # bounds of what only an assumption reads
     decided = boxes.Boxes.of(program, table)
     decided.lines.append(dict(region.items()))
     pairs = list(decided.overlaps())
     if any(len(decided.lines) - 1 in pair for pair in pairs):
         return None
     row = " | ".join(["new", *cells])
-    closes = not boxes.Search.of(decided, disjoint=not pairs).missing()
+    try:
+        closes = not boxes.Search.of(decided, disjoint=not pairs).missing()
+    except boxes.BudgetError:
+        closes = False
     what = "closes the gap" if closes else "closes this part of the gap"
     return f"a line `| {row} || ... |` {what} and overlaps no other: proved"

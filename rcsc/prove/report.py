@@ -50,7 +50,8 @@ def _others(program: Program, verdict: TableVerdict) -> Iterator[Diagnostic]:
                 name = table.lines[line].name
                 helps = ("delete the line, or correct its conditions",)
                 message = f"line `{name}` of table `{table.name}` can never match"
-                yield Diagnostic(Code.DEAD_LINE, message, Label(table.lines[line].cell_span(-1)), help=helps)
+                label = Label(table.lines[line].cell_span(-1))
+                yield Diagnostic(Code.DEAD_LINE, message, label, notes=_under(table), help=helps)
             case ContradictoryAssumptions():
                 message = (
                     f"the assumptions of table `{table.name}` contradict each other or the declared ranges"
@@ -67,11 +68,19 @@ def _others(program: Program, verdict: TableVerdict) -> Iterator[Diagnostic]:
                 pass
     if table.default is None or table.default.unreachable or verdict.undecided:
         return
-    if not any(isinstance(one, Gap) for one in verdict.found):
+    if not any(isinstance(one, Gap | ContradictoryAssumptions) for one in verdict.found):
         message = f"the DEFAULT line of table `{table.name}` is never reached"
         helps = ("declare it: `DEFAULT unreachable`; that is then proved",)
         label = Label(table.default.span)
-        yield Diagnostic(Code.DEFAULT_DEAD, message, label, help=helps, severity=Severity.WARNING)
+        yield Diagnostic(
+            Code.DEFAULT_DEAD, message, label, notes=_under(table), help=helps, severity=Severity.WARNING
+        )
+
+
+def _under(table: Table) -> tuple[str, ...]:
+    """What dead lines and a dead DEFAULT may rest on."""
+    names = ", ".join(f"`{name}`" for name in table.assumptions)
+    return (f"under {names}",) if names else ()
 
 
 # --- overlaps ------------------------------------------------------------------------

@@ -9,6 +9,7 @@ from rcsc.prove import boxes
 from rcsc.prove.certificate import box_certificate, must_cover
 from rcsc.prove.options import Options
 from rcsc.prove.verdict import DeadLine, Found, Gap, Overlap, SolversDisagree, TableVerdict, Undecided
+from rcsc.resolve.leaves import read_by
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -24,6 +25,10 @@ def prove_table(program: Program, table: Table, options: Options) -> TableVerdic
         method, found = "boxes", settled
         if not _wrong(table, found):
             certificate = box_certificate(program, table)
+            if _narrows(program, table):
+                from rcsc.prove.relational import under_assumptions
+
+                found = under_assumptions(program, table, options, settled)
     else:
         from rcsc.prove.relational import decide
 
@@ -49,6 +54,12 @@ def _by_boxes(program: Program, table: Table) -> tuple[Found, ...]:
     if gap is not None:
         found.append(gap)
     return tuple(found)
+
+
+def _narrows(program: Program, table: Table) -> bool:
+    """Whether an assumption reads what the table's conditions read."""
+    assumed = [one for one in program.assumptions if one.name in table.assumptions]
+    return any(not set(read_by(one.condition)).isdisjoint(table.variables) for one in assumed)
 
 
 def _wrong(table: Table, found: tuple[Found, ...]) -> bool:
