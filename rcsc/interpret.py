@@ -62,6 +62,7 @@ class Fault(IntEnum):
     NO_LINE = 2
     SEVERAL_LINES = 3
     EXTERN = 4
+    ASSUMPTION = 5
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,8 +74,8 @@ class Outcome:
         line: The matched line; None where there was none.
         line_index: Its position; DEFAULT is behind the last; -1 where there was none.
         fault: OK, or why it ended early.
-        failed_assumptions: Monitored assumptions that did not hold.
-        fault_at: The leaf that was refused.
+        failed_assumptions: Assumptions that the executors check and that did not hold.
+        fault_at: The leaf that was refused, or the first assumption that ended the cycle.
     """
 
     snapshot: dict[str, Value]
@@ -355,7 +356,10 @@ def _cycle(
         for name in preprocess:
             call(program, name, [], now)
         table = chosen(now)
-        failed = _failed(program, table, now)
+        failed = failed_assumptions(program, table, now)
+        stopped = next((name for name in failed if name in table.stops), None)
+        if stopped is not None:
+            return Outcome(now, None, -1, Fault.ASSUMPTION, failed, stopped)
         found = _match(table, now)
         if isinstance(found, Fault):
             return Outcome(now, None, -1, found, failed)
@@ -368,12 +372,13 @@ def _cycle(
     return Outcome(now, line, index, Fault.OK, failed)
 
 
-def _failed(program: Program, table: Table, now: Snapshot) -> tuple[str, ...]:
+def failed_assumptions(program: Program, table: Table, now: Snapshot) -> tuple[str, ...]:
+    """The table's assumptions that are checked, because they are monitored or stop the cycle, and do not hold."""
     return tuple(
         assumption.name
         for assumption in program.assumptions
         if assumption.name in table.assumptions
-        and assumption.standing is Standing.MONITORED
+        and (assumption.standing is Standing.MONITORED or assumption.name in table.stops)
         and not holds(assumption.condition, now)
     )
 

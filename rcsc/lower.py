@@ -2,6 +2,7 @@
 
 import os
 
+from rcsc.meaning import checked
 from rcsc.model import (
     Bool,
     Box,
@@ -58,7 +59,7 @@ def lower_by_force(program: Program, root: str = "") -> Plan:
 
 
 def _plan(program: Program, root: str, *, proved: bool) -> Plan:
-    monitored = tuple(at for at, a in enumerate(program.assumptions) if a.standing is Standing.MONITORED)
+    monitored = checked(program)
     tables = tuple(_table(program, table, monitored, _seen(table.file, root)) for table in program.tables)
     return Plan(program, _seen(program.file, root), tables, monitored, proved)
 
@@ -73,10 +74,14 @@ def _table(program: Program, table: Table, monitored: tuple[int, ...], file: str
     if table.default is not None:
         name = table.default.name
         lines.append(PlanLine(name, table.default.actions, f"{file} line {name}"))
+    named = [(place, program.assumptions[at]) for place, at in enumerate(monitored)]
+    stops = tuple(place for place, one in named if one.name in table.stops)
     relied = tuple(
-        place for place, at in enumerate(monitored) if program.assumptions[at].name in table.assumptions
+        place
+        for place, one in named
+        if place in stops or (one.standing is Standing.MONITORED and one.name in table.assumptions)
     )
-    return PlanTable(table, _matcher(program, table), tuple(lines), relied)
+    return PlanTable(table, _matcher(program, table), tuple(lines), relied, stops)
 
 
 def _matcher(program: Program, table: Table) -> Matcher:

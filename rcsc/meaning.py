@@ -5,6 +5,7 @@ speak of the same thing; no proof rests on it.
 """
 
 import hashlib
+from collections.abc import Mapping
 from dataclasses import replace
 
 from rcsc.model import (
@@ -54,6 +55,22 @@ def relying(program: Program) -> Program:
 
     tables = tuple(of(table) for table in program.tables)
     return replace(program, assumptions=(*program.assumptions, *made), tables=tables)
+
+
+def with_stops(program: Program, stops: Mapping[str, tuple[AssumptionName, ...]]) -> Program:
+    """The program, each table with its stopping assumptions (`Table.stops`); none where it is not named."""
+    tables = tuple(replace(table, stops=stops.get(table.name, ())) for table in program.tables)
+    return replace(program, tables=tables)
+
+
+def checked(program: Program) -> tuple[int, ...]:
+    """Positions of the assumptions that the executors check: monitored ones, and those that stop some table."""
+    stopping = {name for table in program.tables for name in table.stops}
+    return tuple(
+        at
+        for at, one in enumerate(program.assumptions)
+        if one.standing is Standing.MONITORED or one.name in stopping
+    )
 
 
 def digest(program: Program, table: Table) -> str:

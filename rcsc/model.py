@@ -606,6 +606,8 @@ class Table:
     Attributes:
         variables: Test variables: every leaf some test reads, in declared order.
         assumptions: Names of those that the table's proof may use.
+        stops: Those of them on which the safety of the table's conditions and lines rests, in declared order; `prove` sets it.
+            Where one fails the cycle ends before the table is matched; the others only tell.
     """
 
     name: TableName
@@ -617,6 +619,7 @@ class Table:
     doc: str = ""
     span: Span = at()  # the name in `table NAME`
     file: str = field(default="", compare=False)
+    stops: tuple[AssumptionName, ...] = ()
 
 
 # --- owners, levels, programs --------------------------------------------------------

@@ -135,13 +135,15 @@ class PlanTable:
     """A table to be emitted.
 
     Attributes:
-        monitored: Positions in `Plan.monitored` of the assumptions that it relies on.
+        monitored: Positions in `Plan.monitored` of the assumptions that it checks.
+        stops: Those of them that end the cycle where they fail.
     """
 
     table: Table
     matcher: Matcher
     lines: tuple[PlanLine, ...]
     monitored: tuple[int, ...]
+    stops: tuple[int, ...] = ()
 
 
 UNPROVED = "NOT PROVED: made by force to run a finding; no cell runs it"
@@ -154,7 +156,7 @@ class Plan:
 
     Attributes:
         source: The root file, relative, with `/`.
-        monitored: Positions in `program.assumptions` of those that the executors check.
+        monitored: Positions in `program.assumptions` of those that the executors check: monitored ones, and those that stop some table.
         proved: Whether it is proved; of one that is not, every file is marked (`UNPROVED`).
     """
 

@@ -7,6 +7,8 @@ from rcsc.emit.python import emit_python
 from rcsc.lower import lower
 from rcsc.model import Program, ProvedProgram, seal_of_proof
 from rcsc.project import load
+from rcsc.prove.options import Options
+from rcsc.prove.program import prove_program
 from rcsc.resolve import compile_text, resolve
 
 SHIPPED = ("tables/task/acquire.rcs", "tables/examples/approach.rcs")
@@ -100,11 +102,63 @@ level top {
 """
 
 
+STOPS = """
+input a : int 0 .. 20
+input b : int -9 .. 9
+input x : real -4.0 .. 4.0
+input which : int 0 .. 1
+state seen : array[8] of int 0 .. 9
+state n : int 0 .. 20
+state ready : bool
+output share : int -1000 .. 1000
+output before : int 0 .. 20
+output behind : int 0 .. 20
+invariant few : n <= 8
+
+assume calm monitored : x < 3.5
+assume place assumed : a < 8
+assume some monitored : b /= 0
+assume low monitored : a <= 8
+
+procedure mark { seen[a] := 9 }
+procedure divide { share := 1000 / b }
+procedure take { n := a }
+procedure first { before := a }
+procedure last { behind := a }
+
+table sees assuming calm, place, some, low {
+  | line | b    | x    || procedures   |
+  | 1    | < 3  |      || mark; divide |
+  | 2    | >= 3 | <= 1.0 || mark       |
+  | 3    | >= 3 | > 1.0  ||            |
+}
+table keeps assuming calm, low, some {
+  | line | 9 / b || procedures |
+  | lo   | < 3   || take       |
+  | hi   | >= 3  || take       |
+}
+level top {
+  period 10 [ms]
+  preprocess first
+  table by which { 0 : sees  1 : keeps }
+  postprocess last
+}
+"""
+"""Assumptions that stop (of both standings, for an index, a division, a condition, an invariant), and one that tells."""
+
+
 def program_of(text: str) -> Program:
     """The program of a lone text."""
     program = compile_text(text)
     assert isinstance(program, Program), [(d.code, d.message) for d in program]
     return program
+
+
+def proved_of(text: str) -> Program:
+    """The program of a lone text as `prove` leaves it, with its stopping assumptions."""
+    verdict = prove_program(program_of(text), Options(solver="boxes"))
+    assert verdict.proved is not None, verdict.findings
+    return verdict.proved.program
 
 
 def shipped(path: str, repo: Path) -> Program:

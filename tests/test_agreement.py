@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from rcsc.emit.write import write
+from rcsc.interpret import Fault
 from rcsc.model import Program
 from rcsc.system.executors import CExecutor, PythonExecutor
 from rcsc.system.executors import build as build_executors
@@ -27,7 +28,7 @@ from rcsc.testing.suite import SuiteOptions, run_suite
 from rcsc.testing.symbols import symbols_of
 from rcsc.testing.targets import is_matcher, targets
 from rcsc.testing.tools import Absent, BuildFailed, c_compiler
-from tests.emitted import EXTERN, RICH, SHIPPED, emitted, program_of, shipped
+from tests.emitted import EXTERN, RICH, SHIPPED, STOPS, emitted, program_of, proved_of, shipped
 
 pytestmark = pytest.mark.skipif(not isinstance(c_compiler(), str), reason="no C compiler")
 
@@ -117,8 +118,14 @@ def test_faults_of_every_kind_are_met(rich: Everything, extern: Everything) -> N
     assert extern[1].faults[4] > 10
 
 
-def test_cycles_in_which_an_assumption_fails_are_met(rich: Everything) -> None:
-    assert rich[1].broken > 2
+def test_all_executors_stop_where_safety_rests_on_an_assumption_that_fails() -> None:
+    program = proved_of(STOPS)
+    assert [table.stops for table in program.tables] == [("place", "some"), ("some", "low")]
+    found, compared, sanitized = disagreements(program)
+    assert (found, sanitized) == ([], None)
+    told = compared.broken - compared.faults[Fault.ASSUMPTION]
+    assert min(told, compared.faults[Fault.ASSUMPTION], compared.faults[Fault.OK]) > 10
+    assert compared.faults.keys() == {Fault.OK, Fault.ADMIT, Fault.ASSUMPTION}
 
 
 @pytest.mark.parametrize("path", SHIPPED)

@@ -133,7 +133,8 @@ class State:
     """The complete state, and the trace of the last cycle.
 
     `line` is the position of the line that ran (-1 for none); `fault` is 0 none, 1 input refused, 2 no line, 3 several lines,
-    4 extern refused; `fault_at` the position of the variable refused; bit k of `assumptions_failed` the k-th monitored assumption.
+    4 extern refused, 5 assumption failed; `fault_at` the position of the variable refused, or of the assumption; bit k of
+    `assumptions_failed` the k-th assumption that is checked.
     """
 
     __slots__ = (

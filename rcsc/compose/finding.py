@@ -94,6 +94,7 @@ _FAULTS = {
     Fault.SEVERAL_LINES: "several lines match",
     Fault.ADMIT: "an input is refused",
     Fault.EXTERN: "an extern procedure is refused",
+    Fault.ASSUMPTION: "the cycle ends there",
 }
 _WRONG = {
     Sort.NO_DEFAULT: "DEFAULT is reached",

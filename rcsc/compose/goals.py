@@ -97,12 +97,12 @@ def _tables(cycle: Cycle) -> Iterator[Goal]:
         name = str(at.table.name)
         for assumption, condition in at.assumptions.items():
             yield Goal(Sort.ASSUMPTION, name, assumption, values.follows(at.chosen, condition))
-        some = values.follows(at.chosen, values.negation(at.none))
+        some = values.follows(at.runs, values.negation(at.none))
         if at.table.default is None:
             yield Goal(Sort.SOME_LINE, name, "", some)
         elif at.table.default.unreachable:
             yield Goal(Sort.NO_DEFAULT, name, "", some)
-        yield Goal(Sort.ONE_LINE, name, "", values.follows(at.chosen, values.negation(at.several())))
+        yield Goal(Sort.ONE_LINE, name, "", values.follows(at.runs, values.negation(at.several())))
 
 
 def pairs(cycle: Cycle) -> tuple[Goal, ...]:
@@ -112,7 +112,7 @@ def pairs(cycle: Cycle) -> tuple[Goal, ...]:
         for one, two in may_meet(at.table):
             first, second = (str(at.table.lines[place].name) for place in (one, two))
             never = values.negation(values.both(at.matches[one], at.matches[two]))
-            goal = values.follows(at.chosen, never)
+            goal = values.follows(at.runs, never)
             found.append(
                 Goal(Sort.ONE_LINE, str(at.table.name), f"{first} and {second}", goal, (first, second))
             )

@@ -20,6 +20,7 @@ from rcsc.compose.level import LevelProof, Verdict, essential, prove_level
 from rcsc.compose.search import Effort
 from rcsc.compose.transition import Stepper
 from rcsc.diagnostics.codes import Code
+from rcsc.meaning import with_stops
 from rcsc.model import Program
 from rcsc.project import Loaded, load
 from rcsc.prove.values import TRUE
@@ -111,10 +112,11 @@ def program_of(path: Path, name: str) -> Program:
     from rcsc.prove.options import Options
 
     program = loaded_program(path, name)[0]
-    for one in Obligations(program, Options()).prove(program.tables):
+    owed = Obligations(program, Options())
+    for one in owed.prove(program.tables):
         if one.code not in SHOWN_HERE:
             raise NoProgramError(f"{one.message}: see `rcsc check {one.primary.span.file}`")
-    return program
+    return with_stops(program, owed.stops)
 
 
 def loaded_program(path: Path, name: str) -> tuple[Program, Loaded]:

@@ -18,7 +18,7 @@ from rcsc.compose.goals import Goal, Key, Sort, goals, pairs
 from rcsc.compose.properties import invariant_kept, property_kept
 from rcsc.compose.sat import GaveUpError
 from rcsc.compose.simplest import Bounded, Simplest, constant_of
-from rcsc.compose.transition import GHOST, Cycle, Leaves, Stepper, successor
+from rcsc.compose.transition import EARLY, GHOST, Cycle, Leaves, Stepper, successor
 from rcsc.interpret import (
     ExternError,
     Fault,
@@ -77,8 +77,8 @@ class Step:
 
     @property
     def ends_the_run(self) -> bool:
-        """Whether it ended in a fault that the proofs exclude; a refused result is none, and the next cycle runs."""
-        return self.fault not in {Fault.OK, Fault.EXTERN}
+        """Whether it ended in a fault that the proofs exclude; after the others (`EARLY`) the next cycle runs."""
+        return self.fault not in {Fault.OK, *EARLY}
 
 
 Given: TypeAlias = tuple[Mapping[str, Value], tuple[Answer, ...]]
@@ -380,7 +380,7 @@ def halfway(stepper: Stepper, step: Step) -> Halfway:
                 call(program, name, [], now)
             found.matched, found.middle = True, dict(now)
             execute(program, [action.statement for action in _actions(stepper, step)], now, {})
-            found.acted = True
+            found.acted = step.fault is not Fault.ASSUMPTION
     except ExternError:
         pass
     return found
@@ -488,7 +488,7 @@ def as_cycle(stepper: Stepper, step: Step) -> Cycle:
         {**middle, **taken},
         stepper.tables(middle, matched=half.matched),
         after,
-        values.truth(step.fault is Fault.EXTERN),
+        values.truth(step.fault in EARLY),
         values.truth(not half.matched),
         values.truth(not half.acted),
     )

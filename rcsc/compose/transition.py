@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 from rcsc.compose.contract import COMMAND, ECHO, ECHOED, NUMBER, Below, Links
-from rcsc.interpret import evaluate
+from rcsc.interpret import Fault, evaluate
 from rcsc.model import (
     Action,
     Bool,
@@ -42,6 +42,8 @@ SEEN = "inc_command_seen"
 """The number of the command being worked on; a level that restarts counts the one in its buffer as seen."""
 TAKEN = f"command.{NUMBER}"
 """Where that one stands, by the convention of the tables: of an order under another name nothing is adopted."""
+EARLY = frozenset({Fault.EXTERN, Fault.ASSUMPTION})
+"""Faults that no proof excludes: the cycle ends there, and the next one runs."""
 Leaves = dict[str, Node]
 NUMBERS = 65536
 """Command numbers that there are (16 bits)."""
@@ -80,6 +82,16 @@ class TableAt:
         some = values.TRUE if self.table.default is not None else values.negation(self.none)
         return values.both(some, values.negation(self.several()))
 
+    @property
+    def runs(self) -> Node:
+        """It is the one that runs, and none of its stopping assumptions fails: else the cycle ends before it is matched."""
+        return values.all_of((self.chosen, *(self.assumptions[name] for name in self.table.stops)))
+
+    @property
+    def stopped(self) -> Node:
+        """It is the one that would run, and a stopping assumption fails."""
+        return values.both(self.chosen, values.negation(self.runs)) if self.table.stops else FALSE
+
     def several(self) -> Node:
         """At least two lines match."""
         found, before = FALSE, FALSE
@@ -100,8 +112,8 @@ class Cycle:
         middle: Every leaf that the table sees.
         tables: Each table that may run.
         after: Every leaf and ghost behind the cycle.
-        refused: An extern procedure's result is refused, so that the cycle ends there; `unmatched`, before the table is
-            looked at; `interrupted`, before its line is done.
+        refused: An extern procedure's result is refused, or a stopping assumption fails, so that the cycle ends there;
+            `unmatched`, before the table is looked at; `interrupted`, before its line is done.
         calls: Of extern procedures, in the order in which they can be made.
         settled: Every leaf before the preprocess, and `acted`, before the postprocess.
     """
@@ -127,8 +139,8 @@ class Cycle:
 
     @property
     def goes_on(self) -> Node:
-        """One line matches, or DEFAULT runs: the cycle does not end in a fault."""
-        return values.all_of(values.follows(at.chosen, at.one_line) for at in self.tables)
+        """One line matches, or DEFAULT runs, where a table is matched: the cycle does not end in a fault that the proofs exclude."""
+        return values.all_of(values.follows(at.runs, at.one_line) for at in self.tables)
 
 
 @dataclass(slots=True)
@@ -219,6 +231,7 @@ class Stepper:
         middle = {**before, **run.state.leaves}
         unmatched = run.ended
         tables = tuple(self._tables(run))
+        run.ended = values.either(run.ended, values.any_of(at.stopped for at in tables))
         self._lines(run, tables)
         acted, interrupted = {**before, **run.state.leaves}, run.ended
         run.execute(Call(self.procedures[name].name) for name in self.level.postprocess)
@@ -316,7 +329,7 @@ class Stepper:
         middle = run.state
         ways: list[tuple[Node, State]] = []
         for at in tables:
-            left = at.chosen
+            left = at.runs
             for match, line in zip(at.matches, at.table.lines, strict=True):
                 ways.append(_way(run, middle, values.both(left, match), line.actions))
                 left = values.both(left, values.negation(match))

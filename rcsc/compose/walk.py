@@ -10,7 +10,7 @@ from random import Random
 
 from rcsc.compose.contract import COMMAND, ECHO, ECHOED, NUMBER, STATUS, Links
 from rcsc.compose.given import at_random
-from rcsc.compose.transition import GHOST, NUMBERS
+from rcsc.compose.transition import EARLY, GHOST, NUMBERS
 from rcsc.interpret import Fault, cycle, initial
 from rcsc.model import Enum, Level, Program, Scalar, Value, key_bounds, value_of_key
 
@@ -47,7 +47,7 @@ class Walk:
             self._take()
             with at_random(self.program, self.random):
                 outcome = cycle(self.program, self.level, self.now)
-            if outcome.fault not in {Fault.OK, Fault.EXTERN}:
+            if outcome.fault not in {Fault.OK, *EARLY}:
                 return
             self.now = outcome.snapshot
             yield {**self.now, **self.ghosts}

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from rcsc.emit.ctext import CText, c_type, constant, integer, locals_of, wide_type
 from rcsc.emit.environment import render
 from rcsc.emit.names import FAILED_BITS, Names, c_word, comment, names_of, short
+from rcsc.interpret import Fault
 from rcsc.model import (
     Admit,
     Array,
@@ -514,7 +515,21 @@ class _Maker:
             yield f"    /* {comment(assumption.name)} */"
             yield f"    if (!({self.text.expr(assumption.condition)})) {{"
             yield f"        {self._mark_failed(place)}"
+            if place in table.stops:
+                yield "        if (s->fault == 0) {"
+                yield f"            s->fault = {int(Fault.ASSUMPTION)};"
+                yield f"            s->fault_at = {place};"
+                yield "        }"
             yield "    }"
+        if not table.stops:
+            yield from self._matched(table, name)
+            return
+        yield "    if (s->fault == 0) {"
+        yield from (f"    {line}" for line in self._matched(table, name))
+        yield "    }"
+
+    def _matched(self, table: PlanTable, name: str) -> Iterator[str]:
+        """Finds the line and runs its actions."""
         yield f"    s->line = {self.p}_{name}_line(s);"
         yield "    switch (s->line) {"
         for number, line in enumerate(table.lines):
@@ -743,6 +758,7 @@ def _symbols(plan: Plan, names: Names) -> str:
                 "lines_of_many": f"{p}_{names.tables[t.table.name]}_lines",
                 "step": f"{p}_{names.tables[t.table.name]}_step",
                 "lines": [line.name for line in t.lines],
+                **({"stops": list(t.table.stops)} if t.table.stops else {}),
             }
             for t in plan.tables
         ],

@@ -10,7 +10,8 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-from rcsc.model import Program, Standing
+from rcsc.meaning import checked
+from rcsc.model import Program
 
 C_WORDS = frozenset(
     """auto break case char const continue default do double else enum extern float for goto if inline int long
@@ -119,7 +120,7 @@ def names_of(program: Program) -> Names:
         tables,
         _unique((level.name for level in program.levels), used),
         _unique((p.name for p in program.procedures), Taken()),
-        failed_words(sum(a.standing is Standing.MONITORED for a in program.assumptions)),
+        failed_words(len(checked(program))),
     )
 
 

@@ -8,6 +8,7 @@ from math import prod
 from rcsc.emit.environment import render
 from rcsc.emit.names import FAILED_BITS, comment, names_of, python_word
 from rcsc.emit.pytext import PyText, constant
+from rcsc.interpret import Fault
 from rcsc.model import Admit, Int, Kind, Level, OneTable, Procedure, Real, Variable, key_bounds, pending
 from rcsc.plan import WORD, Coded, Cuts, Direct, Group, Index, Plan, PlanTable, Truth, grouped
 
@@ -272,6 +273,12 @@ class _Maker:
             yield f"    if not {self.text.expr(assumption.condition)}:  # {comment(assumption.name)}"
             word, bit = divmod(place, FAILED_BITS)
             yield f"        s.{self.names.failed[word]} |= 1 << {bit}"
+            if place in table.stops:
+                yield "        if s.fault == 0:"
+                yield f"            s.fault, s.fault_at = {int(Fault.ASSUMPTION)}, {place}"
+        if table.stops:
+            yield "    if s.fault != 0:"
+            yield "        return"
         yield f"    line = {name}_line(s)"
         yield "    if line < 0:"
         yield "        s.fault = 2 if line == -1 else 3"

@@ -34,7 +34,7 @@ _TRACE_FIELDS = (
     "int32 fault # 0 for none",
     "int32 fault_at # place of the leaf that was refused; -1 for none",
 )
-_FAILED_FIELD = "uint64 {} # one bit an assumption that is monitored"
+_FAILED_FIELD = "uint64 {} # one bit an assumption that is checked"
 
 
 def message_definition(leaves: Sequence[Leaf], failed: Sequence[str] | None = None) -> str:

@@ -29,9 +29,8 @@ def fault_of(sign: Signature, values: Values) -> str:
 
 
 def refused_of(sign: Signature, values: Values) -> str:
-    """The leaf that was refused; empty for none."""
-    at = int(values[len(sign.leaves) + 2])
-    return sign.leaves[at].name if 0 <= at < len(sign.leaves) else ""
+    """The leaf that was refused, or the assumption that ended the cycle; empty for none."""
+    return sign.fault_at(values)
 
 
 def failed_of(sign: Signature, values: Values) -> str:

@@ -7,6 +7,8 @@ open. Domains of the variables are asserted here. Z3 is loaded only when somethi
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from enum import Enum, auto
+from itertools import combinations
+from typing import TypeVar
 
 from rcsc.model import Kind, Real, Value, Variable, VariableName, value_of_key
 from rcsc.prove import smt, trial, values
@@ -15,6 +17,10 @@ from rcsc.prove.evaluation import Obligation
 from rcsc.prove.options import Options
 from rcsc.prove.smt import Answer, Solver, Term
 from rcsc.prove.values import Node
+
+MOST_CHOICES = 64
+"""Choices of assumptions that are tried for the fewest; past them, one that has none to spare is taken."""
+Candidate = TypeVar("Candidate")
 
 MOST_UNKNOWN = 2
 """After so many questions without an answer, the rest of a run is not asked."""
@@ -76,6 +82,44 @@ class Asker:
         except smt.troubles():
             return [Failure(one, Outcome.OPEN) for one in obligations]
 
+    def all_hold(self, obligations: Sequence[Obligation], base: Callable[[], Sequence[Node]]) -> bool:
+        """Whether all of them are shown wherever `base` holds, by one question; left open is not shown."""
+        if not obligations:
+            return True
+        try:
+            return _Question(self, obligations, base(), lambda _: False).all_hold()
+        except smt.troubles():
+            return False
+
+
+def fewest(
+    candidates: Sequence[Candidate], suffice: Callable[[Sequence[Candidate]], bool]
+) -> tuple[Candidate, ...]:
+    """The fewest candidates that suffice, the first such choice in their order; more never suffice less.
+
+    Where there are many candidates: a choice of which none can be spared, later ones spared first.
+    """
+    tried = 0
+    for count in range(len(candidates)):
+        for chosen in combinations(candidates, count):
+            if tried == MOST_CHOICES:
+                return _irredundant(candidates, suffice)
+            tried += 1
+            if suffice(chosen):
+                return chosen
+    return tuple(candidates)
+
+
+def _irredundant(
+    candidates: Sequence[Candidate], suffice: Callable[[Sequence[Candidate]], bool]
+) -> tuple[Candidate, ...]:
+    kept = tuple(candidates)
+    for at in reversed(range(len(candidates))):
+        fewer = (*kept[:at], *kept[at + 1 :])
+        if suffice(fewer):
+            kept = fewer
+    return kept
+
 
 class _Question:
     """One run's obligations."""
@@ -105,6 +149,13 @@ class _Question:
         """What is not shown, in the order owed."""
         self._search(0, len(self.owed))
         return self.failures
+
+    def all_hold(self) -> bool:
+        """Whether none of the obligations can fail."""
+        bad = values.any_of(self.bad)
+        if self.reals and trial.found([*self.known, bad], self.variables) is not None:
+            return False
+        return self._ask(values.term_of(bad)) is Answer.UNSATISFIABLE
 
     def _search(self, first: int, last: int) -> None:
         """Looks among the obligations `first .. last - 1`; those before hold, or were found."""

@@ -1,14 +1,21 @@
 """Nothing can overflow, divide by zero, leave an array or a declared range, or write an output twice.
 
-In: a program. Out: diagnostics with least witnesses. Each line's actions are shown right where they run:
-under the table's assumptions, the invariants and the line's conditions; procedures of levels under the
+In: a program. Out: diagnostics with least witnesses, and the assumptions that stop a cycle. Each line's actions are
+shown right where they run: under the invariants and the line's conditions; procedures of levels under the
 invariants; what nothing calls under the declared ranges alone. Conditions are shown to be defined for every
-input: the executors can evaluate each (a monitored assumption too) whatever the others say. Every run also owes
+input: the executors can evaluate each (an assumption too) whatever the others say. Every run also owes
 the invariants.
+
+An assumption may fail at run time. So a table's conditions and lines are first shown without assumptions. What is left is
+shown under the fewest of them, which are the table's *stopping* assumptions: the executors end the cycle where one of them
+fails, before anything is matched. All else that a cycle owes then rests on ranges, guards and invariants alone. Invariants
+count as safety: one that a failed assumption breaks would take the ground from under the next cycle.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import partial
+from typing import TypeAlias
 
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label
@@ -19,6 +26,8 @@ from rcsc.model import (
     Among,
     Apply,
     Assign,
+    Assumption,
+    AssumptionName,
     Call,
     Default,
     Expr,
@@ -40,7 +49,7 @@ from rcsc.model import (
 )
 from rcsc.prove import values
 from rcsc.prove.causes import MOST_WITNESSES, Cause, diagnostic
-from rcsc.prove.discharge import Asker, Tally
+from rcsc.prove.discharge import Asker, Tally, fewest
 from rcsc.prove.evaluation import Evaluation, Obligation, State, TooLongError
 from rcsc.prove.options import Options
 from rcsc.prove.symbolic import Run
@@ -70,6 +79,25 @@ def defined_alone(program: Program, table: Table) -> bool:
     return not run.obligations
 
 
+Known: TypeAlias = Callable[[], list[Node]]
+"""What may be taken for granted where obligations are put to the solver."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Owing:
+    """A condition or a line of a table.
+
+    Attributes:
+        run: What it owes under some assumptions, and what is known there.
+        condition: Whether it is a condition, which the table is then not decided without.
+    """
+
+    run: Callable[[list[Node]], tuple[Run, Known]]
+    where: str
+    span: Span
+    condition: bool
+
+
 @dataclass(slots=True)
 class Obligations:
     """Proves what one program owes.
@@ -77,12 +105,14 @@ class Obligations:
     Attributes:
         tally: How it was settled.
         undefined: Tables with a condition, or an assumption, that is not defined for every input.
+        stops: By table, the assumptions on which the safety of its conditions and lines rests.
     """
 
     program: Program
     options: Options
     tally: Tally = field(default_factory=Tally)
     undefined: set[str] = field(default_factory=set)
+    stops: dict[str, tuple[AssumptionName, ...]] = field(default_factory=dict)
     _causes: dict[tuple[Code, Span, str], Cause] = field(default_factory=dict)
     _start: dict[str, Node] = field(default_factory=dict)
     _clean: dict[str, bool] = field(default_factory=dict)
@@ -108,10 +138,7 @@ class Obligations:
         self._levels()
         self._uncalled()
         for table in tables:
-            self._tests(table)
-            for line in (*table.lines, *((table.default,) if table.default else ())):
-                if not self._plain(line.actions):
-                    self._line(table, line)
+            self._table(table)
         return [*self._too_long, *(diagnostic(*key, cause) for key, cause in self._causes.items())]
 
     # --- what is known ---
@@ -136,26 +163,27 @@ class Obligations:
             level.tables.selector for level in self.program.levels if isinstance(level.tables, TableByCommand)
         ]
         for one in self.program.invariants:
-            self._defined(one.condition, [], "")
+            self._defined(one.condition, [])
         for condition in (*deferred, *selectors):
-            self._defined(condition, self._invariants(), "")
+            self._defined(condition, self._invariants())
         for assumption in self.program.assumptions:
-            if not self._defined(assumption.condition, self._invariants(), ""):
+            if not self._defined(assumption.condition, self._invariants()):
                 users = (table.name for table in self.program.tables if assumption.name in table.assumptions)
                 self.undefined.update(users)
             if assumption.standing is Standing.PROVED:
                 self._follows(assumption.name, assumption.condition, assumption.span)
 
-    def _defined(
-        self, condition: Expr, base: list[Node], where: str, cell: Span = NOWHERE, table: str = ""
-    ) -> bool:
+    def _defined(self, condition: Expr, base: list[Node]) -> bool:
         """Whether evaluating the condition cannot go wrong."""
+        return self._settle(self._evaluated(condition, base), lambda: base, "", "")
+
+    def _evaluated(self, condition: Expr, base: list[Node], cell: Span = NOWHERE) -> Run:
         run = self._run()
         run.cell = cell
         for node in base:
             run.assume(node)
         run.evaluate(condition)
-        return self._settle(run, lambda: base, where, table)
+        return run
 
     def _follows(self, name: str, condition: Expr, span: Span) -> None:
         """An assumption that claims to be proved follows from ranges and invariants."""
@@ -165,7 +193,7 @@ class Obligations:
         run.owe(Code.ASSUMPTION_NOT_PROVED, message, span, good)
         self._settle(run, self._invariants, "", "")
 
-    def _tests(self, table: Table) -> None:
+    def _tests(self, table: Table) -> Iterator[_Owing]:
         """Every condition of the table is evaluated in every cycle, whatever the others say."""
         seen: dict[int, tuple[Expr, Span]] = {}
         for line in table.lines:
@@ -173,14 +201,42 @@ class Obligations:
                 if test is not None and id(test) not in seen:
                     seen[id(test)] = test.condition, line.cell_span(at)
         where = f"in a condition of table `{table.name}`"
-        owing = [(condition, span) for condition, span in seen.values() if _computes(condition)]
-        base = [*self._assumed(table), *self._invariants()] if owing else []
-        for condition, span in owing:
-            if not self._defined(condition, base, where, span, table.name):
-                self.undefined.add(table.name)
+        for condition, span in seen.values():
+            if _computes(condition):
+                yield _Owing(partial(self._test, condition, span), where, span, condition=True)
 
-    def _assumed(self, table: Table) -> list[Node]:
-        return self._known(a.condition for a in self.program.assumptions if a.name in table.assumptions)
+    def _test(self, condition: Expr, span: Span, assumed: list[Node]) -> tuple[Run, Known]:
+        base = [*assumed, *self._invariants()]
+        return self._evaluated(condition, base, span), lambda: base
+
+    # --- tables ---
+
+    def _table(self, table: Table) -> None:
+        """Its conditions and lines, and on which assumptions they rest."""
+        assumptions = [one for one in self.program.assumptions if one.name in table.assumptions]
+        needing = []
+        for owing in (*self._tests(table), *self._lines(table)):
+            try:
+                run, known = owing.run([])
+                if assumptions and not self._asker.all_hold(run.obligations, known):
+                    needing.append(owing)
+                    run, known = owing.run(self._known(one.condition for one in assumptions))
+                if not self._settle(run, known, owing.where, table.name) and owing.condition:
+                    self.undefined.add(table.name)
+            except (TooLongError, RecursionError):
+                self._give_up(owing.where, owing.span)
+        if needing:
+            chosen = fewest(assumptions, partial(self._suffice, needing))
+            self.stops[table.name] = tuple(one.name for one in chosen)
+
+    def _suffice(self, needing: Iterable[_Owing], chosen: Sequence[Assumption]) -> bool:
+        """Whether all is shown under these assumptions that is not reported under all of them."""
+        for owing in needing:
+            run, known = owing.run(self._known(one.condition for one in chosen))
+            left = [one for one in run.obligations if (one.code, one.span, one.message) not in self._causes]
+            if not self._asker.all_hold(left, known):
+                return False
+        return True
 
     # --- runs outside lines ---
 
@@ -288,24 +344,21 @@ class Obligations:
             case _:
                 return None
 
-    def _line(self, table: Table, line: Line | Default) -> None:
-        where = f"in line `{line.name}` of table `{table.name}`"
-        base = [*self._assumed(table), *self._invariants()]
+    def _lines(self, table: Table) -> Iterator[_Owing]:
+        for line in (*table.lines, *((table.default,) if table.default else ())):
+            if not self._plain(line.actions):
+                where = f"in line `{line.name}` of table `{table.name}`"
+                yield _Owing(partial(self._line, table, line), where, _name_of(line), condition=False)
+
+    def _line(self, table: Table, line: Line | Default, assumed: list[Node]) -> tuple[Run, Known]:
+        base = [*assumed, *self._invariants()]
         if isinstance(line, Line):
             base += self._known(test.condition for test in line.tests if test is not None)
-        name = line.cell_span(-1) if isinstance(line, Line) else line.span
+        name = _name_of(line)
         run = self._running(base, f"line `{line.name}` of table `{table.name}`", name)
-        try:
-            self._actions(run, line.actions)
-        except (TooLongError, RecursionError):
-            self._give_up(where, name)
-            return
+        self._actions(run, line.actions)
         self._keep(run, f"line `{line.name}` of table `{table.name}`", name)
-
-        def known() -> list[Node]:
-            return [*base, self._none(table)] if isinstance(line, Default) else base
-
-        self._settle(run, known, where, table.name)
+        return run, lambda: [*base, self._none(table)] if isinstance(line, Default) else base
 
     def _none(self, table: Table) -> Node:
         """That no line matches."""
@@ -373,6 +426,11 @@ class Obligations:
         self._too_long.append(
             Diagnostic(Code.UNDECIDED, message, Label(span), help=("make its loops shorter",))
         )
+
+
+def _name_of(line: Line | Default) -> Span:
+    """Where the line's name stands."""
+    return line.cell_span(-1) if isinstance(line, Line) else line.span
 
 
 def _computes(expr: Expr) -> bool:

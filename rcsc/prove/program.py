@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 from rcsc import children
 from rcsc.diagnostics.diagnostic import Diagnostic, Severity, sort_key
-from rcsc.meaning import relying
+from rcsc.meaning import relying, with_stops
 from rcsc.model import (
     AssumptionName,
     Backing,
@@ -41,6 +41,7 @@ class ProgramVerdict:
         tables: One verdict a table.
         certificate: Of all tables; None where something is not proved.
         tally: How the obligations of procedures and conditions were settled.
+        program: What was proved, with the stopping assumptions of the tables that were looked at.
         unproved: Invariants, and assumptions declared `proved`, that are not proved: what rests on one is not, either.
     """
 
@@ -49,6 +50,7 @@ class ProgramVerdict:
     tables: tuple[TableVerdict, ...]
     certificate: Mapping[str, object] | None
     tally: Tally
+    program: Program
     unproved: frozenset[str] = frozenset()
 
 
@@ -64,6 +66,7 @@ def prove_program(
     wanted = [table for table in program.tables if only is None or table.name in only]
     found += owed.prove(wanted)
     unproved = _unproved(program, found)
+    program = with_stops(program, owed.stops)
     assuming = relying(program)
     known = {table.name for table in wanted}
     tables = [table for table in assuming.tables if table.name in known]
@@ -75,10 +78,11 @@ def prove_program(
     findings = tuple(sorted(dict.fromkeys(found), key=sort_key))
     wrong = any(one.severity is Severity.ERROR for one in findings)
     if wrong or only is not None:
-        return ProgramVerdict(findings, None, verdicts, None, owed.tally, unproved)
+        return ProgramVerdict(findings, None, verdicts, None, owed.tally, program, unproved)
     backings = tuple((verdict.table.name, verdict.backing) for verdict in verdicts)
     proved = ProvedProgram(program, backings, seal_of_proof())
-    return ProgramVerdict(findings, proved, verdicts, _certificate(program, verdicts, owed.tally), owed.tally)
+    certificate = _certificate(program, verdicts, owed.tally)
+    return ProgramVerdict(findings, proved, verdicts, certificate, owed.tally, program)
 
 
 def _unproved(program: Program, found: Iterable[Diagnostic]) -> frozenset[str]:

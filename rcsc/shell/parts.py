@@ -10,8 +10,19 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from rcsc.diagnostics.codes import Code
-from rcsc.interpret import ExternError, admit, call, evaluate, execute, holds, matching_lines, settle
+from rcsc.interpret import (
+    ExternError,
+    admit,
+    call,
+    evaluate,
+    execute,
+    failed_assumptions,
+    matching_lines,
+    settle,
+)
+from rcsc.meaning import with_stops
 from rcsc.model import (
+    AssumptionName,
     Bool,
     Enum,
     Int,
@@ -20,7 +31,6 @@ from rcsc.model import (
     Procedure,
     Program,
     Scalar,
-    Standing,
     Table,
     Value,
     key_bounds,
@@ -92,6 +102,8 @@ def run_part(running: RunningLevel, program: Program, name: str, args: Sequence[
             *near(name, part_names(program)),
         )
     names = [leaf.name for leaf in running.sign.leaves]
+    stops = {table: tuple(map(AssumptionName, one)) for table, one in running.sign.stops.items()}
+    program = with_stops(program, stops)
     level = next(one for one in program.levels if one.name == running.name)
     part = _Part(program, level, dict(zip(names, running.values, strict=False)), running.values[len(names) :])
     try:
@@ -164,7 +176,13 @@ def _chosen(part: _Part) -> Table:
 
 def _match(part: _Part, table: Table) -> str:
     """Runs the line that matches; assumptions that fail are told, and kept in the trace."""
-    failed = _failed(part, table)
+    failed = failed_assumptions(part.program, table, part.now)
+    stopped = [name for name in failed if name in table.stops]
+    if stopped:
+        said = (
+            f"table `{table.name}`: assumption `{stopped[0]}` fails, on which the safety of its lines rests"
+        )
+        raise Refused(Code.STATE_TABLE_ERROR, said)
     matching = matching_lines(table, part.now)
     warned = f"; assumptions that do not hold: {', '.join(failed)}" if failed else ""
     if len(matching) > 1:
@@ -181,16 +199,6 @@ def _match(part: _Part, table: Table) -> str:
     part.trace = (at, 0, -1, part.trace[-1]) if table is _chosen(part) else part.trace
     done = "; ".join(action.text for action in line.actions)
     return f"table `{table.name}`, line {line.name}: {done or 'nothing'}{warned}"
-
-
-def _failed(part: _Part, table: Table) -> list[str]:
-    return [
-        one.name
-        for one in part.program.assumptions
-        if one.name in table.assumptions
-        and one.standing is Standing.MONITORED
-        and not holds(one.condition, part.now)
-    ]
 
 
 def _arguments(procedure: Procedure, given: Sequence[str]) -> list[Value]:

@@ -24,7 +24,7 @@ from rcsc.shell.stops import Stops, reached, stands
 from rcsc.system.cell import StateTableError, System
 from rcsc.system.description import BadDescription, Description, LevelSpec
 from rcsc.system.levels import Fill, Query, RunningLevel
-from rcsc.system.signature import FAULTS, Signature, Value, Values
+from rcsc.system.signature import Signature, Value, Values
 
 if TYPE_CHECKING:
     from rcsc.shell.sources import Kept
@@ -315,13 +315,7 @@ def _carriers(level: RunningLevel) -> list[tuple[str, int, int]]:
 
 
 def _fault(level: RunningLevel) -> str:
-    where = f"level `{level.name}`, table `{level.table}`: {FAULTS[level.fault]}"
-    at = int(level.values[len(level.sign.leaves) + 2])
-    return (
-        where
-        if at < 0
-        else f"{where}: `{level.sign.leaves[at].name}` = {level.sign.leaves[at].shown(level.values[at])}"
-    )
+    return f"level `{level.name}`, table `{level.table}`: {level.sign.fault_said(level.values)}"
 
 
 def silent_queries(system: Description, signs: Mapping[str, Signature]) -> dict[str, Query]:

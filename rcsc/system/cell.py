@@ -13,7 +13,7 @@ from rcsc.system.buffers import Buffers, CommonMemory
 from rcsc.system.description import BadDescription, Description
 from rcsc.system.executors import CExecutor, Executor, PythonExecutor, build
 from rcsc.system.levels import Query, RunningLevel, running_level
-from rcsc.system.signature import FAULTS, Signature, Values, signature
+from rcsc.system.signature import Signature, Values, signature
 from rcsc.system.unproved import refuse_unproved
 
 Kind = Literal["c", "python"]
@@ -100,12 +100,7 @@ def _missing(name: str) -> RunningLevel:
 
 
 def _said(level: RunningLevel, tick: int) -> str:
-    where = f"level `{level.name}`, table `{level.table}`, cycle {tick}"
-    at = int(level.values[len(level.sign.leaves) + 2])
-    if at >= 0:
-        leaf = level.sign.leaves[at]
-        return f"{where}: {FAULTS[level.fault]}: `{leaf.name}` = {leaf.shown(level.values[at])}"
-    return f"{where}: {FAULTS[level.fault]}"
+    return f"level `{level.name}`, table `{level.table}`, cycle {tick}: {level.sign.fault_said(level.values)}"
 
 
 def signatures(system: Description) -> dict[str, Signature]:

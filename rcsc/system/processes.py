@@ -18,9 +18,8 @@ from typing import TYPE_CHECKING, Any, Self
 from rcsc import children
 from rcsc.system.cell import Kind, StateTableError, signatures
 from rcsc.system.description import Description
-from rcsc.system.serve import FAULTY, Factory, Setting, fault_of, serve_level, serve_outside
+from rcsc.system.serve import FAULTY, Factory, Setting, serve_level, serve_outside
 from rcsc.system.shared import Absent, SharedMemoryBuffers, layout
-from rcsc.system.signature import FAULTS
 from rcsc.system.unproved import refuse_unproved
 
 if TYPE_CHECKING:
@@ -145,10 +144,7 @@ class Supervisor:
         values = self.buffers.checkpoint(name)
         if isinstance(values, Absent):
             return f"level `{name}`: a fault"
-        sign = self._signs[name]
-        at = int(values[len(sign.leaves) + 2])
-        where = f": `{sign.leaves[at].name}` = {sign.leaves[at].shown(values[at])}" if at >= 0 else ""
-        return f"level `{name}`: {FAULTS[fault_of(sign, values)]}{where}"
+        return f"level `{name}`: {self._signs[name].fault_said(values)}"
 
 
 def run_processes(

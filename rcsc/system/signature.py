@@ -22,7 +22,15 @@ TRACE = ("line", "fault", "fault_at")
 """What a cycle leaves beside the leaves; the words of failed assumptions come after it."""
 FAILED = ("assumptions_failed",)
 """The words of failed assumptions, 64 in each, where the symbol file names no others."""
-FAULTS = ("none", "input refused", "no line matches", "several lines match", "extern refused")
+FAULTS = (
+    "none",
+    "input refused",
+    "no line matches",
+    "several lines match",
+    "extern refused",
+    "assumption failed",
+)
+STOPPED = FAULTS.index("assumption failed")
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +91,12 @@ class LevelSign:
 
 @dataclass(frozen=True, slots=True)
 class Signature:
-    """A program from outside."""
+    """A program from outside.
+
+    Attributes:
+        monitored: Assumptions that the executors check.
+        stops: By table, those that end the cycle where they fail.
+    """
 
     program: str
     struct_name: str
@@ -94,6 +107,7 @@ class Signature:
     monitored: tuple[str, ...]
     index: Mapping[str, int] = field(default_factory=dict)
     failed: tuple[str, ...] = FAILED
+    stops: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     @property
     def trace(self) -> tuple[str, ...]:
@@ -133,6 +147,23 @@ class Signature:
     def table_of(self, level: LevelSign, values: Values) -> str:
         """The table that the level ran in the cycle that left these values."""
         return level.table or level.tables.get(int(values[self.index[level.by]]), "?")
+
+    def fault_at(self, values: Values) -> str:
+        """What the fault of a cycle is about: the leaf that was refused, or the assumption; empty for nothing."""
+        fault, at = (int(values[len(self.leaves) + place]) for place in (1, 2))
+        if fault == STOPPED:
+            return self.monitored[at] if 0 <= at < len(self.monitored) else f"{at}?"
+        return self.leaves[at].name if 0 <= at < len(self.leaves) else ""
+
+    def fault_said(self, values: Values) -> str:
+        """A fault in words: `input refused: `width` = 9`, `assumption failed: `calm``, `no line matches`."""
+        fault, at = (int(values[len(self.leaves) + place]) for place in (1, 2))
+        word = FAULTS[fault] if 0 <= fault < len(FAULTS) else f"{fault}?"
+        about = self.fault_at(values)
+        if not about:
+            return word
+        shown = "" if fault == STOPPED else f" = {self.leaves[at].shown(values[at])}"
+        return f"{word}: `{about}`{shown}"
 
 
 def signature(path: Path) -> Signature:
@@ -182,6 +213,7 @@ def signature(path: Path) -> Signature:
             tuple(said["monitored"]),
             {leaf.name: at for at, leaf in enumerate(leaves)},
             tuple(said.get("failed", FAILED)),
+            {one["name"]: tuple(one["stops"]) for one in said["tables"] if "stops" in one},
         )
     except (KeyError, TypeError, json.JSONDecodeError) as error:
         raise ValueError(f"{path} is no symbol file of rcsc's: {error}") from error

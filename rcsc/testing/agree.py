@@ -1,9 +1,8 @@
 """Interpreter, Python executor and C executor on the same inputs: line, fault, failed assumptions, state.
 
 In: a program, its executors, sessions. Out: the first disagreement of a session, and what was compared. The
-complete state is compared after every cycle, and each executor carries its own from cycle to cycle. Where a
-table's assumptions do not hold, nothing is claimed of its procedures and the session ends with that cycle: it
-is run and compared (the monitors too) only where the interpreter does nothing undefined in it.
+complete state is compared after every cycle, and each executor carries its own from cycle to cycle. Cycles in
+which assumptions fail are like others: no executor does anything undefined in them.
 """
 
 from collections import Counter
@@ -12,10 +11,10 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from rcsc.interpret import Fault, Outcome, cycle, holds, matching_lines, run_table
-from rcsc.model import LineName, Program, Snapshot, Table, Value, key_bounds, value_of_key
+from rcsc.model import LineName, Program, Snapshot, Table, Value
 from rcsc.testing.externs import begin
 from rcsc.testing.native import Native, Result
-from rcsc.testing.reference_file import all_lines, monitored
+from rcsc.testing.reference_file import all_lines, fault_named, monitored
 from rcsc.testing.sessions import Seen, Session, differences
 from rcsc.testing.targets import Target
 from rcsc.testing.tools import Absent, BuildFailed
@@ -47,7 +46,7 @@ class Compared:
     """What was compared so far.
 
     Attributes:
-        broken: Cycles in which an assumption did not hold.
+        broken: Cycles in which an assumption that is checked did not hold.
         lines: By table, how often each line was taken by a step or cycle that all executors agreed on.
         kept: Sessions that ran, with function and mode, for the sanitized program.
         matched: Snapshots that the matchers were given.
@@ -113,7 +112,7 @@ def seen_by_interpreter(outcome: Outcome) -> Seen:
     """An outcome in the common words."""
     took = outcome.fault in (Fault.OK, Fault.EXTERN) and outcome.line is not None
     line = outcome.line_index if took else NONE
-    at = str(outcome.fault_at) if outcome.fault in (Fault.ADMIT, Fault.EXTERN) else ""
+    at = str(outcome.fault_at)
     failed = tuple(str(name) for name in outcome.failed_assumptions)
     return Seen(int(outcome.fault), at, line, failed, outcome.snapshot)
 
@@ -121,8 +120,7 @@ def seen_by_interpreter(outcome: Outcome) -> Seen:
 def seen_in_c(program: Program, native: Native, result: Result) -> Seen:
     """A row of the C executor in the common words."""
     names = monitored(program)
-    refused = result.fault in (Fault.ADMIT, Fault.EXTERN)
-    at = native.symbols.leaf_at(result.fault_at) if refused else ""
+    at = fault_named(program, native.symbols, result.fault, result.fault_at)
     line = result.line if result.fault in (Fault.OK, Fault.EXTERN) else NONE
     failed = tuple(names[number] for number in result.failed)
     return Seen(result.fault, at, line, failed, result.snapshot)
@@ -131,59 +129,6 @@ def seen_in_c(program: Program, native: Native, result: Result) -> Seen:
 def rows_of(session: Session) -> list[Snapshot]:
     """One row a cycle for the shim: the start with that cycle's readings."""
     return [{**session.start, **readings} for readings in session.readings]
-
-
-def broken_cycle(
-    executors: Executors, target: Target, session: Session, good: Session, compared: Compared
-) -> Disagreement | None:
-    """The cycle after `good`, in which an assumption does not hold; see the module.
-
-    Args:
-        executors: Of the program.
-        target: A step or a cycle.
-        session: The whole session.
-        good: What `within` left of it.
-        compared: Counts what was compared.
-    """
-    program, meaning, state = executors.program, interpreter(executors.program, target), session.start
-    if len(good.readings) == len(session.readings):
-        return None
-    for readings in good.readings:
-        state = meaning({**state, **readings}).snapshot
-    one = Session(state, (session.readings[len(good.readings)],))
-    mode = 2 * begin(program, one.start)
-    try:
-        outcome = meaning({**state, **one.readings[0]})
-    except (ZeroDivisionError, IndexError, KeyError, OverflowError, ValueError):
-        return None  # undefined, and excluded by the assumption
-    if not in_range(program, outcome.snapshot):
-        return None
-    right = seen_by_interpreter(outcome)
-    [row] = executors.native.run(executors.number(target), mode, rows_of(one))
-    others = {"C": seen_in_c(program, executors.native, row), "Python": executors.python.run(target, one)[0]}
-    for name, seen in others.items():
-        words = differences(program, right, seen)
-        if words:
-            return Disagreement(name, target.function, 1, one, words)
-    compared.broken += 1
-    return None
-
-
-def in_range(program: Program, snapshot: Snapshot) -> bool:
-    """Whether every leaf lies in its declared range."""
-    for variable in program.variables:
-        low, high = (value_of_key(variable.type, key) for key in key_bounds(variable.type))
-        if not low <= snapshot[variable.name] <= high:
-            return False
-    return True
-
-
-def within(executors: Executors, target: Target, session: Session) -> Session:
-    """The session up to the first cycle in which the table's assumptions do not hold."""
-    mode = 2 * begin(executors.program, session.start)
-    rows = executors.native.run(executors.number(target) + 1, mode, rows_of(session))
-    good = next((at for at, row in enumerate(rows) if row.outside), len(rows))
-    return Session(session.start, session.readings[:good])
 
 
 def keeps_invariants(program: Program, session: Session) -> bool:
@@ -199,7 +144,7 @@ def run_session(
     Args:
         executors: Of the program.
         target: A step or a cycle.
-        session: Start and readings; see `within` and `keeps_invariants`.
+        session: Start and readings; see `keeps_invariants`.
         compared: Counts what was compared.
     """
     program = executors.program
@@ -238,6 +183,7 @@ def run_init(executors: Executors, target: Target) -> Disagreement | None:
 def _count(program: Program, target: Target, compared: Compared, seen: Seen) -> None:
     compared.cycles += 1
     compared.faults[seen.fault] += 1
+    compared.broken += bool(seen.failed)
     if target.kind == "step" and seen.line >= 0:
         table = program.tables[target.number]
         name = all_lines(table)[seen.line][0]
@@ -256,8 +202,10 @@ def line_number(table: Table, names: Sequence[LineName]) -> int:
 def run_lines(
     executors: Executors, target: Target, snapshots: Sequence[Snapshot], compared: Compared
 ) -> Disagreement | None:
-    """Compares the matchers on snapshots, whether or not assumptions hold in them."""
+    """Compares the matchers on snapshots in which no stopping assumption fails; the others may."""
     table = executors.program.tables[target.number]
+    stops = [one.condition for one in executors.program.assumptions if one.name in table.stops]
+    snapshots = [one for one in snapshots if all(holds(condition, one) for condition in stops)]
     number = executors.number(target)
     in_c = executors.native.run(number, WHOLE, snapshots)
     reference = executors.native.run(number + 1, WHOLE, snapshots)

@@ -32,15 +32,13 @@ class Result:
 
     Attributes:
         result: What the function gave: a line index, or a fault code.
-        outside: The reference says that the table's assumptions do not hold here.
-        failed: Numbers of the monitored assumptions that failed.
+        failed: Numbers of the assumptions that are checked and failed.
     """
 
     result: int
     fault: int
     fault_at: int
     line: int
-    outside: bool
     failed: tuple[int, ...]
     snapshot: dict[str, Value] = field(hash=False)
 
@@ -108,7 +106,7 @@ class Native:
             str(v.name): of_word(v.type, word, self.symbols.c_type(v.name) == "uint64_t")
             for v, word in zip(self.program.variables, row[TRACE_WORDS + count :], strict=True)
         }
-        return Result(row[0], row[1], row[2], row[3], bool(row[4]), failed, snapshot)
+        return Result(row[0], row[1], row[2], row[3], failed, snapshot)
 
     def run_checked(
         self, sessions: Sequence[tuple[int, int, Sequence[Snapshot]]]

@@ -13,7 +13,7 @@ from typing import Any
 from rcsc.interpret import Fault
 from rcsc.model import Program, Snapshot, Value
 from rcsc.testing.externs import PythonStandIns
-from rcsc.testing.reference_file import monitored
+from rcsc.testing.reference_file import fault_named, monitored
 from rcsc.testing.sessions import Seen, Session
 from rcsc.testing.symbols import Symbols
 from rcsc.testing.targets import Target
@@ -70,7 +70,7 @@ class PythonExecutor:
         words = [getattr(state, word) for word in self.symbols.trace.failed_paths]
         names = enumerate(monitored(self.program))
         failed = tuple(name for at, name in names if words[at // 64] >> at % 64 & 1)
-        at = self.symbols.leaf_at(state.fault_at) if fault in (Fault.ADMIT, Fault.EXTERN) else ""
+        at = fault_named(self.program, self.symbols, fault, state.fault_at)
         line = state.line if fault in (Fault.OK, Fault.EXTERN) else -1
         if fault != state.fault:
             at = f"returned {fault}, kept {state.fault}"

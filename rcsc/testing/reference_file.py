@@ -2,12 +2,12 @@
 
 In: a program and the symbols of its emitted C. Out: the text of one C file, to be included after the
 emitted header. Functions: `ref_t<i>_line`, `ref_t<i>_step` (table i), `ref_l<i>_cycle` (level i),
-`ref_ranges`, `ref_invariants`, `ref_init`. Where a table's assumptions do not hold nothing is claimed of its
-procedures: the trace says `outside` and the line's actions are not run.
+`ref_t<i>_safe` (no stopping assumption of table i fails), `ref_ranges`, `ref_invariants`, `ref_init`.
 """
 
 from collections.abc import Iterable, Iterator
 
+from rcsc.interpret import Fault
 from rcsc.model import (
     Kind,
     Level,
@@ -32,7 +32,7 @@ typedef int64_t ref_wide; /* programs that need more are not tested on this targ
 #endif
 #define REF_NONE (-1)
 typedef struct {
-  int32_t fault; int32_t fault_at; int32_t line; int32_t outside; uint8_t failed[REF_ASSUMPTIONS];
+  int32_t fault; int32_t fault_at; int32_t line; uint8_t failed[REF_ASSUMPTIONS];
 } ref_trace_t;
 static void ref_refused(ref_trace_t *r, int at) {
   if (at != 0) { r->fault = 4; r->fault_at = at - 1; }
@@ -124,25 +124,41 @@ def all_lines(table: Table) -> list[tuple[str, tuple[Statement, ...]]]:
 
 def monitored(program: Program) -> tuple[str, ...]:
     """Names of the assumptions that the executors check, in order."""
-    return tuple(str(a.name) for a in program.assumptions if a.standing is Standing.MONITORED)
+    stopping = {name for table in program.tables for name in table.stops}
+    checked = (a for a in program.assumptions if a.standing is Standing.MONITORED or a.name in stopping)
+    return tuple(str(a.name) for a in checked)
+
+
+def fault_named(program: Program, symbols: Symbols, fault: int, at: int) -> str:
+    """The leaf that was refused, or the assumption that ended the cycle; empty for other faults."""
+    if fault in (Fault.ADMIT, Fault.EXTERN):
+        return symbols.leaf_at(at)
+    names = monitored(program)
+    if fault == Fault.ASSUMPTION:
+        return names[at] if 0 <= at < len(names) else f"assumption {at}"
+    return ""
 
 
 def _monitors(writer: Writer, number: int, table: Table) -> Iterator[str]:
-    """Which of the table's monitored assumptions fail."""
+    """Which of the table's assumptions fail that are checked; the first that stops the cycle is its fault."""
     yield f"static void ref_t{number}_monitors(const {writer.symbols.struct} *s, ref_trace_t *r) {{"
     yield "(void)s; (void)r;"
     names = monitored(writer.program)
     for assumption in writer.program.assumptions:
-        if assumption.name in table.assumptions and assumption.standing is Standing.MONITORED:
+        stops = assumption.name in table.stops
+        told = assumption.standing is Standing.MONITORED and assumption.name in table.assumptions
+        if stops or told:
             at = names.index(str(assumption.name))
             yield f"r->failed[{at}] = (uint8_t)!{writer.expr(assumption.condition)};"
+            if stops:
+                yield f"if (r->failed[{at}] && r->fault == 0) {{ r->fault = 5; r->fault_at = {at}; }}"
     yield "}"
 
 
-def _given(writer: Writer, number: int, table: Table) -> Iterator[str]:
-    """Whether the table's assumptions hold."""
-    yield f"static int32_t ref_t{number}_given(const {writer.symbols.struct} *s) {{"
-    used = [a.condition for a in writer.program.assumptions if a.name in table.assumptions]
+def _safe(writer: Writer, number: int, table: Table) -> Iterator[str]:
+    """Whether the table may be matched: its conditions are defined."""
+    yield f"static int32_t ref_t{number}_safe(const {writer.symbols.struct} *s) {{"
+    used = [a.condition for a in writer.program.assumptions if a.name in table.stops]
     yield f"(void)s; return {' && '.join(writer.expr(expr) for expr in used) or '1'}; }}"
 
 
@@ -168,8 +184,8 @@ def _body(writer: Writer, number: int) -> Iterator[str]:
     """Monitor, match and act, as the middle of a step or of a cycle."""
     struct = writer.symbols.struct
     yield f"static void ref_t{number}_body({struct} *s, ref_trace_t *r) {{"
-    yield f"if (!ref_t{number}_given(s)) {{ r->outside = 1; return; }}"
-    yield f"ref_t{number}_monitors(s, r); const int32_t line = ref_t{number}_line(s);"
+    yield f"ref_t{number}_monitors(s, r); if (r->fault != 0) {{ return; }}"
+    yield f"const int32_t line = ref_t{number}_line(s);"
     yield "if (line == -1) { r->fault = 2; } else if (line == -2) { r->fault = 3; } else {"
     yield f"r->line = line; ref_refused(r, ref_t{number}_act(s, line)); }} }}"
 
@@ -238,7 +254,7 @@ def _rest(writer: Writer) -> Iterator[Iterable[str]]:
     yield list(_known(writer))
     yield list(_initial(writer))
     for number, table in enumerate(writer.program.tables):
-        for part in (line_function, _actions, _monitors, _given):
+        for part in (line_function, _actions, _monitors, _safe):
             yield list(part(writer, number, table))
         yield list(_body(writer, number))
         yield list(_step(writer, number))

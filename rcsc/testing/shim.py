@@ -16,8 +16,8 @@ from rcsc.testing.reference_file import monitored, reference_c
 from rcsc.testing.symbols import Symbols
 from rcsc.testing.targets import Target, call_of, reference_of, targets
 
-TRACE_WORDS = 5
-"""Result, fault, fault_at, line, `outside`; then one word a monitored assumption, then the leaves."""
+TRACE_WORDS = 4
+"""Result, fault, fault_at, line; then one word an assumption that is checked, then the leaves."""
 
 WORDS = """
 static int64_t word_of(double x) { int64_t w; memcpy(&w, &x, sizeof w); return w; }
@@ -80,7 +80,7 @@ def _executor(program: Program, symbols: Symbols, target: Target) -> Iterator[st
     yield from call_of(symbols, target, "s")
     yield "out[0] = result; out[1] = result;"
     if target.kind in ("step", "cycle"):
-        yield f"out[2] = (out[1] == 1 || out[1] == 4) ? (int64_t){trace.fault_at('(*s)')} : -1;"
+        yield f"out[2] = (out[1] == 1 || out[1] >= 4) ? (int64_t){trace.fault_at('(*s)')} : -1;"
         yield f"out[3] = {trace.line('(*s)')};"
         for at, _ in enumerate(monitored(program)):
             yield f"out[{TRACE_WORDS + at}] = {trace.failed('(*s)', at)} ? 1 : 0;"
@@ -92,7 +92,7 @@ def _reference(program: Program, target: Target) -> Iterator[str]:
         yield f"out[0] = {name}(s); out[1] = out[0];"
         return
     yield f"const ref_trace_t r = {name}(s); out[0] = r.fault; out[1] = r.fault; out[2] = r.fault_at;"
-    yield "out[3] = r.line; out[4] = r.outside;"
+    yield "out[3] = r.line;"
     for at, _ in enumerate(monitored(program)):
         yield f"out[{TRACE_WORDS + at}] = r.failed[{at}];"
 

@@ -17,7 +17,6 @@ from rcsc.model import (
     Line,
     Program,
     Snapshot,
-    Standing,
     Table,
     Value,
     Variable,
@@ -26,9 +25,10 @@ from rcsc.model import (
 )
 from rcsc.resolve.leaves import read_by
 from rcsc.testing.edges import companions, leaf_edges, outside
+from rcsc.testing.reference_file import monitored
 from rcsc.testing.sessions import Session
 
-BROKEN = 0.2  # how often a monitored assumption is aimed at, to break it
+BROKEN = 0.2  # how often an assumption that is checked is aimed at, to break it
 TRIES = 40  # values of what an assumption reads, of which the first that break it are taken
 BETWEEN = 0.15  # how often a value may lie anywhere in its range
 BESIDE = 0.4  # how often a value is taken from a leaf that it is compared with
@@ -69,12 +69,13 @@ def _aim(known: Declarations, line: Line, drawn: dict[str, int], random: Random)
 
 
 def _break(known: Declarations, drawn: dict[str, int], random: Random) -> None:
-    """Moves the drawn keys to where some monitored assumption is false, if such a place is met."""
+    """Moves the drawn keys to where some assumption that is checked is false, if such a place is met."""
     program = known.program
-    monitored = [a for a in program.assumptions if a.standing is Standing.MONITORED]
-    if not monitored:
+    names = set(monitored(program))
+    checked = [a for a in program.assumptions if a.name in names]
+    if not checked:
         return
-    condition = random.choice(monitored).condition
+    condition = random.choice(checked).condition
     read = [v for v in program.variables if v.name in set(read_by(condition))]
     for _ in range(TRIES):
         tried = drawn | {str(v.name): random.choice(known.edges[v.name]) for v in read}

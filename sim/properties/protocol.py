@@ -3,7 +3,7 @@
 from typing import ClassVar
 
 from rcsc.system.levels import RunningLevel
-from rcsc.system.signature import FAULTS, Signature, Values
+from rcsc.system.signature import Signature, Values
 from sim.properties.cycle import Command, Cycle
 from sim.robot import REST_RAD
 
@@ -32,7 +32,7 @@ class NoStateTableError:
         """Which level met which fault."""
         for level in cycle.ran:
             if level.fault:
-                return f"level `{level.name}`, table `{level.table}`: {FAULTS[level.fault]}"
+                return f"level `{level.name}`, table `{level.table}`: {level.sign.fault_said(level.values)}"
         return None
 
 

@@ -32,7 +32,7 @@ from rcsc.compose.promela.flat import (
 from rcsc.compose.promela.flows import Group
 from rcsc.compose.promela.stated import LeftOut, Stating, computed
 from rcsc.compose.transition import SEEN, Stepper
-from rcsc.model import Action, Apply, Enum, Expr, Kind, Line, Literal, OneTable, Op, Table, pending
+from rcsc.model import Action, Apply, Enum, Expr, Kind, Line, Literal, OneTable, Op, Read, Table, pending
 from rcsc.system.adopt import ECHOES, FAILED, ORDER
 
 
@@ -182,6 +182,20 @@ class Maker:
                 before, holds = self.flat.condition(assumption.condition, "table")
                 yield from before
                 yield self.checks.goal(Sort.ASSUMPTION, holds, str(table.name), str(assumption.name))
+        safe = []
+        for assumption in self.stepper.program.assumptions:
+            if assumption.name in table.stops:
+                before, holds = self.flat.condition(assumption.condition, "table")
+                yield from before
+                safe.append(holds)
+        matched = tuple(self._matched(table, line, many))
+        if safe:  # else the cycle ends here
+            yield Fork(((both(*safe), matched),))
+        else:
+            yield from matched
+
+    def _matched(self, table: Table, line: Read, many: Read) -> Iterable[Flat]:
+        """The one line that matches, and what it runs."""
         conditions = []
         for one in table.lines:
             before, when = self._line(one)

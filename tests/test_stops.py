@@ -1,0 +1,259 @@
+"""Assumptions on which safety rests end the cycle; the others only tell. By brute force, and in every executor."""
+
+from collections import Counter
+from itertools import combinations, product
+from random import Random
+
+import pytest
+
+from rcsc.compose.contract import Links
+from rcsc.compose.transition import Stepper
+from rcsc.interpret import Fault, cycle, evaluate, initial, run_table
+from rcsc.meaning import with_stops
+from rcsc.model import Int, Kind, Program, Snapshot, Value
+from rcsc.prove.options import Options
+from rcsc.prove.program import ProgramVerdict, prove_program
+from rcsc.prove.values import TRUE, constant
+from rcsc.resolve import compile_text
+from tests.emitted import STOPS, proved_of
+
+UNDEFINED = (ArithmeticError, IndexError, KeyError)
+
+
+def verdict_of(text: str) -> ProgramVerdict:
+    program = compile_text(text)
+    assert isinstance(program, Program), program
+    return prove_program(program, Options(solver="boxes"))
+
+
+def stops_of(text: str) -> tuple[str, ...]:
+    """Those of the text's first table."""
+    verdict = verdict_of(text)
+    assert verdict.proved is not None, verdict.findings
+    return verdict.proved.program.tables[0].stops
+
+
+DECLARED = """
+input a : int 0 .. 9
+input b : int -9 .. 9
+state n : int 0 .. 9
+state xs : array[4] of int 0 .. 9
+output o : int 0 .. 9
+assume some monitored : b /= 0
+assume few assumed : a < 4
+assume fewer monitored : a < 3
+assume odd monitored : a mod 2 = 1
+"""
+BODIES = {
+    "mark": "xs[a] := 9",
+    "safe_mark": "if a < 4 { xs[a] := 9 }",
+    "clear": "n := 1",
+    "quotient": "n := 9 / max(b, -b)",
+    "left": "n := 9 - 2 * a",
+    "take": "n := a",
+}
+
+
+def declared(*called: str) -> str:
+    """The declarations, and these procedures: what nothing calls is proved for every input."""
+    return DECLARED + "\n".join(f"procedure {name} {{ {BODIES[name]} }}" for name in dict.fromkeys(called))
+
+
+CASES = {
+    "an index": ("", "mark", "clear", ("few",)),
+    "a guard makes it safe": ("", "safe_mark", "clear", ()),
+    "a line's own condition makes it safe": ("a < 4", "mark", "clear", ()),
+    "a division in one line, an index in the other": ("", "quotient", "mark", ("some", "few")),
+    "a range": ("", "left", "clear", ("few",)),
+    "nothing": ("", "take", "clear", ()),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_the_fewest_assumptions_that_safety_needs_stop(case: str) -> None:
+    guard, one, two, expected = CASES[case]
+    otherwise = f"| 3 | >= 5 | not ({guard}) || |" if guard else ""
+    text = f"""{declared(one, two)}
+table t assuming some, few, fewer, odd {{
+  | line | n    | when    || procedures |
+  | 1    | < 5  |         || {two} |
+  | 2    | >= 5 | {guard} || {one} |
+  {otherwise}
+}}
+"""
+    assert stops_of(text) == expected
+
+
+def test_a_condition_that_an_assumption_defines_stops() -> None:
+    text = f"""{declared()}
+table t assuming some, few {{
+  | line | 9 / b || o |
+  | lo   | <= 2  || 1 |
+  | hi   | > 2   || 2 |
+}}
+"""
+    assert stops_of(text) == ("some",)
+
+
+def test_exactly_one_alone_stops_nothing() -> None:
+    text = f"""{declared()}
+table t assuming few {{
+  | line | a      || o |
+  | lo   | < 2    || 1 |
+  | hi   | 2 .. 3 || 2 |
+}}
+"""
+    assert stops_of(text) == ()
+
+
+def test_an_invariant_that_only_an_assumption_keeps_stops() -> None:
+    text = f"""{declared("take")}
+invariant small : n <= 3
+table t assuming few {{
+  | line | a || procedures |
+  | all  |   || take |
+}}
+"""
+    assert stops_of(text) == ("few",)
+
+
+def test_an_assumption_must_be_defined_by_itself() -> None:
+    text = f"""{declared()}
+assume third monitored : 9 / b > 2
+table t assuming some, third {{
+  | line | a || o |
+  | all  |   || 1 |
+}}
+"""
+    assert [one.code.value for one in verdict_of(text).findings] == ["RCS411"]
+
+
+# --- by brute force ------------------------------------------------------------------
+
+SEEDS = 50
+
+SMALL = """
+input a : int 0 .. 5
+input b : int -2 .. 3
+state n : int 0 .. 5
+state k : int 0 .. 3
+state xs : array[4] of int 0 .. 9
+output o : int 0 .. 9
+output p : int 0 .. 9
+"""
+ASSUMED = ("a /= 0", "b /= 0", "a < 4", "b >= 0", "a + b <= 5", "n <= a", "a < 2 or b > 0", "k < 3", "b > 0")
+INVARIANTS = ("", "", "invariant kept : n <= k + 2", "invariant kept : k /= 3")
+ACTIONS = {
+    "n": ("a", "min(n + 1, 5)", "max(a - b, 0)"),
+    "k": ("3 - b", "a", "0"),
+    "o": ("9 / a", "a + n", "xs[a]", "1"),
+    "p": ("9 mod b", "max(a + b, 0)", "xs[k]"),
+}
+CELLS = ("", "", "9 / b > 1", "xs[a] = k", "9 mod a < 3")
+
+
+def drawn(seed: int) -> str:
+    """A table of two lines (and with a cell about several leaves four) whose actions may go wrong."""
+    random = Random(seed)  # noqa: S311  # repeatable on purpose
+    assumed = random.sample(ASSUMED, random.randint(2, 4))
+    standings = [random.choice(("monitored", "assumed")) for _ in assumed]
+    facts = "\n".join(
+        f"assume f{at} {standing} : {fact}"
+        for at, (fact, standing) in enumerate(zip(assumed, standings, strict=True))
+    )
+    cell = random.choice(CELLS)
+    rows = [(half, when) for half in ("< 3", ">= 3") for when in ([cell, f"not ({cell})"] if cell else [""])]
+    lines, bodies = [], []
+    for at, (half, when) in enumerate(rows):
+        targets = random.sample(list(ACTIONS), random.randint(1, 3))
+        bodies += [f"procedure {one}_{at} {{ {one} := {random.choice(ACTIONS[one])} }}" for one in targets]
+        lines.append(f"  | l{at} | {half} | {when} || {'; '.join(f'{one}_{at}' for one in targets)} |")
+    names = ", ".join(f"f{at}" for at in range(len(assumed)))
+    head = f"table t assuming {names} {{\n  | line | n | when || procedures |"
+    return "\n".join([SMALL, facts, *bodies, random.choice(INVARIANTS), head, *lines, "}"])
+
+
+def in_range(program: Program, snapshot: Snapshot) -> bool:
+    """Whether every leaf, all integers, lies in its declared range."""
+    kinds = {str(v.name): v.type for v in program.variables}
+    return all(
+        kind.low <= snapshot[name] <= kind.high for name, kind in kinds.items() if isinstance(kind, Int)
+    )
+
+
+def goes_wrong(program: Program, state: Snapshot) -> bool:
+    """Whether a step from the state does what is undefined, or leaves what the next one rests on."""
+    try:
+        outcome = run_table(program, program.tables[0], state)
+        kept = all(evaluate(one.condition, outcome.snapshot) for one in program.invariants)
+    except UNDEFINED:
+        return True
+    return not kept or not in_range(program, outcome.snapshot)
+
+
+def states(program: Program) -> list[dict[str, Value]]:
+    """Every state in range that satisfies the invariants; arrays as they begin."""
+    varied = [v for v in program.variables if v.name in ("a", "b", "n", "k")]
+    ranges = [range(v.type.low, v.type.high + 1) for v in varied if isinstance(v.type, Int)]
+    found = []
+    for point in product(*ranges):
+        state = initial(program) | dict(zip((str(v.name) for v in varied), point, strict=True))
+        if all(evaluate(one.condition, state) for one in program.invariants):
+            found.append(state)
+    return found
+
+
+def safe(program: Program, stops: tuple[str, ...], every: list[dict[str, Value]]) -> bool:
+    made = with_stops(program, {"t": stops})  # type: ignore[dict-item]  # names of assumptions
+    return not any(goes_wrong(made, state) for state in every)
+
+
+SAFETY = {"RCS410", "RCS411", "RCS412", "RCS413", "RCS414", "RCS415", "RCS416", "RCS417", "RCS418", "RCS419"}
+
+
+def test_no_input_goes_wrong_and_no_fewer_assumptions_would_do() -> None:
+    stopping, refused = 0, 0
+    for seed in range(SEEDS):
+        program = compile_text(drawn(seed))
+        assert isinstance(program, Program), (seed, program)
+        every, names = states(program), program.tables[0].assumptions
+        verdict = prove_program(program, Options(solver="boxes"))
+        owed = [one for one in verdict.findings if one.code.value in SAFETY]
+        if owed:
+            refused += 1
+            assert not safe(program, names, every), (seed, owed)
+            continue
+        stops = verdict.program.tables[0].stops
+        stopping += bool(stops)
+        fits = [
+            chosen
+            for count in range(len(stops) + 1)
+            for chosen in combinations(names, count)
+            if safe(program, chosen, every)
+        ]
+        assert fits[:1] == [stops], seed
+    assert stopping > 3
+    assert refused > 5
+
+
+# --- in the proof of levels ----------------------------------------------------------
+
+
+def test_a_cycle_of_the_proof_ends_where_the_interpreters_does() -> None:
+    program = proved_of(STOPS)
+    level = program.levels[0]
+    free = tuple(str(v.name) for v in program.variables if v.kind is Kind.INPUT)
+    stepper = Stepper(program, level, Links(level.name, None, (), (), free))
+    start = initial(program) | {"n": 3}
+    met: Counter[Fault] = Counter()
+    for a, b, which in product((0, 7, 8, 9), (-9, 0, 2, 3), (0, 1)):
+        taken = {"a": a, "b": b, "x": 0.0, "which": which}
+        outcome = cycle(program, level, {**start, **taken})
+        before = {str(v.name): constant(v.type, start[v.name]) for v in program.variables}
+        given = {name: constant(program.variable(name).type, value) for name, value in taken.items()}
+        one = stepper.cycle(before, taken=given)
+        met[outcome.fault] += 1
+        assert bool(one.refused.low) == (outcome.fault is Fault.ASSUMPTION)
+        assert one.goes_on is TRUE
+        assert {name: node.low for name, node in one.after.items()} == outcome.snapshot
+    assert min(met[Fault.OK], met[Fault.ASSUMPTION]) > 5
