@@ -24,7 +24,7 @@ def repo() -> Path:
     return Path(__file__).parents[1]
 
 
-TOOLS = ("chromium", "cmake", "pkg-config", "spin")
+TOOLS = ("chromium", "clang", "cmake", "pkg-config", "spin")
 """What `needs` marks may name."""
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 

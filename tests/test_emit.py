@@ -1,6 +1,9 @@
 """What is generated: names that clash with words of C and Python, texts that try to become code, the same bytes every time."""
 
 import ast
+import builtins
+import json
+import keyword
 import os
 import re
 import shutil
@@ -8,15 +11,23 @@ import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
+from enum import EnumType, IntEnum
 from pathlib import Path
 from types import ModuleType
 
 import jinja2
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
+from rcsc import reserved
 from rcsc.emit.environment import environment
-from rcsc.emit.names import C_WORDS, PYTHON_WORDS
+from rcsc.emit.names import C_WORDS, PYTHON_WORDS, comment
+from rcsc.emit.write import write
+from rcsc.interpret import Fault
 from rcsc.resolve import compile_text
+from rcsc.system.signature import generated_files
+from rcsc.testing.externs import python_stand_ins
 from tests.emitted import EXTERN, RICH, emitted, program_of
 
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Wpedantic", "-Wtrigraphs", "-Wshadow", "-Werror")
@@ -26,12 +37,17 @@ KEYWORDS = frozenset("""input state output table level procedure module owner ex
     assuming""".split())  # fmt: skip
 
 
-def compiled(files: dict[str, str], folder: Path, *more: str, flags: tuple[str, ...] = STRICT) -> Path:
+COMPILERS = ["gcc", pytest.param("clang", marks=pytest.mark.needs("clang"))]
+
+
+def compiled(
+    files: dict[str, str], folder: Path, *more: str, flags: tuple[str, ...] = STRICT, cc: str = "cc"
+) -> Path:
     """The object of the emitted C."""
     for name, text in files.items():
         (folder / Path(name).name).write_text(text, encoding="utf-8")
     [source] = folder.glob("*.c")
-    compiler = shutil.which("cc")
+    compiler = shutil.which(cc)
     assert compiler is not None
     made = subprocess.run(
         [compiler, *flags, *more, "-c", source.name, "-o", "made.o"],
@@ -137,7 +153,7 @@ ROLES: dict[str, Callable[[list[str]], str]] = {
 def test_words_of_either_language_may_be_names(role: str, tmp_path: Path) -> None:
     program = program_of(ROLES[role](WORDS))
     files = emitted(program)
-    compiled(files, tmp_path, "-Wno-unused-parameter")
+    compiled(files, tmp_path)
     module = imported(files)
     state = module.State()
     if hasattr(state, "a"):
@@ -145,6 +161,260 @@ def test_words_of_either_language_may_be_names(role: str, tmp_path: Path) -> Non
     for step in [value for key, value in vars(module).items() if key.endswith("_step")]:
         assert step(state) == 0
     assert len(WORDS) > 150
+
+
+CLASHES = """
+enum a { b_c, B_C, mro, name, value, _x, x_x, __class__, _missing_, print, print_, None, real, E, e }
+enum a_b { c, C }
+enum State { one }
+enum IntEnum { s1 }
+enum tuple { t }
+enum do_x { z }
+enum _do_x { z }
+record init { int : bool  int_ : bool  errno : bool  EOF : int 0 .. 3  EOF_ : int 0 .. 3  x : bool  X : bool }
+record x_line { f : array[2] of array[3] of init }
+input line_ : bool
+input line : bool
+input fault : int 0 .. 3
+input assumptions_failed : bool
+input copy_in : a
+input copy_out : a_b
+input of_state : State
+input of_enum : IntEnum
+input of_tuple : tuple
+input of_do : do_x
+input of_do_2 : _do_x
+input big_f : x_line
+input big : array[2] of array[2] of bool
+input big_0_1 : bool
+state late : bool deferred until line
+state late_next : bool
+input self : bool
+input i0 : bool
+input INT_MAX : bool
+input linux : bool
+input __slots__ : bool
+procedure x_t { late_next := true }
+procedure cycle { late_next := late_next }
+procedure never_run(errno : bool) { late_next := max(1, 2) = 2 }
+{tables}
+level m { period 10 table x }
+level init { period 10 table by copy_out { c : do  C : run_x } }
+"""
+CLASHING_TABLES = (
+    "do",
+    "run_x",
+    "x_1",
+    "x",
+    "X",
+    "line",
+    "run",
+    "bit32",
+    "x_line",
+    "step",
+    "_x",
+    "x_",
+    "K0_1",
+    "k0_1",
+)
+
+
+def clashes() -> str:
+    """Names that are made the same by a prefix, a suffix, a case, an index, or what the executors call their own."""
+    rows = "| line | line || procedures |\n| 0 | true || cycle |\n| x | false || x_t |\n"
+    tables = "".join(f"table {name} {{\n{rows}}}\n" for name in CLASHING_TABLES)
+    return CLASHES.replace("{tables}", tables)
+
+
+@pytest.mark.parametrize("cc", COMPILERS)
+def test_names_that_would_be_spelled_alike_stay_apart(cc: str, tmp_path: Path) -> None:
+    program = program_of(clashes())
+    files = emitted(program)
+    compiled(files, tmp_path, cc=cc)
+    module = imported(files)
+    state = module.State()
+    assert len(set(state.__slots__)) == len(state.__slots__) == len(program.variables) + 4
+    for enum in program.enums:
+        members = [value.__members__ for value in vars(module).values() if made_of(value, len(enum.members))]
+        assert any(list(map(int, found.values())) == list(range(len(enum.members))) for found in members)
+    symbols = json.loads(files["c/case.json"])
+    ours = [table["step"] for table in symbols["tables"]] + [level["cycle"] for level in symbols["levels"]]
+    assert len(set(ours)) == len(CLASHING_TABLES) + 2
+    for name in ours:
+        state = module.State()
+        assert getattr(module, name.removeprefix("case__"))(state) == 0
+        assert state.line == 1
+
+
+def made_of(value: object, members: int) -> bool:
+    """Whether it is a class of an enumeration with so many members."""
+    return isinstance(value, EnumType) and len(value.__members__) == members
+
+
+LONE = """
+input a : bool
+enum err { except, file_no }
+input e : err
+enum all { except }
+input f : all
+table t {
+  | line | a     ||
+  | x    | true  ||
+  | y    | false ||
+}
+level l { period 10 table t }
+"""
+KEPT = ("div", "time", "sem", "stdint", "enum", "bisect", "signal", "pthread", "mtx", "c", "test", "case", "Time", "fe", "sig",
+        "posix", "abs", "linux", "errno", "I", "class", "match", "atomic", "int", "size", "clean", "std", "stdbool")  # fmt: skip
+HEADERS = "".join(f"#include <{name}.h>\n" for name in
+                  ("errno fenv float inttypes limits math pthread semaphore signal stdatomic stdio stdlib string threads time unistd "
+                   "complex setjmp sys/types sys/socket").split())  # fmt: skip
+
+
+def test_a_program_may_be_called_as_a_library_s_part_is(tmp_path: Path) -> None:
+    includes, inits, sources, modules = HEADERS, "", [], []
+    for name in KEPT:
+        program = compile_text(LONE, f"{name}.rcs")
+        assert not isinstance(program, tuple), program
+        files = emitted(program)
+        said = json.loads(files[f"c/{name}.json"])
+        assert said["header"].removesuffix(".h").lower() not in reserved.C_HEADERS | reserved.PYTHON_MODULES
+        for path, text in files.items():
+            (tmp_path / Path(path).name).write_text(text, encoding="utf-8")
+        includes += f'#include "{said["header"]}"\n'
+        inits += f"{{ {said['struct']} s; {said['init']}(&s); if (s.fault != 0) return 1; }}\n"
+        sources.append(said["source"])
+        modules.append(said["python"]["module"].removesuffix(".py"))
+    (tmp_path / "run.c").write_text(f"{includes}int main(void) {{ {inits} return 0; }}\n")
+    flags = ("-std=gnu11", "-O0", "-Wall", "-Werror", "-I.")
+    subprocess.run(["cc", *flags, "run.c", *sources, "-o", "run"], cwd=tmp_path, check=True)
+    assert subprocess.run([tmp_path / "run"], check=False).returncode == 0
+    script = "".join(f"import {one} as m; assert m.l_cycle(m.State()) == 0\n" for one in modules)
+    subprocess.run([sys.executable, "-c", script], cwd=tmp_path, check=True)
+
+
+def test_reserved_words_are_at_least_those_of_the_tools_here() -> None:
+    plain = {name for name in dir(builtins) if not name.startswith("_")}
+    assert plain <= reserved.PYTHON_BUILTINS
+    assert {*keyword.kwlist, *keyword.softkwlist} - {"_"} <= reserved.PYTHON_KEYWORDS
+    assert {name for name in sys.stdlib_module_names if not name.startswith("_")} <= reserved.PYTHON_MODULES
+    assert {name for name in dir(IntEnum) if not name.startswith("_")} <= reserved.PYTHON_MEMBERS
+    ran = subprocess.run(
+        ["cc", "-E", "-dM", "-std=gnu11", "-"], input=HEADERS, capture_output=True, text=True, check=True
+    )
+    macros = re.findall(r"^#define ([A-Za-z]\w*) ", ran.stdout, flags=re.MULTILINE)
+    assert len(macros) > 500
+    for (
+        name
+    ) in macros:  # a word in capitals never stands alone, and a word after a capital family ends in `_`
+        kept = name in reserved.C_MACROS | reserved.C_KEYWORDS or name.isupper()
+        assert (
+            kept or name.split("_")[0].upper() in reserved.C_FAMILIES or re.match("PRI|SCN|atomic_", name)
+        ), name
+        assert name.isupper() is False or name.count("_") < 2 or name.split("_")[0] in reserved.C_FAMILIES, (
+            name
+        )
+
+
+@given(st.text(st.sampled_from("*/\\?\"'$%{}#:= \n\r\x1bcodinguprs-é\u2028"), max_size=30))
+def test_what_stands_in_a_comment_means_nothing(text: str) -> None:
+    said = comment(text)
+    assert said.isascii()
+    assert said.isprintable()
+    assert not re.search(r'\*/|/\*|//|\\|\?\?|"|\$\{|coding[:=]|-suppress', said)
+
+
+CONSTANTS = (
+    0,
+    1,
+    -1,
+    5,
+    127,
+    128,
+    -128,
+    -129,
+    255,
+    256,
+    32768,
+    65535,
+    2**31,
+    2**32,
+    2**63 - 1,
+    2**63,
+    2**64 - 1,
+    -(2**63),
+)
+RANGES = ("0 .. 255", "3 .. 140", "-5 .. 95", "-128 .. 127", "0 .. 65535", "-70000 .. 9", "0 .. 4294967295",
+          "-9223372036854775808 .. 9223372036854775807", "0 .. 18446744073709551615", "7 .. 7")  # fmt: skip
+
+
+def one_type_holds(values: str, constant: int) -> bool:
+    """Whether one type of 64 bits holds the range and the constant."""
+    low, high = (int(end) for end in values.split(" .. "))
+    return min(low, constant) >= 0 or max(high, constant) < 2**63
+
+
+def compared() -> str:
+    """Every kind of integer against every constant that its C type can and cannot hold, and against itself."""
+    kinds = [f"x{at} : int {one}" for at, one in enumerate(RANGES)] + ["b : bool", "e : only"]
+    body = [f"o := x{at} {op} {constant}" for at, one in enumerate(RANGES) for constant in CONSTANTS
+            for op in ("<", "<=", "=", ">", ">=", "/=") if one_type_holds(one, constant)]  # fmt: skip
+    body += [f"o := {x} {op} {x}" for x in ("x1", "x8", "b", "e") for op in ("=", "/=")]
+    body += [f"o := x{at} in {{3, 300, 70000}} o := x{at} in 2 .. 300" for at, _ in enumerate(RANGES)]
+    body += ["b2 := b2", "e2 := e2", "if x8 + 1 >= 0 { o := true }"]
+    body += ["for i in 9223372036854775809 .. 9223372036854775810 { o := i >= 0 }"]
+    text = "enum only { one }\n" + "".join(f"input {kind}\n" for kind in kinds)
+    text += "output o : bool\nstate b2 : bool\nstate e2 : only\n"
+    text += "".join(f"procedure p{at} {{ {one} }}\n" for at, one in enumerate(body))
+    calls = "; ".join(f"p{at}" for at, _ in enumerate(body))
+    return text + f"table t {{\n| line | b || procedures |\n| x | x0 >= 0 || {calls} |\n}}\n".replace(
+        "| b ||", "| when ||"
+    )
+
+
+@pytest.mark.parametrize("cc", COMPILERS)
+def test_no_comparison_is_what_a_compiler_finds_idle(cc: str, tmp_path: Path) -> None:
+    compiled(emitted(program_of(compared())), tmp_path, cc=cc)
+
+
+def test_what_externs_are_called_meets_nothing_of_ours(tmp_path: Path) -> None:
+    text = """
+record r { a_b : int 0 .. 9 }
+input errno : int 0 .. 9
+input a : r
+output a_a_b : int 0 .. 9
+output int : int 0 .. 9
+"""
+    modules = ("s", "given", "w0", "State", "IntEnum", "case_1", "time", "a.s")
+    for at, module in enumerate(modules):
+        text += f"""extern procedure p{at}(errno : int 0 .. 9, a_a_b : int 0 .. 9) reads a.a_b, errno, a_a_b writes a_a_b, int
+          python "{module}:s" c "case__do_p{at}"\n"""
+    calls = "; ".join(f"p{at}(1, 2)" for at, _ in enumerate(modules))
+    text += f"table t {{\n| line | errno || procedures |\n| x | || {calls} |\n}}\n"
+    program = program_of(text)
+    files = emitted(program)
+    compiled(files, tmp_path)
+    with python_stand_ins(program) as stand_ins:
+        made = stand_ins.load(files["python/case_.py"], "case_")
+    assert made.t_step(made.State()) in (0, Fault.EXTERN)
+
+
+def test_files_of_a_program_are_found_by_its_own_name(tmp_path: Path) -> None:
+    for name in ("time", "plain"):
+        program = compile_text(LONE, f"{name}.rcs")
+        assert not isinstance(program, tuple)
+        files = emitted(program)
+        write(files, str(tmp_path))
+        found = generated_files(tmp_path, name)
+        assert {path.read_text() for path in found} == {
+            text for path, text in files.items() if not path.endswith((".cmake", ".pc"))
+        }
+    assert [path.name for path in generated_files(tmp_path, "none")] == [
+        "none.json",
+        "none.c",
+        "none.h",
+        "none.py",
+    ]
 
 
 HOSTILE = [
@@ -233,8 +503,9 @@ USE = '#include "case_.h"\nint main() { case__t s; case__init(&s); return s.faul
 @pytest.mark.parametrize(
     "flags", [("-O0",), ("-O2", "-fno-builtin"), ("-O3", "-ffreestanding")], ids=" ".join
 )
-def test_the_c_compiles_without_a_warning(text: str, flags: tuple[str, ...], tmp_path: Path) -> None:
-    compiled(emitted(program_of(text)), tmp_path, *flags)
+@pytest.mark.parametrize("cc", COMPILERS)
+def test_the_c_compiles_without_a_warning(text: str, flags: tuple[str, ...], cc: str, tmp_path: Path) -> None:
+    compiled(emitted(program_of(text)), tmp_path, *flags, cc=cc)
 
 
 def test_the_header_is_one_for_cpp_too(tmp_path: Path) -> None:

@@ -7,11 +7,6 @@ static inline int32_t primitive_bit32(uint32_t m)
 {
     return (int32_t)__builtin_ctz(m);
 }
-
-static inline int32_t primitive_bit64(uint64_t m)
-{
-    return (int32_t)__builtin_ctzll(m);
-}
 #else
 static inline int32_t primitive_bit64(uint64_t m)
 {

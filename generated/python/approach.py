@@ -35,7 +35,7 @@ class level_status(IntEnum):
 
     executing = 0
     done = 1
-    failed_ = 2
+    failed = 2
 
 
 class acquire_state(IntEnum):

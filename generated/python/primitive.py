@@ -69,7 +69,7 @@ class level_status(IntEnum):
 
     done = 0
     executing = 1
-    failed_ = 2
+    failed = 2
 
 
 class object_(IntEnum):

@@ -69,7 +69,7 @@ class level_status(IntEnum):
 
     done = 0
     executing = 1
-    failed_ = 2
+    failed = 2
 
 
 class object_(IntEnum):
@@ -118,7 +118,7 @@ class flash(IntEnum):
 
     dark = 0
     flood = 1
-    line_ = 2
+    line = 2
 
 
 class _Refused(Exception):

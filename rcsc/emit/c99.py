@@ -1,13 +1,13 @@
 """A plan to C99: `<program>.h`, `<program>.c`, the symbol file, CMake and pkg-config files."""
 
-import json
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-from rcsc.emit.ctext import CText, c_type, constant, integer, locals_of, wide_type
+from rcsc.emit.ctext import CText, c_type, constant, integer, locals_of, type_bounds, wide_type
 from rcsc.emit.environment import render
-from rcsc.emit.names import FAILED_BITS, Names, c_word, comment, names_of, short
+from rcsc.emit.names import FAILED_BITS, Scope, comment, guard, names_of, parameter_word
+from rcsc.emit.symbols import symbols, unit_text
 from rcsc.interpret import Fault
 from rcsc.model import (
     Admit,
@@ -20,12 +20,12 @@ from rcsc.model import (
     Level,
     OneTable,
     Procedure,
+    ProcedureName,
     Program,
-    Read,
     Real,
     Record,
+    Statement,
     Type,
-    Unit,
     Variable,
     key_bounds,
     pending,
@@ -71,6 +71,7 @@ class CFile:
     structs: tuple[Struct, ...]
     fields: tuple[Field, ...]
     failed: tuple[str, ...]
+    bits: frozenset[int]
     externs: tuple[str, ...]
     helpers: tuple[Function, ...]
     privates: tuple[Function, ...]
@@ -86,7 +87,7 @@ def emit_c(plan: Plan) -> dict[str, str]:
     return {
         f"c/{name}.h": render("header.h.jinja", made),
         f"c/{name}.c": render("source.c.jinja", made),
-        f"c/{name}.json": _symbols(plan, maker.names),
+        f"c/{maker.names.file}.json": symbols(plan, maker.names),
         f"c/{name}.cmake": render("target.cmake.jinja", made),
         f"c/{name}.pc": render("package.pc.jinja", made),
     }
@@ -129,6 +130,7 @@ class _Maker:
         self.text = CText(self.names, _failing(plan.program))
         self.p = self.names.program
         self.cuts: list[Function] = []
+        self.bits: set[int] = set()
 
     def file(self) -> CFile:
         """The whole view."""
@@ -139,13 +141,14 @@ class _Maker:
         publics = [self._init(), *tables, *self._steps(), *levels]
         return CFile(
             self.p,
-            f"{self.p.upper()}_H",
+            guard(self.p),
             comment(self.plan.source),
             self.plan.mark,
             tuple(self._enum(enum) for enum in self.program.enums),
             tuple(self._record(record) for record in self.program.records),
             tuple(self._fields()),
             self.names.failed,
+            frozenset(self.bits),
             tuple(self._externs()),
             tuple(self._helpers()),
             (*procedures, *shared),
@@ -159,50 +162,45 @@ class _Maker:
     # --- declarations ---
 
     def _enum(self, enum: Enum) -> Struct:
-        prefix = f"{self.p}_{short(enum.name)}".upper()
-        seen: set[str] = set()
-        fields = []
-        for at, member in enumerate(enum.members):
-            plain = f"{prefix}_{short(member).upper()}"
-            unique = plain if plain not in seen else f"{plain}_{at}"
-            seen.add(unique)
-            fields.append(Field(f"{unique} = {at}", comment(member)))
-        return Struct(f"{self.p}_{short(enum.name)}_t", tuple(fields))
+        pairs = zip(self.names.constants[enum.name], enum.members, strict=True)
+        fields = tuple(Field(f"{name} = {at}", comment(member)) for at, (name, member) in enumerate(pairs))
+        return Struct(f"{self.p}_{self.names.enums[enum.name]}_t", fields)
 
     def _record(self, record: Record) -> Struct:
-        fields = tuple(Field(self._declare(c_word(f.name), f.type), comment(f.doc)) for f in record.fields)
-        return Struct(f"{self.p}_{short(record.name)}_t", fields)
+        names = self.names.members[record.name]
+        fields = tuple(Field(self._declare(names[f.name], f.type), comment(f.doc)) for f in record.fields)
+        return Struct(f"{self.p}_{self.names.records[record.name]}_t", fields)
 
     def _declare(self, name: str, kind: Type) -> str:
-        match kind:
-            case Array(length, element):
-                inner = self._declare(name, element)
-                head, _, rest = inner.partition(name)
-                return f"{head}{name}[{length}]{rest}"
-            case Record(name=record):
-                return f"{self.p}_{short(record)}_t {name}"
-            case _:
-                return f"{c_type(kind)} {name}"
+        """A declaration: the type of the innermost elements, the name, the lengths from the outermost in."""
+        lengths = ""
+        while isinstance(kind, Array):
+            lengths += f"[{kind.length}]"
+            kind = kind.element
+        base = f"{self.p}_{self.names.records[kind.name]}_t" if isinstance(kind, Record) else c_type(kind)
+        return f"{base} {name}{lengths}"
 
     def _fields(self) -> Iterator[Field]:
         variables = {v.name: v for v in self.program.variables}
         for one in self.program.declared:
-            root = re.match(r"[A-Za-z0-9_]+", self.names.paths[one.leaves[0]])
-            assert root is not None
+            root = self.names.roots[one.name]
             words = [one.kind.value, _range(one.type), comment(one.doc)]
-            yield Field(self._declare(root[0], one.type), "; ".join(word for word in words if word))
+            yield Field(self._declare(root, one.type), "; ".join(word for word in words if word))
             later = pending(one.name)
             if later in variables:
-                doc = f"state; the deferred next value of {root[0]}"
+                doc = f"state; the deferred next value of {root}"
                 yield Field(f"{c_type(variables[later].type)} {self.names.paths[later]}", doc)
 
     def _externs(self) -> Iterator[str]:
         kinds = {v.name: v.type for v in self.program.variables}
         for one in self.program.procedures:
             if one.extern is not None:
-                ins = [f"{c_type(kinds[name])} {_plain(name)}" for name in one.reads]
-                ins += [f"{wide_type(p.type)} {p.name}" for p in one.params]
-                outs = [f"{c_type(kinds[name])} *{_plain(name)}_out" for name in one.writes]
+                word = Scope().fresh
+                ins = [f"{c_type(kinds[name])} {word(parameter_word(name))}" for name in one.reads]
+                ins += [f"{wide_type(p.type)} {word(parameter_word(p.name))}" for p in one.params]
+                outs = [
+                    f"{c_type(kinds[name])} *{word(f'{parameter_word(name)}_out')}" for name in one.writes
+                ]
                 yield f"extern void {one.extern.c}({', '.join([*ins, *outs]) or 'void'});"
 
     # --- helpers ---
@@ -339,7 +337,9 @@ class _Maker:
         name = self.names.tables[table.table.name]
         head = f"int32_t {self.p}_{name}_line(const {self.p}_t *s)"
         doc = f"The line of table {table.table.name} that matches admitted inputs: its position; -1 none, -2 several."
-        yield Function(doc, head, tuple(self._match(table, name)))
+        body = list(self._match(table, name))
+        unread = [] if any(re.search(r"\bs\b", line) for line in body) else ["    (void)s;"]
+        yield Function(doc, head, (*unread, *body))
         lines = (
             "    uint32_t i;",
             "    for (i = 0u; i < n; i = i + 1u) {",
@@ -402,13 +402,10 @@ class _Maker:
             case Truth(condition=condition):
                 return f"({self.text.expr(condition)} ? 1u : 0u)"
             case Coded(leaf=leaf, low=low):
-                self.cuts.append(self._codes(index, name))
+                function = self.names.c.fresh(f"{self.p}_class_{name}")
+                self.cuts.append(self._codes(index, function))
                 place = f"(int64_t){self.text.place(leaf)}"
-                return (
-                    f"{self.p}_class_{name}({place} - {integer(low)})"
-                    if low
-                    else f"{self.p}_class_{name}({place})"
-                )
+                return f"{function}({place} - {integer(low)})" if low else f"{function}({place})"
             case Cuts():
                 return self._cut(index, name)
 
@@ -422,10 +419,11 @@ class _Maker:
         if len(index.cuts) <= 6:
             tests = [f"(({value} >= {constant(kind, cut)}) ? 1u : 0u)" for cut in index.cuts]
             return "(" + " + ".join(tests) + ")"
-        self.cuts.append(self._search(index, name, wide))
-        return f"{self.p}_class_{name}({value})"
+        function = self.names.c.fresh(f"{self.p}_class_{name}")
+        self.cuts.append(self._search(index, function, wide))
+        return f"{function}({value})"
 
-    def _codes(self, index: Coded, name: str) -> Function:
+    def _codes(self, index: Coded, function: str) -> Function:
         width = 8 if index.count <= 256 else 16
         lines = [
             f"    static const uint{width}_t classes[{len(index.classes)}] = {{",
@@ -433,11 +431,9 @@ class _Maker:
             "    };",
             "    return classes[value];",
         ]
-        return Function(
-            "The class of the value.", f"uint32_t {self.p}_class_{name}(int64_t value)", tuple(lines)
-        )
+        return Function("The class of the value.", f"uint32_t {function}(int64_t value)", tuple(lines))
 
-    def _search(self, index: Cuts, name: str, wide: str) -> Function:
+    def _search(self, index: Cuts, function: str, wide: str) -> Function:
         count = len(index.cuts)
         size = 1 << (count.bit_length())
         shown = [constant(index.type, cut) for cut in index.cuts]
@@ -456,12 +452,13 @@ class _Maker:
         lines.append("    return at;")
         return Function(
             "How many cuts are at most the value.",
-            f"uint32_t {self.p}_class_{name}({wide} value)",
+            f"uint32_t {function}({wide} value)",
             tuple(lines),
         )
 
     def _one_word(self, matcher: Matcher, indices: list[str]) -> Iterator[str]:
         bits = max(_width(matcher.lines), 32)
+        self.bits.add(bits)
         every = f"({2**matcher.lines - 1:#x}{'ull' if bits == 64 else 'u'})"
         loads = [f"(uint{bits}_t)t.t{at}[{index}]" for at, index in enumerate(indices)]
         yield f"    const uint{bits}_t m = {' & '.join(loads) if loads else every};"
@@ -481,6 +478,7 @@ class _Maker:
     def _many_words(self, matcher: Matcher, indices: list[str]) -> Iterator[str]:
         for at, index in enumerate(indices):
             yield f"    const uint64_t * const r{at} = t.t{at}[{index}];"
+        self.bits.add(WORD)
         yield "    uint64_t several = 0u;"
         yield "    uint64_t seen = 0u;"
         yield "    int32_t line = 0;"
@@ -634,20 +632,34 @@ def _failing(program: Program) -> frozenset[str]:
 
 
 def _callees_first(program: Program) -> list[Procedure]:
+    """The procedures that lines and levels run, each after those that it calls; in declared order where it is free."""
     by_name = {p.name: p for p in program.procedures}
+    rows = [line.actions for table in program.tables for line in table.lines]
+    rows += [table.default.actions for table in program.tables if table.default is not None]
+    run = {name for level in program.levels for name in (*level.preprocess, *level.postprocess)}
+    run |= set(_called([action.statement for actions in rows for action in actions]))
     order: dict[str, Procedure] = {}
 
     def visit(procedure: Procedure) -> None:
         if procedure.name in order:
             return
-        for one in everything(procedure.body):
-            if isinstance(one, Call):
-                visit(by_name[one.procedure])
+        for name in _called(procedure.body):
+            visit(by_name[name])
         order[procedure.name] = procedure
 
+    reached = set[str]()
+    while run - reached:
+        reached |= run
+        run = {name for one in reached for name in _called(by_name[ProcedureName(one)].body)}
     for procedure in program.procedures:
-        visit(procedure)
+        if procedure.name in reached:
+            visit(procedure)
     return list(order.values())
+
+
+def _called(body: Iterable[Statement]) -> dict[ProcedureName, None]:
+    """The procedures that statements call, in order."""
+    return dict.fromkeys(one.procedure for one in everything(body) if isinstance(one, Call))
 
 
 def _width(lines: int) -> int:
@@ -671,105 +683,18 @@ def _wrapped(words: list[str], pad: str = "        ", width: int = 96) -> list[s
 def _outside(kind: Int | Enum, place: str) -> list[tuple[str, str]]:
     """For each end of the range that the C type passes: the test that a value is beyond it, and the end."""
     low, high = key_bounds(kind)
-    least, greatest = _type_bounds(c_type(kind)) or (low - 1, high + 1)
+    least, greatest = type_bounds(c_type(kind))
     wide = f"({wide_type(kind)}){place}"
     ends = ((least < low, "<", low), (greatest > high, ">", high))
     return [(f"{wide} {op} {constant(kind, end)}", constant(kind, end)) for passed, op, end in ends if passed]
 
 
-def _type_bounds(name: str) -> tuple[int, int] | None:
-    found = re.match(r"(u?)int(\d+)_t", name)
-    if found is None:
-        return None
-    bits = int(found[2])
-    return (0, 2**bits - 1) if found[1] else (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
-
-
-def _unit(unit: Unit) -> str:
-    return "*".join(name if power == 1 else f"{name}^{power}" for name, power in unit)
-
-
 def _range(kind: Type) -> str:
     match kind:
         case Int(low, high, unit) | Real(low, high, unit):
-            units = _unit(unit)
+            units = unit_text(unit)
             return f"{low} .. {high}" + (f" {units}" if units else "")
         case Enum(name=name):
             return name
         case _:
             return ""
-
-
-def _plain(name: str) -> str:
-    return re.sub(r"\W+", "_", name).strip("_")
-
-
-def _described(variable: Variable) -> dict[str, object]:
-    """What a log or a shell shows of a leaf: its range, unit or members, initial value and doc."""
-    kind = variable.type
-    said: dict[str, object] = {"initial": variable.initial, "doc": variable.doc}
-    match kind:
-        case Enum(members=members):
-            said["members"] = list(members)
-        case Int(low, high, unit) | Real(low, high, unit):
-            said |= {"low": low, "high": high, "unit": _unit(unit)}
-        case Bool():
-            pass
-    return said
-
-
-def _dispatched(level: Level) -> dict[str, object]:
-    """Which table a level runs: one, or by the value of a leaf."""
-    if isinstance(level.tables, OneTable):
-        return {"table": level.tables.table}
-    selector = level.tables.selector
-    by = selector.name if isinstance(selector, Read) else ""
-    return {"by": by, "tables": {str(int(value)): table for value, table in level.tables.tables}}
-
-
-def _symbols(plan: Plan, names: Names) -> str:
-    """What everything is called, for tools."""
-    p = names.program
-    document = {
-        **({"unproved": plan.mark} if plan.mark else {}),
-        "program": p,
-        "struct": f"{p}_t",
-        "header": f"{p}.h",
-        "source": f"{p}.c",
-        "init": f"{p}_init",
-        "python": {"module": f"{p}.py", "class": "State"},
-        **({"failed": names.failed} if len(names.failed) > 1 else {}),
-        "leaves": [
-            {
-                "name": v.name,
-                "kind": v.kind.value,
-                "path": names.paths[v.name],
-                "c_type": c_type(v.type),
-                "attribute": names.attributes[v.name],
-                **_described(v),
-            }
-            for v in plan.program.variables
-        ],
-        "monitored": [plan.program.assumptions[at].name for at in plan.monitored],
-        "tables": [
-            {
-                "name": t.table.name,
-                "line": f"{p}_{names.tables[t.table.name]}_line",
-                "lines_of_many": f"{p}_{names.tables[t.table.name]}_lines",
-                "step": f"{p}_{names.tables[t.table.name]}_step",
-                "lines": [line.name for line in t.lines],
-                **({"stops": list(t.table.stops)} if t.table.stops else {}),
-            }
-            for t in plan.tables
-        ],
-        "levels": [
-            {
-                "name": level.name,
-                "cycle": f"{p}_{names.levels[level.name]}_cycle",
-                "period_ms": level.period_ms,
-                **_dispatched(level),
-            }
-            for level in plan.program.levels
-        ],
-    }
-    return json.dumps(document, indent=1) + "\n"

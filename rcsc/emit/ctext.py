@@ -4,6 +4,7 @@ Integers are computed in `int64_t`, or in `uint64_t` where the bounds of operand
 them fit there was proved (`prove.symbolic.word`). Doubles are IEEE binary64 (`FLT_EVAL_METHOD` 0); what is stored has no -0.0.
 """
 
+import math
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -112,6 +113,41 @@ def element_path(paths: list[str], index: str) -> str:
     return head + f"[{index}]" + re.sub(r"^\[\d+\]", "", first[len(head) :])
 
 
+def type_bounds(name: str) -> tuple[int, int]:
+    """Least and greatest value of an integer type of C, or of `bool`."""
+    if name == "bool":
+        return 0, 1
+    bits = int(name.strip("uint_"))
+    return (0, 2**bits - 1) if name.startswith("u") else (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
+
+
+def _c_bounds(expr: Expr) -> tuple[Value, Value]:
+    """What the C type of an expression can hold: a constant only itself, a double anything."""
+    if isinstance(expr, Literal):
+        return expr.value, expr.value
+    if isinstance(expr.type, Real):
+        return -math.inf, math.inf
+    return type_bounds(c_type(expr.type) if isinstance(expr, Read | Select) else wide_type(expr.type))
+
+
+def _decided(op: Op, args: tuple[Expr, ...]) -> bool | None:
+    """What a comparison always gives by the C types of its operands: compilers refuse it as a comparison."""
+    first, second = args
+    if isinstance(first.type, Real):
+        return None
+    if first == second:
+        return op in (Op.EQ, Op.LE, Op.GE)
+    (low, high), (least, most) = _c_bounds(first), _c_bounds(second)
+    match op:
+        case Op.LT | Op.GE:
+            known = True if high < least else False if low >= most else None
+        case Op.LE | Op.GT:
+            known = True if high <= least else False if low > most else None
+        case _:
+            known = False if high < least or most < low else None
+    return (not known if op in (Op.GE, Op.GT, Op.NE) else known) if known is not None else None
+
+
 def _one(kind: str) -> str:
     """The 1 that a counter of this type goes up by."""
     return "UINT64_C(1)" if kind == "uint64_t" else "INT64_C(1)"
@@ -158,7 +194,9 @@ class CText:
                 return self._widened(kind, self.state + element_path(paths, self.expr(index)))
             case Among(subject=subject, values=values):
                 text, kind = self.expr(subject), subject.type
-                return "(" + " || ".join(f"({text} == {constant(kind, v)})" for v in values) + ")"
+                low, high = _c_bounds(subject)
+                able = [v for v in values if isinstance(kind, Real) or low <= v <= high]
+                return "(" + (" || ".join(f"({text} == {constant(kind, v)})" for v in able) or "false") + ")"
             case Apply(op=op, args=args, type=kind):
                 return self._applied(op, args, kind)
 
@@ -172,6 +210,8 @@ class CText:
             return f"(!{texts[0]})"
         if op is Op.IMPLIES:
             return f"((!{texts[0]}) || {texts[1]})"
+        if op in _COMPARE and (known := _decided(op, args)) is not None:
+            return constant(Bool(), known)
         if op in (Op.TO_INT, Op.TO_REAL):
             return self.converted(texts[0], wide_type(args[0].type), wide_type(kind))
         if op in (Op.ABS, Op.MIN, Op.MAX):

@@ -6,7 +6,7 @@ from itertools import groupby
 from math import prod
 
 from rcsc.emit.environment import render
-from rcsc.emit.names import FAILED_BITS, comment, names_of, python_word
+from rcsc.emit.names import FAILED_BITS, comment, names_of
 from rcsc.emit.pytext import PyText, constant
 from rcsc.interpret import Fault
 from rcsc.model import Admit, Int, Kind, Level, OneTable, Procedure, Real, Variable, key_bounds, pending
@@ -45,10 +45,10 @@ class PyFile:
     enums: tuple[PyEnum, ...]
     attributes: tuple[tuple[str, str, str], ...]  # name, initial value, doc
     failed: tuple[str, ...]
-    imports: tuple[str, ...]
+    imports: tuple[tuple[str, str], ...]  # module, its name here
     constants: tuple[tuple[str, tuple[str, ...]], ...]
     functions: tuple[PyFunction, ...]
-    lines: tuple[tuple[str, tuple[str, ...]], ...]
+    lines: tuple[tuple[str, tuple[str, ...]], ...]  # name of a tuple, what stands in it
 
 
 def emit_python(plan: Plan) -> dict[str, str]:
@@ -66,6 +66,10 @@ class _Maker:
         self.names = names_of(plan.program)
         self.text = PyText(self.names)
         self.constants: list[tuple[str, tuple[str, ...]]] = []
+        self.lines: list[tuple[str, tuple[str, ...]]] = []
+        self.modules = {
+            module: self.names.module.fresh(f"_{module.replace('.', '_')}") for module in self._modules()
+        }
 
     def file(self) -> PyFile:
         """The whole view."""
@@ -78,11 +82,8 @@ class _Maker:
             (self.names.attributes[v.name], constant(v.type, v.initial), comment(v.doc))
             for v in self.program.variables
         )
-        lines = tuple(
-            (self.names.tables[t.table.name], tuple(line.name for line in t.lines)) for t in self.plan.tables
-        )
         enums = tuple(
-            PyEnum(python_word(e.name), tuple(python_word(m) for m in e.members)) for e in self.program.enums
+            PyEnum(self.names.classes[e.name], self.names.class_members[e.name]) for e in self.program.enums
         )
         source = comment(self.plan.source)
         return PyFile(
@@ -91,15 +92,21 @@ class _Maker:
             enums,
             attributes,
             self.names.failed,
-            self._imports(),
+            tuple(self.modules.items()),
             tuple(self.constants),
             tuple(functions),
-            lines,
+            tuple(self.lines),
         )
 
-    def _imports(self) -> tuple[str, ...]:
+    def _modules(self) -> Iterator[str]:
         externs = [p.extern.python for p in self.program.procedures if p.extern is not None]
-        return tuple(dict.fromkeys(one.partition(":")[0] for one in externs))
+        yield from dict.fromkeys(one.partition(":")[0] for one in externs)
+
+    def _constant(self, wanted: str, rows: tuple[str, ...]) -> str:
+        """A tuple of the module; its name."""
+        name = self.names.module.fresh(wanted)
+        self.constants.append((name, rows))
+        return name
 
     # --- procedures ---
 
@@ -123,7 +130,7 @@ class _Maker:
             f"v_{p.name}" for p in procedure.params
         ]
         kept = "given = " if procedure.writes else ""
-        yield f"    {kept}{module}.{function}({', '.join(given)})"
+        yield f"    {kept}{self.modules[module]}.{function}({', '.join(given)})"
         if procedure.writes:
             yield "    if not isinstance(given, tuple):"
             yield "        given = (given,)"
@@ -186,6 +193,7 @@ class _Maker:
     def _table(self, table: PlanTable) -> Iterator[PyFunction]:
         name = self.names.tables[table.table.name]
         upper = f"_{name.upper()}"
+        actions = self.names.module.fresh(f"{upper}_ACTIONS")
         doc = f"The line of table {table.table.name} that matches admitted inputs: its position; -1 none, -2 several."
         yield PyFunction(f"{name}_line", "s", doc, tuple(self._match(table, upper)))
         doc = f"The same for many inputs, table {table.table.name}."
@@ -194,11 +202,15 @@ class _Maker:
             f"_run_{name}",
             "s",
             f"Matches table {table.table.name} and runs the line.",
-            tuple(self._run(table, name)),
+            tuple(self._run(table, name, actions)),
         )
-        for number, line in enumerate(table.lines):
+        acts = tuple(self.names.module.fresh(f"_{name}_{number}") for number, _ in enumerate(table.lines))
+        for act, line in zip(acts, table.lines, strict=True):
             body = tuple(action.statement for action in line.actions)
-            yield PyFunction(f"_{name}_{number}", "s", comment(line.source), tuple(self.text.block(body, 1)))
+            yield PyFunction(act, "s", comment(line.source), tuple(self.text.block(body, 1)))
+        self.lines.append((actions, acts))
+        lines = self.names.module.fresh(f"{name.upper()}_LINES")
+        self.lines.append((lines, tuple(f'"{line.name}"' for line in table.lines)))
         step = (
             "    s.fault = _admit(s)",
             "    if s.fault == 0:",
@@ -217,26 +229,26 @@ class _Maker:
         tail = f"{matcher.lines}, {matcher.default}"
         everything = (1 << matcher.lines) - 1
         probes = [probe for group in matcher.groups for probe in group]
-        for at, probe in enumerate(probes):
-            self.constants.append((f"{upper}_{at}", tuple(f"{mask:#x}," for mask in probe.masks)))
-        names = {id(probe): f"{upper}_{at}" for at, probe in enumerate(probes)}
+        names = {
+            id(probe): self._constant(f"{upper}_{at}", tuple(f"{mask:#x}," for mask in probe.masks))
+            for at, probe in enumerate(probes)
+        }
         groups = grouped(probes, MOST_KEYS)
         if len(groups) == 1:
-            self.constants.append((f"{upper}_LINE", (f"*_lines_of({_joined(groups[0], names)}, {tail}),",)))
-            yield f"    return {upper}_LINE[{self._index(groups[0], f'{upper}_K0')}]"
+            found = self._constant(f"{upper}_LINE", (f"*_lines_of({_joined(groups[0], names)}, {tail}),",))
+            yield f"    return {found}[{self._index(groups[0], f'{upper}_K0')}]"
             return
         ands = []
         for at, group in enumerate(grouped(probes, MOST_GROUPED)):
-            where = f"{upper}_{names[id(group[0])].rpartition('_')[2]}"
+            where = names[id(group[0])]
             if len(group) > 1:
-                where = f"{upper}_G{at}"
-                self.constants.append((where, (f"*{_joined(group, names)},",)))
+                where = self._constant(f"{upper}_G{at}", (f"*{_joined(group, names)},",))
             ands.append(f"{where}[{self._index(group, f'{upper}_K{at}')}]")
         m = " & ".join(ands) or str(everything)
         if matcher.lines <= WORD:  # small masks are found fastest in a dictionary, large ones by their length
-            self.constants.append((f"{upper}_ONE", (f"_one_of({tail}),",)))
+            found = self._constant(f"{upper}_ONE", (f"_one_of({tail}),",))
             yield "    try:"
-            yield f"        return {upper}_ONE[0][{m}]"
+            yield f"        return {found}[0][{m}]"
             yield "    except KeyError:"
             yield "        return -2"
             return
@@ -262,12 +274,12 @@ class _Maker:
                 return f"({self.text.expr(condition)}){times}"
             case Coded(leaf=leaf, low=low):
                 runs = [(at * stride, len(list(same))) for at, same in groupby(index.classes)]
-                self.constants.append((name, tuple(f"*({at},) * {length}," for at, length in runs)))
-                return f"{name}[{_less(self.text.place(leaf), low)}]"
+                rows = tuple(f"*({at},) * {length}," for at, length in runs)
+                return f"{self._constant(name, rows)}[{_less(self.text.place(leaf), low)}]"
             case Cuts(leaf=leaf, cuts=cuts):
                 return f"_bisect({tuple(cuts)!r}, {self.text.place(leaf)}){times}"
 
-    def _run(self, table: PlanTable, name: str) -> Iterator[str]:
+    def _run(self, table: PlanTable, name: str, actions: str) -> Iterator[str]:
         for place in table.monitored:
             assumption = self.program.assumptions[self.plan.monitored[place]]
             yield f"    if not {self.text.expr(assumption.condition)}:  # {comment(assumption.name)}"
@@ -284,7 +296,7 @@ class _Maker:
         yield "        s.fault = 2 if line == -1 else 3"
         yield "        return"
         yield "    s.line = line"
-        yield f"    _{name.upper()}_ACTIONS[line](s)"
+        yield f"    {actions}[line](s)"
 
     # --- levels ---
 

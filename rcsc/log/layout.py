@@ -15,7 +15,7 @@ from typing import Any
 
 from rcsc.system.adopt import Begun
 from rcsc.system.description import Description, Feed, LevelSpec, Wire
-from rcsc.system.signature import FAILED, FORMATS, Leaf, LevelSign, Signature
+from rcsc.system.signature import FAILED, FORMATS, Leaf, LevelSign, Signature, generated_files
 
 FORMAT = "1"
 SYSTEM, PROGRAMS = "rcsc.system", "rcsc.programs"
@@ -149,13 +149,8 @@ def fingerprints(system: Description) -> dict[str, str]:
     found = {}
     for program in sorted({level.program for level in system.levels}):
         digest = hashlib.sha256()
-        for name in (
-            f"c/{program}.json",
-            f"c/{program}.c",
-            f"c/{program}.h",
-            f"python/{program}.py",
-        ):
-            path = system.generated / name
+        for path in generated_files(system.generated, program):
+            name = path.relative_to(system.generated).as_posix()
             content = path.read_bytes() if path.is_file() else b""
             digest.update(f"{name} {len(content)}\n".encode() + content)
         found[program] = digest.hexdigest()

@@ -5,16 +5,13 @@ import re
 
 from rcsc.diagnostics.codes import Code
 from rcsc.model import Extern
+from rcsc.reserved import C_COMPOSED, C_KEYWORDS, C_MACROS
 from rcsc.resolve.scope import Scope
 from rcsc.syntax import tree
 
 _PYTHON = re.compile(r"[a-z_]\w*(\.[a-z_]\w*)*:[a-z_]\w*", re.ASCII | re.IGNORECASE)
 _C = re.compile(r"[a-z]\w{0,62}", re.ASCII | re.IGNORECASE)
-_C_WORDS = frozenset(
-    """auto break case char const continue default do double else enum extern float for goto if inline int
-    long register restrict return short signed sizeof static struct switch typedef union unsigned
-    void volatile while bool true false main""".split()
-)
+_C_WORDS = C_KEYWORDS | C_MACROS | C_COMPOSED
 
 
 def extern(scope: Scope, written: tree.ProcedureDecl) -> Extern:
@@ -29,6 +26,9 @@ def extern(scope: Scope, written: tree.ProcedureDecl) -> Extern:
     if not _C.fullmatch(c) or c in _C_WORDS:
         message = f"`{c}` does not name a C function"
         scope.report(
-            Code.EXTERN_NAME, message, written.name.span, "write a C identifier of at most 63 characters"
+            Code.EXTERN_NAME,
+            message,
+            written.name.span,
+            "write a C identifier of at most 63 characters that no library keeps",
         )
     return Extern(python, c)

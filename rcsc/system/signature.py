@@ -166,6 +166,23 @@ class Signature:
         return f"{word}: `{about}`{shown}"
 
 
+def generated_files(generated: Path, program: str) -> tuple[Path, ...]:
+    """What was generated of a program: symbol file, C, header, Python.
+
+    The symbol file bears the program's name; the others one that no library keeps, as the symbol file says.
+    """
+    symbols = generated / "c" / f"{program}.json"
+    try:
+        said = json.loads(symbols.read_text(encoding="utf-8"))["program"]
+    except (OSError, ValueError, KeyError, TypeError):
+        said = program
+    word = said if isinstance(said, str) and said.isidentifier() else program
+    return symbols, *(generated / f"{place}{word}{end}" for place, end in _SUFFIXES)
+
+
+_SUFFIXES = (("c/", ".c"), ("c/", ".h"), ("python/", ".py"))
+
+
 def signature(path: Path) -> Signature:
     """Reads a symbol file.
 

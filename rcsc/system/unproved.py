@@ -7,6 +7,7 @@ from pathlib import Path
 
 from rcsc.plan import UNPROVED
 from rcsc.system.description import BadDescription, Description
+from rcsc.system.signature import generated_files
 
 
 class UnprovedExecutors(BadDescription):
@@ -17,11 +18,7 @@ def marked(system: Description) -> tuple[Path, ...]:
     """The generated files of the system's programs that bear the mark, wherever in their text."""
     mark = UNPROVED.encode()
     programs = dict.fromkeys(spec.program for spec in system.levels)
-    files = (
-        system.generated / file
-        for name in programs
-        for file in (f"c/{name}.c", f"c/{name}.h", f"c/{name}.json", f"python/{name.rstrip('_')}.py")
-    )
+    files = (path for name in programs for path in generated_files(system.generated, name))
     return tuple(path for path in files if path.is_file() and mark in path.read_bytes())
 
 

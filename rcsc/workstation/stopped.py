@@ -17,6 +17,7 @@ from rcsc.files import write_atomically
 from rcsc.system.cell import Outside
 from rcsc.system.description import Description
 from rcsc.system.levels import RunningLevel
+from rcsc.system.signature import generated_files
 from rcsc.workstation.cell import Run
 from rcsc.workstation.orders import BETWEEN
 from rcsc.workstation.script import Row
@@ -117,13 +118,8 @@ def tables_digest(system: Description) -> str:
     """Changes with the generated executors and with the wiring."""
     hashed = hashlib.sha256(repr((system.tick_ms, system.levels, system.wires)).encode())
     for program in sorted({level.program for level in system.levels}):
-        for name in (
-            f"c/{program}.json",
-            f"c/{program}.h",
-            f"c/{program}.c",
-            f"python/{program}.py",
-        ):
-            hashed.update(hashlib.sha256((system.generated / name).read_bytes()).digest())
+        for path in generated_files(system.generated, program):
+            hashed.update(hashlib.sha256(path.read_bytes()).digest())
     return hashed.hexdigest()
 
 

@@ -1,0 +1,84 @@
+"""The symbol file: what everything is called in C and in Python, and what a log or a shell shows of it."""
+
+import json
+
+from rcsc.emit.ctext import c_type
+from rcsc.emit.names import Names
+from rcsc.model import Bool, Enum, Int, Level, OneTable, Read, Real, Unit, Variable
+from rcsc.plan import Plan
+
+
+def symbols(plan: Plan, names: Names) -> str:
+    """What everything is called, for tools."""
+    p = names.program
+    document = {
+        **({"unproved": plan.mark} if plan.mark else {}),
+        "program": p,
+        "struct": f"{p}_t",
+        "header": f"{p}.h",
+        "source": f"{p}.c",
+        "init": f"{p}_init",
+        "python": {"module": f"{p}.py", "class": "State"},
+        **({"failed": names.failed} if len(names.failed) > 1 else {}),
+        "leaves": [
+            {
+                "name": v.name,
+                "kind": v.kind.value,
+                "path": names.paths[v.name],
+                "c_type": c_type(v.type),
+                "attribute": names.attributes[v.name],
+                **_described(v),
+            }
+            for v in plan.program.variables
+        ],
+        "monitored": [plan.program.assumptions[at].name for at in plan.monitored],
+        "tables": [
+            {
+                "name": t.table.name,
+                "line": f"{p}_{names.tables[t.table.name]}_line",
+                "lines_of_many": f"{p}_{names.tables[t.table.name]}_lines",
+                "step": f"{p}_{names.tables[t.table.name]}_step",
+                "lines": [line.name for line in t.lines],
+                **({"stops": list(t.table.stops)} if t.table.stops else {}),
+            }
+            for t in plan.tables
+        ],
+        "levels": [
+            {
+                "name": level.name,
+                "cycle": f"{p}_{names.levels[level.name]}_cycle",
+                "period_ms": level.period_ms,
+                **_dispatched(level),
+            }
+            for level in plan.program.levels
+        ],
+    }
+    return json.dumps(document, indent=1) + "\n"
+
+
+def unit_text(unit: Unit) -> str:
+    """A unit as it is shown: `mm*s^-1`."""
+    return "*".join(name if power == 1 else f"{name}^{power}" for name, power in unit)
+
+
+def _described(variable: Variable) -> dict[str, object]:
+    """What a log or a shell shows of a leaf: its range, unit or members, initial value and doc."""
+    kind = variable.type
+    said: dict[str, object] = {"initial": variable.initial, "doc": variable.doc}
+    match kind:
+        case Enum(members=members):
+            said["members"] = list(members)
+        case Int(low, high, unit) | Real(low, high, unit):
+            said |= {"low": low, "high": high, "unit": unit_text(unit)}
+        case Bool():
+            pass
+    return said
+
+
+def _dispatched(level: Level) -> dict[str, object]:
+    """Which table a level runs: one, or by the value of a leaf."""
+    if isinstance(level.tables, OneTable):
+        return {"table": level.tables.table}
+    selector = level.tables.selector
+    by = selector.name if isinstance(selector, Read) else ""
+    return {"by": by, "tables": {str(int(value)): table for value, table in level.tables.tables}}
