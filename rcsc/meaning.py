@@ -1,4 +1,4 @@
-"""Names for terms, what tables may rely on, and a digest of what a table's proof depends on.
+"""Names for terms, what tables may rely on, and a digest of all that a proof depends on.
 
 In: the model. Out: text. Shared by the prover, its certificates and the checker, so that all three
 speak of the same thing; no proof rests on it.
@@ -6,7 +6,8 @@ speak of the same thing; no proof rests on it.
 
 import hashlib
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import fields, is_dataclass, replace
+from enum import StrEnum
 
 from rcsc.model import (
     Among,
@@ -19,7 +20,6 @@ from rcsc.model import (
     Read,
     Standing,
     Table,
-    Test,
 )
 from rcsc.resolve.leaves import read_by
 
@@ -73,30 +73,41 @@ def checked(program: Program) -> tuple[int, ...]:
     )
 
 
-def digest(program: Program, table: Table) -> str:
-    """SHA-256 (hex) of the table's lines, its DEFAULT, its variables and its assumptions."""
-    hashed = hashlib.sha256(b"rcsc table 1\n")
-    wanted = set(table.variables)
-    assumed = [a for a in program.assumptions if a.name in table.assumptions]
-    for assumption in assumed:
-        hashed.update(f"assume {assumption.name} {spelled(assumption.condition)}\n".encode())
-    for variable in program.variables:
-        if variable.name in wanted or assumed:
-            hashed.update(f"variable {variable.name} {variable.type!r}\n".encode())
-    numbers: dict[int, int] = {}
-    for line in table.lines:
-        for test in line.tests:
-            if test is not None and id(test) not in numbers:
-                numbers[id(test)] = len(numbers)
-                hashed.update(_shown(test).encode())
-        cells = [-1 if test is None else numbers[id(test)] for test in line.tests]
-        hashed.update(f"line {line.name} {cells}\n".encode())
-    default = table.default
-    hashed.update(b"none" if default is None else b"unreachable" if default.unreachable else b"default")
-    return hashed.hexdigest()
+def digest(*meant: object) -> str:
+    """SHA-256 (hex) of values of the model: every field that equality looks at, so spans are left out.
+
+    Fields are found by walking the classes, so that one that is added cannot be forgotten.
+
+    Raises:
+        TypeError: A part is no value of the model.
+    """
+    return _Digest().of(meant)
 
 
-def _shown(test: Test) -> str:
-    if test.box is not None:
-        return f"test {test.variables[0]} {test.box}\n"
-    return f"test {spelled(test.condition)}\n"
+class _Digest:
+    """Digests parts first, each object once: tests and lists of leaves are shared by many lines."""
+
+    def __init__(self) -> None:
+        self._known: dict[
+            int, tuple[object, str]
+        ] = {}  # the object is kept, so that its identity is not used again
+
+    def of(self, value: object) -> str:
+        found = self._known.get(id(value))
+        if found is None:
+            text = self._text(value)
+            found = self._known[id(value)] = value, hashlib.sha256(text.encode()).hexdigest()
+        return found[1]
+
+    def _text(self, value: object) -> str:
+        kind = type(value).__name__
+        if value is None or isinstance(value, bool | int | float | str):
+            return f"{kind} {value.value if isinstance(value, StrEnum) else value!r}"
+        if isinstance(value, tuple):
+            return f"{kind} {' '.join(map(self.of, value))}"
+        if is_dataclass(value):
+            parts = (
+                f"{one.name} {self.of(getattr(value, one.name))}" for one in fields(value) if one.compare
+            )
+            return f"{kind} {' '.join(parts)}"
+        raise TypeError(f"{kind} is no value of the model")

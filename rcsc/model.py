@@ -677,7 +677,7 @@ class Program:
     """
 
     name: str
-    file: str
+    file: str = field(compare=False)
     enums: tuple[Enum, ...]
     records: tuple[Record, ...]
     declared: tuple[Declared, ...]

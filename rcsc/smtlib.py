@@ -99,10 +99,15 @@ def constant(kind: Scalar, value: Value) -> str:
 
 def cvc5_refutes(text: str, timeout_ms: int = 10_000) -> bool:
     """Whether cvc5 is there and finds the script unsatisfiable within the time."""
+    return cvc5_says(text, timeout_ms) == "unsat"
+
+
+def cvc5_says(text: str, timeout_ms: int = 10_000) -> str:
+    """cvc5's last answer to the script; "" where cvc5 is not there, or fails."""
     try:
         import cvc5  # type: ignore[import-untyped, unused-ignore]  # optional, and heavy to load
     except ImportError:
-        return False
+        return ""
     solver: Any = cvc5.Solver()
     solver.setOption("tlimit-per", str(timeout_ms))
     reader: Any = cvc5.InputParser(solver)
@@ -114,8 +119,8 @@ def cvc5_refutes(text: str, timeout_ms: int = 10_000) -> bool:
             while not (command := reader.nextCommand()).isNull():
                 answer = command.invoke(solver, symbols)
     except RuntimeError:
-        return False
-    return answer.strip() == "unsat"
+        return ""
+    return str(answer).strip()
 
 
 def _applied(op: Op, args: Sequence[Expr], inner: Iterable[str]) -> str:

@@ -4,6 +4,7 @@ import ast
 import copy
 import json
 import random
+from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -11,15 +12,23 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rcsc.certify import certify, check_certificate
+from rcsc.certify import Answer, certify, check_certificate
 from rcsc.interpret import matching_lines
 from rcsc.meaning import digest
 from rcsc.model import Program, Table
 from rcsc.prove.options import Options
 from rcsc.prove.program import prove_program
 from rcsc.resolve import compile_text
+from rcsc.smtlib import cvc5_says
 from tests.bench import families
-from tests.emitted import program_of, shipped
+from tests.certificates import Attack, signed, wrong_with
+from tests.emitted import EXTERN, RICH, program_of, shipped
+
+
+def by_cvc5(question: str) -> Answer:
+    """cvc5's answer."""
+    return {"unsat": Answer.NONE, "sat": Answer.SOME}.get(cvc5_says(question), Answer.UNKNOWN)
+
 
 BOXES = """
 input a : bool
@@ -73,19 +82,12 @@ def certificate_of(program: Program) -> dict[str, Any]:
     return made
 
 
-def forged(certificate: dict[str, Any], program: Program) -> dict[str, Any]:
-    """The certificate with what binds it to its table replaced."""
-    made = copy.deepcopy(certificate)
-    for entry, table in zip(made["tables"], program.tables, strict=True):
-        entry["meaning"] = digest(program, table)
-    return made
-
-
 @pytest.mark.parametrize("text", [BOXES, RELATED], ids=["boxes", "related"])
 def test_a_certificate_holds_and_says_what_it_rests_on(text: str) -> None:
     program = program_of(text)
     found = certify(program, certificate_of(program))
-    assert found.problems == ()
+    assert found.whole
+    assert "table `t`: exactly one line matches" in found.checked
     assert found.rests_on == (("assumption `near` (monitored)",) if text is RELATED else ())
 
 
@@ -99,21 +101,25 @@ def test_families_are_certified(lines: int, variables: int) -> None:
 @pytest.mark.parametrize("path", ["tables/task/acquire.rcs", "tables/examples/approach.rcs"])
 def test_shipped_tables_are_certified(path: str, repo: Path) -> None:
     program = shipped(path, repo)
-    assert check_certificate(program, certificate_of(program)) == ()
+    certificate = certificate_of(program)
+    alone, asked = certify(program, certificate), certify(program, certificate, by_cvc5)
+    assert alone.problems == ()
+    assert asked.whole
+    assert set(asked.checked) == {*alone.checked, *(one.name for one in alone.unchecked)}
 
 
 def test_a_certificate_of_another_table_is_refused() -> None:
     certificate = certificate_of(program_of(BOXES))
     changed = program_of(BOXES.replace("| < 3 ", "| < 4 ").replace("| >= 3 ", "| >= 4 "))
-    assert "of another table" in check_certificate(changed, certificate)[0]
-    assert check_certificate(changed, forged(certificate, changed)) == ()  # the same tree shows that one too
+    assert check_certificate(changed, certificate) == ("it is of another program",)
+    assert check_certificate(changed, signed(changed, certificate)) == ()  # the same tree shows that one too
 
 
 @pytest.mark.parametrize(("text", "old", "new"), WRONG)
 def test_no_forged_certificate_shows_a_wrong_table(text: str, old: str, new: str) -> None:
     assert text.count(old) == 1
     wrong = program_of(text.replace(old, new))
-    [problem] = check_certificate(wrong, forged(certificate_of(program_of(text)), wrong))
+    [problem] = check_certificate(wrong, signed(wrong, certificate_of(program_of(text))))
     assert problem.startswith("table `t`: ")
 
 
@@ -142,19 +148,19 @@ PROGRAMS = {
 @given(text=st.sampled_from([BOXES, RELATED]), data=st.data())
 def test_no_damaged_certificate_shows_a_wrong_table(text: str, data: st.DataObject) -> None:
     program = data.draw(st.sampled_from(PROGRAMS[text]))
-    made = forged(CERTIFIED[text], program)
+    made = json.loads(json.dumps(CERTIFIED[text]))
     for _ in range(data.draw(st.integers(1, 3))):
         entry = made["tables"][0]
         place = data.draw(st.sampled_from(numbers(entry)))
-        if place and place[0] != "meaning":
-            put(entry, place, data.draw(st.sampled_from(ODD)))
-    assert check_certificate(program, made)
+        if place:
+            put(entry, place, copy.deepcopy(data.draw(st.sampled_from(ODD))))
+    assert check_certificate(program, signed(program, made))
 
 
 @given(st.randoms(use_true_random=False))
 def test_whatever_tree_is_made_up_no_wrong_table_passes(rng: random.Random) -> None:
     program = rng.choice(PROGRAMS[RELATED])
-    made = forged(CERTIFIED[RELATED], program)
+    made = signed(program, json.loads(json.dumps(CERTIFIED[RELATED])))
     entry = made["tables"][0]
 
     def tree(depth: int) -> list[Any]:
@@ -173,7 +179,8 @@ def test_whatever_tree_is_made_up_no_wrong_table_passes(rng: random.Random) -> N
 
 @pytest.mark.parametrize("damage", [[], None, {"format": "rcsc-certificate"}, {"format": "x", "version": 1}])
 def test_what_is_no_certificate_is_refused(damage: Any) -> None:
-    assert check_certificate(program_of(BOXES), damage)[0].startswith("malformed certificate")
+    [problem] = check_certificate(program_of(BOXES), damage)
+    assert problem.startswith(("malformed certificate", "not a certificate"))
 
 
 def test_the_wrong_tables_of_these_tests_are_wrong() -> None:
@@ -206,12 +213,248 @@ def every_input(program: Program) -> list[dict[str, Any]]:
 
 
 def test_the_checker_imports_nothing_of_the_prover(repo: Path) -> None:
-    tree = ast.parse((repo / "rcsc/certify.py").read_text(encoding="utf-8"))
-    names = {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
-    assert names == {"collections.abc", "dataclasses", "math", "typing", "rcsc.meaning", "rcsc.model"}
+    trees = [
+        ast.parse(one.read_text(encoding="utf-8")) for one in sorted((repo / "rcsc/certify").glob("*.py"))
+    ]
+    froms = {node.module for tree in trees for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
+    ours = {
+        name for name in froms if name and name.startswith("rcsc") and not name.startswith("rcsc.certify")
+    }
+    assert ours == {"rcsc.meaning", "rcsc.model", "rcsc.resolve.leaves", "rcsc.source"}
 
 
 def test_a_gap_and_an_overlap_have_no_certificate() -> None:
     for program in (*PROGRAMS[BOXES], *PROGRAMS[RELATED]):
         assert prove_program(program, Options()).proved is None
     assert isinstance(compile_text(BOXES), Program)
+
+
+# --- what a program owes besides its tables ----------------------------------------------
+
+OWING = """
+enum word { red, green, blue }
+input take : bool
+input a : int -9 .. 9
+input b : int 1 .. 9 clamp
+input x : real -1.0 .. 1.0
+state left : int 0 .. 9 = 4
+state taken : int 0 .. 9 = 0
+state now : int 0 .. 3 deferred until take
+state k : array[4] of int 0 .. 3
+output o : int -9 .. 9
+output seen : word
+invariant nothing_lost : left + taken = 4
+invariant early : now <= 3
+assume small proved : taken <= 4
+assume near monitored : a <= 8
+extern procedure ask reads a writes o python "m:f" c "m_f"
+procedure move_one { left := left - 1; taken := taken + 1 }
+procedure count(by : int 0 .. 3) { local n : int 0 .. 9 := by; for i in 0 .. 2 { n := n + i }; o := n }
+procedure share { o := a / b }
+procedure later { next now := 2 }
+procedure pick { if a in 0 .. 3 { k[a] := 3 } else { k[0] := 0 } }
+procedure round { if x > 0.0 { o := int(x * 9.0) } else { o := 0 } }
+procedure alone { case seen { red { seen := green } green, blue { seen := red } } }
+table t assuming near {
+  | line  | take  | left | taken  | a - 9 || procedures     | seen |
+  | one   | true  | > 0  |        | < 0   || move_one; pick |      |
+  | none  | true  | = 0  |        | < 0   || count(3)       | red  |
+  | idle  | false |      | 0 .. 4 | < 0   || share; later   | blue |
+}
+table u {
+  | line  | take   || procedures |
+  | yes   | true   || round      |
+  | no    | false  || ask        |
+}
+level top {
+  period 10 [ms]
+  preprocess pick
+  table by take { false : t  true : u }
+  postprocess ask
+}
+"""
+EDITS = [  # what is edited, and what then does not hold
+    ("taken := taken + 1 }", "taken := taken }", "invariant `nothing_lost` is kept"),
+    ("left := left - 1;", "left := left - 2;", "invariant `nothing_lost` is kept"),
+    ("= 4\nstate taken", "= 5\nstate taken", "at first: invariant `nothing_lost` holds"),
+    ("| one   | true  | > 0  |", "| one   | true  |      |", "`left` stays in 0 .. 9"),
+    ("assume small proved : taken <= 4", "assume small proved : taken <= 3", "follows from ranges and invariants"),
+    ("assume near monitored", "assume near proved", "follows from ranges and invariants"),
+    ("input b : int 1 .. 9", "input b : int 0 .. 9", "the divisor is not zero"),
+    ("o := a / b", "o := a * b", "`o` stays in -9 .. 9"),
+    ("next now := 2", "next now := taken", "`now.next` stays in 0 .. 3"),
+    ("early : now <= 3", "early : now <= 2", "taking deferred values: invariant `early` is kept"),
+    ("if a in 0 .. 3 {", "if a in 0 .. 4 {", "the index lies in 0 .. 3"),
+    ("k[a] := 3", "k[a] := a + 1", "stays in 0 .. 3"),
+    ("int(x * 9.0)", "int(x * 11.0)", "`o` stays in -9 .. 9"),
+    ("local n : int 0 .. 9 := by;", "local n : int 0 .. 9; if a > 0 { n := by };", "`n` is assigned before it is read"),
+    ("|| count(3) ", "|| count(taken) ", "`by` stays in 0 .. 3"),
+    ("for i in 0 .. 2", "for i in 0 .. 4", "`n` stays in 0 .. 9"),
+    ("extern procedure ask reads a writes o", "extern procedure ask reads a writes left, o", "where `ask` fails"),
+    ("extern procedure ask reads a writes o", "extern procedure ask reads a writes taken", "`nothing_lost` is kept"),
+    ("move_one; pick |      |", "move_one; alone; alone | blue |", "two actions write one value to `seen`"),
+    ("a - 9 ||", "a / now ||", "the divisor is not zero"),
+    ("deferred until take", "deferred until take and a / now > 0", "`deferred until` of `now`: the divisor is not zero"),
+    ("  postprocess ask", "  postprocess move_one", "`postprocess` of level `top`: `left` stays in 0 .. 9"),
+    ("  preprocess pick", "  preprocess move_one", "`preprocess` of level `top`: `left` stays in 0 .. 9"),
+    ("assume near monitored : a <= 8", "assume near monitored : a / now <= 8", "the divisor is not zero"),
+]  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def owing() -> tuple[Program, dict[str, Any]]:
+    """A program that owes something of every sort, and its certificate."""
+    program = program_of(OWING)
+    return program, certificate_of(program)
+
+
+def test_everything_that_a_program_owes_is_checked_without_a_solver(
+    owing: tuple[Program, dict[str, Any]],
+) -> None:
+    found = certify(*owing)
+    assert found.whole, found
+    assert found.rests_on == ("assumption `near` (monitored)",)
+
+
+@pytest.mark.parametrize(("old", "new", "problem"), EDITS)
+def test_an_edited_program_is_refused_whatever_the_signature(
+    owing: tuple[Program, dict[str, Any]], old: str, new: str, problem: str
+) -> None:
+    assert OWING.count(old) == 1, old
+    edited = program_of(OWING.replace(old, new))
+    assert certify(edited, owing[1]).problems == ("it is of another program",)
+    assert any(problem in one for one in certify(edited, signed(edited, owing[1])).problems)
+
+
+ONE_WRITER = RICH.replace("|| measure; turn      | 9     |", "|| measure; turn      |       |")
+
+
+@pytest.mark.parametrize("text", [ONE_WRITER, EXTERN], ids=["rich", "extern"])
+def test_doubles_wide_words_records_and_externs_are_certified(text: str) -> None:
+    program = program_of(text)
+    found = certify(program, certificate_of(program))
+    assert found.whole, found
+
+
+def test_nothing_is_certified_by_a_certificate_that_says_nothing(
+    owing: tuple[Program, dict[str, Any]],
+) -> None:
+    program, certificate = owing
+    for tables in (
+        [],
+        certificate["tables"][:1],
+        certificate["tables"] * 2,
+        [{"table": "t"}, {"table": "u"}],
+    ):
+        assert certify(program, signed(program, {**certificate, "tables": tables})).problems
+    for entry in certificate["tables"]:
+        for key in entry:
+            rest = [
+                {k: v for k, v in one.items() if one is not entry or k != key}
+                for one in certificate["tables"]
+            ]
+            assert certify(program, signed(program, {**certificate, "tables": rest})).problems, key
+
+
+def test_what_is_not_checked_is_named_and_no_part_of_what_is() -> None:
+    text = (
+        "input n : int 0 .. 1000000\ninput m : int 0 .. 1000000\nstate s : int 0 .. 1000000\n"
+        "procedure p { if m <= n { s := n - m } }\n"
+        "table t {\n| line | n ||\n| one | < 4 ||\n| two | >= 4 ||\n}\n"
+    )
+    program = program_of(text)
+    certificate = certificate_of(program)
+    [left] = certify(program, certificate).unchecked
+    assert left.name == "procedure `p`: `s` stays in 0 .. 1000000"
+    assert cvc5_says(left.question) == "unsat"
+    assert not {left.name} & set(certify(program, certificate).checked)
+    assert certify(program, certificate, by_cvc5).whole
+    assert certify(program, certificate, lambda _: Answer.UNKNOWN).unchecked == (left,)
+    assert certify(program, certificate, lambda _: Answer.SOME).problems
+
+
+def test_the_digest_is_of_every_field_that_equality_looks_at(owing: tuple[Program, dict[str, Any]]) -> None:
+    program, seen = owing[0], set[tuple[str, str]]()
+
+    def changed(value: Any) -> list[Any]:
+        """The value with one field changed, for every field that it or a part has and none of its kind had before."""
+        if isinstance(value, tuple):
+            return [
+                (*value[:at], other, *value[at + 1 :])
+                for at, one in enumerate(value)
+                for other in changed(one)
+            ]
+        if not is_dataclass(value) or isinstance(value, type):
+            return []
+        found = []
+        for one in fields(value):
+            part = getattr(value, one.name) if one.compare else None
+            found += [replace(value, **{one.name: other}) for other in changed(part)]
+            if one.compare and (type(value).__name__, one.name) not in seen:
+                seen.add((type(value).__name__, one.name))
+                found.append(replace(value, **{one.name: ("another",)}))
+        return found
+
+    others = changed(program)
+    assert len(others) > 80
+    assert len({digest(program), *map(digest, others)}) == len(others) + 1
+    assert digest(replace(program, file="elsewhere.rcs")) == digest(program)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_attacks_on_random_programs_fail(seed: int) -> None:
+    attack = Attack(random.Random(seed))  # noqa: S311 - the same attacks in every run
+    attack.run(5)
+    assert attack.failures == []
+    assert attack.counts["true"] == 5
+
+
+FALSE = [  # small programs, each wrong in one way, and how the judge of the attacks calls that
+    ("procedure p { s := s + 1 }", "p", "a range"),
+    ("procedure p { s := abs(2 / a) }", "p", "a division"),
+    ("procedure p { s := k[a] }", "p", "an index"),
+    ("procedure p { local n : int 0 .. 2; if a > 0 { n := 1 }; s := n }", "p", "a local"),
+    ("procedure p { o := b } procedure q { o := not b }", "p; q", "two writers of o"),
+    ("invariant low : s <= 1\nprocedure p { s := 2 }", "p", "an invariant"),
+    ("invariant low : s <= 1\nextern procedure p reads a writes s python 'm:f' c 'f'", "p", "an invariant"),
+    ("invariant low : s >= 1", "", "an invariant at first"),
+    ("assume low proved : s <= 1", "", "low does not follow"),
+    ("assume low assumed : a < 0 and a > 0", "", "assumptions contradict"),
+    ("procedure p { if a * 6148914691236517205 > 0 { s := 0 } }", "p", "64 bits"),
+]
+
+
+@pytest.mark.parametrize(("declared", "called", "why"), FALSE)
+@pytest.mark.parametrize("wrong", [True, False])
+def test_the_judge_of_the_attacks_tells_true_from_false(
+    declared: str, called: str, why: str, wrong: bool
+) -> None:
+    head = "input b : bool\ninput a : int -1 .. 2\nstate s : int 0 .. 2\nstate k : array[2] of int 0 .. 1\noutput o : bool\n"
+    using = " assuming low" if "assume low" in declared else ""
+    body = f"{declared if wrong else ''}\n".replace("'", '"')
+    cells = f"| one | true || {called if wrong else ''} |\n| two | false || |\n"
+    program = program_of(
+        f"{head}{body}table t{using if wrong else ''} {{\n| line | b || procedures |\n{cells}}}\n"
+    )
+    assert wrong_with(program) == (why if wrong else "")
+    if wrong:
+        entry = {
+            "table": "t",
+            "assumptions": [],
+            "columns": ["b"],
+            "forms": [[[0, 1]]],
+            "tree": [["b", 2, None]],
+        }
+        made = {
+            "format": "rcsc-certificate",
+            "version": 2,
+            "program": "case",
+            "tables": [{**entry, "stops": []}],
+        }
+        assert not certify(program, signed(program, made)).whole
+
+
+def test_the_judge_of_the_attacks_counts_lines() -> None:
+    text = "input a : int 0 .. 3\ntable t {{\n| line | a ||\n| one | < 2 ||\n| two | {} ||\n}}\n"
+    said = {cell: wrong_with(program_of(text.format(cell))) for cell in (">= 2", "> 2", ">= 1")}
+    assert said == {">= 2": "", "> 2": "0 lines of t", ">= 1": "2 lines of t"}

@@ -1,5 +1,6 @@
 """The commands: each turns arguments into a call of the driver, shows the report, gives the exit status."""
 
+import importlib.util
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -201,6 +202,7 @@ Examples:
   rcsc certify acquire.rcs                    prove, then re-check the proof
   rcsc certify acquire.rcs --write a.json     and keep the certificate
   rcsc certify acquire.rcs --against a.json   re-check one that was kept; nothing is proved
+  rcsc certify acquire.rcs --certify          have cvc5 answer what the checker leaves
   rcsc certify tables/system.toml             the levels together, again by cvc5""",
 )
 @click.argument("source", metavar="FILE", type=click.Path(exists=True, dir_okay=False))
@@ -208,28 +210,40 @@ Examples:
               help="Keep the certificate in this file.")  # fmt: skip
 @click.option("--against", type=click.Path(exists=True, dir_okay=False, path_type=Path), default=None,
               metavar="CERTIFICATE", help="Check this certificate instead of making one.")  # fmt: skip
+@click.option("--certify", "cvc5", is_flag=True,
+              help="Put what the checker does not settle by itself to cvc5, which has no part in the proof.")  # fmt: skip
+@click.option("--questions", type=click.Path(file_okay=False, path_type=Path), default=None, metavar="DIR",
+              help="Write what is left to DIR as SMT-LIB, one file each: each is to be answered `unsat`.")  # fmt: skip
+@click.option(
+    "--strict", is_flag=True, help="Status 1 where something was not checked; always so with --against."
+)
 @proving
 @showing
 def certify(
-    source: str, write: Path | None, against: Path | None, options: "Options", use_cache: bool, output: Output
-) -> int:
-    """Re-check the proof of FILE's tables with a small checker that shares no code with the prover.
+    source: str, write: Path | None, against: Path | None, cvc5: bool, questions: Path | None, strict: bool,
+    options: "Options", use_cache: bool, output: Output,
+) -> int:  # fmt: skip
+    """Re-check the proof of FILE's tables and procedures with a small checker that shares no code with the prover.
 
-    The checker reads the source anew and asks no solver for tables of boxes. It says what the proof rests on.
+    The checker reads the source anew, derives what is owed, and lists by name what it did not check and what the proof rests on.
     Where FILE describes a system, it is `rcsc prove --certify`: cvc5 answers every question of the levels together.
     """
     from rcsc import driver
+    from rcsc.driver.certified import Checking
 
     if write is not None and against is not None:
         raise click.UsageError("--write and --against do not go together")
     if source.endswith(".toml"):
         from rcsc.cli.prove import prove
 
-        if write is not None or against is not None:
+        if write is not None or against is not None or questions is not None:
             raise click.UsageError("the certificate of a system is written by `rcsc prove --certificate`")
         found: int = click.get_current_context().invoke(prove, system=Path(source), confirms=True)
         return found
-    made = driver.certify(_settings(options, use_cache, output, (source,)), write, against)
+    if cvc5 and importlib.util.find_spec("cvc5") is None:
+        raise click.UsageError("--certify needs the extra `certify`: pip install 'rcsc[certify]'")
+    how = Checking(cvc5=cvc5, strict=strict, questions=questions)
+    made = driver.certify(_settings(options, use_cache, output, (source,)), how, write, against)
     return _finish(made.report, "certify", output, made.closing)
 
 

@@ -6,6 +6,7 @@ ones before it found nothing wrong; nothing is written unless all that was asked
 
 import os
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,6 +18,7 @@ from rcsc.driver.work import Effort, Made, Proof, Settings
 from rcsc.source import Span
 
 if TYPE_CHECKING:
+    from rcsc.driver.certified import Checking
     from rcsc.model import Program, ProvedProgram
     from rcsc.project import Loaded
 
@@ -88,20 +90,23 @@ def test(settings: Settings, effort: Effort) -> Made:
     return Made(_report(loaded, proofs, tuple(found)), "\n".join(figures))
 
 
-def certify(settings: Settings, write: Path | None, against: Path | None) -> Made:
-    """Check a certificate, made now or kept, by the checker alone."""
+def certify(settings: Settings, how: "Checking", write: Path | None, against: Path | None) -> Made:
+    """Check a certificate, made now or kept, by the checker alone.
+
+    Nothing is proved where a kept one is checked: then what the checker leaves has nobody's word, and is an error.
+    """
     from rcsc.driver.certified import keep, kept, reviewed
 
     loaded = _load(settings)
     if against is not None:
-        return reviewed(loaded, kept(against))
+        return reviewed(loaded, kept(against), replace(how, strict=True))
     proofs = tuple(_proofs(loaded, settings, None))
     report = _report(loaded, proofs)
     [proof] = proofs or (None,)
     if report.failed or proof is None or proof.certificate is None:
         return Made(report, "nothing is certified: not everything is proved")
     found = keep(proof.certificate, write) if write is not None else ()
-    made = reviewed(loaded, proof.certificate)
+    made = reviewed(loaded, proof.certificate, how, proof.proved)
     return Made(_report(loaded, proofs, (*found, *made.report.found)), made.closing)
 
 

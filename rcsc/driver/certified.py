@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Mapping
-from importlib.util import find_spec
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,10 +15,26 @@ from rcsc.project import Loaded
 from rcsc.source import Span
 
 if TYPE_CHECKING:
-    from rcsc.certify import Form
-    from rcsc.model import Program, Table
+    from rcsc.certify import Answer, Certified, Unchecked
+    from rcsc.model import Program, ProvedProgram
+    from rcsc.source import Source
 
 MOST_PROBLEMS = 10
+
+
+@dataclass(frozen=True, slots=True)
+class Checking:
+    """How a certificate is checked.
+
+    Attributes:
+        cvc5: Whether cvc5 is put what the checker does not settle by itself.
+        strict: Whether it is an error that something was not checked.
+        questions: A folder for what is left, one SMT-LIB file each.
+    """
+
+    cvc5: bool = False
+    strict: bool = False
+    questions: Path | None = None
 
 
 def kept(path: Path) -> Mapping[str, object] | Diagnostic:
@@ -44,8 +60,17 @@ def keep(certificate: Mapping[str, object], path: Path) -> tuple[Diagnostic, ...
     return ()
 
 
-def reviewed(loaded: Loaded, certificate: Mapping[str, object] | Diagnostic) -> Made:
-    """The report on a certificate of the first root: what is wrong with it, and what the proof rests on."""
+def reviewed(
+    loaded: Loaded,
+    certificate: Mapping[str, object] | Diagnostic,
+    how: Checking,
+    proved: "ProvedProgram | None" = None,
+) -> Made:
+    """The report on a certificate of the first root: what is wrong with it, what was checked and what was not.
+
+    The certificate must name the stopping assumptions of what was `proved`, from which executors are made.
+    """
+    from rcsc.certify import certify
     from rcsc.model import Program
     from rcsc.resolve import resolve
 
@@ -54,52 +79,62 @@ def reviewed(loaded: Loaded, certificate: Mapping[str, object] | Diagnostic) -> 
     program = resolve(loaded.roots[0], loaded) if loaded.roots else loaded.found
     if not isinstance(program, Program):
         return Made(Report(program, (), loaded.sources), "not certified")
-    found, rests_on = _checked(program, certificate)
-    report = Report(found, (), loaded.sources)
-    if found:
-        return Made(report, "not certified")
-    resting = "".join(f"\n  it rests on {one}" for one in rests_on)
-    count = f"{len(program.tables)} table{'' if len(program.tables) == 1 else 's'}"
-    return Made(report, f"certified: {count} of `{program.name}`{resting}")
+    stops = None if proved is None else {str(one.name): one.stops for one in proved.program.tables}
+    outcome = certify(program, certificate, _cvc5 if how.cvc5 else None, stops)
+    found = [
+        _refused(program.file, f"the certificate is refused: {one}")
+        for one in outcome.problems[:MOST_PROBLEMS]
+    ]
+    if how.questions is not None:
+        found += _kept_questions(outcome, how.questions)
+    if how.strict and not found:
+        found += [
+            Diagnostic(Code.CERTIFICATE, f"not checked: {one.name}", Label(one.written))
+            for one in outcome.unchecked
+        ]
+    return Made(Report(tuple(found), (), loaded.sources), _closing(program, outcome, loaded.sources))
 
 
-def _checked(
-    program: "Program", certificate: Mapping[str, object]
-) -> tuple[tuple[Diagnostic, ...], tuple[str, ...]]:
-    from rcsc.certify import certify
-
-    outcome = certify(program, certificate, refuter)
-    found = tuple(
-        _refused(program.file, f"the certificate is refused: {problem}")
-        for problem in outcome.problems[:MOST_PROBLEMS]
+def _closing(program: "Program", outcome: "Certified", sources: "Mapping[str, Source]") -> str:
+    """What was checked, and by name what was not."""
+    if outcome.problems:
+        return "not certified"
+    total = len(outcome.checked) + len(outcome.unchecked)
+    resting = "".join(f"\n  it rests on {one}" for one in outcome.rests_on)
+    if outcome.whole:
+        return f"certified: all {total} obligations of `{program.name}` checked{resting}"
+    left = "".join(f"\n  not checked: {one.name}{_place(one, sources)}" for one in outcome.unchecked)
+    return (
+        f"not wholly certified: {len(outcome.checked)} of {total} obligations of `{program.name}` checked; "
+        f"for the rest there is only the prover's word{left}{resting}"
     )
-    return found, outcome.rests_on
 
 
-def refuter(
-    program: "Program",
-    table: "Table",
-    assumptions: tuple[str, ...],
-    bounds: Mapping["Form", tuple[int, int]],
-    lines: tuple[int, ...],
-) -> str:
-    """The solver that finds no fault in the region; "" where none does.
+def _place(one: "Unchecked", sources: "Mapping[str, Source]") -> str:
+    if one.written.file not in sources:
+        return ""
+    return f" ({one.written.file}:{sources[one.written.file].position(one.written.start).line})"
 
-    cvc5 is asked first, which has no part in the proof; Z3, which has, only where cvc5 is not installed.
-    """
-    from rcsc.questions import question
-    from rcsc.smtlib import cvc5_refutes, script
 
-    asked = question(program, table, assumptions, bounds, lines)
-    if find_spec("cvc5") is not None:
-        return "cvc5" if cvc5_refutes(script(program, asked)) else ""
-    from rcsc.prove.encode import declared, encode
-    from rcsc.prove.smt import Answer, Solver
+def _kept_questions(outcome: "Certified", folder: Path) -> list[Diagnostic]:
+    """Writes what is left, one file a question; why a file could not be written."""
+    for number, one in enumerate(outcome.unchecked, start=1):
+        path = folder / f"{number:03}.smt2"
+        text = f"; {one.name}\n; unsat: it holds\n{one.question}"
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            write_atomically(path, text.encode())
+        except OSError as error:
+            return [_refused(str(path), f"`{path}` cannot be written: {error.strerror}", Code.NOT_WRITTEN)]
+    return []
 
-    frame, ranges = declared(program.variables)
-    solver = Solver()
-    solver.add(*ranges, *(encode(condition, frame) for condition in asked))
-    return "z3 alone (cvc5 is not installed)" if solver.check() is Answer.UNSATISFIABLE else ""
+
+def _cvc5(question: str) -> "Answer":
+    """cvc5's answer, which has no part in the proof."""
+    from rcsc.certify import Answer
+    from rcsc.smtlib import cvc5_says
+
+    return {"unsat": Answer.NONE, "sat": Answer.SOME}.get(cvc5_says(question), Answer.UNKNOWN)
 
 
 def _refused(file: str, message: str, code: Code = Code.CERTIFICATE) -> Diagnostic:

@@ -118,8 +118,7 @@ class _Memory:
         place = _extent(table)
         text = self.loaded.sources[place.file].slice(place)
         own = next(one for one in self.program.tables if one.name == table.name)
-        actions = [[action.statement for action in line.actions] for line in own.lines]
-        return ("table", self.common, digest(self.program, own), text, repr(actions), repr(own.default))
+        return ("table", self.common, digest(own), text)
 
 
 def _extent(table: Table) -> Span:

@@ -1,7 +1,8 @@
 """Certificates: why a verdict holds, as plain data that `rcsc.certify` re-checks.
 
 In: the tree of a search, or a box table found right by counting. Out: a mapping for JSON, with the
-same bytes for the same proof. Nodes stand in preorder:
+same bytes for the same proof. What procedures, conditions and invariants owe is not in it: the checker derives
+that from the program, whose digest is. Nodes stand in preorder:
 `["s", form, cut]` a split (first `form <= cut`, then the rest), `["e", [[form, multiplier], ...]]` no
 point, `["a", k]` assumption k is false, `["l", i]` line i alone (-1: DEFAULT with at most one line),
 `["b", count, parts]` disjoint boxes that fill it, `["z"]` asked of a solver.
@@ -12,12 +13,13 @@ from math import prod
 from typing import TypeAlias
 
 from rcsc.meaning import digest
-from rcsc.model import AssumptionName, Box, Program, Table, Test, key_bounds
+from rcsc.model import AssumptionName, Box, Program, Snapshot, Table, TableName, Test, key_bounds
 from rcsc.prove.atoms import Universe, meet
 from rcsc.prove.boxleaf import MANY, parting
 from rcsc.prove.regions import Counted, Empty, Node, Only, Open, Outside, Rests, Split
+from rcsc.resolve.leaves import read_by
 
-VERSION = 1
+VERSION = 2
 Certificate: TypeAlias = Mapping[str, object]
 
 
@@ -30,11 +32,10 @@ def box_certificate(program: Program, table: Table) -> Certificate:
     count = prod(high - low + 1 for name, (low, high) in extents.items() if name in tested)
     parts = parting(_box_lines(table, extents, names)) if len(table.lines) <= MANY else None
     leaf = ["b", count if must_cover(table) else None, None if parts is None else list(parts)]
-    return _certificate(program, table, names, [[[i, 1]] for i in range(len(names))], [leaf], ())
+    return _certificate(table, names, [[[i, 1]] for i in range(len(names))], [leaf], ())
 
 
 def tree_certificate(
-    program: Program,
     table: Table,
     universe: Universe,
     nodes: Sequence[Node],
@@ -43,26 +44,30 @@ def tree_certificate(
     """The certificate of a table proved by a tree of regions under `assumptions`."""
     names = [column.name for column in universe.columns]
     forms = [[list(term) for term in form] for form in universe.forms]
-    return _certificate(program, table, names, forms, [_shown(node) for node in nodes], assumptions)
+    return _certificate(table, names, forms, [_shown(node) for node in nodes], assumptions)
 
 
-def program_certificate(
-    program: Program, tables: Iterable[Certificate], obligations: Iterable[Mapping[str, object]]
-) -> Certificate:
+def with_witness(made: Certificate, program: Program, table: Table, witness: Snapshot) -> Certificate:
+    """The certificate of a table with an input at which all of the table's assumptions hold."""
+    assumed = [one.condition for one in program.assumptions if one.name in table.assumptions]
+    read = sorted({name for condition in assumed for name in read_by(condition)})
+    return {**made, "witness": {name: witness[name] for name in read}}
+
+
+def program_certificate(program: Program, tables: Iterable[Certificate]) -> Certificate:
     """All certificates of a program.
 
     Args:
-        program: What was proved.
+        program: What was proved, with the assumptions that stop its tables.
         tables: One certificate a table.
-        obligations: What procedures and invariants owed: `name` and `method`, which is `intervals`
-            or the solver that it rests on.
     """
+    stops = {table.name: list(table.stops) for table in program.tables}
     return {
         "format": "rcsc-certificate",
         "version": VERSION,
         "program": program.name,
-        "tables": list(tables),
-        "obligations": [dict(sorted(obligation.items())) for obligation in obligations],
+        "meaning": digest(program),
+        "tables": [{**made, "stops": stops[TableName(str(made["table"]))]} for made in tables],
     }
 
 
@@ -72,7 +77,6 @@ def must_cover(table: Table) -> bool:
 
 
 def _certificate(
-    program: Program,
     table: Table,
     columns: Sequence[str],
     forms: Sequence[object],
@@ -81,7 +85,6 @@ def _certificate(
 ) -> Certificate:
     return {
         "table": table.name,
-        "meaning": digest(program, table),
         "assumptions": list(assumptions),
         "columns": list(columns),
         "forms": list(forms),

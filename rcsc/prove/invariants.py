@@ -62,18 +62,25 @@ def _holds(condition: Expr, snapshot: Snapshot) -> bool | None:
         return None
 
 
-def assumptions_satisfiable(program: Program, table: Table, options: Options) -> Answer:
-    """Whether some input satisfies all assumptions of the table; tried by hand before Z3 is asked."""
+def assumptions_satisfiable(program: Program, table: Table, options: Options) -> Snapshot | Answer:
+    """An input that satisfies all assumptions of the table, or that there is none, or that Z3 does not know.
+
+    A few are tried by hand before Z3 is asked.
+    """
     conditions = [one.condition for one in program.assumptions if one.name in table.assumptions]
-    if any(all(_holds(one, trial) for one in conditions) for trial in _trials(program)):
-        return Answer.SATISFIABLE
+    for trial in _trials(program):
+        if all(_holds(one, trial) for one in conditions):
+            return trial
     from rcsc.prove.encode import declared, encode
     from rcsc.prove.smt import Solver
 
     frame, domain = declared(program.variables)
     solver = Solver(options.limits)
     solver.add(*domain, *(encode(condition, frame) for condition in conditions))
-    return solver.check()
+    answer = solver.check()
+    if answer is not Answer.SATISFIABLE:
+        return answer
+    return {one.name: solver.value(frame.leaves[one.name], one.type) for one in program.variables}
 
 
 def _trials(program: Program) -> Iterator[dict[str, Value]]:

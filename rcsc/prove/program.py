@@ -20,7 +20,7 @@ from rcsc.model import (
     seal_of_proof,
 )
 from rcsc.prove import smt
-from rcsc.prove.certificate import program_certificate
+from rcsc.prove.certificate import program_certificate, with_witness
 from rcsc.prove.discharge import Tally
 from rcsc.prove.invariants import assumptions_satisfiable, at_first, properties_elsewhere
 from rcsc.prove.obligations import Obligations, defined_alone
@@ -81,7 +81,7 @@ def prove_program(
         return ProgramVerdict(findings, None, verdicts, None, owed.tally, program, unproved)
     backings = tuple((verdict.table.name, verdict.backing) for verdict in verdicts)
     proved = ProvedProgram(program, backings, seal_of_proof())
-    certificate = _certificate(program, verdicts, owed.tally)
+    certificate = _certificate(program, verdicts)
     return ProgramVerdict(findings, proved, verdicts, certificate, owed.tally, program)
 
 
@@ -146,8 +146,9 @@ def _uncut_verdict(program: Program, table: Table, options: Options) -> TableVer
         possible = assumptions_satisfiable(program, table, options)
     except smt.troubles() as trouble:
         return _left_open(table, Undecided(f"{type(trouble).__name__}: {trouble}"))
-    if possible is Answer.SATISFIABLE:
-        return verdict
+    if not isinstance(possible, Answer):
+        made = verdict.certificate
+        return replace(verdict, certificate=made and with_witness(made, program, table, possible))
     wrong = ContradictoryAssumptions() if possible is Answer.UNSATISFIABLE else Undecided("its assumptions")
     return replace(verdict, found=(wrong,), certificate=None)
 
@@ -166,12 +167,6 @@ def _in_processes(program: Program, tables: list[Table], options: Options) -> li
         ]
 
 
-def _certificate(program: Program, verdicts: tuple[TableVerdict, ...], tally: Tally) -> Mapping[str, object]:
+def _certificate(program: Program, verdicts: tuple[TableVerdict, ...]) -> Mapping[str, object]:
     tables = [verdict.certificate for verdict in verdicts if verdict.certificate is not None]
-    owed = (
-        [{"name": f"{tally.by_intervals} obligations", "method": "intervals"}] if tally.by_intervals else []
-    )
-    if tally.by_solver:
-        what = "obligations of procedures, conditions and invariants"
-        owed.append({"name": f"{tally.by_solver} {what}", "method": "z3"})
-    return program_certificate(program, tables, owed)
+    return program_certificate(program, tables)

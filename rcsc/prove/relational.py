@@ -104,9 +104,7 @@ class _Decision:
             found = (*found, Undecided(f"{search.undecided} regions of the input space"))
         names = tuple(self.table.assumptions[at] for at in kept)
         certificate = (
-            tree_certificate(self.program, self.table, self.universe, search.nodes, names)
-            if search.proved
-            else None
+            tree_certificate(self.table, self.universe, search.nodes, names) if search.proved else None
         )
         return Decided(found, certificate, names if search.proved else self.table.assumptions)
 

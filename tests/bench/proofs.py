@@ -50,7 +50,7 @@ def ours(family: str, lines: int, variables: int, fault: Fault, solver: str) -> 
     assert wrong == (fault != "ok"), (family, lines, variables, fault, verdict.found[:2])
     checked = "-"
     if verdict.certificate is not None:
-        certificate = program_certificate(program, [verdict.certificate], ())
+        certificate = program_certificate(program, [verdict.certificate])
         begun = time.perf_counter()
         assert not check_certificate(program, certificate)
         checked = f"{time.perf_counter() - begun:.3f}"

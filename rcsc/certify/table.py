@@ -1,22 +1,25 @@
-"""The checker: whether a certificate shows what it claims, from the source's meaning alone.
+"""Exactly-one of a table, by a tree of regions that its certificate gives.
 
-In: a `Program` (resolved anew from the text) and a certificate (JSON). Out: problems, none when
-certified, and what the proof rests on. None of the prover's code is used: conditions are read, canonical
-forms made, boxes counted and multipliers added up here. Trusted besides this file: Python, numpy,
-the parser and `resolve`; a solver only where a leaf says so.
-
-Idea: a node of the tree is a region, given by bounds on forms (integer combinations of leaves).
-At each leaf the lines are judged under these bounds alone: true, false or open all over the region.
+In: a table and its entry in a certificate. Out: nothing, or `RejectedError`. A node of the tree is a region, given by bounds on
+forms (integer combinations of leaves). Conditions are read, canonical forms made, boxes counted and multipliers
+added up here; of a leaf of the tree the certificate only says why it holds, and that is recomputed. At each leaf the
+lines are judged under the region's bounds alone: true, false or open all over it. What such judging cannot settle is handed
+on as a question of its own (`Region`).
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from itertools import combinations
 from math import gcd, prod
 from typing import Any, TypeAlias
 
 import numpy as np
 
-from rcsc.meaning import digest, relying, spelled
+from rcsc.certify.owed import Debt
+from rcsc.certify.run import Owed, Run, Start
+from rcsc.certify.settle import values_in
+from rcsc.certify.values import BOOL, INT, REAL, Term
+from rcsc.meaning import spelled
 from rcsc.model import (
     COMPARISONS,
     Among,
@@ -28,19 +31,25 @@ from rcsc.model import (
     Literal,
     Op,
     Program,
+    Read,
     Real,
     Table,
     key_bounds,
     key_of,
-)  # fmt: skip
+    real_of_key,
+)
+from rcsc.resolve.leaves import read_by
 
 Form: TypeAlias = tuple[tuple[str, int], ...]
 """Terms by name and their coefficients; sorted by name, the first positive, no common divisor."""
 Bounds: TypeAlias = dict[Form, tuple[int, int]]
 Atom: TypeAlias = tuple[Form, Box]
 Formula: TypeAlias = "Atom | All | AnyOf"
-Refuter: TypeAlias = Callable[[Program, Table, tuple[str, ...], Bounds, tuple[int, ...]], str]
-"""Names the solver that finds the region without fault; "" when it does not."""
+
+SMALL = 512
+"""Keys of one leaf up to which a condition that is not linear is tried for each; as in `resolve`."""
+MOST_PAIRED = 128
+"""Lines of one question: it states every pair of them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,47 +66,8 @@ class AnyOf:
     parts: tuple[Formula, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Certified:
-    """What became of the check: certified when there are no problems."""
-
-    problems: tuple[str, ...]
-    rests_on: tuple[str, ...]
-
-
 class RejectedError(Exception):
     """The certificate does not show what it should."""
-
-
-def check_certificate(program: Program, certificate: Mapping[str, object]) -> tuple[str, ...]:
-    """Problems of the certificate; none when it shows every table of `program` right."""
-    return certify(program, certificate).problems
-
-
-def certify(program: Program, certificate: Mapping[str, Any], refuter: Refuter | None = None) -> Certified:
-    """Check every table's certificate; `refuter` is asked where a leaf rests on a solver."""
-    problems: list[str] = []
-    rests: list[str] = []
-    try:
-        if certificate["format"] != "rcsc-certificate" or certificate["version"] != 1:
-            raise RejectedError("not a certificate of this version")  # noqa: TRY301 - one place tells what is malformed
-        by_name = {str(entry["table"]): entry for entry in certificate["tables"]}
-        owed = [one for one in certificate["obligations"] if one["method"] != "intervals"]
-        rests += [f"{one['name']}: {one['method']}" for one in owed]
-    except (RejectedError, KeyError, TypeError, ValueError, AttributeError) as error:
-        return Certified((f"malformed certificate: {error}",), ())
-    program = relying(program)  # an obligation says what the invariants rest on
-    for table in program.tables:
-        try:
-            if table.name in by_name:
-                rests += _Checker(program, table, by_name[table.name], refuter).check()
-            elif table.name in program.own_tables:
-                raise RejectedError("no certificate")  # noqa: TRY301 - as any other rejection
-        except RejectedError as error:
-            problems.append(f"table `{table.name}`: {error}")
-        except (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError) as error:
-            problems.append(f"table `{table.name}`: malformed ({type(error).__name__}: {error})")
-    return Certified(tuple(problems), tuple(dict.fromkeys(rests)))
 
 
 class _Terms:
@@ -105,6 +75,7 @@ class _Terms:
 
     def __init__(self, program: Program) -> None:
         self.range = {str(v.name): key_bounds(v.type) for v in program.variables}
+        self.terms: dict[str, Expr] = {str(v.name): Read(v.name, v.type) for v in program.variables}
 
     def span(self, form: Form) -> tuple[int, int]:
         """Least and greatest value of the form over the declared ranges."""
@@ -114,6 +85,8 @@ class _Terms:
     def name(self, term: Expr) -> str:
         name = spelled(term)
         self.range.setdefault(name, key_bounds(term.type))
+        if self.terms.setdefault(name, term) != term:
+            raise RejectedError(f"two terms are called {name}"[:200])
         return name
 
     def formula(self, expr: Expr, yes: bool = True) -> Formula:
@@ -130,11 +103,9 @@ class _Terms:
                 both = tuple(self.formula(part, yes) for part in args)
                 return All(both) if (op is Op.AND) == yes else AnyOf(both)
             case Apply(op=op, args=(left, right)) if op in COMPARISONS and _ordered(left) and _ordered(right):
-                if isinstance(left.type, Bool) and any(
-                    isinstance(side, Apply | Among) for side in (left, right)
-                ):
+                if isinstance(left.type, Bool) and not (_plain(left) and _plain(right)):
                     same = yes == (op is Op.EQ)
-                    cases = ((left_, left_ == same) for left_ in (True, False))
+                    cases = [(True, same), (False, not same)]
                     return AnyOf(
                         tuple(All((self.formula(left, a), self.formula(right, b))) for a, b in cases)
                     )
@@ -162,7 +133,7 @@ class _Terms:
             Op.LT: (below,), Op.LE: ((low, last),), Op.EQ: ((first, last),), Op.NE: (below, above),
             Op.GE: ((first, high),), Op.GT: (above,),
         }[op]  # fmt: skip
-        inside = tuple((max(a, low), min(b, high)) for a, b in box if max(a, low) <= min(b, high))
+        inside = _union(iter((((max(a, low), min(b, high)),) for a, b in box if max(a, low) <= min(b, high))))
         if not form:
             return All(()) if bool(inside) == yes else AnyOf(())
         return form, inside if yes else _complement(inside, low, high)
@@ -198,36 +169,60 @@ class _Line:
     rest: tuple[Formula, ...]
 
 
-class _Checker:
-    """Walks one table's tree."""
+class TableChecker:
+    """Walks one table's tree.
 
-    def __init__(
-        self, program: Program, table: Table, entry: Mapping[str, Any], refuter: Refuter | None
-    ) -> None:
-        self.program, self.table, self.refuter, self.terms = program, table, refuter, _Terms(program)
-        if entry["meaning"] != digest(program, table):
-            raise RejectedError("it is of another table")
+    Attributes:
+        names: The assumptions that the tree may use.
+        questions: What the tree leaves to be settled.
+    """
+
+    def __init__(self, start: Start, table: Table, entry: Mapping[str, Any]) -> None:
+        self.start, self.table, self.terms = start, table, _Terms(start.program)
         known: dict[int, Formula] = {}
         lines = []
         for index, line in enumerate(table.lines):
             tests = [test for test in line.tests if test is not None]
             for test in tests:
                 if id(test) not in known:
-                    name, box = (
-                        (((str(test.variables[0]), 1),), test.box) if test.box is not None else ((), None)
-                    )
-                    whole = self.terms.formula(test.condition) if box is None else (name, box)
-                    known[id(test)] = self.judge(whole, {})
+                    known[id(test)] = self.judge(self.condition(test.condition), {})
             lines.append(self.line(index, (known[id(test)] for test in tests)))
         self.lines = [line for line in lines if line is not None]
         self.names = tuple(str(name) for name in entry["assumptions"])
-        conditions = {str(a.name): a for a in program.assumptions if a.name in table.assumptions}
-        self.assumed = [self.terms.formula(conditions[name].condition) for name in self.names]
-        self.rests = [f"assumption `{name}` ({conditions[name].standing.value})" for name in self.names]
+        conditions = {str(a.name): a for a in start.program.assumptions if a.name in table.assumptions}
+        self.assumptions = [conditions[name] for name in self.names]
+        self.assumed = [self.terms.formula(one.condition) for one in self.assumptions]
         columns = [str(name) for name in entry["columns"]]
         self.forms = [self.read_form([(columns[c], k) for c, k in form]) for form in entry["forms"]]
         self.tree: list[list[Any]] = list(entry["tree"])
         self.cover = table.default is None or table.default.unreachable
+        self.questions: list[Debt] = []
+
+    def condition(self, expr: Expr) -> Formula:
+        """A condition as a formula; of one leaf, as far as can be, the keys for which it holds."""
+        formula = self.terms.formula(expr)
+        names = set(map(str, read_by(expr)))
+        if len(names) != 1:
+            return formula
+        [name] = names
+        box = _one_form(formula, ((name, 1),), self.terms.range[name]) or self.tried(expr, name)
+        return formula if box is None else (((name, 1),), box)
+
+    def tried(self, expr: Expr, name: str) -> Box | None:
+        """The keys for which the condition holds, each tried; None where there are many, or it is undefined for one."""
+        low, high = self.terms.range[name]
+        leaf = self.start.leaves[name]
+        if high - low >= SMALL or leaf.sort == REAL:
+            return None
+        run = Run(self.start, "")
+        holds = run.evaluate(expr)
+        defined = run.terms.every(run.terms.follows(owed.path, owed.good) for owed in run.owed)
+        keys = np.arange(low, high + 1) if leaf.sort == BOOL else np.array(range(low, high + 1), dtype=object)
+        cases = {leaf: keys.astype(bool) if leaf.sort == BOOL else keys}
+        if not values_in(defined, cases, len(keys)).all():
+            return None
+        holding = keys[values_in(holds, cases, len(keys))]
+        return _union(iter([((int(key), int(key)),) for key in holding]))
 
     def read_form(self, terms: list[tuple[str, int]]) -> tuple[Form, int]:
         """The canonical form, and -1 where the certificate has it with the opposite sign."""
@@ -243,6 +238,7 @@ class _Checker:
         return form, sign
 
     def range(self, form: Form, bounds: Bounds) -> tuple[int, int]:
+        """The form's bounds in a region."""
         return bounds.get(form) or self.terms.span(form)
 
     def judge(self, formula: Formula, bounds: Bounds) -> Formula:
@@ -254,13 +250,22 @@ class _Checker:
             return (form, inside) if inside and inside != ((low, high),) else All(()) if inside else AnyOf(())
         kind, other = (All, AnyOf) if isinstance(formula, All) else (AnyOf, All)
         parts: list[Formula] = []
+        boxes: dict[Form, Box] = {}
         for part in (self.judge(part, bounds) for part in formula.parts):
             if part == other(()):
                 return other(())
-            parts += part.parts if isinstance(part, kind) else (part,)
-        if kind is AnyOf and parts and all(isinstance(p, tuple) and p[0] == parts[0][0] for p in parts):  # type: ignore[index]  # the first is a tuple then
-            joined = parts[0][0], _union(p[1] for p in parts if isinstance(p, tuple))  # type: ignore[index]  # as above
-            return joined if len(parts) == 1 else self.judge(joined, bounds)
+            for one in part.parts if isinstance(part, All | AnyOf) and isinstance(part, kind) else (part,):
+                if not isinstance(one, tuple):
+                    parts.append(one)
+                elif one[0] not in boxes:
+                    boxes[one[0]] = one[1]
+                else:
+                    boxes[one[0]] = (_meet if kind is All else _join)(boxes[one[0]], one[1])
+        for form, box in boxes.items():  # what speaks of one form is one box of it
+            low, high = self.range(form, bounds)
+            if box == (((low, high),) if kind is AnyOf else ()):
+                return other(())
+            parts.append((form, box))
         return parts[0] if len(parts) == 1 else kind(tuple(parts))
 
     def line(self, index: int, parts: Iterator[Formula]) -> _Line | None:
@@ -285,8 +290,12 @@ class _Checker:
             line.index, iter([*kept, *(self.judge(part, bounds) for part in (*old, *line.rest))])
         )
 
-    def check(self) -> list[str]:
-        """Every node, in preorder; what the proof rests on."""
+    def check(self) -> None:
+        """Every node, in preorder.
+
+        Raises:
+            RejectedError: A node does not hold, or the tree is not that of all inputs.
+        """
         stack: list[tuple[Bounds, list[_Line]]] = [({}, self.lines)]
         for node in self.tree:
             if not stack:
@@ -298,18 +307,18 @@ class _Checker:
                 raise RejectedError(f"a leaf does not hold: {node}"[:200])
         if stack:
             raise RejectedError("the tree leaves a region out")
-        return self.rests
 
     def split(
         self, bounds: Bounds, lines: list[_Line], number: int, cut: int
     ) -> list[tuple[Bounds, list[_Line]]]:
+        """The two parts of a region, the first on top of the stack."""
         form, sign = self.forms[number]
         low, high = self.range(form, bounds)
         first, second = ((low, cut), (cut + 1, high)) if sign > 0 else ((-cut, high), (low, -cut - 1))
         if type(cut) is not int or number < 0 or first[0] > first[1] or second[0] > second[1]:
             raise RejectedError("a split is out of its region")
         sides = []
-        for side in (second, first):  # the first is on top of the stack
+        for side in (second, first):
             inner = {**bounds, form: side}
             sides.append(
                 (inner, [kept for line in lines if (kept := self.within(line, form, inner)) is not None])
@@ -332,11 +341,63 @@ class _Checker:
             return [(line.index, line.boxes, line.rest) for line in lines] == [(rest[0], {}, ())]
         if kind == "b":
             return self.counts(bounds, lines, *rest)
-        solver = self.refuter and self.refuter(
-            self.program, self.table, self.names, bounds, tuple(line.index for line in lines)
-        )
-        self.rests.append(f"table `{self.table.name}`: {solver}")
-        return kind == "z" and bool(solver)
+        return kind == "z" and self.left(bounds, [line.index for line in lines])
+
+    def left(self, bounds: Bounds, candidates: list[int]) -> bool:
+        """Hands on that exactly one of the candidates holds in the region; whether it can be said."""
+        if len(candidates) > MOST_PAIRED:
+            return False
+        terms, condition = self.start.terms, self.start.condition
+        lines = [
+            terms.every(condition(test.condition) for test in self.table.lines[at].tests if test is not None)
+            for at in candidates
+        ]
+        good = [terms.negation(terms.every(pair)) for pair in combinations(lines, 2)]
+        if self.cover:
+            good.append(terms.some(lines))
+        known = [*(condition(one.condition) for one in self.assumptions)]
+        for form, (low, high) in bounds.items():
+            known += self.within_bounds(form, low, high)
+        name = f"table `{self.table.name}`: exactly one line matches in region {len(self.questions) + 1}"
+        owed = Owed(name, self.table.span, terms.true, terms.every(good), 0)
+        self.questions.append(Debt(tuple(known), (owed,)))
+        return True
+
+    def within_bounds(self, form: Form, low: int, high: int) -> list[Term]:
+        """`low <= form <= high` as far as terms say it; of the distance of two doubles only which is greater."""
+        make, terms = self.start.terms.make, self.start.terms
+        parts = [(self.start.condition(self.terms.terms[name]), k) for name, k in form]
+        if any(term.sort == REAL for term, _ in parts):
+            if len(parts) == 1:
+                ends = [
+                    real_of_key(max(low, self.span_of(form)[0])),
+                    real_of_key(min(high, self.span_of(form)[1])),
+                ]
+                least, greatest = (terms.constant(REAL, end) for end in ends)
+                return [make("<=", least, parts[0][0]), make("<=", parts[0][0], greatest)]
+            if [k for _, k in parts] != [1, -1]:
+                return []
+            (one, _), (two, _) = parts
+            said = [
+                ("<", one, two, high <= -1),
+                ("<=", one, two, high <= 0),
+                ("<", two, one, low >= 1),
+                ("<=", two, one, low >= 0),
+            ]
+            return [make(op, left, right) for op, left, right, true in said if true]
+        total = terms.constant(INT, 0)
+        for term, k in parts:
+            number = (
+                terms.choice(term, terms.constant(INT, 1), terms.constant(INT, 0))
+                if term.sort == BOOL
+                else term
+            )
+            total = make("+", total, make("*", terms.constant(INT, k), number))
+        return [make("<=", terms.constant(INT, low), total), make("<=", total, terms.constant(INT, high))]
+
+    def span_of(self, form: Form) -> tuple[int, int]:
+        """The form's range over the declared ranges."""
+        return self.terms.span(form)
 
     def is_empty(self, bounds: Bounds, multipliers: list[list[int]]) -> bool:
         """Whether the bounds, times the multipliers, add up to 0 <= a negative number."""
@@ -406,6 +467,23 @@ def _disjoint(lines: list[dict[Form, Box]], forms: list[Form]) -> Iterator[bool]
         yield not len(left)
 
 
+def _one_form(formula: Formula, form: Form, ends: tuple[int, int]) -> Box | None:
+    """The keys for which a formula about one form holds; None where it speaks of another."""
+    if isinstance(formula, tuple):
+        return formula[1] if formula[0] == form else None
+    box: Box = (ends,) if isinstance(formula, All) else ()
+    for part in formula.parts:
+        inner = _one_form(part, form, ends)
+        if inner is None:
+            return None
+        box = _meet(box, inner) if isinstance(formula, All) else _join(box, inner)
+    return box
+
+
+def _plain(expr: Expr) -> bool:
+    return not isinstance(expr, Apply | Among)
+
+
 def _ordered(expr: Expr) -> bool:
     """Whether keys order the values: no infinity or NaN can be among them."""
     return not isinstance(expr.type, Real) or abs(expr.type.low) + abs(expr.type.high) < float("inf")
@@ -413,6 +491,10 @@ def _ordered(expr: Expr) -> bool:
 
 def _meet(left: Box, right: Box) -> Box:
     return tuple((max(a, c), min(b, d)) for a, b in left for c, d in right if max(a, c) <= min(b, d))
+
+
+def _join(left: Box, right: Box) -> Box:
+    return _union(iter((left, right)))
 
 
 def _size(box: Box) -> int:

@@ -1,0 +1,269 @@
+"""What a program owes besides its tables' exactly-one: derived from the program, never from a certificate.
+
+In: a program, and for each table the assumptions whose failure stops the cycle. Out: runs with what they owe, and under
+which hypotheses. A cycle admits inputs, takes deferred values, runs preprocess, stops where a stopping assumption fails, matches, runs a
+line's actions and then postprocess; it may also end wherever an extern procedure's result is refused. Owed is:
+
+- every invariant is defined for all values, holds at first, and is kept by each step of a cycle, also where it ends early;
+- initial values lie in their ranges;
+- assumptions, selectors and the conditions of deferred values are defined wherever the invariants hold; a table's conditions
+  wherever its stopping assumptions hold, too;
+- an assumption that is declared `proved` follows from ranges and invariants;
+- nothing overflows, leaves a range or an array, divides by zero or reads what is not assigned: in each line (with its conditions), in
+  what levels run before and after their tables, and in procedures that nothing calls (for all parameters);
+- no two actions of a line write different values to one output.
+
+The steps are those of `rcsc/interpret.py`; the argument is induction over them.
+"""
+
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+from rcsc.certify.run import Owed, Run, Start, TooLongError
+from rcsc.certify.values import Term, ends_of, sort_of
+from rcsc.model import (
+    Action,
+    Assumption,
+    Call,
+    Default,
+    Expr,
+    Kind,
+    Level,
+    Line,
+    Procedure,
+    Program,
+    Standing,
+    Table,
+    TableByCommand,
+    pending,
+)
+from rcsc.resolve.leaves import everything, read_by
+from rcsc.source import Span as Written
+
+
+@dataclass(frozen=True, slots=True)
+class Debt:
+    """One run: what it owes wherever the hypotheses hold.
+
+    Attributes:
+        too_long: The name of what could not be followed to its end; then nothing of it is checked.
+    """
+
+    hypotheses: tuple[Term, ...]
+    owed: tuple[Owed, ...]
+    too_long: str = ""
+    written: Written | None = None
+
+
+class _Running(Run):
+    """A run in which a cycle can end early; the invariants are owed there, too."""
+
+    invariants: Collection[tuple[str, Expr, frozenset[str]]] = ()
+
+    def stops(self, procedure: Procedure) -> None:
+        self.keeps(self.invariants, f" where `{procedure.name}` fails")
+
+
+class Debts:
+    """Derives what one program owes."""
+
+    def __init__(self, program: Program, start: Start) -> None:
+        self.program, self.start, self.terms = program, start, start.terms
+        self.invariants = [
+            (str(one.name), one.condition, frozenset(map(str, read_by(one.condition))))
+            for one in self.program.invariants
+        ]
+        self.holding = tuple(start.condition(condition) for _, condition, _ in self.invariants)
+
+    def all(self) -> Iterator[Debt]:
+        """Everything."""
+        yield self._first()
+        yield from self._conditions()
+        yield self._deferred()
+        for level in self.program.levels:
+            yield self._calls(level, "preprocess", level.preprocess)
+            yield self._calls(level, "postprocess", level.postprocess)
+        yield from self._uncalled()
+        for table in self.program.tables:
+            yield from self._table(table)
+
+    def stopping(self, table: Table) -> tuple[Term, ...]:
+        """What holds when the table is matched: invariants and the stopping assumptions."""
+        known = (one.condition for one in self.program.assumptions if one.name in table.stops)
+        return (*self.holding, *map(self.start.condition, known))
+
+    # --- conditions ---
+
+    def _first(self) -> Debt:
+        run = Run(self.start, "at first")
+        for one in self.program.variables:
+            initial = self.terms.constant(sort_of(one.type), one.initial)
+            run.state.leaves[one.name] = initial
+            low, high = ends_of(one.type)
+            good = low <= initial.low and initial.high <= high
+            if not good:
+                run.owe(f"`{one.name}` lies in its range", self.terms.false, one.span)
+        for name, condition, reads in self.invariants:
+            inputs = [
+                one.name for one in self.program.variables if one.kind is Kind.INPUT and one.name in reads
+            ]
+            good_ = self.terms.false if inputs else Run.evaluate(_at(run), condition)
+            run.owe(f"invariant `{name}` holds", good_)
+        return Debt((), tuple(run.owed))
+
+    def _defined(self, condition: Expr, what: str, known: Sequence[Term], cell: Written) -> Debt:
+        run = Run(self.start, what, cell)
+        run.evaluate(condition)
+        return Debt(tuple(known), tuple(run.owed))
+
+    def _conditions(self) -> Iterator[Debt]:
+        for one in self.program.invariants:
+            yield self._defined(one.condition, f"invariant `{one.name}`", (), one.span)
+        for leaf in self.program.variables:
+            if leaf.deferred_until is not None:
+                yield self._defined(
+                    leaf.deferred_until, f"`deferred until` of `{leaf.name}`", self.holding, leaf.span
+                )
+        for level in self.program.levels:
+            if isinstance(level.tables, TableByCommand):
+                yield self._defined(
+                    level.tables.selector, f"`table by` of level `{level.name}`", self.holding, level.span
+                )
+        for assumption in self.program.assumptions:
+            yield self._assumption(assumption)
+
+    def _assumption(self, assumption: Assumption) -> Debt:
+        run = Run(self.start, f"assumption `{assumption.name}`", assumption.span)
+        good = run.evaluate(assumption.condition)
+        if assumption.standing is Standing.PROVED:
+            run.owe("follows from ranges and invariants", good)
+        return Debt(self.holding, tuple(run.owed))
+
+    # --- what runs outside lines ---
+
+    def _deferred(self) -> Debt:
+        """All deferred values whose condition holds are taken at once."""
+        deferred = [one for one in self.program.variables if one.deferred_until is not None]
+        run = Run(self.start, "taking deferred values")
+        taken = [
+            (one.name, self.start.leaves[pending(one.name)], self.start.condition(one.deferred_until))
+            for one in deferred
+            if one.deferred_until is not None
+        ]
+        for name, value, when in taken:
+            run.write(name, value, when)
+        run.keeps(self.invariants)
+        return Debt(self.holding, tuple(run.owed))
+
+    def _running(self, where: str, cell: Written) -> _Running:
+        run = _Running(self.start, where, cell)
+        run.invariants = self.invariants
+        return run
+
+    def _calls(self, level: Level, words: str, names: Iterable[str]) -> Debt:
+        run = self._running(f"`{words}` of level `{level.name}`", level.span)
+        try:
+            for name in names:
+                run.call(self.start.procedures[name], [])
+        except (TooLongError, RecursionError):
+            return Debt((), (), run.where, level.span)
+        run.keeps(self.invariants)
+        return Debt(self.holding, tuple(run.owed))
+
+    def _uncalled(self) -> Iterator[Debt]:
+        """Procedures that no line and no level runs, for all values of their parameters."""
+        reached = {
+            str(name) for level in self.program.levels for name in (*level.preprocess, *level.postprocess)
+        }
+        reached |= {
+            str(call.procedure)
+            for call in _calls_of(action for line in self._lines() for action in line.actions)
+        }
+        waiting = list(reached)
+        while waiting:
+            inner = everything(self.start.procedures[waiting.pop()].body)
+            new = {str(one.procedure) for one in inner if isinstance(one, Call)} - reached
+            reached |= new
+            waiting += new
+        for procedure in self.program.procedures:
+            if procedure.name not in reached:
+                yield self._alone(procedure)
+
+    def _lines(self) -> Iterator[Line | Default]:
+        for table in self.program.tables:
+            yield from table.lines
+            if table.default is not None:
+                yield table.default
+
+    def _alone(self, procedure: Procedure) -> Debt:
+        run = Run(self.start, f"procedure `{procedure.name}`", procedure.span)
+        try:
+            given = [(run.any_value(one.name, one.type), one.span) for one in procedure.params]
+            run.call(procedure, given)
+        except (TooLongError, RecursionError):
+            return Debt((), (), run.where, procedure.span)
+        return Debt((), tuple(run.owed))
+
+    # --- tables ---
+
+    def _table(self, table: Table) -> Iterator[Debt]:
+        stopping = self.stopping(table)
+        seen: set[int] = set()
+        for line in table.lines:
+            for at, test in enumerate(line.tests):
+                if test is not None and id(test) not in seen:
+                    seen.add(id(test))
+                    yield self._defined(
+                        test.condition, f"a condition of table `{table.name}`", stopping, line.cell_span(at)
+                    )
+        for line in (*table.lines, *((table.default,) if table.default is not None else ())):
+            yield self._line(table, line, stopping)
+
+    def _line(self, table: Table, line: Line | Default, stopping: tuple[Term, ...]) -> Debt:
+        where = f"line `{line.name}` of table `{table.name}`"
+        run = self._running(where, line.span)
+        try:
+            self._actions(run, line.actions)
+        except (TooLongError, RecursionError):
+            return Debt((), (), where, line.span)
+        run.cell = line.span
+        run.keeps(self.invariants)
+        if not run.owed:
+            return Debt((), ())
+        if isinstance(line, Line):
+            return Debt((*stopping, *self._tests(line)), tuple(run.owed))
+        others = (self.terms.every(self._tests(other)) for other in table.lines)
+        return Debt((*stopping, *map(self.terms.negation, others)), tuple(run.owed))
+
+    def _tests(self, line: Line) -> list[Term]:
+        """That each condition of the line holds."""
+        return [self.start.condition(test.condition) for test in line.tests if test is not None]
+
+    def _actions(self, run: _Running, actions: Iterable[Action]) -> None:
+        """Left to right; an output that two of them write gets one value."""
+        outputs = {str(one.name) for one in self.program.variables if one.kind is Kind.OUTPUT}
+        wrote: dict[str, Term] = {}
+        for action in actions:
+            before, run.state.wrote = dict(run.state.leaves), {}
+            run.state.local, run.state.assigned = {}, {}
+            run.cell = action.statement.span
+            run.execute((action.statement,))
+            for name, now in run.state.wrote.items():
+                if name in wrote and name in outputs:
+                    twice = self.terms.every((wrote[name], now))
+                    same = self.terms.make("=", before[name], run.state.leaves[name])
+                    run.owe(f"two actions write one value to `{name}`", self.terms.follows(twice, same))
+                wrote[name] = self.terms.some((wrote.get(name, self.terms.false), now))
+
+
+def _at(run: Run) -> Run:
+    """A run in the same state that owes nothing of its own."""
+    other = Run(run.start, "")
+    other.state = run.state
+    return other
+
+
+def _calls_of(actions: Iterable[Action]) -> Iterator[Call]:
+    for action in actions:
+        if isinstance(action.statement, Call):
+            yield action.statement

@@ -1,0 +1,362 @@
+"""Whether an obligation holds: by spans, by trying every case, or by a solver that is asked in SMT-LIB.
+
+In: hypotheses and an obligation. Out: shown and how, false with a case that shows it, or open. What is settled here without a
+solver needs none of the prover's arithmetic: spans (`known`), and all values of the few variables it speaks of, where these are few.
+Cases are tried with numpy: whole numbers of 64 bits where every span fits, else Python's.
+"""
+
+import operator
+import random
+import struct
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from enum import Enum, auto
+from math import isfinite, prod
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from rcsc.certify.known import Known
+from rcsc.certify.values import BOOL, INT, REAL, Number, Term, Terms, parts_first
+
+MOST_WORK = 4_000_000
+"""Cases times terms that are tried for one obligation."""
+SAMPLES = 200
+"""Cases picked from the ends of variables and the constants they meet, where there are too many to try all."""
+_FIT = 2**62
+
+
+class Answer(Enum):
+    """What a solver says of a question: is there a case in which the obligation fails?"""
+
+    NONE = auto()
+    SOME = auto()
+    UNKNOWN = auto()
+
+
+Ask: TypeAlias = Callable[[str], Answer]
+"""Puts a question in SMT-LIB to a solver that has no part in the proof."""
+Cases: TypeAlias = Mapping[Term, Any]
+"""For each variable an array of its values, one a case."""
+
+
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """It holds."""
+
+    by: str
+
+
+@dataclass(frozen=True, slots=True)
+class Fails:
+    """It does not; the values of a case, by variable."""
+
+    case: tuple[tuple[str, Number], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Left:
+    """It was not settled; the question that would settle it."""
+
+    question: str
+
+
+Outcome: TypeAlias = Shown | Fails | Left
+
+
+class Settler:
+    """Settles obligations of one program.
+
+    Attributes:
+        first: A value for each variable, of the first cycle.
+    """
+
+    def __init__(self, terms: Terms, ask: Ask | None, first: Mapping[str, Number]) -> None:
+        self.terms, self.ask, self.first = terms, ask, first
+
+    def settle(self, hypotheses: Sequence[Term], path: Term, good: Term, known: Known) -> Outcome:
+        """Whether `good` holds wherever the path is taken; `known` are the spans on the path."""
+        if known.impossible or known.span(good) == (1, 1):
+            return Shown("spans")
+        bad = self.terms.every((path, self.terms.negation(good)))
+        if bad is self.terms.false:
+            return Shown("spans")
+        tried = self._every_case(hypotheses, bad, known) or self._some_cases(hypotheses, bad)
+        if tried is not None:
+            return tried
+        question = script([*hypotheses, bad])
+        answer = Answer.UNKNOWN if self.ask is None else self.ask(question)
+        if answer is Answer.NONE:
+            return Shown("solver")
+        return Fails(()) if answer is Answer.SOME else Left(question)
+
+    def _every_case(self, hypotheses: Sequence[Term], bad: Term, known: Known) -> Outcome | None:
+        """All values of what the obligation speaks of, and of what hypotheses tie to that while these are few.
+
+        Hypotheses that speak of nothing of it are tried after it, part by part: a case that fails is one only where they can hold.
+        """
+        rest, case = list(hypotheses), dict[str, Number]()
+        wanted = bad
+        while True:
+            together = _tied(wanted, rest, known)
+            if together is None:
+                return None
+            found = _where(
+                self.terms.every((wanted, *together)), cases := _crossed(variables(wanted, *together), known)
+            )
+            if found is None:
+                return None
+            if not len(found):
+                return Shown("cases")  # the obligation cannot fail, or the hypotheses cannot hold
+            case |= dict(_row(cases, int(found[0])))
+            rest = [one for one in rest if one not in together]
+            if not rest:
+                return Fails(tuple(sorted(case.items())))
+            if any(name in case for one in rest for name in (leaf.name for leaf in variables(one))):
+                return None  # a hypothesis that ties too much together was left out
+            wanted = rest[0]
+
+    def _some_cases(self, hypotheses: Sequence[Term], bad: Term) -> Outcome | None:
+        """A case among some in which it fails."""
+        wrong = self.terms.every((*hypotheses, bad))
+        wanted = variables(wrong)
+        picked = random.Random(len(wanted))  # noqa: S311 - the same cases in every run
+        edges = _edges(wrong)
+        columns = {}
+        for one in wanted:
+            ends = [one.low, one.high, *(edge for edge in edges[one.sort] if one.low <= edge <= one.high)]
+            start = self.first.get(one.name, one.low)
+            columns[one] = _array(
+                one.sort, [start, one.low, one.high, *picked.choices(ends, k=SAMPLES)], wide=True
+            )
+        failing = _where(wrong, columns)
+        return (
+            Fails(tuple(sorted(_row(columns, int(failing[0])))))
+            if failing is not None and len(failing)
+            else None
+        )
+
+
+# --- cases -----------------------------------------------------------------------------
+
+
+def _tied(wanted: Term, hypotheses: Sequence[Term], known: Known) -> list[Term] | None:
+    """The hypotheses that are tied to the term, while all cases can be tried; None where there are too many without any."""
+    used: list[Term] = []
+    leaves = set(variables(wanted))
+    if not _few(leaves, known, len(parts_first(wanted))):
+        return None
+    growing = True
+    while growing:
+        growing = False
+        for one in hypotheses:
+            spoken = set(variables(one))
+            if one in used or (spoken and spoken.isdisjoint(leaves)):
+                continue
+            if _few(leaves | spoken, known, len(parts_first(wanted, *used, one))):
+                leaves |= spoken
+                used.append(one)
+                growing = True
+    return used
+
+
+def variables(*terms: Term) -> list[Term]:
+    """The variables below the terms."""
+    return [term for term in parts_first(*terms) if term.op == "variable"]
+
+
+def _extent(one: Term, known: Known) -> tuple[Number, Number]:
+    return known.span(one) or (one.low, one.high)
+
+
+def _few(wanted: Iterable[Term], known: Known, size: int) -> bool:
+    """Whether all cases of the variables can be tried."""
+    total = size
+    for one in wanted:
+        low, high = _extent(one, known)
+        if one.sort == REAL and low != high:
+            return False
+        total *= 1 if one.sort == REAL else max(0, int(high) - int(low) + 1)
+        if total > MOST_WORK:
+            return False
+    return True
+
+
+def _crossed(wanted: Sequence[Term], known: Known) -> dict[Term, Any]:
+    """Every combination of the variables' values."""
+    axes = []
+    for one in wanted:
+        low, high = _extent(one, known)
+        values = [low] if one.sort == REAL else range(int(low), int(high) + 1)
+        axes.append(_array(one.sort, values))
+    total = prod(len(axis) for axis in axes)
+    if not total:  # a variable that cannot have a value
+        return {one: axis[:0] for one, axis in zip(wanted, axes, strict=True)}
+    crossed, before = {}, 1
+    for one, axis in zip(wanted, axes, strict=True):
+        crossed[one] = np.tile(np.repeat(axis, total // (before * len(axis))), before)
+        before *= len(axis)
+    return crossed
+
+
+def _array(sort: str, values: Iterable[Number], *, wide: bool = False) -> Any:
+    listed = list(values)
+    if sort == BOOL:
+        return np.array(listed, dtype=bool)
+    if sort == REAL:
+        return np.array(listed, dtype=np.float64)
+    narrow = not wide and all(abs(value) < _FIT for value in listed)
+    return np.array(listed, dtype=np.int64 if narrow else object)
+
+
+def _row(cases: Cases, at: int) -> Iterator[tuple[str, Number]]:
+    """One case: values by the names of variables."""
+    return ((one.name, column[at : at + 1].tolist()[0]) for one, column in cases.items())
+
+
+def _edges(term: Term) -> Mapping[str, list[Number]]:
+    """Constants in the term and their neighbours, by sort."""
+    found: dict[str, list[Number]] = {BOOL: [0, 1], INT: [0, 1, -1], REAL: [0.0, 1.0, -1.0]}
+    for part in parts_first(term):
+        if part.op == "constant" and part.sort != BOOL:
+            found[part.sort] += [part.low, part.low - 1, part.low + 1]
+    return {sort: sorted(set(values)) for sort, values in found.items()}
+
+
+def _where(condition: Term, cases: Cases) -> Any:
+    """Numbers of the cases in which the condition is true; None where numpy's doubles cannot say."""
+    count = max((len(column) for column in cases.values()), default=1)
+    with np.errstate(all="ignore"):
+        try:
+            return np.flatnonzero(values_in(condition, cases, count))
+        except OverflowError:
+            return None
+
+
+def values_in(wanted: Term, cases: Cases, count: int) -> Any:
+    """The term's value in each case, as an array.
+
+    Raises:
+        OverflowError: A whole number is too large to become a double.
+    """
+    # whole numbers stay in 64 bits where the spans of all of them do
+    known = Known((), ())
+    parts = parts_first(wanted)
+    spans = [known.span(part) for part in parts if part.sort == INT]
+    wide = any(span is None or not all(isfinite(end) and abs(end) < _FIT for end in span) for span in spans)
+    found: dict[Term, Any] = {}
+    for part in parts:
+        if part.op == "constant":
+            column = np.repeat(_array(part.sort, [part.low], wide=wide), count)
+        elif part.op == "variable":
+            column = cases[part].astype(object) if wide and part.sort == INT else cases[part]
+            column = column.astype(np.int64) if not wide and part.sort == INT else column
+        else:
+            column = _computed(part, [found[arg] for arg in part.args], wide)
+        found[part] = column
+    return found[wanted].astype(bool) if wanted.sort == BOOL else found[wanted]
+
+
+def _computed(term: Term, args: Sequence[Any], wide: bool) -> Any:
+    """One operation in every case."""
+    one, two = args[0], args[-1]
+    match term.op:
+        case "kept":
+            return one
+        case "not":
+            return ~one.astype(bool)
+        case "and" | "or":
+            join = np.logical_and if term.op == "and" else np.logical_or
+            return join.reduce([arg.astype(bool) for arg in args])
+        case "ite":
+            return np.where(one.astype(bool), args[1], args[2])
+        case "=" | "<" | "<=":
+            compare = {"=": operator.eq, "<": operator.lt, "<=": operator.le}[term.op]
+            return compare(one, two).astype(bool)
+        case "real":
+            return np.array([float(value) for value in one.tolist()], dtype=np.float64)
+        case "int":
+            whole = [int(value) if isfinite(value) else 0 for value in one.tolist()]
+            return np.array(whole, dtype=object if wide else np.int64)
+        case "/" | "mod" if term.sort == INT:
+            return _divided(term.op, one, two)
+        case _:
+            return _NUMBERS[term.op](*args)
+
+
+_NUMBERS: Mapping[str, Callable[..., Any]] = {
+    "neg": operator.neg, "abs": abs, "+": operator.add, "-": operator.sub, "*": operator.mul, "/": operator.truediv,
+}  # fmt: skip
+
+
+def _divided(op: str, one: Any, two: Any) -> Any:
+    """The quotient toward zero, or what it leaves; 0 where the divisor is 0."""
+    divisor = np.where(two == 0, 1, two)
+    quotient = abs(one) // abs(divisor)
+    quotient = np.where((one < 0) == (divisor < 0), quotient, -quotient)
+    return np.where(two == 0, 0, quotient if op == "/" else one - divisor * quotient)
+
+
+# --- SMT-LIB ---------------------------------------------------------------------------
+
+_PRELUDE = """(set-logic ALL)
+(define-fun over ((a Int) (b Int)) Int (ite (= b 0) 0 (ite (= (< a 0) (< b 0)) (div (abs a) (abs b)) (- (div (abs a) (abs b))))))
+(define-fun rest ((a Int) (b Int)) Int (ite (= b 0) 0 (- a (* b (over a b)))))
+"""
+_DOUBLES = {
+    "=": "fp.eq", "<": "fp.lt", "<=": "fp.leq", "+": "fp.add RNE", "-": "fp.sub RNE", "*": "fp.mul RNE",
+    "/": "fp.div RNE", "neg": "fp.neg", "abs": "fp.abs", "ite": "ite",
+}  # fmt: skip
+_WHOLE = {"/": "over", "mod": "rest", "neg": "-"}
+_SORTS = {BOOL: "Bool", INT: "Int", REAL: "Float64"}
+
+
+def script(conditions: Collection[Term]) -> str:
+    """The conditions over the ranges of their variables: `unsat` says that no case satisfies them all."""
+    lines, names = [_PRELUDE], dict[Term, str]()
+    for number, term in enumerate(parts_first(*conditions)):
+        sort = _SORTS[term.sort]
+        if term.op == "constant":
+            names[term] = _constant(term.sort, term.low)
+        elif term.op == "variable":
+            names[term] = f"v{number}"
+            lines.append(f"(declare-const v{number} {sort}) ; {term.name}\n{_ranged(f'v{number}', term)}")
+        elif term.op == "kept":
+            names[term] = names[term.args[0]]
+        else:
+            names[term] = f"t{number}"
+            lines.append(
+                f"(define-fun t{number} () {sort} {_spelled(term, [names[part] for part in term.args])})\n"
+            )
+    lines += [f"(assert {names[term]})\n" for term in conditions]
+    return "".join([*lines, "(check-sat)\n"])
+
+
+def _constant(sort: str, value: Number) -> str:
+    if sort == BOOL:
+        return "true" if value else "false"
+    if sort == REAL:
+        bits = f"{struct.unpack('<Q', struct.pack('<d', value))[0]:064b}"
+        return f"(fp #b{bits[0]} #b{bits[1:12]} #b{bits[12:]})"
+    return str(value) if value >= 0 else f"(- {-value})"
+
+
+def _ranged(name: str, term: Term) -> str:
+    if term.sort == BOOL:
+        return ""
+    low, high = _constant(term.sort, term.low), _constant(term.sort, term.high)
+    if term.sort == INT:
+        return f"(assert (<= {low} {name} {high}))\n"
+    plus = f"(not (and (fp.isNegative {name}) (fp.isZero {name})))"
+    return f"(assert (and (fp.leq {low} {name}) (fp.leq {name} {high}) {plus}))\n"
+
+
+def _spelled(term: Term, args: Sequence[str]) -> str:
+    shown = " ".join(args)
+    if term.op == "real":
+        return f"((_ to_fp 11 53) RNE (to_real {shown}))"
+    if term.op == "int":
+        nothing = f"(or (fp.isNaN {shown}) (fp.isInfinite {shown}))"
+        return f"(ite {nothing} 0 (to_int (fp.to_real (fp.roundToIntegral RTZ {shown}))))"
+    of = _DOUBLES if term.args[0].sort == REAL else _WHOLE
+    return f"({of.get(term.op, term.op)} {shown})"

@@ -1,0 +1,266 @@
+"""Values of a symbolic run as terms, and the spans that they stay in.
+
+Terms are built as the program computes; only constants are folded, since loops are unrolled. Every operation is
+total here: `a / 0` and `a mod 0` are 0, and the whole number of a NaN or an infinity is 0. That a program meets none of these
+is an obligation of its own (`run`), and no other obligation then depends on what stands there.
+
+A *span* is the least and the greatest value of a term; it is None where the term may be a NaN. Infinite ends
+are no NaN. Doubles round to nearest even, which is monotone: the ends of a result are results of ends.
+"""
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from rcsc.model import Bool, Real, Scalar, Value, key_bounds
+
+Number: TypeAlias = int | float
+Span: TypeAlias = tuple[Number, Number] | None
+
+BOOL, INT, REAL = "Bool", "Int", "Real"
+FREE: tuple[Number, Number] = (-math.inf, math.inf)
+TRUTHS: tuple[Number, Number] = (0, 1)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Term:
+    """One value; terms built alike are one object.
+
+    Attributes:
+        op: `constant`, `variable`, `not`, `and`, `or`, `ite`, `=`, `<`, `<=`, `+`, `-`, `*`, `/`, `mod`, `neg`, `abs`, `int`,
+            `real`, or `kept`: its only part, which obligation number `debt` owes to lie in `low .. high`.
+        sort: `Bool`, `Int` (enumeration members too) or `Real`.
+        low, high: Of a constant its value twice, of a variable the ends of its type.
+        name: Of a variable.
+    """
+
+    op: str
+    args: "tuple[Term, ...]"
+    sort: str
+    low: Number = 0
+    high: Number = 0
+    name: str = ""
+    debt: int = -1
+
+
+def sort_of(kind: Scalar) -> str:
+    """The sort of the type's values."""
+    return BOOL if isinstance(kind, Bool) else REAL if isinstance(kind, Real) else INT
+
+
+def ends_of(kind: Scalar) -> tuple[Number, Number]:
+    """Least and greatest value of the type, truths and members as integers."""
+    return (kind.low, kind.high) if isinstance(kind, Real) else key_bounds(kind)
+
+
+class Terms:
+    """Builds terms."""
+
+    def __init__(self) -> None:
+        self._known: dict[tuple[object, ...], Term] = {}
+        self.true, self.false = self.constant(BOOL, 1), self.constant(BOOL, 0)
+
+    def _one(self, term: Term) -> Term:
+        ends = (repr(term.low), repr(term.high))
+        key = (term.op, term.sort, *ends, term.name, term.debt, *map(id, term.args))
+        return self._known.setdefault(key, term)
+
+    def constant(self, sort: str, value: Value) -> Term:
+        """A constant."""
+        point = float(value) if sort == REAL else int(value)
+        return self._one(Term("constant", (), sort, point, point))
+
+    def variable(self, name: str, kind: Scalar) -> Term:
+        """Any value of the type."""
+        return self._one(Term("variable", (), sort_of(kind), *ends_of(kind), name))
+
+    def kept(self, inner: Term, low: Number, high: Number, debt: int) -> Term:
+        """The value, where obligation `debt` holds: then it lies in `low .. high`."""
+        return self._one(Term("kept", (inner,), inner.sort, low, high, debt=debt))
+
+    def make(self, op: str, *args: Term) -> Term:
+        """An operation on numbers, or a comparison."""
+        sort = BOOL if op in ("=", "<", "<=") else {"int": INT, "real": REAL}.get(op, args[0].sort)
+        made = Term(op, args, sort)
+        if all(arg.op == "constant" for arg in args):
+            span = spanned(made, [(arg.low, arg.high) for arg in args])
+            if span is not None and span[0] == span[1] and math.isfinite(span[0]):
+                return self.constant(sort, span[0])
+        return self._one(made)
+
+    def negation(self, one: Term) -> Term:
+        """Its opposite."""
+        if one.op == "constant":
+            return self.false if one.low else self.true
+        return one.args[0] if one.op == "not" else self._one(Term("not", (one,), BOOL))
+
+    def every(self, parts: Iterable[Term]) -> Term:
+        """All of them."""
+        return self._joined("and", parts, self.true, self.false)
+
+    def some(self, parts: Iterable[Term]) -> Term:
+        """One of them."""
+        return self._joined("or", parts, self.false, self.true)
+
+    def _joined(self, op: str, parts: Iterable[Term], neutral: Term, final: Term) -> Term:
+        flat: dict[Term, None] = {}
+        for part in parts:
+            flat.update(dict.fromkeys(part.args if part.op == op else (part,)))
+        if final in flat:
+            return final
+        kept = tuple(part for part in flat if part is not neutral)
+        return kept[0] if len(kept) == 1 else self._one(Term(op, kept, BOOL)) if kept else neutral
+
+    def follows(self, one: Term, two: Term) -> Term:
+        """The second wherever the first."""
+        return self.some((self.negation(one), two))
+
+    def choice(self, condition: Term, one: Term, two: Term) -> Term:
+        """The first where the condition holds, else the second."""
+        if condition.op == "constant":
+            return one if condition.low else two
+        return one if one is two else self._one(Term("ite", (condition, one, two), one.sort))
+
+
+# --- spans -----------------------------------------------------------------------------
+
+
+def spanned(term: Term, spans: Sequence[Span]) -> Span:
+    """The span of a term by those of its parts."""
+    if term.op in ("constant", "variable"):
+        return term.low, term.high
+    if term.op in ("not", "and", "or"):
+        return _logic(term.op, [TRUTHS if span is None else span for span in spans])
+    if term.op == "ite":
+        return _chosen(term, spans)
+    if any(span is None for span in spans):
+        return TRUTHS if term.sort == BOOL else FREE if term.sort == INT else None
+    known = [span for span in spans if span is not None]
+    if term.op in ("=", "<", "<="):
+        return _compared(term.op, term.args, *known)
+    if term.args[0].sort == REAL:
+        return _of_doubles(term.op, known)
+    return _of_integers(term.op, known)
+
+
+def _logic(op: str, spans: Sequence[tuple[Number, Number]]) -> Span:
+    if op == "not":
+        return 1 - spans[0][1], 1 - spans[0][0]
+    join = min if op == "and" else max
+    return join(low for low, _ in spans), join(high for _, high in spans)
+
+
+def _chosen(term: Term, spans: Sequence[Span]) -> Span:
+    """Of both sides, each where the condition lets it be; None only where a side may be a NaN."""
+    condition = spans[0] or TRUTHS
+    if condition[0] == condition[1]:
+        return spans[1] if condition[0] else spans[2]
+    one, two = spans[1], spans[2]
+    if one is None or two is None:
+        return None
+    one = _beside(term.args[0], term.args[1], one, term.args, spans, True)
+    two = _beside(term.args[0], term.args[2], two, term.args, spans, False)
+    return min(one[0], two[0]), max(one[1], two[1])
+
+
+def _beside(
+    condition: Term,
+    side: Term,
+    span: tuple[Number, Number],
+    args: Sequence[Term],
+    spans: Sequence[Span],
+    yes: bool,
+) -> tuple[Number, Number]:
+    """The span of a side that the condition itself compares with the other side, or with a constant: least and greatest."""
+    if condition.op not in ("<", "<=") or side not in condition.args:
+        return span
+    at = condition.args.index(side)
+    other = condition.args[1 - at]
+    if other.op == "constant":
+        limit: Span = (other.low, other.high)
+    else:
+        limit = spans[1] if other is args[1] else spans[2] if other is args[2] else None
+    if limit is None:
+        return span
+    below = (at == 0) == yes
+    met = (span[0], min(span[1], limit[1])) if below else (max(span[0], limit[0]), span[1])
+    return met if met[0] <= met[1] else span
+
+
+def _compared(op: str, args: Sequence[Term], one: tuple[Number, Number], two: tuple[Number, Number]) -> Span:
+    same = args[0] is args[1]
+    if op == "=":
+        always, never = same or one[0] == one[1] == two[0] == two[1], one[1] < two[0] or two[1] < one[0]
+    elif op == "<":
+        always, never = one[1] < two[0], same or one[0] >= two[1]
+    else:
+        always, never = same or one[1] <= two[0], one[0] > two[1]
+    return (1, 1) if always else (0, 0) if never else TRUTHS
+
+
+def truncated(a: int, b: int) -> int:
+    """The quotient toward zero; 0 where the divisor is 0."""
+    quotient = abs(a) // abs(b) if b else 0
+    return quotient if (a < 0) == (b < 0) else -quotient
+
+
+def _of_integers(op: str, spans: Sequence[tuple[Number, Number]]) -> Span:
+    if any(not math.isfinite(end) for span in spans for end in span):
+        return FREE if op != "real" else None
+    (a, b), *rest = [(int(low), int(high)) for low, high in spans]
+    if op == "real":
+        return (float(a), float(b)) if max(abs(a), abs(b)) < 2**1000 else None
+    if op == "neg":
+        return -b, -a
+    c, d = rest[0]
+    if op == "+":
+        return a + c, b + d
+    if op == "-":
+        return a - d, b - c
+    if op == "*":
+        found = [a * c, a * d, b * c, b * d]
+    elif op == "/":
+        found = [truncated(x, y) for x in (a, b) for y in (c, d, -1, 1, 0) if c <= y <= d] or [0]
+    elif a == b and c == d:
+        found = [a - c * truncated(a, c) if c else 0]
+    else:
+        most = max(abs(c), abs(d), 1) - 1
+        found = [max(min(a, 0), -most), min(max(b, 0), most)]
+    return min(found), max(found)
+
+
+def _of_doubles(op: str, spans: Sequence[tuple[Number, Number]]) -> Span:
+    (a, b), *rest = [(float(low), float(high)) for low, high in spans]
+    if op == "int":
+        return (int(a), int(b)) if math.isfinite(a) and math.isfinite(b) else FREE
+    if op == "neg":
+        return -b, -a
+    if op == "abs":
+        return (0.0 if a <= 0.0 <= b else min(abs(a), abs(b))), max(abs(a), abs(b))
+    c, d = rest[0]
+    if not all(map(math.isfinite, (a, b, c, d))) or (op == "/" and c <= 0.0 <= d):
+        return None  # an infinity less itself, or times zero, is a NaN
+    if op in ("+", "-"):
+        return (a + c, b + d) if op == "+" else (a - d, b - c)
+    found = [x * y if op == "*" else x / y for x in (a, b) for y in (c, d)]
+    return min(found), max(found)
+
+
+# --- walks -----------------------------------------------------------------------------
+
+
+def parts_first(*terms: Term) -> list[Term]:
+    """Every term once, parts before wholes; without recursion, since runs are long."""
+    found: list[Term] = []
+    seen: set[Term] = set()
+    stack = [(term, False) for term in reversed(terms)]
+    while stack:
+        term, ready = stack.pop()
+        if ready:
+            found.append(term)
+        elif term not in seen:
+            seen.add(term)
+            stack.append((term, True))
+            stack += [(part, False) for part in reversed(term.args)]
+    return found
