@@ -6,7 +6,22 @@ from hypothesis.strategies import SearchStrategy
 from rcsc.syntax import tree
 from rcsc.syntax.tree import Name
 
-NAMES = st.sampled_from(["a", "b", "long_name", "x1", "status", "done", "Z"]).map(Name)
+NAMES = st.sampled_from(
+    [
+        "a",
+        "b",
+        "long_name",
+        "x1",
+        "status",
+        "Z",
+        "DEFAULT",
+        "unreachable",
+        "when",
+        "line",
+        "procedures",
+        "status_out",
+    ]
+).map(Name)
 WORDS = st.lists(st.sampled_from(["why", "a note", "  indented", "x := 3", "|"]), max_size=2).map(tuple)
 DOCS = st.lists(st.sampled_from(["what it is", "in mm"]), max_size=2).map(tuple)
 FACTORS = st.builds(

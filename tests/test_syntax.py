@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from rcsc.diagnostics.codes import Code
 from rcsc.source import Source, Span
 from rcsc.syntax import tree
-from rcsc.syntax.format import format_file
+from rcsc.syntax.format import format_file, format_text
 from rcsc.syntax.parse import MOST_ERRORS, parse
 from rcsc.syntax.spell import spell_expr
 from tests.strategies_syntax import expressions, files
@@ -185,3 +185,35 @@ def test_what_is_long_or_wide_but_not_deep_is_taken() -> None:
         "invariant i : " + "a implies " * 99 + "a\n"
     )
     assert isinstance(parse(Source("case.rcs", text)), tree.File)
+
+
+@pytest.mark.parametrize("said", ["DEFAULT", "DEFAULT unreachable", " DEFAULT  unreachable "])
+@pytest.mark.parametrize("column", [1, 2])
+def test_default_in_another_column_is_an_error(said: str, column: int) -> None:
+    """Also where a value is called so: only the first column makes a DEFAULT line."""
+    cells = ["", "", ""]
+    cells[column] = said
+    head = "enum e { DEFAULT, other }\ninput x : e\ninput y : bool\ntable t {\n  | line | x | x | when ||\n"
+    text = f"{head}  | a | {' | '.join(cells)} ||\n}}\n"
+    assert errors(text) == [("RCS113", 6)]
+    assert not isinstance(format_text(Source("case.rcs", text)), str)
+    assert errors(
+        f"{head}  | a | DEFAULT | {said if column == 1 else ''} | {said if column == 2 else ''} ||\n}}\n"
+    ) == [("RCS108", 6)]
+
+
+def test_values_and_variables_called_like_words_stay_what_they_are() -> None:
+    text = (
+        "enum e { DEFAULT, other }\ninput when : bool\ninput DEFAULT : bool\ninput x : e\noutput procedures : bool\n\n"
+        "table t {\n  | line | (when) | x           | when      || (procedures) |\n"
+        "  |------|--------|-------------|-----------||--------------|\n"
+        "  | a    |        | = DEFAULT   | (DEFAULT) || DEFAULT      |\n"
+        "  | b    | true   | in {DEFAULT}| not DEFAULT || when       |\n}\n"
+    )
+    parsed = parse(Source("case.rcs", text))
+    assert isinstance(parsed, tree.File)
+    formatted = format_file(parsed)
+    assert parse(Source("case.rcs", formatted)) == parsed
+    [table] = [one for one in parsed.declarations if isinstance(one, tree.TableDecl)]
+    assert not any(row.default for row in table.rows)
+    assert [heading.word for heading in (*table.conditions, *table.actions)] == ["", "", "when", ""]

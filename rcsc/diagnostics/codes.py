@@ -24,6 +24,7 @@ class Code(StrEnum):
     PROJECT_FILE = "RCS110"
     NO_TABLES = "RCS111"
     NOT_FORMATTED = "RCS112"
+    DEFAULT_ELSEWHERE = "RCS113"
     # 2xx names and writers
     UNKNOWN_NAME = "RCS201"
     DUPLICATE_NAME = "RCS202"

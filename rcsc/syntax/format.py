@@ -3,11 +3,12 @@
 Comments stand above what they belong to, doc lines directly above the declaration; tables are aligned.
 """
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 
 from rcsc.diagnostics.diagnostic import Diagnostic
 from rcsc.source import Source
 from rcsc.syntax import tree
+from rcsc.syntax.rows import ACTION_WORDS
 from rcsc.syntax.spell import spell_condition, spell_expr, spell_type
 
 _LONE = (tree.Use, tree.UnitDecl, tree.ConstDecl, tree.TypeDecl, tree.VariableDecl, tree.AssumeDecl, tree.InvariantDecl,
@@ -190,8 +191,8 @@ def _simple(one: tree.Assign | tree.Call) -> str:
 def _table(one: tree.TableDecl) -> Iterator[str]:
     assuming = f" assuming {', '.join(name.text for name in one.assuming)}" if one.assuming else ""
     yield f"table {one.name.text}{assuming} {{"
-    left = [["line", *(_heading(h) for h in one.conditions)]]
-    right = [[_heading(h) for h in one.actions]]
+    left = [["line", *(_heading(h, {"when"}) for h in one.conditions)]]
+    right = [[_heading(h, ACTION_WORDS) for h in one.actions]]
     for row in one.rows:
         left.append([row.name, *_conditions(row, one)])
         right.append([_action(cell) for cell in row.actions])
@@ -206,8 +207,12 @@ def _table(one: tree.TableDecl) -> Iterator[str]:
     yield "}"
 
 
-def _heading(heading: tree.Heading) -> str:
-    return heading.word if heading.subject is None else spell_expr(heading.subject)
+def _heading(heading: tree.Heading, words: Collection[str]) -> str:
+    """A heading; a variable that is called like one of the words stands in parentheses."""
+    if heading.subject is None:
+        return heading.word
+    text = spell_expr(heading.subject)
+    return f"({text})" if text in words else text
 
 
 def _conditions(row: tree.Row, table: tree.TableDecl) -> list[str]:

@@ -118,6 +118,10 @@ def _error(code: Code, message: str, span: Span, *helps: str) -> Diagnostic:
     return Diagnostic(code, message, Label(span), help=helps)
 
 
+def _says_default(cell: Cell) -> bool:
+    return cell.text.split() in (["DEFAULT"], ["DEFAULT", "unreachable"])
+
+
 @dataclass(slots=True)
 class _Rows:
     """Parses the rows of a table; each distinct cell text once."""
@@ -169,11 +173,14 @@ class _Rows:
         if not NAME.match(name.text):
             self._report(Code.SYNTAX, "a line needs a name of letters, digits and `_`", name)
         tests = cells.conditions[1:]
-        default = bool(tests) and tests[0].text.split() in (["DEFAULT"], ["DEFAULT", "unreachable"])
-        if default:
-            for cell in tests[1:]:
-                if cell.text:
-                    self._report(Code.DEFAULT_WITH_CONDITIONS, "a DEFAULT line has no conditions", cell)
+        default = bool(tests) and _says_default(tests[0])
+        for cell in tests[1:]:
+            if default and cell.text:
+                self._report(Code.DEFAULT_WITH_CONDITIONS, "a DEFAULT line has no conditions", cell)
+            elif _says_default(cell):
+                what = "DEFAULT stands in the first column of conditions, or nowhere"
+                helps = "write `= DEFAULT` for a value of that name, `(DEFAULT)` under `when`"
+                self._report(Code.DEFAULT_ELSEWHERE, what, cell, helps)
         parsed = tuple(
             None if default else self._condition(cell, heading)
             for cell, heading in zip(tests, conditions, strict=True)
@@ -210,7 +217,7 @@ class _Rows:
         return True
 
     def _condition(self, cell: Cell, heading: tree.Heading) -> tree.Condition | None:
-        if not cell.text:
+        if not cell.text or _says_default(cell):  # which is reported
             return None
         if heading.subject is None:
             whole = self._parse("when", cell)
@@ -241,5 +248,5 @@ class _Rows:
         self.memory[start, cell.text] = parsed
         return parsed
 
-    def _report(self, code: Code, message: str, cell: Cell) -> None:
-        self.found.append(_error(code, message, Span(self.source.name, cell.start, cell.end)))
+    def _report(self, code: Code, message: str, cell: Cell, *helps: str) -> None:
+        self.found.append(_error(code, message, Span(self.source.name, cell.start, cell.end), *helps))

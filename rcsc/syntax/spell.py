@@ -94,7 +94,7 @@ def spell_condition(condition: tree.Condition, whole: bool) -> str:
     match condition:
         case tree.Comparison(op, value):
             if whole:
-                return spell_expr(value)
+                return spell_expr(value) if _plain(value) else f"({spell_expr(value)})"
             return spell_expr(value, 6) if op == "=" and _plain(value) else f"{op} {spell_expr(value, 6)}"
         case tree.OneOf(members):
             return f"in {_set(members)}"
