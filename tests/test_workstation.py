@@ -50,7 +50,7 @@ WRONG_DATA = {
     "out of reach": ("x = 198.4, y = 545.0", "x = 198.4, y = 1545.0", "mm from the base, out of reach"),
     "too high": ("y = 545.0, z = 350.0", "y = 545.0, z = 1350.0", "mm high, out of reach"),
     "a gripper that does not open": ("departure_mm = 90.0", "departure_mm = 20.0", "do not open wider"),
-    "too many in stock": ("stock = 10", "stock = 200", "not 0 .. 99"),
+    "too many in stock": ("stock = 10", "stock = 200", "from 0 to 99, not `200`"),
     "vision without a view": ('vupos = "BUFFER-VUPOS"\n', "", "`vupos`"),
     "a missing value": ("breakpoint_mm = 30.0\n", "", "breakpoint_mm"),
     "no TOML": ("[robot]", "[robot", "not TOML"),

@@ -5,8 +5,13 @@ from typing import TYPE_CHECKING, NoReturn
 
 import click
 
+from rcsc.cli.options import showing
+
 if TYPE_CHECKING:
+    from rcsc.cli.show import Output
+    from rcsc.described import BadFile
     from rcsc.diagnostics.codes import Code
+    from rcsc.diagnostics.report import Report
 
 SYSTEM = click.option(
     "--system", "system", type=click.Path(exists=True, dir_okay=False, path_type=Path), default=None, metavar="FILE",
@@ -39,6 +44,21 @@ class Stopped(click.ClickException):  # what happened
             click.echo(f"  = help: {one}", err=True)
 
 
+class StoppedByFile(Stopped):
+    """The faults of a description or a data file, each with its place."""
+
+    def __init__(self, code: "Code", error: "BadFile") -> None:
+        super().__init__(code, str(error))
+        self.found, self.sources = error.found, error.sources
+
+    def show(self, file: object = None) -> None:  # noqa: ARG002  # click's signature
+        """Each fault, with the line it stands in."""
+        from rcsc.diagnostics.render import full, plain
+
+        for one in self.found:
+            click.echo(plain(full(one, self.sources)), err=True)
+
+
 def system_path(given: Path | None) -> Path:
     """The description that is meant."""
     from rcsc.diagnostics.codes import Code
@@ -52,6 +72,7 @@ def system_path(given: Path | None) -> Path:
 def stop(error: Exception) -> NoReturn:
     """The coded error of what the system, the data or the script said."""
     from rcsc.database.build import BadData
+    from rcsc.described import BadFile
     from rcsc.diagnostics.codes import Code
     from rcsc.system.cell import StateTableError
     from rcsc.system.unproved import UnprovedExecutors
@@ -64,6 +85,8 @@ def stop(error: Exception) -> NoReturn:
         ) from error
     if isinstance(error, NotResumed):
         raise Stopped(error.code, str(error), "`--from-row N` begins anew at row N") from error
+    if isinstance(error, BadFile) and error.found:
+        raise StoppedByFile(error.found[0].code, error) from error
     if isinstance(error, BadData):
         raise Stopped(Code.BAD_DATA, "\n".join(error.problems)) from error
     if isinstance(error, BadScript):
@@ -125,11 +148,39 @@ def build(system: Path | None, output: Path | None) -> int:
 
 @db.command(short_help="Check the data: every reference resolves, every pose is within reach.")
 @SYSTEM
-def check(system: Path | None) -> int:
-    """Check the data file; every problem is named."""
-    _built(system, None, writes=False)
-    click.echo("the data is in order")
-    return 0
+@showing
+def check(system: Path | None, output: "Output") -> int:
+    """Check the description and the data file; every fault is named, with its line."""
+    from rcsc.cli.show import Form, show
+
+    try:
+        _built(system, None, writes=False)
+        report = _report(None)
+    except Stopped as error:
+        if output.form is Form.TEXT and output.file is None:
+            raise
+        report = _report(error)
+    if output.form is Form.TEXT and output.file is None:
+        click.echo("the data is in order")
+    else:
+        show(report, "db check", output)
+    return 1 if report.failed else 0
+
+
+def _report(error: Stopped | None) -> "Report":
+    """What is wrong, for a form that a program reads."""
+    from rcsc.diagnostics.diagnostic import Diagnostic, Label
+    from rcsc.diagnostics.report import Report
+    from rcsc.source import Span
+
+    if error is None:
+        return Report(())
+    if isinstance(error, StoppedByFile):
+        return Report(error.found, sources=error.sources)
+    lines = error.message.splitlines()
+    return Report(
+        tuple(Diagnostic(error.code, line, Label(Span("", 0, 0)), help=error.helps) for line in lines)
+    )
 
 
 def _built(system: Path | None, output: Path | None, *, writes: bool) -> Path:
@@ -141,20 +192,22 @@ def _built(system: Path | None, output: Path | None, *, writes: bool) -> Path:
     from rcsc.database.build import build as build_database
     from rcsc.system.cell import signatures
     from rcsc.system.description import BadDescription, description
-    from rcsc.workstation.cell import database_path, parts_of
+    from rcsc.workstation.cell import database_path, limits_of, needs_data, parts_of
     from sim.reach import checked
 
     try:
         path = system_path(system)
         said = description(path)
-        parts = parts_of(signatures(said))
+        signs = signatures(said)
+        parts, limits = parts_of(signs), limits_of(said, signs)
+        needs_data(said)
         target = output or database_path(said)
         with scratch("db") as folder:
             tried = folder / "cell.sqlite"
-            build_database(said.database, tried, parts)
+            build_database(said.database, tried, parts, limits)
             checked(open_database(tried), open_cache(path.parent) if writes else None)
         if writes:
-            build_database(said.database, target, parts)
+            build_database(said.database, target, parts, limits)
     except (BadData, BadDescription) as error:
         stop(error)
     return target

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal, Protocol
 
+from rcsc.described import Document, KeyPath, nearest
 from rcsc.system.adopt import Restarted, restart
 from rcsc.system.buffers import Buffers, CommonMemory
 from rcsc.system.description import BadDescription, Description
@@ -107,18 +108,101 @@ def signatures(system: Description) -> dict[str, Signature]:
     """The signature of each level's program, by the level's name.
 
     Raises:
-        BadDescription: A program is not there.
+        BadDescription: A program is not there, or the description does not fit the programs.
     """
-    found = {}
-    for spec in system.levels:
+    found, page = {}, system.review()
+    for at, spec in enumerate(system.levels):
         path = system.generated / "c" / f"{spec.program}.json"
+        place: KeyPath = ("level", at, "name" if spec.program == spec.name else "program")
         try:
             found[spec.name] = signature(path)
-        except OSError as error:
-            raise BadDescription(f"`{path}` cannot be read: run `rcsc compile`") from error
+        except OSError:
+            made = sorted(one.stem for one in path.parent.glob("*.json"))
+            helps = nearest(spec.program, made) or ("run `rcsc compile`",)
+            page.wrong(place, f"program `{spec.program}` is not compiled: `{path}` cannot be read", *helps)
         except ValueError as error:
-            raise BadDescription(str(error)) from error
+            page.wrong(place, str(error))
+    if page.faults:
+        raise page.bad(BadDescription)
+    _check_fit(system, found)
     return found
+
+
+def _check_fit(system: Description, signs: Mapping[str, Signature]) -> None:
+    """What the description says of levels and variables is so in their programs.
+
+    Raises:
+        BadDescription: Something is not; all that is not is told at once.
+    """
+    page = system.review()
+    for at, spec in enumerate(system.levels):
+        sign = signs[spec.name]
+        level = next((one for one in sign.levels if one.name == spec.name), None)
+        if level is None:
+            names = [one.name for one in sign.levels]
+            page.wrong(
+                ("level", at, "name"),
+                f"program `{sign.program}` has no level `{spec.name}`",
+                *nearest(spec.name, names),
+            )
+        elif level.period_ms % system.tick_ms:
+            page.wrong(
+                ("tick_ms",),
+                f"`tick_ms` is {system.tick_ms}, and level `{spec.name}` runs every {level.period_ms} ms: no whole number of ticks",
+                f"the period stands in program `{sign.program}`",
+            )
+        for number, feed in enumerate(spec.feeds):
+            path: KeyPath = ("level", at, "feed", number)
+            _check_variable(page, (*path, "into"), sign, feed.into, "input")
+            for place, key in enumerate(feed.keys):
+                _check_variable(page, (*path, "keys", place), sign, key, one=True)
+    for wire in system.wires:
+        for end, kind in ((wire.source, ""), (wire.target, "input")):
+            owner, _, variable = end.partition(".")
+            if owner in signs:
+                _check_variable(page, ("buffers", wire.source), signs[owner], variable, kind)
+    if not page.faults:
+        _check_ends(page, system, signs)
+    for name, shown in system.displays.items():
+        for place, text in enumerate(shown):
+            owner, _, variable = text.partition(".")
+            if owner not in signs:
+                page.wrong(("displays", name, place), f"there is no level `{owner}` to show", *nearest(owner, list(signs)))  # fmt: skip
+            else:
+                _check_variable(page, ("displays", name, place), signs[owner], variable, one=True)
+    if page.faults:
+        raise page.bad(BadDescription)
+
+
+def _check_variable(
+    page: Document, path: KeyPath, sign: Signature, variable: str, kind: str = "", *, one: bool = False
+) -> None:
+    """Note where the program has no such variable, or not of that kind, or not one scalar where one is wanted."""
+    try:
+        leaves = [sign.leaves[at] for at in sign.record(variable)]
+    except KeyError:
+        names = sorted({part for leaf in sign.leaves for part in (leaf.name, leaf.name.partition(".")[0])})
+        page.wrong(path, f"program `{sign.program}` has no variable `{variable}`", *nearest(variable, names))
+        return
+    if kind and any(leaf.kind != kind for leaf in leaves):
+        page.wrong(path, f"`{variable}` of program `{sign.program}` is filled, and is no {kind}")
+    if one and variable not in sign.index:
+        page.wrong(path, f"`{variable}` of program `{sign.program}` has {len(leaves)} parts; name one")
+
+
+def _check_ends(page: Document, system: Description, signs: Mapping[str, Signature]) -> None:
+    """Note buffers between levels whose two ends hold other things."""
+    for wire in system.wires:
+        ends = []
+        for end in (wire.source, wire.target):
+            owner, _, variable = end.partition(".")
+            if owner in signs:
+                leaves = [signs[owner].leaves[at] for at in signs[owner].record(variable)]
+                ends.append(
+                    [(leaf.name.removeprefix(variable), leaf.c_type, leaf.members) for leaf in leaves]
+                )
+        if len(ends) == 2 and ends[0] != ends[1]:
+            page.wrong(("buffers", wire.source), f"`{wire.source}` and `{wire.target}` hold other things")
 
 
 def executors(system: Description, signs: Mapping[str, Signature], kind: Kind) -> dict[str, Executor]:

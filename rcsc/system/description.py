@@ -4,15 +4,48 @@ In: `system.toml`. Out: a frozen `Description`. The names of buffers and of thei
 rest is automatic (Haynes et al. 1984, section 9).
 """
 
-import tomllib
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
+from rcsc.described import (
+    BadFile,
+    Document,
+    Entries,
+    KeyPath,
+    Listing,
+    Name,
+    Number,
+    Record,
+    Text,
+    nearest,
+    read_document,
+)
+from rcsc.diagnostics.codes import Code
+from rcsc.source import Source
 
-class BadDescription(Exception):  # noqa: N818  # what happened, not an error of ours
+
+class BadDescription(BadFile):
     """The description says something that cannot be; tells where and what."""
+
+
+LONGEST_MS = 3_600_000
+FEED = Record({"into": Text(), "query": Text(), "keys": Listing(Text())})
+LEVEL = Record({"name": Name()}, {"program": Name(), "feed": Listing(FEED)})
+SYSTEM = Record(
+    {
+        "name": Name(),
+        "generated": Text(),
+        "tick_ms": Number(1, LONGEST_MS, whole=True),
+        "level": Listing(LEVEL, least=1),
+        "buffers": Entries(Text()),
+    },
+    {"data": Text(), "displays": Entries(Listing(Text())), "outside": Listing(Text())},
+)
+PARTIES = Record({key: SYSTEM.needed[key] for key in ("level", "buffers")}, {"outside": Listing(Text())})
+"""What a description may say; `outside` are the parties of its buffers that are no levels."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +85,9 @@ class Description:
     """A whole system; levels from the top down.
 
     Attributes:
+        database: The data of the cell; there is no such file where the system asks no database.
         displays: Sets of variables to look at, by the name that a level's `display` gives them.
+        document: The file, for the places of what is wrong with it.
     """
 
     name: str
@@ -62,41 +97,105 @@ class Description:
     levels: tuple[LevelSpec, ...]
     wires: tuple[Wire, ...]
     displays: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    document: Document | None = field(default=None, compare=False, repr=False)
+
+    def review(self) -> Document:
+        """A fresh page for faults, with the places of this description."""
+        if self.document is None:
+            return Document(self.name, Source(self.name, ""), {}, Code.BAD_SYSTEM)
+        return replace(self.document, faults=[])
 
 
 def description(path: Path) -> Description:
-    """Reads a description; its paths are seen from where it stands.
+    """Read a description; its paths are seen from where it stands.
 
     Raises:
-        BadDescription: It cannot be read, or lacks something.
+        BadDescription: It cannot be read, or something in it cannot be; all that is wrong is told at once.
     """
-    try:
-        said: dict[str, Any] = tomllib.loads(path.read_text(encoding="utf-8"))
-        levels = tuple(
-            LevelSpec(
-                one["name"],
-                one.get("program", one["name"]),
-                tuple(Feed(feed["into"], feed["query"], tuple(feed["keys"])) for feed in one.get("feed", ())),
-            )
-            for one in said["level"]
+    document = read_document(path, Code.BAD_SYSTEM, BadDescription)
+    document.check(SYSTEM)
+    if document.holds(PARTIES):
+        _check_parties(document)
+    if document.faults:
+        raise document.bad(BadDescription)
+    return _described(path, document)
+
+
+def _described(path: Path, document: Document) -> Description:
+    said: dict[str, Any] = document.value
+    levels = tuple(
+        LevelSpec(
+            one["name"],
+            one.get("program", one["name"]),
+            tuple(Feed(feed["into"], feed["query"], tuple(feed["keys"])) for feed in one.get("feed", ())),
         )
-        wires = tuple(Wire(str(a), str(b)) for a, b in said["buffers"].items())
-        here = path.parent
-        return Description(
-            said["name"],
-            (here / said["generated"]).resolve(),
-            (here / said["data"]).resolve(),
-            int(said["tick_ms"]),
-            levels,
-            wires,
-            {str(name): tuple(map(str, shown)) for name, shown in said.get("displays", {}).items()},
-        )
-    except OSError as error:
-        raise BadDescription(f"{path} cannot be read: {error.strerror}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise BadDescription(f"{path} is not TOML: {error}") from error
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise BadDescription(f"{path} lacks {error}") from error
+        for one in said["level"]
+    )
+    data = (path.parent / said.get("data", NO_DATA)).resolve()
+    return Description(
+        said["name"],
+        (path.parent / said["generated"]).resolve(),
+        data if data != path.resolve() else data.with_name(NO_DATA),  # older descriptions name themselves
+        said["tick_ms"],
+        levels,
+        tuple(Wire(a, b) for a, b in said["buffers"].items()),
+        {name: tuple(shown) for name, shown in said.get("displays", {}).items()},
+        document,
+    )
+
+
+NO_DATA = ".no-data"
+"""Stands for the data of a system that has none: no such file is ever made."""
+
+
+def _check_parties(document: Document) -> None:
+    """Every level has a name of its own; each buffer has a level at an end, and parties that are known."""
+    said = document.value
+    levels = [str(one["name"]) for one in said["level"]]
+    for at, name in enumerate(levels):
+        if name in levels[:at]:
+            document.wrong(("level", at, "name"), f"there are two levels `{name}`")
+    ends = list(_ends(said["buffers"]))
+    for path, end, _ in ends:
+        party, dot, variable = end.partition(".")
+        if not (party and dot and variable):
+            document.wrong(path, f"`{end}` is no buffer's end", "write `party.variable`")
+    parties = [end.partition(".")[0] for _, end, _ in ends]
+    outside = said.get("outside")
+    for path, end, other in ends:
+        party, theirs = end.partition(".")[0], other.partition(".")[0]
+        if party in levels:
+            continue
+        if outside is not None:
+            known = [*levels, *outside]
+            if party not in outside:
+                document.wrong(path, f"`{party}` is neither a level nor in `outside`", *nearest(party, known))
+        elif alike := _alike(party, levels, parties):
+            document.wrong(
+                path, f"`{party}` is no level, and is spelled almost as `{alike}`",
+                f'did you mean `{alike}`? Else name those that are no levels: `outside = ["{party}"]`',
+            )  # fmt: skip
+        elif theirs not in levels:
+            document.wrong(path, f"neither end of `{end}` and `{other}` is a level", *nearest(party, levels))
+    targets = [target for _, target, _ in ends[1::2]]
+    for (path, target, _), at in zip(ends[1::2], range(len(targets)), strict=True):
+        if target in targets[:at]:
+            document.wrong(path, f"`{target}` is filled twice")
+
+
+def _ends(buffers: Mapping[str, str]) -> Iterator[tuple[KeyPath, str, str]]:
+    """Both ends of each buffer: where it stands, the end, the other end."""
+    for source, target in buffers.items():
+        yield ("buffers", source), source, target
+        yield ("buffers", source), target, source
+
+
+def _alike(party: str, levels: list[str], parties: list[str]) -> str:
+    """The level, or the party that is named oftener, whose spelling is nearest; empty where none is near."""
+    oftener = [one for one in parties if parties.count(one) > parties.count(party)]
+    swapped = [one for one in levels if sorted(one) == sorted(party)]
+    near = [*swapped, *get_close_matches(party, [*levels, *oftener], n=1, cutoff=0.8)]
+    return near[0] if near else ""
 
 
 def places(path: Path, program: str) -> tuple[Path, Path]:

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rcsc.database.ask import Database, fresh, open_database
-from rcsc.database.build import build, digest
+from rcsc.database.build import Limit, build, digest
 from rcsc.system.cell import Kind, Outside, System, assemble, signatures
-from rcsc.system.description import Description, description
-from rcsc.system.signature import Signature
+from rcsc.system.description import NO_DATA, BadDescription, Description, description
+from rcsc.system.signature import Leaf, Signature
 from rcsc.workstation.script import BadScript, Row, read_script
 from rcsc.workstation.station import Result, Workstation, workstation
 
@@ -46,8 +46,35 @@ class Run:
 
 
 def parts_of(signs: Mapping[str, Signature]) -> tuple[str, ...]:
-    """Names of parts as the tables have them."""
-    return next(leaf.members for leaf in signs["task"].leaves if leaf.name == "command.obj")
+    """Names of parts as the tables have them.
+
+    Raises:
+        BadDescription: No level has any.
+    """
+    leaves = signs["task"].leaves if "task" in signs else ()
+    found = next((leaf.members for leaf in leaves if leaf.name == "command.obj"), ())
+    if not found:
+        raise BadDescription(
+            "the data names parts, and no level `task` has an enumeration `command.obj` of them"
+        )
+    return found
+
+
+def limits_of(system: Description, signs: Mapping[str, Signature]) -> dict[str, list[list[Limit | None]]]:
+    """What the levels can hold of each answer of the database, by question."""
+    found: dict[str, list[list[Limit | None]]] = {}
+    for spec in system.levels:
+        for feed in spec.feeds:
+            run = signs[spec.name].record(feed.into)
+            leaves = [signs[spec.name].leaves[at] for at in run]
+            found.setdefault(feed.query, []).append([_limit(spec.name, leaf) for leaf in leaves])
+    return found
+
+
+def _limit(level: str, leaf: Leaf) -> Limit | None:
+    if leaf.low is None or leaf.high is None:
+        return None
+    return Limit(f"{level}.{leaf.name}", leaf.low, leaf.high)
 
 
 def database_path(system: Description) -> Path:
@@ -55,17 +82,31 @@ def database_path(system: Description) -> Path:
     return system.database.parent / ".rcsc-cache" / f"{system.name}.sqlite"
 
 
+def needs_data(system: Description) -> None:
+    """Refuse a system without data.
+
+    Raises:
+        BadDescription: It names none.
+    """
+    if system.database.name == NO_DATA:
+        page = system.review()
+        page.wrong(("data",), "the description names no `data`, of which the database would be made")
+        raise page.bad(BadDescription)
+
+
 def database_of(system: Description, signs: Mapping[str, Signature], path: Path | None = None) -> Database:
     """The database, made anew where the data has changed; as it is where `path` says which.
 
     Raises:
         BadData: The data or the file is not in order.
+        BadDescription: It names no data.
     """
     if path is not None:
         return open_database(path)
-    kept, parts = database_path(system), parts_of(signs)
-    if not system.database.is_file() or not fresh(kept, digest(system.database, parts)):
-        build(system.database, kept, parts)
+    needs_data(system)
+    kept, parts, limits = database_path(system), parts_of(signs), limits_of(system, signs)
+    if not system.database.is_file() or not fresh(kept, digest(system.database, parts, limits)):
+        build(system.database, kept, parts, limits)
     return open_database(kept)
 
 
