@@ -1,21 +1,34 @@
-"""Mutants: slips of the hand in a table are noticed by the prover, or mean the same, or are another table."""
+"""Mutants of tables and of the C, each noticed or shown equal; what nobody can decide is a figure and no failure."""
 
 from collections import Counter
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
+from random import Random
 
 import pytest
 
+from rcsc.cli import run
 from rcsc.driver.trials import proofs
 from rcsc.interpret import matching_lines
 from rcsc.model import Program, Table, key_bounds, value_of_key
 from rcsc.project import load
 from rcsc.prove.options import Options
 from rcsc.resolve import resolve
+from rcsc.testing import suite
+from rcsc.testing.code_mutants import Decider, Noticed, code_mutants, decider, source_of
+from rcsc.testing.esbmc import EsbmcVerdict, Said
+from rcsc.testing.figures import SuiteResult
+from rcsc.testing.matcher import Checked, Compared, check_matcher
 from rcsc.testing.mutants import Caught, Opinion, difference, judge_table, narrower, table_mutants, wider
 from rcsc.testing.search import Missing, search_in
+from rcsc.testing.suite import SuiteOptions, run_suite
+from rcsc.testing.symbols import symbols_of
+from tests.emitted import emitted, program_of
 
 BOXES = proofs(Options(solver="boxes"))
+SAMPLE = 100
+"""Of the mutants of a shipped table; `rcsc test --mutants -1` judges them all."""
 
 
 def shipped(path: str, repo: Path) -> Program:
@@ -30,7 +43,7 @@ def test_no_table_mutant_survives(path: str, repo: Path) -> None:
     program = shipped(path, repo)
     assert BOXES.prover is not None
     for table in program.tables:
-        judged = judge_table(search_in(program, BOXES.solver), table, BOXES.prover)
+        judged = judge_table(search_in(program, BOXES.solver), table, BOXES.prover, SAMPLE)
         counts = Counter(one.caught for one in judged)
         assert counts[Caught.SURVIVED] == 0, [one for one in judged if one.caught is Caught.SURVIVED]
         assert counts[Caught.PROVER] > len(judged) // 2
@@ -88,3 +101,141 @@ def test_boxes_grow_and_shrink_by_one_key(repo: Path) -> None:
     assert set(narrower(((3, 5), (7, 7)))) == {((4, 5), (7, 7)), ((3, 4), (7, 7)), ((3, 5),)}
     assert list(narrower(((7, 7),))) == []
     assert list(wider((key_bounds(kind),), kind)) == []
+
+
+# --- mutants of the C ----------------------------------------------------------------------
+
+CLASSED = """
+enum mode { idle, up, down }
+input now : mode
+input offset : int -40 .. 40 clamp
+input go : bool
+state ticks : int 0 .. 300
+output motor : int 0 .. 9
+procedure tick { ticks := min(ticks + 1, 300) }
+procedure again { ticks := 0 }
+table t {
+  | line | now  | go    | ticks     | offset   | when             || procedures | motor |
+  | a    | idle | false |           |          |                  ||            | 0     |
+  | b    | idle | true  | < 20      |          |                  || tick       | 1     |
+  | c    | idle | true  | 20 .. 250 |          |                  || tick       | 2     |
+  | d    | idle | true  | > 250     |          |                  || again      | 3     |
+  | e    | up   |       |           |          | abs(offset) > 5  || tick       | 4     |
+  | f    | up   |       | < 200     |          | abs(offset) <= 5 ||            | 5     |
+  | g    | up   |       | >= 200    |          | abs(offset) <= 5 || again      | 6     |
+  | h    | down |       |           | -40 .. 0 |                  || tick       | 7     |
+  | i    | down |       |           | > 0      |                  ||            | 8     |
+}
+"""
+"""A supervisor of the ordinary kind: a counter that is compared in many lines gets a table of 301 classes."""
+
+
+@pytest.fixture(scope="module")
+def classed() -> tuple[Program, dict[str, str], Checked, Decider]:
+    program = program_of(CLASSED)
+    files = emitted(program)
+    checked = check_matcher(program, symbols_of(program, files), files, program.tables[0])
+    assert isinstance(checked, Checked)
+    return program, files, checked, decider(program, symbols_of(program, files), files, {"t": checked})
+
+
+def behaviour(tables: list[Compared]) -> list[int]:
+    """For every input of the tables the lines that all their masks leave; each leaf is in one table."""
+    found = [-1]
+    for one in tables:
+        keys = product(*(classes or [(0, 0), (1, 0)] for classes in one.classes))
+        masks = []
+        for classes in keys:
+            at = 0
+            for (number, _), count in zip(classes, one.counts, strict=True):
+                at = at * count + number
+            masks.append(one.entries[at] if at < len(one.entries) else 0)
+        found = [left & mask for left in found for mask in masks]
+    return found
+
+
+def test_the_check_of_the_masks_decides_every_mutant_of_a_mask_and_of_a_class(
+    classed: tuple[Program, dict[str, str], Checked, Decider],
+) -> None:
+    program, files, _, decides = classed
+    source = source_of(symbols_of(program, files), files)
+    every = [one for one in code_mutants(source, len(program.tables[0].lines)) if one.change == "mask"]
+    judged = Counter(decides.decides(one) for one in every)
+    assert "classes[301]" in source
+    assert judged[Noticed.MATCHER] > 2000
+    # what is left undecided are numbers of no mask: of the bit scan for other compilers
+    assert {one.function for one in every if not decides.knows(one)} <= {
+        f"{program.name}_bit64",
+        "case__bit64",
+    }
+    assert set(judged) <= {Noticed.MATCHER, Noticed.EQUIVALENT, None}
+
+
+def test_what_the_check_calls_equal_is_equal_for_every_input() -> None:
+    """By brute force over masks and classes that are changed at random."""
+    random, verdicts = Random(3), Counter[bool]()  # noqa: S311  # repeatable
+    for _ in range(400):
+        counts = (random.randint(1, 3), random.randint(2, 3))
+        classes = [[(random.randrange(n), 0) for _ in range(4)] for n in counts]
+        lines = [{at: random.getrandbits(3) for at in range(n)} for n in counts]
+        classes = [[(at, way[at]) for at, _ in one] for one, way in zip(classes, lines, strict=True)]
+        entries = [lines[0][a] & lines[1][b] for a, b in product(range(counts[0]), range(counts[1]))]
+        before = Compared(7, 1, entries, counts, lines, classes)
+        if random.getrandbits(1):
+            at, value = random.randrange(len(entries)), random.getrandbits(3)
+            equal = before.with_word(at, value)
+            after = replace(before, entries=[*entries[:at], value, *entries[at + 1 :]])
+        else:
+            which, at = random.randrange(2), random.randrange(4)
+            value = random.randrange(counts[which] + 1)
+            equal = before.with_class(which, at, value)
+            other = [*classes[which][:at], (value, 0), *classes[which][at + 1 :]]
+            after = replace(before, classes=[other if n == which else one for n, one in enumerate(classes)])
+        verdicts[equal] += 1
+        assert not equal or behaviour([before]) == behaviour([after])
+    assert min(verdicts.values()) > 20
+
+
+def deep(program: Program, files: dict[str, str], mutants: int = 4) -> SuiteResult:
+    options = SuiteOptions(examples=20, deep=True, esbmc_s=0.0, cortex=False, mutants=mutants)
+    return run_suite(program, files, options)
+
+
+def test_what_nobody_can_decide_is_a_figure_and_no_failure(
+    classed: tuple[Program, dict[str, str], Checked, Decider], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    program, files, _, _ = classed
+    result = deep(program, files)
+    assert result.found == ()
+    assert "mutants of the masks: " in result.text()
+    assert set(result.programs[0].code_mutants["mutants of the masks"]) <= {"the matcher check", "equivalent"}
+    for said, failed in ((Said.FAILED, False), (Said.REFUTED, True)):
+        monkeypatch.setattr(suite, "prove_function", lambda *_, said=said: EsbmcVerdict("f", said, 0, 0.0))
+        asked = SuiteOptions(examples=1, esbmc_s=1.0, cortex=False, mutants=0)
+        assert run_suite(program, files, asked).failed is failed
+
+
+def test_a_check_of_the_masks_that_calls_all_equal_is_found_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    lines = "| line | part || on |\n| a | < 2 || true |\n| b | >= 2 || false |"
+    program = program_of(f"input part : int 0 .. 3\noutput on : bool\ntable t {{\n{lines}\n}}\n")
+    monkeypatch.setattr(Compared, "with_word", lambda *_: True)
+    found = deep(program, emitted(program)).found
+    assert ["calls equal what the tests tell apart" in one.message for one in found] == [True]
+
+
+def test_without_being_asked_no_model_checker_runs_and_no_c_is_mutated(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def never(*_: object) -> None:
+        raise AssertionError
+
+    monkeypatch.setattr(suite, "prove_function", never)
+    monkeypatch.setattr(suite, "judge_code", never)
+    (tmp_path / "lift.rcs").write_text(CLASSED, encoding="utf-8")
+    for more in ((), ("--esbmc", "0")):
+        asked = ["test", "--no-cache", "--no-cortex", "--examples", "10", "--mutants", "2", *more]
+        assert run([*asked, str(tmp_path / "lift.rcs")]) == 0
+        said = capsys.readouterr().out
+        assert "matcher = table: " in said
+        assert "9 of 9 lines reached" in said
+        assert "ESBMC" not in said

@@ -31,6 +31,7 @@ def try_out(
     asked = SuiteOptions(
         effort.examples,
         effort.cycles,
+        effort.deep,
         effort.esbmc_s,
         effort.cortex,
         None if effort.mutants < 0 else effort.mutants,

@@ -67,15 +67,17 @@ class Effort:
     Attributes:
         examples: Inputs for each matcher, and sequences for each step and cycle.
         cycles: Longest sequence.
+        deep: Whether the C is mutated and the emulated target is asked about as many inputs as it can.
         esbmc_s: Time limit of the model checker for one function, in seconds; 0 leaves it out.
         cortex: Whether an emulated Cortex-M3 is asked.
-        mutants: How many mutants of each table and of its code; 0 for none, -1 for all.
+        mutants: How many mutants of each table (and of the C, where `deep`); 0 for none, -1 for all.
         vectors: Where to write MC/DC vectors.
     """
 
     examples: int = 200
     cycles: int = 8
-    esbmc_s: float = 60.0
+    deep: bool = False
+    esbmc_s: float = 0.0
     cortex: bool = True
     mutants: int = 24
     vectors: Path | None = None

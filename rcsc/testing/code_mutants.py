@@ -1,23 +1,29 @@
 """Mutants of the emitted C: bits of the masks, constants, operators; each must be noticed or be equivalent.
 
 In: a program, its emitted C, the sessions that its executors agreed on. Out: for each mutant who noticed it.
-A mutant runs in a process of its own on all the sessions; one that leaves the same behind is given to ESBMC,
-which proves it equal to the reference for all inputs (equivalent) or refutes it.
+What is a number of a mask or of a class table is decided by the complete check of the matcher, without a run:
+it is noticed, or no input can tell. Any other mutant runs in a process of its own on all the sessions; one that
+leaves the same behind is decided by the check of the matcher where it is in one, else by ESBMC, which proves it
+equal to the reference for all inputs (equivalent) or refutes it. What neither decides is undecided: that is a
+figure, no fault of the C.
 """
 
 import re
 from array import array
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from bisect import bisect_left
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
 from random import Random
 
 from rcsc.children import scratch
 from rcsc.model import Program, Snapshot
-from rcsc.testing.esbmc import Said, prove_function
+from rcsc.testing.esbmc import Said, prove_function, too_large
 from rcsc.testing.externs import STAND_INS
+from rcsc.testing.matcher import Checked, Compared, check_matcher
+from rcsc.testing.matcher_text import matcher_text, numbers
 from rcsc.testing.native import COMPILE_S, Native
 from rcsc.testing.shim import shim_c
 from rcsc.testing.symbols import Symbols
@@ -25,6 +31,8 @@ from rcsc.testing.targets import Target, targets
 from rcsc.testing.tools import Absent, c_compiler, run_command, write_c
 
 RUN_S = 20.0
+MOST_MASKS = 5000
+SEED = 1984
 FLAGS = ("-std=gnu11", "-O0", "-w", "-ffp-contract=off")
 
 TOKEN = re.compile(
@@ -73,7 +81,8 @@ class Noticed(StrEnum):
     ESBMC = "ESBMC"
     MATCHER = "the matcher check"
     EQUIVALENT = "equivalent"
-    SURVIVED = "survived"
+    UNDECIDED = "undecided"
+    MISSED = "missed by the matcher check"  # it calls equal what the tests tell apart
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,14 +91,27 @@ class CodeMutant:
 
     Attributes:
         change: `mask`, `constant` or `operator`.
-        where: Line of the C file and the change, in words.
         function: Name of the function that was changed.
+        base: The C file as it is.
+        start: Where the changed token begins.
     """
 
     change: str
-    where: str
     function: str
-    text: str
+    base: str = field(repr=False)
+    start: int = 0
+    old: str = ""
+    new: str = ""
+
+    @property
+    def where(self) -> str:
+        """Line of the C file and the change, in words."""
+        return f"line {self.base.count(chr(10), 0, self.start) + 1}: {self.old} -> {self.new}"
+
+    @property
+    def text(self) -> str:
+        """The changed C file."""
+        return f"{self.base[: self.start]}{self.new}{self.base[self.start + len(self.old) :]}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -195,16 +217,67 @@ def code_mutants(text: str, lines: int) -> Iterator[CodeMutant]:
 
 def _mutants(text: str, lines: int, first: int, last: int) -> Iterator[CodeMutant]:
     """Mutants of the tokens between two offsets."""
-    tokens, functions = _tokens(text), list(FUNCTION.finditer(text))
+    tokens, heads = _tokens(text), list(FUNCTION.finditer(text))
+    starts = [head.start() for head in heads]
     for at, token in enumerate(tokens):
         inside = first <= token.start < last and token.depth > 0
         if not inside or (token.text in SWAPS and not _binary(tokens, at)):
             continue
-        function = next((f[1] for f in reversed(functions) if f.start() < token.start), "")
+        before = bisect_left(starts, token.start)
+        function = heads[before - 1][1] if before else ""
         for change, new in _changes(token, lines):
-            row = text.count("\n", 0, token.start) + 1
-            mutated = f"{text[: token.start]}{new}{text[token.start + len(token.text) :]}"
-            yield CodeMutant(change, f"line {row}: {token.text} -> {new}", function, mutated)
+            yield CodeMutant(change, function, text, token.start, token.text, new)
+
+
+@dataclass(frozen=True, slots=True)
+class Decider:
+    """The numbers of all masks and class tables, and what the complete check says of others in their place."""
+
+    source: str = field(default="", repr=False)
+    places: Mapping[int, tuple[Compared, int, int]] = field(default_factory=dict)
+    """By offset in the source: the table, the component (-1 for its masks) and the position."""
+
+    def knows(self, mutant: CodeMutant) -> bool:
+        """Whether the mutant is a changed mask or class."""
+        return mutant.change == "mask" and mutant.start in self.places and mutant.base == self.source
+
+    def decides(self, mutant: CodeMutant) -> Noticed | None:
+        """Who notices a changed mask or class; None where the mutant is something else."""
+        value = INTEGER.match(mutant.new)
+        if value is None or not self.knows(mutant):
+            return None
+        compared, component, at = self.places[mutant.start]
+        number = int(value[1], 0)
+        masks = component < 0
+        same = compared.with_word(at, number) if masks else compared.with_class(component, at, number)
+        return Noticed.EQUIVALENT if same else Noticed.MATCHER
+
+
+def decider(
+    program: Program, symbols: Symbols, files: Mapping[str, str], checked: Mapping[str, Checked]
+) -> Decider:
+    """What the complete check of the tables in `checked` knows, by place in the C file.
+
+    A number whose value is not the one that the check read from the compiled C is left out.
+    """
+    source = variants(source_of(symbols, files))[0]
+    places: dict[int, tuple[Compared, int, int]] = {}
+    for table in program.tables:
+        if table.name not in checked:
+            continue
+        tables, function = checked[table.name].tables, symbols.lines[table.name]
+        for one in numbers(source, function, matcher_text(source, function, symbols.struct)):
+            compared, component = tables[one.lookup], one.component
+            read = compared.words if component < 0 else [at for at, _ in compared.classes[component]]
+            if list(one.values) == read:
+                found = ((compared, component, at) for at, _ in enumerate(read))
+                places.update(zip(one.offsets, found, strict=True))
+    return Decider(source, places)
+
+
+def source_of(symbols: Symbols, files: Mapping[str, str]) -> str:
+    """The emitted C file."""
+    return next(text for path, text in files.items() if Path(path).name == symbols.source)
 
 
 @dataclass(slots=True)
@@ -218,6 +291,7 @@ class Judge:
     compiler: str
     expected: bytes
     esbmc_s: float
+    decider: Decider
 
     def source(self) -> str:
         """Path of the emitted C among the files."""
@@ -225,26 +299,35 @@ class Judge:
 
     def expect(self, source: str) -> None:
         """Runs the C as it is, for what the mutants are compared with."""
-        noticed = self.judge(CodeMutant("none", "nowhere", "", source), prove=False)
+        noticed = self.by_tests(source)
         if noticed is not Noticed.TESTS:
             raise RuntimeError("the emitted C does not run")  # `build` ran it before
         self.expected = (self.place / "out.bin").read_bytes()
 
-    def judge(self, mutant: CodeMutant, *, prove: bool = True) -> Noticed:
+    def judge(self, mutant: CodeMutant) -> Noticed:
         """Who notices the mutant."""
-        (self.place / self.symbols.source).write_text(mutant.text, "utf-8")
+        decided = self.decider.decides(mutant)
+        if decided is Noticed.MATCHER:
+            return decided
+        noticed = self.by_tests(mutant.text)
+        if noticed is not Noticed.UNDECIDED:
+            return Noticed.MISSED if decided and noticed is Noticed.TESTS else noticed
+        return decided or self.by_proof(mutant)
+
+    def by_tests(self, text: str) -> Noticed:
+        """Whether the compiler or the tests notice another C file."""
+        (self.place / self.symbols.source).write_text(text, "utf-8")
         command = [self.compiler, *FLAGS, "-o", "mutant", self.symbols.source, "shim.o", "extra.o"]
         if run_command(command, self.place, COMPILE_S).status != 0:
             return Noticed.COMPILER
         out = self.place / "out.bin"
         out.unlink(missing_ok=True)
         ran = run_command([str(self.place / "mutant"), "in.bin", "out.bin"], self.place, RUN_S)
-        if ran.status != 0 or out.read_bytes() != self.expected:
-            return Noticed.TESTS
-        return self.by_proof(mutant) if prove else Noticed.SURVIVED
+        same = ran.status == 0 and out.read_bytes() == self.expected
+        return Noticed.UNDECIDED if same else Noticed.TESTS
 
     def by_proof(self, mutant: CodeMutant) -> Noticed:
-        """What ESBMC says of a mutant that left the same behind.
+        """What is shown of a mutant that left the same behind.
 
         The functions asked about are the first on every way up from the changed one that have a reference: where
         those are proved equal to it, their callers cannot tell.
@@ -254,15 +337,25 @@ class Judge:
         asked = first_callers(mutant.text, mutant.function, with_reference)
         found = Noticed.EQUIVALENT
         for target in (with_reference[name] for name in asked):
-            said = self.proved(files, target)
-            if said is Said.REFUTED:
-                return Noticed.ESBMC
-            found = found if said is Said.PROVED else Noticed.SURVIVED
+            said = self.shown(files, target)
+            if said in (Noticed.MATCHER, Noticed.ESBMC):
+                return said
+            found = Noticed.UNDECIDED if said is Noticed.UNDECIDED else found
         return found
 
-    def proved(self, files: Mapping[str, str], target: Target) -> Said:
-        """ESBMC on one function."""
-        return prove_function(self.program, self.symbols, files, target, self.esbmc_s).said
+    def shown(self, files: Mapping[str, str], target: Target) -> Noticed:
+        """What the check of the matcher says of a changed function, else ESBMC."""
+        if target.kind == "line":
+            table = self.program.tables[target.number]
+            checked = check_matcher(self.program, self.symbols, files, table)
+            if isinstance(checked, tuple):
+                return Noticed.MATCHER
+            if isinstance(checked, Checked) and not checked.truths:
+                return Noticed.EQUIVALENT  # complete without the truths of conditions
+        if not self.esbmc_s or too_large(self.program, target):
+            return Noticed.UNDECIDED
+        said = prove_function(self.program, self.symbols, files, target, self.esbmc_s).said
+        return {Said.PROVED: Noticed.EQUIVALENT, Said.REFUTED: Noticed.ESBMC}.get(said, Noticed.UNDECIDED)
 
 
 def _rows(native: Native, sessions: Sequence[tuple[int, int, Sequence[Snapshot]]]) -> bytes:
@@ -277,10 +370,9 @@ def portable_agrees(
     native: Native, files: Mapping[str, str], sessions: Sequence[tuple[int, int, Sequence[Snapshot]]]
 ) -> bool:
     """Whether the C without compiler built-ins leaves the same behind; see `judge_code`."""
-    source = next(text for path, text in files.items() if Path(path).name == native.symbols.source)
-    with prepared(native, files, sessions, 0.0) as judge:
-        mutant = CodeMutant("none", "nowhere", "", variants(source)[1])
-        return judge is None or judge.judge(mutant, prove=False) is Noticed.SURVIVED
+    with prepared(native, files, sessions, 0.0, Decider()) as judge:
+        other = variants(source_of(native.symbols, files))[1]
+        return judge is None or judge.by_tests(other) is Noticed.UNDECIDED
 
 
 @contextmanager
@@ -289,6 +381,7 @@ def prepared(
     files: Mapping[str, str],
     sessions: Sequence[tuple[int, int, Sequence[Snapshot]]],
     esbmc_s: float,
+    decides: Decider,
 ) -> "Iterator[Judge | None]":
     """A judge with its files in place, which knows what the C as it is leaves behind."""
     compiler, program, symbols = c_compiler(), native.program, native.symbols
@@ -302,18 +395,61 @@ def prepared(
         (place / "in.bin").write_bytes(_rows(native, sessions))
         for name in ("shim", "extra"):
             run_command([compiler, *FLAGS, "-c", "-o", f"{name}.o", f"{name}.c"], place, COMPILE_S)
-        judge = Judge(program, symbols, files, place, compiler, b"", esbmc_s)
-        judge.expect(next(text for path, text in files.items() if Path(path).name == symbols.source))
+        judge = Judge(program, symbols, files, place, compiler, b"", esbmc_s, decides)
+        judge.expect(source_of(symbols, files))
         yield judge
+
+
+def judge_masks(
+    symbols: Symbols, files: Mapping[str, str], lines: int, decides: Decider
+) -> list[tuple[CodeMutant, Noticed]]:
+    """Judges mutants of the masks and class tables, by the complete check alone; by sample where there are many.
+
+    Args:
+        symbols: Names in the emitted C.
+        files: The emitted files, text by path.
+        lines: How many lines the largest table has.
+        decides: The check.
+    """
+    every = [m for m in code_mutants(source_of(symbols, files), lines) if decides.knows(m)]
+    if len(every) > MOST_MASKS:
+        every = Random(SEED).sample(every, MOST_MASKS)  # noqa: S311  # a repeatable sample
+    return [(mutant, decides.decides(mutant) or Noticed.UNDECIDED) for mutant in every]
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """Which mutants are run.
+
+    Attributes:
+        others: How many of those that the check of the masks does not know; None for all.
+        equal: Those that the check calls equivalent; as many of them are run to see whether that is so.
+    """
+
+    others: int | None
+    equal: tuple[CodeMutant, ...] = ()
+
+    def of(self, every: Sequence[CodeMutant], decides: Decider) -> list[CodeMutant]:
+        """The mutants to run."""
+        others = [mutant for mutant in every if not decides.knows(mutant)]
+        if self.others is None:
+            return [*others, *self.equal]
+        random = Random(SEED)  # noqa: S311  # a repeatable sample
+        return [
+            one
+            for group in (others, self.equal)
+            for one in random.sample(group, min(self.others, len(group)))
+        ]
 
 
 def judge_code(
     native: Native,
     files: Mapping[str, str],
     sessions: Sequence[tuple[int, int, Sequence[Snapshot]]],
-    sample: int | None,
-    seed: int = 1984,
+    decides: Decider,
+    sample: Sample,
     esbmc_s: float = 60.0,
+    progress: Callable[[str], None] = lambda _: None,
 ) -> list[tuple[CodeMutant, Noticed]]:
     """Judges mutants of the emitted C.
 
@@ -321,13 +457,16 @@ def judge_code(
         native: The program as it is, compiled.
         files: The emitted files, text by path.
         sessions: What is run: number of the function, mode (see `shim`), rows.
-        sample: How many mutants; None for all.
-        seed: Of the sample.
-        esbmc_s: Time limit of ESBMC for one function, in seconds.
+        decides: The check of the masks and class tables.
+        sample: Which mutants.
+        esbmc_s: Time limit of ESBMC for one function, in seconds; 0 leaves it out.
+        progress: Told which mutant is judged.
     """
-    source = next(text for path, text in files.items() if Path(path).name == native.symbols.source)
-    mutants = list(code_mutants(source, max((len(t.lines) for t in native.program.tables), default=1)))
-    if sample is not None and len(mutants) > sample:
-        mutants = Random(seed).sample(mutants, sample)  # noqa: S311  # a repeatable sample
-    with prepared(native, files, sessions, esbmc_s) as judge:
-        return [] if judge is None else [(mutant, judge.judge(mutant)) for mutant in mutants]
+    lines = max((len(t.lines) for t in native.program.tables), default=1)
+    mutants = sample.of(list(code_mutants(source_of(native.symbols, files), lines)), decides)
+    judged = []
+    with prepared(native, files, sessions, esbmc_s, decides) as judge:
+        for number, mutant in enumerate(mutants if judge else (), 1):
+            progress(f"mutant {number} of {len(mutants)} of the C of {native.program.name}")
+            judged.append((mutant, judge.judge(mutant)))  # type: ignore[union-attr]  # there is one
+    return judged

@@ -84,17 +84,19 @@ class CortexRun:
     differ: int
 
 
-def choices(program: Program, table: Table) -> tuple[list[tuple[Variable, list[int]]], bool]:
+def choices(
+    program: Program, table: Table, most: int = MOST_INPUTS
+) -> tuple[list[tuple[Variable, list[int]]], bool]:
     """The keys to run for each test variable, and whether that is every input of the table."""
     edges = leaf_edges(program)
     used = [program.variable(name) for name in table.variables]
     full = {v.name: key_bounds(v.type) for v in used}
-    complete = prod(high - low + 1 for low, high in full.values()) <= MOST_INPUTS
+    complete = prod(high - low + 1 for low, high in full.values()) <= most
     every = {
         name: list(range(low, high + 1)) if complete else list(edges[name])
         for name, (low, high) in full.items()
     }
-    while prod(len(keys) for keys in every.values()) > MOST_INPUTS:
+    while prod(len(keys) for keys in every.values()) > most:
         widest = max(every, key=lambda name: len(every[name]))
         every[widest] = every[widest][::2]
     return [(variable, every[variable.name]) for variable in used], complete
@@ -130,11 +132,11 @@ def _same(program: Program, symbols: Symbols) -> Iterator[str]:
     yield "; }"
 
 
-def image_c(program: Program, symbols: Symbols, number: int) -> str:
+def image_c(program: Program, symbols: Symbols, number: int, most: int) -> str:
     """The C text that runs one table on the target."""
     table = program.tables[number]
     struct = symbols.struct
-    used, _ = choices(program, table)
+    used, _ = choices(program, table, most)
     parts = [
         "#include <stdio.h>",
         "#include <stdlib.h>",
@@ -169,7 +171,12 @@ def image_c(program: Program, symbols: Symbols, number: int) -> str:
 
 
 def run_cortex(
-    program: Program, symbols: Symbols, files: Mapping[str, str], number: int, timeout_s: float = 120.0
+    program: Program,
+    symbols: Symbols,
+    files: Mapping[str, str],
+    number: int,
+    most: int = MOST_INPUTS,
+    timeout_s: float = 120.0,
 ) -> CortexRun | Absent | BuildFailed:
     """Builds and runs one table's image.
 
@@ -178,6 +185,7 @@ def run_cortex(
         symbols: Names in its emitted C.
         files: The emitted files, text by path.
         number: Position of the table in the program.
+        most: How many of its inputs are run at most; edges where they are not all.
         timeout_s: For the emulation, in seconds.
     """
     tools = cortex_tools()
@@ -186,7 +194,7 @@ def run_cortex(
     table = program.tables[number]
     with scratch("cortex") as place:
         (place / "rcsc.ld").write_text(LINKER, "utf-8")
-        (place / "image.c").write_text(image_c(program, symbols, number), "utf-8")
+        (place / "image.c").write_text(image_c(program, symbols, number, most), "utf-8")
         sources = ["image.c", *write_c(files, place)]
         built = run_command([tools[0], *FLAGS, *LINK, "-o", "image.elf", *sources], place, timeout_s)
         if built.status != 0:
@@ -198,4 +206,4 @@ def run_cortex(
             f"the target gave no result (status {ran.status}): {(ran.out + ran.err).strip()[:400]}"
         )
     inputs, lines, steps, differ = (int(number) for number in said.groups())
-    return CortexRun(table.name, inputs, choices(program, table)[1], steps, lines + differ)
+    return CortexRun(table.name, inputs, choices(program, table, most)[1], steps, lines + differ)

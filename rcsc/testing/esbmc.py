@@ -36,6 +36,7 @@ SOLVERS = ("--bitwuzla", "--boolector")
 """In turn: Bitwuzla is quick and gives up on memory where Boolector gets through products of integers."""
 
 MEMORY_MB = 6000
+MOST_LINES = 64
 MOST_CALLS = 16
 RECORD = "the calls of an extern fit their record"
 COUNT = re.compile(r"\*\* (\d+) of (\d+) properties failed, (\d+) passed")
@@ -191,6 +192,13 @@ def part_harness(program: Program, symbols: Symbols, target: Target, part: str, 
             body += [AGAIN, f"{function}(&a); rcsc_calls(); const int32_t result = a.fault;", *same]
             body += list(_trace_claims(program, symbols))
     return "\n".join([*top, *body, "return 0; }"]) + "\n"
+
+
+def too_large(program: Program, target: Target) -> bool:
+    """Whether ESBMC is not asked about a function, for the size of its tables."""
+    table = program.tables[target.number] if target.kind in ("line", "batch", "step") else None
+    lines = max((len(one.lines) for one in ((table,) if table else program.tables)), default=0)
+    return lines > MOST_LINES and target.kind != "init"
 
 
 def prove_function(

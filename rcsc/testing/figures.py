@@ -49,7 +49,7 @@ class ProgramFigures:
         faults: Cycles by fault code.
         sanitized: How the sessions went under the sanitizers, in words.
         esbmc: A verdict a function.
-        code_mutants: Mutants of the emitted C by who noticed them.
+        code_mutants: Mutants of the emitted C, of its masks and of the rest, by who noticed them.
     """
 
     program: str
@@ -60,7 +60,7 @@ class ProgramFigures:
     faults: Mapping[int, int] = field(default_factory=dict, hash=False)
     sanitized: str = ""
     esbmc: tuple[EsbmcVerdict, ...] = ()
-    code_mutants: Mapping[str, int] = field(default_factory=dict, hash=False)
+    code_mutants: Mapping[str, Mapping[str, int]] = field(default_factory=dict, hash=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,8 +100,8 @@ def _program_text(program: ProgramFigures) -> Iterator[str]:
         yield f"  ESBMC {verdict.function}: {verdict.said}{shown} ({verdict.seconds:.1f} s){detail}"
     for table in program.tables:
         yield from _table_text(table)
-    if program.code_mutants:
-        yield f"  {_mutants_text('mutants of the C', program.code_mutants)}"
+    for name, mutants in program.code_mutants.items():
+        yield f"  {_mutants_text(name, mutants)}"
 
 
 def _table_text(table: TableFigures) -> Iterator[str]:

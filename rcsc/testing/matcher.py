@@ -51,12 +51,85 @@ class Checked:
         classes: Values of leaves whose class was found.
         truths: Conditions over several variables, compared on edges.
         masks: Masks given to the tail.
+        tables: The numbers that were compared; they tell what another number would change.
     """
 
     cells: int
     classes: int
     truths: int
     masks: int
+    tables: "tuple[Compared, ...]" = field(default=(), repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Compared:
+    """One mask table of the C that equals its cells, with all that decides so.
+
+    Attributes:
+        everyone: A mask with every line.
+        width: Words a mask.
+        entries: The masks.
+        counts: How many classes each component of the index has.
+        ways: For each component the lines that each of its classes stands for.
+        classes: For each component that reads a leaf: its class and the lines that admit it, key by key.
+    """
+
+    everyone: int
+    width: int
+    entries: Sequence[int]
+    counts: Sequence[int]
+    ways: Sequence[Mapping[int, int]]
+    classes: Sequence[Sequence[tuple[int, int]]]
+
+    @property
+    def words(self) -> list[int]:
+        """The masks word by word, as C lays them out."""
+        shifts = range(0, 64 * self.width, 64)
+        return [entry >> shift & 0xFFFF_FFFF_FFFF_FFFF for entry in self.entries for shift in shifts]
+
+    def with_word(self, at: int, value: int) -> bool:
+        """Whether the table would still be equal with another value of word `at`, counted as C lays them out."""
+        entry, shift = at // self.width, 64 * (at % self.width)
+        changed = list(self.entries)
+        changed[entry] = changed[entry] & ~(0xFFFF_FFFF_FFFF_FFFF << shift) | value << shift
+        return agrees(changed, self.counts, self.ways, self.everyone) is not None
+
+    def with_class(self, component: int, at: int, value: int) -> bool:
+        """Whether the table would still be equal if key number `at` of the component's leaf had another class."""
+        changed = list(self.classes[component])
+        changed[at] = (value, changed[at][1])
+        lines = lines_of(changed)
+        ways = [*self.ways[:component], lines or {}, *self.ways[component + 1 :]]
+        return lines is not None and agrees(self.entries, self.counts, ways, self.everyone) is not None
+
+
+def lines_of(classes: Sequence[tuple[int, int]]) -> dict[int, int] | None:
+    """For each class the lines that admit it; None if one class is of values that different lines admit."""
+    expected: dict[int, int] = {}
+    if any(expected.setdefault(at, cells) != cells for at, cells in classes):
+        return None
+    return expected
+
+
+def agrees(
+    entries: Sequence[int], counts: Sequence[int], ways: Sequence[Mapping[int, int]], everyone: int
+) -> int | None:
+    """Compares every entry that some input finds with the AND of its classes' cells.
+
+    Returns:
+        How many entries were compared; None if one differs, or is none of the table's.
+    """
+    compared = 0
+    for classes in product(*(expected.items() for expected in ways)):
+        at, cells = 0, everyone
+        for (one, lines), count in zip(classes, counts, strict=True):
+            if one >= count:
+                return None
+            at, cells = at * count + one, cells & lines
+        if entries[at] != cells:
+            return None
+        compared += 1
+    return compared
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,6 +152,7 @@ class _Checker:
     cells: int = 0
     stated: set[int] = field(default_factory=set)
     truths: dict[int, list[int]] = field(default_factory=dict)
+    tables: list[Compared] = field(default_factory=list)
 
     @property
     def everyone(self) -> int:
@@ -137,19 +211,20 @@ class _Checker:
         near = {key + step for key in named for step in (-1, 0, 1)} | {low, high}
         return sorted(key for key in near if low <= key <= high)
 
-    def unary(self, name: str, part: Component) -> dict[int, int]:
-        """For each class of a leaf that some value has, the lines that admit it."""
+    def unary(self, name: str, part: Component) -> list[tuple[int, int]]:
+        """For each key of a leaf its class and the lines that admit it."""
         leaf = self.leaf(part.path)
         keys = self.keys(leaf, part)
         words = array("q", [to_word(leaf.type, value_of_key(leaf.type, key)) for key in keys])
         classes = self.run(name, len(keys), words)
+        self.classes += len(keys)
+        found = list(zip(classes, self.cells_at(leaf, keys), strict=True))
         expected: dict[int, int] = {}
-        for key, at, cells in zip(keys, classes, self.cells_at(leaf, keys), strict=True):
+        for key, (at, cells) in zip(keys, found, strict=True):
             if expected.setdefault(at, cells) != cells:
                 value = value_of_key(leaf.type, key)
                 self.wrong.append(f"`{leaf.name}` = {value} shares its class with a value of other lines")
-        self.classes += len(keys)
-        return expected
+        return found
 
     def truth(self, name: str, rows: "array[int]", count: int) -> "list[_Way]":
         """For each truth of a condition the lines that admit it; once for each test that agrees."""
@@ -179,31 +254,25 @@ class _Checker:
     def lookup(self, number: int, lookup: Lookup, rows: "array[int]", count: int) -> None:
         """Compares one table with the cells of its classes."""
         ways: list[list[_Way]] = []
+        classes: list[list[tuple[int, int]]] = []
         for at, part in enumerate(lookup.components):
             name = f"rcsc_class_{number}_{at}"
-            ways.append([_Way(-1, self.unary(name, part))] if part.path else self.truth(name, rows, count))
+            classes.append(self.unary(name, part) if part.path else [])
+            ways.append([_Way(-1, dict(classes[-1]))] if part.path else self.truth(name, rows, count))
         counts = [part.count for part in lookup.components]
         counts[0] = lookup.entries // max(1, prod(counts[1:]))
         entries = self.entries(number, lookup)
-        right = (way for way in product(*ways) if self.agrees(entries, counts, [one.lines for one in way]))
-        chosen = next(right, None)
-        self.stated |= {one.test for one in chosen or ()}
-        if chosen is None:
+        for chosen in product(*ways):
+            lines = [one.lines for one in chosen]
+            compared = agrees(entries, counts, lines, self.everyone)
+            if compared is not None:
+                self.stated |= {one.test for one in chosen}
+                self.cells += compared * len(self.table.lines)
+                self.tables.append(Compared(self.everyone, lookup.words, entries, counts, lines, classes))
+                break
+        else:
             self.wrong.append(f"table t{number} of the matcher has an entry that is not its cells")
         self.mixed(number, lookup, counts, rows, count)
-
-    def agrees(self, entries: Sequence[int], counts: Sequence[int], way: Sequence[Mapping[int, int]]) -> bool:
-        """Whether every entry that some input finds is the AND of its classes' cells."""
-        for classes in product(*(expected.items() for expected in way)):
-            at, cells = 0, self.everyone
-            for (one, lines), count in zip(classes, counts, strict=True):
-                if one >= count:
-                    return False
-                at, cells = at * count + one, cells & lines
-            if entries[at] != cells:
-                return False
-            self.cells += len(self.table.lines)
-        return True
 
     def mixed(
         self, number: int, lookup: Lookup, counts: Sequence[int], rows: "array[int]", count: int
@@ -246,7 +315,7 @@ class _Checker:
         for number, lookup in enumerate(self.parts.lookups):
             self.lookup(number, lookup, rows, count)
         self.everything_stated()
-        return Checked(self.cells, self.classes, len(tests), self.tail())
+        return Checked(self.cells, self.classes, len(tests), self.tail(), tuple(self.tables))
 
     def everything_stated(self) -> None:
         """Whether each leaf and each test that lines state has its place in some look-up."""

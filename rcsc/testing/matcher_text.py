@@ -10,6 +10,7 @@ or is the truth of a condition.
 """
 
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 TABLES = re.compile(
@@ -34,6 +35,7 @@ UNARY = (
 )
 TRUTH = re.compile(r"^\((?P<condition>.*) \? 1u : 0u\)$", re.DOTALL)
 LOAD = re.compile(r"\bt\.t(\d+)\[")
+WHOLE = re.compile(r"\b(0[xX][0-9a-fA-F]+|\d+)[uUlL]*\b")
 NUMBER = re.compile(r"(?<![\w.])(\d+(?:\.\d+)?(?:e[+-]?\d+)?)(?![\w.])")
 
 
@@ -83,6 +85,22 @@ class MatcherText:
     lookups: tuple[Lookup, ...]
     word_bits: int
     tail: str
+
+
+@dataclass(frozen=True, slots=True)
+class Numbers:
+    """Where the numbers of one table stand in the C file, in order.
+
+    Attributes:
+        lookup: Which mask table they are, or are the classes for.
+        component: Of a class table, the component that looks up in it; -1 for the masks.
+        offsets: Where each number begins.
+    """
+
+    lookup: int
+    component: int
+    offsets: tuple[int, ...]
+    values: tuple[int, ...]
 
 
 class ShapeError(Exception):
@@ -216,3 +234,33 @@ def _lookup(source: str, declaration: str, table: re.Match[str], index: str) -> 
     components = [component(source, text, count) for text, count in pieces]
     entries, words = int(table[3]), int(table[4] or 1)
     return Lookup(declaration, index, entries, words, tuple(components))
+
+
+def numbers(source: str, function: str, parts: MatcherText) -> Iterator[Numbers]:
+    """The masks and the class tables of a matcher, number by number.
+
+    Args:
+        source: The emitted C.
+        function: Name of its `line` function.
+        parts: What `matcher_text` made of it.
+    """
+    for at, lookup in enumerate(parts.lookups):
+        if at == 0:
+            start = source.index(lookup.declaration, source.index(f"int32_t {function}(const "))
+            start = source.index("} t = {", start) + len("} t = {")
+        start = source.index("{", start)
+        end = closing(source, start, "{}")
+        yield _numbers(source, start, end, at, -1)
+        start = end
+        for number, part in enumerate(lookup.components):
+            called = UNARY[-1].match(part.text)
+            head = None if called is None else source.find(f" {called['search']}(int64_t value)\n{{")
+            table = None if not head else re.compile(r"\w+ classes\[\d+\] = ").search(source, head)
+            if table is not None and not part.constants:
+                yield _numbers(source, table.end(), closing(source, table.end(), "{}"), at, number)
+
+
+def _numbers(source: str, start: int, end: int, lookup: int, component: int) -> Numbers:
+    found = list(WHOLE.finditer(source, start, end))
+    values = tuple(int(number[1], 0) for number in found)
+    return Numbers(lookup, component, tuple(number.start() for number in found), values)

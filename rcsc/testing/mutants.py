@@ -43,7 +43,8 @@ class Caught(StrEnum):
     DEFAULT = "the prover (what falls to DEFAULT)"
     EXECUTORS = "the executors"  # another correct table; they take another line on a snapshot
     EQUIVALENT = "equivalent"
-    SURVIVED = "survived"
+    UNDECIDED = "undecided"  # neither shown to mean the same, nor a snapshot found
+    SURVIVED = "survived"  # the search calls them different where the interpreter does not
 
 
 @dataclass(frozen=True, slots=True)
@@ -261,9 +262,9 @@ def judge(search: Search, table: Table, mutant: TableMutant, before: Opinion, pr
     found = difference(search, table, mutant)
     if found is Missing.NONE:
         return Judged(mutant.change, mutant.where, Caught.EQUIVALENT)
-    parted = not isinstance(found, Missing) and matching_lines(table, found) != matching_lines(
-        mutant.table, found
-    )
+    if isinstance(found, Missing):
+        return Judged(mutant.change, mutant.where, Caught.UNDECIDED)
+    parted = matching_lines(table, found) != matching_lines(mutant.table, found)
     return Judged(mutant.change, mutant.where, Caught.EXECUTORS if parted else Caught.SURVIVED)
 
 

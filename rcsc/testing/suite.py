@@ -22,9 +22,9 @@ from rcsc.testing.agree import (
     run_sanitized,
     run_session,
 )
-from rcsc.testing.code_mutants import Noticed, judge_code, portable_agrees
-from rcsc.testing.cortex import CortexRun, run_cortex
-from rcsc.testing.esbmc import EsbmcVerdict, Said, prove_function
+from rcsc.testing.code_mutants import Noticed, Sample, decider, judge_code, judge_masks, portable_agrees
+from rcsc.testing.cortex import MOST_INPUTS, CortexRun, run_cortex
+from rcsc.testing.esbmc import EsbmcVerdict, Said, prove_function, too_large
 from rcsc.testing.externs import PythonStandIns, python_stand_ins, with_c_stand_ins
 from rcsc.testing.figures import ProgramFigures, SuiteResult, TableFigures, counted, tally
 from rcsc.testing.matcher import Checked, check_matcher
@@ -39,8 +39,8 @@ from rcsc.testing.targets import Target, is_matcher, targets
 from rcsc.testing.tools import Absent, BuildFailed
 from rcsc.testing.vectors import Vectors, vectors_of
 
+QUICK_CORTEX = 1 << 14  # inputs of a table that the emulated target is given in an ordinary run
 LARGE = 128  # lines; of a larger table so many, by seed, are given vectors in an ordinary run
-MOST_ESBMC_LINES = 64
 MOST_SHOWN = 5
 
 
@@ -51,16 +51,18 @@ class SuiteOptions:
     Attributes:
         examples: Inputs for each matcher, and sequences for each step and cycle.
         cycles: Longest sequence.
+        deep: Whether mutants of the C are made too, and the target is asked about as many inputs as it can.
         esbmc_s: Time limit of ESBMC for one function, in seconds; 0 leaves it out.
         cortex: Whether the emulated target is asked.
-        mutants: How many mutants of each table and of its code are tried; None for all, 0 for none.
+        mutants: How many mutants of each table (and of the C, where `deep`) are tried; None for all, 0 for none.
         seed: Of every sample.
         progress: Told what is being done.
     """
 
     examples: int = 200
     cycles: int = 8
-    esbmc_s: float = 60.0
+    deep: bool = False
+    esbmc_s: float = 0.0
     cortex: bool = True
     mutants: int | None = 24
     seed: int = 1984
@@ -106,6 +108,7 @@ class Suite:
     executors: Executors
     compared: Compared = field(default_factory=Compared)
     found: list[Diagnostic] = field(default_factory=list)
+    checked: dict[str, Checked] = field(default_factory=dict)
 
     def table(self, target: Target) -> Table | None:
         """The table of a matcher or step."""
@@ -165,11 +168,10 @@ class Suite:
         return f"the same {len(self.compared.kept)} sequences, no finding of AddressSanitizer or UBSan"
 
     def reached(self, table: Table, vectors: Vectors) -> int:
-        """Reports lines that no step took; how many were taken."""
+        """Reports lines that no step took though an input takes them; how many were taken."""
         taken: Mapping[str, int] = self.compared.lines.get(table.name, {})
         spans = {str(line.name): line.span for line in table.lines}
-        reasons = {u.line: u.reason for u in vectors.unshown if not u.condition}
-        looked_at = {v.line for v in vectors.vectors} | {n for n, r in reasons.items() if r == "not found"}
+        looked_at = {v.line for v in vectors.vectors if v.purpose == "reach" and v.expected == v.line}
         named = [name for name, _ in all_lines(table)]
         for name in named:
             if name in looked_at and not taken.get(name, 0):
@@ -189,30 +191,33 @@ class Suite:
         checked = check_matcher(self.program, self.symbols, self.files, table)
         if isinstance(checked, tuple):
             self.differs(f"the C matcher of table `{table.name}` is not the table", table, checked)
-        return checked if isinstance(checked, Checked) else None
+            return None
+        if isinstance(checked, Absent):
+            return None
+        self.checked[table.name] = checked
+        return checked
 
     def esbmc(self) -> Iterator[EsbmcVerdict]:
         """ESBMC on every function of a table that is not too large for it."""
         for target in self.executors.targets if self.options.esbmc_s else ():
             self.options.progress(f"proving {target.function} with ESBMC")
-            table = self.table(target)
-            lines = max((len(t.lines) for t in ((table,) if table else self.program.tables)), default=0)
-            if lines > MOST_ESBMC_LINES and target.kind != "init":
+            if too_large(self.program, target):
                 reason = "complete per-variable check used"
                 yield EsbmcVerdict(target.function, Said.TOO_LARGE, 0, 0.0, reason)
                 continue
             verdict = prove_function(self.program, self.symbols, self.files, target, self.options.esbmc_s)
-            if verdict.said in (Said.REFUTED, Said.FAILED):
-                message = f"ESBMC does not prove the C function `{target.function}` equal to the tables"
-                self.differs(message, table, (f"{verdict.said}: {verdict.detail}",))
+            if verdict.said is Said.REFUTED:
+                message = f"ESBMC refutes that the C function `{target.function}` equals the tables"
+                self.differs(message, self.table(target), (verdict.detail,))
             yield verdict
 
     def cortex(self, number: int, table: Table) -> CortexRun | str:
         """What the emulated target says, or why it was not asked."""
         if not self.options.cortex:
             return "not asked"
+        most = MOST_INPUTS if self.options.deep else QUICK_CORTEX
         self.options.progress(f"running table {table.name} on the emulated Cortex-M3")
-        ran = run_cortex(self.program, self.symbols, self.files, number)
+        ran = run_cortex(self.program, self.symbols, self.files, number, most)
         if isinstance(ran, Absent):
             return ran.reason
         if isinstance(ran, BuildFailed) or ran.differ:
@@ -230,25 +235,42 @@ class Suite:
         judged = judge_table(search, table, self.proofs.prover, self.options.mutants, self.options.seed)
         alive = [one for one in judged if one.caught is Caught.SURVIVED]
         if alive:
-            message = f"{counted(len(alive), 'mutant')} of table `{table.name}` noticed by nobody"
+            message = (
+                f"{counted(len(alive), 'mutant')} of table `{table.name}` told apart by the search alone"
+            )
             self.differs(message, table, [f"{one.change}: {one.where}" for one in alive[:MOST_SHOWN]])
         return tally([one.caught.value for one in judged])
 
-    def code_mutants(self) -> dict[str, int]:
-        """Mutants of the emitted C, by who noticed them."""
-        if self.options.mutants == 0:
-            return {}
+    def code_mutants(self) -> Iterator[tuple[str, dict[str, int]]]:
+        """Mutants of the emitted C, by who noticed them: of the masks, and of the rest."""
+        if self.options.mutants == 0 or not self.options.deep:
+            return
         self.options.progress(f"mutating the C of {self.program.name}")
-        replays = self.compared.replays
-        if not portable_agrees(self.executors.native, self.files, replays):
+        native, replays = self.executors.native, self.compared.replays
+        if not portable_agrees(native, self.files, replays):
             message = f"the C of `{self.program.name}` does something else without compiler built-ins"
             self.differs(message, None, ())
-        judged = judge_code(self.executors.native, self.files, replays, self.options.mutants)
-        alive = [mutant for mutant, noticed in judged if noticed is Noticed.SURVIVED]
-        if alive:
-            message = f"{counted(len(alive), 'mutant')} of the C of `{self.program.name}` noticed by nobody"
-            self.differs(message, None, [mutant.where for mutant in alive[:MOST_SHOWN]])
-        return tally([noticed.value for _, noticed in judged])
+        decides = decider(self.program, self.symbols, self.files, self.checked)
+        lines = max((len(table.lines) for table in self.program.tables), default=1)
+        masks = judge_masks(self.symbols, self.files, lines, decides)
+        options = self.options
+        equal = [mutant for mutant, noticed in masks if noticed is Noticed.EQUIVALENT]
+        rest = judge_code(
+            native,
+            self.files,
+            replays,
+            decides,
+            Sample(options.mutants, tuple(equal)),
+            options.esbmc_s,
+            options.progress,
+        )
+        missed = [mutant for mutant, noticed in rest if noticed is Noticed.MISSED]
+        if missed:
+            message = f"the check of the masks of `{self.program.name}` calls equal what the tests tell apart"
+            self.differs(message, None, [mutant.where for mutant in missed[:MOST_SHOWN]])
+        for name, judged in (("mutants of the masks", masks), ("mutants of the C", rest)):
+            if judged:
+                yield name, tally([noticed.value for _, noticed in judged])
 
     def figures(self, number: int, table: Table, vectors: Vectors) -> TableFigures:
         """What is checked table by table."""
@@ -280,7 +302,7 @@ class Suite:
             dict(self.compared.faults),
             self.sanitized(),
             tuple(self.esbmc()),
-            self.code_mutants(),
+            dict(self.code_mutants()),
         )
 
 
