@@ -166,7 +166,7 @@ table t assuming one, two {{
     ("one", "two", "contradictory"),
     [
         ("a < 3", "a > 6", True),
-        ("a < 3", "a > 1", False),
+        ("a < 8", "a > 1", False),
         ("a + a = 7", "a >= 0", True),
         ("x > 0.25", "x < 0.2500000000000001", False),
         ("x > 0.25", "x < 0.25", True),
@@ -180,6 +180,18 @@ def test_contradictory_assumptions_are_found_where_boxes_decide(
     program = program_of(text)
     answer = assumptions_satisfiable(program, program.tables[0], OPTIONS)
     assert (answer is Answer.UNSATISFIABLE) == contradictory
+
+
+@pytest.mark.parametrize(("bound", "wrong"), [("s <= 2", ["RCS405"]), ("s <= 3", [])])
+def test_an_assumption_that_contradicts_an_invariant_is_found_where_the_table_reads_neither(
+    bound: str, wrong: list[str]
+) -> None:
+    text = (
+        "input go : bool\ninput a : int 3 .. 9\nstate s : int 0 .. 9\n"
+        f"invariant low : {bound}\nassume near : a <= s\n"
+        "table t assuming near {\n| line | go ||\n| yes | true ||\n| no | false ||\n}\n"
+    )
+    assert codes(proved(text).findings) == wrong
 
 
 @pytest.mark.parametrize(("one", "wrong"), [("a < 10", []), ("a < 9", ["RCS406"]), ("a * a <= 81", [])])

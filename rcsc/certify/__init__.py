@@ -171,7 +171,7 @@ class _Check:
             self.consistent(table, entry)
 
     def consistent(self, table: Table, entry: Mapping[str, Any]) -> None:
-        """At the input that the certificate names, every assumption of the table holds."""
+        """At the values that the certificate names, every assumption of the table and every invariant holds."""
         name = f"table `{table.name}`: its assumptions do not contradict each other"
         given = dict(entry["witness"])
         for leaf in self.program.variables:
@@ -182,12 +182,13 @@ class _Check:
             for one in self.relying.assumptions
             if one.name in table.assumptions
         ]
-        whole = self.start.terms.every(conditions)
+        invariants = [one.condition for one in self.program.invariants]
+        whole = self.start.terms.every((*conditions, *map(self.start.condition, invariants)))
         values = {
             one: _column(one, given.get(one.name, self.settler.first[one.name])) for one in variables(whole)
         }
         if not values_in(whole, values, 1)[0]:
-            raise RejectedError("its assumptions do not hold at the input that is to show that they can")
+            raise RejectedError("its assumptions do not hold at the values that are to show that they can")
         self.checked[name] = None
 
     def settle(self, debt: Debt) -> None:

@@ -16,6 +16,7 @@ from rcsc.meaning import digest
 from rcsc.model import AssumptionName, Box, Program, Snapshot, Table, TableName, Test, key_bounds
 from rcsc.prove.atoms import Universe, meet
 from rcsc.prove.boxleaf import MANY, parting
+from rcsc.prove.invariants import assumed_of
 from rcsc.prove.regions import Counted, Empty, Node, Only, Open, Outside, Rests, Split
 from rcsc.resolve.leaves import read_by
 
@@ -48,9 +49,8 @@ def tree_certificate(
 
 
 def with_witness(made: Certificate, program: Program, table: Table, witness: Snapshot) -> Certificate:
-    """The certificate of a table with an input at which all of the table's assumptions hold."""
-    assumed = [one.condition for one in program.assumptions if one.name in table.assumptions]
-    read = sorted({name for condition in assumed for name in read_by(condition)})
+    """The certificate of a table with values at which all of the table's assumptions and all invariants hold."""
+    read = sorted({name for one in assumed_of(program, table) for name in read_by(one.condition)})
     return {**made, "witness": {name: witness[name] for name in read}}
 
 

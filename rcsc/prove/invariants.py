@@ -9,7 +9,9 @@ from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label, Severity
 from rcsc.interpret import holds, initial
 from rcsc.model import (
+    Assumption,
     Expr,
+    Invariant,
     Kind,
     Program,
     Property,
@@ -63,11 +65,11 @@ def _holds(condition: Expr, snapshot: Snapshot) -> bool | None:
 
 
 def assumptions_satisfiable(program: Program, table: Table, options: Options) -> Snapshot | Answer:
-    """An input that satisfies all assumptions of the table, or that there is none, or that Z3 does not know.
+    """Values that satisfy all assumptions of the table and all invariants, or that there are none, or that Z3 does not know.
 
     A few are tried by hand before Z3 is asked.
     """
-    conditions = [one.condition for one in program.assumptions if one.name in table.assumptions]
+    conditions = [one.condition for one in assumed_of(program, table)]
     for trial in _trials(program):
         if all(_holds(one, trial) for one in conditions):
             return trial
@@ -81,6 +83,12 @@ def assumptions_satisfiable(program: Program, table: Table, options: Options) ->
     if answer is not Answer.SATISFIABLE:
         return answer
     return {one.name: solver.value(frame.leaves[one.name], one.type) for one in program.variables}
+
+
+def assumed_of(program: Program, table: Table) -> tuple[Assumption | Invariant, ...]:
+    """The assumptions of the table, and every invariant of the program."""
+    named = (one for one in program.assumptions if one.name in table.assumptions)
+    return (*named, *program.invariants)
 
 
 def _trials(program: Program) -> Iterator[dict[str, Value]]:

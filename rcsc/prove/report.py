@@ -53,9 +53,7 @@ def _others(program: Program, verdict: TableVerdict) -> Iterator[Diagnostic]:
                 label = Label(table.lines[line].cell_span(-1))
                 yield Diagnostic(Code.DEAD_LINE, message, label, notes=_under(table), help=helps)
             case ContradictoryAssumptions():
-                message = (
-                    f"the assumptions of table `{table.name}` contradict each other or the declared ranges"
-                )
+                message = f"the assumptions of table `{table.name}` contradict each other, an invariant or the declared ranges"
                 yield Diagnostic(Code.CONTRADICTORY_ASSUMPTIONS, message, Label(table.span))
             case Undecided(what):
                 helps = ("give each query more steps with `--steps`, or simplify the conditions",)
