@@ -24,7 +24,7 @@ def repo() -> Path:
     return Path(__file__).parents[1]
 
 
-TOOLS = ("chromium", "clang", "cmake", "pkg-config", "spin")
+TOOLS = ("arm-none-eabi-gcc", "chromium", "clang", "cmake", "pkg-config", "qemu-system-arm", "spin")
 """What `needs` marks may name."""
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 

@@ -5,6 +5,7 @@ import builtins
 import json
 import keyword
 import os
+import platform
 import re
 import shutil
 import subprocess
@@ -13,6 +14,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import EnumType, IntEnum
 from pathlib import Path
+from random import Random
 from types import ModuleType
 
 import jinja2
@@ -27,7 +29,9 @@ from rcsc.emit.write import write
 from rcsc.interpret import Fault
 from rcsc.resolve import compile_text
 from rcsc.system.signature import generated_files
+from rcsc.testing.cortex import CortexRun, run_cortex
 from rcsc.testing.externs import python_stand_ins
+from rcsc.testing.symbols import symbols_of
 from tests.emitted import EXTERN, RICH, emitted, program_of
 
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Wpedantic", "-Wtrigraphs", "-Wshadow", "-Werror")
@@ -575,3 +579,143 @@ def test_a_user_links_it_by_cmake(repo: Path, tmp_path: Path) -> None:
     subprocess.run(["cmake", "-S", ".", "-B", "b"], cwd=tmp_path, check=True, capture_output=True)
     subprocess.run(["cmake", "--build", "b"], cwd=tmp_path, check=True, capture_output=True)
     subprocess.run(["b/app"], cwd=tmp_path, check=True)
+
+
+SUMS = """
+input x : real -10.0 .. 10.0
+input y : real -10.0 .. 10.0
+input z : real -100.0 .. 100.0
+input tiny : real 0.0 .. 1.0
+output o : bool
+output r : array[6] of real -10000.0 .. 10000.0
+procedure p {
+  o := x * y + z = 0.0
+  r[0] := x * y + z
+  r[1] := x * y - z
+  r[2] := z - x * y
+  r[3] := (x + z) - x + z / 10.0
+  r[4] := tiny * 0.5
+  r[5] := 0.0
+  for i in 0 .. 4 { r[5] := r[5] * x * 0.01 + y }
+}
+table t {
+  | line | o || procedures |
+  | a    |   || p          |
+}
+"""
+DRIVER = """
+#include <fenv.h>
+#include <stdio.h>
+#include "case_.h"
+#if defined(__SSE2__)
+#include <xmmintrin.h>
+#define CHOOSE(how) ((how) < 4 ? (void)fesetround(modes[how]) : _mm_setcsr(_mm_getcsr() | ((how) == 4 ? 0x8000u : 0x0040u)))
+#define WAYS 6
+#else
+#define CHOOSE(how) (void)fesetround(modes[how])
+#define WAYS 4
+#endif
+static const int modes[4] = { FE_TONEAREST, FE_UPWARD, FE_DOWNWARD, FE_TOWARDZERO };
+static const double given[][4] = { @VALUES@ };
+int main(int argc, char **argv) {
+  int how, at, n; (void)argv;
+  for (how = 0; how < (argc > 1 ? WAYS : 1); how++) {
+    for (at = 0; at < (int)(sizeof given / sizeof given[0]); at++) {
+      case__t s; case__init(&s);
+      s.x = given[at][0]; s.y = given[at][1]; s.z = given[at][2]; s.tiny = given[at][3];
+      fesetround(FE_TONEAREST); CHOOSE(how);
+      case__t_step(&s);
+      fesetround(FE_TONEAREST);
+#if defined(__SSE2__)
+      _mm_setcsr(_mm_getcsr() & ~0x8040u);
+#endif
+      printf("%d %d %d", how, (int)s.fault, (int)s.o);
+      for (n = 0; n < 6; n++) { printf(" %a", s.r[n]); }
+      printf("\\n");
+    }
+  }
+  return 0;
+}
+"""
+
+
+def drawn_reals() -> list[tuple[float, ...]]:
+    """Products that cancel against a sum up to one rounding, and subnormal values."""
+    rng = Random(7)  # noqa: S311  # repeatable on purpose
+    found: list[tuple[float, ...]] = []
+    for _ in range(60):
+        x, y = rng.uniform(-10, 10), rng.uniform(-10, 10)
+        found.append(
+            (x, y, rng.choice((-x * y, x * y, rng.uniform(-100, 100))), rng.choice((5e-324, 3e-320, 1e-300)))
+        )
+    return found
+
+
+def as_python_computes(values: list[tuple[float, ...]], files: dict[str, str]) -> list[list[str]]:
+    """What the Python executor gives, as the driver prints it."""
+    module, found = imported(files), []
+    for x, y, z, tiny in values:
+        state = module.State()
+        state.x, state.y, state.z, state.tiny = x, y, z, tiny
+        assert module.t_step(state) == 0
+        reals = [getattr(state, f"r_{at}") for at in range(6)]
+        found.append([str(int(state.o)), *(float(one).hex() for one in reals)])
+    return found
+
+
+OFTEN = ("-O0", "-O2", "-O3 -march=native", "-O3 -march=native -ffp-contract=fast")
+OTHERWISE = ("-O2 -ffast-math", "-O1 -mfpmath=387", "-O2 -funsafe-math-optimizations -march=native")
+
+
+@pytest.mark.parametrize("cc", COMPILERS)
+def test_c_computes_reals_as_python_does_or_says_that_it_does_not(cc: str, tmp_path: Path) -> None:
+    files = emitted(program_of(SUMS))
+    values = drawn_reals()
+    compiled(files, tmp_path, "-march=native" if platform.machine() == "x86_64" else "-O2", cc=cc)
+    rows = ", ".join("{ " + ", ".join(one.hex() for one in row) + " }" for row in values)
+    (tmp_path / "main.c").write_text(DRIVER.replace("@VALUES@", rows))
+    right = as_python_computes(values, files)
+    stopped = dict[str, set[int]]()
+    for flags in (*OFTEN, *(OTHERWISE if platform.machine() == "x86_64" else ())):
+        made = subprocess.run(
+            [cc, "-std=gnu99", *flags.split(), "main.c", "case_.c", "-o", "run", "-lm"],
+            cwd=tmp_path, capture_output=True, text=True, check=False,
+        )  # fmt: skip
+        if "387" in flags and made.returncode != 0:
+            continue  # clang has no such option
+        assert made.returncode == 0, made.stderr
+        ran = subprocess.run([tmp_path / "run", "all"], capture_output=True, text=True, check=True)
+        for number, line in enumerate(ran.stdout.splitlines()):
+            way, fault, *found = line.split()
+            stopped.setdefault(f"{flags} {way}", set()).add(int(fault))
+            if int(fault) == 0:
+                assert [found[0], *(float.fromhex(one).hex() for one in found[1:])] == right[
+                    number % len(values)
+                ], (flags, way)
+    assert all(faults == {Fault.ARITHMETIC} for way, faults in stopped.items() if not way.endswith(" 0"))
+    assert all(stopped[f"{flags} 0"] == {0} for flags in OFTEN[:3])
+    if cc == "gcc":
+        assert stopped[f"{OFTEN[3]} 0"] == {0}
+    assert all(
+        stopped.get(f"{flags} 0", {7}) == {7} for flags in OTHERWISE[:2] if f"{OTHERWISE[0]} 0" in stopped
+    )
+
+
+@pytest.mark.needs("arm-none-eabi-gcc", "qemu-system-arm")
+def test_reals_are_the_same_on_a_processor_without_them() -> None:
+    text = SUMS.replace("| o ||", "| n ||").replace("|   || p", "| < 90 || p")
+    text = "input n : int 0 .. 255\n" + text.replace(
+        "| p          |\n", "| p          |\n| b | >= 90 || p |\n"
+    )
+    program = program_of(text)
+    files = emitted(program)
+    ran = run_cortex(program, symbols_of(program, files), files, 0)
+    assert isinstance(ran, CortexRun), ran
+    assert (ran.differ, ran.steps) == (0, 256)
+
+
+def test_only_programs_with_reals_test_the_arithmetic() -> None:
+    assert "case__exact" in emitted(program_of(SUMS))["c/case_.c"]
+    assert "case__exact" not in emitted(program_of(all_named("a")))["c/case_.c"]
+    divided = "input n : int 0 .. 9\ninput m : int 0 .. 9\ntable t {\n| line | when ||\n| a | real(n) / 3.0 < real(m) ||\n}\n"
+    assert "case__exact" in emitted(program_of(divided))["c/case_.c"]

@@ -3,3 +3,6 @@
 add_library(approach STATIC "${CMAKE_CURRENT_LIST_DIR}/approach.c")
 target_include_directories(approach PUBLIC "${CMAKE_CURRENT_LIST_DIR}")
 set_target_properties(approach PROPERTIES C_STANDARD 99 C_STANDARD_REQUIRED ON C_EXTENSIONS OFF)
+if(CMAKE_C_COMPILER_ID MATCHES "GNU|Clang")
+  target_compile_options(approach PRIVATE -ffp-contract=off)
+endif()

@@ -87,7 +87,7 @@ typedef struct {
     uint16_t speed_mm_s; /* output; 0 .. 1000 mm*s^-1; Commanded speed. */
     uint8_t status_report; /* output; level_status */
     int32_t line; /* trace: position of the line that ran; -1 for none */
-    int32_t fault; /* trace: 0 none, 1 input refused, 2 no line, 3 several lines, 4 extern refused, 5 assumption failed */
+    int32_t fault; /* trace: 0 none, 1 input refused, 2 no line, 3 several lines, 4 extern refused, 5 assumption failed, 7 reals computed otherwise here */
     int32_t fault_at; /* trace: position of the variable that was refused, or of the assumption; -1 for none */
     uint64_t assumptions_failed; /* trace: bit k for the k-th assumption that is checked */
 } approach_t;

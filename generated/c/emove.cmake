@@ -3,3 +3,6 @@
 add_library(emove STATIC "${CMAKE_CURRENT_LIST_DIR}/emove.c")
 target_include_directories(emove PUBLIC "${CMAKE_CURRENT_LIST_DIR}")
 set_target_properties(emove PROPERTIES C_STANDARD 99 C_STANDARD_REQUIRED ON C_EXTENSIONS OFF)
+if(CMAKE_C_COMPILER_ID MATCHES "GNU|Clang")
+  target_compile_options(emove PRIVATE -ffp-contract=off)
+endif()

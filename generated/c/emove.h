@@ -274,7 +274,7 @@ typedef struct {
     emove_vision_order_t to_vision; /* output; To vision. */
     emove_emove_report_t report; /* output; To TASK. */
     int32_t line; /* trace: position of the line that ran; -1 for none */
-    int32_t fault; /* trace: 0 none, 1 input refused, 2 no line, 3 several lines, 4 extern refused, 5 assumption failed */
+    int32_t fault; /* trace: 0 none, 1 input refused, 2 no line, 3 several lines, 4 extern refused, 5 assumption failed, 7 reals computed otherwise here */
     int32_t fault_at; /* trace: position of the variable that was refused, or of the assumption; -1 for none */
     uint64_t assumptions_failed; /* trace: bit k for the k-th assumption that is checked */
 } emove_t;

@@ -3,3 +3,6 @@
 add_library(gripper STATIC "${CMAKE_CURRENT_LIST_DIR}/gripper.c")
 target_include_directories(gripper PUBLIC "${CMAKE_CURRENT_LIST_DIR}")
 set_target_properties(gripper PROPERTIES C_STANDARD 99 C_STANDARD_REQUIRED ON C_EXTENSIONS OFF)
+if(CMAKE_C_COMPILER_ID MATCHES "GNU|Clang")
+  target_compile_options(gripper PRIVATE -ffp-contract=off)
+endif()

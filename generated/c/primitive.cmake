@@ -3,3 +3,6 @@
 add_library(primitive STATIC "${CMAKE_CURRENT_LIST_DIR}/primitive.c")
 target_include_directories(primitive PUBLIC "${CMAKE_CURRENT_LIST_DIR}")
 set_target_properties(primitive PROPERTIES C_STANDARD 99 C_STANDARD_REQUIRED ON C_EXTENSIONS OFF)
+if(CMAKE_C_COMPILER_ID MATCHES "GNU|Clang")
+  target_compile_options(primitive PRIVATE -ffp-contract=off)
+endif()

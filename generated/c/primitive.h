@@ -266,7 +266,7 @@ typedef struct {
     primitive_primitive_report_t report; /* output; To E-MOVE. */
     uint8_t display; /* output; display; To whoever looks. */
     int32_t line; /* trace: position of the line that ran; -1 for none */
-    int32_t fault; /* trace: 0 none, 1 input refused, 2 no line, 3 several lines, 4 extern refused, 5 assumption failed */
+    int32_t fault; /* trace: 0 none, 1 input refused, 2 no line, 3 several lines, 4 extern refused, 5 assumption failed, 7 reals computed otherwise here */
     int32_t fault_at; /* trace: position of the variable that was refused, or of the assumption; -1 for none */
     uint64_t assumptions_failed; /* trace: bit k for the k-th assumption that is checked */
 } primitive_t;

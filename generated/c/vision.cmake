@@ -3,3 +3,6 @@
 add_library(vision STATIC "${CMAKE_CURRENT_LIST_DIR}/vision.c")
 target_include_directories(vision PUBLIC "${CMAKE_CURRENT_LIST_DIR}")
 set_target_properties(vision PROPERTIES C_STANDARD 99 C_STANDARD_REQUIRED ON C_EXTENSIONS OFF)
+if(CMAKE_C_COMPILER_ID MATCHES "GNU|Clang")
+  target_compile_options(vision PRIVATE -ffp-contract=off)
+endif()

@@ -243,7 +243,7 @@ typedef struct {
     vision_camera_order_t to_camera; /* output; To the camera. */
     vision_vision_report_t report; /* output; To E-MOVE. */
     int32_t line; /* trace: position of the line that ran; -1 for none */
-    int32_t fault; /* trace: 0 none, 1 input refused, 2 no line, 3 several lines, 4 extern refused, 5 assumption failed */
+    int32_t fault; /* trace: 0 none, 1 input refused, 2 no line, 3 several lines, 4 extern refused, 5 assumption failed, 7 reals computed otherwise here */
     int32_t fault_at; /* trace: position of the variable that was refused, or of the assumption; -1 for none */
     uint64_t assumptions_failed; /* trace: bit k for the k-th assumption that is checked */
 } vision_t;

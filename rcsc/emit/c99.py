@@ -71,6 +71,7 @@ class CFile:
     structs: tuple[Struct, ...]
     fields: tuple[Field, ...]
     failed: tuple[str, ...]
+    reals: bool
     bits: frozenset[int]
     externs: tuple[str, ...]
     helpers: tuple[Function, ...]
@@ -137,7 +138,8 @@ class _Maker:
         procedures = tuple(self._procedure(one) for one in _callees_first(self.program))
         tables = [function for table in self.plan.tables for function in self._table(table)]
         levels = [self._level(level) for level in self.program.levels]
-        shared = [self._admit(), self._settle(), *self._actions()]
+        shared = [self._settle(), *self._actions()]
+        shared.insert(0, self._admit())  # the last to be spelled: it asks what the others compute with
         publics = [self._init(), *tables, *self._steps(), *levels]
         return CFile(
             self.p,
@@ -148,6 +150,7 @@ class _Maker:
             tuple(self._record(record) for record in self.program.records),
             tuple(self._fields()),
             self.names.failed,
+            self._reals(),
             frozenset(self.bits),
             tuple(self._externs()),
             tuple(self._helpers()),
@@ -301,10 +304,20 @@ class _Maker:
         yield f"{pad}    s->fault_at = {position};"
         yield f"{pad}}}"
 
+    def _reals(self) -> bool:
+        """Whether anything is a real in what has been spelled."""
+        return self.text.reals or any(isinstance(one.type, Real) for one in self.program.variables)
+
     def _admit(self) -> Function:
         """Admits into a copy, so that a refused cycle changes nothing."""
         lines = [f"    {self.p}_t before = *s;", "    s->line = -1;", "    s->fault = 0;", "    s->fault_at = -1;",
                  *(f"    s->{word} = 0;" for word in self.names.failed)]  # fmt: skip
+        if self._reals():
+            lines += [
+                f"    if (!{self.p}_exact()) {{",
+                f"        s->fault = {int(Fault.ARITHMETIC)};",
+                "    }",
+            ]
         body = [
             line
             for at, variable in enumerate(self.program.variables)

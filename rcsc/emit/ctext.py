@@ -168,13 +168,14 @@ class CText:
     Attributes:
         state: How the struct is reached: `s->`.
         helpers: Helper functions that were used.
+        reals: Whether an expression was a real.
     """
 
     names: Names
     failing: frozenset[str] = frozenset()
     state: str = "s->"
     helpers: set[str] = field(default_factory=set)
-    _cases: int = 0
+    reals: bool = False
 
     def place(self, leaf: str) -> str:
         """A leaf."""
@@ -182,6 +183,7 @@ class CText:
 
     def expr(self, expr: Expr) -> str:
         """An expression in the wide type of its kind, parenthesised where needed."""
+        self.reals = self.reals or isinstance(expr.type, Real)
         match expr:
             case Literal(value=value, type=kind):
                 return constant(kind, value)

@@ -213,7 +213,7 @@ def guard(p: str) -> str:
 
 def _file_scope(program: Program, p: str) -> Scope:
     externs = {one.extern.c for one in program.procedures if one.extern is not None}
-    own = {f"{p}_{end}" for end in ("t", "init", "admit", "settle", "bit32", "bit64")}
+    own = {f"{p}_{end}" for end in ("t", "init", "admit", "settle", "exact", "bit32", "bit64")}
     return Scope(set(reserved.C_COMPOSED | C_WORDS) | externs | own | {guard(p)})
 
 

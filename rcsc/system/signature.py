@@ -29,6 +29,8 @@ FAULTS = (
     "several lines match",
     "extern refused",
     "assumption failed",
+    "state refused",
+    "reals computed otherwise here",
 )
 STOPPED = FAULTS.index("assumption failed")
 
