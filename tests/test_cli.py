@@ -464,6 +464,44 @@ def test_certify(rcsc: Rcsc) -> None:
     assert rcsc("certify", "grip.rcs").status == 1
 
 
+HARD = """
+input n : int 0 .. 1000000
+input m : int 0 .. 1000000
+state s : int 0 .. 1000000
+assume small proved : n <= 1000000
+procedure p { if m <= n { s := n - m } }
+table t assuming small {
+  | line | n    ||
+  |------|------||
+  | one  | < 4  ||
+  | two  | >= 4 ||
+}
+"""
+
+
+def test_certify_names_what_it_did_not_check(rcsc: Rcsc) -> None:
+    write("hard.rcs", HARD)
+    ran = rcsc("certify", "hard.rcs", "--write", "a.json", "--questions", "left")
+    assert ran.status == 0
+    assert "note[RCS421]: not checked: procedure `p`: `s` stays in 0 .. 1000000" in ran.out
+    assert "not wholly certified: checked 4 of 5 obligations" in ran.out
+    assert "(proved)" not in ran.out
+    [question] = Path("left").iterdir()
+    assert question.read_text().startswith("; procedure `p`: `s` stays in 0 .. 1000000\n")
+    for more in (["--strict"], ["--against", "a.json"]):
+        ran = rcsc("certify", "hard.rcs", *more)
+        assert ran.status == 1
+        assert "error[RCS421]" in ran.out
+    for more in (["--strict"], ["--against", "a.json"]):
+        ran = rcsc("certify", "hard.rcs", "--certify", *more)
+        assert ran.status == 0
+        assert "certified: checked all 5 obligations" in ran.out
+    write("hard.rcs", HARD.replace("m <= n", "m <= n + 1"))
+    ran = rcsc("certify", "hard.rcs", "--against", "a.json", "--certify")
+    assert ran.status == 1
+    assert "of another program" in ran.out
+
+
 def test_new_makes_a_project_that_checks_compiles_and_is_formatted(rcsc: Rcsc) -> None:
     assert rcsc("new", "robot").status == 0
     for command in (["check", "robot"], ["compile", "robot"], ["fmt", "--check", "robot"]):

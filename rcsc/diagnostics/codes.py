@@ -77,6 +77,7 @@ class Code(StrEnum):
     CERTIFICATE = "RCS418"
     ASSUMPTION_INITIAL = "RCS419"
     PROPERTY_ELSEWHERE = "RCS420"
+    NOT_CHECKED = "RCS421"
     # 5xx emission and generated files
     STALE = "RCS501"
     NOT_WRITTEN = "RCS502"

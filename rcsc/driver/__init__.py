@@ -107,7 +107,8 @@ def certify(settings: Settings, how: "Checking", write: Path | None, against: Pa
         return Made(report, "nothing is certified: not everything is proved")
     found = keep(proof.certificate, write) if write is not None else ()
     made = reviewed(loaded, proof.certificate, how, proof.proved)
-    return Made(_report(loaded, proofs, (*found, *made.report.found)), made.closing)
+    report = _report(loaded, proofs, (*found, *made.report.found))
+    return Made(replace(report, tables=()), made.closing)  # the verdicts are the prover's, not the checker's
 
 
 # --- parts -----------------------------------------------------------------------------

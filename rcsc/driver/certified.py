@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rcsc.diagnostics.codes import Code
-from rcsc.diagnostics.diagnostic import Diagnostic, Label
+from rcsc.diagnostics.diagnostic import Diagnostic, Label, Severity
 from rcsc.diagnostics.report import Report
 from rcsc.driver.work import Made
 from rcsc.files import write_atomically
@@ -15,9 +15,8 @@ from rcsc.project import Loaded
 from rcsc.source import Span
 
 if TYPE_CHECKING:
-    from rcsc.certify import Answer, Certified, Unchecked
+    from rcsc.certify import Answer, Certified
     from rcsc.model import Program, ProvedProgram
-    from rcsc.source import Source
 
 MOST_PROBLEMS = 10
 
@@ -87,33 +86,24 @@ def reviewed(
     ]
     if how.questions is not None:
         found += _kept_questions(outcome, how.questions)
-    if how.strict and not found:
-        found += [
-            Diagnostic(Code.CERTIFICATE, f"not checked: {one.name}", Label(one.written))
-            for one in outcome.unchecked
-        ]
-    return Made(Report(tuple(found), (), loaded.sources), _closing(program, outcome, loaded.sources))
+    severity = Severity.ERROR if how.strict else Severity.NOTE
+    found += [
+        Diagnostic(Code.NOT_CHECKED, f"not checked: {one.name}", Label(one.written), severity=severity)
+        for one in outcome.unchecked
+    ]
+    return Made(Report(tuple(found), (), loaded.sources), _closing(program, outcome))
 
 
-def _closing(program: "Program", outcome: "Certified", sources: "Mapping[str, Source]") -> str:
-    """What was checked, and by name what was not."""
+def _closing(program: "Program", outcome: "Certified") -> str:
+    """How much was checked, and what that rests on."""
     if outcome.problems:
         return "not certified"
-    total = len(outcome.checked) + len(outcome.unchecked)
+    checked, total = len(outcome.checked), len(outcome.checked) + len(outcome.unchecked)
     resting = "".join(f"\n  it rests on {one}" for one in outcome.rests_on)
     if outcome.whole:
-        return f"certified: all {total} obligations of `{program.name}` checked{resting}"
-    left = "".join(f"\n  not checked: {one.name}{_place(one, sources)}" for one in outcome.unchecked)
-    return (
-        f"not wholly certified: {len(outcome.checked)} of {total} obligations of `{program.name}` checked; "
-        f"for the rest there is only the prover's word{left}{resting}"
-    )
-
-
-def _place(one: "Unchecked", sources: "Mapping[str, Source]") -> str:
-    if one.written.file not in sources:
-        return ""
-    return f" ({one.written.file}:{sources[one.written.file].position(one.written.start).line})"
+        return f"certified: checked all {total} obligations of `{program.name}`{resting}"
+    said = f"not wholly certified: checked {checked} of {total} obligations of `{program.name}`"
+    return f"{said}; for the others, named above, there is only the prover's word{resting}"
 
 
 def _kept_questions(outcome: "Certified", folder: Path) -> list[Diagnostic]:
