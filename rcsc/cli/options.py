@@ -21,15 +21,22 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
+class _Millions(click.FloatRange):
+    """A number of millions on the command line, single ones in the program."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
+        """The number; a default is converted like what is typed."""
+        return max(1, round(super().convert(value, param, ctx) * 1_000_000))
+
+
 def steps_option(default: float) -> Callable[[Command], Command]:
     """Adds `--steps`, in millions; the command gets `steps`, in single ones."""
     return click.option(
         "--steps",
-        type=click.FloatRange(min=0, min_open=True),
+        type=_Millions(min=0, min_open=True),
         default=default,
         show_default=True,
         metavar="MILLIONS",
-        callback=lambda _context, _option, millions: max(1, round(millions * 1_000_000)),
         help="Budget of each question to the solver, in its own steps, which are the same on every machine: a million takes "
         "some tenths of a second. Past it the answer is `undecided`, never `proved`.",
     )

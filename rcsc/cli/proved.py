@@ -95,10 +95,10 @@ def reaction(made: "Mapping[str, Stepper]", proof: "SystemProof") -> Iterator[st
 def confirmed(stepper: "Stepper", proof: "LevelProof") -> "dict[str, bool]":
     """Each question of the certificate, and whether cvc5 refutes it within two minutes."""
     from rcsc.compose.level import certificate
-    from rcsc.smtlib import cvc5_refutes
+    from rcsc.smtlib import CVC5_STEPS, cvc5_refutes
 
     return {
-        name: cvc5_refutes(text, timeout_ms=120_000) for name, text in certificate(stepper, proof).items()
+        name: cvc5_refutes(text, steps=6 * CVC5_STEPS) for name, text in certificate(stepper, proof).items()
     }
 
 
