@@ -5,7 +5,8 @@ import shutil
 import subprocess
 from collections import Counter
 from collections.abc import Callable, Iterator
-from dataclasses import replace
+from dataclasses import fields, is_dataclass, replace
+from enum import StrEnum
 from itertools import product
 from pathlib import Path
 from random import Random
@@ -21,9 +22,15 @@ from rcsc.diff.present import knows, within_reach
 from rcsc.interpret import cycle, execute, initial, matching_lines
 from rcsc.model import (
     Bool,
+    Default,
     Enum,
+    Invariant,
     Kind,
+    Level,
+    Line,
+    Owner,
     Program,
+    Property,
     Scalar,
     Table,
     Value,
@@ -938,3 +945,130 @@ def test_an_error_in_a_revision_names_the_revision(folder: Path, capfd: pytest.C
     shown = capfd.readouterr().out
     assert "HEAD:a.rcs:1:1" in shown
     assert "rcsc-diff-" not in shown
+
+
+# --- whatever differs is told, or proved to mean the same ------------------------------------
+
+EVERYTHING = """
+enum mode { idle, run }
+unit tick
+record pair {
+  a : int 0 .. 9
+  b : bool
+}
+input m : mode
+input x : int 0 .. 9 clamp
+input r : real 0.0 .. 2.0 [m]
+input p : pair
+state s : mode = idle deferred until x = 3
+state n : int 0 .. 20 = 4
+state k : array[2] of int 0 .. 5
+output o : int 0 .. 9
+output q : bool
+assume low monitored : x <= 7
+assume slow assumed : x <= 8 or n <= 3
+invariant small : n <= 20
+property kept : n <= 20
+procedure count(by : int 0 .. 3) { if n + by <= 20 { n := n + by } next s := run }
+extern procedure ask reads x writes k python "plant:ask" c "plant_ask"
+module tidy reads x, r writes q { q := x in {1, 2} and r < 1.0 [m] }
+owner hands { tidy }
+table t assuming low, slow {
+  | line | m    | x    || procedures | o |
+  | a    | idle | <= 4 || count(2)   | 1 |
+  | b    | idle | > 4  || ask        | 2 |
+  | d    | DEFAULT |   || count(1)   | 3 |
+}
+table u {
+  | line | x || o |
+  | e | < 5  || 1 |
+  | f | >= 5 || 2 |
+  | z | DEFAULT unreachable || 2 |
+}
+level top {
+  period 20 [ms]
+  preprocess hands
+  table by m { idle : t  run : u }
+}
+"""
+WORDS = {"doc", "text", "box", "heading", "columns", "variables", "file", "stops"}
+"""What is made from other fields, or said for people."""
+RENAMED = (Line, Default, Level, Owner, Property, Invariant)
+
+
+def otherwise(value: object, owner: object, name: str) -> Iterator[object]:
+    """Other values for one field of the model, of its own type, one change each."""
+    match value:
+        case StrEnum():
+            yield next(one for one in type(value) if one is not value)
+        case bool():
+            yield not value
+        case int() | float():
+            yield value + 1
+        case str() if name in {"python", "c"} or (name == "name" and isinstance(owner, RENAMED)):
+            yield f"{value}2"
+        case tuple():
+            yield from otherwise_made(value, owner, name)
+        case Enum() if not isinstance(owner, Program):
+            return  # it is declared elsewhere
+        case _ if is_dataclass(value) and not isinstance(value, type):
+            for one in fields(value):
+                if one.compare and one.name not in WORDS:
+                    for other in otherwise(getattr(value, one.name), value, one.name):
+                        yield replace(value, **{one.name: other})
+            if name in {"deferred_until", "default"}:
+                yield None
+
+
+def otherwise_made(value: tuple[object, ...], owner: object, name: str) -> Iterator[object]:
+    """One member fewer, two in another order, or one of them otherwise."""
+    if value:
+        yield value[:-1]
+    if len(value) > 1 and value[0] != value[1]:
+        yield (value[1], value[0], *value[2:])
+    for at, part in enumerate(value):
+        yield from ((*value[:at], other, *value[at + 1 :]) for other in otherwise(part, owner, name))
+
+
+def test_whatever_differs_is_told_or_proved_to_mean_the_same() -> None:
+    whole = program(EVERYTHING)
+    assert not compare("case", whole, whole, Options()).changed
+    told: Counter[str] = Counter()
+    for field in fields(Program):
+        if field.name in {"name", "file", "own_tables"}:
+            continue
+        for value in otherwise(getattr(whole, field.name), whole, field.name):
+            other = replace(whole, **{field.name: value})  # type: ignore[arg-type]  # of the field's own type
+            try:
+                found = compare("case", whole, other, Options(steps=2))
+            except (LookupError, ValueError, TypeError, AttributeError, AssertionError):
+                continue  # no program that `resolve` makes
+            proved = any(part.basis is Basis.SOLVER or part.moved for part in found.parts)
+            assert found.changed or found.undecided or proved, (field.name, value)
+            told[field.name] += found.changed
+    assert sum(told.values()) > 40, told
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (("assuming low, slow", "assuming low"), "no longer assumes `slow`"),
+        (("table u {", "table u assuming low {"), "assumes `low`, too"),
+        (("assuming low, slow", "assuming slow, low"), "its assumptions stand in another order"),
+        (("| z | DEFAULT unreachable", "| z | DEFAULT"), "its DEFAULT line: unreachable, now reachable"),
+        (("  | z | DEFAULT unreachable || 2 |\n", ""), "its DEFAULT line: unreachable, now none"),
+        (("assume low monitored", "assume low assumed"), "monitored, now assumed"),
+        (("x : int 0 .. 9 clamp", "x : int 0 .. 9"), "input : int 0 .. 9 = 0 clamp -> input : int 0 .. 9 = 0 reject"),
+        (("0 .. 20 = 4", "0 .. 20 = 5"), "state : int 0 .. 20 = 4 -> state : int 0 .. 20 = 5"),
+        (('"plant:ask"', '"plant:tell"'), "line `b`: another effect"),
+        (("by : int 0 .. 3", "by : int 0 .. 4"), "procedure `count`  declared otherwise"),
+        (("until x = 3", "until x = 4"), "deferred value `s`"),
+        (("invariant small : n <= 20", ""), "invariant `small`  gone"),
+    ],
+)  # fmt: skip
+def test_what_no_region_shows_is_said(change: tuple[str, str], said: str) -> None:
+    assert change[0] in EVERYTHING
+    made = program(EVERYTHING.replace(*change))
+    found = compare("case", program(EVERYTHING), made, Options())
+    assert found.changed
+    assert said in plain(list(rows(Difference("a", "b", (found,)))))

@@ -40,6 +40,11 @@ def compare(
             found += steps()
         except given_up:
             undecided.append(what)
+    told = [
+        *(one.what for one in made.changes),
+        *(f"{one.what} `{one.name}`" for one in found if one.changed),
+    ]
+    found += parts.unsaid(versions, told)
     seen: tuple[Traces, ...] = ()
     if not undecided:
         try:

@@ -4,18 +4,22 @@ In: versions. Out: `Part`s.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import replace
+from dataclasses import fields, is_dataclass, replace
+from enum import StrEnum
 from functools import partial
+from typing import Any
 
 from rcsc.diff.contrast import changes, contrast
 from rcsc.diff.difference import Basis, Change, Part, Sort
 from rcsc.diff.versions import Doing, Runner, Versions
 from rcsc.diff.words import number
 from rcsc.interpret import call, execute
+from rcsc.meaning import digest
 from rcsc.model import (
     BEFORE,
     Assumption,
     Call,
+    Enum,
     Expr,
     Int,
     Invariant,
@@ -162,6 +166,76 @@ def _sequence(
         return Part(what, level, (f"cannot be compared: `{apart[0]}` changed its kind",))
     one, two = (m.effect(body) for m, body in zip(versions.meanings(), bodies, strict=True))
     return _effects(versions, what, level, (one, two), (partial(_run, bodies[0]), partial(_run, bodies[1])))
+
+
+# --- what no comparison has looked at -----------------------------------------------------------
+
+_COMPARED: Mapping[str, tuple[str, Mapping[str, object]]] = {
+    "enums": ("enumeration", {}),
+    "records": ("record", {}),
+    "declared": ("variable", {}),
+    "variables": ("variable", {"deferred_until": None}),
+    "procedures": ("procedure", {"body": (), "reads": (), "writes": ()}),
+    "assumptions": ("assumption", {"condition": None, "standing": None}),
+    "invariants": ("invariant", {"condition": None}),
+    "properties": ("property", {"condition": None}),
+    "tables": ("table", {"columns": (), "lines": (), "default": None, "variables": (), "assumptions": ()}),
+    "owners": ("owner", {}),
+    "levels": ("level", {"preprocess": (), "postprocess": ()}),
+}
+"""What the members of a program's field are called, and which of their fields a comparison of their own looks at."""
+_UNSEEN = {"name", "file", "own_tables"}
+"""Fields of a program that mean nothing to it: where it stands, and which file declares what."""
+_WORDS = {"doc": "", "text": "", "box": None}
+"""Fields that say again, for people or for the prover, what others say."""
+
+
+def unsaid(versions: Versions, said: Iterable[str]) -> Iterator[Part]:
+    """Whatever of the two programs differs, by a walk over all fields, and is neither said yet nor compared.
+
+    Procedures that only one version has are left out: what they do shows where they are called.
+
+    Args:
+        versions: The two programs.
+        said: What declarations and parts have told: `table t`.
+    """
+    known = set(said)
+    before, after = versions.before, versions.after
+    for field in fields(Program):
+        if field.name in _UNSEEN:
+            continue
+        what, compared = _COMPARED.get(field.name, (field.name, {}))
+        one, two = ({str(m.name): m for m in getattr(p, field.name)} for p in (before, after))
+        for name in dict.fromkeys((*one, *two)):
+            key = f"{what} `{name.removesuffix('.next')}"
+            if any(told.startswith((f"{key}`", f"{key}.", f"{key}[")) for told in known):
+                continue  # itself, or a part of it
+            if name not in one or name not in two:
+                if what != "procedure":
+                    yield Part(what, name, ("new" if name not in one else "gone",))
+            elif _rest_of(one[name], compared) != _rest_of(two[name], compared):
+                yield Part(what, name, ("declared otherwise",))
+        if [name for name in one if name in two] != [name for name in two if name in one]:
+            yield Part("order", field.name, ("declared in another order",))
+
+
+def _rest_of(member: Any, compared: Mapping[str, object]) -> str:
+    """A digest of a member without what is compared; an enumeration stands for itself."""
+    left_out = {*compared, *_WORDS}
+    kept = (getattr(member, f.name) for f in fields(member) if f.compare and f.name not in left_out)
+    return digest(tuple(_bare(one, whole=isinstance(member, Enum)) for one in kept))
+
+
+def _bare(value: Any, *, whole: bool = False) -> Any:
+    """The value without words; a type by its name, since its members are compared by themselves."""
+    if isinstance(value, tuple):
+        return tuple(_bare(part) for part in value)
+    if isinstance(value, Enum) and not whole:
+        return ("enum", value.name)
+    if isinstance(value, StrEnum) or not is_dataclass(value):
+        return value
+    parts = ((f.name, _WORDS.get(f.name, getattr(value, f.name))) for f in fields(value) if f.compare)
+    return (type(value).__name__, *((name, _bare(part)) for name, part in parts))
 
 
 # --- conditions --------------------------------------------------------------------------------

@@ -4,7 +4,7 @@ In: two tables over shared leaves. Out: a `Part`. Inputs at which the versions d
 other; when the solver finds no more, that is the proof that nothing else changed.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
 
@@ -58,8 +58,30 @@ def table_part(versions: Versions, one: Table, two: Table) -> Part:
     apart = sorted(versions.aligned.apart & (_touched(versions, 0, one) | _touched(versions, 1, two)))
     if apart:
         said = (f"cannot be compared: {', '.join(f'`{leaf}`' for leaf in apart)} changed its kind",)
-        return Part("table", name, said)
+        return Part("table", name, (*said, *_claims(one, two)))
     return _Comparison(versions, one, two).part()
+
+
+def _claims(one: Table, two: Table) -> Iterator[str]:
+    """What changed of a table that no region shows: the assumptions that it may rely on, and what is said of its DEFAULT."""
+    gone = [name for name in one.assumptions if name not in two.assumptions]
+    new = [name for name in two.assumptions if name not in one.assumptions]
+    yield from (f"no longer assumes `{name}`" for name in gone)
+    yield from (f"assumes `{name}`, too" for name in new)
+    orders = [
+        [name for name in names if name not in (*gone, *new)] for names in (one.assumptions, two.assumptions)
+    ]
+    if orders[0] != orders[1]:
+        yield "its assumptions stand in another order"
+    first, second = (_default(table) for table in (one, two))
+    if first != second:
+        yield f"its DEFAULT line: {first}, now {second}"
+
+
+def _default(table: Table) -> str:
+    if table.default is None:
+        return "none"
+    return "unreachable" if table.default.unreachable else "reachable"
 
 
 def _touched(versions: Versions, side: int, table: Table) -> set[str]:
@@ -110,7 +132,7 @@ class _Comparison:
                 (moved if change.sort is Sort.LINE else changed).append(change)
         space = versions.space(*(out.when for outs in self.outcomes for out in outs.values()))
         return Part(
-            "table", str(self.tables[1].name), (), tuple(changed), tuple(moved), Basis.SOLVER,
+            "table", str(self.tables[1].name), tuple(_claims(*self.tables)), tuple(changed), tuple(moved), Basis.SOLVER,
             versions.queries - before, space.volume(space.nodes),
         )  # fmt: skip
 
