@@ -20,6 +20,7 @@ from typing import Any
 
 from rcsc import __version__
 from rcsc.files import write_atomically
+from rcsc.files.read import json_of
 
 FOLDER = ".rcsc-cache"
 MOST_ENTRIES = 4096
@@ -52,7 +53,7 @@ class Cache:
             return None
         if not hmac.compare_digest(seal, self._seal(key, content)):
             return None
-        value = json.loads(content)
+        value = json_of(content, plain=False)
         return value if isinstance(value, dict) else None
 
     def store(self, value: Json, *parts: str) -> None:
@@ -62,7 +63,7 @@ class Cache:
         path = self._path(key)
         try:
             self._prepare(path.parent)
-            write_atomically(path, self._seal(key, content) + b"\n" + content)
+            write_atomically(path, self._seal(key, content) + b"\n" + content, durable=False)
             self._prune()
         except OSError:
             return
@@ -80,7 +81,7 @@ class Cache:
         folder.mkdir(parents=True, exist_ok=True)
         for name, text in (("CACHEDIR.TAG", _TAG), (".gitignore", "*\n")):
             if not (self.folder / name).exists():
-                write_atomically(self.folder / name, text.encode())
+                write_atomically(self.folder / name, text.encode(), durable=False)
 
     def _prune(self) -> None:
         """Drop the older half of the entries when there are too many."""

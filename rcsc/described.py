@@ -5,8 +5,6 @@ as diagnostics. `tomllib` says what the file means but not where; the places are
 granted that the text is TOML. Source: TOML 1.0.0 (toml.io), of which only the structure is scanned.
 """
 
-import re
-import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
@@ -16,12 +14,12 @@ from typing import Any, TypeAlias, assert_never
 
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label
+from rcsc.files import read
+from rcsc.files.names import MOST_FILE_CHARACTERS, is_file_name, is_identifier, is_member
 from rcsc.source import Source, Span
 
 KeyPath: TypeAlias = tuple[str | int, ...]
 
-MOST_BYTES = 4 * 1024 * 1024
-_NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9_.-]{0,99}")
 MOST_FAULTS = 100
 """Faults shown of one file; the last says how many more there are."""
 
@@ -75,7 +73,21 @@ class Text:
 class Name:
     """A name that may stand in the name of a file: it leads to no other folder."""
 
-    shown = "a name of at most 100 letters, digits, `_`, `-` and `.`, not beginning with `.`"
+    shown = f"a name of at most {MOST_FILE_CHARACTERS} letters, digits, `_`, `-` and `.`, not beginning with `.` or `-`"
+
+
+@dataclass(frozen=True, slots=True)
+class Word:
+    """A name of a level, a program or a variable: what C and Python can call a thing."""
+
+    shown = "a name of letters, digits and `_`, not beginning with a digit"
+
+
+@dataclass(frozen=True, slots=True)
+class Member:
+    """A place in a level or in a record: `robot.plate[1]`."""
+
+    shown = "names joined by `.`, with numbers in `[]`"
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,7 +147,7 @@ class Either:
         return ", or ".join(kind.shown for kind in self.kinds)
 
 
-Kind: TypeAlias = Number | Text | Name | Flag | Listing | Entries | Record | Either
+Kind: TypeAlias = Number | Text | Name | Word | Member | Flag | Listing | Entries | Record | Either
 
 
 def shown_path(path: KeyPath) -> str:
@@ -232,7 +244,7 @@ class Document:
                 yield from ((key, value[key], every[key]) for key in value.keys() & every.keys())
             case Either(kinds):
                 yield from self._parts(next(one for one in kinds if _fits(one, value)), value, path)
-            case Number() | Text() | Name() | Flag():
+            case Number() | Text() | Name() | Word() | Member() | Flag():
                 return
             case _:
                 assert_never(kind)
@@ -247,7 +259,11 @@ def _fits(kind: Kind, value: Any) -> bool:
         case Text():
             return isinstance(value, str) and bool(value.strip())
         case Name():
-            return isinstance(value, str) and _NAME.fullmatch(value) is not None
+            return is_file_name(value)
+        case Word():
+            return is_identifier(value)
+        case Member():
+            return is_member(value)
         case Flag():
             return isinstance(value, bool)
         case Listing(_, least, most):
@@ -292,23 +308,17 @@ def read_document(path: Path, code: Code, error: type[BadFile]) -> Document:
     """
     name = str(path)
     try:
-        size = path.stat().st_size if path.is_file() else 0
-        raw = path.read_bytes() if size <= MOST_BYTES else b""
+        text = read.text(path, read.MOST_TOML_BYTES)
     except OSError as problem:
         raise _unread(name, f"the file cannot be read: {problem.strerror}", code, error) from problem
-    if size > MOST_BYTES:
-        raise _unread(name, f"the file has {size} bytes; more than {MOST_BYTES} are not read", code, error)
-    try:
-        text = raw.decode("utf-8")
-    except UnicodeDecodeError as problem:
-        raise _unread(name, f"the file is not UTF-8: byte {problem.start}", code, error) from problem
+    except read.Malformed as problem:
+        raise _unread(name, f"the file {problem}", code, error) from problem
     source = Source(name, text)
     try:
-        return Document(name, source, tomllib.loads(text), code)
-    except (tomllib.TOMLDecodeError, RecursionError, ValueError) as problem:
-        why = "it is nested too deep" if isinstance(problem, RecursionError) else str(problem)
-        at = _decode_place(why, text)
-        found = Diagnostic(code, f"the file is not TOML: {why}", Label(Span(name, at, at)))
+        return Document(name, source, read.toml_of(text), code)
+    except read.Malformed as problem:
+        at = _decode_place(str(problem), text)
+        found = Diagnostic(code, f"the file {problem}", Label(Span(name, at, at)))
         raise error(found=(found,), sources={name: source}) from problem
 
 
@@ -382,7 +392,7 @@ class _Scan:
             begin = self._at
             if self._text[begin] in "'\"":
                 self._string()
-                parts.append(str(tomllib.loads(f"x = {self._text[begin : self._at]}")["x"]))
+                parts.append(str(read.toml_of(f"x = {self._text[begin : self._at]}")["x"]))
             else:
                 while self._text[self._at].isalnum() or self._text[self._at] in "_-":
                     self._at += 1

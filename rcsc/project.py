@@ -6,7 +6,6 @@ In: paths as the user gave them. Out: `Loaded`; what cannot be read or found is 
 import os
 import re
 import stat
-import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatch
@@ -14,6 +13,7 @@ from pathlib import Path
 
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label, sort_key
+from rcsc.files.read import Malformed, toml_of
 from rcsc.source import Source, Span
 from rcsc.syntax import tree
 
@@ -180,10 +180,10 @@ class _Loader:
             return ()
         self.sources[path] = Source(path, text)
         try:
-            settings = tomllib.loads(text)
-        except (tomllib.TOMLDecodeError, RecursionError) as error:
+            settings = toml_of(text)
+        except Malformed as error:
             where = _toml_place(str(error), text)
-            message = f"the project file is not TOML: {str(error).partition(' (at ')[0]}"
+            message = f"the project file {str(error).partition(' (at ')[0]}"
             self.report(Code.PROJECT_FILE, message, Span(path, where, where))
             return ()
         patterns = settings.get("exclude", [])

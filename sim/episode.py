@@ -10,6 +10,7 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, get_args
 
+from rcsc.files.read import json_of
 from rcsc.system.cell import Kind
 from sim.cell import Backend
 from sim.faults import Faults
@@ -155,7 +156,7 @@ class Episode:
             ValueError: The text is none.
         """
         try:
-            said = {**json.loads(text)}
+            said = {**json_of(text)}
             for name, kind in _LISTS.items():
                 said[name] = tuple(kind(**_tuples(one)) for one in said.get(name, ()))
             said["rows"] = tuple(said.get("rows", ()))

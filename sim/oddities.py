@@ -3,9 +3,9 @@
 In: an episode. Out: names of `sim.episode.FAULTS` that are about parts.
 """
 
-import csv
 from collections.abc import Iterator, Sequence
 
+from rcsc.files.read import rows_of
 from rcsc.workstation.script import PARTS
 from sim.episode import COLUMNS, Episode, PartSpec
 
@@ -34,7 +34,7 @@ def _top(part: str) -> str:
 
 def _asked(rows: Sequence[str]) -> Iterator[str]:
     """Objects that rows take from the buffer."""
-    for row in csv.DictReader([COLUMNS, *rows]):
-        name = PARTS.get((row["part"] or "").partition(" ")[0])
+    for row in rows_of("\n".join((COLUMNS, *rows)), COLUMNS.split(",")):
+        name = PARTS.get(row["part"].partition(" ")[0])
         if name and row["source"] == "BUFFER":
             yield name

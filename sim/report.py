@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from rcsc.files import write_atomically
 from sim.pictures.page import PAGES
 from sim.pictures.plot import plot
 
@@ -105,7 +106,7 @@ def report(path: Path, story: Story) -> None:
     Raises:
         OSError: The file could not be written.
     """
-    path.write_text(page(story), encoding="utf-8")
+    write_atomically(path, page(story).encode())
 
 
 def page(story: Story) -> str:

@@ -4,6 +4,8 @@ Exit statuses: 0 proved, 1 findings, 2 usage, 3 a bug in rcsc, 130 interrupted. 
 print or end the process. Nothing heavy is imported before a command needs it.
 """
 
+import contextlib
+import errno
 import os
 import sys
 from collections.abc import Sequence
@@ -13,7 +15,13 @@ PROVED, FINDINGS, USAGE, BUG, INTERRUPTED = 0, 1, 2, 3, 130
 
 def main() -> None:
     """Run `rcsc` with the process's arguments and end the process."""
-    sys.exit(run(sys.argv[1:]))
+    status = run(sys.argv[1:])
+    try:
+        sys.stdout.flush()
+    except OSError as error:
+        status = status or _unwritable("standard output", error.strerror)
+        _forget_stdout()
+    sys.exit(status)
 
 
 def run(args: Sequence[str]) -> int:
@@ -32,15 +40,33 @@ def run(args: Sequence[str]) -> int:
         click.echo("rcsc: interrupted; nothing was half written", err=True)
         return INTERRUPTED
     except UnwritableError as error:
-        place, why = error.args
-        click.echo(f"error[RCS502]: {place} cannot be written: {why}", err=True)
-        return FINDINGS
+        return _unwritable(*error.args)
     except BrokenPipeError:
         _forget_stdout()
         return FINDINGS
+    except OSError as error:
+        if error.errno not in _FULL:
+            return _bug(error)
+        return _unwritable(f"`{error.filename}`" if error.filename else "a file", error.strerror)
     except Exception as error:  # noqa: BLE001  # whatever it is, it is a bug in rcsc and is reported as one
         return _bug(error)
     return status if isinstance(status, int) else PROVED
+
+
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS)
+
+
+def _unwritable(place: str, why: str | None) -> int:
+    """A full disk, or one that is read only."""
+    import click
+
+    with contextlib.suppress(OSError):  # it may be the disk that this goes to
+        click.echo(
+            f"error[RCS502]: {place} cannot be written: {why or 'no reason given'}\n"
+            "  = note: a file that was there is as it was before, whole; a log is kept as far as it goes",
+            err=True,
+        )
+    return FINDINGS
 
 
 def _forget_stdout() -> None:

@@ -228,17 +228,19 @@ def table(
 
 
 def _tabled(drawn: str, form: str | None) -> "Tabled":
+    from rcsc.files.read import Malformed, content, decoded, piped, plain
     from rcsc.graph.forms import FORMS, form_of
-    from rcsc.graph.reading import UnreadableError, diagnosed
+    from rcsc.graph.reading import MOST_BYTES, UnreadableError, diagnosed
     from rcsc.graph.tables import tabled
 
     try:
-        raw = sys.stdin.buffer.read() if drawn == "-" else Path(drawn).read_bytes()
-        source = Source(drawn, raw.decode("utf-8-sig"))
-    except (OSError, UnicodeDecodeError) as error:
+        raw = piped(sys.stdin.buffer, MOST_BYTES) if drawn == "-" else content(Path(drawn), MOST_BYTES)
+        source = Source(drawn, plain(decoded(raw)))
+    except (OSError, Malformed) as error:
         place = Label(Span(drawn, 0, 0))
+        why = f"it {error}" if isinstance(error, Malformed) else error.strerror
         raise _WrongError(
-            (Diagnostic(Code.GRAPH_UNREADABLE, f"the graph cannot be read: {error}", place),)
+            (Diagnostic(Code.GRAPH_UNREADABLE, f"the graph cannot be read: {why}", place),)
         ) from error
     try:
         return tabled(FORMS[form or form_of(source.text)].read(source.text))

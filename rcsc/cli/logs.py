@@ -90,7 +90,7 @@ def log(  # noqa: PLR0913  # as many as there are options
 ) -> int:  # fmt: skip
     """Say what the run recorded in FILE did: its ticks, its levels, and which lines of which tables ran.
 
-    A log that was cut off, by a kill or a full disk, is read as far as it goes.
+    A log that was cut off, by a kill or a full disk, is read as far as it goes; one that has changed, as far as it is what was recorded.
     """
     from rcsc.log.read import read
 
@@ -116,7 +116,16 @@ def log(  # noqa: PLR0913  # as many as there are options
         click.echo(f"wrote {path}")
     if not exported:
         _summary(found)
-    return 0
+    return _changed(file, found)
+
+
+def _changed(file: Path, found: "Log") -> int:
+    """What is no longer as it was recorded; a log that a kill has cut is read as far as it goes."""
+    from rcsc.log.records import Seal
+
+    if found.checked.seal is not Seal.CHANGED:
+        return 0
+    return _refuse(file, Code.LOG_NOT_WHOLE, f"the log is {found.checked.said}")
 
 
 def _check_plot(plot: str | None, against: str | None, output: Path | None) -> None:
@@ -170,8 +179,8 @@ def _summary(found: "Log") -> None:
 
     count = len(found.ticks)
     seconds = count * found.tick_ms / 1000
-    end = "" if found.complete else "; cut off: up to the last second is lost"
-    click.echo(f"{found.facts['name']}: {count} ticks of {found.tick_ms} ms, {seconds:g} s{end}")
+    click.echo(f"{found.facts['name']}: {count} ticks of {found.tick_ms} ms, {seconds:g} s")
+    click.echo(found.checked.said)
     if (shown := found.finding) is not None:
         where = f"level `{shown.level}`" + (f", table `{shown.table}`" if shown.table else "")
         click.echo(f"a finding, broken in cycle {shown.broken_at}: {where}: {shown.goal}")
@@ -228,7 +237,8 @@ def replay(
 ) -> int:
     """Run the run recorded in FILE again, each cycle from the recorded state with the recorded inputs.
 
-    Every leaf must be what it was, bit for bit; the first that is not is named.
+    Every leaf must be what it was, bit for bit; the first that is not is named. A log that is not whole is replayed as far as it goes,
+    and the exit status is 1.
     """
     from rcsc.log.read import read
     from rcsc.log.replay import Replay
@@ -247,7 +257,9 @@ def replay(
     if moment is not None and moment.differs:
         return _differs(file, again, moment)
     if tick is None:
-        click.echo(f"{len(found.ticks)} ticks replayed: nothing differs")
+        click.echo(f"{len(found.ticks)} ticks replayed: nothing differs; {found.checked.said}")
+    if not found.complete:
+        return _refuse(file, Code.LOG_NOT_WHOLE, f"the log is {found.checked.said}")
     return 0
 
 

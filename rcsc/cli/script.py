@@ -284,8 +284,7 @@ def _apart(made: "Run", asked: Asked) -> int:
 
 def _rows_apart(asked: Asked, first: int, results: Path) -> list[list[Any]]:
     """Runs the processes to the end: of each row its number, text, state, reason and ticks; `results` is where they travel."""
-    import json
-
+    from rcsc.files.read import content, json_of
     from rcsc.system.description import description
     from rcsc.system.processes import Supervisor, run_processes
     from rcsc.system.serve import Factory
@@ -299,7 +298,7 @@ def _rows_apart(asked: Asked, first: int, results: Path) -> list[list[Any]]:
     rows: list[list[Any]] = []
 
     def more() -> list[list[Any]]:
-        return [json.loads(line) for line in results.read_text(encoding="utf-8").splitlines()[len(rows) :]]
+        return [json_of(line) for line in content(results).decode().splitlines()[len(rows) :]]
 
     def watch(_: Supervisor) -> None:
         new = more()

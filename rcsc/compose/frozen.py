@@ -24,6 +24,7 @@ from rcsc.compose.together import broken_in, exchange
 from rcsc.compose.trace import Step, broken, one_cycle
 from rcsc.compose.transition import Stepper
 from rcsc.compose.variants import VARIANTS
+from rcsc.files.read import content, json_of
 from rcsc.interpret import initial
 from rcsc.model import Bool, Enum, Kind, Program, Real, Scalar, Value, key_bounds, key_of, spell
 from rcsc.prove import values
@@ -124,7 +125,7 @@ def read_case(path: Path) -> Case:
         BadCaseError: It is none.
     """
     try:
-        said: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        said: dict[str, Any] = json_of(content(path))
         if said["format"] != FORMAT:
             raise BadCaseError(f"`{path}` has format {said['format']}, not {FORMAT}")
         about = said["goal"]

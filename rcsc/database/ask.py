@@ -3,7 +3,6 @@
 In: the SQLite file. Out: a `Database` whose answers are tuples in the order of the records that they fill.
 """
 
-import json
 import sqlite3
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -12,6 +11,7 @@ from typing import Any
 
 from rcsc.database.build import BadData
 from rcsc.database.pose import Pose, Vector, about_z, pose_of
+from rcsc.files.read import json_of
 from rcsc.system.signature import Values
 
 NO_PLACE: Values = (False, False, False, 0, 0)
@@ -173,7 +173,7 @@ def open_database(path: Path) -> Database:
             return _read(held)
         finally:
             held.close()
-    except (sqlite3.Error, KeyError, TypeError, IndexError) as error:
+    except (sqlite3.Error, KeyError, TypeError, ValueError, IndexError) as error:
         raise BadData((f"`{path}` is no database of a cell: {error}",)) from error
 
 
@@ -222,4 +222,4 @@ def _read(held: sqlite3.Connection) -> Database:
 def _station(name: str, row: Sequence[Any]) -> Station:
     x, y, z, yaw, length, width, vise, vblock = row
     frame = Pose(about_z(yaw), (x, y, z))
-    return Station(name, frame, yaw, (length, width), json.loads(vise or "{}"), json.loads(vblock or "{}"))
+    return Station(name, frame, yaw, (length, width), json_of(vise or "{}"), json_of(vblock or "{}"))

@@ -5,7 +5,6 @@ In: `cell.toml`, and the names of parts as the tables have them. Out: a SQLite f
 
 import hashlib
 import json
-import os
 import sqlite3
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -31,6 +30,8 @@ from rcsc.described import (
 )
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic
+from rcsc.files import written_whole
+from rcsc.files.read import content
 from rcsc.source import Source
 
 SCHEMA = """
@@ -204,9 +205,9 @@ def read_data(path: Path) -> Document:
 
 def digest(data: Path, objects: Sequence[str], limits: Limits) -> str:
     """What a database must have been made of to be fresh: the data, the tables' names and limits, and this module's rules."""
-    hashed = hashlib.sha256(Path(__file__).read_bytes() + "\0".join(objects).encode())
+    hashed = hashlib.sha256(content(Path(__file__)) + "\0".join(objects).encode())
     hashed.update(repr(sorted(limits.items())).encode())
-    hashed.update(data.read_bytes())
+    hashed.update(content(data))
     return hashed.hexdigest()
 
 
@@ -226,26 +227,27 @@ def build(data: Path, database: Path, objects: Sequence[str], limits: Limits | N
     rows = _Rows(read_data(data), objects, limits or {})
     if rows.document.faults:
         raise rows.document.bad(BadData)
-    beside = database.with_name(
-        f".{database.name}.{os.getpid()}.new"
-    )  # several processes may find it stale at once
-    beside.unlink(missing_ok=True)
     database.parent.mkdir(parents=True, exist_ok=True)
-    made = sqlite3.connect(beside)
+    with written_whole(database) as beside:  # several processes may find it stale at once
+        _fill(beside, rows, data, digest(data, objects, limits or {}))
+
+
+def _fill(database: Path, rows: "_Rows", data: Path, made_of: str) -> None:
+    made = sqlite3.connect(database)
     try:
+        made.execute("pragma journal_mode = off")  # it is another's only when it is whole
         made.executescript("pragma foreign_keys = on;" + SCHEMA)
         made.execute("begin")
         made.execute("pragma defer_foreign_keys = on")  # locations name one another
         for table, lines in rows.tables.items():
             for line in lines:
                 made.execute(f"insert into {table} values ({', '.join('?' * len(line))})", line)  # noqa: S608  # our own table names
-        made.execute("insert into meta values (?)", (digest(data, objects, limits or {}),))
+        made.execute("insert into meta values (?)", (made_of,))
         made.commit()
     except sqlite3.Error as error:
-        raise BadData((f"{data}: {error}",)) from error
+        raise BadData((f"{data}: {error}; the database that was there is kept",)) from error
     finally:
         made.close()
-    beside.replace(database)
 
 
 class _Rows:

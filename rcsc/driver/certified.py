@@ -11,6 +11,7 @@ from rcsc.diagnostics.diagnostic import Diagnostic, Label, Severity
 from rcsc.diagnostics.report import Report
 from rcsc.driver.work import Made
 from rcsc.files import write_atomically
+from rcsc.files.read import Malformed, content, json_of
 from rcsc.project import Loaded
 from rcsc.source import Span
 
@@ -39,11 +40,11 @@ class Checking:
 def kept(path: Path) -> Mapping[str, object] | Diagnostic:
     """The certificate in a file; anything else there is a diagnostic."""
     try:
-        value = json.loads(path.read_bytes())
+        value = json_of(content(path), plain=False)
     except OSError as error:
         return _refused(str(path), f"`{path}` cannot be read: {error.strerror}", Code.UNREADABLE)
-    except (ValueError, RecursionError):
-        return _refused(str(path), f"`{path}` is not a certificate: it is not JSON")
+    except Malformed as error:
+        return _refused(str(path), f"`{path}` is not a certificate: it {error}")
     if not isinstance(value, dict):
         return _refused(str(path), f"`{path}` is not a certificate")
     return value

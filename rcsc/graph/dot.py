@@ -14,10 +14,12 @@ from rcsc.graph.reading import Drawn, UnreadableError, finished
 
 MOST_WIDE = 44
 """Characters of a label's line."""
+DEEPEST = 64
+"""Subgraphs in each other."""
 _TOKEN = re.compile(
-    r"""(?P<blank>\s+|//[^\n]*|/\*.*?\*/|^\#[^\n]*)
+    r"""(?P<blank>\s++|//[^\n]*+|/\*.*?\*/|^\#[^\n]*+)
       |(?P<arrow>->|--)|(?P<mark>[{}\[\]=;,:+])
-      |(?P<text>"(?:[^"\\]|\\.)*")
+      |(?P<text>"[^"\\]*+(?:\\.[^"\\]*+)*+")
       |(?P<name>[A-Za-z_\u0080-\U0010ffff][A-Za-z0-9_\u0080-\U0010ffff]*|-?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?))""",
     re.VERBOSE | re.DOTALL | re.MULTILINE,
 )
@@ -111,6 +113,7 @@ class _Reader:
 
     tokens: list[_Token]
     at: int = 0
+    depth: int = 0
     said: dict[str, str] = field(default_factory=dict)
     drawn: list[Drawn] = field(default_factory=list)
 
@@ -128,6 +131,10 @@ class _Reader:
             raise UnreadableError(f"`{self._now().text}` after the graph", self._now().offset)
 
     def _statements(self) -> None:
+        """Those up to the closing brace."""
+        self.depth += 1
+        if self.depth > DEEPEST:
+            raise UnreadableError(f"subgraphs are nested more than {DEEPEST} deep", self._now().offset)
         while not self._is("}"):
             if self._is("{"):
                 self.at += 1
@@ -135,6 +142,7 @@ class _Reader:
             elif not self._skip(";"):
                 self._statement()
         self.at += 1
+        self.depth -= 1
 
     def _statement(self) -> None:
         first = self._take("name")

@@ -4,7 +4,6 @@ In: boxes and arrows with labels of known size, in pixels. Out: their places and
 extra `graph` installs, which gives the same places on every machine, else `dot` where the machine has it.
 """
 
-import json
 import shutil
 import sysconfig
 from collections.abc import Sequence
@@ -13,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from rcsc import children
+from rcsc.files.read import json_of
 
 PACKAGE = "graphviz-pure"
 MOST_SECONDS = 120
@@ -68,7 +68,7 @@ def place(boxes: Sequence[Box], arrows: Sequence[Arrow]) -> Placed:
     Raises:
         NoLayoutError: No layout program is there, or it failed.
     """
-    said = json.loads(_run(_text(boxes, arrows)))
+    said = json_of(_run(_text(boxes, arrows)))
     left, bottom, right, top = (float(one) for one in said["bb"].split(","))
 
     def point(text: str) -> Point:

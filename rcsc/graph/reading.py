@@ -22,6 +22,12 @@ class UnreadableError(Exception):
         self.what, self.offset = what, offset
 
 
+MOST_BYTES = 16 * 1024 * 1024
+"""Of a graph."""
+MOST_ARROWS = 4096
+"""More make no table that anyone reads."""
+
+
 @dataclass(frozen=True, slots=True)
 class Drawn:
     """An arrow as a form has it: its ends, and words about it (`line`, `when`, `does`, `decided`, `default`)."""
@@ -50,6 +56,10 @@ def finished(said: Mapping[str, str], drawn: list[Drawn]) -> StateGraph:
     """The graph of what was read; UnreadableError where it is no graph of a table."""
     if not drawn:
         raise UnreadableError("the graph has no edge")
+    if len(drawn) > MOST_ARROWS:
+        raise UnreadableError(
+            f"the graph has {len(drawn)} arrows, more than {MOST_ARROWS}", drawn[MOST_ARROWS].offset
+        )
     said = {word: text for word, text in said.items() if word in HEADER}
     if not said.get("table"):
         raise UnreadableError("the graph does not say which `table` it is")

@@ -6,12 +6,15 @@ not in a data model that an SCXML processor knows; what it has no word for stand
 """
 
 import re
-from io import StringIO
-from xml.etree import ElementTree as ET
+from typing import TYPE_CHECKING
 from xml.sax.saxutils import quoteattr
 
+from rcsc.files.read import Malformed, xml_of
 from rcsc.graph.model import ANY, Edge, StateGraph, header
 from rcsc.graph.reading import Drawn, UnreadableError, finished
+
+if TYPE_CHECKING:
+    from xml.etree.ElementTree import Element
 
 SCXML = "http://www.w3.org/2005/07/scxml"
 OWN = "urn:rcsc:graph"
@@ -57,13 +60,11 @@ def _transition(edge: Edge) -> str:
 
 def read(text: str) -> StateGraph:
     """The graph that the text draws; UnreadableError where it is none."""
-    if "<!DOCTYPE" in text or "<!ENTITY" in text:
-        raise UnreadableError("a document type is not read", text.find("<!"))
     try:
-        root = ET.parse(StringIO(text)).getroot()  # noqa: S314  # without a document type there is no entity to expand
-    except ET.ParseError as error:
-        row, column = error.position
-        raise UnreadableError(f"not XML: {error.msg.split(':')[0]}", _offset(text, row) + column) from error
+        root = xml_of(text)
+    except Malformed as error:
+        what, row, column = error.args
+        raise UnreadableError(what, _offset(text, row) + column) from error
     if root.tag != f"{{{SCXML}}}scxml":
         raise UnreadableError("the outermost element is not `scxml`")
     said = {
@@ -95,7 +96,7 @@ class _Reader:
         ]
         self.drawn: list[Drawn] = []
 
-    def state(self, state: ET.Element, name: str) -> None:
+    def state(self, state: "Element", name: str) -> None:
         """The transitions of a state and of those within it, in the order of the text."""
         for one in state:
             if one.tag == _STATE and name != ANY:

@@ -3,14 +3,15 @@
 In: a log. Out: text, bytes or a file. A row is a tick; a level that did not run in it stands as it was left.
 """
 
-import csv
-import io
 import json
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 
+from rcsc.files import csv_text as csv_lines
+from rcsc.files import written_whole
 from rcsc.log.expression import named_columns
 from rcsc.log.read import Log, LoggedLevel
 from rcsc.log.words import Column, columns, line_of, plain
@@ -74,14 +75,12 @@ def rows(log: Log) -> Rows:
 
 def csv_text(log: Log) -> str:
     """A heading, then a row a tick; enumerations in the table's words."""
-    out = io.StringIO()
-    write = csv.writer(out, lineterminator="\n")
     known = named_columns(log)
-    write.writerow(["tick", "time_ms", *known])
-    for tick, held in rows(log):
-        cells = (_cell(column.read(held[level])) for level, column in known.values())
-        write.writerow([tick, tick * log.tick_ms, *cells])
-    return out.getvalue()
+    cells = (
+        [tick, tick * log.tick_ms, *(_cell(column.read(held[level])) for level, column in known.values())]
+        for tick, held in rows(log)
+    )
+    return csv_lines(chain([["tick", "time_ms", *known]], cells))
 
 
 def _cell(value: Value | str) -> Value | str:
@@ -94,6 +93,7 @@ def json_text(log: Log) -> str:
         "system": log.facts["name"],
         "tick_ms": log.tick_ms,
         "complete": log.complete,
+        "checked": log.checked.said,
         "programs": dict(log.programs),
         "levels": [level.name for level in log.levels],
         "restarts": [
@@ -153,7 +153,8 @@ def write_parquet(log: Log, path: Path) -> None:
     for name, (_, column) in known.items():
         made = pa.array(cells[name], getattr(pa, _ARROW.get(column.c_type, "string"))())
         arrays[name] = made if column.c_type else made.dictionary_encode()
-    parquet.write_table(pa.table(arrays), path)
+    with written_whole(path) as beside:
+        parquet.write_table(pa.table(arrays), beside)
 
 
 _ARROW = {

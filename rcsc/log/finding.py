@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from rcsc.files.read import json_of
 from rcsc.system.signature import Value
 
 FINDING = "rcsc.finding"
@@ -85,6 +86,11 @@ def _answer(said: Sequence[Any]) -> tuple[str, tuple[Value, ...]]:
     return str(name), tuple(float(one) if isinstance(one, str) else one for one in given)
 
 
+def _flag(text: str) -> bool:
+    """Raises KeyError where it is none."""
+    return {"true": True, "false": False}[text]
+
+
 def finding_of(facts: Mapping[str, str]) -> LoggedFinding:
     """What `finding_facts` was made of.
 
@@ -95,9 +101,9 @@ def finding_of(facts: Mapping[str, str]) -> LoggedFinding:
         (int(tick), str(level)): LoggedCycle(
             tuple(map(str, matched)), str(wrong), tuple(_answer(one) for each in answers for one in each)
         )
-        for tick, level, matched, wrong, *answers in json.loads(facts["cycles"])
+        for tick, level, matched, wrong, *answers in json_of(facts["cycles"])
     }
-    restarted, legal, altered = (bool(json.loads(facts[name])) for name in ("restarted", "legal", "altered"))
+    restarted, legal, altered = (_flag(facts[name]) for name in ("restarted", "legal", "altered"))
     return LoggedFinding(
         facts["level"],
         facts["table"],

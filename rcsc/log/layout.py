@@ -11,11 +11,19 @@ import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
+from rcsc.files.names import file_name
+from rcsc.files.read import Said, content, json_of
 from rcsc.system.adopt import Begun
-from rcsc.system.description import Description, Feed, LevelSpec, Wire
-from rcsc.system.signature import FAILED, FORMATS, Leaf, LevelSign, Signature, generated_files
+from rcsc.system.description import (
+    LONGEST_MS,
+    MOST_LEVELS,
+    Description,
+    Wire,
+    level_of,
+    wire_of,
+)
+from rcsc.system.signature import FORMATS, Leaf, Signature, generated_files, signature_of
 
 FORMAT = "1"
 SYSTEM, PROGRAMS = "rcsc.system", "rcsc.programs"
@@ -88,29 +96,13 @@ def signature_text(sign: Signature) -> str:
     return compact(asdict(sign))
 
 
-def signature_of(text: str) -> Signature:
+def signature_from(text: str) -> Signature:
     """A signature from its text.
 
     Raises:
-        KeyError, TypeError, ValueError: It is none.
+        Malformed: It is none.
     """
-    said: dict[str, Any] = json.loads(text)
-    leaves = tuple(Leaf(**{**one, "members": tuple(one["members"])}) for one in said["leaves"])
-    levels = tuple(
-        LevelSign(**{**one, "tables": {int(value): table for value, table in one["tables"].items()}})
-        for one in said["levels"]
-    )
-    return Signature(
-        said["program"],
-        said["struct_name"],
-        said["init"],
-        leaves,
-        {name: tuple(lines) for name, lines in said["tables"].items()},
-        levels,
-        tuple(said["monitored"]),
-        {leaf.name: at for at, leaf in enumerate(leaves)},
-        tuple(said.get("failed", FAILED)),
-    )
+    return signature_of(Said(json_of(text), "signature"))
 
 
 def system_facts(system: Description) -> dict[str, str]:
@@ -132,16 +124,10 @@ def system_of(facts: Mapping[str, str], generated: Path, database: Path) -> Desc
     """
     if facts["format"] != FORMAT:
         raise ValueError(f"format {facts['format']}, not {FORMAT}")
-    levels = tuple(
-        LevelSpec(
-            one["name"],
-            one["program"],
-            tuple(Feed(feed["into"], feed["query"], tuple(feed["keys"])) for feed in one["feeds"]),
-        )
-        for one in json.loads(facts["levels"])
-    )
-    wires = tuple(Wire(source, target) for source, target in json.loads(facts["wires"]))
-    return Description(facts["name"], generated, database, int(facts["tick_ms"]), levels, wires)
+    levels = tuple(map(level_of, Said({"levels": json_of(facts["levels"])}).each("levels", MOST_LEVELS)))
+    wires = tuple(wire_of(source, target) for source, target in json_of(facts["wires"]))
+    tick_ms = Said({"tick_ms": int(facts["tick_ms"])}).whole("tick_ms", 1, LONGEST_MS)
+    return Description(file_name(facts["name"], "name"), generated, database, tick_ms, levels, wires)
 
 
 def fingerprints(system: Description) -> dict[str, str]:
@@ -150,9 +136,8 @@ def fingerprints(system: Description) -> dict[str, str]:
     for program in sorted({level.program for level in system.levels}):
         digest = hashlib.sha256()
         for path in generated_files(system.generated, program):
-            name = path.relative_to(system.generated).as_posix()
-            content = path.read_bytes() if path.is_file() else b""
-            digest.update(f"{name} {len(content)}\n".encode() + content)
+            text = content(path) if path.is_file() else b""
+            digest.update(f"{path.parent.name}/{path.name} {len(text)}\n".encode() + text)
         found[program] = digest.hexdigest()
     return found
 

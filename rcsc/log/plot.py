@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rcsc.files import written_whole
 from rcsc.log.export import MissingPackage, rows
 from rcsc.log.expression import BadExpression, named_columns, nearest
 from rcsc.log.read import Log
@@ -57,7 +58,8 @@ def plot(log: Log, names: Sequence[str], path: Path, against: str | None = None)
             _draw(axes, log, series, over[0] if over else None)
         places[-1].set_xlabel(over[0].label if over else "time (s)")
         metadata = {"Date": None} if path.suffix == ".svg" else None
-        figure.savefig(path, metadata=metadata)
+        with written_whole(path) as beside:
+            figure.savefig(beside, metadata=metadata)
 
 
 def _draw(axes: "Axes", log: Log, series: _Series, over: _Series | None) -> None:

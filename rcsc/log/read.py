@@ -1,6 +1,7 @@
 """A log, read: the whole one, or what a kill left of it.
 
-In: an MCAP file that `rcsc.log.write` wrote. Out: a `Log`: for each level its signature and what every cycle left.
+In: an MCAP file that `rcsc.log.write` wrote. Out: a `Log`: for each level its signature and what every cycle left. A log may come from
+anybody: whatever it names is checked against what it may be.
 """
 
 import struct
@@ -9,11 +10,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from mcap.exceptions import McapError
-from mcap.records import Channel, Chunk, Footer, McapRecord, Message, Metadata
-from mcap.stream_reader import StreamReader, breakup_chunk
-from zstandard import ZstdError
+from mcap.records import Channel, McapRecord, Message, Metadata
 
+from rcsc.files.names import identifier, shown
 from rcsc.log.finding import FINDING, LoggedFinding, finding_of
 from rcsc.log.layout import (
     BUFFERS,
@@ -25,15 +24,17 @@ from rcsc.log.layout import (
     buffer_leaves,
     message_format,
     restart_of,
-    signature_of,
+    signature_from,
     system_of,
 )
+from rcsc.log.records import Checked, Seal, records
 from rcsc.system.adopt import Begun
-from rcsc.system.description import Description, Wire
+from rcsc.system.description import Description, wire_of
 from rcsc.system.signature import LevelSign, Signature, Values
 
 _NOWHERE = Path()
-_DAMAGE = (McapError, ZstdError, struct.error, ValueError, EOFError, KeyError, OverflowError)
+_TICKS_A_MESSAGE, _ALWAYS_TICKS = 64, 1_000_000
+"""How far apart the records of a log may lie; ticks without one cost time and hold nothing."""
 
 
 class UnreadableLog(Exception):  # noqa: N818  # what happened, not an error of ours
@@ -45,25 +46,26 @@ class Track:
     """What one level left, or what one buffer carried, in ticks that ascend.
 
     Attributes:
-        packed: Canonical bytes; the same object where nothing changed, so that waiting costs no memory.
+        packed: Canonical bytes; the same object where a state comes again, so that waiting costs no memory.
     """
 
     layout: struct.Struct
     ticks: list[int] = field(default_factory=list)
     packed: list[bytes] = field(default_factory=list)
+    known: dict[bytes, bytes] = field(default_factory=dict, repr=False)
 
     def add(self, tick: int, content: bytes) -> None:
         """Append one record.
 
         Raises:
-            ValueError: It has not the length that the signature says.
+            ValueError: It has not the length that the signature says, or is of an earlier tick.
         """
         if len(content) != self.layout.size:
             raise ValueError(f"{len(content)} bytes, not {self.layout.size}")
-        if self.packed and self.packed[-1] == content:
-            content = self.packed[-1]
+        if self.ticks and tick <= self.ticks[-1]:
+            raise ValueError(f"tick {tick} after tick {self.ticks[-1]}")
         self.ticks.append(tick)
-        self.packed.append(content)
+        self.packed.append(self.known.setdefault(content, content))
 
     def place(self, tick: int) -> int:
         """Where the latest record of then lies; -1 for none."""
@@ -125,7 +127,7 @@ class Log:
         programs: The digest of each program that ran.
         levels: From the top down.
         buffers: Those that no level fills, by name.
-        complete: Whether the log was closed; otherwise up to a chunk is lost.
+        checked: What its chain says of it.
         finding: What the run breaks; None where it is not kept for that.
     """
 
@@ -133,8 +135,13 @@ class Log:
     programs: Mapping[str, str]
     levels: tuple[LoggedLevel, ...]
     buffers: Mapping[str, Track]
-    complete: bool
+    checked: Checked
     finding: LoggedFinding | None = None
+
+    @property
+    def complete(self) -> bool:
+        """Whether the log is whole, and every byte as it was recorded."""
+        return self.checked.seal is Seal.WHOLE
 
     def system(self, generated: Path = _NOWHERE, database: Path = _NOWHERE) -> Description:
         """The description, with paths of here."""
@@ -173,49 +180,35 @@ class Log:
 
 
 def read(path: Path) -> Log:
-    """Reads a log; one that was cut off is read as far as it goes.
+    """Reads a log; one that was cut off or changed is read as far as it is what was recorded.
 
     Raises:
         UnreadableLog: It cannot be read, or is none.
     """
-    made = _Reading()
+    checked = Checked()
+    made = _Reading(checked)
     try:
-        for record in _records(path):
+        for record in records(path, checked):
             made.take(record)
         return made.log()
     except OSError as error:
         raise UnreadableLog(f"`{path}` cannot be read: {error.strerror}") from error
-    except (KeyError, TypeError, ValueError, AttributeError, StopIteration) as error:
-        raise UnreadableLog(f"`{path}` holds no run that rcsc recorded") from error
-
-
-def _records(path: Path) -> Iterator[McapRecord]:
-    """Every record, up to the end or to where it is cut off; a chunk counts whole or not at all."""
-    with path.open("rb") as file:
-        limit = path.stat().st_size
-        records = iter(StreamReader(file, emit_chunks=True, record_size_limit=limit).records)
-        while True:
-            try:
-                record = next(records, None)
-                if record is None:
-                    return
-                inside = breakup_chunk(record, validate_crc=True) if isinstance(record, Chunk) else [record]
-            except _DAMAGE:
-                return
-            yield from inside
+    except (KeyError, TypeError, ValueError, AttributeError, StopIteration, struct.error) as error:
+        why = checked.why or (str(error) if isinstance(error, ValueError) else "")
+        raise UnreadableLog(f"`{path}` holds no run that rcsc recorded{why and f': {why}'}") from error
 
 
 @dataclass(slots=True)
 class _Reading:
     """What was read so far."""
 
+    checked: Checked
     metadata: dict[str, dict[str, str]] = field(default_factory=dict)
     signs: dict[str, Signature] = field(default_factory=dict)
     tracks: dict[int, Track] = field(default_factory=dict)
     topics: dict[str, int] = field(default_factory=dict)
     begun: dict[int, tuple[Begun, str, struct.Struct]] = field(default_factory=dict)
     restarts: dict[str, list[LoggedRestart]] = field(default_factory=dict)
-    complete: bool = False
 
     def take(self, record: McapRecord) -> None:
         """Notes one record."""
@@ -228,8 +221,6 @@ class _Reading:
                 self.tracks[channel].add(tick, content)
             case Message(channel_id=channel, sequence=tick, data=content) if channel in self.begun:
                 self._restart(*self.begun[channel], tick, content)
-            case Footer():
-                self.complete = True
             case _:
                 pass
 
@@ -239,15 +230,18 @@ class _Reading:
         self.restarts.setdefault(level, []).append(LoggedRestart(tick, begun, layout.unpack(content)))
 
     def _channel(self, channel: Channel) -> None:
-        if channel.id in self.tracks:  # said again at the end
+        if channel.id in self.tracks or channel.id in self.begun:  # said again at the end
             return
+        if channel.topic in self.topics:
+            raise ValueError(f"two channels are called {shown(channel.topic)}")
         if channel.topic.startswith(LEVELS):
-            sign = signature_of(channel.metadata[SIGNATURE])
-            self.signs[channel.topic.removeprefix(LEVELS)] = sign
+            sign = signature_from(channel.metadata[SIGNATURE])
+            self.signs[identifier(channel.topic.removeprefix(LEVELS), "level")] = sign
             self.tracks[channel.id] = Track(sign.packed)
         elif channel.topic.startswith(BUFFERS):
             source, target = channel.topic.removeprefix(BUFFERS), channel.metadata["target"]
-            leaves = buffer_leaves(self.signs[target.partition(".")[0]], Wire(source, target))
+            wire = wire_of(source, target)
+            leaves = buffer_leaves(self.signs[target.partition(".")[0]], wire)
             self.tracks[channel.id] = Track(struct.Struct(message_format(leaves)))
         elif channel.topic.startswith(RESTARTS):
             begun, level = restart_of(channel.topic)
@@ -273,7 +267,11 @@ class _Reading:
             if topic.startswith(BUFFERS)
         }
         found = finding_of(self.metadata[FINDING]) if FINDING in self.metadata else None
-        return Log(facts, self.metadata.get(PROGRAMS, {}), levels, buffers, self.complete, found)
+        log = Log(facts, self.metadata.get(PROGRAMS, {}), levels, buffers, self.checked, found)
+        held = sum(len(track.ticks) for track in self.tracks.values())
+        if log.last - log.first > _ALWAYS_TICKS + _TICKS_A_MESSAGE * held:
+            raise ValueError(f"{log.last - log.first} ticks and {held} records")
+        return log
 
     def _level(self, name: str) -> LoggedLevel:
         sign = self.signs[name]

@@ -4,10 +4,14 @@ In: a `System`, after each tick. Out: the file. It depends on the run alone: no 
 not on which executors ran. A kill at any moment costs at most the last chunk, `CHUNK_MS` of the run.
 """
 
+import contextlib
+import hashlib
+import os
 import struct
+from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import BinaryIO, Self
 
 from mcap.writer import CompressionType, Writer
 
@@ -27,6 +31,7 @@ from rcsc.log.layout import (
     signature_text,
     system_facts,
 )
+from rcsc.log.records import CHAIN, DIGEST, OPEN, SEAL
 from rcsc.system.adopt import Begun, Restarted
 from rcsc.system.cell import System
 from rcsc.system.levels import RunningLevel
@@ -35,8 +40,58 @@ from rcsc.system.signature import Leaf
 CHUNK_MS = 1000
 """How much of the run a chunk holds, and so the most that a kill loses."""
 
-_ENDLESS = 1 << 40  # bytes: chunks end by time alone
+_MOST_OPEN = 8 << 20  # bytes after which a chunk ends before its time
 _NS_PER_MS = 1_000_000
+
+
+class _Chained:
+    """A file that keeps the digest of all that was written to it."""
+
+    def __init__(self, file: BinaryIO) -> None:
+        self._file, self._hashed, self._at, self._seal_at = file, hashlib.sha256(), 0, 0
+
+    @property
+    def closed(self) -> bool:
+        """Whether nothing can be written any more."""
+        return self._file.closed
+
+    def write(self, content: bytes) -> int:
+        """Write."""
+        self._hashed.update(content)
+        self._at += len(content)
+        return self._file.write(content)
+
+    def tell(self) -> int:
+        """Bytes so far."""
+        return self._at
+
+    def flush(self) -> None:
+        """Hand all to the system: a kill of this process loses none of it."""
+        self._file.flush()
+
+    def digest(self) -> str:
+        """Of all so far."""
+        return self._hashed.hexdigest()
+
+    def seal_comes(self) -> None:
+        """Note that the next record written is the seal."""
+        self._seal_at = self._at
+
+    def seal(self) -> None:
+        """Put the digest in the seal's place, once everything else has reached the disk."""
+        self.flush()
+        os.fsync(self._file.fileno())
+        self._file.seek(self._seal_at + _SEAL_HEAD)
+        self._file.write(self.digest().encode())
+        self.flush()
+
+    def close(self) -> None:
+        """Close."""
+        self._file.close()
+
+
+_SEAL_HEAD = len(b"K") + 8 + 4 + len(SEAL) + 4 + 4 + len(DIGEST) + 4
+"""Bytes of the seal's record before its digits: kind, length, name, length of the table, its one key, length of the value."""
 
 
 class Recorder:
@@ -60,11 +115,11 @@ class Recorder:
         self._tick_ns = system.description.tick_ms * _NS_PER_MS
         self._ticks_a_chunk = max(1, CHUNK_MS // system.description.tick_ms)
         beside = path.with_name(f".{path.name}.part")
-        self._file = beside.open("wb", buffering=1 << 20)
-        self._writer = Writer(self._file, chunk_size=_ENDLESS, compression=CompressionType.ZSTD)
+        self._path, self._tick, self._kept = path, system.tick, system.tick
+        self._file = _Chained(beside.open("wb", buffering=1 << 20))
+        self._writer = Writer(self._file, chunk_size=_MOST_OPEN, compression=CompressionType.ZSTD)  # type: ignore[arg-type]  # all that it calls
         try:
             self._begin(system, finding)
-            self._file.flush()
             beside.replace(path)
         except OSError:
             self._file.close()
@@ -92,7 +147,7 @@ class Recorder:
         for level in system.levels:
             self._write_level(level, system.tick)
         self._write_buffers(system)
-        self._writer.flush()  # type: ignore[no-untyped-call]  # mcap leaves it untyped
+        self._end_chunk()
 
     def _level_channel(self, level: RunningLevel) -> int:
         definition = message_definition(level.sign.leaves, level.sign.failed)
@@ -110,14 +165,41 @@ class Recorder:
         return channel, struct.Struct(message_format(leaves))
 
     def __call__(self, system: System, ran: tuple[RunningLevel, ...]) -> None:
-        """Write which levels were started again, what those that ran in this tick were left with, and what came from outside."""
+        """Write which levels were started again, what those that ran in this tick were left with, and what came from outside.
+
+        Raises:
+            OSError: The disk is full, or cannot be written; says up to which cycle the log is kept.
+        """
+        with self._said():
+            self._write_tick(system, ran)
+
+    @contextlib.contextmanager
+    def _said(self) -> Iterator[None]:
+        """Say what is kept where no more can be written; nothing more is."""
+        try:
+            yield
+        except OSError as error:
+            with contextlib.suppress(OSError):
+                self._file.close()
+            why = f"{error.strerror}; the log is kept up to cycle {self._kept}"
+            raise OSError(error.errno, why, str(self._path)) from error
+
+    def _write_tick(self, system: System, ran: tuple[RunningLevel, ...]) -> None:
+        self._tick = system.tick
         for one in system.restarts:
             self._write_restart(system.level(one.level), one, system.tick)
         for level in ran:
             self._write_level(level, system.tick)
         self._write_buffers(system)
         if system.tick % self._ticks_a_chunk == 0:
-            self._writer.flush()  # type: ignore[no-untyped-call]  # mcap leaves it untyped
+            self._end_chunk()
+
+    def _end_chunk(self) -> None:
+        """Writes what there is, and the chain over it."""
+        self._writer.flush()  # type: ignore[no-untyped-call]  # mcap leaves it untyped
+        self._writer.add_metadata(CHAIN, {DIGEST: self._file.digest()})
+        self._file.flush()
+        self._kept = self._tick
 
     def _write_level(self, level: RunningLevel, tick: int) -> None:
         channel, packed = self._levels[level.name]
@@ -147,9 +229,19 @@ class Recorder:
         self._writer.add_message(channel, time, content, time, tick)
 
     def close(self) -> None:
-        """Write the last chunk and the index; once is enough."""
-        if not self._file.closed:
+        """Write the last chunk, the index and the seal; once is enough.
+
+        Raises:
+            OSError: They cannot be written; the log then ends with the last chunk that could.
+        """
+        if self._file.closed:
+            return
+        with self._said():
+            self._end_chunk()
+            self._file.seal_comes()
+            self._writer.add_metadata(SEAL, {DIGEST: OPEN})
             self._writer.finish()  # type: ignore[no-untyped-call]  # likewise
+            self._file.seal()
             self._file.close()
 
     def __enter__(self) -> Self:

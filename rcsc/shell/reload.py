@@ -28,7 +28,7 @@ from rcsc.system.cell import Kind, executors
 from rcsc.system.description import BadDescription, Description, LevelSpec, places
 from rcsc.system.executors import NotBuilt
 from rcsc.system.levels import Query, RunningLevel, running_level
-from rcsc.system.signature import Leaf, Signature, signature
+from rcsc.system.signature import Leaf, Signature, generated_files, signature
 
 MOST_SHOWN = 5
 
@@ -118,7 +118,7 @@ def reload(plant: Plant, spec: LevelSpec, old: RunningLevel) -> Reloaded:
         program = _resolved(source)
         try:
             there = replace(plant.system, generated=place)
-            sign = signature(there.generated / "c" / f"{spec.program}.json")
+            sign = signature(generated_files(there.generated, spec.program)[0])
             executor = executors(there, {spec.name: sign}, plant.kind)[spec.name]
             level = running_level(spec, there, sign, executor, plant.queries)
         except (OSError, ValueError, StopIteration, BadDescription, NotBuilt) as error:

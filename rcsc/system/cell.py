@@ -14,7 +14,7 @@ from rcsc.system.buffers import Buffers, CommonMemory
 from rcsc.system.description import BadDescription, Description
 from rcsc.system.executors import CExecutor, Executor, PythonExecutor, build
 from rcsc.system.levels import Query, RunningLevel, running_level
-from rcsc.system.signature import Signature, Values, signature
+from rcsc.system.signature import Signature, Values, generated_files, signature
 from rcsc.system.unproved import refuse_unproved
 
 Kind = Literal["c", "python"]
@@ -112,7 +112,7 @@ def signatures(system: Description) -> dict[str, Signature]:
     """
     found, page = {}, system.review()
     for at, spec in enumerate(system.levels):
-        path = system.generated / "c" / f"{spec.program}.json"
+        path, *_ = generated_files(system.generated, spec.program)
         place: KeyPath = ("level", at, "name" if spec.program == spec.name else "program")
         try:
             found[spec.name] = signature(path)

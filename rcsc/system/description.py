@@ -16,14 +16,19 @@ from rcsc.described import (
     Entries,
     KeyPath,
     Listing,
+    Member,
     Name,
     Number,
     Record,
     Text,
+    Word,
     nearest,
     read_document,
 )
 from rcsc.diagnostics.codes import Code
+from rcsc.files.names import BadName, is_member, member, within
+from rcsc.files.read import Said
+from rcsc.project import project_root
 from rcsc.source import Source
 
 
@@ -31,20 +36,20 @@ class BadDescription(BadFile):
     """The description says something that cannot be; tells where and what."""
 
 
-LONGEST_MS = 3_600_000
-FEED = Record({"into": Text(), "query": Text(), "keys": Listing(Text())})
-LEVEL = Record({"name": Name()}, {"program": Name(), "feed": Listing(FEED)})
+LONGEST_MS, MOST_LEVELS = 3_600_000, 10_000
+FEED = Record({"into": Member(), "query": Word(), "keys": Listing(Member())})
+LEVEL = Record({"name": Word()}, {"program": Word(), "feed": Listing(FEED)})
 SYSTEM = Record(
     {
         "name": Name(),
         "generated": Text(),
         "tick_ms": Number(1, LONGEST_MS, whole=True),
         "level": Listing(LEVEL, least=1),
-        "buffers": Entries(Text()),
+        "buffers": Entries(Member()),
     },
-    {"data": Text(), "displays": Entries(Listing(Text())), "outside": Listing(Text())},
+    {"data": Text(), "displays": Entries(Listing(Member())), "outside": Listing(Word())},
 )
-PARTIES = Record({key: SYSTEM.needed[key] for key in ("level", "buffers")}, {"outside": Listing(Text())})
+PARTIES = Record({key: SYSTEM.needed[key] for key in ("level", "buffers")}, {"outside": Listing(Word())})
 """What a description may say; `outside` are the parties of its buffers that are no levels."""
 
 
@@ -116,32 +121,61 @@ def description(path: Path) -> Description:
     document.check(SYSTEM)
     if document.holds(PARTIES):
         _check_parties(document)
+    generated, data = (_place(path, document, key) for key in ("generated", "data"))
     if document.faults:
         raise document.bad(BadDescription)
-    return _described(path, document)
+    return _described(path, document, generated, data)
 
 
-def _described(path: Path, document: Document) -> Description:
-    said: dict[str, Any] = document.value
-    levels = tuple(
-        LevelSpec(
-            one["name"],
-            one.get("program", one["name"]),
-            tuple(Feed(feed["into"], feed["query"], tuple(feed["keys"])) for feed in one.get("feed", ())),
+def _place(path: Path, document: Document, key: str) -> Path:
+    """Where a path of the description leads: into its project, or to the folder `generated` beside that."""
+    try:
+        return within(
+            Path(project_root(str(path))), path.parent, document.value.get(key, NO_DATA), f"path `{key}`"
         )
-        for one in said["level"]
-    )
-    data = (path.parent / said.get("data", NO_DATA)).resolve()
+    except BadName as error:
+        document.wrong((key,), str(error))
+        return path
+
+
+def _described(path: Path, document: Document, generated: Path, data: Path) -> Description:
+    said: dict[str, Any] = document.value
     return Description(
         said["name"],
-        (path.parent / said["generated"]).resolve(),
+        generated,
         data if data != path.resolve() else data.with_name(NO_DATA),  # older descriptions name themselves
         said["tick_ms"],
-        levels,
+        tuple(level_of(Said(one)) for one in said["level"]),
         tuple(Wire(a, b) for a, b in said["buffers"].items()),
         {name: tuple(shown) for name, shown in said.get("displays", {}).items()},
         document,
     )
+
+
+def level_of(said: Said) -> LevelSpec:
+    """Return a level of a description, or of a log's copy of one.
+
+    Raises:
+        Malformed: It is none, or a name in it is none.
+    """
+    feeds = "feed" if "feed" in said.value else "feeds"
+    return LevelSpec(
+        said.name("name"),
+        said.name("program", said.name("name")),
+        tuple(
+            Feed(one.member("into"), one.name("query"), one.members("keys"))
+            for one in said.each(feeds, MOST_LEVELS, ())
+        ),
+    )
+
+
+def wire_of(source: object, target: object) -> Wire:
+    """Return a buffer between two variables, `level.variable` each.
+
+    Raises:
+        BadName: One of them is none.
+    """
+    return Wire(member(source, "buffer"), member(target, "buffer's destination"))
 
 
 NO_DATA = ".no-data"
@@ -158,7 +192,7 @@ def _check_parties(document: Document) -> None:
     ends = list(_ends(said["buffers"]))
     for path, end, _ in ends:
         party, dot, variable = end.partition(".")
-        if not (party and dot and variable):
+        if not (party and dot and variable) or not is_member(end):
             document.wrong(path, f"`{end}` is no buffer's end", "write `party.variable`")
     parties = [end.partition(".")[0] for _, end, _ in ends]
     outside = said.get("outside")

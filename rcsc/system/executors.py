@@ -18,7 +18,9 @@ from pathlib import Path
 from typing import Protocol
 
 from rcsc import children
-from rcsc.system.signature import FORMATS, LevelSign, Signature, Value, Values
+from rcsc.files.names import BadName
+from rcsc.files.read import Malformed, content
+from rcsc.system.signature import FORMATS, LevelSign, Signature, Value, Values, sources_of
 
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared")
 
@@ -48,7 +50,8 @@ class PythonExecutor:
 
     def __init__(self, generated: Path, sign: Signature, level: LevelSign) -> None:
         name = f"rcsc_generated_{sign.program}"
-        spec = importlib.util.spec_from_file_location(name, generated / "python" / f"{sign.program}.py")
+        *_, path = _files(generated, sign)
+        spec = importlib.util.spec_from_file_location(name, path)
         if spec is None or spec.loader is None:
             raise NotBuilt(f"no Python module for `{sign.program}`")
         module = importlib.util.module_from_spec(spec)
@@ -96,15 +99,27 @@ def build(generated: Path, signs: Sequence[Signature]) -> Library:
         raise NotBuilt("there is no C compiler here")
     layout = "\n".join(_layout(sign) for sign in signs)
     try:
-        texts = [
-            (generated / "c" / f"{sign.program}{end}").read_bytes() for sign in signs for end in (".c", ".h")
-        ]
+        texts = [content(path) for sign in signs for path in _files(generated, sign)[:2]]
     except OSError as error:
         raise NotBuilt(f"{error.filename} cannot be read: {error.strerror}") from error
+    except Malformed as error:
+        raise NotBuilt(f"a generated file {error}") from error
     key = hashlib.sha256(b"\0".join([layout.encode(), *texts])).digest()
     if key not in _BUILT:
         _BUILT[key] = _built(compiler, generated, signs, layout)
     return _BUILT[key]
+
+
+def _files(generated: Path, sign: Signature) -> tuple[Path, Path, Path]:
+    """The program's files, all in the generated folder: nothing else is compiled or loaded.
+
+    Raises:
+        NotBuilt: A name or a link leads elsewhere.
+    """
+    try:
+        return sources_of(generated, sign.program)
+    except BadName as error:
+        raise NotBuilt(str(error)) from error
 
 
 def _built(compiler: str, generated: Path, signs: Sequence[Signature], layout: str) -> Library:
@@ -112,7 +127,7 @@ def _built(compiler: str, generated: Path, signs: Sequence[Signature], layout: s
         shim = folder / "layout.c"
         shim.write_text(layout, encoding="utf-8")
         library = folder / "executors.so"
-        sources = [str(generated / "c" / f"{sign.program}.c") for sign in signs]
+        sources = [str(_files(generated, sign)[0]) for sign in signs]
         command = [compiler, *FLAGS, f"-I{generated / 'c'}", "-o", str(library), str(shim), *sources]
         ran = children.run(command)
         if ran.status != 0:

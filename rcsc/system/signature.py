@@ -4,12 +4,16 @@ In: `generated/c/NAME.json`. Out: a `Signature`. The canonical bytes of a state 
 then the trace, little-endian, without padding: the same for every executor and machine.
 """
 
-import json
+import re
 import struct
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeAlias
+
+from rcsc.files.names import BadName, identifier, inside, shown
+from rcsc.files.read import MIB, Malformed, Said, json_of, text
+from rcsc.system.description import BadDescription
 
 Value: TypeAlias = bool | int | float
 Values: TypeAlias = tuple[Value, ...]
@@ -33,6 +37,9 @@ FAULTS = (
     "reals computed otherwise here",
 )
 STOPPED = FAULTS.index("assumption failed")
+
+
+MOST_SYMBOL_BYTES, MOST_LEAVES, MOST_LEVELS, LONGEST_PERIOD_MS = 64 * MIB, 1_000_000, 100_000, 2**31 - 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,20 +176,33 @@ class Signature:
 
 
 def generated_files(generated: Path, program: str) -> tuple[Path, ...]:
-    """What was generated of a program: symbol file, C, header, Python.
+    """What was generated of a program: symbol file, C, header, Python; all in the generated folder.
 
     The symbol file bears the program's name; the others one that no library keeps, as the symbol file says.
+
+    Raises:
+        BadDescription: The name is none of a program, or a link leads out of the folder.
     """
-    symbols = generated / "c" / f"{program}.json"
     try:
-        said = json.loads(symbols.read_text(encoding="utf-8"))["program"]
-    except (OSError, ValueError, KeyError, TypeError):
-        said = program
-    word = said if isinstance(said, str) and said.isidentifier() else program
-    return symbols, *(generated / f"{place}{word}{end}" for place, end in _SUFFIXES)
+        symbols = inside(generated, "c", f"{identifier(program, 'program')}.json")
+        try:
+            word = Said(json_of(text(symbols, MOST_SYMBOL_BYTES))).name("program")
+        except (OSError, Malformed):
+            word = program
+        return symbols, *sources_of(generated, word)
+    except BadName as error:
+        raise BadDescription(str(error)) from error
 
 
-_SUFFIXES = (("c/", ".c"), ("c/", ".h"), ("python/", ".py"))
+def sources_of(generated: Path, word: str) -> tuple[Path, Path, Path]:
+    """The C, the header and the Python that bear a program's word, in the generated folder.
+
+    Raises:
+        BadName: It is none, or a link leads out of the folder.
+    """
+    name = identifier(word, "program")
+    source, header = (inside(generated, "c", f"{name}{ending}") for ending in (".c", ".h"))
+    return source, header, inside(generated, "python", f"{name}.py")
 
 
 def signature(path: Path) -> Signature:
@@ -193,46 +213,123 @@ def signature(path: Path) -> Signature:
         ValueError: It is no symbol file.
     """
     try:
-        said = json.loads(path.read_text(encoding="utf-8"))
-        leaves = tuple(
-            Leaf(
-                one["name"],
-                one["kind"],
-                one["path"],
-                one["attribute"],
-                one["c_type"],
-                tuple(one.get("members", ())),
-                one.get("low"),
-                one.get("high"),
-                one.get("unit", ""),
-                one["initial"],
-                one["doc"],
-            )
-            for one in said["leaves"]
-        )
-        levels = tuple(
-            LevelSign(
-                one["name"],
-                one["cycle"],
-                one["period_ms"],
-                one.get("table", ""),
-                one.get("by", ""),
-                {int(value): table for value, table in one.get("tables", {}).items()},
-            )
-            for one in said["levels"]
-        )
-        tables = {one["name"]: tuple(one["lines"]) for one in said["tables"]}
-        return Signature(
-            said["program"],
-            said["struct"],
-            said["init"],
-            leaves,
-            tables,
-            levels,
-            tuple(said["monitored"]),
-            {leaf.name: at for at, leaf in enumerate(leaves)},
-            tuple(said.get("failed", FAILED)),
-            {one["name"]: tuple(one["stops"]) for one in said["tables"] if "stops" in one},
-        )
-    except (KeyError, TypeError, json.JSONDecodeError) as error:
+        return signature_of(Said(json_of(text(path, MOST_SYMBOL_BYTES))))
+    except Malformed as error:
         raise ValueError(f"{path} is no symbol file of rcsc's: {error}") from error
+
+
+def signature_of(said: Said) -> Signature:
+    """Returns the signature that a symbol file, or a log's copy of one, holds.
+
+    What is called by name is called so by this program alone: its functions begin with its own name.
+
+    Raises:
+        Malformed: A name in it is none, a value does not fit its type, or something is missing.
+    """
+    program = said.name("program")
+    leaves = tuple(map(_leaf, said.each("leaves", MOST_LEAVES)))
+    index = {leaf.name: at for at, leaf in enumerate(leaves)}
+    if len(index) < len(leaves):
+        raise Malformed("two leaves have one name")
+    tables, stops = _tables(said)
+    levels = tuple(_level(one, program, index) for one in said.each("levels", MOST_LEVELS))
+    if len(tables) == 0 and levels:
+        raise Malformed("it has levels and no table")
+    monitored, failed = said.names("monitored"), said.names("failed", FAILED)
+    if len(monitored) > 64 * len(failed):
+        raise Malformed(f"{len(failed)} words for {len(monitored)} assumptions")
+    return Signature(
+        program,
+        _own(said.name("struct" if "struct" in said.value else "struct_name"), f"{program}_t", ""),
+        _own(said.name("init"), f"{program}_init", ""),
+        leaves,
+        tables,
+        levels,
+        monitored,
+        index,
+        failed,
+        stops,
+    )
+
+
+def _own(name: str, begins: str, rest: str) -> str:
+    """A name in C that is the program's own, not one of a library's."""
+    if not (name.startswith(begins) if rest else name == begins):
+        raise Malformed(f"{shown(name)} is not `{begins}{rest}`")
+    return name
+
+
+def _leaf(said: Said) -> Leaf:
+    members, c_type, initial = (
+        said.names("members", ()),
+        said.one_of("c_type", tuple(FORMATS)),
+        said.number("initial"),
+    )
+    if not _fits(c_type, initial) or (members and not 0 <= (initial or 0) < len(members)):
+        raise Malformed(f"{said.where}.initial is no `{c_type}` of it")
+    assert initial is not None
+    return Leaf(
+        said.member("name"),
+        said.one_of("kind", ("input", "state", "output")),
+        said.member("path" if "path" in said.value else "place"),
+        said.name("attribute"),
+        c_type,
+        members,
+        said.number("low", None),
+        said.number("high", None),
+        said.text("unit", ""),
+        initial,
+        said.text("doc"),
+    )
+
+
+def _fits(c_type: str, value: object) -> bool:
+    """Whether a value is one of the type, and not of another that happens to be equal."""
+    if type(value) is not {"bool": bool, "double": float}.get(c_type, int):
+        return False
+    try:
+        struct.pack(f"<{FORMATS[c_type]}", value)
+    except struct.error:
+        return False
+    return True
+
+
+def _tables(said: Said) -> tuple[dict[str, tuple[str, ...]], dict[str, tuple[str, ...]]]:
+    """The lines of each table, and what stops it: a list of tables in a symbol file, two tables of them in a log."""
+    if isinstance(said.value.get("tables"), dict):
+        lines, stops = said.table("tables"), said.table("stops") if "stops" in said.value else Said({})
+        return (
+            {identifier(name, "table"): lines.lines(name) for name in lines.value},
+            {identifier(name, "table"): stops.names(name) for name in stops.value},
+        )
+    several = tuple(said.each("tables", MOST_LEVELS))
+    return (
+        {one.name("name"): one.lines("lines") for one in several},
+        {one.name("name"): one.names("stops") for one in several if "stops" in one.value},
+    )
+
+
+def _level(said: Said, program: str, index: Mapping[str, int]) -> LevelSign:
+    by, tables = said.text("by", ""), {}
+    if "tables" in said.value:
+        named = said.table("tables")
+        tables = {_key(value): named.name(value) for value in named.value}
+    if (by or tables) and by not in index:
+        raise Malformed(f"{said.where}.by: {shown(by)} is no leaf")
+    table = said.name("table", "") if said.value.get("table") else ""
+    if not table and not by:
+        raise Malformed(f"{said.where} has no table")
+    return LevelSign(
+        said.name("name"),
+        _own(said.name("cycle"), f"{program}_", "..."),
+        said.whole("period_ms", 1, LONGEST_PERIOD_MS),
+        table,
+        by,
+        tables,
+    )
+
+
+def _key(text: str) -> int:
+    if re.fullmatch(r"-?[0-9]{1,19}", text) is None:
+        raise Malformed(f"{shown(text)} is no value of a command")
+    return int(text)

@@ -5,6 +5,7 @@ In: a description. Out: the generated files that bear the mark (`plan.UNPROVED`)
 
 from pathlib import Path
 
+from rcsc.files.read import content
 from rcsc.plan import UNPROVED
 from rcsc.system.description import BadDescription, Description
 from rcsc.system.signature import generated_files
@@ -19,7 +20,7 @@ def marked(system: Description) -> tuple[Path, ...]:
     mark = UNPROVED.encode()
     programs = dict.fromkeys(spec.program for spec in system.levels)
     files = (path for name in programs for path in generated_files(system.generated, name))
-    return tuple(path for path in files if path.is_file() and mark in path.read_bytes())
+    return tuple(path for path in files if path.is_file() and mark in content(path))
 
 
 def refuse_unproved(system: Description) -> None:

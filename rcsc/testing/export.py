@@ -4,11 +4,10 @@ In: vectors. Out: text. Values are in the table's words (members by name); doubl
 that reads back to the same double.
 """
 
-import csv
-import io
 import json
 from collections.abc import Sequence
 
+from rcsc.files import csv_text
 from rcsc.model import Program, Real, Snapshot, Value
 from rcsc.testing.sessions import said
 from rcsc.testing.vectors import Vectors
@@ -64,12 +63,10 @@ def vectors_json(program: Program, found: Sequence[Vectors]) -> str:
 
 def vectors_csv(program: Program, found: Sequence[Vectors]) -> str:
     """The vectors as CSV: one row a vector, one column a leaf."""
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow([*COLUMNS, *(v.name for v in program.variables)])
+    rows: list[list[object]] = [[*COLUMNS, *(v.name for v in program.variables)]]
     for part in found:
         for vector in part.vectors:
             values = _values(program, vector.snapshot).values()
             words = [str(value).lower() if isinstance(value, bool) else value for value in values]
-            writer.writerow([*(getattr(vector, name) for name in COLUMNS), *words])
-    return out.getvalue()
+            rows.append([*(getattr(vector, name) for name in COLUMNS), *words])
+    return csv_text(rows)

@@ -3,11 +3,11 @@
 In: the text of `<program>.json`. Out: names of files, functions and leaves, in C and in Python.
 """
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from rcsc.files.read import json_of
 from rcsc.model import I64_MAX, Bool, Int, Program, Real, Scalar
 
 
@@ -116,7 +116,7 @@ def symbols_of(program: Program, files: Mapping[str, str]) -> Symbols:
     Raises:
         KeyError: The symbol file is missing, or is another program's.
     """
-    found = [json.loads(text) for path, text in files.items() if path.endswith(".json")]
+    found = [json_of(text) for path, text in files.items() if path.endswith(".json")]
     names = [str(v.name) for v in program.variables]
     for document in found:
         if [leaf["name"] for leaf in document["leaves"]] == names:

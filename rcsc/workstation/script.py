@@ -3,11 +3,12 @@
 In: a CSV file with the columns command, part, source, dest, end_at. Out: rows, or what is wrong with them, by row.
 """
 
-import csv
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+
+from rcsc.files.read import MIB, Malformed, rows_of, text
 
 COLUMNS = ("command", "part", "source", "dest", "end_at")
 ROBOT = ("acquire", "move", "release", "transfer", "clear", "pause")
@@ -51,19 +52,15 @@ def read_script(path: Path) -> tuple[Row, ...]:
         BadScript: The file cannot be read, or a row says nothing that a workstation can do.
     """
     try:
-        with path.open(newline="", encoding="utf-8") as file:
-            table = csv.DictReader(file)
-            if tuple(table.fieldnames or ()) != COLUMNS:
-                raise BadScript(f"{path}: the columns are {', '.join(COLUMNS)}")
-            lines = list(table)
+        lines = rows_of(text(path, MIB), COLUMNS)
     except OSError as error:
         raise BadScript(f"{path} cannot be read: {error.strerror}") from error
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise BadScript(f"{path} is no CSV file: {error}") from error
+    except Malformed as error:
+        raise BadScript(f"{path}: {error}") from error
     rows, wrong = [], []
     for number, line in enumerate(lines, 1):
         try:
-            rows.append(_row(number, {key: (value or "").strip() for key, value in line.items() if key}))
+            rows.append(_row(number, {key: value.strip() for key, value in line.items()}))
         except ValueError as error:
             wrong.append(f"{path}, row {number}: {error}")
     if wrong:

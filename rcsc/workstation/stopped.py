@@ -14,6 +14,7 @@ from typing import Any, Protocol, runtime_checkable
 
 from rcsc.diagnostics.codes import Code
 from rcsc.files import write_atomically
+from rcsc.files.read import content, json_of
 from rcsc.system.cell import Outside
 from rcsc.system.description import Description
 from rcsc.system.levels import RunningLevel
@@ -119,13 +120,13 @@ def tables_digest(system: Description) -> str:
     hashed = hashlib.sha256(repr((system.tick_ms, system.levels, system.wires)).encode())
     for program in sorted({level.program for level in system.levels}):
         for path in generated_files(system.generated, program):
-            hashed.update(hashlib.sha256(path.read_bytes()).digest())
+            hashed.update(hashlib.sha256(content(path)).digest())
     return hashed.hexdigest()
 
 
 def _read(path: Path) -> dict[str, Any]:
     try:
-        whole = json.loads(path.read_bytes())
+        whole = json_of(content(path))
         said: dict[str, Any] = whole["stopped"]
         whole_and_ours = whole["digest"] == _digest(_text(said)) and said["form"] == FORM
     except FileNotFoundError as error:

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rcsc.files import write_atomically
+from rcsc.files.read import json_of, text
 from rcsc.system.cell import Kind
 from sim.campaign.crew import Crashed, Crew
 from sim.campaign.journal import Record
@@ -136,7 +137,7 @@ def save(folder: Path, rig: Rig, seed: int, choice: Choice, made: Shrunk) -> Pat
 def is_saved(folder: Path, rig: Rig, seed: int, choice: Choice) -> bool:
     """Whether the folder has this counterexample, of these tables; `finding.json` is written last."""
     try:
-        said = json.loads((folder / choice.name(seed) / "finding.json").read_text(encoding="utf-8"))
+        said = json_of(text(folder / choice.name(seed) / "finding.json"))
         return bool(said | _origin(rig, seed, choice) == said)
     except (OSError, ValueError, TypeError):
         return False
@@ -161,7 +162,7 @@ def saved_episode(path: Path) -> Episode:
     """
     file = path / "episode.json" if path.is_dir() else path
     try:
-        return Episode.from_json(file.read_text(encoding="utf-8"))
+        return Episode.from_json(text(file))
     except OSError as error:
         raise BadEpisode(f"{file} cannot be read: {error.strerror}") from error
     except ValueError as error:

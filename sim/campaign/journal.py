@@ -14,6 +14,7 @@ from types import TracebackType
 from typing import Any, BinaryIO, Self
 
 from rcsc import __version__
+from rcsc.files.read import json_of
 from sim.campaign.rig import Rig, digest
 from sim.episode import Finding
 
@@ -156,7 +157,7 @@ def _lock(file: BinaryIO, path: Path) -> None:
 
 def _compare(path: Path, line: bytes, head: dict[str, Any]) -> None:
     try:
-        found = dict(json.loads(line))
+        found = dict(json_of(line))
     except (ValueError, TypeError) as error:
         raise BadJournal(f"{path} is no journal") from error
     if not found.keys() >= {"form", "seed"}:
@@ -184,7 +185,7 @@ def _said(one: Record) -> dict[str, Any]:
 
 def _read(path: Path, number: int, line: bytes) -> Record:
     try:
-        said = json.loads(line)
+        said = json_of(line)
         return Record(
             int(said["index"]),
             tuple(map(str, said["faults"])),

@@ -19,6 +19,7 @@ from typing import Any, Self
 
 from aiohttp import WSMsgType, web
 
+from rcsc.files.read import Malformed, json_of
 from sim.live.board import Board, Latest, Moment, Value, problems
 from sim.live.guard import HEADERS, policy, refusal
 
@@ -28,6 +29,7 @@ PUSH_S = 0.1
 GOODBYE_S = 1.0
 """A page that does not answer is waited for no longer when the run ends."""
 MOST_WATCHED = 256
+DEEPEST_MESSAGE = 4
 """Variables that one page may ask for."""
 MOST_BYTES = 65_536
 """Of a message from the page."""
@@ -294,8 +296,8 @@ class Live:
 def watched(text: str, names: frozenset[str]) -> tuple[str, ...] | None:
     """The variables that a message from the page asks for; None where it is no such message."""
     try:
-        said = json.loads(text)
-    except (ValueError, RecursionError):
+        said = json_of(text, DEEPEST_MESSAGE)
+    except Malformed:
         return None
     wanted = said.get("watch") if isinstance(said, dict) else None
     if not isinstance(wanted, list) or len(wanted) > MOST_WATCHED:
