@@ -517,7 +517,7 @@ def test_a_run_of_a_level_alone_that_ends_in_a_fault_replays(
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_text(text, encoding="utf-8")
     wires = (Wire("over.order", "lone.command"), Wire("under.report", "lone.reported"))
-    about = Description("finding", tmp_path, tmp_path, 40, (LevelSpec("lone", "case_", ()),), wires)
+    about = Description("finding", tmp_path, tmp_path, 40, (LevelSpec("lone", "case", ()),), wires)
     logs = []
     log = tmp_path / "finding.mcap"
     for kind in ("c", "python"):
