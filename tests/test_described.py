@@ -4,6 +4,7 @@ import copy
 import json
 import random
 import re
+import shutil
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
@@ -16,7 +17,6 @@ from hypothesis import strategies as st
 from rcsc import cli
 from rcsc.database.build import BadData, build
 from rcsc.described import (
-    MOST_BYTES,
     MOST_FAULTS,
     BadFile,
     Document,
@@ -34,6 +34,8 @@ from rcsc.described import (
     read_document,
 )
 from rcsc.diagnostics.codes import Code
+from rcsc.files.names import MOST_FILE_CHARACTERS
+from rcsc.files.read import MOST_TOML_BYTES
 from rcsc.source import Source
 from rcsc.system.cell import signatures
 from rcsc.system.description import BadDescription, description
@@ -161,7 +163,7 @@ BAD: list[tuple[Kind, object, int]] = [
     *each(Number(), NAN, INF, -INF, 1000000.1, -1000000.1, 10**400, True, "1", [], {}),
     *each(Number(1, 2, whole=True), 1.0, 0, 3, NAN, True),
     *each(Text(), "", " ", 1, False, []),
-    *each(Name(), "", "..", "../x", "a/b", ".a", "a" * 101, "a\n", "a b", "é", "\0", 1),
+    *each(Name(), "", "..", "../x", "a/b", ".a", "a" * (MOST_FILE_CHARACTERS + 1), "-a", "a\n", "a b", "é", "\0", 1),
     *each(Flag(), 0, 1, "true"),
     *each(Listing(Flag(), 1, 2), [], [True] * 3, {}, "ab", [1]),
     (Listing(Number()), [1, "a", NAN, 2], 2),
@@ -211,11 +213,11 @@ def test_faults_have_lines_and_come_in_order_and_not_without_end(tmp_path: Path)
 
 UNREAD = {
     "cannot be read": None,
-    "is not UTF-8: byte 4": b"a = \xff",
+    "is not UTF-8 at byte 4": b"a = \xff",
     "is not TOML: Cannot overwrite": b"a = 1\na = 2",
     "is not TOML: Invalid value": b"a = ",
-    "nested too deep": b"a = " + b"[" * 5000 + b"]" * 5000,
-    "has 4194305 bytes": b"#" * (MOST_BYTES + 1),
+    "nested more than 32 deep": b"a = " + b"[" * 5000 + b"]" * 5000,
+    "has more than 4 MiB": b"#" * (MOST_TOML_BYTES + 1),
 }
 
 
@@ -245,7 +247,8 @@ def test_what_is_no_toml_is_a_coded_error(
 def laid(repo: Path, folder: Path, system: object = None, cell: object = None) -> Path:
     """The shipped description and data in a folder, or what stands for them."""
     texts = [(repo / name).read_text(encoding="utf-8") for name in SHIPPED]
-    texts[0] = texts[0].replace('"../generated"', json.dumps(str(repo / "generated")))
+    texts[0] = texts[0].replace('"../generated"', '"generated"')
+    shutil.copytree(repo / "generated", folder / "generated", dirs_exist_ok=True)
     for at, said in enumerate((system, cell)):
         if isinstance(said, dict):
             texts[at] = toml(said)

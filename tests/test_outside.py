@@ -134,7 +134,7 @@ HOSTILE: Mapping[str, tuple[Callable[[str], object], str]] = {
     "apostrophes": (toml_of, "'" * 900_001),
     "escapes": (toml_of, '"' + "\\" * 900_001),
     "a bell": (toml_of, 'a = "\\u0007"'),
-    "two MiB": (toml_of, "#" * (2 << 20)),
+    "five MiB": (toml_of, "#" * (5 << 20)),
     "elements": (xml_of, "<a>" * 300_000),
     "elements, closed": (xml_of, "<a>" * 65 + "</a>" * 65),
     "entities": (xml_of, '<!DOCTYPE a [<!ENTITY b "cc"><!ENTITY c "&b;&b;">]><a>&c;</a>'),
@@ -292,6 +292,8 @@ PLACES = [
 def test_nothing_in_a_description_leads_elsewhere(tmp_path: Path, place: tuple[object, ...]) -> None:
     path = tmp_path / "system.toml"
     for text in ("../../x", "/etc/x", "a\x1b[2J", "a\u202eb", 7, None, ["x"], "a\0b", "x" * 5000):
+        if (place, text) == (("data",), None):
+            continue  # a system may have none
         said = _with(DESCRIPTION, place, text)
         rows = (f"{key} = {_toml(one)}\n" for key, one in said.items() if one is not None)
         path.write_text("".join(rows), encoding="utf-8")
