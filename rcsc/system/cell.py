@@ -104,8 +104,12 @@ def _said(level: RunningLevel, tick: int) -> str:
     return f"level `{level.name}`, table `{level.table}`, cycle {tick}: {level.sign.fault_said(level.values)}"
 
 
-def signatures(system: Description) -> dict[str, Signature]:
+def signatures(system: Description, *, fitting: bool = True) -> dict[str, Signature]:
     """The signature of each level's program, by the level's name.
+
+    Args:
+        system: The description.
+        fitting: Whether the levels are to run together, and so must fit each other.
 
     Raises:
         BadDescription: A program is not there, or the description does not fit the programs.
@@ -124,7 +128,8 @@ def signatures(system: Description) -> dict[str, Signature]:
             page.wrong(place, str(error))
     if page.faults:
         raise page.bad(BadDescription)
-    _check_fit(system, found)
+    if fitting:
+        _check_fit(system, found)
     return found
 
 
