@@ -38,6 +38,10 @@ class BadFile(Exception):  # noqa: N818  # what happened, not an error of ours
         self.found, self.sources = tuple(found), dict(sources or {})
         super().__init__(text or "; ".join(self._line(one) for one in found))
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """As it is, from one process to another: classes below take other arguments."""
+        return type(self).__new__, (type(self), *self.args), self.__dict__
+
     def _line(self, one: Diagnostic) -> str:
         span = one.primary.span
         source = self.sources.get(span.file)

@@ -14,7 +14,7 @@ from rcsc.database.pose import about_z
 from rcsc.system.cell import signatures
 from rcsc.system.description import Description, description
 from rcsc.system.signature import Signature
-from rcsc.workstation.cell import database_of
+from rcsc.workstation.cell import database_of, needs_cell
 from rcsc.workstation.script import BadScript, Row, read_script
 from rcsc.workstation.station import workstation
 from sim.cell import Lying
@@ -40,6 +40,7 @@ def _ready(
 ) -> tuple[Description, dict[str, Signature], Database]:
     said = description(system)
     signs = signatures(said)
+    needs_cell(said, signs)
     return said, signs, database_of(said, signs)
 
 

@@ -199,8 +199,8 @@ def _built(system: Path | None, output: Path | None, *, writes: bool) -> Path:
         path = system_path(system)
         said = description(path)
         signs = signatures(said)
-        parts, limits = parts_of(signs), limits_of(said, signs)
         needs_data(said)
+        parts, limits = parts_of(signs), limits_of(said, signs)
         target = output or database_path(said)
         with scratch("db") as folder:
             tried = folder / "cell.sqlite"

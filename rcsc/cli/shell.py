@@ -11,9 +11,13 @@ import click
 from rcsc.cli.cell import EXECUTOR, stop, system_path
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from rcsc.shell.commands import Commands
     from rcsc.shell.refusal import Refused
     from rcsc.system.cell import Kind
+    from rcsc.system.description import Description
+    from rcsc.system.signature import Signature
 
 
 @click.command(
@@ -36,7 +40,7 @@ In the shell:
               help="Do the commands of FILE, one a line; else they are read from standard input.")  # fmt: skip
 @EXECUTOR
 @click.option("--alone", is_flag=True,
-              help="No stand-ins and no database: buffers from outside and answers are what is set by hand.")  # fmt: skip
+              help="No stand-ins and no database, as for a system that is no such cell: what comes in is set by hand.")  # fmt: skip
 @click.argument(
     "system", required=False, type=click.Path(exists=True, dir_okay=False, path_type=Path), metavar="[SYSTEM]"
 )
@@ -69,7 +73,7 @@ def _commands(path: Path, kind: "Kind", alone: bool) -> "Commands":
         said = description(path)
         signs = signatures(said)
         outside: tuple[Outside, ...] = ()
-        if alone or not said.database.is_file():
+        if alone or not _is_cell(said, signs):
             queries = silent_queries(said, signs)
         else:
             database = database_of(said, signs)
@@ -78,6 +82,18 @@ def _commands(path: Path, kind: "Kind", alone: bool) -> "Commands":
         return Commands(Session(system, Plant(path, said, kind, queries)))
     except (BadDescription, BadData, NotBuilt) as error:
         stop(error)
+
+
+def _is_cell(system: "Description", signs: "Mapping[str, Signature]") -> bool:
+    """Whether robot, hand and camera can stand beside the system, and its database be asked."""
+    from rcsc.system.description import BadDescription
+    from rcsc.workstation.cell import needs_cell
+
+    try:
+        needs_cell(system, signs)
+    except BadDescription:
+        return False
+    return system.database.is_file()
 
 
 def _has_prompt() -> bool:

@@ -79,7 +79,7 @@ def links(system: Description, level: str, program: Program) -> Links:
     """The environment of a level, with every leaf of its order taken to be numbered.
 
     Raises:
-        BadDescription: An order has no report to answer it, or a report no order; or there are two superiors.
+        BadDescription: An order has no report to answer it, a report no order, or one lacks a field; or there are two superiors.
     """
     inputs = {_variable(w.target): _owner(w.source) for w in system.wires if _owner(w.target) == level}
     outputs = {_variable(w.source): _owner(w.target) for w in system.wires if _owner(w.source) == level}
@@ -96,10 +96,12 @@ def links(system: Description, level: str, program: Program) -> Links:
             if above is not None:
                 raise BadDescription(f"`{level}` takes numbered orders in `{above.order}` and in `{record}`")
             numbered = tuple(leaf for leaf in order if leaf != f"{record}.{NUMBER}")
+            _whole(level, names, record, report)
             above = Above(owner, record, report, owner not in levels, numbered)
             used |= {*order}
         elif f"{record}.{ECHO}" in names:
             order_record = _one(back, names, NUMBER, f"{level}.{record}", owner)
+            _whole(level, names, order_record, record)
             below.append(Below(owner, order_record, record, owner not in levels))
             used |= {*leaves_under(program, record)}
     feeds = next((spec.feeds for spec in system.levels if spec.name == level), ())
@@ -107,6 +109,20 @@ def links(system: Description, level: str, program: Program) -> Links:
     used |= {leaf for one in asked for leaf in one.leaves}
     free = tuple(str(v.name) for v in program.variables if v.kind is Kind.INPUT and v.name not in used)
     return Links(level, above, tuple(below), asked, free)
+
+
+def _whole(level: str, names: set[str], order: str, report: str) -> None:
+    """An order with a number, and the report on it, have the other fields of the contract, too.
+
+    Raises:
+        BadDescription: One is missing.
+    """
+    needed = f"{order}.{COMMAND}", f"{report}.{ECHOED}", f"{report}.{STATUS}"
+    missing = [f"`{level}.{name}`" for name in needed if name not in names]
+    if missing:
+        raise BadDescription(
+            f"level `{level}`: `{order}` is numbered and `{report}` answers it, but there is no {', no '.join(missing)}"
+        )
 
 
 def check_ends(system: Description, programs: Mapping[str, Program]) -> None:

@@ -9,10 +9,11 @@ from pathlib import Path
 
 from rcsc.database.ask import Database, fresh, open_database
 from rcsc.database.build import Limit, build, digest
+from rcsc.described import Document
 from rcsc.system.cell import Kind, Outside, System, assemble, signatures
 from rcsc.system.description import NO_DATA, BadDescription, Description, description
 from rcsc.system.signature import Leaf, Signature
-from rcsc.workstation.script import BadScript, Row, read_script
+from rcsc.workstation.script import ROBOT, Row, read_script
 from rcsc.workstation.station import Result, Workstation, workstation
 
 MOST_TICKS = 100_000
@@ -94,6 +95,67 @@ def needs_data(system: Description) -> None:
         raise page.bad(BadDescription)
 
 
+def needs_cell(system: Description, signs: Mapping[str, Signature]) -> None:
+    """Refuse a system that workstation, robot, hand and camera of the cell cannot be put beside.
+
+    Raises:
+        BadDescription: A buffer or a word that they need is not there; every one is told.
+    """
+    needs_data(system)
+    page = system.review()
+    targets = {wire.source: wire.target for wire in system.wires}
+    for source, (level, record, fields) in BUFFERS.items():
+        inner = f"{level}.{record}"
+        if level not in signs:
+            page.wrong(("level",), f"the cell needs a level `{level}`, for buffer `{source}`")
+        elif source not in targets or inner not in (source, targets[source]):
+            page.wrong(("buffers",), f"the cell needs buffer `{source}`, with `{inner}` at the level's end")
+        else:
+            sign = signs[level]
+            leaves = [sign.leaves[at].name for at in sign.record(record)]
+            if [name.removeprefix(f"{record}.") for name in leaves] != list(fields):
+                page.wrong(("buffers", source), f"the cell needs in `{inner}`: {', '.join(fields)}")
+    if not page.faults:
+        _need_words(page, signs)
+    if page.faults:
+        raise page.bad(BadDescription)
+
+
+def _need_words(page: Document, signs: Mapping[str, Signature]) -> None:
+    for (level, variable), words in WORDS.items():
+        sign = signs[level]
+        missing = [word for word in words if word not in sign.leaves[sign.index[variable]].members]
+        if missing:
+            page.wrong(("level",), f"the cell needs in `{level}.{variable}` the words {', '.join(missing)}")
+
+
+_PLATE = tuple(f"plate[{at}]" for at in range(9))
+BUFFERS: Mapping[str, tuple[str, str, tuple[str, ...]]] = {
+    "workstation.order": ("task", "command", (
+        "inc_command", "input_command", "obj", "grasp", "source_locpt", "dest_locpt", "end_at_locpt", "sector",
+    )),
+    "task.report": ("task", "report", (
+        "inc_command_echo", "ref_command_echo", "status_report", "status_parameter", "failure",
+    )),
+    "primitive.to_robot": ("primitive", "to_robot", ("inc_command", "input_command", *_PLATE)),
+    "robot.report": ("primitive", "robot", (
+        "inc_command_echo", "ref_command_echo", "status_report", "failure", *_PLATE,
+    )),
+    "gripper.to_hand": ("gripper", "to_hand", ("drive", "opening_mm", "force_n", "speed_mm_s")),
+    "hand.report": ("gripper", "hand", ("opening_mm", "force_n")),
+    "vision.to_camera": ("vision", "to_camera", ("number", "fire", "obj_ptr")),
+    "camera.picture": ("vision", "camera", (
+        "number", "matched", "x_mm", "y_mm", "c", "s", "range_mm", "flat",
+    )),
+}  # fmt: skip
+"""What workstation, robot, hand and camera write and read: of each buffer the level, its variable, and the fields in order."""
+WORDS: Mapping[tuple[str, str], tuple[str, ...]] = {
+    ("task", "command.input_command"): ROBOT,
+    ("task", "command.obj"): ("null_obj",),
+    ("task", "report.status_report"): ("done", "executing", "failed"),
+}
+
+
 def database_of(system: Description, signs: Mapping[str, Signature], path: Path | None = None) -> Database:
     """The database, made anew where the data has changed; as it is where `path` says which.
 
@@ -144,8 +206,7 @@ def prepare(
     """
     system = description(path)
     signs = signatures(system)
-    if "task" not in signs:
-        raise BadScript("the system has no level `task` to send commands to")
+    needs_cell(system, signs)
     held = database_of(system, signs, database)
     script = read_script(script_path(rows, path)) if isinstance(rows, str) else rows
     station = workstation(script, held.locations, signs["task"], safe_places(held))
