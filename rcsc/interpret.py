@@ -10,7 +10,7 @@ import operator
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import Any, TypeAlias
 
@@ -312,6 +312,20 @@ def admit(program: Program, snapshot: Snapshot) -> dict[str, Value] | str:
     return admitted
 
 
+def unfit(program: Program, snapshot: Snapshot) -> str:
+    """The first state or output that is no value of its type, or else the first invariant that does not hold; empty for none.
+
+    Inputs are admitted by every cycle.
+    """
+    for variable in program.variables:
+        value, kind = snapshot[variable.name], variable.type
+        low, high = (kind.low, kind.high) if isinstance(kind, Real) else key_bounds(kind)
+        if variable.kind is not Kind.INPUT and not low <= value <= high:
+            return variable.name
+    broken = (one.name for one in program.invariants if not evaluate(one.condition, snapshot))
+    return next(broken, "")
+
+
 def settle(program: Program, snapshot: dict[str, Value]) -> None:
     """Deferred variables whose condition holds take their next value, all at once."""
     ready = [
@@ -341,6 +355,21 @@ def cycle(program: Program, level: Level, snapshot: Snapshot) -> Outcome:
 
 
 def _cycle(
+    program: Program,
+    chosen: Callable[[Snapshot], Table],
+    preprocess: tuple[str, ...],
+    postprocess: tuple[str, ...],
+    snapshot: Snapshot,
+) -> Outcome:
+    """One cycle; after a fault the outputs that have a safe value show it."""
+    outcome = _attempt(program, chosen, preprocess, postprocess, snapshot)
+    if outcome.fault is Fault.OK:
+        return outcome
+    shown = {str(v.name): v.safe for v in program.variables if v.safe is not None}
+    return replace(outcome, snapshot={**outcome.snapshot, **shown})
+
+
+def _attempt(
     program: Program,
     chosen: Callable[[Snapshot], Table],
     preprocess: tuple[str, ...],

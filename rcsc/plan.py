@@ -145,6 +145,12 @@ class PlanTable:
     monitored: tuple[int, ...]
     stops: tuple[int, ...] = ()
 
+    @property
+    def where(self) -> str:
+        """What must hold where the table is matched by itself, in words; empty for nothing."""
+        names = " and ".join(self.table.stops)
+        return f" where {names} {'holds' if len(self.stops) == 1 else 'hold'}" if names else ""
+
 
 UNPROVED = "NOT PROVED: made by force to run a finding; no cell runs it"
 """What every file says that is emitted of a program that is not proved."""
@@ -165,6 +171,18 @@ class Plan:
     tables: tuple[PlanTable, ...]
     monitored: tuple[int, ...]
     proved: bool = True
+
+    @property
+    def checked(self) -> tuple[str, ...]:
+        """What each assumption that is checked does where it fails, in words: `seen: ends the cycle in tally; told in count`."""
+        return tuple(self._checked(place, at) for place, at in enumerate(self.monitored))
+
+    def _checked(self, place: int, at: int) -> str:
+        stops = [one.table.name for one in self.tables if place in one.stops]
+        told = [one.table.name for one in self.tables if place in one.monitored and place not in one.stops]
+        parts = [(f"ends the cycle in {', '.join(stops)}", stops), (f"only told in {', '.join(told)}", told)]
+        does = "; ".join(words for words, tables in parts if tables) or "no table relies on it"
+        return f"{self.program.assumptions[at].name}: {does}"
 
     @property
     def mark(self) -> str:

@@ -147,6 +147,43 @@ level top {
 """Assumptions that stop (of both standings, for an index, a division, a condition, an invariant), and one that tells."""
 
 
+FAULTED = """
+enum mode { off, slow, fast }
+input a : int 0 .. 9
+input b : int -3 .. 3
+input x : real -4.0 .. 4.0 clamp
+state seen : array[8] of int 0 .. 9
+state again : int 0 .. 9
+state phase : int 0 .. 9 deferred until b < 3
+output hold : bool = true safe true
+output pull : real -2.0 .. 2.0 safe 0.5
+output pace : mode safe slow
+output wide : int 0 .. 18446744073709551615 safe 18446744073709551615
+output before : int 0 .. 9
+output given : int 0 .. 9
+output behind : int 0 .. 9
+invariant slow_or_held : pace /= fast or hold
+assume place monitored : a < 8
+extern procedure ask reads a writes given, pull python "no_such:ask" c "ask"
+procedure mark { seen[a] := 9; next phase := a; hold := false; pull := x / 2.0 }
+procedure later { again := a }
+procedure first { before := a }
+procedure last { behind := a }
+table t assuming place {
+  | line | b      || procedures       | wide | pace |
+  | 1    | -2..0  || mark; ask        | 3    | off  |
+  | 2    | 0 .. 2 || mark; ask; later | 4    | slow |
+}
+level top {
+  period 10 [ms]
+  preprocess first
+  table t
+  postprocess last
+}
+"""
+"""Every fault can be met: it is not proved. Outputs of each kind with a safe value, and some without."""
+
+
 def program_of(text: str) -> Program:
     """The program of a lone text."""
     program = compile_text(text)
@@ -159,6 +196,11 @@ def proved_of(text: str) -> Program:
     verdict = prove_program(program_of(text), Options(solver="boxes"))
     assert verdict.proved is not None, verdict.findings
     return verdict.proved.program
+
+
+def stopping(text: str) -> Program:
+    """The program of a lone text with its stopping assumptions, whether it is proved or not."""
+    return prove_program(program_of(text), Options(solver="boxes")).program
 
 
 def shipped(path: str, repo: Path) -> Program:

@@ -219,6 +219,7 @@ def declarations() -> SearchStrategy[tree.Declaration]:
             st.none() | expressions(),
             st.sampled_from(["", "clamp", "reject"]),
             st.none() | expressions(),
+            st.none() | expressions(),
             **head,
         ),
         st.builds(

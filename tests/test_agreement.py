@@ -1,5 +1,6 @@
 """Interpreter = Python = C, over drawn inputs and sequences of cycles; each difference is found once planted."""
 
+from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -7,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from rcsc.emit.write import write
-from rcsc.interpret import Fault
-from rcsc.model import Program
+from rcsc.interpret import Fault, admit, call, settle, unfit
+from rcsc.model import Program, Snapshot
 from rcsc.system.executors import CExecutor, PythonExecutor
 from rcsc.system.executors import build as build_executors
 from rcsc.system.signature import signature
@@ -19,16 +20,29 @@ from rcsc.testing.agree import (
     run_init,
     run_sanitized,
 )
+from rcsc.testing.bits import same_value
 from rcsc.testing.esbmc import Said, prove_function
 from rcsc.testing.externs import python_stand_ins, with_c_stand_ins
 from rcsc.testing.hunt import hunt_lines, hunt_sessions
 from rcsc.testing.native import Native, build
 from rcsc.testing.python_executor import python_executor
+from rcsc.testing.sessions import Seen
 from rcsc.testing.suite import SuiteOptions, run_suite
 from rcsc.testing.symbols import symbols_of
 from rcsc.testing.targets import is_matcher, targets
 from rcsc.testing.tools import Absent, BuildFailed, c_compiler
-from tests.emitted import EXTERN, RICH, SHIPPED, STOPS, emitted, program_of, proved_of, shipped
+from tests.emitted import (
+    EXTERN,
+    FAULTED,
+    RICH,
+    SHIPPED,
+    STOPS,
+    emitted,
+    program_of,
+    proved_of,
+    shipped,
+    stopping,
+)
 
 pytestmark = pytest.mark.skipif(not isinstance(c_compiler(), str), reason="no C compiler")
 
@@ -126,6 +140,55 @@ def test_all_executors_stop_where_safety_rests_on_an_assumption_that_fails() -> 
     told = compared.broken - compared.faults[Fault.ASSUMPTION]
     assert min(told, compared.faults[Fault.ASSUMPTION], compared.faults[Fault.OK]) > 10
     assert compared.faults.keys() == {Fault.OK, Fault.ADMIT, Fault.ASSUMPTION}
+
+
+def test_what_a_cycle_that_ends_in_a_fault_leaves() -> None:
+    """The manual's "What a fault leaves", of every executor: they leave the same."""
+    program = stopping(FAULTED)
+    compared = Compared()
+    with executors_of(program) as executors:
+        assert list(found_of(executors, compared, 120)) == []
+        kinds = {executors.number(one): one.kind for one in executors.targets}
+    met: Counter[tuple[str, int]] = Counter()
+    for number, _, session, seen in compared.kept:
+        state = session.start
+        for readings, after in zip(session.readings, seen, strict=True):
+            left_as_stated(program, kinds[number] == "cycle", {**state, **readings}, after)
+            met[kinds[number], after.fault] += 1
+            state = after.snapshot
+    assert all(met[kind, fault] > 3 for kind in ("step", "cycle") for fault in Fault if fault <= 5), met
+
+
+SAFE = {"hold": True, "pull": 0.5, "pace": 1, "wide": 2**64 - 1}
+
+
+def left_as_stated(program: Program, level: bool, before: Snapshot, after: Seen) -> None:
+    """What holds after a cycle of `FAULTED`."""
+    shown = {} if after.fault == Fault.OK else SAFE
+    left = {name: value for name, value in after.snapshot.items() if name not in shown}
+    assert {name: after.snapshot[name] for name in shown} == shown
+    assert unfit(program, after.snapshot) == ""
+    if after.fault == Fault.ADMIT:  # nothing has changed
+        same = {name: before[name] for name in left}
+        assert (after.fault_at, after.line) == ("a", -1) or after.fault_at in ("b", "x")
+    else:
+        came = admit(program, before)
+        assert isinstance(came, dict)
+        settle(program, came)
+        if level:
+            call(program, "first", [], came)
+        same = {name: came[name] for name in left}
+    if after.fault == Fault.EXTERN:  # what ran before is kept, what comes after has not run
+        same |= {f"seen[{before['a']}]": 9, "phase.next": before["a"], "given": after.snapshot["given"]}
+        assert after.line in (0, 1)
+        assert after.fault_at in ("given", "pull")
+    elif after.fault == Fault.OK:
+        return
+    else:
+        assert after.line == -1
+    if after.fault == Fault.ASSUMPTION:
+        assert (after.fault_at, after.failed) == ("place", ("place",))
+    assert all(same_value(left[name], same[name]) for name in left), (after, same)
 
 
 @pytest.mark.parametrize("path", SHIPPED)

@@ -1,13 +1,19 @@
 """Assumptions on which safety rests end the cycle; the others only tell. By brute force, and in every executor."""
 
 from collections import Counter
+from dataclasses import replace
 from itertools import combinations, product
+from pathlib import Path
 from random import Random
 
 import pytest
 
+from rcsc.cli.show import backing
 from rcsc.compose.contract import Links
 from rcsc.compose.transition import Stepper
+from rcsc.diagnostics.jsonform import table_from_json, table_to_json
+from rcsc.driver import TARGETS, compile_
+from rcsc.driver.work import Settings
 from rcsc.interpret import Fault, cycle, evaluate, initial, run_table
 from rcsc.meaning import with_stops
 from rcsc.model import Int, Kind, Program, Snapshot, Value
@@ -255,3 +261,50 @@ def test_a_cycle_of_the_proof_ends_where_the_interpreters_does() -> None:
         assert one.goes_on is TRUE
         assert {name: node.low for name, node in one.after.items()} == outcome.snapshot
     assert min(met[Fault.OK], met[Fault.ASSUMPTION]) > 5
+
+
+def test_reports_and_generated_files_say_which_stop_and_which_only_tell(tmp_path: Path) -> None:
+    source = tmp_path / "said.rcs"
+    source.write_text(STOPS)
+    made = compile_(Settings((str(source),), Options(), use_cache=False), tmp_path, TARGETS, only_check=False)
+    said = {one.table: (one.stops, one.tells) for one in made.report.tables}
+    assert said == {
+        "sees": (("place", "some"), ("calm", "low")),
+        "keeps": (("some", "low"), ("calm",)),
+    }
+    for form, given in zip(map(table_to_json, made.report.tables), made.report.tables, strict=True):
+        assert replace(table_from_json(form, cached=False), proof_ms=0.0) == replace(given, proof_ms=0.0)
+    text = backing(made.report.tables[0])
+    assert "stops where `place` or `some` fails, only tells where `calm` or `low` fails" in text
+    for file in ("c/said.h", "python/said.py"):
+        written = (tmp_path / file).read_text()
+        assert "calm: only told in sees, keeps" in written
+        assert "low: ends the cycle in keeps; only told in sees" in written
+        assert "that matches admitted inputs where place and some hold:" in written
+
+
+def test_safe_is_a_name_wherever_no_value_follows_it_on_its_line() -> None:
+    text = """
+record place { up : int 0 .. 3
+  safe : int 0 .. 3 }
+enum e { a, safe }
+output spot : place
+output m : e safe safe
+output k : int 0 .. 3 = 1 safe 2
+output r : real -1.0 .. 1.0 safe -(0.5)
+state safe : bool
+procedure q { spot.safe := 1
+  safe := true
+  if safe { k := 1 }
+  local z : bool
+  safe := false }
+"""
+    program = verdict_of(text).program
+    shown = {str(one.name): one.safe for one in program.variables if one.safe is not None}
+    assert shown == {"m": 1, "k": 2, "r": -0.5}
+
+
+def test_safe_values_keep_the_invariants() -> None:
+    text = "output a : bool safe true\noutput b : bool{}\ninvariant one : not a or not b\n"
+    assert [one.code.value for one in verdict_of(text.format("")).findings] == ["RCS417"]
+    assert verdict_of(text.format(" safe false")).findings == ()

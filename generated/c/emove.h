@@ -276,6 +276,12 @@ typedef struct {
     int32_t line; /* trace: position of the line that ran; -1 for none */
     int32_t fault; /* trace: 0 none, 1 input refused, 2 no line, 3 several lines, 4 extern refused, 5 assumption failed, 7 reals computed otherwise here */
     int32_t fault_at; /* trace: position of the variable that was refused, or of the assumption; -1 for none */
+    /* assumption 0, in_step: only told in locate, move_to, move_to_obj, pickup, release_part */
+    /* assumption 1, locate_states: only told in locate */
+    /* assumption 2, move_to_states: only told in move_to */
+    /* assumption 3, move_to_obj_states: only told in move_to_obj */
+    /* assumption 4, pickup_states: only told in pickup */
+    /* assumption 5, release_part_states: only told in release_part */
     uint64_t assumptions_failed; /* trace: bit k for the k-th assumption that is checked */
 } emove_t;
 

@@ -268,6 +268,12 @@ typedef struct {
     int32_t line; /* trace: position of the line that ran; -1 for none */
     int32_t fault; /* trace: 0 none, 1 input refused, 2 no line, 3 several lines, 4 extern refused, 5 assumption failed, 7 reals computed otherwise here */
     int32_t fault_at; /* trace: position of the variable that was refused, or of the assumption; -1 for none */
+    /* assumption 0, in_step: only told in approach_position_fingers, departure_position_fingers, goto, gothru, immed_grasp */
+    /* assumption 1, approach_states: only told in approach_position_fingers */
+    /* assumption 2, departure_states: only told in departure_position_fingers */
+    /* assumption 3, goto_states: only told in goto */
+    /* assumption 4, gothru_states: only told in gothru */
+    /* assumption 5, grasp_states: only told in immed_grasp */
     uint64_t assumptions_failed; /* trace: bit k for the k-th assumption that is checked */
 } primitive_t;
 

@@ -262,6 +262,12 @@ typedef struct {
     int32_t line; /* trace: position of the line that ran; -1 for none */
     int32_t fault; /* trace: 0 none, 1 input refused, 2 no line, 3 several lines, 4 extern refused, 5 assumption failed */
     int32_t fault_at; /* trace: position of the variable that was refused, or of the assumption; -1 for none */
+    /* assumption 0, in_step: only told in acquire, clear, move, release_part, transfer */
+    /* assumption 1, resting: only told in acquire, clear, move, release_part, transfer */
+    /* assumption 2, acquire_states: only told in acquire */
+    /* assumption 3, clear_states: only told in clear */
+    /* assumption 4, move_states: only told in move */
+    /* assumption 5, release_states: only told in release_part */
     uint64_t assumptions_failed; /* trace: bit k for the k-th assumption that is checked */
 } task_t;
 

@@ -138,6 +138,14 @@ class State:
     `line` is the position of the line that ran (-1 for none); `fault` is 0 none, 1 input refused, 2 no line, 3 several lines,
     4 extern refused, 5 assumption failed; `fault_at` the position of the variable refused, or of the assumption; bit k of
     `assumptions_failed` the k-th assumption that is checked.
+
+    Assumptions that are checked:
+    0 in_step: only told in locate, move_to, move_to_obj, pickup, release_part
+    1 locate_states: only told in locate
+    2 move_to_states: only told in move_to
+    3 move_to_obj_states: only told in move_to_obj
+    4 pickup_states: only told in pickup
+    5 release_part_states: only told in release_part
     """
 
     __slots__ = (

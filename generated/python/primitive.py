@@ -135,6 +135,14 @@ class State:
     `line` is the position of the line that ran (-1 for none); `fault` is 0 none, 1 input refused, 2 no line, 3 several lines,
     4 extern refused, 5 assumption failed; `fault_at` the position of the variable refused, or of the assumption; bit k of
     `assumptions_failed` the k-th assumption that is checked.
+
+    Assumptions that are checked:
+    0 in_step: only told in approach_position_fingers, departure_position_fingers, goto, gothru, immed_grasp
+    1 approach_states: only told in approach_position_fingers
+    2 departure_states: only told in departure_position_fingers
+    3 goto_states: only told in goto
+    4 gothru_states: only told in gothru
+    5 grasp_states: only told in immed_grasp
     """
 
     __slots__ = (

@@ -140,6 +140,14 @@ class State:
     `line` is the position of the line that ran (-1 for none); `fault` is 0 none, 1 input refused, 2 no line, 3 several lines,
     4 extern refused, 5 assumption failed; `fault_at` the position of the variable refused, or of the assumption; bit k of
     `assumptions_failed` the k-th assumption that is checked.
+
+    Assumptions that are checked:
+    0 in_step: only told in acquire, clear, move, release_part, transfer
+    1 resting: only told in acquire, clear, move, release_part, transfer
+    2 acquire_states: only told in acquire
+    3 clear_states: only told in clear
+    4 move_states: only told in move
+    5 release_states: only told in release_part
     """
 
     __slots__ = (

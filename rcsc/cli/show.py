@@ -173,6 +173,11 @@ def backing(table: TableReport) -> str:
         parts.append("confirmed by Z3")
     if table.assumptions:
         parts.append(f"assuming {', '.join(_assumed(table))}")
+    parts += [
+        f"{word} where {' or '.join(f'`{escape(name)}`' for name in names)} fails"
+        for word, names in (("stops", table.stops), ("only tells", table.tells))
+        if names
+    ]
     doubtful = [f"`{escape(name)}`" for name, standing in table.assumptions if standing == NOT_PROVED]
     if doubtful and table.verdict is Verdict.CONDITIONAL:
         parts.append(

@@ -236,6 +236,10 @@ class Stepper:
         acted, interrupted = {**before, **run.state.leaves}, run.ended
         run.execute(Call(self.procedures[name].name) for name in self.level.postprocess)
         after = {**before, **run.state.leaves, **ghosts}
+        for variable in self.program.variables:
+            if variable.safe is not None:
+                shown, name = values.constant(variable.type, variable.safe), str(variable.name)
+                after[name] = values.choice(run.ended, shown, after[name])
         calls = tuple(run.answered)
         return Cycle(
             before, taken, contract, middle, tables, after,

@@ -50,6 +50,8 @@ def table_to_json(table: TableReport) -> Json:
         "proof_ms": round(table.proof_ms, 3),
         "cached": table.cached,
         "together": None if table.together is None else _listed(table.together),
+        "stops": list(table.stops),
+        "tells": list(table.tells),
     }
 
 
@@ -76,6 +78,8 @@ def table_from_json(form: Mapping[str, Any], *, cached: bool) -> TableReport:
         float(form["proof_ms"]),
         cached,
         None if form["together"] is None else _together(form["together"]),
+        tuple(form["stops"]),
+        tuple(form["tells"]),
     )
 
 

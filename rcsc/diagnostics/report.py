@@ -67,6 +67,8 @@ class TableReport:
         proof_ms: What the proof took when it was made.
         cached: Whether it was made by an earlier run.
         together: What the levels together make of it; None where nobody knows.
+        stops: Assumptions on which safety rests: the executors end the cycle where one fails.
+        tells: Monitored assumptions whose failure is only reported.
     """
 
     table: str
@@ -79,6 +81,8 @@ class TableReport:
     proof_ms: float = 0.0
     cached: bool = False
     together: InSystem | None = None
+    stops: tuple[str, ...] = ()
+    tells: tuple[str, ...] = ()
 
 
 def resting(table: TableReport, unproved: Collection[str]) -> TableReport:
@@ -110,7 +114,9 @@ def _worse(one: TableReport, two: TableReport) -> TableReport:
         return kept
     known = dict(kept.assumptions)
     more = tuple((name, standing) for name, standing in other.assumptions if name not in known)
-    return replace(kept, assumptions=(*kept.assumptions, *more))
+    stops = tuple(dict.fromkeys((*kept.stops, *other.stops)))
+    tells = tuple(name for name in dict.fromkeys((*kept.tells, *other.tells)) if name not in stops)
+    return replace(kept, assumptions=(*kept.assumptions, *more), stops=stops, tells=tells)
 
 
 @dataclass(frozen=True, slots=True)

@@ -180,6 +180,8 @@ class _Rewriter:
                 parts["values"] = self._numbers(subject.type, value.values)
             case Variable(type=kind):
                 parts["initial"] = self._number(kind, value.initial)
+                if value.safe is not None:
+                    parts["safe"] = self._number(kind, value.safe)
             case Case(subject=subject):
                 parts["arms"] = tuple(
                     Arm(self._numbers(subject.type, arm.values), self.any(arm.body), arm.span)
@@ -231,6 +233,7 @@ def _said(variable: Variable) -> str:
     first = spell(variable.type, variable.initial)
     admit = f" {variable.admit.value}" if variable.kind is Kind.INPUT else ""
     deferred = " deferred" if variable.deferred_until is not None else ""
+    admit += "" if variable.safe is None else f" safe {spell(variable.type, variable.safe)}"
     return f"{variable.kind.value} : {kind_said(variable.type)}{stated} = {first}{admit}{deferred}"
 
 

@@ -16,7 +16,7 @@ from rcsc.diagnostics.jsonform import diagnostic_from_json, diagnostic_to_json, 
 from rcsc.diagnostics.report import TableReport, Verdict, resting
 from rcsc.driver.work import Proof
 from rcsc.meaning import digest
-from rcsc.model import Program, Table
+from rcsc.model import Program, Standing, Table
 from rcsc.project import Loaded
 from rcsc.prove.certificate import must_cover
 from rcsc.prove.obligations import called_by_lines
@@ -37,7 +37,7 @@ def prove(root: str, program: Program, loaded: Loaded, options: Options, cache: 
     options = options if cells >= WORTH_A_PROCESS else replace(options, jobs=1)
     if cache is None:
         verdict = prove_program(program, options)
-        tables = tuple(resting(table_report(one), verdict.unproved) for one in verdict.tables)
+        tables = tuple(resting(table_report(one, program), verdict.unproved) for one in verdict.tables)
         return Proof(root, verdict.findings, program, tables, verdict.proved, verdict.certificate)
     memory = _Memory(program, loaded, options, cache)
     known = {table.name: one for table in program.tables if (one := memory.table(table)) is not None}
@@ -48,7 +48,7 @@ def prove(root: str, program: Program, loaded: Loaded, options: Options, cache: 
     verdict = prove_program(program, options, only=[table.name for table in missing])
     if not any(one.severity is Severity.ERROR for one in verdict.findings):
         memory.keep([one for one in verdict.findings if one not in elsewhere], verdict.tables)
-    new = {one.table.name: _Kept(table_report(one), ()) for one in verdict.tables}
+    new = {one.table.name: _Kept(table_report(one, program), ()) for one in verdict.tables}
     return _proof(root, program, verdict.findings, {**known, **new}, verdict.unproved)
 
 
@@ -107,7 +107,7 @@ class _Memory:
             notes = [one for one in found if all(_inside(span, place) for span in _spans(one))]
             touching = [one for one in found if any(_inside(span, place) for span in _spans(one))]
             rest -= set(notes)
-            report = table_report(verdict)
+            report = table_report(verdict, self.program)
             if report.verdict is Verdict.PROVED and touching == notes:
                 forms = [diagnostic_to_json(_moved(one, -place.start, ""), {}) for one in notes]
                 self.cache.store({"report": table_to_json(report), "notes": forms}, *self._key(verdict.table))
@@ -157,9 +157,11 @@ def _moved(diagnostic: Diagnostic, by: int, file: str) -> Diagnostic:
     return replace(diagnostic, primary=label(diagnostic.primary), related=related, witnesses=witnesses)
 
 
-def table_report(verdict: TableVerdict) -> TableReport:
+def table_report(verdict: TableVerdict, program: Program) -> TableReport:
     """A verdict as the report shows it."""
-    backing = verdict.backing
+    backing, stops = verdict.backing, verdict.table.stops
+    checked = [one.name for one in program.assumptions if one.standing is Standing.MONITORED]
+    tells = [name for name in checked if name in verdict.table.assumptions and name not in stops]
     return TableReport(
         verdict.table.name,
         verdict.table.file,
@@ -169,6 +171,8 @@ def table_report(verdict: TableVerdict) -> TableReport:
         backing.confirmed_by_z3,
         tuple((str(name), standing.value) for name, standing in backing.assumptions),
         verdict.seconds * 1000,
+        stops=tuple(map(str, stops)),
+        tells=tuple(map(str, tells)),
     )
 
 

@@ -26,9 +26,11 @@ from rcsc.model import (
     Record,
     Statement,
     Type,
+    Value,
     Variable,
     key_bounds,
     pending,
+    spell,
 )
 from rcsc.plan import WORD, Coded, Cuts, Direct, Group, Index, Matcher, Plan, PlanTable, Truth, joined
 from rcsc.resolve.leaves import everything
@@ -73,6 +75,7 @@ class CFile:
     failed: tuple[str, ...]
     reals: bool
     bits: frozenset[int]
+    checked: tuple[str, ...]
     externs: tuple[str, ...]
     helpers: tuple[Function, ...]
     privates: tuple[Function, ...]
@@ -138,7 +141,7 @@ class _Maker:
         procedures = tuple(self._procedure(one) for one in _callees_first(self.program))
         tables = [function for table in self.plan.tables for function in self._table(table)]
         levels = [self._level(level) for level in self.program.levels]
-        shared = [self._settle(), *self._actions()]
+        shared = [self._settle(), *self._safe(), *self._actions()]
         shared.insert(0, self._admit())  # the last to be spelled: it asks what the others compute with
         publics = [self._init(), *tables, *self._steps(), *levels]
         return CFile(
@@ -152,6 +155,7 @@ class _Maker:
             self.names.failed,
             self._reals(),
             frozenset(self.bits),
+            self.plan.checked,
             tuple(self._externs()),
             tuple(self._helpers()),
             (*procedures, *shared),
@@ -187,7 +191,7 @@ class _Maker:
         variables = {v.name: v for v in self.program.variables}
         for one in self.program.declared:
             root = self.names.roots[one.name]
-            words = [one.kind.value, _range(one.type), comment(one.doc)]
+            words = [one.kind.value, _range(one.type), _safe_said(variables[one.leaves[0]]), comment(one.doc)]
             yield Field(self._declare(root, one.type), "; ".join(word for word in words if word))
             later = pending(one.name)
             if later in variables:
@@ -344,12 +348,32 @@ class _Maker:
         return Function("Deferred variables take their next values, all at once.", f"void {self.p}_settle({self.p}_t *s)",
                         tuple(lines) or ("    (void)s;",))  # fmt: skip
 
+    @property
+    def _shown(self) -> list[Variable]:
+        """Outputs with a safe value."""
+        return [one for one in self.program.variables if one.safe is not None]
+
+    def _safe(self) -> Iterator[Function]:
+        if self._shown:
+            lines = tuple(self._assigned(one, one.safe) for one in self._shown if one.safe is not None)
+            doc = "After a fault: outputs that have a safe value show it."
+            yield Function(doc, f"void {self.p}_safe({self.p}_t *s)", lines)
+
+    def _end(self) -> list[str]:
+        """The last lines of a step or a cycle."""
+        safe = ["    if (s->fault != 0) {", f"        {self.p}_safe(s);", "    }"] if self._shown else []
+        return [*safe, "    return s->fault;"]
+
+    def _assigned(self, variable: Variable, value: Value) -> str:
+        cast = "" if isinstance(variable.type, Bool | Real) else f"({c_type(variable.type)})"
+        return f"    {self.text.place(variable.name)} = {cast}{constant(variable.type, value)};"
+
     # --- tables ---
 
     def _table(self, table: PlanTable) -> Iterator[Function]:
         name = self.names.tables[table.table.name]
         head = f"int32_t {self.p}_{name}_line(const {self.p}_t *s)"
-        doc = f"The line of table {table.table.name} that matches admitted inputs: its position; -1 none, -2 several."
+        doc = f"The line of table {table.table.name} that matches admitted inputs{table.where}: its position; -1 none, -2 several."
         body = list(self._match(table, name))
         unread = [] if any(re.search(r"\bs\b", line) for line in body) else ["    (void)s;"]
         yield Function(doc, head, (*unread, *body))
@@ -572,7 +596,7 @@ class _Maker:
                 f"        {self.p}_settle(s);",
                 f"        {self.p}_run_{name}(s);",
                 "    }",
-                "    return s->fault;",
+                *self._end(),
             )
             doc = f"One step of table {table.table.name}: admits, settles, matches, acts; returns the fault, 0 for none."
             yield Function(doc, f"int32_t {self.p}_{name}_step({self.p}_t *s)", lines)
@@ -585,7 +609,7 @@ class _Maker:
         lines += ["        if (s->fault == 0) {", *chosen, "        }"]
         for name in level.postprocess:
             lines += self._guarded(self.text.call(name))
-        lines += ["    }", "    return s->fault;"]
+        lines += ["    }", *self._end()]
         doc = f"One cycle of level {level.name}, every {level.period_ms} ms: returns the fault, 0 for none."
         return Function(
             doc, f"int32_t {self.p}_{self.names.levels[level.name]}_cycle({self.p}_t *s)", tuple(lines)
@@ -620,14 +644,15 @@ class _Maker:
             "    s->fault_at = -1;",
             *(f"    s->{word} = 0;" for word in self.names.failed),
         ]
-        for variable in self.program.variables:
-            value = constant(variable.type, variable.initial)
-            cast = "" if isinstance(variable.type, Bool | Real) else f"({c_type(variable.type)})"
-            lines.append(f"    {self.text.place(variable.name)} = {cast}{value};")
+        lines += [self._assigned(variable, variable.initial) for variable in self.program.variables]
         return Function("Every variable's initial value.", f"void {self.p}_init({self.p}_t *s)", tuple(lines))
 
 
 # --- small things --------------------------------------------------------------------
+
+
+def _safe_said(variable: Variable) -> str:
+    return "" if variable.safe is None else f"safe {spell(variable.type, variable.safe)}"
 
 
 def _failing(program: Program) -> frozenset[str]:

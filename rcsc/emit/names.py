@@ -29,9 +29,11 @@ _FILES = (
 )
 _MODULE = frozenset(
     """IntEnum State _Refused _bisect _reduce _product _and _div _mod _min _max _refused _line_of _one_of _joined _lines_of
-    _admit _settle""".split()
+    _admit _settle _safe""".split()
 )
 """What the Python module calls its own."""
+OWN = ("t", "init", "check", "admit", "settle", "safe")
+"""Ends of the C names that every program may have."""
 LONGEST = 100
 MOST_SAID = 400
 FAILED_BITS = 64
@@ -197,7 +199,7 @@ def _program_words(program: Program) -> tuple[str, str]:
     own = re.sub(r"\W", "_", program.name, flags=re.ASCII) or "program"
     own = short(own if own[0].isalpha() else f"p{own}")
     kept = own.lower() in _FILES | C_WORDS
-    composed = any(f"{own}_{end}" in reserved.C_COMPOSED for end in ("t", "init", "admit", "settle"))
+    composed = any(f"{own}_{end}" in reserved.C_COMPOSED for end in OWN)
     return own, f"{own}_" if kept or composed else own
 
 
@@ -213,7 +215,7 @@ def guard(p: str) -> str:
 
 def _file_scope(program: Program, p: str) -> Scope:
     externs = {one.extern.c for one in program.procedures if one.extern is not None}
-    own = {f"{p}_{end}" for end in ("t", "init", "admit", "settle", "exact", "bit32", "bit64")}
+    own = {f"{p}_{end}" for end in (*OWN, "exact", "bit32", "bit64")}
     return Scope(set(reserved.C_COMPOSED | C_WORDS) | externs | own | {guard(p)})
 
 

@@ -45,6 +45,7 @@ class PyFile:
     enums: tuple[PyEnum, ...]
     attributes: tuple[tuple[str, str, str], ...]  # name, initial value, doc
     failed: tuple[str, ...]
+    checked: tuple[str, ...]
     imports: tuple[tuple[str, str], ...]  # module, its name here
     constants: tuple[tuple[str, tuple[str, ...]], ...]
     functions: tuple[PyFunction, ...]
@@ -74,7 +75,7 @@ class _Maker:
     def file(self) -> PyFile:
         """The whole view."""
         functions = [self._procedure(p) for p in self.program.procedures]
-        functions += [self._admit(), self._settle()]
+        functions += [self._admit(), self._settle(), *self._safe()]
         for table in self.plan.tables:
             functions += self._table(table)
         functions += [self._level(level) for level in self.program.levels]
@@ -92,6 +93,7 @@ class _Maker:
             enums,
             attributes,
             self.names.failed,
+            self.plan.checked,
             tuple(self.modules.items()),
             tuple(self.constants),
             tuple(functions),
@@ -188,13 +190,33 @@ class _Maker:
         doc = "Deferred variables take their next values, all at once."
         return PyFunction("_settle", "s", doc, tuple(lines) or ("    pass",))
 
+    @property
+    def _shown(self) -> list[Variable]:
+        """Outputs with a safe value."""
+        return [one for one in self.program.variables if one.safe is not None]
+
+    def _safe(self) -> Iterator[PyFunction]:
+        if self._shown:
+            lines = tuple(
+                f"    {self.text.place(one.name)} = {constant(one.type, one.safe)}"
+                for one in self._shown
+                if one.safe is not None
+            )
+            doc = "After a fault: outputs that have a safe value show it."
+            yield PyFunction("_safe", "s", doc, lines)
+
+    def _end(self) -> list[str]:
+        """The last lines of a step or a cycle."""
+        safe = ["    if s.fault != 0:", "        _safe(s)"] if self._shown else []
+        return [*safe, "    return s.fault"]
+
     # --- tables ---
 
     def _table(self, table: PlanTable) -> Iterator[PyFunction]:
         name = self.names.tables[table.table.name]
         upper = f"_{name.upper()}"
         actions = self.names.module.fresh(f"{upper}_ACTIONS")
-        doc = f"The line of table {table.table.name} that matches admitted inputs: its position; -1 none, -2 several."
+        doc = f"The line of table {table.table.name} that matches admitted inputs{table.where}: its position; -1 none, -2 several."
         yield PyFunction(f"{name}_line", "s", doc, tuple(self._match(table, upper)))
         doc = f"The same for many inputs, table {table.table.name}."
         yield PyFunction(f"{name}_lines", "states", doc, (f"    return [{name}_line(s) for s in states]",))
@@ -219,7 +241,7 @@ class _Maker:
             f"            _run_{name}(s)",
             "        except _Refused as refused:",
             "            s.fault, s.fault_at = 4, refused.position",
-            "    return s.fault",
+            *self._end(),
         )
         doc = f"One step of table {table.table.name}: admits, settles, matches, acts; the fault, 0 for none."
         yield PyFunction(f"{name}_step", "s", doc, step)
@@ -313,7 +335,7 @@ class _Maker:
             lines.append("            if s.fault == 0:")
             lines += [f"                {self.text.call(name)}" for name in level.postprocess]
         lines += ["        except _Refused as refused:", "            s.fault, s.fault_at = 4, refused.position",
-                  "    return s.fault"]  # fmt: skip
+                  *self._end()]  # fmt: skip
         doc = f"One cycle of level {level.name}, every {level.period_ms} ms; the fault, 0 for none."
         return PyFunction(f"{self.names.levels[level.name]}_cycle", "s", doc, tuple(lines))
 

@@ -65,6 +65,8 @@ def _described(variable: Variable) -> dict[str, object]:
     """What a log or a shell shows of a leaf: its range, unit or members, initial value and doc."""
     kind = variable.type
     said: dict[str, object] = {"initial": variable.initial, "doc": variable.doc}
+    if variable.safe is not None:
+        said["safe"] = variable.safe
     match kind:
         case Enum(members=members):
             said["members"] = list(members)

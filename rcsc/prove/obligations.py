@@ -53,7 +53,7 @@ from rcsc.prove.discharge import Asker, Tally, fewest
 from rcsc.prove.evaluation import Evaluation, Obligation, State, TooLongError
 from rcsc.prove.options import Options
 from rcsc.prove.symbolic import Run
-from rcsc.prove.values import FALSE, Node
+from rcsc.prove.values import FALSE, TRUE, Node
 from rcsc.resolve.leaves import everything, read_by
 from rcsc.source import Span
 
@@ -135,6 +135,7 @@ class Obligations:
         """What is wrong with conditions, deferred values, procedures, levels, and the lines of `tables`."""
         self._conditions()
         self._deferred()
+        self._safe_values()
         self._levels()
         self._uncalled()
         for table in tables:
@@ -251,6 +252,18 @@ class Obligations:
         for variable, when, value in zip(deferred, ready, later, strict=True):
             run.write(variable.name, value, when)
         self._keep(run, "taking the deferred values", deferred[0].span)
+        self._settle(run, self._invariants, "", "")
+
+    def _safe_values(self) -> None:
+        """After a fault outputs show their safe values; invariants held where the cycle ended, and go on to hold."""
+        shown = [v for v in self.program.variables if v.safe is not None]
+        if not shown or not self._kept:
+            return
+        run = self._run()
+        for variable in shown:
+            assert variable.safe is not None
+            run.write(variable.name, values.constant(variable.type, variable.safe), TRUE)
+        self._keep(run, "showing the safe values after a fault", shown[0].span)
         self._settle(run, self._invariants, "", "")
 
     def _levels(self) -> None:

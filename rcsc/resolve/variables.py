@@ -87,7 +87,7 @@ def declare_variable(scope: Scope, written: tree.VariableDecl) -> None:
         )
         return
     flat = list(_leaves(written.name.text, kind))
-    initial = _initial(scope, written, kind)
+    initial, safe = _constant(scope, written.initial, kind, "initial"), _safe(scope, written, kind)
     deferred = written.deferred_until is not None and _may_be_deferred(scope, written, kind)
     for name, leaf in flat:
         least = value_of_key(leaf, key_bounds(leaf)[0])
@@ -100,6 +100,7 @@ def declare_variable(scope: Scope, written: tree.VariableDecl) -> None:
             None,
             " ".join(written.doc),
             written.name.span,
+            safe,
         )
         scope.leaves[name] = variable
         if deferred:
@@ -137,17 +138,26 @@ def _leaves(name: str, kind: Type) -> Iterator[tuple[str, Scalar]]:
             yield name, kind
 
 
-def _initial(scope: Scope, written: tree.VariableDecl, kind: Type) -> Value | None:
-    if written.initial is None:
+def _constant(scope: Scope, written: tree.Expr | None, kind: Type, what: str) -> Value | None:
+    """The initial or the safe value; None where none is written, or what is written is none."""
+    if written is None:
         return None
     if not isinstance(kind, Bool | Enum | Int | Real):
-        scope.report(Code.KIND, "a record or array has no initial value of its own", written.initial.span)
+        scope.report(Code.KIND, f"a record or array has no {what} value of its own", written.span)
         return None
-    value = constant(scope, written.initial, kind)
-    if value is None or not fits(scope, kind, value, written.initial.span):
+    value = constant(scope, written, kind)
+    if value is None or not fits(scope, kind, value, written.span):
         return None
     found = value.literal().value
     return float(found) + 0.0 if isinstance(kind, Real) else found
+
+
+def _safe(scope: Scope, written: tree.VariableDecl, kind: Type) -> Value | None:
+    if written.safe is not None and written.kind != "output":
+        message = f"only an output has a safe value, `{written.name.text}` is not one"
+        scope.report(Code.KIND, message, written.name.span)
+        return None
+    return _constant(scope, written.safe, kind, "safe")
 
 
 def fits(scope: Scope, kind: Scalar, value: Typed, span: Span) -> bool:

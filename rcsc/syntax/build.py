@@ -110,16 +110,14 @@ class Build:
     def _variable_decl(self, node: Node) -> tree.VariableDecl:
         head = self._head(node)
         kind, name, declared, *rest = node.children
-        initial = until = None
-        admit = self._kind(rest, "ADMIT")
-        equal = self._kind(rest, "EQUAL")
-        exprs = [item for item in rest if item is not admit and item is not equal]
-        if equal is not None:
-            initial = self.expr(exprs.pop(0))
-        if exprs:
-            until = self.expr(exprs[0])
+        admit, equal, safe = (self._kind(rest, word) for word in ("ADMIT", "EQUAL", "SAFE"))
+        words = {id(word) for word in (admit, equal, safe)}
+        exprs = [item for item in rest if id(item) not in words]
+        initial = self.expr(exprs.pop(0)) if equal is not None else None
+        shown = self.expr(exprs.pop(0)) if safe is not None else None
+        until = self.expr(exprs[0]) if exprs else None
         return tree.VariableDecl(
-            str(kind), self._name(name), self.type(declared), initial, str(admit or ""), until, **head
+            str(kind), self._name(name), self.type(declared), initial, str(admit or ""), until, shown, **head
         )
 
     def _assume_decl(self, node: Node) -> tree.AssumeDecl:

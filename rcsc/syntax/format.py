@@ -108,6 +108,7 @@ def _record(one: tree.RecordDecl) -> Iterator[str]:
 def _variable(one: tree.VariableDecl) -> str:
     text = f"{one.kind} {one.name.text} : {spell_type(one.type)}"
     text += f" = {spell_expr(one.initial)}" if one.initial is not None else ""
+    text += f" safe {spell_expr(one.safe)}" if one.safe is not None else ""
     text += f" {one.admit}" if one.admit else ""
     return text + (
         f" deferred until {spell_expr(one.deferred_until)}" if one.deferred_until is not None else ""

@@ -452,9 +452,9 @@ class RecordDecl:
 
 @dataclass(frozen=True, slots=True)
 class VariableDecl:
-    """`input|state|output name : type = initial [clamp|reject] [deferred until expr]`.
+    """`input|state|output name : type = initial [safe value] [clamp|reject] [deferred until expr]`.
 
-    `admit` is "", "clamp" or "reject" and only for inputs. A missing initial value means
+    `admit` is "", "clamp" or "reject" and only for inputs, `safe` only for outputs. A missing initial value means
     the least value of the type (first member, low bound, false).
     """
 
@@ -464,6 +464,7 @@ class VariableDecl:
     initial: Expr | None = None
     admit: str = ""
     deferred_until: Expr | None = None
+    safe: Expr | None = None
     span: Span = at()
     comments: tuple[str, ...] = ()
     doc: tuple[str, ...] = ()

@@ -32,6 +32,7 @@ _WORDS = {
     "EQUAL": "`=`",
     "MINUS": "`-`",
     "ADMIT": "`clamp` or `reject`",
+    "SAFE": "`safe`",
     "STANDING": "`assumed`, `monitored` or `proved`",
     "BOOL": "a type",
     "_DOTS": "`..`",

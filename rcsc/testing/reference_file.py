@@ -82,6 +82,16 @@ def _deferred(writer: Writer) -> Iterator[str]:
     yield "}"
 
 
+def _safe_values(writer: Writer) -> Iterator[str]:
+    """After a fault: outputs that have a safe value show it."""
+    yield f"static void ref_safe({writer.symbols.struct} *s) {{ (void)s;"
+    for variable in writer.program.variables:
+        if variable.safe is not None:
+            value = constant(variable.type, variable.safe)
+            yield f"{writer.place(variable.name)} = ({writer.symbols.c_type(variable.name)}){value};"
+    yield "}"
+
+
 def line_function(writer: Writer, number: int, table: Table) -> Iterator[str]:
     """The line that matches: index, `len(lines)` for DEFAULT, -1 for none, -2 for several."""
     struct = writer.symbols.struct
@@ -191,13 +201,16 @@ def _body(writer: Writer, number: int) -> Iterator[str]:
 
 
 FRESH = "ref_trace_t r = {0}; r.line = -1; r.fault_at = REF_NONE; const int32_t refused = ref_admit(s);"
-REFUSED = "if (refused != REF_NONE) { r.fault = 1; r.fault_at = refused; return r; } ref_deferred(s);"
+REFUSED = (
+    "if (refused != REF_NONE) { r.fault = 1; r.fault_at = refused; ref_safe(s); return r; } ref_deferred(s);"
+)
+ENDED = "if (r.fault != 0) { ref_safe(s); } return r;"
 
 
 def _step(writer: Writer, number: int) -> Iterator[str]:
     """One step of a table."""
     yield f"static ref_trace_t ref_t{number}_step({writer.symbols.struct} *s) {{"
-    yield f"{FRESH} {REFUSED} ref_t{number}_body(s, &r); return r; }}"
+    yield f"{FRESH} {REFUSED} ref_t{number}_body(s, &r); {ENDED} }}"
 
 
 def _runs(writer: Writer, names: Iterable[str]) -> Iterator[str]:
@@ -223,7 +236,7 @@ def _cycle(writer: Writer, number: int, level: Level) -> Iterator[str]:
         yield "default: break; }"
     yield "}"
     yield from _runs(writer, level.postprocess)
-    yield "return r; }"
+    yield f"{ENDED} }}"
 
 
 def reference_c(program: Program, symbols: Symbols) -> str:
@@ -251,6 +264,7 @@ def _initial(writer: Writer) -> Iterator[str]:
 def _rest(writer: Writer) -> Iterator[Iterable[str]]:
     yield list(_admit(writer))
     yield list(_deferred(writer))
+    yield list(_safe_values(writer))
     yield list(_known(writer))
     yield list(_initial(writer))
     for number, table in enumerate(writer.program.tables):
