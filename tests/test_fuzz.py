@@ -1,5 +1,9 @@
-"""A short run of the fuzzer; the long one is `python -m tests.fuzz`."""
+"""Short runs of the fuzzers; the long ones are `python -m tests.fuzz` and `python -m tests.differential`."""
 
+from itertools import product
+from pathlib import Path
+
+from tests import differential
 from tests.fuzz import campaign
 
 
@@ -9,3 +13,44 @@ def test_mutated_tables_and_garbage_give_only_coded_errors() -> None:
     assert sum(number for code, number in count.items() if code.startswith("RCS2")) > 20
     # one in a hundred, give or take: which ones changes with every shipped table
     assert sum(number for code, number in count.items() if code.startswith("RCS4")) > 2
+
+
+def test_cycles_of_drawn_programs_are_the_same_to_all() -> None:
+    told = differential.campaign(count=40, seed=20261122)
+    assert told["programs"] > 35
+    assert all(told[f"fault {number}"] > 5 for number in (0, 1, 2, 3, 5))
+
+
+ENDS = ("0 .. 255", "0 .. 256", "1 .. 254", "-5 .. 5", "-129 .. 0", "0 .. 65535", "0 .. 65536", "-70000 .. 3", "0 .. 4294967295",
+        "0 .. 4294967296", "5 .. 9223372036854775807", "0 .. 9223372036854775808", "0 .. 18446744073709551615",
+        "18446744073709551610 .. 18446744073709551614", "-9223372036854775807 .. 0", "-1 .. 9223372036854775806")  # fmt: skip
+
+
+def test_what_an_input_s_type_can_hold_is_admitted_alike(tmp_path: Path) -> None:
+    drawn = differential.Drawn()
+    for at, (text, clamp) in enumerate(product(ENDS, (False, True))):
+        low, high = map(int, text.split(" .. "))
+        name, kind = f"v{at}", differential.Kind("int", f"int {text}", low, high)
+        drawn.text.append(f"input {name} : {kind.text}{' clamp' if clamp else ''}")
+        drawn.declared.append(differential.Declared(name, "input", (differential.Leaf(name, kind),), clamp))
+    drawn.text += ["table t {", "| line | v0 ||", "| l | ||", "}", "level top { period 10 [ms] table t }"]
+    drawn.tables.append(differential.Table("t", (differential.Line((), ()),), None, (), ()))
+    one = differential.built(drawn, "ends")
+    assert isinstance(one, differential.Built)
+    in_c, python = differential.InC(one, differential.library([one], tmp_path)), differential.InPython(one)
+    start = differential.begun(drawn)
+    for leaf in one.symbols["leaves"]:
+        least, most = differential.HELD[leaf["c_type"]]
+        ends = {
+            least,
+            most,
+            *(end + by for end in (leaf["low"], leaf["high"]) for by in (-1, 0, 1)),
+            0,
+            2**63,
+            2**63 - 1,
+        }
+        for value in (one for one in sorted(ends) if least <= one <= most):
+            inputs = {**start, leaf["name"]: value}
+            right, _ = differential.evaluated(drawn, inputs)
+            assert differential.interpreted(one, inputs)[0] == right
+            assert (in_c.run(inputs), python.run(inputs)) == (right, right), (leaf["name"], value)

@@ -719,12 +719,18 @@ def _wrapped(words: list[str], pad: str = "        ", width: int = 96) -> list[s
 
 
 def _outside(kind: Int | Enum, place: str) -> list[tuple[str, str]]:
-    """For each end of the range that the C type passes: the test that a value is beyond it, and the end."""
+    """For each end of the range that the C type passes: the test that a value is beyond it, and the end.
+
+    What is compared is anything that the C type holds: a `uint64_t` is not made an `int64_t`, whatever its range.
+    """
     low, high = key_bounds(kind)
-    least, greatest = type_bounds(c_type(kind))
-    wide = f"({wide_type(kind)}){place}"
+    held = c_type(kind)
+    least, greatest = type_bounds(held)
+    whole = held == "uint64_t"
+    wide = place if whole else f"({wide_type(kind)}){place}"
     ends = ((least < low, "<", low), (greatest > high, ">", high))
-    return [(f"{wide} {op} {constant(kind, end)}", constant(kind, end)) for passed, op, end in ends if passed]
+    shown = [(op, f"UINT64_C({end})" if whole else constant(kind, end)) for passed, op, end in ends if passed]
+    return [(f"{wide} {op} {end}", end) for op, end in shown]
 
 
 def _range(kind: Type) -> str:

@@ -1,0 +1,1079 @@
+"""Whole cycles of drawn programs: an evaluator of its own, the interpreter, the Python and the C executor agree.
+
+`python -m tests.differential --count 100000 --seed 1` for a long run; `tests/test_fuzz.py` makes a short one in the suite.
+
+A program is drawn as pairs of a text and a function: what stands in the table's language, and what it means, written down here a
+second time from the manual, without anything of rcsc's. Programs are safe by construction, so that they need no proof: values are
+pulled into their ranges, divisors are not zero, indices are taken modulo the length. Tables may have gaps and overlaps. The C of many
+programs is one shared library.
+"""
+
+import argparse
+import ctypes
+import json
+import math
+import random
+import struct
+import subprocess
+import tempfile
+from array import array
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from rcsc.emit import emit_c, emit_python
+from rcsc.interpret import cycle, initial
+from rcsc.lower import lower
+from rcsc.model import AssumptionName, Program, ProvedProgram, seal_of_proof
+from rcsc.resolve import compile_text
+
+I64, U64 = 2**63 - 1, 2**64 - 1
+BATCH = 50
+CYCLES = 10
+FLAGS = ("-std=c99", "-w", "-fPIC", "-shared")
+
+Value = bool | int | float
+State = dict[str, Value]
+Locals = dict[str, Value]
+Meaning = Callable[[State, Locals], Any]
+Doing = Callable[[State, Locals], None]
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A scalar type: `bool`, `enum`, `int` or `real`, its text, its bounds (of an enumeration: of the index)."""
+
+    sort: str
+    text: str
+    low: float = 0
+    high: float = 1
+    members: tuple[str, ...] = ()
+
+    def literal(self, value: Value) -> str:
+        """A value in the language."""
+        if self.sort == "bool":
+            return "true" if value else "false"
+        if self.sort == "enum":
+            return f"{self.text}.{self.members[int(value)]}"
+        text = repr(float(value)) if self.sort == "real" else str(int(value))
+        return f"({text})" if text.startswith("-") else text
+
+
+BOOL = Kind("bool", "bool")
+
+
+@dataclass(frozen=True)
+class Expr:
+    """An expression: its text, what it gives, and bounds of it (integers)."""
+
+    kind: Kind
+    text: str
+    of: Meaning
+    low: int = 0
+    high: int = 0
+
+
+@dataclass(frozen=True)
+class Leaf:
+    """A scalar variable; `many` are the elements that a computed index chooses from, where it is one of them."""
+
+    name: str
+    kind: Kind
+
+
+@dataclass(frozen=True)
+class Elements:
+    """Leaves that differ in one index: `before[i]after`."""
+
+    before: str
+    after: str
+    length: int
+    kind: Kind
+
+
+@dataclass(frozen=True)
+class Declared:
+    """A variable: `input`, `state` or `output`, clamped or not, its initial value (scalars), the condition of its deferral."""
+
+    name: str
+    word: str
+    leaves: tuple[Leaf, ...]
+    clamp: bool = False
+    start: Value | None = None
+    until: Expr | None = None
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line: its conditions and what it does."""
+
+    when: tuple[Expr, ...]
+    does: tuple[Doing, ...]
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table: its lines; the actions of DEFAULT, where there is one; the assumptions that it names."""
+
+    name: str
+    lines: tuple[Line, ...]
+    default: tuple[Doing, ...] | None
+    assuming: tuple[str, ...]
+    stops: tuple[str, ...]
+
+
+@dataclass
+class Drawn:
+    """A drawn program and its meaning."""
+
+    text: list[str] = field(default_factory=list)
+    declared: list[Declared] = field(default_factory=list)
+    elements: list[tuple[str, Elements]] = field(default_factory=list)
+    procedures: list[tuple[str, tuple[Kind, ...], Callable[[State, list[Value]], None]]] = field(
+        default_factory=list
+    )
+    assumptions: list[tuple[str, Expr]] = field(default_factory=list)
+    tables: list[Table] = field(default_factory=list)
+    before: list[int] = field(default_factory=list)
+    after: list[int] = field(default_factory=list)
+    by: tuple[Leaf, tuple[int, ...]] | None = None
+
+    def leaves(self, *words: str) -> list[Leaf]:
+        """The leaves of variables of these words; of all without one."""
+        return [leaf for one in self.declared if not words or one.word in words for leaf in one.leaves]
+
+
+# --- what operators mean -----------------------------------------------------------------------
+
+
+def quotient(a: int, b: int) -> int:
+    """Toward zero."""
+    return abs(a) // abs(b) * (1 if (a >= 0) == (b >= 0) else -1)
+
+
+def remainder(a: int, b: int) -> int:
+    """With the sign of the dividend."""
+    return abs(a) % abs(b) * (1 if a >= 0 else -1)
+
+
+def least(a: Any, b: Any) -> Any:
+    """The second where it is less."""
+    return b if b < a else a  # noqa: FURB136  # it is what is meant
+
+
+def most(a: Any, b: Any) -> Any:
+    """The second where it is greater."""
+    return b if b > a else a  # noqa: FURB136
+
+
+def kept(value: Value) -> Value:
+    """What is stored: 0.0 for -0.0."""
+    return 0.0 if isinstance(value, float) and value == 0.0 else value
+
+
+def fits(*bounds: tuple[float, float]) -> bool:
+    """Whether one type of 64 bits holds everything in these bounds."""
+    low, high = min(a for a, _ in bounds), max(b for _, b in bounds)
+    return (low >= -I64 - 1 and high <= I64) or (low >= 0 and high <= U64)
+
+
+COMPARE: dict[str, Callable[[Any, Any], bool]] = {
+    "=": lambda a, b: a == b,
+    "/=": lambda a, b: a != b,
+    "<": lambda a, b: a < b,
+    "<=": lambda a, b: a <= b,
+    ">": lambda a, b: a > b,
+    ">=": lambda a, b: a >= b,
+}
+
+
+COMPUTE: dict[str, Callable[[Any, Any], Any]] = {
+    "+": lambda a, b: a + b,
+    "-": lambda a, b: a - b,
+    "*": lambda a, b: a * b,
+}
+JOIN: dict[str, Callable[[bool, bool], bool]] = {
+    "and": lambda a, b: a and b,
+    "or": lambda a, b: a or b,
+    "implies": lambda a, b: b or not a,
+}
+
+
+class Maker:
+    """Draws one program."""
+
+    def __init__(self, rng: random.Random) -> None:
+        self.rng = rng
+        self.made = Drawn()
+        self.locals: list[tuple[str, Kind, bool]] = []
+        self.number = 0
+
+    def name(self, head: str) -> str:
+        """A name of its own."""
+        self.number += 1
+        return f"{head}{self.number}"
+
+    # --- types ---
+
+    def kind(self) -> Kind:
+        """A scalar type that leans on ends."""
+        rng = self.rng
+        sort = rng.choice(("bool", "enum", "int", "int", "int", "real", "real"))
+        if sort == "bool":
+            return BOOL
+        if sort == "enum":
+            return rng.choice(self.enums)
+        if sort == "int":
+            ends = ((0, 9), (-5, 95), (7, 7), (0, 255), (0, 256), (-128, 127), (-129, 0), (-70000, 3), (0, 2**32), (-I64 - 1, I64),
+                    (0, U64), (I64 - 3, I64 + 3), (-I64 - 1, -I64 + 5), (U64 - 4, U64), (-3, -1))  # fmt: skip
+            low, high = rng.choice(ends) if rng.randrange(3) else (rng.randint(-9, 3), rng.randint(3, 99))
+            return Kind("int", f"int {low} .. {high}", low, high)
+        reals = (
+            (-1.5, 2.5),
+            (0.0, 1.0),
+            (0.0, 1e308),
+            (-1e308, 1e308),
+            (1e-310, 3.0),
+            (-4.0, -0.25),
+            (0.0, 0.0),
+            (-1e-320, 1e-320),
+        )
+        a, b = rng.choice(reals)
+        return Kind("real", f"real {a!r} .. {b!r}", a, b)
+
+    def value(self, kind: Kind) -> Value:
+        """A value of a type, an end of it more often than not."""
+        rng = self.rng
+        if kind.sort == "bool":
+            return rng.random() < 0.5
+        if kind.sort == "real":
+            inside = [x for x in (0.0, 1.0, -1.0, 0.1, 0.3, 5e-324, 1e300) if kind.low <= x <= kind.high]
+            middle = kind.low / 2 + kind.high / 2
+            return float(rng.choice((kind.low, kind.high, middle, rng.uniform(middle / 2, middle), *inside)))
+        low, high = int(kind.low), int(kind.high)
+        return rng.choice((low, high, min(low + 1, high), max(high - 1, low), rng.randint(low, high)))
+
+    def declare(self, word: str) -> None:
+        """A variable: a scalar, an array, a record, an array of records."""
+        rng, name = self.rng, self.name("v")
+        shape = rng.randrange(8)
+        if shape > 2 or word == "output":
+            kind = self.kind()
+            start = self.value(kind) if rng.randrange(2) else None
+            clamp = word == "input" and kind.sort not in {"bool", "enum"} and rng.randrange(2) == 0
+            text = f"{word} {name} : {kind.text}" + ("" if start is None else f" = {kind.literal(start)}")
+            self.made.text.append(text + (" clamp" if clamp else ""))
+            self.made.declared.append(Declared(name, word, (Leaf(name, kind),), clamp, start))
+            return
+        kind, length = self.kind(), rng.randint(1, 4)
+        if shape == 0:
+            self.made.text.append(f"{word} {name} : array[{length}] of {kind.text}")
+            self._elements(word, name, "", length, kind)
+            return
+        record, other = self.name("r"), self.kind()
+        if shape == 1:
+            self.made.text.append(
+                f"record {record} {{ a : {kind.text}  b : array[{length}] of {other.text} }}"
+            )
+            self.made.text.append(f"{word} {name} : {record}")
+            leaves = (Leaf(f"{name}.a", kind), *(Leaf(f"{name}.b[{at}]", other) for at in range(length)))
+            self.made.elements.append((word, Elements(f"{name}.b", "", length, other)))
+        else:
+            self.made.text.append(f"record {record} {{ a : {kind.text}  b : {other.text} }}")
+            self.made.text.append(f"{word} {name} : array[{length}] of {record}")
+            pairs = ((f"{name}[{at}].a", f"{name}[{at}].b") for at in range(length))
+            leaves = tuple(leaf for a, b in pairs for leaf in (Leaf(a, kind), Leaf(b, other)))
+            self.made.elements += [
+                (word, Elements(name, ".a", length, kind)),
+                (word, Elements(name, ".b", length, other)),
+            ]
+        self.made.declared.append(Declared(name, word, leaves))
+
+    def _elements(self, word: str, before: str, after: str, length: int, kind: Kind) -> None:
+        leaves = tuple(Leaf(f"{before}[{at}]{after}", kind) for at in range(length))
+        self.made.declared.append(Declared(before, word, leaves))
+        self.made.elements.append((word, Elements(before, after, length, kind)))
+
+    # --- expressions ---
+
+    def literal(self, kind: Kind) -> Expr:
+        """A constant."""
+        value = self.value(kind)
+        ends = (int(value), int(value)) if kind.sort == "int" else (0, 0)
+        return Expr(kind, kind.literal(value), lambda s, v: value, *ends)
+
+    def read(self, kind: Kind) -> Expr:
+        """A variable, an element or a local of a sort; a constant where there is none."""
+        same = [leaf for leaf in self.made.leaves() if alike(leaf.kind, kind)]
+        chosen = [(name, one) for name, one, _ in self.locals if alike(one, kind)]
+        several = [one for _, one in self.made.elements if alike(one.kind, kind)]
+        way = self.rng.randrange(6)
+        if way < 2 and chosen:
+            name, one = self.rng.choice(chosen)
+            return Expr(one, name, lambda s, v: v[name], *ends_of(one))
+        if way == 2 and several:
+            return self.element(self.rng.choice(several))
+        if way < 5 and same:
+            leaf = self.rng.choice(same)
+            return Expr(leaf.kind, leaf.name, lambda s, v: s[leaf.name], *ends_of(leaf.kind))
+        return self.literal(kind)
+
+    def element(self, one: Elements) -> Expr:
+        """An element by a computed index."""
+        index = self.index(one.length)
+        text = f"{one.before}[{index.text}]{one.after}"
+        return Expr(
+            one.kind, text, lambda s, v: s[f"{one.before}[{index.of(s, v)}]{one.after}"], *ends_of(one.kind)
+        )
+
+    def index(self, length: int) -> Expr:
+        """An index of an array of this length."""
+        given = self.integer(1)
+        if given.low > -I64 - 1 and fits((-abs(given.low), given.high), (0, abs(given.low))):
+            return Expr(
+                given.kind,
+                f"(abs({given.text}) mod {length})",
+                lambda s, v: abs(given.of(s, v)) % length,
+                0,
+                length - 1,
+            )
+        at = self.rng.randrange(length)
+        return Expr(given.kind, str(at), lambda s, v: at, at, at)
+
+    def of_kind(self, kind: Kind, depth: int) -> Expr:
+        """An expression whose values lie in the range of the type."""
+        if kind.sort == "bool":
+            return self.truth(depth)
+        if kind.sort == "enum":
+            return self.read(kind)
+        return self.pulled(kind, self.integer(depth) if kind.sort == "int" else self.real(depth))
+
+    def pulled(self, kind: Kind, one: Expr) -> Expr:
+        """A number pulled into the range of a type; a value that is no number becomes an end."""
+        low, high = kind.literal(kind.low), kind.literal(kind.high)
+        if kind.sort == "int" and not fits((one.low, one.high), (kind.low, kind.high)):
+            return self.literal(kind)
+        if kind.sort == "int" and kind.low <= one.low and one.high <= kind.high and self.rng.randrange(2):
+            return one
+        return Expr(kind, f"min({high}, max({low}, {one.text}))",
+                    lambda s, v: least(kind.high, most(kind.low, one.of(s, v))), *ends_of(kind))  # fmt: skip
+
+    def integer(self, depth: int) -> Expr:
+        """An integer expression that stays within 64 bits."""
+        rng = self.rng
+        if depth <= 0 or rng.randrange(4) == 0:
+            return self.read(Kind("int", "", -3, 9))
+        way = rng.randrange(9)
+        if way == 0:
+            one = self.real(depth - 1)
+            return Expr(one.kind, f"int(min(900.0, max(-900.0, {one.text})))",
+                        lambda s, v: math.trunc(least(900.0, most(-900.0, one.of(s, v)))), -900, 900)  # fmt: skip
+        a, b = self.integer(depth - 1), self.integer(depth - 1)
+        found = self._computed(
+            rng.choice(("+", "-", "*", "/", "/", "mod", "mod", "mod", "min", "max", "abs", "neg")), a, b
+        )
+        return found or a
+
+    def _computed(self, op: str, a: Expr, b: Expr) -> Expr | None:
+        """The operator applied; None where something might leave 64 bits."""
+        corners = [(x, y) for x in (a.low, a.high) for y in (b.low, b.high)]
+        if op in ("+", "-", "*"):
+            compute = COMPUTE[op]
+            ends = [compute(x, y) for x, y in corners]
+            text, of = f"({a.text} {op} {b.text})", lambda s, v: compute(a.of(s, v), b.of(s, v))
+        elif op in ("/", "mod"):
+            c = self.rng.choice((1, 2, 3, 7, 1000, -1, -4))
+            work = quotient if op == "/" else remainder
+            ends = (
+                [work(a.low, c), work(a.high, c), 0] if op == "/" else [-abs(c) if a.low < 0 else 0, abs(c)]
+            )
+            b = Expr(a.kind, "", a.of, c, c)
+            text, of = f"({a.text} {op} {f'({c})' if c < 0 else c})", lambda s, v: work(a.of(s, v), c)
+        elif op in ("min", "max"):
+            choose = least if op == "min" else most
+            ends = [min(a.low, b.low), max(a.high, b.high)]
+            text, of = f"{op}({a.text}, {b.text})", lambda s, v: choose(a.of(s, v), b.of(s, v))
+        else:
+            b, ends = a, [-a.low, -a.high, abs(a.low), abs(a.high)]
+            text = f"abs({a.text})" if op == "abs" else f"(-{a.text})"
+            of = (lambda s, v: abs(a.of(s, v))) if op == "abs" else (lambda s, v: -a.of(s, v))
+        low, high = min(ends), max(ends)
+        if not fits((a.low, a.high), (b.low, b.high), (low, high)):
+            return None
+        return Expr(a.kind, text, of, low, high)
+
+    def real(self, depth: int) -> Expr:
+        """A real expression; it may become infinite, or no number."""
+        rng = self.rng
+        wanted = Kind("real", "", -1e3, 1e3)
+        if depth <= 0 or rng.randrange(4) == 0:
+            return self.read(wanted)
+        op = rng.choice(("+", "-", "*", "*", "/", "min", "max", "abs", "neg", "real"))
+        if op == "real":
+            n = self.integer(depth - 1)
+            return Expr(wanted, f"real({n.text})", lambda s, v: float(n.of(s, v)))
+        a, b = self.real(depth - 1), self.real(depth - 1)
+        if op == "/":
+            c = rng.choice((3.0, -0.1, 1e-300, 1e300))
+            return Expr(wanted, f"({a.text} / {wanted.literal(c)})", lambda s, v: a.of(s, v) / c)
+        if op in ("min", "max"):
+            choose = least if op == "min" else most
+            return Expr(wanted, f"{op}({a.text}, {b.text})", lambda s, v: choose(a.of(s, v), b.of(s, v)))
+        if op in ("abs", "neg"):
+            return Expr(wanted, f"abs({a.text})" if op == "abs" else f"(-{a.text})",
+                        lambda s, v: math.fabs(a.of(s, v)) if op == "abs" else -a.of(s, v))  # fmt: skip
+        work = COMPUTE[op]
+        return Expr(wanted, f"({a.text} {op} {b.text})", lambda s, v: work(a.of(s, v), b.of(s, v)))
+
+    def truth(self, depth: int) -> Expr:
+        """A condition."""
+        rng = self.rng
+        way = rng.randrange(8) if depth > 0 else rng.randrange(3)
+        if way == 0:
+            return self.read(BOOL)
+        if way < 4:
+            return self.compared(depth - 1)
+        if way == 4:
+            one = self.truth(depth - 1)
+            return Expr(BOOL, f"(not {one.text})", lambda s, v: not one.of(s, v))
+        a, b = self.truth(depth - 1), self.truth(depth - 1)
+        word = rng.choice(tuple(JOIN))
+        join = JOIN[word]
+        return Expr(BOOL, f"({a.text} {word} {b.text})", lambda s, v: bool(join(a.of(s, v), b.of(s, v))))
+
+    def compared(self, depth: int) -> Expr:
+        """A comparison, a set or a range."""
+        rng = self.rng
+        sort = rng.choice(("int", "int", "real", "enum", "bool"))
+        if sort == "enum":
+            kind = rng.choice(self.enums)
+            one = self.read(kind)
+            values = sorted({int(self.value(kind)) for _ in range(2)})
+            text = f"({one.text} in {{{', '.join(kind.literal(x) for x in values)}}})"
+            return Expr(BOOL, text, lambda s, v: one.of(s, v) in values)
+        word = rng.choice(tuple(COMPARE) if sort != "bool" else ("=", "/="))
+        make = {"int": self.integer, "real": self.real, "bool": self.truth}[sort]
+        a, b = make(depth), make(depth)
+        if sort == "int" and not fits((a.low, a.high), (b.low, b.high)):
+            return self.read(BOOL)
+        if sort == "int" and rng.randrange(4) == 0:
+            low, high = sorted(
+                (int(self.value(Kind("int", "", -9, 99))), int(self.value(Kind("int", "", 0, 300))))
+            )
+            if fits((a.low, a.high), (low, high)):
+                return Expr(
+                    BOOL,
+                    f"({a.text} in {f'({low})' if low < 0 else low} .. {high})",
+                    lambda s, v: low <= a.of(s, v) <= high,
+                )
+        return Expr(BOOL, f"({a.text} {word} {b.text})", lambda s, v: COMPARE[word](a.of(s, v), b.of(s, v)))
+
+    # --- statements ---
+
+    def block(self, depth: int, count: int) -> tuple[str, Doing]:
+        """Some statements."""
+        inner = len(self.locals)
+        pairs = [self.statement(depth) for _ in range(self.rng.randint(1, count))]
+        del self.locals[inner:]
+        doings = [one for _, one in pairs]
+
+        def run(s: State, v: Locals) -> None:
+            for one in doings:
+                one(s, v)
+
+        return " ".join(text for text, _ in pairs), run
+
+    def statement(self, depth: int) -> tuple[str, Doing]:
+        """One statement."""
+        rng = self.rng
+        way = rng.randrange(10) if depth > 0 else rng.randrange(4)
+        if way < 3:
+            return self.assign()
+        if way == 3:
+            return self.local()
+        if way == 4 and self.made.procedures:
+            return self.call(self.rng.randrange(len(self.made.procedures)))
+        if way < 7:
+            asked, (a, first), (b, second) = self.truth(2), self.block(depth - 1, 2), self.block(depth - 1, 2)
+
+            def either(s: State, v: Locals) -> None:
+                (first if asked.of(s, v) else second)(s, v)
+
+            return f"if {asked.text} {{ {a} }} else {{ {b} }}", either
+        return self.case(depth) if way == 7 else self.loop(depth)
+
+    def assign(self) -> tuple[str, Doing]:
+        """An assignment to a leaf, an element or a local."""
+        rng = self.rng
+        several = [one for word, one in self.made.elements if word == "state"]
+        local = [(name, kind) for name, kind, may in self.locals if may]
+        if several and rng.randrange(3) == 0:
+            one = rng.choice(several)
+            index, value = self.index(one.length), self.of_kind(one.kind, 2)
+
+            def put(s: State, v: Locals) -> None:
+                found = kept(value.of(s, v))
+                s[f"{one.before}[{index.of(s, v)}]{one.after}"] = found
+
+            return f"{one.before}[{index.text}]{one.after} := {value.text}", put
+        if local and rng.randrange(3) == 0:
+            name, kind = rng.choice(local)
+            given = self.of_kind(kind, 2)
+            return f"{name} := {given.text}", lambda s, v: v.__setitem__(name, kept(given.of(s, v)))
+        leaf = rng.choice(self.made.leaves("state", "output"))
+        wanted = self.of_kind(leaf.kind, 3)
+        late = any(one.until is not None and one.name == leaf.name for one in self.made.declared)
+        where = f"{leaf.name}.next" if late else leaf.name
+        text = f"{'next ' if late else ''}{leaf.name} := {wanted.text}"
+        return text, lambda s, v: s.__setitem__(where, kept(wanted.of(s, v)))
+
+    def local(self) -> tuple[str, Doing]:
+        """A local with a value."""
+        name, kind = self.name("k"), self.kind()
+        value = self.of_kind(kind, 2)
+        self.locals.append((name, kind, True))
+        return f"local {name} : {kind.text} := {value.text}", lambda s, v: v.__setitem__(
+            name, kept(value.of(s, v))
+        )
+
+    def case(self, depth: int) -> tuple[str, Doing]:
+        """A choice by an enumeration or a small integer."""
+        kind = self.rng.choice(self.enums)
+        subject = self.read(kind)
+        values = list(range(len(kind.members)))
+        self.rng.shuffle(values)
+        values = values[: self.rng.randint(1, 3)]
+        arms = [self.block(depth - 1, 2) for _ in values]
+        text, orelse = self.block(depth - 1, 2)
+        chosen = {value: body for value, (_, body) in zip(values, arms, strict=True)}
+        parts = " ".join(f"{kind.literal(x)} {{ {arm} }}" for x, (arm, _) in zip(values, arms, strict=True))
+
+        def run(s: State, v: Locals) -> None:
+            chosen.get(int(subject.of(s, v)), orelse)(s, v)
+
+        whole = len(values) == len(kind.members)
+        return f"case {subject.text} {{ {parts} {'' if whole else f'else {{ {text} }}'} }}", run
+
+    def loop(self, depth: int) -> tuple[str, Doing]:
+        """A loop, at an end of 64 bits now and then."""
+        low = self.rng.choice((0, 0, 1, -2, I64 - 1, U64 - 1, -I64 - 1))
+        high = low + self.rng.randint(-1, 2)
+        high = max(min(high, U64 if low >= 0 else I64), -I64 - 1)
+        name = self.name("i")
+        self.locals.append((name, Kind("int", "", low, max(high, low)), False))
+        text, body = self.block(depth - 1, 2)
+        self.locals.pop()
+
+        def run(s: State, v: Locals) -> None:
+            for at in range(low, high + 1):
+                v[name] = at
+                body(s, v)
+
+        return f"for {name} in {low} .. {high} {{ {text} }}", run
+
+    def call(self, number: int) -> tuple[str, Doing]:
+        """A call of a procedure that is already there."""
+        name, kinds, body = self.made.procedures[number]
+        args = [self.of_kind(kind, 2) for kind in kinds]
+        text = f"{name}({', '.join(one.text for one in args)})" if args else name
+        return text, lambda s, v: body(s, [kept(one.of(s, v)) for one in args])
+
+    def procedure(self) -> None:
+        """A procedure with parameters."""
+        name, kinds = self.name("p"), tuple(self.kind() for _ in range(self.rng.randrange(3)))
+        params = [self.name("a") for _ in kinds]
+        self.locals = [(param, kind, False) for param, kind in zip(params, kinds, strict=True)]
+        text, body = self.block(self.rng.randrange(3), 3)
+        self.locals = []
+        said = ", ".join(f"{param} : {kind.text}" for param, kind in zip(params, kinds, strict=True))
+        self.made.text.append(f"procedure {name}{f'({said})' if params else ''} {{ {text} }}")
+        self.made.procedures.append(
+            (name, kinds, lambda s, given: body(s, dict(zip(params, given, strict=True))))
+        )
+
+    # --- tables ---
+
+    def cell(self, leaf: Leaf) -> tuple[str, Expr | None]:
+        """A condition cell over a leaf; blank now and then, and where no value would satisfy it."""
+        rng, kind = self.rng, leaf.kind
+        if rng.randrange(3) == 0:
+            return "", None
+        a, b = self.value(kind), self.value(kind)
+        if kind.sort in ("bool", "enum"):
+            return kind.literal(a), Expr(BOOL, "", lambda s, v: s[leaf.name] == a)
+        if rng.randrange(3) == 0:
+            low, high = sorted((a, b))
+            return f"{kind.literal(low)} .. {kind.literal(high)}", Expr(
+                BOOL, "", lambda s, v: low <= s[leaf.name] <= high
+            )
+        word = rng.choice(tuple(COMPARE))
+        if not any(COMPARE[word](x, a) for x in (kind.low, kind.high, a)):
+            return "", None
+        return f"{word} {kind.literal(a)}", Expr(BOOL, "", lambda s, v: COMPARE[word](s[leaf.name], a))
+
+    def possible(self, condition: Expr | None) -> Expr | None:
+        """The condition, where some drawn state satisfies it."""
+        for _ in range(12 if condition else 0):
+            state: State = {leaf.name: self.value(leaf.kind) for leaf in self.made.leaves()}
+            if condition and condition.of(state, {}):
+                return condition
+        return None
+
+    def table(self) -> None:
+        """A table: lines by a few leaves, and by whole conditions."""
+        rng, made, name = self.rng, self.made, self.name("t")
+        columns = rng.sample(made.leaves(), min(rng.randint(1, 3), len(made.leaves())))
+        outputs = rng.sample(self.shown, rng.randint(0, len(self.shown)))
+        heads = [*(leaf.name for leaf in columns), "when"]
+        rows = [
+            f"| line | {' | '.join(heads)} || procedures {''.join(f'| {leaf.name} ' for leaf in outputs)}|"
+        ]
+        lines, half = [], self.truth(2)
+        for number in range(rng.randint(1, 4)):
+            cells = [self.cell(leaf) for leaf in columns]
+            way = rng.randrange(4)  # two lines that part, more often than not
+            when = self.possible((half, negated(half), self.truth(1), None)[way])
+            texts, does = self.actions(outputs)
+            rows.append(
+                f"| l{number} | {' | '.join(text for text, _ in cells)} | {when.text if when else ''} || {texts} |"
+            )
+            lines.append(Line((*(one for _, one in cells if one), *([when] if when else [])), does))
+        default = None
+        if rng.randrange(3):
+            texts, default = self.actions(outputs)
+            rows.append(f"| rest | DEFAULT | {'| ' * (len(heads) - 2)}|| {texts} |")
+        assuming = tuple(name for name, _ in made.assumptions if rng.randrange(2))
+        stops = tuple(name for name in assuming if rng.randrange(3) == 0)
+        relies = f"assuming {', '.join(assuming)} " if assuming else ""
+        made.text.append(f"table {name} {relies}{{")
+        made.text += [*rows, "}"]
+        made.tables.append(Table(name, tuple(lines), default, assuming, stops))
+
+    def actions(self, outputs: Sequence[Leaf]) -> tuple[str, tuple[Doing, ...]]:
+        """The action cells of a line."""
+        text, does = "", list[Doing]()
+        if self.made.procedures and self.rng.randrange(4):
+            text, run = self.call(self.rng.randrange(len(self.made.procedures)))
+            does.append(run)
+        cells = [text]
+        for leaf in outputs:
+            if self.rng.randrange(3) == 0:
+                cells.append("")
+                continue
+            given = self.of_kind(leaf.kind, 2)
+            cells.append(given.text)
+            does.append(self._put(leaf.name, given))
+        return " | ".join(cells), tuple(does)
+
+    @staticmethod
+    def _put(name: str, given: Expr) -> Doing:
+        return lambda s, v: s.__setitem__(name, kept(given.of(s, v)))
+
+    # --- the whole ---
+
+    def draw(self) -> Drawn:
+        """A program of one level."""
+        rng, made = self.rng, self.made
+        sizes = (rng.choice((1, 2, 3)), rng.choice((2, 4, 5)))
+        self.enums = tuple(
+            Kind("enum", f"e{at}", 0, size - 1, tuple(f"m{at}_{n}" for n in range(size)))
+            for at, size in enumerate(sizes)
+        )
+        made.text += [f"enum {one.text} {{ {', '.join(one.members)} }}" for one in self.enums]
+        for word, count in (("input", 3), ("state", 3), ("output", 1)):
+            for _ in range(rng.randint(1, count)):
+                self.declare(word)
+        if rng.randrange(2):
+            self.deferred()
+        for at in range(rng.randrange(3)):
+            condition = self.truth(2)
+            made.text.append(f"assume h{at} monitored : {condition.text}")
+            made.assumptions.append((f"h{at}", condition))
+        for _ in range(rng.randint(1, 3)):
+            self.procedure()
+        self.shown = []
+        for _ in range(rng.randint(1, 2)):  # only lines write these
+            kind, name = self.kind(), self.name("o")
+            made.text.append(f"output {name} : {kind.text}")
+            made.declared.append(Declared(name, "output", (Leaf(name, kind),)))
+            self.shown.append(Leaf(name, kind))
+        for _ in range(rng.choice((1, 1, 2))):
+            self.table()
+        self.level()
+        return made
+
+    def deferred(self) -> None:
+        """A variable that takes its next value when a condition holds."""
+        kind, name = self.kind(), self.name("d")
+        start, until = self.value(kind), self.truth(2)
+        self.made.text.append(
+            f"state {name} : {kind.text} = {kind.literal(start)} deferred until {until.text}"
+        )
+        self.made.declared.append(Declared(name, "state", (Leaf(name, kind),), start=start, until=until))
+
+    def level(self) -> None:
+        """The level: what runs before and after, and which table."""
+        made, rng = self.made, self.rng
+        plain = [at for at, (_, kinds, _) in enumerate(made.procedures) if not kinds]
+        made.before = [at for at in plain if rng.randrange(3) == 0]
+        made.after = [at for at in plain if rng.randrange(3) == 0]
+        by = [
+            leaf
+            for leaf in made.leaves("input", "state")
+            if leaf.kind.sort == "enum" and leaf.name.isidentifier()
+        ]
+        chosen = f"table {made.tables[0].name}"
+        if by and rng.randrange(2):
+            leaf = rng.choice(by)
+            numbers = tuple(rng.randrange(len(made.tables)) for _ in leaf.kind.members)
+            made.by = leaf, numbers
+            pairs = zip(leaf.kind.members, numbers, strict=True)
+            chosen = (
+                f"table by {leaf.name} {{ {'  '.join(f'{m} : {made.tables[n].name}' for m, n in pairs)} }}"
+            )
+        said = [made.procedures[at][0] for at in made.before], [made.procedures[at][0] for at in made.after]
+        before, after = (
+            f"{word} {', '.join(names)} " if names else ""
+            for word, names in zip(("preprocess", "postprocess"), said, strict=True)
+        )
+        made.text.append(f"level top {{ period 10 [ms] {before}{chosen} {after}}}")
+
+
+def alike(one: Kind, other: Kind) -> bool:
+    """Whether values of one may stand where the other is wanted; ranges aside."""
+    return one.sort == other.sort and (one.sort != "enum" or one.text == other.text)
+
+
+def ends_of(kind: Kind) -> tuple[int, int]:
+    """Bounds of an integer type; nothing of interest of others."""
+    return (int(kind.low), int(kind.high)) if kind.sort == "int" else (0, 0)
+
+
+def negated(one: Expr) -> Expr:
+    """The condition turned round."""
+    return Expr(BOOL, f"(not {one.text})", lambda s, v: not one.of(s, v))
+
+
+# --- what a cycle does -------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What a cycle left: fault, what it is about, the line, failed assumptions, and every leaf."""
+
+    fault: int
+    about: str
+    line: int
+    failed: tuple[str, ...]
+    values: tuple[object, ...]
+
+
+def bits(value: Value) -> object:
+    """A value by which -0.0, NaN and the rest are told apart."""
+    return struct.pack("<d", value) if isinstance(value, float) else int(value)
+
+
+def order(drawn: Drawn) -> list[tuple[str, Kind]]:
+    """Leaves with the pending ones, in declared order."""
+    found = []
+    for one in drawn.declared:
+        for leaf in one.leaves:
+            found.append((leaf.name, leaf.kind))
+            if one.until is not None:
+                found.append((f"{leaf.name}.next", leaf.kind))
+    return found
+
+
+def begun(drawn: Drawn) -> State:
+    """The state before the first cycle."""
+    state: State = {}
+    for one in drawn.declared:
+        for leaf in one.leaves:
+            zero: Value = False if leaf.kind.sort == "bool" else leaf.kind.low
+            state[leaf.name] = kept(zero if one.start is None else one.start)
+            if one.until is not None:
+                state[f"{leaf.name}.next"] = state[leaf.name]
+    return state
+
+
+def admitted(one: Declared, leaf: Leaf, value: Value) -> Value | None:
+    """The value that the level sees; None where it is refused."""
+    if isinstance(value, float) and math.isnan(value):
+        return None
+    if leaf.kind.low <= value <= leaf.kind.high:
+        return kept(value)
+    if not one.clamp:
+        return None
+    return kept(leaf.kind.low if value < leaf.kind.low else leaf.kind.high)
+
+
+def evaluated(drawn: Drawn, state: State) -> tuple[Seen, State]:
+    """One cycle by this evaluator: steps 1 to 7 of the manual."""
+    now = dict(state)
+    for one in drawn.declared:
+        if one.word == "input":
+            for leaf in one.leaves:
+                value = admitted(one, leaf, state[leaf.name])
+                if value is None:
+                    return seen(drawn, 1, leaf.name, -1, (), state), state
+                now[leaf.name] = value
+    ready = [one.name for one in drawn.declared if one.until is not None and one.until.of(now, {})]
+    now |= {name: now[f"{name}.next"] for name in ready}
+    for at in drawn.before:
+        drawn.procedures[at][2](now, [])
+    table = drawn.tables[0 if drawn.by is None else drawn.by[1][int(now[drawn.by[0].name])]]
+    failed = tuple(
+        name for name, condition in drawn.assumptions if name in table.assuming and not condition.of(now, {})
+    )
+    stopped = [name for name in failed if name in table.stops]
+    if stopped:
+        return seen(drawn, 5, stopped[0], -1, failed, now), now
+    matching = [at for at, line in enumerate(table.lines) if all(cell.of(now, {}) for cell in line.when)]
+    if len(matching) > 1 or (not matching and table.default is None):
+        return seen(drawn, 3 if matching else 2, "", -1, failed, now), now
+    at = matching[0] if matching else len(table.lines)
+    for does in table.lines[at].does if matching else table.default or ():
+        does(now, {})
+    for number in drawn.after:
+        drawn.procedures[number][2](now, [])
+    return seen(drawn, 0, "", at, failed, now), now
+
+
+def seen(drawn: Drawn, fault: int, about: str, line: int, failed: tuple[str, ...], state: State) -> Seen:
+    """The state after a cycle, in the form in which all are compared."""
+    return Seen(fault, about, line, failed, tuple(bits(state[name]) for name, _ in order(drawn)))
+
+
+# --- the others --------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Built:
+    """A drawn program as rcsc has it: model, symbols, emitted text."""
+
+    drawn: Drawn
+    program: Program
+    symbols: Mapping[str, Any]
+    files: Mapping[str, str]
+
+
+def built(drawn: Drawn, name: str) -> Built | tuple[str, ...]:
+    """The program emitted; the codes of what was refused."""
+    program = compile_text("\n".join(drawn.text) + "\n", f"{name}.rcs")
+    if not isinstance(program, Program):
+        return tuple(d.code.value for d in program)
+    stops = {table.name: tuple(map(AssumptionName, table.stops)) for table in drawn.tables}
+    tables = tuple(replace(table, stops=stops[table.name]) for table in program.tables)
+    program = replace(program, tables=tables)
+    plan = lower(ProvedProgram(program, (), seal_of_proof()))
+    files = emit_c(plan) | emit_python(plan)
+    [symbols] = [json.loads(text) for path, text in files.items() if path.endswith(".json")]
+    return Built(drawn, program, symbols, files)
+
+
+def interpreted(one: Built, state: State) -> tuple[Seen, State]:
+    """One cycle by the interpreter."""
+    did = cycle(one.program, one.program.levels[0], state)
+    now = dict(did.snapshot)
+    return seen(one.drawn, int(did.fault), did.fault_at, did.line_index, did.failed_assumptions, now), now
+
+
+class InPython:
+    """The emitted Python."""
+
+    def __init__(self, one: Built) -> None:
+        self.one = one
+        [text] = [text for path, text in one.files.items() if path.endswith(".py")]
+        module = ModuleType("drawn")
+        exec(compile(text, "drawn.py", "exec"), module.__dict__)  # noqa: S102  # it is what is tested
+        self.state = module.State()
+        self.cycle = module.__dict__[
+            one.symbols["levels"][0]["cycle"].removeprefix(f"{one.symbols['program']}_")
+        ]
+        self.names = {leaf["name"]: leaf["attribute"] for leaf in one.symbols["leaves"]}
+
+    def run(self, inputs: State) -> Seen:
+        """One cycle."""
+        for name, value in inputs.items():
+            setattr(self.state, self.names[name], value)
+        fault = self.cycle(self.state)
+        state = {name: getattr(self.state, attribute) for name, attribute in self.names.items()}
+        return traced(
+            self.one, fault, self.state.fault_at, self.state.line, self.state.assumptions_failed, state
+        )
+
+
+def traced(one: Built, fault: int, at: int, line: int, failed: int, state: State) -> Seen:
+    """The trace of an executor in names."""
+    checked = one.symbols["monitored"]
+    about = one.symbols["leaves"][at]["name"] if fault == 1 else checked[at] if fault == 5 else ""
+    names = tuple(name for bit, name in enumerate(checked) if failed >> bit & 1)
+    return seen(one.drawn, fault, about, line, names, state)
+
+
+def driver_c(one: Built) -> Iterator[str]:
+    """C that takes inputs as words and gives trace and leaves as words."""
+    p, inputs = one.symbols["program"], [leaf for leaf in one.symbols["leaves"] if leaf["kind"] == "input"]
+    yield f"static {p}_t {p}_state; void {p}_reset(void) {{ {p}_init(&{p}_state); }}"
+    yield f"void {p}_go(const int64_t *in, int64_t *out) {{ {p}_t *s = &{p}_state; double x;"
+    for at, leaf in enumerate(inputs):
+        real = leaf["c_type"] == "double"
+        yield (
+            f"memcpy(&x, &in[{at}], 8); s->{leaf['path']} = x;"
+            if real
+            else f"s->{leaf['path']} = ({leaf['c_type']})in[{at}];"
+        )
+    yield f"out[0] = {one.symbols['levels'][0]['cycle']}(s); out[1] = s->fault_at; out[2] = s->line;"
+    yield "out[3] = (int64_t)s->assumptions_failed;"
+    for at, leaf in enumerate(one.symbols["leaves"], 4):
+        real = leaf["c_type"] == "double"
+        yield (
+            f"x = s->{leaf['path']} ; memcpy(&out[{at}], &x, 8);"
+            if real
+            else f"out[{at}] = (int64_t)s->{leaf['path']};"
+        )
+    yield "}"
+
+
+def library(programs: Sequence[Built], folder: Path, *flags: str, cc: str = "cc") -> ctypes.CDLL:
+    """The C of several programs and their drivers in one shared library."""
+    texts = ["#include <stdint.h>\n#include <stdbool.h>\n#include <string.h>\n"]
+    for one in programs:
+        for path, text in one.files.items():
+            if path.endswith(".h"):
+                (folder / Path(path).name).write_text(text)
+        texts += [text for path, text in one.files.items() if path.endswith(".c")]
+        texts += driver_c(one)
+    (folder / "all.c").write_text("\n".join(texts))
+    subprocess.run([cc, *FLAGS, *flags, "all.c", "-o", "all.so"], cwd=folder, check=True)
+    return ctypes.CDLL(str(folder / "all.so"))
+
+
+class InC:
+    """The emitted C."""
+
+    def __init__(self, one: Built, made: ctypes.CDLL) -> None:
+        self.one, p = one, one.symbols["program"]
+        getattr(made, f"{p}_reset")()
+        self.go = getattr(made, f"{p}_go")
+        self.inputs = [leaf["name"] for leaf in one.symbols["leaves"] if leaf["kind"] == "input"]
+
+    def run(self, inputs: State) -> Seen:
+        """One cycle."""
+        given = array("q", [word(inputs[name]) for name in self.inputs] or [0])
+        found = array("q", bytes(8 * (4 + len(self.one.symbols["leaves"]))))
+        self.go(*(ctypes.c_void_p(one.buffer_info()[0]) for one in (given, found)))
+        state: State = {}
+        for value, leaf in zip(found[4:], self.one.symbols["leaves"], strict=True):
+            state[leaf["name"]] = struct.unpack("<d", struct.pack("<q", value))[0] if leaf["c_type"] == "double" else (
+                value & U64 if leaf["c_type"] == "uint64_t" else value)  # fmt: skip
+        fault, at, line, failed = found[:4]
+        return traced(self.one, fault, at, line, failed, state)
+
+
+def word(value: Value) -> int:
+    """A value as a signed word."""
+    if isinstance(value, float):
+        found: int = struct.unpack("<q", struct.pack("<d", value))[0]
+        return found
+    return int(value) - 2**64 if int(value) > I64 else int(value)
+
+
+HELD = {"uint8_t": (0, 255), "int8_t": (-128, 127), "uint16_t": (0, 65535), "int16_t": (-32768, 32767), "uint32_t": (0, 2**32 - 1),
+        "int32_t": (-(2**31), 2**31 - 1), "uint64_t": (0, U64), "int64_t": (-I64 - 1, I64)}  # fmt: skip
+
+
+def readings(one: Built, rng: random.Random) -> State:
+    """A value for every input: in its range more often than not, else what its C type can hold."""
+    maker, given = Maker(rng), dict[str, Value]()
+    types = {leaf["name"]: leaf["c_type"] for leaf in one.symbols["leaves"]}
+    for leaf in one.drawn.leaves("input"):
+        value = maker.value(leaf.kind)
+        if rng.randrange(12) == 0 and leaf.kind.sort != "bool":
+            if leaf.kind.sort == "real":
+                value = rng.choice(
+                    (
+                        math.nan,
+                        math.inf,
+                        -math.inf,
+                        -0.0,
+                        leaf.kind.high * 2,
+                        math.nextafter(leaf.kind.low, -math.inf),
+                    )
+                )
+            else:
+                low, high = HELD[types[leaf.name]]
+                value = rng.choice(
+                    (low, high, max(low, int(leaf.kind.low) - 1), min(high, int(leaf.kind.high) + 1))
+                )
+        given[leaf.name] = value
+    return given
+
+
+# --- campaigns ---------------------------------------------------------------------------------
+
+
+def compare(one: Built, made: ctypes.CDLL, rng: random.Random, count: Counter[str]) -> None:
+    """Some cycles of one program; AssertionError where two of the four differ."""
+    state, modelled = begun(one.drawn), dict(initial(one.program))
+    python, in_c = InPython(one), InC(one, made)
+    for number in range(CYCLES):
+        inputs = readings(one, rng)
+        right, state = evaluated(one.drawn, {**state, **inputs})
+        other, modelled = interpreted(one, {**modelled, **inputs})
+        for who, found in (("interpreter", other), ("Python", python.run(inputs)), ("C", in_c.run(inputs))):
+            assert found == right, difference(one, who, number, inputs, found, right)
+        count[f"fault {right.fault}"] += 1
+        count["assumption failed"] += bool(right.failed)
+
+
+def difference(one: Built, who: str, number: int, inputs: State, found: Seen, right: Seen) -> str:
+    """What differs, with the program."""
+    leaves = [
+        (name, a, b)
+        for (name, _), a, b in zip(order(one.drawn), found.values, right.values, strict=True)
+        if a != b
+    ]
+    trace = [(a, b) for a, b in ((replace(found, values=()), replace(right, values=())),) if a != b]
+    return f"{who}, cycle {number}: {trace} {leaves}\ninputs {inputs}\n" + "\n".join(one.drawn.text)
+
+
+def campaign(count: int, seed: int, cc: str = "cc") -> Counter[str]:
+    """Draws `count` programs and compares them; how many cycles ended how, and how many texts were refused."""
+    told: Counter[str] = Counter()
+    for begin in range(0, count, BATCH):
+        batch = []
+        for number in range(begin, min(begin + BATCH, count)):
+            rng = random.Random(f"{seed} {number}")
+            one = built(Maker(rng).draw(), f"p{number}")
+            if isinstance(one, Built):
+                batch.append((number, one))
+                told["programs"] += 1
+            else:
+                told[f"refused {' '.join(sorted(set(one)))}"] += 1
+        with tempfile.TemporaryDirectory(prefix="rcsc-differential-") as place:
+            flags = ("-O2", "-march=native") if begin // BATCH % 5 == 4 else ("-O0",)
+            made = library([one for _, one in batch], Path(place), *flags, cc=cc)
+            for number, one in batch:
+                try:
+                    compare(one, made, random.Random(f"{seed} {number} inputs"), told)
+                except Exception as bug:
+                    raise AssertionError(f"program {number} of seed {seed}: {bug}") from bug
+    return told
+
+
+def main() -> None:
+    """A long run, by command."""
+    arguments = argparse.ArgumentParser(description=__doc__)
+    arguments.add_argument("--count", type=int, default=10_000)
+    arguments.add_argument("--seed", type=int, default=1)
+    given = arguments.parse_args()
+    for name, number in sorted(campaign(given.count, given.seed).items()):
+        print(f"{name:24} {number:9}")
+
+
+if __name__ == "__main__":
+    main()
