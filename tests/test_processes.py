@@ -2,6 +2,7 @@
 
 import contextlib
 import multiprocessing
+import os
 import random
 import signal
 import subprocess
@@ -9,6 +10,8 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 from hypothesis import given, settings
@@ -578,3 +581,98 @@ def test_common_memory_and_shared_memory_are_used_alike(buffers: SharedMemoryBuf
         transport.publish("far.out", pattern(1))
         transport.publish("far.out", pattern(2))
         assert transport.latest("far.out") == pattern(2)
+
+
+# --- what stands still ---
+
+
+def stopped_at(
+    holds: Callable[[], bool], name: str, then: Callable[[], None] | None = None
+) -> Callable[[Supervisor], None]:
+    """Stops a process as SIGSTOP does, once, as soon as that holds."""
+    done: list[int] = []
+
+    def watch(system: Supervisor) -> None:
+        if not done and holds() and system.runs(name):
+            pid = system._running[name].pid
+            assert pid is not None
+            os.kill(pid, signal.SIGSTOP)
+            done.append(pid)
+            if then is not None:
+                then()
+
+    return watch
+
+
+def test_a_level_that_is_stopped_is_noticed_and_goes_on(repo: Path, tmp_path: Path) -> None:
+    """Nothing is lost and nothing is done twice; what happened is told by the level's name."""
+    told: list[str] = []
+    run_processes(
+        alone(repo), "python", outside(tmp_path, 2, 1), queries=QUERIES, rate=8.0,
+        watch=stopped_at((tmp_path / "below").exists, "task"), told=told.append,
+    )  # fmt: skip
+    assert told == ["level `task` stood still (stopped by a signal); it is started again"]
+    answered_once(tmp_path / "sent", 2 * len(ROUND), 1)
+
+
+def test_what_stands_still_outside_ends_the_run_by_its_name(repo: Path, tmp_path: Path) -> None:
+    with pytest.raises(ChildProcessError, match="process `below` stands still: stopped by a signal"):
+        run_processes(
+            alone(repo), "python", outside(tmp_path, 100000, 1), queries=QUERIES, rate=8.0,
+            watch=stopped_at((tmp_path / "below").exists, "below"),
+        )  # fmt: skip
+    assert not list(FOLDER.glob(f"{PREFIX}{os.getpid()}-*"))
+
+
+def test_what_is_killed_outside_ends_the_run_by_its_name(repo: Path, tmp_path: Path) -> None:
+    def watch(system: Supervisor) -> None:
+        if (tmp_path / "below").exists() and system.runs("sender"):
+            system.stop("sender", signal.SIGKILL)
+
+    with pytest.raises(ChildProcessError, match="process `sender` was killed"):
+        run_processes(
+            alone(repo), "python", outside(tmp_path, 100000, 1), queries=QUERIES, rate=8.0, watch=watch
+        )
+
+
+SEEN = [
+    # of a level: stamp changes, state, seconds by the clock and of the processor since the last commit; what is said
+    (True, "T", 100.0, 0.0, ""),
+    (False, "T", 0.1, 0.0, ""),
+    (False, "T", 1.1, 0.0, "stopped by a signal"),
+    (False, "t", 1.1, 0.0, "stopped by a signal"),
+    (False, "R", 1000.0, 0.1, ""),  # it gets no processor
+    (False, "S", 9.0, 0.1, ""),
+    (False, "S", 11.0, 0.1, "waiting for something that does not come"),
+    (False, "D", 11.0, 0.1, "waiting for something that does not come"),
+    (False, "R", 6.0, 5.1, "5 s of computing without an end of its cycle"),
+    (True, "R", 6.0, 5.1, ""),
+]
+
+
+@pytest.mark.parametrize(("changes", "state", "clock_s", "cpu_s", "said"), SEEN)
+def test_still_is_told_from_late(
+    repo: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    changes: bool,
+    state: str,
+    clock_s: float,
+    cpu_s: float,
+    said: str,
+) -> None:
+    """A level whose period is 40 ms, by a clock and a process table of the test's own."""
+    now = [0.0, 0.0]
+    monkeypatch.setattr("rcsc.system.processes.time", SimpleNamespace(monotonic=lambda: now[0]))
+    monkeypatch.setattr("rcsc.system.processes._state", lambda _: (state if now[0] else "R", now[1]))
+    system = Supervisor(alone(repo), "python", {}, queries=QUERIES)
+    try:
+        system.buffers.commit("task", started(repo, 1))
+        system._running["task"] = cast(Any, SimpleNamespace(pid=1, is_alive=lambda: True))
+        assert system.still() == {}
+        if changes:
+            system.buffers.commit("task", started(repo, 2))
+        now[:] = clock_s, cpu_s
+        assert system.still() == ({"task": said} if said else {})
+    finally:
+        system._running.clear()
+        system.close()

@@ -100,6 +100,7 @@ def run(  # noqa: PLR0913, PLR0917  # as many as there are options
     again = _command(script, system, database, executor, backend)
     asked = Asked(script, path, kind, database, backend, seed, log, report, live, rate, quiet, again)
     from rcsc.database.build import BadData
+    from rcsc.diagnostics.codes import Code
     from rcsc.system.cell import StateTableError
     from rcsc.system.description import BadDescription
     from rcsc.system.executors import NotBuilt
@@ -110,6 +111,8 @@ def run(  # noqa: PLR0913, PLR0917  # as many as there are options
         return _run(asked, processes, from_row, resumes)
     except (BadDescription, BadData, BadScript, NotBuilt, NotResumed, StateTableError) as error:
         stop(error)
+    except ChildProcessError as error:
+        raise Stopped(Code.PROCESS_LOST, str(error), "what levels say as they end stands above") from error
 
 
 def _run(asked: Asked, processes: bool, from_row: int | None, resumes: bool) -> int:

@@ -10,8 +10,11 @@ What it sees is at times older or newer than in one process; tables that keep th
 import contextlib
 import os
 import signal
+import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Any, Self
 
@@ -27,6 +30,25 @@ if TYPE_CHECKING:
 
 PATIENCE_S = 5.0
 MOST_RESTARTS = 20
+STILL_PERIODS, STILL_S = 25, 0.2
+"""A process that has committed nothing for so many periods, and so many seconds, is looked at."""
+LOOP_CPU_S, WAIT_S = 5.0, 10.0
+"""One that computes for so long without a commit loops; one that waits for so long hangs. One that gets no processor does neither."""
+
+
+@dataclass(slots=True)
+class _Pulse:
+    """When a process was last seen to do something.
+
+    Attributes:
+        stamp: Of its last commit; 0 for what has no region of its own.
+        since_s: By the clock.
+        cpu_s: Of the processor, that it had used by then.
+    """
+
+    stamp: int
+    since_s: float
+    cpu_s: float
 
 
 class Supervisor:
@@ -49,6 +71,18 @@ class Supervisor:
         laid = layout(description, self._signs)
         self._outside = outside
         self._running: dict[str, SpawnProcess] = {}
+        self._pulses: dict[str, _Pulse] = {}
+        tick_s = description.tick_ms / 1000
+        periods_s = dict.fromkeys(outside, tick_s) | {
+            name: level.period_ms / 1000
+            for name, sign in self._signs.items()
+            for level in sign.levels
+            if level.name == name
+        }
+        self._still_s = {
+            name: max(STILL_S, STILL_PERIODS * period_s / (rate or 1.0))
+            for name, period_s in periods_s.items()
+        }
         self.buffers = SharedMemoryBuffers.create(laid)
         self._setting = Setting(description, queries, rate, kind, self.buffers.block.name, os.getpid())
 
@@ -86,12 +120,15 @@ class Supervisor:
         with children.interrupts_held():
             made.start()
         self._running[name] = made
+        self._pulses.pop(name, None)
 
     def stop(self, name: str, how: signal.Signals = signal.SIGTERM) -> None:
         """Ends a process: SIGTERM after its cycle, SIGKILL at once."""
         process = self._running[name]
         if process.pid is not None and process.is_alive():
             os.kill(process.pid, how)
+            if _state(process.pid)[0] in STOPPED:  # it would take nothing else
+                process.kill()
         process.join(PATIENCE_S)
         if process.is_alive():
             process.kill()
@@ -128,6 +165,29 @@ class Supervisor:
         """Processes that a signal ended."""
         return tuple(name for name in self._running if (self.code(name) or 0) < 0)
 
+    def still(self) -> dict[str, str]:
+        """Processes that run and stand still, and why: of each, whether it was stopped, loops, or waits for something."""
+        found = {name: self._why_still(name) for name in self._running if self.runs(name)}
+        return {name: why for name, why in found.items() if why}
+
+    def _why_still(self, name: str) -> str:
+        region = self.buffers.layout.regions.get(name)
+        stamp = 0 if region is None else self.buffers.block.word(region.at)
+        state, cpu_s = _state(self._running[name].pid or 0)
+        now_s, pulse = time.monotonic(), self._pulses.get(name)
+        idle = region is None and state not in STOPPED  # nothing is known of what it does
+        if pulse is None or pulse.stamp != stamp or idle:
+            self._pulses[name] = _Pulse(stamp, now_s, cpu_s)
+            return ""
+        if now_s - pulse.since_s < self._still_s[name]:
+            return ""
+        if state in STOPPED:
+            return "stopped by a signal"
+        if cpu_s - pulse.cpu_s > LOOP_CPU_S:
+            return f"{LOOP_CPU_S:g} s of computing without an end of its cycle"
+        waits = state in WAITING and now_s - pulse.since_s > max(WAIT_S, self._still_s[name])
+        return "waiting for something that does not come" if waits else ""
+
     def close(self) -> None:
         """Ends all, and removes the shared memory."""
         with children.interrupts_held():
@@ -155,8 +215,9 @@ def run_processes(
     queries: Factory | None = None,
     rate: float = 1.0,
     watch: Callable[[Supervisor], None] | None = None,
+    told: Callable[[str], None] | None = None,
 ) -> None:
-    """Runs the system until something outside is over, or Ctrl-C or SIGTERM ends all; a killed level is started again.
+    """Runs the system until something outside is over, or Ctrl-C or SIGTERM ends all; a level that is killed or still is begun again.
 
     Args:
         description: Levels and wires.
@@ -165,19 +226,30 @@ def run_processes(
         queries: Makes the database's questions by name, in each level's process.
         rate: Seconds of the system in one of the clock; 0 is as fast as possible.
         watch: Called some fifty times a second.
+        told: Called with what happened to a level that stood still; else it goes to the standard error stream.
 
     Raises:
         UnprovedExecutors: Executors are made of tables that are not proved.
         StateTableError: A level met a fault.
-        ChildProcessError: A process ended by an exception, or was killed too often.
+        ChildProcessError: A process ended by an exception, was killed too often, or stands still outside the levels.
         KeyboardInterrupt: Ctrl-C, or SIGTERM.
     """
     refuse_unproved(description)
     restarts = 0
+    say = told or _say
     with _terminable(), Supervisor(description, kind, outside, queries=queries, rate=rate) as system:
         while not system.over:
             system.check()
+            for name, why in system.still().items():
+                if name in outside:
+                    raise ChildProcessError(f"process `{name}` stands still: {why}")
+                say(f"level `{name}` stood still ({why}); it is started again")
+                system.stop(name, signal.SIGKILL)
             for name in system.killed():
+                if name in outside:
+                    raise ChildProcessError(
+                        f"process `{name}` was killed; what it did cannot be taken up again"
+                    )
                 restarts += 1
                 if restarts > MOST_RESTARTS:
                     raise ChildProcessError(f"process `{name}` was killed; there were {restarts} of them")
@@ -185,6 +257,23 @@ def run_processes(
             if watch is not None:
                 watch(system)
             time.sleep(0.02)
+
+
+STOPPED, WAITING = frozenset("Tt"), frozenset("SD")
+
+
+def _state(pid: int) -> tuple[str, float]:
+    """A process's state and the seconds of processor time it has used. Source: proc(5), /proc/PID/stat."""
+    try:
+        text = Path(f"/proc/{pid}/stat").read_text(encoding="ascii", errors="replace")
+    except OSError:
+        return "", 0.0
+    fields = text.rpartition(")")[2].split()
+    return fields[0], (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def _say(text: str) -> None:
+    sys.stderr.write(f"{text}\n")
 
 
 @contextlib.contextmanager
