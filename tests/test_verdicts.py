@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rcsc.diagnostics.codes import Code
+from rcsc.diagnostics.diagnostic import Severity
 from rcsc.diagnostics.jsonform import report_to_json
 from rcsc.diagnostics.report import NOT_PROVED, Report, TableReport, Verdict, merged, resting
 from rcsc.diagnostics.sarif import sarif
@@ -227,3 +228,15 @@ def test_what_an_assumption_kills_is_told(solver: Literal["boxes", "auto", "both
         [found] = prove_program(program, Options(solver=solver)).findings
         assert found.code is code
         assert found.notes == ("under `up`",)
+        assert found.severity is Severity.WARNING  # where the assumption fails it may match
+
+
+@pytest.mark.parametrize("solver", ["boxes", "auto", "both"])
+def test_a_line_that_an_invariant_kills_is_a_mistake(solver: Literal["boxes", "auto", "both"]) -> None:
+    program = compile_text(
+        "state v : bool = true\ninput w : bool\ninvariant up : v\nassume w_up assumed : w\ntable t assuming w_up {\n"
+        "  | line | v ||\n  | l | true ||\n  | m | false ||\n}\n"
+    )
+    assert isinstance(program, Program)
+    found = prove_program(program, Options(solver=solver)).findings
+    assert [(one.code, one.severity) for one in found] == [(Code.DEAD_LINE, Severity.ERROR)]

@@ -21,7 +21,7 @@ from rcsc.project import Loaded
 from rcsc.prove.certificate import must_cover
 from rcsc.prove.obligations import called_by_lines
 from rcsc.prove.options import Options
-from rcsc.prove.verdict import Gap, SolversDisagree, TableVerdict, Undecided
+from rcsc.prove.verdict import DeadLine, Gap, SolversDisagree, TableVerdict, Undecided
 from rcsc.source import Span
 
 WORTH_A_PROCESS = 20_000
@@ -180,5 +180,8 @@ def _said(verdict: TableVerdict) -> Verdict:
     if any(isinstance(one, Undecided | SolversDisagree) for one in verdict.found):
         return Verdict.UNDECIDED
     falls = not must_cover(verdict.table)
-    wrong = any(not (isinstance(one, Gap) and falls) for one in verdict.found)
+    wrong = any(
+        not (isinstance(one, Gap) and falls) and not (isinstance(one, DeadLine) and one.assuming)
+        for one in verdict.found
+    )
     return Verdict.REFUTED if wrong else Verdict.PROVED

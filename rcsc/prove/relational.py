@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from itertools import combinations
 
 from rcsc.interpret import matching_lines
-from rcsc.model import AssumptionName, Program, Read, Snapshot, Table, Value, key_of, value_of_key
+from rcsc.model import AssumptionName, Program, Read, Snapshot, Standing, Table, Value, key_of, value_of_key
 from rcsc.prove.asked import Asked, shown
 from rcsc.prove.atoms import Formula, Universe, assumptions_of, lines_of, some
 from rcsc.prove.certificate import must_cover, tree_certificate
@@ -244,7 +244,10 @@ class _Decision:
         return [Undecided("what no line matches")] if witness is None else [Gap((witness,), (None,))]
 
     def dead(self) -> list[Found]:
-        """Lines that no input matches."""
+        """Lines that no input matches, those that only an assumption excludes told apart from those that ranges and invariants do."""
+        standing = {one.name: one.standing for one in self.program.assumptions}
+        names = zip(self.table.assumptions, self.assumed, strict=True)
+        sure = [formula for name, formula in names if standing[name] is Standing.PROVED]
         found: list[Found] = []
         for at, line in enumerate(self.lines):
             point = find(self.universe, [line, *self.assumed])
@@ -253,7 +256,9 @@ class _Decision:
                 if point is Unsettled.UNKNOWN:
                     answer = self.asked.holds(self.asked.line(at))
                 if answer is Answer.UNSATISFIABLE:
-                    found.append(DeadLine(at))
+                    assuming = len(sure) < len(self.assumed)
+                    assuming = assuming and find(self.universe, [line, *sure]) is not Unsettled.NONE
+                    found.append(DeadLine(at, assuming))
                 elif answer is Answer.UNKNOWN:
                     found.append(Undecided(f"whether line `{self.table.lines[at].name}` can match"))
         return found

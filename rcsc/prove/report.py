@@ -46,12 +46,8 @@ def _others(program: Program, verdict: TableVerdict) -> Iterator[Diagnostic]:
         match one:
             case Gap():
                 yield _gap(program, table, one)
-            case DeadLine(line):
-                name = table.lines[line].name
-                helps = ("delete the line, or correct its conditions",)
-                message = f"line `{name}` of table `{table.name}` can never match"
-                label = Label(table.lines[line].cell_span(-1))
-                yield Diagnostic(Code.DEAD_LINE, message, label, notes=_under(table), help=helps)
+            case DeadLine(line, assuming):
+                yield _dead(table, line, assuming)
             case ContradictoryAssumptions():
                 message = f"the assumptions of table `{table.name}` contradict each other, an invariant or the declared ranges"
                 yield Diagnostic(Code.CONTRADICTORY_ASSUMPTIONS, message, Label(table.span))
@@ -73,6 +69,16 @@ def _others(program: Program, verdict: TableVerdict) -> Iterator[Diagnostic]:
         yield Diagnostic(
             Code.DEFAULT_DEAD, message, label, notes=_under(table), help=helps, severity=Severity.WARNING
         )
+
+
+def _dead(table: Table, line: int, assuming: bool) -> Diagnostic:
+    label = Label(table.lines[line].cell_span(-1))
+    name = f"line `{table.lines[line].name}` of table `{table.name}`"
+    if not assuming:
+        helps = ("delete the line, or correct its conditions",)
+        return Diagnostic(Code.DEAD_LINE, f"{name} can never match", label, help=helps)
+    message = f"{name} matches only where an assumption fails"
+    return Diagnostic(Code.DEAD_LINE, message, label, notes=_under(table), severity=Severity.WARNING)
 
 
 def _under(table: Table) -> tuple[str, ...]:

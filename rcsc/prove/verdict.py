@@ -43,9 +43,14 @@ class Gap:
 
 @dataclass(frozen=True, slots=True)
 class DeadLine:
-    """A line that no input matches (under the assumptions)."""
+    """A line that no input matches.
+
+    Attributes:
+        assuming: Whether that rests on an assumption: where it fails the line may match, so that it is no mistake to write it.
+    """
 
     line: int
+    assuming: bool = False
 
 
 @dataclass(frozen=True, slots=True)
