@@ -20,11 +20,14 @@ from typing import Any
 
 from rcsc import __version__
 from rcsc.files import write_atomically
-from rcsc.files.read import json_of
+from rcsc.files.read import Malformed, content, json_of
 
 FOLDER = ".rcsc-cache"
 MOST_ENTRIES = 4096
-_PROVERS = ("z3", "lark", "numpy", "cvc5", "pysat")
+_PROVERS = {
+    "z3": "z3_solver", "lark": "lark", "numpy": "numpy", "cvc5": "cvc5", "pysat": "python_sat",
+}  # fmt: skip
+"""Packages that a proof goes through, and what they are called where they are installed."""
 _TAG = "Signature: 8a477f597d28d172789f06886806bc55\n# Made by rcsc; see https://bford.info/cachedir/\n"
 
 Json = dict[str, Any]
@@ -48,22 +51,22 @@ class Cache:
         """What was stored under the same parts; None where there is nothing to be believed."""
         key = self._key(parts)
         try:
-            seal, _, content = self._path(key).read_bytes().partition(b"\n")
-        except OSError:
+            seal, _, kept = content(self._path(key)).partition(b"\n")
+            if not hmac.compare_digest(seal, self._seal(key, kept)):
+                return None
+            value = json_of(kept, plain=False)
+        except (OSError, Malformed):
             return None
-        if not hmac.compare_digest(seal, self._seal(key, content)):
-            return None
-        value = json_of(content, plain=False)
         return value if isinstance(value, dict) else None
 
     def store(self, value: Json, *parts: str) -> None:
         """Keep `value` under `parts`: the whole entry or nothing."""
         key = self._key(parts)
-        content = json.dumps(value, separators=(",", ":"), sort_keys=True).encode()
+        said = json.dumps(value, separators=(",", ":"), sort_keys=True).encode()
         path = self._path(key)
         try:
             self._prepare(path.parent)
-            write_atomically(path, self._seal(key, content) + b"\n" + content, durable=False)
+            write_atomically(path, self._seal(key, said) + b"\n" + said, durable=False)
             self._prune()
         except OSError:
             return
@@ -71,8 +74,8 @@ class Cache:
     def _key(self, parts: tuple[str, ...]) -> str:
         return hashlib.sha256(json.dumps([self.tool, *parts]).encode()).hexdigest()
 
-    def _seal(self, key: str, content: bytes) -> bytes:
-        return hmac.new(self.secret, key.encode() + b"\n" + content, "sha256").hexdigest().encode()
+    def _seal(self, key: str, kept: bytes) -> bytes:
+        return hmac.new(self.secret, key.encode() + b"\n" + kept, "sha256").hexdigest().encode()
 
     def _path(self, key: str) -> Path:
         return self.folder / key[:2] / f"{key[2:]}.json"
@@ -118,7 +121,7 @@ def secret_of_user() -> bytes | None:
     path = Path(home) / "rcsc" / "secret"
     try:
         return _secret_at(path)
-    except OSError:
+    except (OSError, Malformed):
         return None
 
 
@@ -126,36 +129,47 @@ def _secret_at(path: Path) -> bytes | None:
     if not path.exists():
         path.parent.mkdir(parents=True, exist_ok=True)
         write_atomically(path, secrets.token_bytes(32), mode=0o600)
-    kept = path.read_bytes()
+    kept = content(path, 1024)
     return kept if len(kept) == 32 else None  # as written above
 
 
 def digest_of_tool() -> str:
-    """Changes with rcsc's version or files, with Python and with each prover's installation."""
+    """Changes with what rcsc is made of, with Python and with each prover that is installed; by content, whatever the times of files."""
     hashed = hashlib.sha256(f"{__version__} {sys.version}".encode())
     package = Path(__file__).parent
-    for name, size, changed in _files(package):
-        hashed.update(f"{name} {size} {changed}\n".encode())
-    for prover in _PROVERS:
-        spec = find_spec(prover)
-        if spec is not None and spec.origin is not None:
-            status = os.stat(spec.origin)  # one call instead of three
-            hashed.update(f"{spec.origin} {status.st_size} {status.st_mtime_ns}\n".encode())
+    for path in sorted(_parts(package)):
+        found = content(Path(path))
+        hashed.update(f"{os.path.relpath(path, package)} {len(found)}\n".encode() + found)
+    for name, found in _provers():
+        hashed.update(f"{name} {len(found)}\n".encode() + found)
     return hashed.hexdigest()
 
 
-def _files(package: Path) -> Iterator[tuple[str, int, int]]:
-    """Name, size and time of change of every file that rcsc is made of, in order."""
+def _parts(package: Path) -> Iterator[str]:
+    """Every file that rcsc is made of."""
     folders = (package, package.parent / "grammar")
-    yield from sorted(file for folder in folders if folder.is_dir() for file in _files_below(str(folder)))
+    for folder in folders:
+        if folder.is_dir():
+            yield from _files_below(str(folder))
 
 
-def _files_below(folder: str) -> Iterator[tuple[str, int, int]]:
+def _files_below(folder: str) -> Iterator[str]:
     """These of one folder and those in it; `os.scandir` asks once for a folder where `Path.rglob` asks for each file."""
     with os.scandir(folder) as entries:
         for entry in entries:
             if entry.name.endswith((".py", ".lark", ".jinja", ".md")):
-                status = entry.stat()
-                yield entry.path, status.st_size, status.st_mtime_ns
+                yield entry.path
             elif entry.name != "__pycache__" and entry.is_dir():
                 yield from _files_below(entry.path)
+
+
+def _provers() -> Iterator[tuple[str, bytes]]:
+    """What each installed prover is: its record, which has the digest of each of its files; of one without a record its first module."""
+    for prover, project in _PROVERS.items():
+        spec = find_spec(prover)
+        if spec is None or spec.origin is None:
+            continue
+        first = Path(spec.origin)
+        records = sorted(first.parent.parent.glob(f"{project}-*.dist-info/RECORD"))
+        for path in records or [first]:
+            yield f"{prover} {path.parent.name}", content(path)

@@ -1,12 +1,14 @@
 """The cache: what was stored comes back; what is in doubt does not; a failure to keep is no failure."""
 
 import os
+import re
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from rcsc import cache as cache_module
+from rcsc import cli
 from rcsc.cache import Cache, digest_of_tool, open_cache
 from rcsc.files import write_atomically
 
@@ -134,3 +136,54 @@ def test_a_symbolic_link_stays_a_link(tmp_path: Path) -> None:
     write_atomically(tmp_path / "link", b"after")
     assert (tmp_path / "link").is_symlink()
     assert (tmp_path / "real").read_text() == "after"
+
+
+def test_the_tools_digest_is_of_contents_not_of_times(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    package = tmp_path / "rcsc"
+    package.mkdir()
+    part = package / "cache.py"
+    part.write_text("old")
+    monkeypatch.setattr(cache_module, "__file__", str(part))
+    before, status = digest_of_tool(), part.stat()
+    part.write_text("new")
+    os.utime(part, ns=(status.st_atime_ns, status.st_mtime_ns))
+    assert digest_of_tool() != before
+    part.write_text("old")
+    os.utime(part, (1, 1))
+    assert digest_of_tool() == before
+
+
+SHADOWS: dict[str, Callable[[Path, Path], object]] = {
+    "a file": lambda place, other: place.write_bytes(other.read_bytes()),
+    "a file that says something else": lambda place, _: place.write_text("enum mode { a }\n"),
+    "an empty file": lambda place, _: place.touch(),
+    "a folder": lambda place, _: place.mkdir(),
+    "a link to the file": lambda place, other: place.symlink_to(other),
+    "a link to nowhere": lambda place, _: place.symlink_to("nowhere"),
+    "a link to a folder": lambda place, _: place.symlink_to(place.parent),
+    "a link to itself": lambda place, _: place.symlink_to(place.name),
+    "a pipe": lambda place, _: os.mkfifo(place),
+}
+
+
+@pytest.mark.parametrize("shadow", SHADOWS)
+def test_whatever_newly_stands_where_a_use_looks_first_is_noticed(
+    shadow: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "home"))
+    (tmp_path / "rcsc.toml").touch()
+    (tmp_path / "words.rcs").write_text("enum mode { a, b }\n")
+    (tmp_path / "in").mkdir()
+    table = "use words\ninput m : mode\noutput o : bool\ntable t {\n| line | m || o |\n| 1 | a || true |\n| 2 | b || false |\n}\n"
+    (tmp_path / "in" / "t.rcs").write_text(table)
+    assert cli.run(["check", "in/t.rcs"]) == 0
+    assert cli.run(["check", "in/t.rcs"]) == 0
+    assert "(earlier run)" in capsys.readouterr().out
+    SHADOWS[shadow](tmp_path / "in" / "words.rcs", tmp_path / "words.rcs")
+    status = cli.run(["check", "in/t.rcs"])
+    said = re.sub(r"[0-9.]+ ms( \(earlier run\))?", "", capsys.readouterr().out)
+    assert cli.run(["check", "in/t.rcs", "--no-cache"]) == status
+    assert re.sub(r"[0-9.]+ ms", "", capsys.readouterr().out) == said

@@ -165,7 +165,8 @@ def test_texts_with_brackets_are_not_taken_for_nesting() -> None:
 
 def test_what_is_no_regular_file_is_not_read(tmp_path: Path) -> None:
     (tmp_path / "large").write_bytes(b"x" * 11)
-    for path in (Path("/dev/zero"), tmp_path / "large"):
+    os.mkfifo(tmp_path / "pipe")
+    for path in (Path("/dev/zero"), tmp_path / "large", tmp_path / "pipe"):
         with pytest.raises(Malformed):
             content(path, 10)
     with pytest.raises(OSError, match="directory"):

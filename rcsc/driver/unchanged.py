@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any
 from rcsc.cache import Cache
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.report import Report
-from rcsc.project import PROJECT_FILE, Loaded, listed
+from rcsc.files.read import Malformed, content
+from rcsc.project import MOST_BYTES, PROJECT_FILE, Loaded, listed
 from rcsc.source import Source
 
 if TYPE_CHECKING:
@@ -62,29 +63,29 @@ def remember(
 
 
 def digests(loaded: Loaded) -> dict[str, str] | None:
-    """Of every file that was read, and that a file is not there where it would have been found; None where one has changed since."""
-    contents = {name: _content(name) for name in _looked_at(loaded)}
+    """What stands at every place that was looked at, those where nothing stands too; None where a file has changed since."""
+    seen = {name: _seen(name) for name in _looked_at(loaded)}
     for name, source in loaded.sources.items():
-        if (contents[name] or b"").decode("utf-8-sig", "replace") != source.text:
+        if (seen[name][1] or b"").decode("utf-8-sig", "replace") != source.text:
             return None  # changed while it was checked
-    return {name: _digest(content) for name, content in contents.items()}
+    return {name: digest for name, (digest, _) in seen.items()}
 
 
 def as_before(looked_at: Mapping[str, str]) -> dict[str, bytes] | None:
-    """The contents of the files, if every one has the digest that it had; those that were not there are not there."""
+    """The contents of the files, if at every place stands what stood there."""
     texts: dict[str, bytes] = {}
     for name, digest in looked_at.items():
-        content = _content(name)
-        if _digest(content) != digest:
+        now, found = _seen(name)
+        if now != digest:
             return None
-        if content is not None:
-            texts[name] = content
+        if found is not None:
+            texts[name] = found
     return texts
 
 
 def digest_at(name: str) -> str:
-    """Of a file as it is now, or that it is not there."""
-    return _digest(_content(name))
+    """What stands at a place now."""
+    return _seen(name)[0]
 
 
 def _key(paths: tuple[str, ...], options: "Options") -> tuple[str, ...]:
@@ -116,12 +117,17 @@ def _uses(loaded: Loaded) -> list[tuple[str, str]]:
     ]
 
 
-def _content(name: str) -> bytes | None:
+def _seen(name: str) -> tuple[str, bytes | None]:
+    """What stands at a place, and what it holds: a file and where it really is, something that is no file, or nothing.
+
+    A `use` goes to the first place where anything stands, be it a folder or a link to nowhere: these are told from an empty place.
+    """
+    if not os.path.lexists(name):
+        return "absent", None
     try:
-        return Path(name).read_bytes()
-    except OSError:
-        return None
-
-
-def _digest(content: bytes | None) -> str:
-    return "absent" if content is None else hashlib.sha256(content).hexdigest()
+        found = content(Path(name), MOST_BYTES)
+    except (OSError, Malformed):
+        return "no file that can be read", None
+    real = os.path.realpath(name)
+    elsewhere = "" if real == os.path.abspath(name) else f" at {real}"
+    return hashlib.sha256(found).hexdigest() + elsewhere, found

@@ -13,7 +13,7 @@ import stat
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any, BinaryIO
 
 from rcsc.files.names import BadName, file_name, identifier, line_name, member, shown
 
@@ -56,16 +56,27 @@ def content(path: Path, most: int = MOST_BYTES) -> bytes:
         OSError: It cannot be read.
         Malformed: It is no regular file, or is too large.
     """
-    with open(path, "rb") as file:
-        about = os.fstat(file.fileno())
-        if not stat.S_ISREG(about.st_mode):
-            raise Malformed("is not a regular file")
-        if about.st_size > most:
+    with opened(path) as file:
+        if os.fstat(file.fileno()).st_size > most:
             raise Malformed(f"has more than {_size(most)}")
         found = file.read(most + 1)
     if len(found) > most:
         raise Malformed(f"has more than {_size(most)}")
     return found
+
+
+def opened(path: Path) -> BinaryIO:
+    """Return a regular file, open for reading; a pipe is not waited for.
+
+    Raises:
+        OSError: It cannot be read.
+        Malformed: It is no regular file.
+    """
+    file = open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK))  # noqa: SIM115  # the caller's
+    if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+        file.close()
+        raise Malformed("is not a regular file")
+    return file
 
 
 def _size(count: int) -> str:

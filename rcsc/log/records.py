@@ -11,6 +11,7 @@ Source: MCAP specification, version 0.
 """
 
 import hashlib
+import os
 import struct
 import zlib
 from collections.abc import Iterator
@@ -25,6 +26,8 @@ from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, Footer, McapRecord, Message, Metadata
 from zstandard import ZstdDecompressor, ZstdError, frame_content_size
+
+from rcsc.files.read import opened
 
 CHAIN, SEAL, DIGEST = "rcsc.chain", "rcsc.seal", "sha256"
 """Names of the metadata records, and of what they hold."""
@@ -140,8 +143,8 @@ def records(path: Path, checked: Checked) -> Iterator[McapRecord]:
     Raises:
         OSError: It cannot be read.
     """
-    with path.open("rb") as file:
-        checked.size = path.stat().st_size
+    with opened(path) as file:
+        checked.size = os.fstat(file.fileno()).st_size
         unpacking = _Unpacking(checked.size)
         waiting: list[McapRecord] = []
         for found in _framed(_Frames(file), checked):
