@@ -1,7 +1,6 @@
 """The levels proved together: a small system of two levels in full, broken in many ways, and the shipped levels."""
 
 import json
-import os
 import re
 import shutil
 from collections.abc import Callable
@@ -294,15 +293,8 @@ NOT_NUMBERED = {
 }
 
 
-EVERY = os.environ.get("RCSC_LEVELS") == "all"
-"""Set by `.ci/run`: the upper levels cost minutes to prove and to confirm."""
-LEVELS = ["primitive", "vision", "gripper", *(["task", "emove"] if EVERY else [])]
-CONFIRMED = LEVELS if EVERY else ["vision", "gripper"]
-
-
-@pytest.mark.timeout(900)  # under load; some twenty seconds for the longest where there is none
-@pytest.mark.parametrize("level", LEVELS)
-def test_the_shipped_levels_are_proved_in_their_environment(level: str) -> None:
+def proved_in_its_environment(level: str, *, confirmed: bool) -> None:
+    """Prove a shipped level, and have cvc5 confirm it where that is wanted."""
     stepper = steppers(SHIPPED)[level]
     proof = prove_level(stepper)
     assert essential(proof) == ()
@@ -313,12 +305,19 @@ def test_the_shipped_levels_are_proved_in_their_environment(level: str) -> None:
     again = {(one.table, one.line, one.leaves) for one in proof.context.repeated}
     assert again <= {("goto", "1", ("length_mm",)), ("gothru", "1", ("length_mm",))}
     assert {one.table for one in proof.endings if not one.proved} == set()
-    if level not in CONFIRMED:
+    if not confirmed:
         return
     questions = certificate(stepper, proof)
     # those about lines take cvc5 longest: `rcsc prove --certify` asks them
     asked = {name: text for name, text in questions.items() if not name.startswith("lines")}
     assert [name for name, text in asked.items() if not cvc5_refutes(text, 120_000_000)] == []
+
+
+@pytest.mark.timeout(900)  # under load
+@pytest.mark.parametrize(("level", "confirmed"), [("primitive", False), ("vision", True), ("gripper", True)])
+def test_the_shipped_levels_are_proved_in_their_environment(level: str, confirmed: bool) -> None:
+    """The upper levels, and the primitive level with cvc5, cost minutes: `python -m tests.test_compose`, as CI does."""
+    proved_in_its_environment(level, confirmed=confirmed)
 
 
 def test_without_deferral_the_published_argument_is_found_in_three_cycles() -> None:
@@ -410,3 +409,8 @@ def test_rcsc_certify_covers_a_system(capsys: pytest.CaptureFixture[str], tmp_pa
 def test_rcsc_prove_refuses_a_level_that_there_is_not(capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["prove", str(SMALL / "system.toml"), "--level", "middle"]) == 2
     assert "there is no level `middle`" in capsys.readouterr().err
+
+
+if __name__ == "__main__":
+    for each in ("task", "emove", "primitive", "vision", "gripper"):
+        proved_in_its_environment(each, confirmed=True)
