@@ -14,7 +14,7 @@ import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import product
+from itertools import islice, product
 from typing import Any
 
 from rcsc.certify import certify
@@ -59,7 +59,7 @@ from rcsc.prove.program import prove_program
 from rcsc.resolve import compile_text
 
 OPTIONS = Options(solver="boxes")
-MOST_STATES = 1_500
+MOST_STATES = 1_000
 
 # --- what is true ----------------------------------------------------------------------
 
@@ -328,6 +328,8 @@ class _Text:
     rng: random.Random
     ints: dict[str, tuple[int, int]] = field(default_factory=dict)
     kept: list[str] = field(default_factory=list)
+    first: dict[str, int] = field(default_factory=dict)
+    states: int = 12
     procedures: list[str] = field(default_factory=list)
 
     def program(self) -> str:
@@ -336,15 +338,18 @@ class _Text:
         for name in ("a", "b"):
             low = rng.choice((-1, 0, 0, 1))
             self.ints[name] = low, low + rng.randint(1, 3)
+            self.states *= self.ints[name][1] - low + 1
             lines.append(f"input {name} : int {low} .. {self.ints[name][1]} {rng.choice(('', 'clamp'))}")
         for name in ("s", "t")[: rng.randint(1, 2)]:
             high = rng.randint(1, 4)
             self.ints[name] = 0, high
             self.kept.append(name)
             until = " deferred until far" if name == "t" and high < 3 and rng.random() < 0.3 else ""
-            lines.append(f"state {name} : int 0 .. {high} = {rng.randint(0, high)}{until}")
+            self.first[name] = rng.randint(0, high)
+            self.states *= (high + 1) ** (2 if until else 1)
+            lines.append(f"state {name} : int 0 .. {high} = {self.first[name]}{until}")
         lines.append("output o : bool")
-        if rng.random() < 0.25:
+        if rng.random() < 0.25 and self.states * 4 <= MOST_STATES:
             lines.append("state k : array[2] of int 0 .. 1")
             self.ints["k"] = 0, 1
         invariants = self.invariants()
@@ -365,9 +370,13 @@ class _Text:
         rng, found = self.rng, []
         if rng.random() < 0.5:
             name = rng.choice(self.kept)
-            found.append(f"invariant bound : {name} <= {rng.randint(0, self.ints[name][1])}")
+            found.append(f"invariant bound : {name} <= {rng.randint(self.first[name], self.ints[name][1])}")
         if len(self.kept) == 2 and rng.random() < 0.4:
-            found.append(f"invariant pair : {rng.choice(('s <= t', 't <= s', 's + t <= 4', 's + t = 2'))}")
+            s, t = self.first["s"], self.first["t"]
+            order = "s <= t" if s <= t else "t <= s"
+            found.append(
+                f"invariant pair : {rng.choice((order, f's + t <= {s + t + 1}', f's + t = {s + t}'))}"
+            )
         return found
 
     def assumptions(self) -> list[str]:
@@ -487,7 +496,11 @@ class _Text:
 
 def random_text(rng: random.Random) -> str:
     """A program of few values, often right."""
-    return _Text(rng).program()
+    while True:
+        writing = _Text(rng)
+        text = writing.program()
+        if writing.states <= MOST_STATES:
+            return text
 
 
 def small(program: object) -> Program | None:
@@ -609,28 +622,104 @@ def _instead(rng: random.Random, token: str) -> str | None:
     return None
 
 
+def altered(rng: random.Random, program: Program) -> Program:
+    """The program with something else in it that types do not depend on: quicker than another text, and often right."""
+    at = rng.randrange(len(program.tables))
+    table = program.tables[at]
+    lines = list(table.lines)
+    one = rng.randrange(len(lines))
+    match rng.randrange(9):
+        case 0:
+            rng.shuffle(lines)
+        case 1:
+            kept = tuple(action for action in lines[one].actions if rng.random() < 0.5)
+            lines[one] = replace(lines[one], actions=kept)
+        case 2:
+            lines[one] = replace(lines[one], actions=rng.choice(lines).actions)
+        case 3:
+            column = rng.randrange(len(table.columns))
+            tests = list(lines[one].tests)
+            tests[column] = rng.choice([None, *(line.tests[column] for line in lines)])
+            lines[one] = replace(lines[one], tests=tuple(tests))
+        case 4:
+            names = tuple(name for name in table.assumptions if rng.random() < 0.5)
+            table = replace(table, assumptions=names)
+        case 5:
+            standings = list(Standing)
+            some = tuple(replace(each, standing=rng.choice(standings)) for each in program.assumptions)
+            return replace(program, assumptions=some)
+        case 6:
+            leaf = rng.randrange(len(program.variables))
+            variables = list(program.variables)
+            initial_ = rng.choice(values(variables[leaf].type))
+            variables[leaf] = replace(variables[leaf], initial=initial_)
+            return replace(program, variables=tuple(variables))
+        case 7:
+            return replace(
+                program, invariants=program.invariants[: rng.randrange(len(program.invariants) + 1)]
+            )
+        case _:
+            procedures = tuple(replace(each, body=_shorn(rng, each.body)) for each in program.procedures)
+            return replace(program, procedures=procedures)
+    tables = list(program.tables)
+    tables[at] = replace(table, lines=tuple(lines))
+    return replace(program, tables=tuple(tables))
+
+
+def _shorn(rng: random.Random, body: tuple[Statement, ...]) -> tuple[Statement, ...]:
+    """The statements, some of them, or some of their guards, taken out."""
+    found: list[Statement] = []
+    for one in body:
+        chance = rng.random()
+        if isinstance(one, If) and chance < 0.3:
+            found += one.then
+        elif isinstance(one, If) and chance < 0.4:
+            found.append(replace(one, then=one.orelse, orelse=one.then))
+        elif chance < 0.9:
+            found.append(one)
+    return tuple(found)
+
+
 # --- runs ------------------------------------------------------------------------------
+
+
+VARIANTS = 6
+"""Programs tried of each text."""
 
 
 @dataclass(frozen=True, slots=True)
 class Proved:
-    """A program that the prover proves, and its certificate."""
+    """A program that the prover proves, and its certificate.
+
+    Attributes:
+        text: Of the program that this one is, or is made of.
+    """
 
     text: str
     program: Program
     certificate: dict[str, Any]
 
 
-def proved(rng: random.Random) -> Proved:
-    """The next random program that proves."""
+def all_proved(rng: random.Random) -> Iterator[Proved]:
+    """Random programs that prove, without end."""
     while True:
         text = random_text(rng)
         program = small(compile_text(text))
-        if program is None:
+        made = None if program is None else _proved(text, program)
+        if made is None:
             continue
-        certificate = prove_program(program, OPTIONS).certificate
-        if certificate is not None:
-            return Proved(text, program, json.loads(json.dumps(certificate)))
+        yield made
+        seen = {digest(made.program)}
+        for _ in range(VARIANTS):
+            other = altered(rng, made.program)
+            if digest(other) not in seen and (found := _proved(text, other)) is not None:
+                yield found
+            seen.add(digest(other))
+
+
+def _proved(text: str, program: Program) -> Proved | None:
+    certificate = prove_program(program, OPTIONS).certificate
+    return None if certificate is None else Proved(text, program, json.loads(json.dumps(certificate)))
 
 
 @dataclass(slots=True)
@@ -648,12 +737,15 @@ class Attack:
 
     def run(self, count: int, tell: Callable[[str], None] = lambda _: None) -> None:
         """Checks `count` true certificates and `count` false or doubtful ones."""
-        before = proved(self.rng)
-        for number in range(count):
-            one = proved(self.rng)
+        programs = all_proved(self.rng)
+        before, told = next(programs), 0
+        for number, one in enumerate(islice(programs, count)):
             self.true(one)
             (self.edited if number % 2 else self.damaged)(one, before)
             before = one
+            for failure in self.failures[told:]:
+                tell(failure)
+            told = len(self.failures)
             if not number % 500:
                 tell(f"{number}: {dict(self.counts)}, {len(self.failures)} failures")
 
@@ -670,25 +762,24 @@ class Attack:
         if self.counts["true"] % 10 == 1 and (why := wrong_with(stopping(one.program, one.certificate))):
             self.fail(f"proved and certified, but: {why}", one.text, one.certificate)
 
+    def another(self, one: Proved) -> tuple[Program, str]:
+        """An edited program that says something else."""
+        while True:
+            by_text = self.rng.random() < 0.3
+            text = edit(self.rng, one.text) if by_text else one.text
+            program = small(compile_text(text)) if by_text else altered(self.rng, one.program)
+            if program is not None and digest(program) != digest(one.program):
+                return program, text
+
     def edited(self, one: Proved, other: Proved) -> None:
         """Another text under the certificate, or under another program's."""
-        for _ in range(100):
-            text = edit(self.rng, one.text)
-            program = small(compile_text(text))
-            if program is not None and digest(program) != digest(one.program):
-                break
-        else:
-            return
+        program, text = self.another(one)
         kept = other.certificate if self.rng.random() < 0.1 else one.certificate
         self.judge("edited", program, signed(program, kept) if self.rng.random() < 0.9 else kept, text)
 
     def damaged(self, one: Proved, other: Proved) -> None:
         """The certificate with something changed, of its program or of an edited one."""
-        program, text = one.program, one.text
-        if self.rng.random() < 0.5:
-            text = edit(self.rng, text)
-            program = small(compile_text(text)) or one.program
-            text = text if program is not one.program else one.text
+        program, text = self.another(one) if self.rng.random() < 0.5 else (one.program, one.text)
         made = damage(self.rng, one.certificate, other.certificate)
         self.judge("damaged", program, signed(program, made) if self.rng.random() < 0.9 else made, text)
 
@@ -714,7 +805,6 @@ def main() -> int:
     given = parser.parse_args()
     attack = Attack(random.Random(given.seed))
     attack.run(given.count, lambda text: print(text, flush=True))
-    print("\n\n".join(attack.failures[:5]))
     print(f"{dict(attack.counts)}, {len(attack.failures)} failures")
     return 1 if attack.failures else 0
 
