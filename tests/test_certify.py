@@ -5,15 +5,21 @@ import copy
 import json
 import random
 from dataclasses import fields, is_dataclass, replace
+from math import isnan
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from rcsc.certify import Answer, certify, check_certificate
-from rcsc.interpret import matching_lines
+from rcsc.certify.known import Known
+from rcsc.certify.run import Run, Start
+from rcsc.certify.settle import script, values_in
+from rcsc.certify.values import parts_first
+from rcsc.interpret import evaluate, matching_lines
 from rcsc.meaning import digest
 from rcsc.model import Program, Table
 from rcsc.prove.options import Options
@@ -373,6 +379,24 @@ def test_what_is_not_checked_is_named_and_no_part_of_what_is() -> None:
     assert certify(program, certificate, lambda _: Answer.SOME).problems
 
 
+def test_what_rests_on_an_obligation_that_is_not_checked_is_not_checked() -> None:
+    text = (
+        "input n : int 0 .. 1000000\ninput m : int 0 .. 1000000\nstate s : int 0 .. 1000000\n"
+        "state u : int 1 .. 1000001\nprocedure p { if m <= n { s := n - m; u := s + 1 } }\n"
+        "table t {\n| line | n ||\n| one | < 4 ||\n| two | >= 4 ||\n}\n"
+    )
+    program = program_of(text)
+    certificate = certificate_of(program)
+    left = {one.name for one in certify(program, certificate).unchecked}
+    assert left == {
+        "procedure `p`: `s` stays in 0 .. 1000000",
+        "procedure `p`: an operand stays in its 64 bits",
+        "procedure `p`: the result of `+` stays in its 64 bits",
+        "procedure `p`: `u` stays in 1 .. 1000001",
+    }
+    assert certify(program, certificate, by_cvc5).whole
+
+
 def test_the_digest_is_of_every_field_that_equality_looks_at(owing: tuple[Program, dict[str, Any]]) -> None:
     program, seen = owing[0], set[tuple[str, str]]()
 
@@ -458,3 +482,114 @@ def test_the_judge_of_the_attacks_counts_lines() -> None:
     text = "input a : int 0 .. 3\ntable t {{\n| line | a ||\n| one | < 2 ||\n| two | {} ||\n}}\n"
     said = {cell: wrong_with(program_of(text.format(cell))) for cell in (">= 2", "> 2", ">= 1")}
     assert said == {">= 2": "", "> 2": "0 lines of t", ">= 1": "2 lines of t"}
+
+
+# --- the checker's arithmetic --------------------------------------------------------------
+
+WIDE = (
+    "input c : int -9223372036854775808 .. 9223372036854775807\ninput u : int 0 .. 18446744073709551615\n"
+    "input a : int -7 .. 9\ninput x : real -1.5 .. 2.5\ninput y : real 0.0 .. 1e300\ninput z : real -1e-310 .. 3.0\n"
+)
+NUMBERS = [
+    "a + c", "a - c", "a * c", "c * c", "-c", "abs(c)", "c / a", "a / c", "c mod a", "a mod c", "min(a, c)",
+    "max(c, a)", "u - 1", "u / 3", "u mod 7", "int(x)", "int(y)", "int(x * 1e30)", "min(a, 3) * abs(a - 4)",
+    "int(real(c))", "int(z / x)",
+]  # fmt: skip
+DOUBLES = [
+    "x + y", "x - y", "y * y", "x * z", "x / z", "z / x", "y / y", "-x", "abs(z)", "min(x, y)", "max(x, z)",
+    "min(x / z, y)", "max(y, x / z)", "min(y * y - y * y, x)", "max(x, y * y - y * y)", "real(c)", "real(u)",
+    "real(a) / 3.0", "x * 0.1 + z",
+]  # fmt: skip
+
+
+def points(program: Program) -> list[dict[str, Any]]:
+    """Ends, zeros and some values between, in many combinations."""
+    drawn = random.Random(7)  # noqa: S311 - the same points in every run
+    found = []
+    for _ in range(60):
+        point: dict[str, Any] = {}
+        for leaf in program.variables:
+            low, high = leaf.type.low, leaf.type.high  # type: ignore[union-attr]  # numbers only
+            near = [0, 1, -1, 2, 0.5, 1e-310, -1e-310, 1e200, 3, 2**53 + 1, 2**63, drawn.uniform(-2, 3)]
+            some = [
+                low,
+                high,
+                *(kind(each) for each in near for kind in [type(low)] if low <= kind(each) <= high),
+            ]
+            point[leaf.name] = drawn.choice(some)
+        found.append(point)
+    return found
+
+
+def expression(program: Program) -> Any:
+    """What the program's procedure assigns."""
+    [statement] = program.procedures[0].body
+    return statement.value  # type: ignore[union-attr]  # an assignment
+
+
+@pytest.mark.parametrize("text", [*NUMBERS, *DOUBLES])
+def test_values_spans_and_questions_are_the_interpreters(text: str) -> None:
+    whole = text in NUMBERS
+    kind = "int -9223372036854775808 .. 9223372036854775807" if whole else "real -1e308 .. 1e308"
+    program = program_of(f"{WIDE}state s : {kind}\nprocedure p {{ s := {text} }}\n")
+    start = Start(program)
+    run = Run(start, "p")
+    term = run.evaluate(expression(program))
+    owed = start.terms.every(start.terms.follows(one.path, one.good) for one in run.owed)
+    span = Known((), ()).span(term)
+    asked = 0
+    for point in points(program):
+        cases = {
+            start.leaves[n]: np.array([v], dtype=object if type(v) is int else float)
+            for n, v in point.items()
+        }
+        if not values_in(owed, cases, 1)[0]:
+            continue
+        expected = evaluate(expression(program), point)
+        found, nothing = values_in(term, cases, 1)[0], isinstance(expected, float) and isnan(expected)
+        assert found == expected or (nothing and isnan(found)), point
+        if not nothing:
+            assert span is None or span[0] <= expected <= span[1], point
+        else:
+            assert span is None, point
+        if asked < 3 and not nothing:
+            asked += 1
+            fixed = [
+                start.terms.make("=", leaf, start.terms.constant(leaf.sort, point[leaf.name]))
+                for leaf in cases
+            ]
+            other = start.terms.negation(
+                start.terms.make("=", term, start.terms.constant(term.sort, expected))
+            )
+            assert cvc5_says(script([*fixed, other])) == "unsat", point
+    assert asked == 3 or text in {"c * c", "a * c"}
+
+
+TOLD = [
+    "a < 3", "not (a < 3)", "c > a", "not (c <= a and a > 2)", "a in {1, 4} or a = 2", "not (a in {-7, 9})", "a = c",
+    "a /= -7", "c >= a and a >= 5", "x < y", "not (x < y)", "not (y * y - y * y < 1.0)",
+    "y * y - y * y < 1.0 or a > 3", "not (y * y - y * y >= 0.0)", "x / z > 1.0", "x = z",
+    "not (x <= 0.0) and x < 1.0", "a > 3 implies c = 7", "(a < 0) = (x < 0.0)", "min(a, c) > 2",
+    "max(x, y * y - y * y) < 2.0",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("condition", TOLD)
+def test_what_a_condition_tells_of_spans_is_so_wherever_it_holds(condition: str) -> None:
+    program = program_of(f"{WIDE}assume here assumed : {condition}\n")
+    start = Start(program)
+    known = [start.condition(program.assumptions[0].condition)]
+    spans, everything = Known(known, ()), parts_first(*known)
+    assert not spans.impossible
+    holding = 0
+    for point in points(program):
+        cases = {
+            start.leaves[n]: np.array([v], dtype=object if type(v) is int else float)
+            for n, v in point.items()
+        }
+        if values_in(known[0], cases, 1)[0]:
+            holding += 1
+            for term in everything:
+                value, span = values_in(term, cases, 1)[0], spans.span(term)
+                assert span is None or span[0] <= value <= span[1], (term, value, span)
+    assert holding

@@ -226,11 +226,10 @@ def _edges(term: Term) -> Mapping[str, list[Number]]:
 def _where(condition: Term, cases: Cases) -> Any:
     """Numbers of the cases in which the condition is true; None where numpy's doubles cannot say."""
     count = max((len(column) for column in cases.values()), default=1)
-    with np.errstate(all="ignore"):
-        try:
-            return np.flatnonzero(values_in(condition, cases, count))
-        except OverflowError:
-            return None
+    try:
+        return np.flatnonzero(values_in(condition, cases, count))
+    except OverflowError:
+        return None
 
 
 def values_in(wanted: Term, cases: Cases, count: int) -> Any:
@@ -252,7 +251,8 @@ def values_in(wanted: Term, cases: Cases, count: int) -> Any:
             column = cases[part].astype(object) if wide and part.sort == INT else cases[part]
             column = column.astype(np.int64) if not wide and part.sort == INT else column
         else:
-            column = _computed(part, [found[arg] for arg in part.args], wide)
+            with np.errstate(all="ignore"):  # infinities and NaN are values
+                column = _computed(part, [found[arg] for arg in part.args], wide)
         found[part] = column
     return found[wanted].astype(bool) if wanted.sort == BOOL else found[wanted]
 
