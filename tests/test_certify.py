@@ -425,7 +425,7 @@ def test_the_digest_is_of_every_field_that_equality_looks_at(owing: tuple[Progra
     assert digest(replace(program, file="elsewhere.rcs")) == digest(program)
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_attacks_on_random_programs_fail(seed: int) -> None:
     attack = Attack(random.Random(seed))  # noqa: S311 - the same attacks in every run
     attack.run(5)
