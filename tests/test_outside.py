@@ -22,16 +22,21 @@ import zstandard
 from mcap.writer import Writer
 
 from rcsc.cli import run
+from rcsc.compose.frozen import BadCaseError, read_case
+from rcsc.diff import forms
 from rcsc.emit.write import write
 from rcsc.files import csv_text
 from rcsc.files.names import BadName, identifier, inside, within
 from rcsc.files.read import Malformed, Said, content, json_of, toml_of, xml_of
+from rcsc.graph.drawing import svg
+from rcsc.graph.model import Edge, StateGraph
 from rcsc.log.read import UnreadableLog, read
 from rcsc.log.records import MOST_CHUNK, Checked, Seal, records
 from rcsc.log.write import Recorder
 from rcsc.system.cell import System, assemble
 from rcsc.system.description import BadDescription, description
 from rcsc.system.signature import signature
+from sim.pictures.page import quoted
 from tests.emitted import emitted, shipped
 
 REPO = Path(__file__).parents[1]
@@ -630,6 +635,25 @@ def test_no_log_unpacks_to_more_than_its_size_allows(
     assert "RCS701" in "".join(capsys.readouterr())
 
 
+CASE = {
+    "format": 1, "system": "system.toml", "variants": [], "expect": "kept",
+    "goal": {"level": "walker", "what": "gap", "table": "walk", "name": "", "lines": []}, "start": {}, "ticks": [],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "system", ["/etc/passwd", "../../../../etc/system.toml", "a\x1b[2J", 5, None, ["x"], "out/system.toml"]
+)
+def test_a_frozen_case_stays_in_its_project(
+    system: object, project: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "out").symlink_to(project)
+    (tmp_path / "case.json").write_text(json.dumps(CASE | {"system": system}), encoding="utf-8")
+    with pytest.raises(BadCaseError):
+        read_case(tmp_path / "case.json")
+
+
 # --- symbol files ------------------------------------------------------------------------------
 
 SYMBOLS = [
@@ -820,3 +844,46 @@ def test_no_text_of_a_csv_file_is_a_formula() -> None:
     )
     assert [one[:1] for one in rows[0]] == ["'"] * len(FORMULAS)
     assert rows[1] == ["a,b", 'c"d', "e\nf", "-1", "-1.5", "", "a=1"]
+
+
+HOSTILE_TEXTS = ["a|b", "<script>alert(1)</script>", "<img src=x onerror=y>", "[a](javascript:b)", "![a](http://b)", "a\nb|c", "`a|b`",
+                 "``", "`", "&lt;", "\x1b[2J", "a\u202eb", "</details>", "\\", "\\|", "a\r\n# b", "{{ x }}",
+                 "]]>", "'\"><svg onload=x>"]  # fmt: skip
+
+
+@pytest.mark.parametrize("text", HOSTILE_TEXTS, ids=repr)
+def test_no_text_ends_a_cell_of_markdown_or_marks_anything_up(text: str) -> None:
+    for said in (forms._cell(text), forms._code(text)):
+        assert "\n" not in said
+        assert said.isprintable()
+        assert re.search(r"(?<!\\)(?:\\\\)*\|", said) is None
+        assert said.count("`") % 2 == 0
+    assert "<" not in forms._cell(text)
+    assert "](" not in forms._cell(text)
+
+
+@pytest.mark.parametrize("text", HOSTILE_TEXTS, ids=repr)
+def test_no_text_becomes_markup_in_a_page_or_a_drawing(text: str) -> None:
+    shown = str(quoted(text))
+    assert re.sub(r"</?code>", "", shown).count("<") == 0
+    edge = Edge(text, text, text, text, text, text, shown=text)
+    graph = StateGraph(text, text, (edge,), initial=text, states=(text, "b"))
+    plain = re.sub(r"[\x00-\x08\x0b-\x1f]", "", svg(graph))
+    root = xml_of(plain)
+    known = {
+        "svg",
+        "style",
+        "text",
+        "g",
+        "path",
+        "title",
+        "rect",
+        "circle",
+        "line",
+        "tspan",
+        "polygon",
+        "ellipse",
+        "marker",
+        "defs",
+    }
+    assert {one.tag.rpartition("}")[2] for one in root.iter()} <= known

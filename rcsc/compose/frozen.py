@@ -24,9 +24,11 @@ from rcsc.compose.together import broken_in, exchange
 from rcsc.compose.trace import Step, broken, one_cycle
 from rcsc.compose.transition import Stepper
 from rcsc.compose.variants import VARIANTS
+from rcsc.files.names import shown
 from rcsc.files.read import content, json_of
 from rcsc.interpret import initial
 from rcsc.model import Bool, Enum, Kind, Program, Real, Scalar, Value, key_bounds, key_of, spell
+from rcsc.project import project_root
 from rcsc.prove import values
 from rcsc.system.description import BadDescription
 
@@ -129,21 +131,66 @@ def read_case(path: Path) -> Case:
         if said["format"] != FORMAT:
             raise BadCaseError(f"`{path}` has format {said['format']}, not {FORMAT}")
         about = said["goal"]
-        sort, lines = Sort[about["what"].upper()], tuple(about["lines"])
+        level, table, name = _texts([about[key] for key in ("level", "table", "name")])
+        sort, lines = Sort[about["what"].upper()], _texts(about["lines"])
         return Case(
-            path.parent / said["system"],
-            tuple(said["variants"]),
-            about["level"],
-            Goal(sort, about["table"], about["name"], values.TRUE, lines),
-            said["start"],
-            tuple(said["ticks"]),
+            _system(path, said["system"]),
+            _texts(said["variants"]),
+            level,
+            Goal(sort, table, name, values.TRUE, lines),
+            _leaves(said["start"]),
+            tuple(map(_leaves, said["ticks"])),
             {"broken": True, "kept": False}[said["expect"]],
-            tuple(said.get("answers", ())),
+            tuple(map(_answered, said.get("answers", ()))),
         )
     except OSError as error:
         raise BadCaseError(f"`{path}` cannot be read: {error.strerror}") from error
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise BadCaseError(f"`{path}` is no frozen finding: {error}") from error
+
+
+def _texts(said: object) -> tuple[str, ...]:
+    """A list of texts; a ValueError for anything else."""
+    if not isinstance(said, list) or not all(isinstance(one, str) for one in said):
+        raise ValueError("a list holds something else than texts")
+    return tuple(said)
+
+
+def _leaves(said: object) -> dict[str, dict[str, str]]:
+    """For each level the texts of leaves; a ValueError for anything else."""
+    if not isinstance(said, dict) or not all(isinstance(one, dict) for one in said.values()):
+        raise ValueError("a tick is no table of levels")
+    return {
+        level: dict(zip(leaves, _texts(list(leaves.values())), strict=True)) for level, leaves in said.items()
+    }
+
+
+def _answered(said: object) -> dict[str, list[tuple[str, list[Any]]]]:
+    """For each level the extern procedures that are called in a tick, with what they give; a ValueError for anything else."""
+    if not isinstance(said, dict):
+        raise ValueError("the answers of a tick are no table of levels")
+    found: dict[str, list[tuple[str, list[Any]]]] = {}
+    for level, several in said.items():
+        for procedure, given in several:
+            if not isinstance(procedure, str) or not isinstance(given, list):
+                raise ValueError("an answer is no procedure and what it gives")
+            found.setdefault(level, []).append((procedure, given))
+    return found
+
+
+def _system(case: Path, named: object) -> Path:
+    """The description that a case is about: in the project of the case, or in the folder where rcsc runs.
+
+    Raises:
+        ValueError: It leads elsewhere.
+    """
+    if not isinstance(named, str) or os.path.isabs(named) or not named.isprintable():
+        raise ValueError(f"{shown(named)} is no relative path")
+    found = (case.parent / named).resolve()
+    trusted = (Path.cwd(), Path(project_root(str(case))).resolve())
+    if not any(found.is_relative_to(folder) for folder in trusted):
+        raise ValueError(f"the system {shown(named)} is outside this project")
+    return case.parent / named
 
 
 def case_breaks(case: Case) -> bool:

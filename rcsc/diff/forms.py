@@ -238,8 +238,13 @@ def _traced(traces: Traces) -> Iterator[Row]:
 
 def markdown(found: Difference) -> str:
     """As a review comment: a summary, a table for each table that changed, and details to open."""
-    lines = [f"### rcsc diff: {headline(found)}", "", f"`{found.before}` → `{found.after}`", ""]
-    lines += [f"- {said}" for said in found.said] + ([""] if found.said else [])
+    lines = [
+        f"### rcsc diff: {_cell(headline(found))}",
+        "",
+        f"{_code(found.before)} → {_code(found.after)}",
+        "",
+    ]
+    lines += [f"- {_cell(said)}" for said in found.said] + ([""] if found.said else [])
     for program in found.programs:
         if program.changed or program.undecided or any(_shown(part) for part in program.parts):
             lines += _program_marked(program)
@@ -247,9 +252,9 @@ def markdown(found: Difference) -> str:
 
 
 def _program_marked(program: ProgramDifference) -> Iterator[str]:
-    yield from (f"#### `{program.name}`", "")
+    yield from (f"#### {_code(program.name)}", "")
     if program.undecided:
-        yield from (f"**Not decided: {', '.join(program.undecided)}. Nothing is proved of it.**", "")
+        yield from (f"**Not decided: {_cell(', '.join(program.undecided))}. Nothing is proved of it.**", "")
     if program.declarations:
         yield from ("| declared | before | after |", "|---|---|---|")
         yield from (
@@ -268,14 +273,14 @@ def _program_marked(program: ProgramDifference) -> Iterator[str]:
 
 def _part_marked(part: Part) -> Iterator[str]:
     said = f": {_cell(', '.join(part.said))}" if part.said else ""
-    yield from (f"**{part.what} `{part.name}`**{said}", "")
+    yield from (f"**{_cell(part.what)} {_code(part.name)}**{said}", "")
     if part.changes:
         yield from ("| before → after | where | what is left otherwise | inputs |", "|---|---|---|---|")
         for change in part.changes:
             yield _row(part, change)
         yield ""
     if part.basis is not None and not (part.said and not part.changes):
-        yield from (f"{proof(part)[0].upper()}{proof(part)[1:]}.", "")
+        yield from (f"{_cell(proof(part)[0].upper() + proof(part)[1:])}.", "")
     details = [line for change in (*part.changes, *part.moved) for line in _details(part, change)]
     if details:
         moved = (
@@ -297,7 +302,7 @@ def _part_marked(part: Part) -> Iterator[str]:
 def _row(part: Part, change: Change) -> str:
     where = "<br>".join(_cell(box) for box in _boxes(change.where))
     besides = _besides(change.where)
-    left = "<br>".join(f"`{value.leaf or 'the run'}`: {_cell(_left(value))}" for value in change.values)
+    left = "<br>".join(f"{_code(value.leaf or 'the run')}: {_cell(_left(value))}" for value in change.values)
     note = "" if change.relied_on else " (outside the assumptions)"
     cells = (
         _cell(_title(part, change)),
@@ -309,13 +314,15 @@ def _row(part: Part, change: Change) -> str:
 
 
 def _details(part: Part, change: Change) -> Iterator[str]:
-    title = _title(part, change)
+    title = _cell(_title(part, change))
     if change.sort is Sort.LINE:
-        yield f"- {title}: {'; '.join(_boxes(change.where))} {_besides(change.where)}".rstrip()
+        said = f"{'; '.join(_boxes(change.where))} {_besides(change.where)}"
+        yield f"- {title}: {_cell(said)}".rstrip()
     elif change.witness:
-        yield f"- {title}: {', '.join(f'{name} = {value}' for name, value in change.witness)}"
+        said = ", ".join(f"{name} = {value}" for name, value in change.witness)
+        yield f"- {title}: {_cell(said)}"
     yield from (
-        f"  - `{value.leaf}`: {value.at[0]} → {value.at[1]}"
+        f"  - {_code(value.leaf)}: {_cell(str(value.at[0]))} → {_cell(str(value.at[1]))}"
         for value in change.values
         if value.leaf and all(value.at)
     )
@@ -326,25 +333,42 @@ def _traces_marked(traces: Traces) -> Iterator[str]:
         if not steps:
             continue
         shown, more = _steps(steps)
-        yield from (f"**level `{traces.level}`**: {_count(len(steps), 'step')} {word}", "")
+        yield from (f"**level {_code(traces.level)}**: {_count(len(steps), 'step')} {word}", "")
         yield from ("| step | by | shortest trace |", "|---|---|---|")
         for step in shown:
-            yield f"| {step.variable}: {step.before} → {step.after} | {_cell(', '.join(step.by))} | {_cell(_trace(step))} |"
+            said = f"{step.variable}: {step.before} → {step.after}"
+            yield f"| {_cell(said)} | {_cell(', '.join(step.by))} | {_cell(_trace(step))} |"
         if more:
             yield f"| and {more} more | | |"
         yield ""
 
 
 def _follows_marked(follows: Follows) -> Iterator[str]:
-    where = f"**table `{follows.table}`** of level `{follows.level}`"
+    where = f"**table {_code(follows.table)}** of level {_code(follows.level)}"
     if not follows.decided:
         yield from (f"{where}: which line can follow which was not decided", "")
     for word, pairs in (("newly possible", follows.new), ("no longer possible", follows.gone)):
         if pairs:
             yield f"{where}: {_count(len(pairs), 'step')} from line to line {word}"
-            yield from ("", *(f"- {line} → {', '.join(then)}" for line, then in _by_line(pairs).items()), "")
+            yield from (
+                "",
+                *(f"- {_cell(line)} → {_cell(', '.join(then))}" for line, then in _by_line(pairs).items()),
+                "",
+            )
+
+
+_MARKS = (("\\", "\\\\"), ("&", "&amp;"), ("<", "&lt;"), ("|", "\\|"), ("](", "]\\("))
 
 
 def _cell(text: str) -> str:
-    """Text that ends no cell and marks nothing up."""
-    return text.replace("|", "\\|").replace("<", "&lt;").replace("\n", " ")
+    """Text that ends no cell, marks nothing up, leads nowhere and shows all that it holds; names in pairs of backticks stay set apart."""
+    plain = escape(text.replace("\n", " "))
+    for mark, said in _MARKS:
+        plain = plain.replace(mark, said)
+    return plain if plain.count("`") % 2 == 0 else plain.replace("`", "'")
+
+
+def _code(name: str) -> str:
+    """A name set apart, which cannot end that itself."""
+    plain = escape(name).replace("`", "'").replace("|", "/")
+    return f"`{plain}`"
