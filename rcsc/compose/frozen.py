@@ -166,14 +166,14 @@ def _leaves(said: object) -> dict[str, dict[str, str]]:
 
 
 def _answered(said: object) -> dict[str, list[tuple[str, list[Any]]]]:
-    """For each level the extern procedures that are called in a tick, with what they give; a ValueError for anything else."""
+    """For each level the extern procedures that are called in a tick, with what they give; a TypeError for anything else."""
     if not isinstance(said, dict):
-        raise ValueError("the answers of a tick are no table of levels")
+        raise TypeError("the answers of a tick are no table of levels")
     found: dict[str, list[tuple[str, list[Any]]]] = {}
     for level, several in said.items():
         for procedure, given in several:
             if not isinstance(procedure, str) or not isinstance(given, list):
-                raise ValueError("an answer is no procedure and what it gives")
+                raise TypeError("an answer is no procedure and what it gives")
             found.setdefault(level, []).append((procedure, given))
     return found
 
