@@ -20,6 +20,7 @@ from rcsc.compose.keyed import Keyed
 from rcsc.compose.measured import Measured
 from rcsc.compose.sat import Sat
 from rcsc.diagnostics.codes import Code
+from rcsc.diff.words import said
 from rcsc.emit.c99 import helper
 from rcsc.emit.ctext import CText, wide_type
 from rcsc.emit.names import names_of
@@ -396,20 +397,24 @@ def c_program() -> str:
         for who, body, types in (("c", wide, wide_type), ("r", reference, c_type)):
             params = ", ".join(f"{types(case.kind)} v_{name}" for name in ("a", "b")[: case.many])
             functions.append(f"static {c_word(case.made)} {who}_{at}({params}) {{ return {body}; }}")
-        for operands, _ in ROWS[case]:
-            given = ", ".join(c_constant(case.kind, value) for value in operands)
-            calls.append(f"show_{c_word(case.made)}(c_{at}({given}), r_{at}({given}));")
+        rows = ", ".join(
+            "{" + ", ".join(c_bits(case.kind, v) for v in operands) + "}" for operands, _ in ROWS[case]
+        )
+        size = f"[{len(ROWS[case])}][{case.many}]"
+        given = ", ".join(c_value(case.kind, f"rows_{at}[i][{one}]") for one in range(case.many))
+        functions.append(f"static const uint64_t rows_{at}{size} = {{{rows}}};")
+        calls.append(
+            f"for (int i = 0; i < {len(ROWS[case])}; i++) {{ show_{c_word(case.made)}(c_{at}({given}), r_{at}({given})); }}"
+        )
     helpers = [
         f"static {one.head} {{\n" + "\n".join(one.lines) + "\n}"
         for one in (helper(text.names.program, name) for name in sorted(text.helpers))
     ]
     extremes = [EXTREMES.format(T=name) for name in ("int32_t", "int64_t", "ref_wide", "double")]
     head = ["#include <stdio.h>\n#include <stdint.h>\n#include <stdbool.h>\n#include <string.h>", SHOW]
-    chunks = [calls[at : at + 500] for at in range(0, len(calls), 500)]
-    parts = [f"static void part_{at}(void) {{\n" + "\n".join(one) + "\n}" for at, one in enumerate(chunks)]
-    main = "int main(void) { " + " ".join(f"part_{at}();" for at in range(len(chunks))) + " return 0; }"
+    main = "int main(void) {\n" + "\n".join(calls) + "\nreturn 0; }"
     prelude = ["#define REF_ASSUMPTIONS 1", C_PRELUDE]
-    return "\n".join([*head, *prelude, *extremes, *helpers, *functions, *parts, main])
+    return "\n".join([*head, *prelude, *extremes, *helpers, *functions, main])
 
 
 SHOW = """
@@ -427,12 +432,16 @@ def c_word(kind: Scalar) -> str:
     return wide_type(kind)
 
 
-def c_constant(kind: Scalar, value: Value) -> str:
+def c_bits(kind: Scalar, value: Value) -> str:
+    """The value as 64 bits."""
     if isinstance(kind, Real):
-        return f"of_bits({struct.unpack('<Q', struct.pack('<d', value))[0]}u)"
-    if isinstance(kind, Bool):
-        return str(int(value))
-    return f"{int(value)}u" if value >= 0 else f"(-{-int(value) - 1} - 1)"
+        return f"{struct.unpack('<Q', struct.pack('<d', value))[0]}u"
+    return f"{int(value) % 2**64}u"
+
+
+def c_value(kind: Scalar, bits: str) -> str:
+    """The value of 64 bits."""
+    return f"of_bits({bits})" if isinstance(kind, Real) else f"({wide_type(kind)}){bits}"
 
 
 def shown(value: Value, kind: Scalar) -> str:
@@ -481,14 +490,13 @@ NUMBER, NONE = "(x + x)", "((x + x) - (x + x))"  # infinite, and no number, wher
 @pytest.mark.parametrize("sign", ["<", ">=", "="])
 @pytest.mark.parametrize(
     ("one", "two"),
-    [(NONE, "1.0"), (NUMBER, NUMBER), (f"min({NONE}, 1.0)", "1.0"), (f"-{NONE}", f"-{NONE}")],
+    [(NONE, "1.0"), (NUMBER, NUMBER), (f"-{NONE}", f"-{NONE}")],
 )
 def test_no_table_is_proved_that_an_edge_refutes(one: str, two: str, sign: str) -> None:
     """Two lines, the second with the opposite sign, or with `not`: only the second way covers a NaN."""
     for other in (
         f"{one} {OPPOSITE[sign]} {two}",
         f"not ({one} {sign} {two})",
-        f"{two} {OPPOSITE[sign]} {one}",
     ):
         program = program_of(
             "input x : real -1.7e308 .. 1.7e308\ninput y : real -1.7e308 .. 1.7e308\n"
@@ -497,7 +505,7 @@ def test_no_table_is_proved_that_an_edge_refutes(one: str, two: str, sign: str) 
         [table] = program.tables
         edges = (-1.7e308, -1e308, -1.0, 0.0, 1.0, 1e308, 1.7e308)
         wrong = any(len(matching_lines(table, {"x": x, "y": y})) != 1 for x, y in product(edges, edges))
-        verdict = prove_program(program, Options(steps=100_000, solver="boxes"))
+        verdict = prove_program(program, Options(steps=20_000, solver="boxes"))
         if wrong:
             assert not verdict.proved
         elif other.startswith("not"):
@@ -506,10 +514,17 @@ def test_no_table_is_proved_that_an_edge_refutes(one: str, two: str, sign: str) 
 
 def test_a_line_that_a_nan_does_not_match_leaves_it_to_default() -> None:
     text = (
-        "input x : real 0.0 .. 1.7e308\ntable t {\n  | line | when ||\n"
+        "input x : real 8.988465674311579e307 .. 8.98846567431158e307\ntable t {\n  | line | when ||\n"
         "  | a | min((x + x) - (x + x), 1.0) <= 1.0 ||\n  | d | DEFAULT unreachable ||\n}\n"
     )
     program = program_of(text)
     found = prove_program(program, Options()).findings
     assert [one.code for one in found] == [Code.DEFAULT_REACHED]
     assert matching_lines(program.tables[0], {"x": 1.7e308}) == []
+
+
+def test_words_turn_no_comparison_of_what_may_be_no_number() -> None:
+    for kind, words in ((Real(-1.0, 1.0), "a >= b"), (REAL, "not (a < b)")):
+        one, two = values.variable("a", kind), values.variable("b", kind)
+        assert said(values.negation(values.compare(Op.LT, one, two))) == words
+        assert said(values.negation(values.compare(Op.EQ, one, two))) == "a /= b"

@@ -73,7 +73,8 @@ def _negated(node: Node, depth: int) -> str:
             for part in node.args
         ]
         return f"({sides[0]} or {sides[1]})"
-    if node.op in turned:
+    certain = node.op == Op.EQ or all(arg.ordered for arg in node.args)  # of a NaN both are false
+    if node.op in turned and certain:
         inner = _fuller([arg.kind for arg in node.args])
         one, two = (_said(arg, inner, depth + 1) for arg in node.args)
         return f"({one} {turned[Op(node.op)]} {two})"
