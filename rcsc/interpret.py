@@ -63,6 +63,7 @@ class Fault(IntEnum):
     SEVERAL_LINES = 3
     EXTERN = 4
     ASSUMPTION = 5
+    STATE = 6  # of the executors that are compiled to check their state in every cycle
     ARITHMETIC = 7  # of the executors in C alone: this machine, or its compiler, computes reals otherwise
 
 

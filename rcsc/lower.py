@@ -1,6 +1,7 @@
 """A proved program to a `Plan`: classes, masks and their grouping."""
 
 import os
+from dataclasses import replace
 
 from rcsc.meaning import checked
 from rcsc.model import (
@@ -42,15 +43,16 @@ MOST_GROUPED = 512
 """Combinations of classes up to which leaves share a table of masks."""
 
 
-def lower(proved: ProvedProgram, root: str = "") -> Plan:
+def lower(proved: ProvedProgram, root: str = "", *, defensive: bool = False) -> Plan:
     """The plan of a proved program; there is no other way to one that is not marked.
 
     Args:
         proved: What `prove` made.
         root: The project's folder: files are named as seen from there, so that the same project gives the
             same bytes wherever it stands and from wherever it is compiled; "" leaves their names alone.
+        defensive: Whether the executors check their state at the beginning of every cycle.
     """
-    return _plan(proved.program, root, proved=True)
+    return replace(_plan(proved.program, root, proved=True), defensive=defensive)
 
 
 def lower_by_force(program: Program, root: str = "") -> Plan:

@@ -164,6 +164,7 @@ class Plan:
         source: The root file, relative, with `/`.
         monitored: Positions in `program.assumptions` of those that the executors check: monitored ones, and those that stop some table.
         proved: Whether it is proved; of one that is not, every file is marked (`UNPROVED`).
+        defensive: Whether every cycle begins with a check of the state.
     """
 
     program: Program
@@ -171,6 +172,7 @@ class Plan:
     tables: tuple[PlanTable, ...]
     monitored: tuple[int, ...]
     proved: bool = True
+    defensive: bool = False
 
     @property
     def checked(self) -> tuple[str, ...]:

@@ -1,8 +1,11 @@
 """Assumptions on which safety rests end the cycle; the others only tell. By brute force, and in every executor."""
 
+import re
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import replace
 from itertools import combinations, product
+from math import inf, nan
 from pathlib import Path
 from random import Random
 
@@ -14,13 +17,22 @@ from rcsc.compose.transition import Stepper
 from rcsc.diagnostics.jsonform import table_from_json, table_to_json
 from rcsc.driver import TARGETS, compile_
 from rcsc.driver.work import Settings
-from rcsc.interpret import Fault, cycle, evaluate, initial, run_table
+from rcsc.emit import emit_c, emit_python
+from rcsc.emit.write import write
+from rcsc.interpret import Fault, cycle, evaluate, initial, run_table, unfit
+from rcsc.lower import lower
 from rcsc.meaning import with_stops
-from rcsc.model import Int, Kind, Program, Snapshot, Value
+from rcsc.model import Bool, Int, Kind, Program, Snapshot, Value
 from rcsc.prove.options import Options
 from rcsc.prove.program import ProgramVerdict, prove_program
 from rcsc.prove.values import TRUE, constant
 from rcsc.resolve import compile_text
+from rcsc.system.adopt import restart
+from rcsc.system.buffers import CommonMemory
+from rcsc.system.executors import CExecutor, PythonExecutor, build
+from rcsc.system.levels import BadState, RunningLevel
+from rcsc.system.signature import signature
+from rcsc.testing.bits import same_value
 from tests.emitted import STOPS, proved_of
 
 SAFETY = {"RCS410", "RCS411", "RCS412", "RCS413", "RCS414", "RCS415", "RCS417"}
@@ -308,3 +320,135 @@ def test_safe_values_keep_the_invariants() -> None:
     text = "output a : bool safe true\noutput b : bool{}\ninvariant one : not a or not b\n"
     assert [one.code.value for one in verdict_of(text.format("")).findings] == ["RCS417"]
     assert verdict_of(text.format(" safe false")).findings == ()
+
+
+# --- states from outside -------------------------------------------------------------
+
+CHECKED = """
+enum mode { off, slow, fast }
+record pair { one : bool
+  two : real -1.0 .. 2.5 }
+input a : int 0 .. 9
+input go : bool
+state n : int -3 .. 200
+state big : int 0 .. 18446744073709551615
+state small : int -9223372036854775808 .. 9
+state kept : array[3] of int 0 .. 7
+state pairs : array[2] of pair
+state phase : mode deferred until go
+output shown : mode safe slow
+output hold : bool = true safe true
+invariant below : n <= 100 or hold
+invariant never_both : not (pairs[0].one and pairs[1].one)
+procedure mark { kept[0] := 1; hold := false; if a > 5 { next phase := fast } }
+procedure count { n := min(n + 1, 100) }
+table t {
+  | line | a    || procedures  | shown |
+  | lo   | < 5  || count       | off   |
+  | hi   | >= 5 || count; mark | fast  |
+}
+level top { period 10 [ms] table t }
+"""
+STRANGE: dict[str, tuple[Value, ...]] = {
+    "n": (-4, 201, -128, 101), "kept[2]": (8, 255), "pairs[1].two": (nan, inf, -inf, -1.25, 2.5000001),
+    "phase": (3, 255), "phase.next": (3,), "shown": (3,), "small": (10, 2**62), "big": (2**64 - 1,),
+    "pairs[0].one": (True,), "pairs[1].one": (True,), "hold": (False,),
+}  # fmt: skip
+
+
+def made(tmp_path: Path, *, defensive: bool) -> list[PythonExecutor | CExecutor]:
+    """Both executors of `CHECKED`."""
+    verdict = verdict_of(CHECKED)
+    assert verdict.proved is not None, verdict.findings
+    plan = lower(verdict.proved, defensive=defensive)
+    write(emit_c(plan) | emit_python(plan), str(tmp_path))
+    sign = signature(next((tmp_path / "c").glob("*.json")))
+    library = build(tmp_path, [sign])
+    return [PythonExecutor(tmp_path, sign, sign.levels[0]), CExecutor(library, sign, sign.levels[0])]
+
+
+def drawn_states(program: Program, many: int) -> Iterator[dict[str, Value]]:
+    random = Random(3)  # noqa: S311  # repeatable on purpose
+    for _ in range(many):
+        state = initial(program) | {"n": random.choice((0, 100, 101)), "hold": random.random() < 0.7}
+        for name in random.sample(list(STRANGE), random.choice((0, 1, 1, 2))):
+            state[name] = random.choice(STRANGE[name])
+        yield state
+
+
+def test_a_state_is_checked_alike_everywhere(tmp_path: Path) -> None:
+    program = verdict_of(CHECKED).program
+    names = [str(v.name) for v in program.variables]
+    said: Counter[str] = Counter()
+    for executor in made(tmp_path, defensive=False):
+        for state in drawn_states(program, 300):
+            executor.put(0, [state[name] for name in names])
+            at = executor.check()
+            positions = [*names, *(one.name for one in program.invariants)]
+            assert (positions[at] if at >= 0 else "") == unfit(program, state), state
+            said[unfit(program, state)] += 1
+    assert set(said) == {"", "below", "never_both", *STRANGE} - {
+        "big",
+        "hold",
+        "pairs[0].one",
+        "pairs[1].one",
+    }
+
+
+def test_a_bool_that_is_neither_is_refused_in_c(tmp_path: Path) -> None:
+    program = verdict_of(CHECKED).program
+    executor = made(tmp_path, defensive=False)[1]
+    assert isinstance(executor, CExecutor)
+    for at, variable in enumerate(program.variables):
+        if isinstance(variable.type, Bool):
+            executor._memory[executor._places[at]] = b"\x02"  # no other way puts it there
+            assert executor.check() == at
+            executor._memory[executor._places[at]] = b"\x00"
+    executor.put(0, [v.initial for v in program.variables])
+    assert executor.check() == -1
+
+
+def test_defensive_executors_refuse_a_state_in_every_cycle(tmp_path: Path) -> None:
+    program = verdict_of(CHECKED).program
+    names, shown = [str(v.name) for v in program.variables], {"shown": 1, "hold": True}
+    for executor in made(tmp_path, defensive=True):
+        met: Counter[int] = Counter()
+        for state in drawn_states(program, 200):
+            executor.put(0, [state[name] for name in names])
+            fault, wrong = executor.cycle(), unfit(program, state)
+            met[fault] += 1
+            left = executor.values()
+            if wrong:
+                expected, position = state | shown, [*names, *(one.name for one in program.invariants)]
+                assert (fault, position[int(left[len(names) + 2])]) == (Fault.STATE, wrong)
+            else:
+                outcome = cycle(program, program.levels[0], state)
+                assert fault == outcome.fault
+                expected = outcome.snapshot
+            assert all(map(same_value, left, (expected[name] for name in names))), state
+        assert min(met[Fault.OK], met[Fault.STATE]) > 20
+
+
+def test_a_level_keeps_its_state_where_one_from_outside_is_refused(tmp_path: Path) -> None:
+    program = verdict_of(CHECKED).program
+    names = [str(v.name) for v in program.variables]
+    sign = signature(next((made(tmp_path, defensive=False), tmp_path)[1].glob("c/*.json")))
+    for executor in made(tmp_path, defensive=False):
+        level = RunningLevel("top", sign, sign.levels[0], executor, (), (), ())
+        level.run()
+        kept = level.values
+        for change, said in (
+            ({"n": 150, "hold": False}, "invariant `below` does not hold"),
+            ({"n": -4}, "`n` = -4"),
+            ({"pairs[1].two": nan}, "`pairs[1].two` = nan"),
+            ({"kept[1]": 9}, "`kept[1]` = 9"),
+        ):
+            state = initial(program) | change
+            bad = (*(state[name] for name in names), *kept[len(names) :])
+            with pytest.raises(BadState, match=re.escape(said)):
+                level.restore(bad)
+            with pytest.raises(BadState, match=re.escape(said)):
+                restart(level, CommonMemory(), bad)
+            assert executor.values() == level.values == kept
+        level.restore(kept)
+        assert executor.values()[: len(names)] == kept[: len(names)]

@@ -216,6 +216,25 @@ void approach_init(approach_t *s)
     s->status_report = (uint8_t)INT64_C(1);
 }
 
+/* Whether the state may be gone on from: -1, or the position of the first variable outside its range, or, counted after the variables, of the first invariant that does not hold. Call it on every state that comes from outside. */
+int32_t approach_check(const approach_t *s)
+{
+    int32_t at = -1;
+    if ((at < 0) && (!((s->smooth_n >= 0.0) && (s->smooth_n <= 500.0)))) {
+        at = 5;
+    }
+    if ((at < 0) && (((int64_t)s->settled > INT64_C(25)))) {
+        at = 6;
+    }
+    if ((at < 0) && (((int64_t)s->speed_mm_s > INT64_C(1000)))) {
+        at = 7;
+    }
+    if ((at < 0) && (((int64_t)s->status_report > INT64_C(2)))) {
+        at = 8;
+    }
+    return at;
+}
+
 /* The line of table approach that matches admitted inputs: its position; -1 none, -2 several. */
 int32_t approach_approach_line(const approach_t *s)
 {

@@ -1238,6 +1238,187 @@ void emove_init(emove_t *s)
     s->report.failure = (uint8_t)INT64_C(0);
 }
 
+/* Whether the state may be gone on from: -1, or the position of the first variable outside its range, or, counted after the variables, of the first invariant that does not hold. Call it on every state that comes from outside. */
+int32_t emove_check(const emove_t *s)
+{
+    int32_t at = -1;
+    if ((at < 0) && ((*(const uint8_t *)&s->command.apoint_pos_flag) > 1u)) {
+        at = 6;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->primitive.holds) > 1u)) {
+        at = 12;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->origin.known) > 1u)) {
+        at = 22;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->target.known) > 1u)) {
+        at = 30;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->object_data.known) > 1u)) {
+        at = 38;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->held_data.known) > 1u)) {
+        at = 42;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->new_command) > 1u)) {
+        at = 46;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->begun) > 1u)) {
+        at = 47;
+    }
+    if ((at < 0) && (((int64_t)s->ref_command_in > INT64_C(5)))) {
+        at = 49;
+    }
+    if ((at < 0) && (((int64_t)s->status_in > INT64_C(2)))) {
+        at = 50;
+    }
+    if ((at < 0) && (((int64_t)s->ref_vision_in > INT64_C(2)))) {
+        at = 51;
+    }
+    if ((at < 0) && (((int64_t)s->vision_status_in > INT64_C(2)))) {
+        at = 52;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->idle) > 1u)) {
+        at = 53;
+    }
+    if ((at < 0) && (((int64_t)s->cur_state > INT64_C(13)))) {
+        at = 54;
+    }
+    if ((at < 0) && (((int64_t)s->cur_state_next > INT64_C(13)))) {
+        at = 55;
+    }
+    if ((at < 0) && (((int64_t)s->path_at > INT64_C(62)))) {
+        at = 56;
+    }
+    if ((at < 0) && (((int64_t)s->path_at_next > INT64_C(62)))) {
+        at = 57;
+    }
+    if ((at < 0) && (((int64_t)s->here_sector > INT64_C(99)))) {
+        at = 60;
+    }
+    if ((at < 0) && (((int64_t)s->here_sector_asked > INT64_C(99)))) {
+        at = 62;
+    }
+    if ((at < 0) && (((int64_t)s->depart_first > INT64_C(9999)))) {
+        at = 63;
+    }
+    if ((at < 0) && (((int64_t)s->depart_count > INT64_C(31)))) {
+        at = 64;
+    }
+    if ((at < 0) && (((int64_t)s->path_length > INT64_C(62)))) {
+        at = 65;
+    }
+    if ((at < 0) && (!((s->displaced_here.x >= (-500.0)) && (s->displaced_here.x <= 500.0)))) {
+        at = 66;
+    }
+    if ((at < 0) && (!((s->displaced_here.y >= (-500.0)) && (s->displaced_here.y <= 500.0)))) {
+        at = 67;
+    }
+    if ((at < 0) && (!((s->displaced_here.z >= (-500.0)) && (s->displaced_here.z <= 500.0)))) {
+        at = 68;
+    }
+    if ((at < 0) && (!((s->displaced_here.c >= (-1.0)) && (s->displaced_here.c <= 1.0)))) {
+        at = 69;
+    }
+    if ((at < 0) && (!((s->displaced_here.s >= (-1.0)) && (s->displaced_here.s <= 1.0)))) {
+        at = 70;
+    }
+    if ((at < 0) && (!((s->lift_mm >= (-500.0)) && (s->lift_mm <= 500.0)))) {
+        at = 71;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->lost) > 1u)) {
+        at = 72;
+    }
+    if ((at < 0) && (((int64_t)s->old_order.input_command > INT64_C(5)))) {
+        at = 74;
+    }
+    if ((at < 0) && (((int64_t)s->old_order.obj_ptr > INT64_C(6)))) {
+        at = 75;
+    }
+    if ((at < 0) && (((int64_t)s->old_order.grasp > INT64_C(9)))) {
+        at = 76;
+    }
+    if ((at < 0) && (((int64_t)s->old_order.pose_ptr > INT64_C(9999)))) {
+        at = 77;
+    }
+    if ((at < 0) && (!((s->old_order.displaced.x >= (-500.0)) && (s->old_order.displaced.x <= 500.0)))) {
+        at = 78;
+    }
+    if ((at < 0) && (!((s->old_order.displaced.y >= (-500.0)) && (s->old_order.displaced.y <= 500.0)))) {
+        at = 79;
+    }
+    if ((at < 0) && (!((s->old_order.displaced.z >= (-500.0)) && (s->old_order.displaced.z <= 500.0)))) {
+        at = 80;
+    }
+    if ((at < 0) && (!((s->old_order.displaced.c >= (-1.0)) && (s->old_order.displaced.c <= 1.0)))) {
+        at = 81;
+    }
+    if ((at < 0) && (!((s->old_order.displaced.s >= (-1.0)) && (s->old_order.displaced.s <= 1.0)))) {
+        at = 82;
+    }
+    if ((at < 0) && (((int64_t)s->old_vision.input_command > INT64_C(2)))) {
+        at = 84;
+    }
+    if ((at < 0) && (((int64_t)s->old_vision.obj_ptr > INT64_C(6)))) {
+        at = 85;
+    }
+    if ((at < 0) && (!((s->old_vision.expected_range_mm >= 0.0) && (s->old_vision.expected_range_mm <= 2000.0)))) {
+        at = 86;
+    }
+    if ((at < 0) && (((int64_t)s->status_report > INT64_C(2)))) {
+        at = 87;
+    }
+    if ((at < 0) && (((int64_t)s->failure > INT64_C(15)))) {
+        at = 88;
+    }
+    if ((at < 0) && (((int64_t)s->to_primitive.input_command > INT64_C(5)))) {
+        at = 90;
+    }
+    if ((at < 0) && (((int64_t)s->to_primitive.obj_ptr > INT64_C(6)))) {
+        at = 91;
+    }
+    if ((at < 0) && (((int64_t)s->to_primitive.grasp > INT64_C(9)))) {
+        at = 92;
+    }
+    if ((at < 0) && (((int64_t)s->to_primitive.pose_ptr > INT64_C(9999)))) {
+        at = 93;
+    }
+    if ((at < 0) && (!((s->to_primitive.displaced.x >= (-500.0)) && (s->to_primitive.displaced.x <= 500.0)))) {
+        at = 94;
+    }
+    if ((at < 0) && (!((s->to_primitive.displaced.y >= (-500.0)) && (s->to_primitive.displaced.y <= 500.0)))) {
+        at = 95;
+    }
+    if ((at < 0) && (!((s->to_primitive.displaced.z >= (-500.0)) && (s->to_primitive.displaced.z <= 500.0)))) {
+        at = 96;
+    }
+    if ((at < 0) && (!((s->to_primitive.displaced.c >= (-1.0)) && (s->to_primitive.displaced.c <= 1.0)))) {
+        at = 97;
+    }
+    if ((at < 0) && (!((s->to_primitive.displaced.s >= (-1.0)) && (s->to_primitive.displaced.s <= 1.0)))) {
+        at = 98;
+    }
+    if ((at < 0) && (((int64_t)s->to_vision.input_command > INT64_C(2)))) {
+        at = 100;
+    }
+    if ((at < 0) && (((int64_t)s->to_vision.obj_ptr > INT64_C(6)))) {
+        at = 101;
+    }
+    if ((at < 0) && (!((s->to_vision.expected_range_mm >= 0.0) && (s->to_vision.expected_range_mm <= 2000.0)))) {
+        at = 102;
+    }
+    if ((at < 0) && (((int64_t)s->report.ref_command_echo > INT64_C(5)))) {
+        at = 104;
+    }
+    if ((at < 0) && (((int64_t)s->report.status_report > INT64_C(2)))) {
+        at = 105;
+    }
+    if ((at < 0) && (((int64_t)s->report.failure > INT64_C(15)))) {
+        at = 106;
+    }
+    return at;
+}
+
 /* The line of table locate that matches admitted inputs: its position; -1 none, -2 several. */
 int32_t emove_locate_line(const emove_t *s)
 {

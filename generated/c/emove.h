@@ -288,6 +288,9 @@ typedef struct {
 /* Every variable's initial value. */
 void emove_init(emove_t *s);
 
+/* Whether the state may be gone on from: -1, or the position of the first variable outside its range, or, counted after the variables, of the first invariant that does not hold. Call it on every state that comes from outside. */
+int32_t emove_check(const emove_t *s);
+
 /* The line of table locate that matches admitted inputs: its position; -1 none, -2 several. */
 int32_t emove_locate_line(const emove_t *s);
 

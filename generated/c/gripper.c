@@ -380,6 +380,61 @@ void gripper_init(gripper_t *s)
     s->report.opening_mm = 0.0;
 }
 
+/* Whether the state may be gone on from: -1, or the position of the first variable outside its range, or, counted after the variables, of the first invariant that does not hold. Call it on every state that comes from outside. */
+int32_t gripper_check(const gripper_t *s)
+{
+    int32_t at = -1;
+    if ((at < 0) && ((*(const uint8_t *)&s->new_command) > 1u)) {
+        at = 7;
+    }
+    if ((at < 0) && (((int64_t)s->cur_state > INT64_C(2)))) {
+        at = 9;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->at_opening) > 1u)) {
+        at = 10;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->forced) > 1u)) {
+        at = 11;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->closing) > 1u)) {
+        at = 12;
+    }
+    if ((at < 0) && (((int64_t)s->waited > INT64_C(150)))) {
+        at = 13;
+    }
+    if ((at < 0) && (((int64_t)s->status_report > INT64_C(2)))) {
+        at = 14;
+    }
+    if ((at < 0) && (((int64_t)s->failure > INT64_C(15)))) {
+        at = 15;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->to_hand.drive) > 1u)) {
+        at = 16;
+    }
+    if ((at < 0) && (!((s->to_hand.opening_mm >= 0.0) && (s->to_hand.opening_mm <= 200.0)))) {
+        at = 17;
+    }
+    if ((at < 0) && (!((s->to_hand.force_n >= 0.0) && (s->to_hand.force_n <= 1000.0)))) {
+        at = 18;
+    }
+    if ((at < 0) && (!((s->to_hand.speed_mm_s >= 0.0) && (s->to_hand.speed_mm_s <= 500.0)))) {
+        at = 19;
+    }
+    if ((at < 0) && (((int64_t)s->report.ref_command_echo > INT64_C(2)))) {
+        at = 21;
+    }
+    if ((at < 0) && (((int64_t)s->report.status_report > INT64_C(2)))) {
+        at = 22;
+    }
+    if ((at < 0) && (((int64_t)s->report.failure > INT64_C(15)))) {
+        at = 23;
+    }
+    if ((at < 0) && (!((s->report.opening_mm >= 0.0) && (s->report.opening_mm <= 200.0)))) {
+        at = 24;
+    }
+    return at;
+}
+
 /* The line of table position that matches admitted inputs: its position; -1 none, -2 several. */
 int32_t gripper_position_line(const gripper_t *s)
 {

@@ -241,6 +241,9 @@ typedef struct {
 /* Every variable's initial value. */
 void gripper_init(gripper_t *s);
 
+/* Whether the state may be gone on from: -1, or the position of the first variable outside its range, or, counted after the variables, of the first invariant that does not hold. Call it on every state that comes from outside. */
+int32_t gripper_check(const gripper_t *s);
+
 /* The line of table position that matches admitted inputs: its position; -1 none, -2 several. */
 int32_t gripper_position_line(const gripper_t *s);
 

@@ -1204,6 +1204,205 @@ void primitive_init(primitive_t *s)
     s->display = (uint8_t)INT64_C(0);
 }
 
+/* Whether the state may be gone on from: -1, or the position of the first variable outside its range, or, counted after the variables, of the first invariant that does not hold. Call it on every state that comes from outside. */
+int32_t primitive_check(const primitive_t *s)
+{
+    int32_t at = -1;
+    if ((at < 0) && ((*(const uint8_t *)&s->goal.known) > 1u)) {
+        at = 28;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->fingers.known) > 1u)) {
+        at = 41;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->new_command) > 1u)) {
+        at = 48;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->begun) > 1u)) {
+        at = 49;
+    }
+    if ((at < 0) && (((int64_t)s->ref_robot_in > INT64_C(1)))) {
+        at = 51;
+    }
+    if ((at < 0) && (((int64_t)s->robot_status_in > INT64_C(2)))) {
+        at = 52;
+    }
+    if ((at < 0) && (((int64_t)s->ref_gripper_in > INT64_C(2)))) {
+        at = 53;
+    }
+    if ((at < 0) && (((int64_t)s->gripper_status_in > INT64_C(2)))) {
+        at = 54;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->idle) > 1u)) {
+        at = 55;
+    }
+    if ((at < 0) && (((int64_t)s->cur_state > INT64_C(3)))) {
+        at = 56;
+    }
+    if ((at < 0) && (((int64_t)s->cur_state_next > INT64_C(3)))) {
+        at = 57;
+    }
+    if ((at < 0) && (!((s->from[0] >= (-4000.0)) && (s->from[0] <= 4000.0)))) {
+        at = 58;
+    }
+    if ((at < 0) && (!((s->from[1] >= (-4000.0)) && (s->from[1] <= 4000.0)))) {
+        at = 59;
+    }
+    if ((at < 0) && (!((s->from[2] >= (-4000.0)) && (s->from[2] <= 4000.0)))) {
+        at = 60;
+    }
+    if ((at < 0) && (!((s->from[3] >= (-4000.0)) && (s->from[3] <= 4000.0)))) {
+        at = 61;
+    }
+    if ((at < 0) && (!((s->from[4] >= (-4000.0)) && (s->from[4] <= 4000.0)))) {
+        at = 62;
+    }
+    if ((at < 0) && (!((s->from[5] >= (-4000.0)) && (s->from[5] <= 4000.0)))) {
+        at = 63;
+    }
+    if ((at < 0) && (!((s->from[6] >= (-4000.0)) && (s->from[6] <= 4000.0)))) {
+        at = 64;
+    }
+    if ((at < 0) && (!((s->from[7] >= (-4000.0)) && (s->from[7] <= 4000.0)))) {
+        at = 65;
+    }
+    if ((at < 0) && (!((s->from[8] >= (-4000.0)) && (s->from[8] <= 4000.0)))) {
+        at = 66;
+    }
+    if ((at < 0) && (!((s->to[0] >= (-4000.0)) && (s->to[0] <= 4000.0)))) {
+        at = 67;
+    }
+    if ((at < 0) && (!((s->to[1] >= (-4000.0)) && (s->to[1] <= 4000.0)))) {
+        at = 68;
+    }
+    if ((at < 0) && (!((s->to[2] >= (-4000.0)) && (s->to[2] <= 4000.0)))) {
+        at = 69;
+    }
+    if ((at < 0) && (!((s->to[3] >= (-4000.0)) && (s->to[3] <= 4000.0)))) {
+        at = 70;
+    }
+    if ((at < 0) && (!((s->to[4] >= (-4000.0)) && (s->to[4] <= 4000.0)))) {
+        at = 71;
+    }
+    if ((at < 0) && (!((s->to[5] >= (-4000.0)) && (s->to[5] <= 4000.0)))) {
+        at = 72;
+    }
+    if ((at < 0) && (!((s->to[6] >= (-4000.0)) && (s->to[6] <= 4000.0)))) {
+        at = 73;
+    }
+    if ((at < 0) && (!((s->to[7] >= (-4000.0)) && (s->to[7] <= 4000.0)))) {
+        at = 74;
+    }
+    if ((at < 0) && (!((s->to[8] >= (-4000.0)) && (s->to[8] <= 4000.0)))) {
+        at = 75;
+    }
+    if ((at < 0) && (!((s->length_mm >= 1.0) && (s->length_mm <= 30000.0)))) {
+        at = 76;
+    }
+    if ((at < 0) && (!((s->travelled_mm >= 0.0) && (s->travelled_mm <= 30000.0)))) {
+        at = 77;
+    }
+    if ((at < 0) && (!((s->speed_mm_s >= 0.0) && (s->speed_mm_s <= 2000.0)))) {
+        at = 78;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->near_) > 1u)) {
+        at = 79;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->there) > 1u)) {
+        at = 80;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->settled) > 1u)) {
+        at = 81;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->fits) > 1u)) {
+        at = 82;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->closed) > 1u)) {
+        at = 83;
+    }
+    if ((at < 0) && (((int64_t)s->waited > INT64_C(250)))) {
+        at = 84;
+    }
+    if ((at < 0) && (((int64_t)s->old_robot > INT64_C(1)))) {
+        at = 85;
+    }
+    if ((at < 0) && (((int64_t)s->old_gripper.input_command > INT64_C(2)))) {
+        at = 87;
+    }
+    if ((at < 0) && (!((s->old_gripper.opening_mm >= 0.0) && (s->old_gripper.opening_mm <= 200.0)))) {
+        at = 88;
+    }
+    if ((at < 0) && (!((s->old_gripper.force_n >= 0.0) && (s->old_gripper.force_n <= 1000.0)))) {
+        at = 89;
+    }
+    if ((at < 0) && (!((s->old_gripper.speed_mm_s >= 0.0) && (s->old_gripper.speed_mm_s <= 500.0)))) {
+        at = 90;
+    }
+    if ((at < 0) && (((int64_t)s->status_report > INT64_C(2)))) {
+        at = 91;
+    }
+    if ((at < 0) && (((int64_t)s->failure > INT64_C(15)))) {
+        at = 92;
+    }
+    if ((at < 0) && (((int64_t)s->to_robot.input_command > INT64_C(1)))) {
+        at = 94;
+    }
+    if ((at < 0) && (!((s->to_robot.plate[0] >= (-4000.0)) && (s->to_robot.plate[0] <= 4000.0)))) {
+        at = 95;
+    }
+    if ((at < 0) && (!((s->to_robot.plate[1] >= (-4000.0)) && (s->to_robot.plate[1] <= 4000.0)))) {
+        at = 96;
+    }
+    if ((at < 0) && (!((s->to_robot.plate[2] >= (-4000.0)) && (s->to_robot.plate[2] <= 4000.0)))) {
+        at = 97;
+    }
+    if ((at < 0) && (!((s->to_robot.plate[3] >= (-4000.0)) && (s->to_robot.plate[3] <= 4000.0)))) {
+        at = 98;
+    }
+    if ((at < 0) && (!((s->to_robot.plate[4] >= (-4000.0)) && (s->to_robot.plate[4] <= 4000.0)))) {
+        at = 99;
+    }
+    if ((at < 0) && (!((s->to_robot.plate[5] >= (-4000.0)) && (s->to_robot.plate[5] <= 4000.0)))) {
+        at = 100;
+    }
+    if ((at < 0) && (!((s->to_robot.plate[6] >= (-4000.0)) && (s->to_robot.plate[6] <= 4000.0)))) {
+        at = 101;
+    }
+    if ((at < 0) && (!((s->to_robot.plate[7] >= (-4000.0)) && (s->to_robot.plate[7] <= 4000.0)))) {
+        at = 102;
+    }
+    if ((at < 0) && (!((s->to_robot.plate[8] >= (-4000.0)) && (s->to_robot.plate[8] <= 4000.0)))) {
+        at = 103;
+    }
+    if ((at < 0) && (((int64_t)s->to_gripper.input_command > INT64_C(2)))) {
+        at = 105;
+    }
+    if ((at < 0) && (!((s->to_gripper.opening_mm >= 0.0) && (s->to_gripper.opening_mm <= 200.0)))) {
+        at = 106;
+    }
+    if ((at < 0) && (!((s->to_gripper.force_n >= 0.0) && (s->to_gripper.force_n <= 1000.0)))) {
+        at = 107;
+    }
+    if ((at < 0) && (!((s->to_gripper.speed_mm_s >= 0.0) && (s->to_gripper.speed_mm_s <= 500.0)))) {
+        at = 108;
+    }
+    if ((at < 0) && (((int64_t)s->report.ref_command_echo > INT64_C(5)))) {
+        at = 110;
+    }
+    if ((at < 0) && (((int64_t)s->report.status_report > INT64_C(2)))) {
+        at = 111;
+    }
+    if ((at < 0) && (((int64_t)s->report.failure > INT64_C(15)))) {
+        at = 112;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->report.holds) > 1u)) {
+        at = 113;
+    }
+    if ((at < 0) && (((int64_t)s->display > INT64_C(1)))) {
+        at = 114;
+    }
+    return at;
+}
+
 /* The line of table approach_position_fingers that matches admitted inputs: its position; -1 none, -2 several. */
 int32_t primitive_approach_position_fingers_line(const primitive_t *s)
 {

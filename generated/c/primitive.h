@@ -280,6 +280,9 @@ typedef struct {
 /* Every variable's initial value. */
 void primitive_init(primitive_t *s);
 
+/* Whether the state may be gone on from: -1, or the position of the first variable outside its range, or, counted after the variables, of the first invariant that does not hold. Call it on every state that comes from outside. */
+int32_t primitive_check(const primitive_t *s);
+
 /* The line of table approach_position_fingers that matches admitted inputs: its position; -1 none, -2 several. */
 int32_t primitive_approach_position_fingers_line(const primitive_t *s);
 

@@ -1184,6 +1184,160 @@ void task_init(task_t *s)
     s->report.failure = (uint8_t)INT64_C(0);
 }
 
+/* Whether the state may be gone on from: -1, or the position of the first variable outside its range, or, counted after the variables, of the first invariant that does not hold. Call it on every state that comes from outside. */
+int32_t task_check(const task_t *s)
+{
+    int32_t at = -1;
+    if ((at < 0) && ((*(const uint8_t *)&s->source.known) > 1u)) {
+        at = 12;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->source.vision) > 1u)) {
+        at = 13;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->source.buffer) > 1u)) {
+        at = 14;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->dest.known) > 1u)) {
+        at = 17;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->dest.vision) > 1u)) {
+        at = 18;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->dest.buffer) > 1u)) {
+        at = 19;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->end_at.known) > 1u)) {
+        at = 22;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->end_at.vision) > 1u)) {
+        at = 23;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->end_at.buffer) > 1u)) {
+        at = 24;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->here.known) > 1u)) {
+        at = 27;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->here.vision) > 1u)) {
+        at = 28;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->here.buffer) > 1u)) {
+        at = 29;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->new_command) > 1u)) {
+        at = 32;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->begun) > 1u)) {
+        at = 33;
+    }
+    if ((at < 0) && (((int64_t)s->ref_command_in > INT64_C(5)))) {
+        at = 35;
+    }
+    if ((at < 0) && (((int64_t)s->status_in > INT64_C(2)))) {
+        at = 36;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->idle) > 1u)) {
+        at = 37;
+    }
+    if ((at < 0) && (((int64_t)s->cur_state > INT64_C(8)))) {
+        at = 38;
+    }
+    if ((at < 0) && (((int64_t)s->cur_state_next > INT64_C(8)))) {
+        at = 39;
+    }
+    if ((at < 0) && (((int64_t)s->loc_of_obj > INT64_C(1)))) {
+        at = 40;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->source_spec) > 1u)) {
+        at = 41;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->dest_spec) > 1u)) {
+        at = 42;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->names_known) > 1u)) {
+        at = 43;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->obj_acquired) > 1u)) {
+        at = 44;
+    }
+    if ((at < 0) && (((int64_t)s->obj_now_in_gripper > INT64_C(6)))) {
+        at = 45;
+    }
+    if ((at < 0) && (((int64_t)s->grasp_now > INT64_C(9)))) {
+        at = 46;
+    }
+    if ((at < 0) && (((int64_t)s->current_sector > INT64_C(99)))) {
+        at = 49;
+    }
+    if ((at < 0) && (((int64_t)s->old_order.input_command > INT64_C(5)))) {
+        at = 51;
+    }
+    if ((at < 0) && (((int64_t)s->old_order.obj_ptr > INT64_C(6)))) {
+        at = 52;
+    }
+    if ((at < 0) && (((int64_t)s->old_order.grasp > INT64_C(9)))) {
+        at = 53;
+    }
+    if ((at < 0) && (((int64_t)s->old_order.sector > INT64_C(99)))) {
+        at = 55;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->old_order.apoint_pos_flag) > 1u)) {
+        at = 56;
+    }
+    if ((at < 0) && (((int64_t)s->old_order.gripped_obj_ptr > INT64_C(6)))) {
+        at = 57;
+    }
+    if ((at < 0) && (((int64_t)s->tbuffer_boxt > INT64_C(99)))) {
+        at = 58;
+    }
+    if ((at < 0) && (((int64_t)s->bbuffer_boxb > INT64_C(99)))) {
+        at = 59;
+    }
+    if ((at < 0) && (((int64_t)s->fbuffer_flag > INT64_C(99)))) {
+        at = 60;
+    }
+    if ((at < 0) && (((int64_t)s->hbuffer_hous > INT64_C(99)))) {
+        at = 61;
+    }
+    if ((at < 0) && (((int64_t)s->status_report > INT64_C(2)))) {
+        at = 62;
+    }
+    if ((at < 0) && (((int64_t)s->failure > INT64_C(15)))) {
+        at = 63;
+    }
+    if ((at < 0) && (((int64_t)s->to_emove.input_command > INT64_C(5)))) {
+        at = 65;
+    }
+    if ((at < 0) && (((int64_t)s->to_emove.obj_ptr > INT64_C(6)))) {
+        at = 66;
+    }
+    if ((at < 0) && (((int64_t)s->to_emove.grasp > INT64_C(9)))) {
+        at = 67;
+    }
+    if ((at < 0) && (((int64_t)s->to_emove.sector > INT64_C(99)))) {
+        at = 69;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->to_emove.apoint_pos_flag) > 1u)) {
+        at = 70;
+    }
+    if ((at < 0) && (((int64_t)s->to_emove.gripped_obj_ptr > INT64_C(6)))) {
+        at = 71;
+    }
+    if ((at < 0) && (((int64_t)s->report.ref_command_echo > INT64_C(5)))) {
+        at = 73;
+    }
+    if ((at < 0) && (((int64_t)s->report.status_report > INT64_C(2)))) {
+        at = 74;
+    }
+    if ((at < 0) && (((int64_t)s->report.status_parameter > INT64_C(6)))) {
+        at = 75;
+    }
+    if ((at < 0) && (((int64_t)s->report.failure > INT64_C(15)))) {
+        at = 76;
+    }
+    return at;
+}
+
 /* The line of table acquire that matches admitted inputs: its position; -1 none, -2 several. */
 int32_t task_acquire_line(const task_t *s)
 {

@@ -274,6 +274,9 @@ typedef struct {
 /* Every variable's initial value. */
 void task_init(task_t *s);
 
+/* Whether the state may be gone on from: -1, or the position of the first variable outside its range, or, counted after the variables, of the first invariant that does not hold. Call it on every state that comes from outside. */
+int32_t task_check(const task_t *s);
+
 /* The line of table acquire that matches admitted inputs: its position; -1 none, -2 several. */
 int32_t task_acquire_line(const task_t *s);
 

@@ -424,6 +424,70 @@ void vision_init(vision_t *s)
     s->report.range_mm = 0.0;
 }
 
+/* Whether the state may be gone on from: -1, or the position of the first variable outside its range, or, counted after the variables, of the first invariant that does not hold. Call it on every state that comes from outside. */
+int32_t vision_check(const vision_t *s)
+{
+    int32_t at = -1;
+    if ((at < 0) && ((*(const uint8_t *)&s->camera.matched) > 1u)) {
+        at = 5;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->camera.flat) > 1u)) {
+        at = 11;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->new_command) > 1u)) {
+        at = 12;
+    }
+    if ((at < 0) && (((int64_t)s->cur_state > INT64_C(2)))) {
+        at = 14;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->arrived) > 1u)) {
+        at = 15;
+    }
+    if ((at < 0) && ((*(const uint8_t *)&s->fits) > 1u)) {
+        at = 16;
+    }
+    if ((at < 0) && (((int64_t)s->waited > INT64_C(100)))) {
+        at = 17;
+    }
+    if ((at < 0) && (((int64_t)s->status_report > INT64_C(2)))) {
+        at = 18;
+    }
+    if ((at < 0) && (((int64_t)s->failure > INT64_C(15)))) {
+        at = 19;
+    }
+    if ((at < 0) && (((int64_t)s->to_camera.fire > INT64_C(2)))) {
+        at = 21;
+    }
+    if ((at < 0) && (((int64_t)s->to_camera.obj_ptr > INT64_C(6)))) {
+        at = 22;
+    }
+    if ((at < 0) && (((int64_t)s->report.ref_command_echo > INT64_C(2)))) {
+        at = 24;
+    }
+    if ((at < 0) && (((int64_t)s->report.status_report > INT64_C(2)))) {
+        at = 25;
+    }
+    if ((at < 0) && (((int64_t)s->report.failure > INT64_C(15)))) {
+        at = 26;
+    }
+    if ((at < 0) && (!((s->report.x_mm >= (-500.0)) && (s->report.x_mm <= 500.0)))) {
+        at = 27;
+    }
+    if ((at < 0) && (!((s->report.y_mm >= (-500.0)) && (s->report.y_mm <= 500.0)))) {
+        at = 28;
+    }
+    if ((at < 0) && (!((s->report.c >= (-1.0)) && (s->report.c <= 1.0)))) {
+        at = 29;
+    }
+    if ((at < 0) && (!((s->report.s >= (-1.0)) && (s->report.s <= 1.0)))) {
+        at = 30;
+    }
+    if ((at < 0) && (!((s->report.range_mm >= 0.0) && (s->report.range_mm <= 2000.0)))) {
+        at = 31;
+    }
+    return at;
+}
+
 /* The line of table flood_flash that matches admitted inputs: its position; -1 none, -2 several. */
 int32_t vision_flood_flash_line(const vision_t *s)
 {

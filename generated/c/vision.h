@@ -251,6 +251,9 @@ typedef struct {
 /* Every variable's initial value. */
 void vision_init(vision_t *s);
 
+/* Whether the state may be gone on from: -1, or the position of the first variable outside its range, or, counted after the variables, of the first invariant that does not hold. Call it on every state that comes from outside. */
+int32_t vision_check(const vision_t *s);
+
 /* The line of table flood_flash that matches admitted inputs: its position; -1 none, -2 several. */
 int32_t vision_flood_flash_line(const vision_t *s);
 

@@ -246,6 +246,19 @@ def _do_stop(s):
     s.settled = 0
 
 
+def check(s):
+    """Whether the state may be gone on from: -1, or the position of the first variable outside its range, or, counted after the variables, of the first invariant that does not hold."""
+    if not (isinstance(s.smooth_n, (int, float)) and 0.0 <= s.smooth_n <= 500.0):
+        return 5
+    if not (isinstance(s.settled, int) and 0 <= s.settled <= 25):
+        return 6
+    if not (isinstance(s.speed_mm_s, int) and 0 <= s.speed_mm_s <= 1000):
+        return 7
+    if not (isinstance(s.status_report, int) and 0 <= s.status_report <= 2):
+        return 8
+    return -1
+
+
 def _admit(s):
     """Admits every input; the fault."""
     s.line = -1

@@ -1088,6 +1088,145 @@ def _do_located(s):
     s.displaced_here_y = s.to_primitive_displaced_y + 0.0
 
 
+def check(s):
+    """Whether the state may be gone on from: -1, or the position of the first variable outside its range, or, counted after the variables, of the first invariant that does not hold."""
+    if not (isinstance(s.command_apoint_pos_flag, int) and 0 <= s.command_apoint_pos_flag <= 1):
+        return 6
+    if not (isinstance(s.primitive_holds, int) and 0 <= s.primitive_holds <= 1):
+        return 12
+    if not (isinstance(s.origin_known, int) and 0 <= s.origin_known <= 1):
+        return 22
+    if not (isinstance(s.target_known, int) and 0 <= s.target_known <= 1):
+        return 30
+    if not (isinstance(s.object_data_known, int) and 0 <= s.object_data_known <= 1):
+        return 38
+    if not (isinstance(s.held_data_known, int) and 0 <= s.held_data_known <= 1):
+        return 42
+    if not (isinstance(s.new_command, int) and 0 <= s.new_command <= 1):
+        return 46
+    if not (isinstance(s.begun, int) and 0 <= s.begun <= 1):
+        return 47
+    if not (isinstance(s.inc_command_seen, int) and 0 <= s.inc_command_seen <= 65535):
+        return 48
+    if not (isinstance(s.ref_command_in, int) and 0 <= s.ref_command_in <= 5):
+        return 49
+    if not (isinstance(s.status_in, int) and 0 <= s.status_in <= 2):
+        return 50
+    if not (isinstance(s.ref_vision_in, int) and 0 <= s.ref_vision_in <= 2):
+        return 51
+    if not (isinstance(s.vision_status_in, int) and 0 <= s.vision_status_in <= 2):
+        return 52
+    if not (isinstance(s.idle, int) and 0 <= s.idle <= 1):
+        return 53
+    if not (isinstance(s.cur_state, int) and 0 <= s.cur_state <= 13):
+        return 54
+    if not (isinstance(s.cur_state_next, int) and 0 <= s.cur_state_next <= 13):
+        return 55
+    if not (isinstance(s.path_at, int) and 0 <= s.path_at <= 62):
+        return 56
+    if not (isinstance(s.path_at_next, int) and 0 <= s.path_at_next <= 62):
+        return 57
+    if not (isinstance(s.here, int) and 0 <= s.here <= 255):
+        return 58
+    if not (isinstance(s.here_next, int) and 0 <= s.here_next <= 255):
+        return 59
+    if not (isinstance(s.here_sector, int) and 0 <= s.here_sector <= 99):
+        return 60
+    if not (isinstance(s.here_asked, int) and 0 <= s.here_asked <= 255):
+        return 61
+    if not (isinstance(s.here_sector_asked, int) and 0 <= s.here_sector_asked <= 99):
+        return 62
+    if not (isinstance(s.depart_first, int) and 0 <= s.depart_first <= 9999):
+        return 63
+    if not (isinstance(s.depart_count, int) and 0 <= s.depart_count <= 31):
+        return 64
+    if not (isinstance(s.path_length, int) and 0 <= s.path_length <= 62):
+        return 65
+    if not (isinstance(s.displaced_here_x, (int, float)) and -500.0 <= s.displaced_here_x <= 500.0):
+        return 66
+    if not (isinstance(s.displaced_here_y, (int, float)) and -500.0 <= s.displaced_here_y <= 500.0):
+        return 67
+    if not (isinstance(s.displaced_here_z, (int, float)) and -500.0 <= s.displaced_here_z <= 500.0):
+        return 68
+    if not (isinstance(s.displaced_here_c, (int, float)) and -1.0 <= s.displaced_here_c <= 1.0):
+        return 69
+    if not (isinstance(s.displaced_here_s, (int, float)) and -1.0 <= s.displaced_here_s <= 1.0):
+        return 70
+    if not (isinstance(s.lift_mm, (int, float)) and -500.0 <= s.lift_mm <= 500.0):
+        return 71
+    if not (isinstance(s.lost, int) and 0 <= s.lost <= 1):
+        return 72
+    if not (isinstance(s.old_order_inc_command, int) and 0 <= s.old_order_inc_command <= 65535):
+        return 73
+    if not (isinstance(s.old_order_input_command, int) and 0 <= s.old_order_input_command <= 5):
+        return 74
+    if not (isinstance(s.old_order_obj_ptr, int) and 0 <= s.old_order_obj_ptr <= 6):
+        return 75
+    if not (isinstance(s.old_order_grasp, int) and 0 <= s.old_order_grasp <= 9):
+        return 76
+    if not (isinstance(s.old_order_pose_ptr, int) and 0 <= s.old_order_pose_ptr <= 9999):
+        return 77
+    if not (isinstance(s.old_order_displaced_x, (int, float)) and -500.0 <= s.old_order_displaced_x <= 500.0):
+        return 78
+    if not (isinstance(s.old_order_displaced_y, (int, float)) and -500.0 <= s.old_order_displaced_y <= 500.0):
+        return 79
+    if not (isinstance(s.old_order_displaced_z, (int, float)) and -500.0 <= s.old_order_displaced_z <= 500.0):
+        return 80
+    if not (isinstance(s.old_order_displaced_c, (int, float)) and -1.0 <= s.old_order_displaced_c <= 1.0):
+        return 81
+    if not (isinstance(s.old_order_displaced_s, (int, float)) and -1.0 <= s.old_order_displaced_s <= 1.0):
+        return 82
+    if not (isinstance(s.old_vision_inc_command, int) and 0 <= s.old_vision_inc_command <= 65535):
+        return 83
+    if not (isinstance(s.old_vision_input_command, int) and 0 <= s.old_vision_input_command <= 2):
+        return 84
+    if not (isinstance(s.old_vision_obj_ptr, int) and 0 <= s.old_vision_obj_ptr <= 6):
+        return 85
+    if not (isinstance(s.old_vision_expected_range_mm, (int, float)) and 0.0 <= s.old_vision_expected_range_mm <= 2000.0):
+        return 86
+    if not (isinstance(s.status_report, int) and 0 <= s.status_report <= 2):
+        return 87
+    if not (isinstance(s.failure, int) and 0 <= s.failure <= 15):
+        return 88
+    if not (isinstance(s.to_primitive_inc_command, int) and 0 <= s.to_primitive_inc_command <= 65535):
+        return 89
+    if not (isinstance(s.to_primitive_input_command, int) and 0 <= s.to_primitive_input_command <= 5):
+        return 90
+    if not (isinstance(s.to_primitive_obj_ptr, int) and 0 <= s.to_primitive_obj_ptr <= 6):
+        return 91
+    if not (isinstance(s.to_primitive_grasp, int) and 0 <= s.to_primitive_grasp <= 9):
+        return 92
+    if not (isinstance(s.to_primitive_pose_ptr, int) and 0 <= s.to_primitive_pose_ptr <= 9999):
+        return 93
+    if not (isinstance(s.to_primitive_displaced_x, (int, float)) and -500.0 <= s.to_primitive_displaced_x <= 500.0):
+        return 94
+    if not (isinstance(s.to_primitive_displaced_y, (int, float)) and -500.0 <= s.to_primitive_displaced_y <= 500.0):
+        return 95
+    if not (isinstance(s.to_primitive_displaced_z, (int, float)) and -500.0 <= s.to_primitive_displaced_z <= 500.0):
+        return 96
+    if not (isinstance(s.to_primitive_displaced_c, (int, float)) and -1.0 <= s.to_primitive_displaced_c <= 1.0):
+        return 97
+    if not (isinstance(s.to_primitive_displaced_s, (int, float)) and -1.0 <= s.to_primitive_displaced_s <= 1.0):
+        return 98
+    if not (isinstance(s.to_vision_inc_command, int) and 0 <= s.to_vision_inc_command <= 65535):
+        return 99
+    if not (isinstance(s.to_vision_input_command, int) and 0 <= s.to_vision_input_command <= 2):
+        return 100
+    if not (isinstance(s.to_vision_obj_ptr, int) and 0 <= s.to_vision_obj_ptr <= 6):
+        return 101
+    if not (isinstance(s.to_vision_expected_range_mm, (int, float)) and 0.0 <= s.to_vision_expected_range_mm <= 2000.0):
+        return 102
+    if not (isinstance(s.report_inc_command_echo, int) and 0 <= s.report_inc_command_echo <= 65535):
+        return 103
+    if not (isinstance(s.report_ref_command_echo, int) and 0 <= s.report_ref_command_echo <= 5):
+        return 104
+    if not (isinstance(s.report_status_report, int) and 0 <= s.report_status_report <= 2):
+        return 105
+    if not (isinstance(s.report_failure, int) and 0 <= s.report_failure <= 15):
+        return 106
+    return -1
+
+
 def _admit(s):
     """Admits every input; the fault."""
     s.line = -1

@@ -662,6 +662,47 @@ def _do_fail(s):
     s.status_report = 2
 
 
+def check(s):
+    """Whether the state may be gone on from: -1, or the position of the first variable outside its range, or, counted after the variables, of the first invariant that does not hold."""
+    if not (isinstance(s.new_command, int) and 0 <= s.new_command <= 1):
+        return 7
+    if not (isinstance(s.inc_command_seen, int) and 0 <= s.inc_command_seen <= 65535):
+        return 8
+    if not (isinstance(s.cur_state, int) and 0 <= s.cur_state <= 2):
+        return 9
+    if not (isinstance(s.at_opening, int) and 0 <= s.at_opening <= 1):
+        return 10
+    if not (isinstance(s.forced, int) and 0 <= s.forced <= 1):
+        return 11
+    if not (isinstance(s.closing, int) and 0 <= s.closing <= 1):
+        return 12
+    if not (isinstance(s.waited, int) and 0 <= s.waited <= 150):
+        return 13
+    if not (isinstance(s.status_report, int) and 0 <= s.status_report <= 2):
+        return 14
+    if not (isinstance(s.failure, int) and 0 <= s.failure <= 15):
+        return 15
+    if not (isinstance(s.to_hand_drive, int) and 0 <= s.to_hand_drive <= 1):
+        return 16
+    if not (isinstance(s.to_hand_opening_mm, (int, float)) and 0.0 <= s.to_hand_opening_mm <= 200.0):
+        return 17
+    if not (isinstance(s.to_hand_force_n, (int, float)) and 0.0 <= s.to_hand_force_n <= 1000.0):
+        return 18
+    if not (isinstance(s.to_hand_speed_mm_s, (int, float)) and 0.0 <= s.to_hand_speed_mm_s <= 500.0):
+        return 19
+    if not (isinstance(s.report_inc_command_echo, int) and 0 <= s.report_inc_command_echo <= 65535):
+        return 20
+    if not (isinstance(s.report_ref_command_echo, int) and 0 <= s.report_ref_command_echo <= 2):
+        return 21
+    if not (isinstance(s.report_status_report, int) and 0 <= s.report_status_report <= 2):
+        return 22
+    if not (isinstance(s.report_failure, int) and 0 <= s.report_failure <= 15):
+        return 23
+    if not (isinstance(s.report_opening_mm, (int, float)) and 0.0 <= s.report_opening_mm <= 200.0):
+        return 24
+    return -1
+
+
 def _admit(s):
     """Admits every input; the fault."""
     s.line = -1

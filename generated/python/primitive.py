@@ -1043,6 +1043,149 @@ def _do_stop(s):
     s.speed_mm_s = 0.0 + 0.0
 
 
+def check(s):
+    """Whether the state may be gone on from: -1, or the position of the first variable outside its range, or, counted after the variables, of the first invariant that does not hold."""
+    if not (isinstance(s.goal_known, int) and 0 <= s.goal_known <= 1):
+        return 28
+    if not (isinstance(s.fingers_known, int) and 0 <= s.fingers_known <= 1):
+        return 41
+    if not (isinstance(s.new_command, int) and 0 <= s.new_command <= 1):
+        return 48
+    if not (isinstance(s.begun, int) and 0 <= s.begun <= 1):
+        return 49
+    if not (isinstance(s.inc_command_seen, int) and 0 <= s.inc_command_seen <= 65535):
+        return 50
+    if not (isinstance(s.ref_robot_in, int) and 0 <= s.ref_robot_in <= 1):
+        return 51
+    if not (isinstance(s.robot_status_in, int) and 0 <= s.robot_status_in <= 2):
+        return 52
+    if not (isinstance(s.ref_gripper_in, int) and 0 <= s.ref_gripper_in <= 2):
+        return 53
+    if not (isinstance(s.gripper_status_in, int) and 0 <= s.gripper_status_in <= 2):
+        return 54
+    if not (isinstance(s.idle, int) and 0 <= s.idle <= 1):
+        return 55
+    if not (isinstance(s.cur_state, int) and 0 <= s.cur_state <= 3):
+        return 56
+    if not (isinstance(s.cur_state_next, int) and 0 <= s.cur_state_next <= 3):
+        return 57
+    if not (isinstance(s.from_0, (int, float)) and -4000.0 <= s.from_0 <= 4000.0):
+        return 58
+    if not (isinstance(s.from_1, (int, float)) and -4000.0 <= s.from_1 <= 4000.0):
+        return 59
+    if not (isinstance(s.from_2, (int, float)) and -4000.0 <= s.from_2 <= 4000.0):
+        return 60
+    if not (isinstance(s.from_3, (int, float)) and -4000.0 <= s.from_3 <= 4000.0):
+        return 61
+    if not (isinstance(s.from_4, (int, float)) and -4000.0 <= s.from_4 <= 4000.0):
+        return 62
+    if not (isinstance(s.from_5, (int, float)) and -4000.0 <= s.from_5 <= 4000.0):
+        return 63
+    if not (isinstance(s.from_6, (int, float)) and -4000.0 <= s.from_6 <= 4000.0):
+        return 64
+    if not (isinstance(s.from_7, (int, float)) and -4000.0 <= s.from_7 <= 4000.0):
+        return 65
+    if not (isinstance(s.from_8, (int, float)) and -4000.0 <= s.from_8 <= 4000.0):
+        return 66
+    if not (isinstance(s.to_0, (int, float)) and -4000.0 <= s.to_0 <= 4000.0):
+        return 67
+    if not (isinstance(s.to_1, (int, float)) and -4000.0 <= s.to_1 <= 4000.0):
+        return 68
+    if not (isinstance(s.to_2, (int, float)) and -4000.0 <= s.to_2 <= 4000.0):
+        return 69
+    if not (isinstance(s.to_3, (int, float)) and -4000.0 <= s.to_3 <= 4000.0):
+        return 70
+    if not (isinstance(s.to_4, (int, float)) and -4000.0 <= s.to_4 <= 4000.0):
+        return 71
+    if not (isinstance(s.to_5, (int, float)) and -4000.0 <= s.to_5 <= 4000.0):
+        return 72
+    if not (isinstance(s.to_6, (int, float)) and -4000.0 <= s.to_6 <= 4000.0):
+        return 73
+    if not (isinstance(s.to_7, (int, float)) and -4000.0 <= s.to_7 <= 4000.0):
+        return 74
+    if not (isinstance(s.to_8, (int, float)) and -4000.0 <= s.to_8 <= 4000.0):
+        return 75
+    if not (isinstance(s.length_mm, (int, float)) and 1.0 <= s.length_mm <= 30000.0):
+        return 76
+    if not (isinstance(s.travelled_mm, (int, float)) and 0.0 <= s.travelled_mm <= 30000.0):
+        return 77
+    if not (isinstance(s.speed_mm_s, (int, float)) and 0.0 <= s.speed_mm_s <= 2000.0):
+        return 78
+    if not (isinstance(s.near, int) and 0 <= s.near <= 1):
+        return 79
+    if not (isinstance(s.there, int) and 0 <= s.there <= 1):
+        return 80
+    if not (isinstance(s.settled, int) and 0 <= s.settled <= 1):
+        return 81
+    if not (isinstance(s.fits, int) and 0 <= s.fits <= 1):
+        return 82
+    if not (isinstance(s.closed, int) and 0 <= s.closed <= 1):
+        return 83
+    if not (isinstance(s.waited, int) and 0 <= s.waited <= 250):
+        return 84
+    if not (isinstance(s.old_robot, int) and 0 <= s.old_robot <= 1):
+        return 85
+    if not (isinstance(s.old_gripper_inc_command, int) and 0 <= s.old_gripper_inc_command <= 65535):
+        return 86
+    if not (isinstance(s.old_gripper_input_command, int) and 0 <= s.old_gripper_input_command <= 2):
+        return 87
+    if not (isinstance(s.old_gripper_opening_mm, (int, float)) and 0.0 <= s.old_gripper_opening_mm <= 200.0):
+        return 88
+    if not (isinstance(s.old_gripper_force_n, (int, float)) and 0.0 <= s.old_gripper_force_n <= 1000.0):
+        return 89
+    if not (isinstance(s.old_gripper_speed_mm_s, (int, float)) and 0.0 <= s.old_gripper_speed_mm_s <= 500.0):
+        return 90
+    if not (isinstance(s.status_report, int) and 0 <= s.status_report <= 2):
+        return 91
+    if not (isinstance(s.failure, int) and 0 <= s.failure <= 15):
+        return 92
+    if not (isinstance(s.to_robot_inc_command, int) and 0 <= s.to_robot_inc_command <= 65535):
+        return 93
+    if not (isinstance(s.to_robot_input_command, int) and 0 <= s.to_robot_input_command <= 1):
+        return 94
+    if not (isinstance(s.to_robot_plate_0, (int, float)) and -4000.0 <= s.to_robot_plate_0 <= 4000.0):
+        return 95
+    if not (isinstance(s.to_robot_plate_1, (int, float)) and -4000.0 <= s.to_robot_plate_1 <= 4000.0):
+        return 96
+    if not (isinstance(s.to_robot_plate_2, (int, float)) and -4000.0 <= s.to_robot_plate_2 <= 4000.0):
+        return 97
+    if not (isinstance(s.to_robot_plate_3, (int, float)) and -4000.0 <= s.to_robot_plate_3 <= 4000.0):
+        return 98
+    if not (isinstance(s.to_robot_plate_4, (int, float)) and -4000.0 <= s.to_robot_plate_4 <= 4000.0):
+        return 99
+    if not (isinstance(s.to_robot_plate_5, (int, float)) and -4000.0 <= s.to_robot_plate_5 <= 4000.0):
+        return 100
+    if not (isinstance(s.to_robot_plate_6, (int, float)) and -4000.0 <= s.to_robot_plate_6 <= 4000.0):
+        return 101
+    if not (isinstance(s.to_robot_plate_7, (int, float)) and -4000.0 <= s.to_robot_plate_7 <= 4000.0):
+        return 102
+    if not (isinstance(s.to_robot_plate_8, (int, float)) and -4000.0 <= s.to_robot_plate_8 <= 4000.0):
+        return 103
+    if not (isinstance(s.to_gripper_inc_command, int) and 0 <= s.to_gripper_inc_command <= 65535):
+        return 104
+    if not (isinstance(s.to_gripper_input_command, int) and 0 <= s.to_gripper_input_command <= 2):
+        return 105
+    if not (isinstance(s.to_gripper_opening_mm, (int, float)) and 0.0 <= s.to_gripper_opening_mm <= 200.0):
+        return 106
+    if not (isinstance(s.to_gripper_force_n, (int, float)) and 0.0 <= s.to_gripper_force_n <= 1000.0):
+        return 107
+    if not (isinstance(s.to_gripper_speed_mm_s, (int, float)) and 0.0 <= s.to_gripper_speed_mm_s <= 500.0):
+        return 108
+    if not (isinstance(s.report_inc_command_echo, int) and 0 <= s.report_inc_command_echo <= 65535):
+        return 109
+    if not (isinstance(s.report_ref_command_echo, int) and 0 <= s.report_ref_command_echo <= 5):
+        return 110
+    if not (isinstance(s.report_status_report, int) and 0 <= s.report_status_report <= 2):
+        return 111
+    if not (isinstance(s.report_failure, int) and 0 <= s.report_failure <= 15):
+        return 112
+    if not (isinstance(s.report_holds, int) and 0 <= s.report_holds <= 1):
+        return 113
+    if not (isinstance(s.display, int) and 0 <= s.display <= 1):
+        return 114
+    return -1
+
+
 def _admit(s):
     """Admits every input; the fault."""
     s.line = -1

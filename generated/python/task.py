@@ -931,6 +931,125 @@ def _do_release_failure(s):
     _do_lost_on_the_way(s)
 
 
+def check(s):
+    """Whether the state may be gone on from: -1, or the position of the first variable outside its range, or, counted after the variables, of the first invariant that does not hold."""
+    if not (isinstance(s.source_known, int) and 0 <= s.source_known <= 1):
+        return 12
+    if not (isinstance(s.source_vision, int) and 0 <= s.source_vision <= 1):
+        return 13
+    if not (isinstance(s.source_buffer, int) and 0 <= s.source_buffer <= 1):
+        return 14
+    if not (isinstance(s.dest_known, int) and 0 <= s.dest_known <= 1):
+        return 17
+    if not (isinstance(s.dest_vision, int) and 0 <= s.dest_vision <= 1):
+        return 18
+    if not (isinstance(s.dest_buffer, int) and 0 <= s.dest_buffer <= 1):
+        return 19
+    if not (isinstance(s.end_at_known, int) and 0 <= s.end_at_known <= 1):
+        return 22
+    if not (isinstance(s.end_at_vision, int) and 0 <= s.end_at_vision <= 1):
+        return 23
+    if not (isinstance(s.end_at_buffer, int) and 0 <= s.end_at_buffer <= 1):
+        return 24
+    if not (isinstance(s.here_known, int) and 0 <= s.here_known <= 1):
+        return 27
+    if not (isinstance(s.here_vision, int) and 0 <= s.here_vision <= 1):
+        return 28
+    if not (isinstance(s.here_buffer, int) and 0 <= s.here_buffer <= 1):
+        return 29
+    if not (isinstance(s.new_command, int) and 0 <= s.new_command <= 1):
+        return 32
+    if not (isinstance(s.begun, int) and 0 <= s.begun <= 1):
+        return 33
+    if not (isinstance(s.inc_command_seen, int) and 0 <= s.inc_command_seen <= 65535):
+        return 34
+    if not (isinstance(s.ref_command_in, int) and 0 <= s.ref_command_in <= 5):
+        return 35
+    if not (isinstance(s.status_in, int) and 0 <= s.status_in <= 2):
+        return 36
+    if not (isinstance(s.idle, int) and 0 <= s.idle <= 1):
+        return 37
+    if not (isinstance(s.cur_state, int) and 0 <= s.cur_state <= 8):
+        return 38
+    if not (isinstance(s.cur_state_next, int) and 0 <= s.cur_state_next <= 8):
+        return 39
+    if not (isinstance(s.loc_of_obj, int) and 0 <= s.loc_of_obj <= 1):
+        return 40
+    if not (isinstance(s.source_spec, int) and 0 <= s.source_spec <= 1):
+        return 41
+    if not (isinstance(s.dest_spec, int) and 0 <= s.dest_spec <= 1):
+        return 42
+    if not (isinstance(s.names_known, int) and 0 <= s.names_known <= 1):
+        return 43
+    if not (isinstance(s.obj_acquired, int) and 0 <= s.obj_acquired <= 1):
+        return 44
+    if not (isinstance(s.obj_now_in_gripper, int) and 0 <= s.obj_now_in_gripper <= 6):
+        return 45
+    if not (isinstance(s.grasp_now, int) and 0 <= s.grasp_now <= 9):
+        return 46
+    if not (isinstance(s.remember_current_loc, int) and 0 <= s.remember_current_loc <= 255):
+        return 47
+    if not (isinstance(s.current_loc, int) and 0 <= s.current_loc <= 255):
+        return 48
+    if not (isinstance(s.current_sector, int) and 0 <= s.current_sector <= 99):
+        return 49
+    if not (isinstance(s.old_order_inc_command, int) and 0 <= s.old_order_inc_command <= 65535):
+        return 50
+    if not (isinstance(s.old_order_input_command, int) and 0 <= s.old_order_input_command <= 5):
+        return 51
+    if not (isinstance(s.old_order_obj_ptr, int) and 0 <= s.old_order_obj_ptr <= 6):
+        return 52
+    if not (isinstance(s.old_order_grasp, int) and 0 <= s.old_order_grasp <= 9):
+        return 53
+    if not (isinstance(s.old_order_locpt_ptr, int) and 0 <= s.old_order_locpt_ptr <= 255):
+        return 54
+    if not (isinstance(s.old_order_sector, int) and 0 <= s.old_order_sector <= 99):
+        return 55
+    if not (isinstance(s.old_order_apoint_pos_flag, int) and 0 <= s.old_order_apoint_pos_flag <= 1):
+        return 56
+    if not (isinstance(s.old_order_gripped_obj_ptr, int) and 0 <= s.old_order_gripped_obj_ptr <= 6):
+        return 57
+    if not (isinstance(s.tbuffer_boxt, int) and 0 <= s.tbuffer_boxt <= 99):
+        return 58
+    if not (isinstance(s.bbuffer_boxb, int) and 0 <= s.bbuffer_boxb <= 99):
+        return 59
+    if not (isinstance(s.fbuffer_flag, int) and 0 <= s.fbuffer_flag <= 99):
+        return 60
+    if not (isinstance(s.hbuffer_hous, int) and 0 <= s.hbuffer_hous <= 99):
+        return 61
+    if not (isinstance(s.status_report, int) and 0 <= s.status_report <= 2):
+        return 62
+    if not (isinstance(s.failure, int) and 0 <= s.failure <= 15):
+        return 63
+    if not (isinstance(s.to_emove_inc_command, int) and 0 <= s.to_emove_inc_command <= 65535):
+        return 64
+    if not (isinstance(s.to_emove_input_command, int) and 0 <= s.to_emove_input_command <= 5):
+        return 65
+    if not (isinstance(s.to_emove_obj_ptr, int) and 0 <= s.to_emove_obj_ptr <= 6):
+        return 66
+    if not (isinstance(s.to_emove_grasp, int) and 0 <= s.to_emove_grasp <= 9):
+        return 67
+    if not (isinstance(s.to_emove_locpt_ptr, int) and 0 <= s.to_emove_locpt_ptr <= 255):
+        return 68
+    if not (isinstance(s.to_emove_sector, int) and 0 <= s.to_emove_sector <= 99):
+        return 69
+    if not (isinstance(s.to_emove_apoint_pos_flag, int) and 0 <= s.to_emove_apoint_pos_flag <= 1):
+        return 70
+    if not (isinstance(s.to_emove_gripped_obj_ptr, int) and 0 <= s.to_emove_gripped_obj_ptr <= 6):
+        return 71
+    if not (isinstance(s.report_inc_command_echo, int) and 0 <= s.report_inc_command_echo <= 65535):
+        return 72
+    if not (isinstance(s.report_ref_command_echo, int) and 0 <= s.report_ref_command_echo <= 5):
+        return 73
+    if not (isinstance(s.report_status_report, int) and 0 <= s.report_status_report <= 2):
+        return 74
+    if not (isinstance(s.report_status_parameter, int) and 0 <= s.report_status_parameter <= 6):
+        return 75
+    if not (isinstance(s.report_failure, int) and 0 <= s.report_failure <= 15):
+        return 76
+    return -1
+
+
 def _admit(s):
     """Admits every input; the fault."""
     s.line = -1

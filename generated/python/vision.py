@@ -604,6 +604,55 @@ def _do_fail(s):
     s.status_report = 2
 
 
+def check(s):
+    """Whether the state may be gone on from: -1, or the position of the first variable outside its range, or, counted after the variables, of the first invariant that does not hold."""
+    if not (isinstance(s.camera_matched, int) and 0 <= s.camera_matched <= 1):
+        return 5
+    if not (isinstance(s.camera_flat, int) and 0 <= s.camera_flat <= 1):
+        return 11
+    if not (isinstance(s.new_command, int) and 0 <= s.new_command <= 1):
+        return 12
+    if not (isinstance(s.inc_command_seen, int) and 0 <= s.inc_command_seen <= 65535):
+        return 13
+    if not (isinstance(s.cur_state, int) and 0 <= s.cur_state <= 2):
+        return 14
+    if not (isinstance(s.arrived, int) and 0 <= s.arrived <= 1):
+        return 15
+    if not (isinstance(s.fits, int) and 0 <= s.fits <= 1):
+        return 16
+    if not (isinstance(s.waited, int) and 0 <= s.waited <= 100):
+        return 17
+    if not (isinstance(s.status_report, int) and 0 <= s.status_report <= 2):
+        return 18
+    if not (isinstance(s.failure, int) and 0 <= s.failure <= 15):
+        return 19
+    if not (isinstance(s.to_camera_number, int) and 0 <= s.to_camera_number <= 65535):
+        return 20
+    if not (isinstance(s.to_camera_fire, int) and 0 <= s.to_camera_fire <= 2):
+        return 21
+    if not (isinstance(s.to_camera_obj_ptr, int) and 0 <= s.to_camera_obj_ptr <= 6):
+        return 22
+    if not (isinstance(s.report_inc_command_echo, int) and 0 <= s.report_inc_command_echo <= 65535):
+        return 23
+    if not (isinstance(s.report_ref_command_echo, int) and 0 <= s.report_ref_command_echo <= 2):
+        return 24
+    if not (isinstance(s.report_status_report, int) and 0 <= s.report_status_report <= 2):
+        return 25
+    if not (isinstance(s.report_failure, int) and 0 <= s.report_failure <= 15):
+        return 26
+    if not (isinstance(s.report_x_mm, (int, float)) and -500.0 <= s.report_x_mm <= 500.0):
+        return 27
+    if not (isinstance(s.report_y_mm, (int, float)) and -500.0 <= s.report_y_mm <= 500.0):
+        return 28
+    if not (isinstance(s.report_c, (int, float)) and -1.0 <= s.report_c <= 1.0):
+        return 29
+    if not (isinstance(s.report_s, (int, float)) and -1.0 <= s.report_s <= 1.0):
+        return 30
+    if not (isinstance(s.report_range_mm, (int, float)) and 0.0 <= s.report_range_mm <= 2000.0):
+        return 31
+    return -1
+
+
 def _admit(s):
     """Admits every input; the fault."""
     s.line = -1

@@ -105,10 +105,12 @@ Examples:
 @click.option("--target", default="python,c", show_default=True, metavar="LIST",
               help="What to write, by commas: python, c.")  # fmt: skip
 @click.option("--check", "only_check", is_flag=True, help="Write nothing; say whether the files are fresh.")
+@click.option("--defensive", is_flag=True,
+              help="Executors that check their whole state, ranges and invariants, in every cycle.")  # fmt: skip
 @proving
 @showing
 def compile_(
-    paths: tuple[str, ...], out: Path, target: str, only_check: bool,
+    paths: tuple[str, ...], out: Path, target: str, only_check: bool, defensive: bool,
     options: "Options", use_cache: bool, output: Output,
 ) -> int:  # fmt: skip
     """Prove the tables, then write their Python and C executors.
@@ -122,7 +124,7 @@ def compile_(
     if not targets or not set(targets) <= {"python", "c"}:
         raise click.BadParameter("choose from python and c", param_hint="--target")
     settings = _settings(options, use_cache, output, paths)
-    made = driver.compile_(settings, out, targets, only_check=only_check)
+    made = driver.compile_(settings, out, targets, only_check=only_check, defensive=defensive)
     return _finish(made.report, "compile", output, made.closing)
 
 

@@ -33,6 +33,7 @@ def _told(command: Callable[..., int]) -> Callable[..., int]:
         from rcsc.log.read import UnreadableLog
         from rcsc.system.description import BadDescription
         from rcsc.system.executors import NotBuilt
+        from rcsc.system.levels import BadState
 
         try:
             return command(file=file, **kwargs)
@@ -43,7 +44,7 @@ def _told(command: Callable[..., int]) -> Callable[..., int]:
                 file, Code.EXTRA_MISSING, f"`{error.package}` is not installed",
                 help_=f"pip install 'rcsc[{error.extra}]'",
             )  # fmt: skip
-        except (BadDescription, NotBuilt) as error:
+        except (BadDescription, NotBuilt, BadState) as error:
             return _refuse(file, Code.NOT_REPLAYED, f"the log cannot be replayed: {error}")
         except BadExpression as error:
             raise click.UsageError(str(error)) from error

@@ -210,7 +210,7 @@ def _begun(finding: Finding, system: Description, kind: Kind) -> System:
     )
     for level in levels:
         start = finding.start(level.name)
-        level.restore(
+        level.put_back(
             (*(start[leaf.name] for leaf in level.sign.leaves), *level.values[len(level.sign.leaves) :])
         )
     return System(system, levels, (), CommonMemory())

@@ -49,7 +49,9 @@ def _checked(settings: Settings, cache: Cache | None) -> Report:
     return report
 
 
-def compile_(settings: Settings, out: Path, targets: tuple[str, ...], *, only_check: bool) -> Made:
+def compile_(
+    settings: Settings, out: Path, targets: tuple[str, ...], *, only_check: bool, defensive: bool = False
+) -> Made:
     """Prove every table anew, then write the executors, or say whether they are fresh."""
     loaded = _load(settings)
     proofs = tuple(_proofs(loaded, settings, None))
@@ -58,7 +60,7 @@ def compile_(settings: Settings, out: Path, targets: tuple[str, ...], *, only_ch
         return Made(report, "nothing was written")
     from rcsc.emit.write import stale, write
 
-    files, clashes = _executors(proofs, targets)
+    files, clashes = _executors(proofs, targets, defensive=defensive)
     found = clashes or (stale if only_check else write)(files, str(out))
     report = _report(loaded, proofs, found)
     if report.failed:
@@ -155,7 +157,7 @@ def _report(loaded: "Loaded", proofs: tuple[Proof, ...], found: tuple[Diagnostic
 
 
 def _executors(
-    proofs: tuple[Proof, ...], targets: tuple[str, ...]
+    proofs: tuple[Proof, ...], targets: tuple[str, ...], *, defensive: bool
 ) -> tuple[dict[str, str], tuple[Diagnostic, ...]]:
     """The generated files of every program that declares a table or a level, by path under the folder."""
     files: dict[str, str] = {}
@@ -168,16 +170,16 @@ def _executors(
         if owner.setdefault(name.casefold(), proof.root) != proof.root:
             found.append(_same_name(name, proof.root, owner[name.casefold()]))
             continue
-        files |= _emitted(proof.proved, targets)
+        files |= _emitted(proof.proved, targets, defensive=defensive)
     return files, tuple(found)
 
 
-def _emitted(proved: "ProvedProgram", targets: tuple[str, ...]) -> dict[str, str]:
+def _emitted(proved: "ProvedProgram", targets: tuple[str, ...], *, defensive: bool = False) -> dict[str, str]:
     from rcsc.emit import emit_c, emit_python
     from rcsc.lower import lower
     from rcsc.project import project_root
 
-    plan = lower(proved, project_root(proved.program.file))
+    plan = lower(proved, project_root(proved.program.file), defensive=defensive)
     return (emit_python(plan) if "python" in targets else {}) | (emit_c(plan) if "c" in targets else {})
 
 

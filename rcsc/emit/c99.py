@@ -69,6 +69,7 @@ class CFile:
     guard: str
     source: str
     mark: str
+    defensive: bool
     enums: tuple[Struct, ...]
     structs: tuple[Struct, ...]
     fields: tuple[Field, ...]
@@ -141,14 +142,17 @@ class _Maker:
         procedures = tuple(self._procedure(one) for one in _callees_first(self.program))
         tables = [function for table in self.plan.tables for function in self._table(table)]
         levels = [self._level(level) for level in self.program.levels]
+        check = self._check()
         shared = [self._settle(), *self._safe(), *self._actions()]
         shared.insert(0, self._admit())  # the last to be spelled: it asks what the others compute with
-        publics = [self._init(), *tables, *self._steps(), *levels]
+        shared += [self._begin()] if self.plan.defensive else []
+        publics = [self._init(), check, *tables, *self._steps(), *levels]
         return CFile(
             self.p,
             guard(self.p),
             comment(self.plan.source),
             self.plan.mark,
+            self.plan.defensive,
             tuple(self._enum(enum) for enum in self.program.enums),
             tuple(self._record(record) for record in self.program.records),
             tuple(self._fields()),
@@ -334,6 +338,53 @@ class _Maker:
                   "        *s = before;", "    }"]  # fmt: skip
         return Function("Admits every input; a refused one leaves everything else as it was.",
                         f"void {self.p}_admit({self.p}_t *s)", tuple(lines))  # fmt: skip
+
+    def _check(self) -> Function:
+        """All states and outputs, and the representation of every bool; then the invariants, which are about these."""
+        variables = [(at, self._unfit(one)) for at, one in enumerate(self.program.variables)]
+        tests = [(at, test) for at, test in variables if test]
+        for at, one in enumerate(self.program.invariants, len(variables)):
+            tests.append((at, f"!({self.text.expr(one.condition)})"))
+        lines = ["    int32_t at = -1;"] if tests else ["    const int32_t at = -1;", "    (void)s;"]
+        for at, test in tests:
+            lines += [f"    if ((at < 0) && ({test})) {{", f"        at = {at};", "    }"]
+        doc = (
+            "Whether the state may be gone on from: -1, or the position of the first variable outside its range, or, counted after "
+            "the variables, of the first invariant that does not hold. Call it on every state that comes from outside."
+        )
+        return Function(doc, f"int32_t {self.p}_check(const {self.p}_t *s)", (*lines, "    return at;"))
+
+    def _unfit(self, variable: Variable) -> str:
+        """That the place holds no value of the type; inputs are admitted by every cycle."""
+        kind, place = variable.type, self.text.place(variable.name)
+        if isinstance(kind, Bool):  # read as a byte: as a bool, another than 0 and 1 means nothing
+            return f"(*(const uint8_t *)&{place}) > 1u"
+        if variable.kind is Kind.INPUT:
+            return ""
+        if isinstance(kind, Real):
+            low, high = constant(kind, kind.low), constant(kind, kind.high)
+            return f"!(({place} >= {low}) && ({place} <= {high}))"
+        return " || ".join(f"({test})" for test, _ in _outside(kind, place))
+
+    def _begin(self) -> Function:
+        lines = [
+            f"    const int32_t at = {self.p}_check(s);",
+            "    if (at < 0) {",
+            f"        {self.p}_admit(s);",
+            "    } else {",
+            "        s->line = -1;",
+            f"        s->fault = {int(Fault.STATE)};",
+            "        s->fault_at = at;",
+            *(f"        s->{word} = 0;" for word in self.names.failed),
+            "    }",
+        ]
+        return Function("Checks the state, then admits every input.", f"void {self.p}_begin({self.p}_t *s)",
+                        tuple(lines))  # fmt: skip
+
+    @property
+    def _first(self) -> str:
+        """What every step and cycle begins with."""
+        return f"    {self.p}_{'begin' if self.plan.defensive else 'admit'}(s);"
 
     def _settle(self) -> Function:
         deferred = [v for v in self.program.variables if v.deferred_until is not None]
@@ -591,7 +642,7 @@ class _Maker:
         for table in self.plan.tables:
             name = self.names.tables[table.table.name]
             lines = (
-                f"    {self.p}_admit(s);",
+                self._first,
                 "    if (s->fault == 0) {",
                 f"        {self.p}_settle(s);",
                 f"        {self.p}_run_{name}(s);",
@@ -602,7 +653,7 @@ class _Maker:
             yield Function(doc, f"int32_t {self.p}_{name}_step({self.p}_t *s)", lines)
 
     def _level(self, level: Level) -> Function:
-        lines = [f"    {self.p}_admit(s);", "    if (s->fault == 0) {", f"        {self.p}_settle(s);"]
+        lines = [self._first, "    if (s->fault == 0) {", f"        {self.p}_settle(s);"]
         for name in level.preprocess:
             lines += self._guarded(self.text.call(name))
         chosen = self._chosen(level)

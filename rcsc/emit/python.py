@@ -9,7 +9,7 @@ from rcsc.emit.environment import render
 from rcsc.emit.names import FAILED_BITS, comment, names_of
 from rcsc.emit.pytext import PyText, constant
 from rcsc.interpret import Fault
-from rcsc.model import Admit, Int, Kind, Level, OneTable, Procedure, Real, Variable, key_bounds, pending
+from rcsc.model import Admit, Bool, Int, Kind, Level, OneTable, Procedure, Real, Variable, key_bounds, pending
 from rcsc.plan import WORD, Coded, Cuts, Direct, Group, Index, Plan, PlanTable, Truth, grouped
 
 MOST_KEYS = 8192
@@ -75,7 +75,8 @@ class _Maker:
     def file(self) -> PyFile:
         """The whole view."""
         functions = [self._procedure(p) for p in self.program.procedures]
-        functions += [self._admit(), self._settle(), *self._safe()]
+        functions += [self._check(), self._admit(), self._settle(), *self._safe()]
+        functions += [self._begin()] if self.plan.defensive else []
         for table in self.plan.tables:
             functions += self._table(table)
         functions += [self._level(level) for level in self.program.levels]
@@ -178,6 +179,41 @@ class _Maker:
                 stores.append(f"    {self.text.place(variable.name)} = {value}")
         return PyFunction("_admit", "s", "Admits every input; the fault.", (*lines, *stores, "    return 0"))
 
+    def _check(self) -> PyFunction:
+        """As in C."""
+        lines = []
+        for at, one in enumerate(self.program.variables):
+            kind, place = one.type, self.text.place(one.name)
+            low, high = (kind.low, kind.high) if isinstance(kind, Int | Real) else key_bounds(kind)
+            types = "(int, float)" if isinstance(kind, Real) else "int"
+            if one.kind is not Kind.INPUT or isinstance(kind, Bool):
+                lines.append(f"    if not (isinstance({place}, {types}) and {low!r} <= {place} <= {high!r}):")
+                lines.append(f"        return {at}")
+        for at, invariant in enumerate(self.program.invariants, len(self.program.variables)):
+            lines += [f"    if not {self.text.expr(invariant.condition)}:", f"        return {at}"]
+        doc = (
+            "Whether the state may be gone on from: -1, or the position of the first variable outside its range, or, counted after "
+            "the variables, of the first invariant that does not hold."
+        )
+        return PyFunction("check", "s", doc, (*lines, "    return -1"))
+
+    def _begin(self) -> PyFunction:
+        lines = (
+            "    at = check(s)",
+            "    if at < 0:",
+            "        return _admit(s)",
+            "    s.line = -1",
+            "    s.fault_at = at",
+            *(f"    s.{word} = 0" for word in self.names.failed),
+            f"    return {int(Fault.STATE)}",
+        )
+        return PyFunction("_begin", "s", "Checks the state, then admits every input; the fault.", lines)
+
+    @property
+    def _first(self) -> str:
+        """What every step and cycle begins with."""
+        return f"    s.fault = {'_begin' if self.plan.defensive else '_admit'}(s)"
+
     def _settle(self) -> PyFunction:
         deferred = [v for v in self.program.variables if v.deferred_until is not None]
         lines = []
@@ -234,7 +270,7 @@ class _Maker:
         lines = self.names.module.fresh(f"{name.upper()}_LINES")
         self.lines.append((lines, tuple(f'"{line.name}"' for line in table.lines)))
         step = (
-            "    s.fault = _admit(s)",
+            self._first,
             "    if s.fault == 0:",
             "        try:",
             "            _settle(s)",
@@ -323,7 +359,7 @@ class _Maker:
     # --- levels ---
 
     def _level(self, level: Level) -> PyFunction:
-        lines = ["    s.fault = _admit(s)", "    if s.fault == 0:", "        try:", "            _settle(s)"]
+        lines = [self._first, "    if s.fault == 0:", "        try:", "            _settle(s)"]
         lines += [f"            {self.text.call(name)}" for name in level.preprocess]
         if isinstance(level.tables, OneTable):
             lines.append(f"            _run_{self.names.tables[level.tables.table]}(s)")

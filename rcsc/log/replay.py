@@ -21,6 +21,7 @@ from rcsc.system.answers import Answers, told
 from rcsc.system.cell import Kind, executors, signatures
 from rcsc.system.description import BadDescription
 from rcsc.system.executors import Executor
+from rcsc.system.levels import put_checked
 from rcsc.system.signature import Leaf, LevelSign, Signature, Value, Values
 
 _ASIDE = frozenset({"table", "line", "assumptions_failed"})
@@ -115,19 +116,23 @@ class _Again:
         )
 
     def _put(self, before: Values, recorded: Values) -> None:
-        """The state before, and the inputs of the cycle; what the log does not know stays as it is."""
+        """The state before, and the inputs of the cycle; what the log does not know stays as it is.
+
+        Raises:
+            BadState: The tables are not proved for it.
+        """
         start = [
             recorded[at] if at in self.inputs else before[at] for at in range(len(self.logged.sign.leaves))
         ]
         if self.same:
-            self.executor.put(0, start)
+            put_checked(self.logged.name, self.sign, self.executor, tuple(start))
             return
         values = list(self.executor.values()[: len(self.sign.leaves)])
         for source, target in self.carried:
             values[target] = _translated(
                 self.logged.sign.leaves[source], self.sign.leaves[target], start[source]
             )
-        self.executor.put(0, values)
+        put_checked(self.logged.name, self.sign, self.executor, tuple(values))
 
     def _differences(self, recorded: Values, now: Values) -> tuple[Difference, ...]:
         then_words = words(self.logged.sign, self.logged.level, recorded)

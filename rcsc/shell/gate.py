@@ -116,7 +116,7 @@ def _tried(level: RunningLevel, buffers: Buffers, *, run: bool) -> _Tried:
     if run:
         level.run()
     left = level.values if run else taken
-    level.restore(kept)
+    level.put_back(kept)
     level.values = kept  # the trace too, which the executor does not take back
     return _Tried(taken, left)
 

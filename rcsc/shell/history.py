@@ -72,7 +72,7 @@ def put_back(moment: Moment, system: System, memory: Memory) -> None:
     system.tick, system.levels, system.outside = moment.tick, moment.levels, moment.outside
     memory.held = dict(moment.buffers)
     for level, values in zip(moment.levels, moment.values, strict=True):
-        level.restore(values)
+        level.put_back(values)
         level.values = values  # the trace too, which the executor does not take back
 
 

@@ -181,7 +181,7 @@ def _carried(old: RunningLevel, new: RunningLevel) -> str:
     values: list[Value] = [
         _value(old, leaf) if leaf.name in old.sign.index else leaf.initial for leaf in new.sign.leaves
     ]
-    new.restore(tuple(values))
+    new.put_back(tuple(values))  # `_in_proof` looks at it
     added = [leaf.name for leaf in new.sign.leaves if leaf.name not in old.sign.index]
     gone = [leaf.name for leaf in old.sign.leaves if leaf.name not in new.sign.index]
     parts = [f"{len(values) - len(added)} variables keep their values"]

@@ -107,6 +107,8 @@ class Session:
         Raises:
             Refused: A level was refused an input, or no line or several matched.
         """
+        for level in self.levels:
+            _fit(level)
         self._keep()
         try:
             self.system.step()
@@ -119,6 +121,7 @@ class Session:
         Raises:
             Refused: It was refused an input, or no line or several matched.
         """
+        _fit(level)
         self._keep()
         level.take(self.memory)
         fault = level.run()
@@ -312,6 +315,19 @@ def _carriers(level: RunningLevel) -> list[tuple[str, int, int]]:
     """Buffers that the level takes or gives, and which leaves they carry."""
     taken = [(take.buffer, take.first, take.first + take.count) for take in level.takes]
     return taken + [(give.buffer, give.first, give.end) for give in level.gives]
+
+
+def _fit(level: RunningLevel) -> None:
+    """Refuses a cycle from a state that was set by hand and is none that the tables are proved for.
+
+    Raises:
+        Refused: It is.
+    """
+    at = level.executor.check()
+    if at >= 0:
+        wrong = level.sign.unfit(at, level.values)
+        said = f"level `{level.name}` cannot go on from this state: {wrong}"
+        raise Refused(Code.STATE_TABLE_ERROR, said, "`set` what it is about, or `undo`")
 
 
 def _fault(level: RunningLevel) -> str:

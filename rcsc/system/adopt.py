@@ -54,9 +54,12 @@ def restart(level: RunningLevel, buffers: Buffers, checkpoint: Values | None = N
         level: Whatever state it is in.
         buffers: What it takes from and gives to.
         checkpoint: All leaves and the trace after its last cycle; None where they are lost: then it starts anew.
+
+    Raises:
+        BadState: The checkpoint, or what the level would adopt, lies outside what its tables are proved for.
     """
     if checkpoint is None:
-        level.restore(level.initial)
+        level.put_back(level.initial)
         level.take(buffers)
         level.restore(adopt(level.sign, level.executor.values(), standing(level, buffers)))
     else:

@@ -14,6 +14,7 @@ from rcsc.system.buffers import Buffers, CommonMemory
 from rcsc.system.description import BadDescription, Description
 from rcsc.system.executors import CExecutor, Executor, PythonExecutor, build
 from rcsc.system.levels import Query, RunningLevel, running_level
+from rcsc.system.levels import StateTableError as StateTableError  # noqa: PLC0414  # callers look for it here
 from rcsc.system.signature import Signature, Values, generated_files, signature
 from rcsc.system.unproved import refuse_unproved
 
@@ -26,10 +27,6 @@ class Outside(Protocol):
     def step(self, tick: int, latest: Callable[[str], Values | None]) -> Mapping[str, Values]:
         """Look at the buffers as the tick before left them; what it publishes."""
         ...
-
-
-class StateTableError(Exception):
-    """A level met a fault that the proofs exclude, or was refused an input; says which, where and when."""
 
 
 @dataclass(slots=True)

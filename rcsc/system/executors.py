@@ -44,6 +44,10 @@ class Executor(Protocol):
         """Set the leaves from position `first` on."""
         ...
 
+    def check(self) -> int:
+        """-1 where the state may be gone on from, else what is wrong with it (`Signature.unfit`)."""
+        ...
+
 
 class PythonExecutor:
     """A generated Python module with a state."""
@@ -58,6 +62,7 @@ class PythonExecutor:
         spec.loader.exec_module(module)
         self._state = module.State()
         self._cycle = getattr(module, level.cycle.removeprefix(f"{sign.program}_"))
+        self._check = module.check
         self._names = [leaf.attribute for leaf in sign.leaves]
         self._get = attrgetter(*self._names, *sign.trace)
 
@@ -65,6 +70,11 @@ class PythonExecutor:
         """Run one cycle; the fault, 0 for none."""
         fault: int = self._cycle(self._state)
         return fault
+
+    def check(self) -> int:
+        """-1 where the state may be gone on from, else what is wrong with it."""
+        at: int = self._check(self._state)
+        return at
 
     def values(self) -> Values:
         """All leaves, then the trace."""
@@ -158,6 +168,8 @@ class CExecutor:
         self._address = ctypes.byref(self._memory)
         self._cycle = getattr(library.handle, level.cycle)
         self._cycle.restype = ctypes.c_int32
+        self._check = getattr(library.handle, sign.check)
+        self._check.restype = ctypes.c_int32
         getattr(library.handle, sign.init)(self._address)
         formats = [*(FORMATS[leaf.c_type] for leaf in sign.leaves), *sign.trace_format]
         self._places, self._formats = places, formats
@@ -171,6 +183,11 @@ class CExecutor:
         """Run one cycle; the fault, 0 for none."""
         fault: int = self._cycle(self._address)
         return fault
+
+    def check(self) -> int:
+        """-1 where the state may be gone on from, else what is wrong with it."""
+        at: int = self._check(self._address)
+        return at
 
     def write(self, name: str, value: ctypes.Array[ctypes.c_uint64] | ctypes.c_uint32) -> None:
         """Sets a variable of the library, where it has one of that name."""

@@ -3,6 +3,7 @@
 In: a description, signatures, executors, a database. Out: `RunningLevel`, which takes, runs and gives, each when told.
 """
 
+import struct
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -39,6 +40,33 @@ class Fill:
     query: Query
     first: int
     keys: tuple[int, ...]
+
+
+class StateTableError(Exception):
+    """A level met a fault that the proofs exclude, or was refused an input or a state; says which, where and when."""
+
+
+class BadState(StateTableError):  # noqa: N818  # what was refused, not an error of ours
+    """A state from outside lies outside what the executors are proved for; says which level and what."""
+
+
+def put_checked(name: str, sign: Signature, executor: Executor, values: Values) -> None:
+    """Gives an executor a state from outside, and checks it before any cycle sees it.
+
+    Raises:
+        BadState: Something lies outside its range, or an invariant does not hold; the executor has the state that it had.
+    """
+    count = len(sign.leaves)
+    kept = executor.values()[:count]
+    try:
+        executor.put(0, values[:count])
+        at = executor.check()
+        wrong = "" if at < 0 else sign.unfit(at, values)
+    except (struct.error, OverflowError, TypeError) as error:
+        wrong = str(error)
+    if wrong:
+        executor.put(0, kept)
+        raise BadState(f"level `{name}` cannot go on from this state: {wrong}")
 
 
 @dataclass(slots=True)
@@ -95,8 +123,20 @@ class RunningLevel:
             buffers.publish(give.buffer, self.values[give.first : give.end])
 
     def restore(self, values: Values) -> None:
-        """Goes on from a state that `values` said, as if nothing had happened in between."""
+        """Goes on from a state that `values` said, as if nothing had happened in between.
+
+        Raises:
+            BadState: The state is none that a cycle may begin with; the level has kept its own.
+        """
+        put_checked(self.name, self.sign, self.executor, values)
+        self._restored()
+
+    def put_back(self, values: Values) -> None:
+        """The same with a state that this level had, or that was looked at already: it is not checked."""
         self.executor.put(0, values[: len(self.sign.leaves)])
+        self._restored()
+
+    def _restored(self) -> None:
         self.values = self.executor.values()
         self._taken.clear()
         self._asked.clear()

@@ -117,6 +117,12 @@ class Signature:
     index: Mapping[str, int] = field(default_factory=dict)
     failed: tuple[str, ...] = FAILED
     stops: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    invariants: tuple[str, ...] = ()
+
+    @property
+    def check(self) -> str:
+        """The C function that checks a state."""
+        return f"{self.program}_check"
 
     @property
     def trace(self) -> tuple[str, ...]:
@@ -162,6 +168,8 @@ class Signature:
         fault, at = (int(values[len(self.leaves) + place]) for place in (1, 2))
         if fault == STOPPED:
             return self.monitored[at] if 0 <= at < len(self.monitored) else f"{at}?"
+        if at >= len(self.leaves):
+            return self._invariant(at)
         return self.leaves[at].name if 0 <= at < len(self.leaves) else ""
 
     def fault_said(self, values: Values) -> str:
@@ -171,8 +179,19 @@ class Signature:
         about = self.fault_at(values)
         if not about:
             return word
-        shown = "" if fault == STOPPED else f" = {self.leaves[at].shown(values[at])}"
-        return f"{word}: `{about}`{shown}"
+        if fault == STOPPED:
+            return f"{word}: `{about}`"
+        return f"{word}: {self.unfit(at, values)}"
+
+    def _invariant(self, at: int) -> str:
+        at -= len(self.leaves)
+        return self.invariants[at] if at < len(self.invariants) else f"{at}?"
+
+    def unfit(self, at: int, values: Values) -> str:
+        """What `check` found wrong with a state, in words: `width` = 300, or the invariant that does not hold."""
+        if at >= len(self.leaves):
+            return f"invariant `{self._invariant(at)}` does not hold"
+        return f"`{self.leaves[at].name}` = {self.leaves[at].shown(values[at])}"
 
 
 def generated_files(generated: Path, program: str) -> tuple[Path, ...]:
@@ -249,6 +268,7 @@ def signature_of(said: Said) -> Signature:
         index,
         failed,
         stops,
+        said.names("invariants", ()),
     )
 
 

@@ -17,7 +17,7 @@ from rcsc.files import write_atomically
 from rcsc.files.read import content, json_of
 from rcsc.system.cell import Outside
 from rcsc.system.description import Description
-from rcsc.system.levels import RunningLevel
+from rcsc.system.levels import BadState, RunningLevel
 from rcsc.system.signature import generated_files
 from rcsc.workstation.cell import Run
 from rcsc.workstation.orders import BETWEEN
@@ -171,7 +171,10 @@ def _put(run: Run, said: Mapping[str, Any]) -> None:
             raise ValueError(f"nothing outside is a `{name}`")
         outside[name].restore(state)
     for level in system.levels:
-        level.restore(_values(level, said["levels"][level.name]))
+        try:
+            level.restore(_values(level, said["levels"][level.name]))
+        except BadState as error:
+            raise NotResumed(Code.NOT_RESUMED, str(error)) from error
     for name, values in said["buffers"].items():
         system.buffers.publish(name, tuple(values))
     run.station.restore(said["station"])
