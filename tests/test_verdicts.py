@@ -240,3 +240,13 @@ def test_a_line_that_an_invariant_kills_is_a_mistake(solver: Literal["boxes", "a
     assert isinstance(program, Program)
     found = prove_program(program, Options(solver=solver)).findings
     assert [(one.code, one.severity) for one in found] == [(Code.DEAD_LINE, Severity.ERROR)]
+
+
+def test_what_an_unproved_invariant_kills_says_so() -> None:
+    program = compile_text(
+        "state n : int 0 .. 9 = 1\ninput v : bool\ninvariant small : n <= 4\n"
+        "table t {\n  | line | n || n |\n  | l | <= 4 || 9 |\n  | d | DEFAULT || 1 |\n}\n"
+    )
+    assert isinstance(program, Program)
+    notes = {one.code: one.notes for one in prove_program(program, Options()).findings}
+    assert notes[Code.DEFAULT_DEAD] == ("under `small` (not proved)",)

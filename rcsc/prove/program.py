@@ -74,7 +74,7 @@ def prove_program(
     verdicts = tuple(_with_invariants(program, verdict) for verdict in made)
     for verdict in verdicts:
         if verdict.table.name not in owed.undefined:
-            found += diagnostics(assuming, verdict)
+            found += diagnostics(assuming, verdict, unproved)
     findings = tuple(sorted(dict.fromkeys(found), key=sort_key))
     wrong = any(one.severity is Severity.ERROR for one in findings)
     if wrong or only is not None:

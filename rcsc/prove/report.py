@@ -1,6 +1,6 @@
 """What was found of a table, as diagnostics."""
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from math import prod
 
 from rcsc.diagnostics.codes import Code
@@ -26,8 +26,8 @@ MOST_PAIRS = 20
 """Overlapping pairs shown of one table; then how many more."""
 
 
-def diagnostics(program: Program, verdict: TableVerdict) -> list[Diagnostic]:
-    """The verdict's findings, ready to show."""
+def diagnostics(program: Program, verdict: TableVerdict, unproved: Collection[str] = ()) -> list[Diagnostic]:
+    """The verdict's findings, ready to show; `unproved` are invariants and assumptions that should be proved and are not."""
     table = verdict.table
     overlaps = [one for one in verdict.found if isinstance(one, Overlap)]
     shown = [_overlap(program, table, one) for one in overlaps[:MOST_PAIRS]]
@@ -37,17 +37,17 @@ def diagnostics(program: Program, verdict: TableVerdict) -> list[Diagnostic]:
             f"and {least}{len(overlaps) - MOST_PAIRS} more pairs of lines of table `{table.name}` overlap"
         )
         shown.append(Diagnostic(Code.OVERLAP, message, Label(table.span)))
-    return shown + list(_others(program, verdict))
+    return shown + list(_others(program, verdict, unproved))
 
 
-def _others(program: Program, verdict: TableVerdict) -> Iterator[Diagnostic]:
+def _others(program: Program, verdict: TableVerdict, unproved: Collection[str]) -> Iterator[Diagnostic]:
     table = verdict.table
     for one in verdict.found:
         match one:
             case Gap():
                 yield _gap(program, table, one)
             case DeadLine(line, assuming):
-                yield _dead(table, line, assuming)
+                yield _dead(table, line, assuming, _under(table, unproved))
             case ContradictoryAssumptions():
                 message = f"the assumptions of table `{table.name}` contradict each other, an invariant or the declared ranges"
                 yield Diagnostic(Code.CONTRADICTORY_ASSUMPTIONS, message, Label(table.span))
@@ -67,23 +67,28 @@ def _others(program: Program, verdict: TableVerdict) -> Iterator[Diagnostic]:
         helps = ("declare it: `DEFAULT unreachable`; that is then proved",)
         label = Label(table.default.span)
         yield Diagnostic(
-            Code.DEFAULT_DEAD, message, label, notes=_under(table), help=helps, severity=Severity.WARNING
+            Code.DEFAULT_DEAD,
+            message,
+            label,
+            notes=_under(table, unproved),
+            help=helps,
+            severity=Severity.WARNING,
         )
 
 
-def _dead(table: Table, line: int, assuming: bool) -> Diagnostic:
+def _dead(table: Table, line: int, assuming: bool, under: tuple[str, ...]) -> Diagnostic:
     label = Label(table.lines[line].cell_span(-1))
     name = f"line `{table.lines[line].name}` of table `{table.name}`"
     if not assuming:
         helps = ("delete the line, or correct its conditions",)
         return Diagnostic(Code.DEAD_LINE, f"{name} can never match", label, help=helps)
     message = f"{name} matches only where an assumption fails"
-    return Diagnostic(Code.DEAD_LINE, message, label, notes=_under(table), severity=Severity.WARNING)
+    return Diagnostic(Code.DEAD_LINE, message, label, notes=under, severity=Severity.WARNING)
 
 
-def _under(table: Table) -> tuple[str, ...]:
+def _under(table: Table, unproved: Collection[str]) -> tuple[str, ...]:
     """What dead lines and a dead DEFAULT may rest on."""
-    names = ", ".join(f"`{name}`" for name in table.assumptions)
+    names = ", ".join(f"`{name}`{' (not proved)' if name in unproved else ''}" for name in table.assumptions)
     return (f"under {names}",) if names else ()
 
 
