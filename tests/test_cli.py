@@ -7,7 +7,6 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -153,7 +152,7 @@ def test_ctrl_c_ends_a_long_run_and_leaves_nothing(folder: Path) -> None:
     assert child.stdout is not None
     assert child.stdout.readline() == "ready\n"
     child.send_signal(signal.SIGINT)
-    _, err = child.communicate(timeout=20)
+    _, err = child.communicate()
     assert child.returncode == 130
     assert "interrupted" in err
     assert [path.name for path in folder.iterdir()] == ["slow.rcs"]
@@ -273,13 +272,11 @@ def loaded(*args: str) -> tuple[str, set[str]]:
     return status, {name.split(".")[0] for name in names} & HEAVY
 
 
-def test_a_second_check_imports_nothing_heavy_and_is_quick() -> None:
+def test_a_second_check_imports_nothing_heavy() -> None:
     shutil.copytree(REPO / "tables", "tables")
     status, first = loaded("check", "tables")
     assert {"lark"} <= first
-    begun = time.perf_counter()
     assert loaded("check", "tables") == (status, set())
-    assert time.perf_counter() - begun < 1.5  # alone on a machine: well under half a second
     assert loaded("--help") == ("0", set())
 
 

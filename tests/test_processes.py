@@ -49,7 +49,7 @@ from tests.processes_outside import (
 LEVELS = ("task", "emove", "primitive", "vision", "gripper")
 TRACE = (0, 0, 0, 0)
 FIRST = 65531
-PATIENCE_S = 60.0
+PATIENCE_S = 900.0
 
 
 @pytest.fixture(autouse=True)
@@ -146,9 +146,7 @@ def test_a_buffer_that_does_not_fit_is_refused(repo: Path) -> None:
 def test_a_stranger_that_ends_takes_nothing_with_it(buffers: SharedMemoryBuffers) -> None:
     """A process with a resource tracker of its own, which would remove the block and complain."""
     look = f"from rcsc.system.block import Block; Block.attach({buffers.block.name!r}).close()"
-    ran = subprocess.run(
-        [sys.executable, "-c", look], capture_output=True, text=True, timeout=60, check=False
-    )
+    ran = subprocess.run([sys.executable, "-c", look], capture_output=True, text=True, check=False)
     assert (ran.returncode, ran.stderr) == (0, "")
     Block.attach(buffers.block.name).close()
 
@@ -450,7 +448,7 @@ def test_a_run_of_all_processes_ends_and_leaves_nothing(repo: Path, tmp_path: Pa
     ran = subprocess.Popen(
         [sys.executable, str(script)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
-    said = ran.communicate(timeout=60)
+    said = ran.communicate()
     assert (ran.returncode, *said) == (0, "over\n", "")
     answered_once(tmp_path / "sent", len(ROUND), 1)
     assert blocks_of(ran) == []
@@ -467,7 +465,7 @@ def test_a_run_that_is_ended_leaves_nothing(repo: Path, tmp_path: Path, how: sig
     until((tmp_path / "below").exists, "it does not run")
     assert blocks_of(ran)
     ran.send_signal(how)
-    said = ran.communicate(timeout=60)[1]
+    said = ran.communicate()[1]
     assert how is signal.SIGKILL or said.rstrip().endswith("KeyboardInterrupt")
     assert said.count("Traceback") == (how is not signal.SIGKILL)
     assert "resource_tracker" not in said
