@@ -203,10 +203,23 @@ JOIN: dict[str, Callable[[bool, bool], bool]] = {
 
 
 class Maker:
-    """Draws one program."""
+    """Draws one program.
 
-    def __init__(self, rng: random.Random) -> None:
+    Args:
+        rng: Where all choices come from.
+        words: Gives the names, each another; without it they are a letter and a number.
+        members: How many members an enumeration may have.
+    """
+
+    def __init__(
+        self,
+        rng: random.Random,
+        words: Callable[[], str] | None = None,
+        members: Sequence[int] = (1, 2, 3, 4, 5),
+    ) -> None:
         self.rng = rng
+        self.words = words
+        self.members = members
         self.made = Drawn()
         self.locals: list[tuple[str, Kind, bool]] = []
         self.number = 0
@@ -214,7 +227,7 @@ class Maker:
     def name(self, head: str) -> str:
         """A name of its own."""
         self.number += 1
-        return f"{head}{self.number}"
+        return self.words() if self.words else f"{head}{self.number}"
 
     # --- types ---
 
@@ -274,22 +287,23 @@ class Maker:
             self._elements(word, name, "", length, kind)
             return
         record, other = self.name("r"), self.kind()
+        a, b = self.name("f"), self.name("f")
         if shape == 1:
             self.made.text.append(
-                f"record {record} {{ a : {kind.text}  b : array[{length}] of {other.text} }}"
+                f"record {record} {{ {a} : {kind.text}  {b} : array[{length}] of {other.text} }}"
             )
             self.made.text.append(f"{word} {name} : {record}")
-            leaves = (Leaf(f"{name}.a", kind), *(Leaf(f"{name}.b[{at}]", other) for at in range(length)))
-            self.made.elements.append((word, Elements(f"{name}.b", "", length, other)))
+            leaves = (Leaf(f"{name}.{a}", kind), *(Leaf(f"{name}.{b}[{at}]", other) for at in range(length)))
+            self.made.elements.append((word, Elements(f"{name}.{b}", "", length, other)))
         else:
-            self.made.text.append(f"record {record} {{ a : {kind.text}  b : {other.text} }}")
-            self.made.text.append(f"{word} {name} : array[{length}] of {record}")
-            pairs = ((f"{name}[{at}].a", f"{name}[{at}].b") for at in range(length))
-            leaves = tuple(leaf for a, b in pairs for leaf in (Leaf(a, kind), Leaf(b, other)))
-            self.made.elements += [
-                (word, Elements(name, ".a", length, kind)),
-                (word, Elements(name, ".b", length, other)),
-            ]
+            outer = self.name("r")
+            self.made.text.append(f"record {record} {{ {a} : {kind.text}  {b} : {other.text} }}")
+            self.made.text.append(f"record {outer} {{ {b} : {record} }}")
+            self.made.text.append(f"{word} {name} : array[{length}] of {outer}")
+            pairs = ((f"{name}[{at}].{b}.{a}", f"{name}[{at}].{b}.{b}") for at in range(length))
+            leaves = tuple(leaf for one, two in pairs for leaf in (Leaf(one, kind), Leaf(two, other)))
+            for part, inner in ((a, kind), (b, other)):
+                self.made.elements.append((word, Elements(name, f".{b}.{part}", length, inner)))
         self.made.declared.append(Declared(name, word, leaves))
 
     def _elements(self, word: str, before: str, after: str, length: int, kind: Kind) -> None:
@@ -677,10 +691,10 @@ class Maker:
     def draw(self) -> Drawn:
         """A program of one level."""
         rng, made = self.rng, self.made
-        sizes = (rng.choice((1, 2, 3)), rng.choice((2, 4, 5)))
+        sizes = [(self.name("e"), rng.choice(self.members)) for _ in range(2)]
         self.enums = tuple(
-            Kind("enum", f"e{at}", 0, size - 1, tuple(f"m{at}_{n}" for n in range(size)))
-            for at, size in enumerate(sizes)
+            Kind("enum", name, 0, size - 1, tuple(self.name("m") for _ in range(size)))
+            for name, size in sizes
         )
         made.text += [f"enum {one.text} {{ {', '.join(one.members)} }}" for one in self.enums]
         for word, count in (("input", 3), ("state", 3), ("output", 1)):
@@ -688,10 +702,10 @@ class Maker:
                 self.declare(word)
         if rng.randrange(2):
             self.deferred()
-        for at in range(rng.randrange(3)):
-            condition = self.truth(2)
-            made.text.append(f"assume h{at} monitored : {condition.text}")
-            made.assumptions.append((f"h{at}", condition))
+        for _ in range(rng.randrange(3)):
+            condition, name = self.truth(2), self.name("h")
+            made.text.append(f"assume {name} monitored : {condition.text}")
+            made.assumptions.append((name, condition))
         for _ in range(rng.randint(1, 3)):
             self.procedure()
         self.shown = []
@@ -739,7 +753,7 @@ class Maker:
             f"{word} {', '.join(names)} " if names else ""
             for word, names in zip(("preprocess", "postprocess"), said, strict=True)
         )
-        made.text.append(f"level top {{ period 10 [ms] {before}{chosen} {after}}}")
+        made.text.append(f"level {self.name('level')} {{ period 10 [ms] {before}{chosen} {after}}}")
 
 
 def alike(one: Kind, other: Kind) -> bool:
@@ -866,7 +880,7 @@ def built(drawn: Drawn, name: str) -> Built | tuple[str, ...]:
     if not isinstance(program, Program):
         return tuple(d.code.value for d in program)
     stops = {table.name: tuple(map(AssumptionName, table.stops)) for table in drawn.tables}
-    tables = tuple(replace(table, stops=stops[table.name]) for table in program.tables)
+    tables = tuple(replace(table, stops=stops.get(table.name, ())) for table in program.tables)
     program = replace(program, tables=tables)
     plan = lower(ProvedProgram(program, (), seal_of_proof()))
     files = emit_c(plan) | emit_python(plan)

@@ -1,18 +1,24 @@
 """Fuzzes the whole pipeline with garbage and with mutated tables: only coded errors, no hang, bounded memory.
 
-`python -m tests.fuzz --runs 100000 --seed 1` for a long run; `tests/test_fuzz.py` makes a short one in the suite.
+`python -m tests.fuzz --runs 100000 --seed 1` for a long run; `tests/test_fuzz.py` makes a short one in the suite. With
+`--names` programs of adversarial names, types and docs are emitted, compiled by gcc and clang under the strict flags, imported and run: C,
+Python, interpreter and the evaluator of `tests.differential` agree.
 """
 
 import argparse
 import random
 import re
 import resource
+import shutil
+import subprocess
+import tempfile
 import time
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from rcsc import reserved
 from rcsc.diagnostics.diagnostic import Diagnostic
 from rcsc.emit.c99 import emit_c
 from rcsc.emit.python import emit_python
@@ -21,6 +27,7 @@ from rcsc.model import Program
 from rcsc.prove.options import Options
 from rcsc.prove.program import prove_program
 from rcsc.resolve import compile_text
+from tests import differential
 
 REPO = Path(__file__).parents[1]
 SLOWEST_S = 30.0
@@ -136,12 +143,154 @@ def campaign(runs: int, seed: int) -> tuple[Counter[str], float]:
     return count, slowest
 
 
+# --- names, types and docs ---
+
+STRICT = (
+    "-std=c99",
+    "-O1",
+    "-Wall",
+    "-Wextra",
+    "-Wconversion",
+    "-Wpedantic",
+    "-Wshadow",
+    "-Wtrigraphs",
+    "-Werror",
+)
+OURS = frozenset(
+    """input state output table level procedure module owner extern enum record type unit const use assume invariant property
+    was then reads writes python c bool int real true false and or not implies in mod abs min max if else case for next
+    local call array of period preprocess postprocess by reject clamp deferred until assumed monitored proved assuming when
+    line procedures DEFAULT unreachable rest command_out status_out""".split()
+)
+"""Words of the language, and headings."""
+KEPT = sorted(
+    (
+        reserved.C_KEYWORDS | reserved.C_MACROS | reserved.C_COMPOSED | reserved.C_HEADERS | reserved.PYTHON_KEYWORDS
+        | reserved.PYTHON_BUILTINS | reserved.PYTHON_MEMBERS | reserved.PYTHON_MODULES
+    ) - OURS
+)  # fmt: skip
+ODD = """s v_x x X x_ _x __x __slots__ __init__ _value_ _missing_ State IntEnum copy_in copy_out fault fault_at assumptions_failed ready0
+    i0 w0 given subject chosen more_i INT_MAX EOF E2BIG A I B0 None_ mro self m t t0 do run exact bit32 admit settle init class_x_0 K0_0
+    G0 O0 l1 Il _Bool _Generic __LINE__ _ __ e1 x1e5 f u8 L R lines step cycle name value""".split()  # fmt: skip
+ENDINGS = "_ _2 _line _lines _step _cycle _next _t _0 _1 _LINES _ACTIONS _out __ _K0_0".split()
+DOCS = (
+    "*/ int evil(void); /*",
+    "ends in \\",
+    "??/ ??' ???/",
+    "%s %n",
+    '"""',
+    "''' \\u0041 \\x",
+    "coding: latin-1",
+    "// /* {{ 7 }} {% x %} {# #}",
+    "${HOME} #[[ ]]",
+    "\u202e\u2066 \u0430",
+    "x" * 3000,
+    "cppcheck-suppress all",
+    "#define x",
+)
+
+
+def hostile_words(rng: random.Random) -> Callable[[], str]:
+    """Names, each another: words that something keeps, and what becomes like another name by a prefix, an ending or a case."""
+    given: list[str] = []
+
+    def word() -> str:
+        while True:
+            name = rng.choice(rng.choice((KEPT, ODD)))
+            if given and rng.randrange(2):
+                near = rng.choice(given[-12:])
+                ways = (
+                    near + rng.choice(ENDINGS),
+                    near.upper(),
+                    near.capitalize(),
+                    f"x{near}",
+                    f"run_{near}",
+                    f"do_{near}",
+                    f"_{near}",
+                )
+                name = rng.choice(ways)
+            if name.isidentifier() and name.isascii() and name not in OURS and name not in given:
+                given.append(name)
+                return name
+
+    return word
+
+
+def documented(text: Sequence[str], rng: random.Random) -> list[str]:
+    """The lines, declarations among them with a doc now and then."""
+    heads = ("input ", "state ", "output ", "procedure ", "table ", "level ", "assume ", "record ", "enum ")
+    found = []
+    for line in text:
+        if line.startswith(heads) and rng.randrange(2):
+            found.append(f"## {rng.choice(DOCS)}")
+        found.append(line)
+    return found
+
+
+def named(number: int, seed: int, taken: set[str]) -> differential.Built | tuple[str, ...]:
+    """A drawn program with adversarial names, emitted; the codes where it was refused."""
+    rng = random.Random(f"{seed} {number} names")
+    sizes = (1, 1, 2, 3, 5, 200) if rng.randrange(8) == 0 else (1, 1, 2, 3)
+    drawn = differential.Maker(rng, hostile_words(rng), sizes).draw()
+    drawn.text = documented(drawn.text, rng)
+    own = rng.choice([one for one in (*KEPT, *ODD) if len(one) < 60 and one.lower() not in taken])
+    taken.add(own.lower())
+    return differential.built(drawn, own)
+
+
+def strictly(one: differential.Built, folder: Path, cc: str) -> None:
+    """Compiles the C of one program without a warning."""
+    for path, text in one.files.items():
+        (folder / Path(path).name).write_text(text, encoding="utf-8")
+    command = [cc, *STRICT, "-c", one.symbols["source"], "-o", "strict.o"]
+    ran = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    assert ran.returncode == 0, "\n".join([*ran.stderr.splitlines()[:12], *one.drawn.text])
+
+
+def names_campaign(runs: int, seed: int, compilers: Sequence[str]) -> Counter[str]:
+    """Emits, compiles, imports and runs programs of adversarial names; how many cycles ended how."""
+    told: Counter[str] = Counter()
+    for begin in range(0, runs, differential.BATCH):
+        taken: set[str] = set()
+        batch = {
+            number: named(number, seed, taken)
+            for number in range(begin, min(begin + differential.BATCH, runs))
+        }
+        whole = {number: one for number, one in batch.items() if isinstance(one, differential.Built)}
+        told.update(
+            f"refused {' '.join(sorted(set(one)))}" for one in batch.values() if isinstance(one, tuple)
+        )
+        with tempfile.TemporaryDirectory(prefix="rcsc-names-") as place:
+            for number, one in whole.items():
+                try:
+                    for cc in compilers:
+                        strictly(one, Path(place), cc)
+                except AssertionError as bug:
+                    raise AssertionError(f"program {number} of seed {seed}: {bug}") from bug
+            made = differential.library(list(whole.values()), Path(place), "-O0")
+            for number, one in whole.items():
+                try:
+                    differential.compare(one, made, random.Random(f"{seed} {number} inputs"), told)
+                except Exception as bug:
+                    raise AssertionError(f"program {number} of seed {seed}: {bug}") from bug
+                told["programs"] += 1
+    return told
+
+
 def main() -> None:
     """A long run, by command."""
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument("--runs", type=int, default=10_000)
     arguments.add_argument("--seed", type=int, default=1)
+    arguments.add_argument(
+        "--names", action="store_true", help="adversarial names, types and docs, compiled and run"
+    )
     given = arguments.parse_args()
+    if given.names:
+        told = names_campaign(given.runs, given.seed, [cc for cc in ("gcc", "clang") if shutil.which(cc)])
+        for name, number in sorted(told.items()):
+            print(f"{name:24} {number:9}")
+        return
     count, slowest = campaign(given.runs, given.seed)
     peak_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024
     assert peak_mb < MEMORY_MB, f"{peak_mb} MB"

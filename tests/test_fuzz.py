@@ -3,8 +3,12 @@
 from itertools import product
 from pathlib import Path
 
+import pytest
+
+from rcsc.model import Program
+from rcsc.resolve import compile_text
 from tests import differential
-from tests.fuzz import campaign
+from tests.fuzz import campaign, names_campaign, strictly
 
 
 def test_mutated_tables_and_garbage_give_only_coded_errors() -> None:
@@ -19,6 +23,54 @@ def test_cycles_of_drawn_programs_are_the_same_to_all() -> None:
     told = differential.campaign(count=40, seed=20261122)
     assert told["programs"] > 35
     assert all(told[f"fault {number}"] > 5 for number in (0, 1, 2, 3, 5))
+
+
+@pytest.mark.parametrize("cc", ["gcc", pytest.param("clang", marks=pytest.mark.needs("clang"))])
+def test_programs_of_adversarial_names_compile_load_and_agree(cc: str) -> None:
+    told = names_campaign(runs=12, seed=20261122 + len(cc), compilers=[cc])
+    assert told["programs"] > 8
+    assert told["fault 0"] > 20
+
+
+def test_a_bound_beyond_all_doubles_is_no_bug() -> None:
+    text = "input a : int 0 .. 18446744073709551615\noutput r : real 0.0 .. 1e300\n"
+    power = " * ".join(["a"] * 40)
+    assert isinstance(compile_text(f"{text}procedure p {{ r := real({power}) }}\n"), Program)
+
+
+IDLE = """
+input a : bool
+input n : int 0 .. 9
+input one : array[1] of int 0 .. 3
+output b : bool
+output m : int 0 .. 9
+procedure p {
+  local never_read : int 0 .. 9 := n
+  never_read := 4
+  local kept : int 0 .. 9 := n
+  kept := kept
+  b := b
+  m := m
+  if b = a { m := 1 } else { m := 2 }
+  if b = b { m := 3 }
+  if m = 3 { m := kept }
+  case n { 1 { case m { 2 { m := 1 } else { m := 2 } } } else { } }
+  if one[abs(n) mod 1] = one[0] { }
+}
+procedure none { b := b }
+table t {
+  | line | a || procedures |
+  | x    |   || p; none    |
+}
+level l { period 10 [ms] table t }
+"""
+
+
+@pytest.mark.parametrize("cc", ["gcc", pytest.param("clang", marks=pytest.mark.needs("clang"))])
+def test_what_does_nothing_compiles_without_a_warning(cc: str, tmp_path: Path) -> None:
+    one = differential.built(differential.Drawn(text=IDLE.splitlines()), "idle")
+    assert isinstance(one, differential.Built)
+    strictly(one, tmp_path, cc)
 
 
 ENDS = ("0 .. 255", "0 .. 256", "1 .. 254", "-5 .. 5", "-129 .. 0", "0 .. 65535", "0 .. 65536", "-70000 .. 3", "0 .. 4294967295",

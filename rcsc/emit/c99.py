@@ -24,6 +24,7 @@ from rcsc.model import (
     Program,
     Real,
     Record,
+    Scalar,
     Statement,
     Type,
     Value,
@@ -132,7 +133,8 @@ class _Maker:
         self.plan = plan
         self.program = plan.program
         self.names = names_of(plan.program)
-        self.text = CText(self.names, _failing(plan.program))
+        parameters = {str(one.name): tuple(p.type for p in one.params) for one in plan.program.procedures}
+        self.text = CText(self.names, _failing(plan.program), parameters)
         self.p = self.names.program
         self.cuts: list[Function] = []
         self.bits: set[int] = set()
@@ -233,12 +235,9 @@ class _Maker:
             yield f"    {wide_type(kind)} v_{name} = {constant(kind, 0)};"
         body = list(self.text.block(procedure.body, 1))
         text = "\n".join(body)
-        for name in dict(locals_of(procedure)):
-            if text.count(f"v_{name}") < 2:
+        for name in (*dict(locals_of(procedure)), *(param.name for param in procedure.params)):
+            if not re.search(rf"\bv_{name}\b(?! = )", text):  # set, perhaps, and never read
                 yield f"    (void)v_{name};"
-        for param in procedure.params:
-            if f"v_{param.name}" not in text:
-                yield f"    (void)v_{param.name};"
         yield from body
         if not re.search(r"\bs\b", text):
             yield "    (void)s;"
@@ -486,14 +485,17 @@ class _Maker:
                     return f"({place} ? 1u : 0u)"
                 if low == 0:
                     return place
-                return self.text.converted(f"((int64_t){place} - {integer(low)})", "int64_t", "uint32_t")
+                return self.text.converted(f"({_less(kind, place, low)})", wide_type(kind), "uint32_t")
             case Truth(condition=condition):
                 return f"({self.text.expr(condition)} ? 1u : 0u)"
-            case Coded(leaf=leaf, low=low):
+            case Coded(leaf=leaf, type=kind, low=low):
                 function = self.names.c.fresh(f"{self.p}_class_{name}")
                 self.cuts.append(self._codes(index, function))
-                place = f"(int64_t){self.text.place(leaf)}"
-                return f"{function}({place} - {integer(low)})" if low else f"{function}({place})"
+                place = self.text.place(leaf)
+                if low == 0:
+                    return f"{function}((int64_t){place})"
+                above = self.text.converted(f"({_less(kind, place, low)})", wide_type(kind), "int64_t")
+                return f"{function}{above}" if above.startswith("(") else f"{function}({above})"
             case Cuts():
                 return self._cut(index, name)
 
@@ -767,6 +769,12 @@ def _wrapped(words: list[str], pad: str = "        ", width: int = 96) -> list[s
             now = pad
         now += word + ", "
     return [*lines, now.rstrip().rstrip(",")]
+
+
+def _less(kind: Scalar, place: str, low: int) -> str:
+    """How far a value is above the least of its type, in the type that its values are computed in."""
+    wide = wide_type(kind)
+    return f"({wide}){place} - {f'UINT64_C({low})' if wide == 'uint64_t' else integer(low)}"
 
 
 def _outside(kind: Int | Enum, place: str) -> list[tuple[str, str]]:

@@ -6,7 +6,7 @@ them fit there was proved (`prove.symbolic.word`). Doubles are IEEE binary64 (`F
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from rcsc.emit.names import Names
@@ -104,9 +104,7 @@ def integer(value: int) -> str:
 
 
 def element_path(paths: list[str], index: str) -> str:
-    """The place of an array element by a computed index, from the places of all its elements."""
-    if len(paths) == 1:
-        return paths[0]
+    """The place of an array element by a computed index, from the places of all its elements, at least two."""
     first, second = paths[0], paths[1]
     at = next(i for i, (a, b) in enumerate(zip(first, second, strict=False)) if a != b)
     head = first[: first.rindex("[", 0, at + 1)]
@@ -167,19 +165,28 @@ class CText:
 
     Attributes:
         state: How the struct is reached: `s->`.
+        failing: Procedures after which a fault may stand.
+        parameters: Types of each procedure's parameters.
         helpers: Helper functions that were used.
         reals: Whether an expression was a real.
     """
 
     names: Names
     failing: frozenset[str] = frozenset()
+    parameters: Mapping[str, tuple[Scalar, ...]] = field(default_factory=dict)
     state: str = "s->"
     helpers: set[str] = field(default_factory=set)
     reals: bool = False
+    _nested: int = 0
 
     def place(self, leaf: str) -> str:
         """A leaf."""
         return self.state + self.names.paths[leaf]
+
+    def element(self, leaves: Sequence[str], index: Expr) -> str:
+        """An array element by a computed index, which is not spelled where it can only be 0."""
+        paths = [self.names.paths[leaf] for leaf in leaves]
+        return self.state + (paths[0] if len(paths) == 1 else element_path(paths, self.expr(index)))
 
     def expr(self, expr: Expr) -> str:
         """An expression in the wide type of its kind, parenthesised where needed."""
@@ -192,13 +199,12 @@ class CText:
             case ReadLocal(name=name):
                 return f"v_{name}"
             case Select(leaves=leaves, index=index, type=kind):
-                paths = [self.names.paths[leaf] for leaf in leaves]
-                return self._widened(kind, self.state + element_path(paths, self.expr(index)))
+                return self._widened(kind, self.element(leaves, index))
             case Among(subject=subject, values=values):
-                text, kind = self.expr(subject), subject.type
-                low, high = _c_bounds(subject)
-                able = [v for v in values if isinstance(kind, Real) or low <= v <= high]
-                return "(" + (" || ".join(f"({text} == {constant(kind, v)})" for v in able) or "false") + ")"
+                kind, (low, high) = subject.type, _c_bounds(subject)
+                able = [constant(kind, v) for v in values if isinstance(kind, Real) or low <= v <= high]
+                text = self.expr(subject) if able else ""
+                return "(" + (" || ".join(f"({text} == {value})" for value in able) or "false") + ")"
             case Apply(op=op, args=args, type=kind):
                 return self._applied(op, args, kind)
 
@@ -207,13 +213,13 @@ class CText:
         return text if isinstance(kind, Bool | Real) else f"({wide_type(kind)}){text}"
 
     def _applied(self, op: Op, args: tuple[Expr, ...], kind: Scalar) -> str:
+        if op in _COMPARE and (known := _decided(op, args)) is not None:
+            return constant(Bool(), known)
         texts = [self.expr(arg) for arg in args]
         if op is Op.NOT:
             return f"(!{texts[0]})"
         if op is Op.IMPLIES:
             return f"((!{texts[0]}) || {texts[1]})"
-        if op in _COMPARE and (known := _decided(op, args)) is not None:
-            return constant(Bool(), known)
         if op in (Op.TO_INT, Op.TO_REAL):
             return self.converted(texts[0], wide_type(args[0].type), wide_type(kind))
         if op in (Op.ABS, Op.MIN, Op.MAX):
@@ -302,7 +308,7 @@ class CText:
                 start = constant(kind, 0) if value is None else self.stored(kind, value, wide_type(kind))
                 yield f"{pad}v_{name} = {start};"
             case If(condition=condition, then=then, orelse=orelse):
-                yield f"{pad}if ({self.expr(condition)}) {{"
+                yield f"{pad}if ({self._asked(condition)}) {{"
                 yield from self.block(then, indent + 1)
                 if orelse:
                     yield f"{pad}}} else {{"
@@ -314,6 +320,12 @@ class CText:
                 yield from self._for(statement, indent)
             case Call(procedure=name, args=args):
                 yield pad + self.call(name, args)
+
+    def _asked(self, condition: Expr) -> str:
+        """A condition as it stands in the parentheses of an `if`: `(a == b)` in them looks like a mistyped assignment."""
+        text = self.expr(condition)
+        equal = isinstance(condition, Apply) and condition.op is Op.EQ
+        return text[1:-1] if equal and text.startswith("(") and text[1] not in "(!" else text
 
     def _for(self, loop: For, indent: int) -> Iterator[str]:
         """A loop; one to the last value of its type ends without counting past it."""
@@ -344,30 +356,35 @@ class CText:
 
     def call(self, name: str, args: tuple[Expr, ...] = ()) -> str:
         """A call of a procedure."""
-        given = ["s", *(self.expr(arg) + (" + 0.0" if isinstance(arg.type, Real) else "") for arg in args)]
+        kinds = self.parameters.get(name, tuple(arg.type for arg in args))
+        pairs = zip(kinds, args, strict=True)
+        given = ["s", *(self.stored(kind, arg, wide_type(kind)) for kind, arg in pairs)]
         return f"{self.names.program}_do_{self.names.procedures[name]}({', '.join(given)});"
 
     def _assign(self, statement: Assign) -> str:
         place, value = statement.place, statement.value
         if isinstance(place, ToLeaf):
-            return f"{self.place(place.name)} = {self.stored(place.type, value, c_type(place.type))};"
-        if isinstance(place, ToElement):
-            paths = [self.names.paths[leaf] for leaf in place.leaves]
-            target = self.state + element_path(paths, self.expr(place.index))
-            return f"{target} = {self.stored(place.type, value, c_type(place.type))};"
-        return f"v_{place.name} = {self.stored(place.type, value, wide_type(place.type))};"
+            target, kind = self.place(place.name), c_type(place.type)
+        elif isinstance(place, ToElement):
+            target, kind = self.element(place.leaves, place.index), c_type(place.type)
+        else:
+            target, kind = f"v_{place.name}", wide_type(place.type)
+        given = self.stored(place.type, value, kind)
+        return f"{target} = {given};" if given != target else "/* keeps its value */"
 
     def _case(self, statement: Case, indent: int) -> Iterator[str]:
         pad, subject = "    " * indent, statement.subject
         if not statement.arms:
             yield from self.block(statement.orelse, indent)
             return
+        self._nested += 1
+        name = "subject" if self._nested == 1 else f"subject_{self._nested}"
         word = "if"
         yield f"{pad}{{"
         inner = pad + "    "
-        yield f"{inner}const {wide_type(subject.type)} subject = {self.expr(subject)};"
+        yield f"{inner}const {wide_type(subject.type)} {name} = {self.expr(subject)};"
         for arm in statement.arms:
-            tests = " || ".join(f"(subject == {constant(subject.type, v)})" for v in arm.values) or "false"
+            tests = " || ".join(f"({name} == {constant(subject.type, v)})" for v in arm.values) or "false"
             yield f"{inner}{word} ({tests}) {{"
             yield from self.block(arm.body, indent + 2)
             word = "} else if"
@@ -377,6 +394,7 @@ class CText:
             yield f"{inner}    /* nothing */"
         yield f"{inner}}}"
         yield f"{pad}}}"
+        self._nested -= 1
 
 
 def locals_of(procedure: Procedure) -> Iterator[tuple[str, Scalar]]:

@@ -144,6 +144,14 @@ def compared(scope: Scope, op: Op, pair: tuple[Typed, Typed], span: Span) -> Typ
     return Typed(Apply(op, (left.expr, right.expr), Bool(), span))
 
 
+def _nearest(bound: int) -> float:
+    """The double nearest to a bound; infinite beyond all doubles, where a bound of a bound may lie."""
+    try:
+        return float(bound)
+    except OverflowError:
+        return math.inf if bound > 0 else -math.inf
+
+
 def converted(scope: Scope, op: Op, operand: Typed, span: Span) -> Typed | None:
     """`int(x)` toward zero, or `real(n)` to the nearest double; the unit stays."""
     kind = operand.expr.type
@@ -151,7 +159,7 @@ def converted(scope: Scope, op: Op, operand: Typed, span: Span) -> Typed | None:
         if not isinstance(kind, Int):
             scope.report(Code.KIND, "`real` converts a whole number", span)
             return None
-        converted: Scalar = Real(float(kind.low), float(kind.high), kind.unit)
+        converted: Scalar = Real(_nearest(kind.low), _nearest(kind.high), kind.unit)
     else:
         if not isinstance(kind, Real):
             scope.report(Code.KIND, "`int` converts a real number", span)
