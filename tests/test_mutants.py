@@ -1,5 +1,7 @@
 """Mutants of tables and of the C, each noticed or shown equal; what nobody can decide is a figure and no failure."""
 
+import subprocess
+import sys
 from collections import Counter
 from dataclasses import replace
 from itertools import product
@@ -239,3 +241,31 @@ def test_without_being_asked_no_model_checker_runs_and_no_c_is_mutated(
         assert "matcher = table: " in said
         assert "9 of 9 lines reached" in said
         assert "ESBMC" not in said
+
+
+def test_a_condition_is_not_asked_where_what_stops_the_cycle_fails(tmp_path: Path) -> None:
+    """The matcher then divides by zero, and is not called: nor may the check of the masks call it."""
+    text = """
+input a : int 0 .. 9
+input b : int 0 .. 9
+output o : bool
+assume some monitored : b /= 0
+table t assuming some {
+  | line | a / b || o     |
+  | 1    | > 3   || true  |
+  | 2    | <= 3  || false |
+}
+"""
+    (tmp_path / "quotient.rcs").write_text(text, encoding="utf-8")
+    asked = [
+        "--no-cache",
+        "--no-cortex",
+        "--examples",
+        "20",
+        "--mutants",
+        "2",
+        str(tmp_path / "quotient.rcs"),
+    ]
+    start = "import sys; from rcsc.cli import run; sys.exit(run(sys.argv[1:]))"
+    ran = subprocess.run([sys.executable, "-c", start, "test", *asked], capture_output=True, check=False)
+    assert ran.returncode == 0, ran.stderr

@@ -27,6 +27,7 @@ from pathlib import Path
 from random import Random
 
 from rcsc.children import scratch
+from rcsc.interpret import holds
 from rcsc.model import Box, Program, Real, Table, Variable, key_bounds, real_key, value_of_key
 from rcsc.testing.edges import companions, leaf_edges, relational_tests
 from rcsc.testing.externs import STAND_INS
@@ -309,7 +310,7 @@ class _Checker:
 
     def all(self) -> Checked:
         """Everything."""
-        rows, count = edge_rows(self.program, ROWS)
+        rows, count = edge_rows(self.program, self.table, ROWS)
         tests = relational_tests(self.table)
         self.truths = {at: list(self.run(f"rcsc_test_{at}", count, rows)) for at, _ in enumerate(tests)}
         for number, lookup in enumerate(self.parts.lookups):
@@ -330,8 +331,12 @@ class _Checker:
                 self.wrong.append(f"no table of the matcher looks at `{test.text}`")
 
 
-def edge_rows(program: Program, count: int, seed: int = 1984) -> tuple["array[int]", int]:
-    """Complete states on edges, as words, by seed; half of the leaves beside what they are compared with."""
+def edge_rows(program: Program, table: Table, count: int, seed: int = 1984) -> tuple["array[int]", int]:
+    """Complete states on edges, as words, by seed; half of the leaves beside what they are compared with.
+
+    Where an assumption fails that stops the cycle, a condition may be undefined: such states are left out.
+    """
+    stops = [one.condition for one in program.assumptions if one.name in table.stops]
     random = Random(seed)  # noqa: S311  # repeatable
     edges, near = leaf_edges(program), companions(program)
     rows = array("q")
@@ -343,8 +348,10 @@ def edge_rows(program: Program, count: int, seed: int = 1984) -> tuple["array[in
                 low, high = key_bounds(variable.type)
                 beside = keys[random.choice(others)] + random.choice((-1, 0, 1))
                 keys[variable.name] = min(high, max(low, beside))
-        rows.extend(to_word(v.type, value_of_key(v.type, keys[v.name])) for v in program.variables)
-    return rows, count
+        snapshot = {str(v.name): value_of_key(v.type, keys[v.name]) for v in program.variables}
+        if all(holds(condition, snapshot) for condition in stops):
+            rows.extend(to_word(v.type, snapshot[v.name]) for v in program.variables)
+    return rows, len(rows) // max(1, len(program.variables))
 
 
 def check_matcher(
