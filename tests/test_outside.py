@@ -599,7 +599,7 @@ def chunk(data: bytes, size: int, packed: str, crc: int) -> tuple[int, bytes]:
     return 6, struct.pack("<QQQII", 0, 0, size, crc, len(name)) + name + struct.pack("<Q", len(data)) + data
 
 
-MESSAGES = (struct.pack("<BQ", 5, 22) + bytes(22)) * 1_000_000
+MESSAGES = (struct.pack("<BQ", 5, 22) + bytes(22)) * 400_000
 
 
 BOMBS: Mapping[str, Callable[[], bytes]] = {
