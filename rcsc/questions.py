@@ -1,8 +1,7 @@
 """A region's question as conditions of the model: is there an input at which not one line holds?
 
 In: bounds on forms (by the names of their terms), and lines. Out: expressions whose conjunction
-is to be refuted. Shared by the prover, which asks one solver, and the checker, which asks another; only
-leaves that say they rest on a solver rest on it.
+is to be refuted. The checker of certificates states the same question by itself (`certify.table`).
 
 A bound that no condition can say (a distance between two doubles, in ranks) is left out: the
 question then covers more than the region, so that a refutation still stands.

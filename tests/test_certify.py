@@ -21,7 +21,7 @@ from rcsc.certify.settle import script, values_in
 from rcsc.certify.values import parts_first
 from rcsc.interpret import evaluate, matching_lines
 from rcsc.meaning import digest
-from rcsc.model import Program, Table
+from rcsc.model import AssumptionName, Program, Table
 from rcsc.prove.options import Options
 from rcsc.prove.program import prove_program
 from rcsc.resolve import compile_text
@@ -593,3 +593,46 @@ def test_what_a_condition_tells_of_spans_is_so_wherever_it_holds(condition: str)
                 value, span = values_in(term, cases, 1)[0], spans.span(term)
                 assert span is None or span[0] <= value <= span[1], (term, value, span)
     assert holding
+
+
+# --- assumptions that stop a cycle --------------------------------------------------------
+
+STOPPED = """
+input a : int 0 .. 9
+input b : int 0 .. 9
+state s : int 0 .. 9
+assume nonzero monitored : b /= 0
+assume low monitored : a <= 8
+assume elsewhere monitored : a >= 0
+procedure p { s := a / b }
+table t assuming low, nonzero {
+  | line | a    || procedures |
+  | one  | < 4  || p          |
+  | two  | >= 4 ||            |
+}
+"""
+
+
+def test_safety_is_checked_under_the_assumptions_that_stop_and_no_others() -> None:
+    program = program_of(STOPPED)
+    certificate = certificate_of(program)
+    [entry] = certificate["tables"]
+    assert entry["stops"] == ["nonzero"]
+    found = certify(program, certificate)
+    assert found.whole
+    assert found.rests_on == ("table `t`: a cycle in which `nonzero` fails is stopped",)
+
+    def with_stops(*names: str) -> dict[str, Any]:
+        return signed(program, {**certificate, "tables": [{**entry, "stops": list(names)}]})
+
+    for names in ((), ("low",)):
+        [problem] = certify(program, with_stops(*names)).problems
+        assert problem.startswith("line `one` of table `t`: the divisor is not zero: does not hold where")
+    for names in (("elsewhere",), ("low", "nonzero"), ("nonzero", "nonzero"), ("unknown",)):
+        [problem] = certify(program, with_stops(*names)).problems
+        assert problem.startswith("table `t` cannot stop at")
+    assert certify(program, with_stops("nonzero", "low")).whole  # as executors that stop at both would be
+    executors = {"t": (AssumptionName("nonzero"),)}
+    assert certify(program, certificate, stops=executors).whole
+    for other in (with_stops("nonzero", "low"), with_stops()):
+        assert "stops elsewhere" in certify(program, other, stops=executors).problems[0]

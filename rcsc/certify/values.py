@@ -84,7 +84,7 @@ class Terms:
         sort = BOOL if op in ("=", "<", "<=") else {"int": INT, "real": REAL}.get(op, args[0].sort)
         made = Term(op, args, sort)
         if all(arg.op == "constant" for arg in args):
-            span = spanned(made, [(arg.low, arg.high) for arg in args])
+            span = spanned(made, [spanned(arg, ()) for arg in args])
             if span is not None and span[0] == span[1] and math.isfinite(span[0]):
                 return self.constant(sort, span[0])
         return self._one(made)
@@ -129,7 +129,7 @@ class Terms:
 def spanned(term: Term, spans: Sequence[Span]) -> Span:
     """The span of a term by those of its parts."""
     if term.op in ("constant", "variable"):
-        return term.low, term.high
+        return None if isinstance(term.low, float) and math.isnan(term.low) else (term.low, term.high)
     if term.op in ("not", "and", "or"):
         return _logic(term.op, [TRUTHS if span is None else span for span in spans])
     if term.op == "ite":
