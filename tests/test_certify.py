@@ -625,14 +625,79 @@ def test_safety_is_checked_under_the_assumptions_that_stop_and_no_others() -> No
     def with_stops(*names: str) -> dict[str, Any]:
         return signed(program, {**certificate, "tables": [{**entry, "stops": list(names)}]})
 
-    for names in ((), ("low",)):
+    for names in (tuple[str, ...](), ("low",)):
         [problem] = certify(program, with_stops(*names)).problems
         assert problem.startswith("line `one` of table `t`: the divisor is not zero: does not hold where")
-    for names in (("elsewhere",), ("low", "nonzero"), ("nonzero", "nonzero"), ("unknown",)):
-        [problem] = certify(program, with_stops(*names)).problems
+    for other_names in (("elsewhere",), ("low", "nonzero"), ("nonzero", "nonzero"), ("unknown",)):
+        [problem] = certify(program, with_stops(*other_names)).problems
         assert problem.startswith("table `t` cannot stop at")
     assert certify(program, with_stops("nonzero", "low")).whole  # as executors that stop at both would be
     executors = {"t": (AssumptionName("nonzero"),)}
     assert certify(program, certificate, stops=executors).whole
     for other in (with_stops("nonzero", "low"), with_stops()):
         assert "stops elsewhere" in certify(program, other, stops=executors).problems[0]
+
+
+@pytest.mark.parametrize("cut", [0.5, 4.5, -30, 41, True, None, "4"])
+def test_a_split_is_of_whole_numbers_inside_its_region(cut: Any) -> None:
+    program = program_of(
+        "input a : int 0 .. 9\ntable t {\n| line | a ||\n| one | < 5 ||\n| two | > 5 ||\n}\n"
+    )
+    entry = {"table": "t", "assumptions": [], "stops": [], "columns": ["a"], "forms": [[[0, 1]]]}
+    made = {"format": "rcsc-certificate", "version": 2, "program": "case"}
+    tree = [["s", 0, cut], ["l", 0], ["l", 1]]
+    assert certify(program, signed(program, {**made, "tables": [{**entry, "tree": tree}]})).problems
+    good = program_of("input a : int 0 .. 9\ntable t {\n| line | a ||\n| one | < 5 ||\n| two | >= 5 ||\n}\n")
+    tree = [["s", 0, 4], ["l", 0], ["l", 1]]
+    assert certify(good, signed(good, {**made, "tables": [{**entry, "tree": tree}]})).whole
+
+
+def test_a_region_with_one_point_is_not_empty() -> None:
+    head = "input x : int -5 .. 5\ninput y : int -5 .. 5\ntable t {\n| line | when ||\n| two | x - y < 0 ||\n"
+    entry: dict[str, Any] = {"table": "t", "assumptions": [], "stops": [], "columns": ["x", "y"]}
+    entry["forms"] = [[[0, 1], [1, -1]], [[0, 1]], [[1, 1]]]
+    made = {"format": "rcsc-certificate", "version": 2, "program": "case"}
+    empty = ["e", [[0, -1], [1, 1], [2, -1]]]  # x - y >= 0, x <= 0 and y >= 0 leave the point 0, 0
+    for condition, last, right in (
+        ("x - y >= 0", ["l", 1], True),
+        ("x - y >= 0 and not (x = 0 and y = 0)", empty, False),
+    ):
+        program = program_of(f"{head}| one | {condition} ||\n}}\n")
+        tree = [["s", 0, -1], ["l", 0], ["s", 1, 0], ["s", 2, -1], ["l", 1], last, ["l", 1]]
+        found = certify(program, signed(program, {**made, "tables": [{**entry, "tree": tree}]}))
+        assert found.whole is right, found
+        assert right or "['e'" in found.problems[0]
+
+
+def test_a_condition_of_one_leaf_that_is_undefined_for_some_value_is_certified() -> None:
+    program = program_of(
+        "input a : int 0 .. 9\nassume some monitored : a /= 0\n"
+        "table t assuming some {\n| line | 6 / a ||\n| one | < 2 ||\n| two | >= 2 ||\n}\n"
+    )
+    certificate = certificate_of(program)
+    assert certificate["tables"][0]["columns"] != ["a"]
+    assert certify(program, certificate).whole
+
+
+def test_assumptions_are_shown_to_hold_together_at_values_of_the_types() -> None:
+    program = program_of(STOPPED)
+    certificate = certificate_of(program)
+    [entry] = certificate["tables"]
+    assert certify(
+        program, signed(program, {**certificate, "tables": [{**entry, "witness": {"a": 8, "b": 1}}]})
+    ).whole
+    wrong: list[Any] = [
+        {"a": 9, "b": 1},
+        {"a": 8, "b": 0},
+        {},
+        {"b": 10},
+        {"b": -1},
+        {"b": True},
+        {"b": 1.5},
+        {"b": "1"},
+        None,
+        [1],
+    ]
+    for witness in wrong:
+        made = signed(program, {**certificate, "tables": [{**entry, "witness": witness}]})
+        assert certify(program, made).problems, witness
