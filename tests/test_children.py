@@ -15,6 +15,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
+from concurrent.futures import Future
 from pathlib import Path
 from typing import Any
 
@@ -289,6 +290,31 @@ def test_programs_in_other_threads_are_killed_together(tmp_path: Path) -> None:
     for thread in threads:
         thread.join()
     assert found == [-9, -9]
+
+
+def test_after_an_interrupt_no_program_begins(tmp_path: Path) -> None:
+    ready, begun = tmp_path / "ready", list[int]()
+    os.mkfifo(ready)
+
+    def several() -> None:
+        for at in range(1000):
+            begun.append(at)
+            children.run(["sh", "-c", f"echo > {ready}; sleep 100000"] if at == 0 else ["true"])
+
+    waiting: list[Future[None]] = []
+
+    def interrupted() -> None:
+        with children.searchers(1) as pool:
+            waiting.append(pool.submit(several))
+            ready.read_bytes()
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
+    with pytest.raises(children.WorkerEndedError):
+        waiting[0].result()
+    assert begun == [0, 1]
+    assert children.run(["true"]).status == 0  # what comes later may
 
 
 # --- workers ---

@@ -1,9 +1,7 @@
 """`rcsc promela`: the levels of a system as Promela models, and what Spin finds in them."""
 
-import contextlib
 import os
 from collections import Counter
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -145,7 +143,7 @@ def _check(
 
     click.echo(f"a small instance, no proof: {breadth}")
     broken = 0
-    with _searchers(jobs) as pool:
+    with children.searchers(jobs) as pool:
         waiting = [
             (one, model, pool.submit(check, model, search)) for one, model in _models(made, models, breadth)
         ]
@@ -159,20 +157,6 @@ def _check(
             broken += _say(made, one, model, checked)
     _say_goals(model for _, model, _ in waiting)
     return 1 if broken else 0
-
-
-@contextlib.contextmanager
-def _searchers(jobs: int) -> "Iterator[ThreadPoolExecutor]":
-    """Threads that each wait for a search; an interrupt ends the searches."""
-    pool = ThreadPoolExecutor(jobs)
-    try:
-        yield pool
-    except BaseException:
-        pool.shutdown(wait=False, cancel_futures=True)
-        children.kill_programs()
-        raise
-    finally:
-        pool.shutdown()
 
 
 def _say(made: "Mapping[str, Stepper]", one: "Wanted", model: "Model", checked: "Checked") -> bool:
