@@ -422,3 +422,29 @@ def test_esbmc_knows_nothing_of_what_an_extern_gives(last: int, old: str, new: s
     files = {path: swap(old, new)(text) if path.endswith(".c") else text for path, text in files.items()}
     step = next(target for target in targets(program, symbols) if target.kind == "step")
     assert prove_function(program, symbols, files, step, 30.0).said is said
+
+
+QUOTIENT = """
+input a : int -9 .. 9
+input b : int -9 .. 9
+state c : int 0 .. 9 = 1
+assume some monitored : b /= 0
+output o : bool
+invariant counted : c > 0
+table t assuming some {
+  | line | a / b || o     |
+  | lo   | <= 2  || true  |
+  | hi   | > 2   || false |
+}
+table u {
+  | line | a / c || o     |
+  | lo   | <= 2  || true  |
+  | hi   | > 2   || false |
+}
+"""
+
+
+def test_conditions_are_tested_only_where_they_are_defined() -> None:
+    program = proved_of(QUOTIENT)
+    made = run_suite(program, emitted(program), QUICK)
+    assert made.found == ()

@@ -12,6 +12,7 @@ from typing import Protocol
 
 from rcsc.interpret import Fault, Outcome, cycle, holds, matching_lines, run_table
 from rcsc.model import LineName, Program, Snapshot, Table, Value
+from rcsc.testing.edges import may_be_matched
 from rcsc.testing.externs import begin
 from rcsc.testing.native import Native, Result
 from rcsc.testing.reference_file import all_lines, fault_named, monitored
@@ -202,10 +203,9 @@ def line_number(table: Table, names: Sequence[LineName]) -> int:
 def run_lines(
     executors: Executors, target: Target, snapshots: Sequence[Snapshot], compared: Compared
 ) -> Disagreement | None:
-    """Compares the matchers on snapshots in which no stopping assumption fails; the others may."""
+    """Compares the matchers on snapshots in which the table may be matched; assumptions that only tell may fail."""
     table = executors.program.tables[target.number]
-    stops = [one.condition for one in executors.program.assumptions if one.name in table.stops]
-    snapshots = [one for one in snapshots if all(holds(condition, one) for condition in stops)]
+    snapshots = [one for one in snapshots if may_be_matched(executors.program, table, one)]
     number = executors.number(target)
     in_c = executors.native.run(number, WHOLE, snapshots)
     reference = executors.native.run(number + 1, WHOLE, snapshots)

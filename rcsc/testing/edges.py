@@ -6,6 +6,7 @@ In: a program. Out: keys (see `rcsc.model`) and readings outside the declared ra
 from collections.abc import Iterable, Iterator, Mapping
 from math import inf, nan
 
+from rcsc.interpret import holds
 from rcsc.model import (
     Among,
     Apply,
@@ -25,6 +26,7 @@ from rcsc.model import (
     Real,
     Scalar,
     Select,
+    Snapshot,
     Statement,
     Table,
     TableByCommand,
@@ -202,3 +204,10 @@ def outside(kind: Scalar) -> tuple[Value, ...]:
     least, greatest = representable(kind)
     strange = {k for k in (least, low - 1, high + 1, greatest) if not low <= k <= high}
     return tuple(sorted(k for k in strange if least <= k <= greatest))
+
+
+def may_be_matched(program: Program, table: Table, snapshot: Snapshot) -> bool:
+    """Whether the table's conditions are defined: the invariants hold, and no stopping assumption fails."""
+    rests = [one.condition for one in program.invariants]
+    rests += [one.condition for one in program.assumptions if one.name in table.stops]
+    return all(holds(condition, snapshot) for condition in rests)

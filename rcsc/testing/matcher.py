@@ -27,9 +27,8 @@ from pathlib import Path
 from random import Random
 
 from rcsc.children import scratch
-from rcsc.interpret import holds
 from rcsc.model import Box, Program, Real, Table, Variable, key_bounds, real_key, value_of_key
-from rcsc.testing.edges import companions, leaf_edges, relational_tests
+from rcsc.testing.edges import companions, leaf_edges, may_be_matched, relational_tests
 from rcsc.testing.externs import STAND_INS
 from rcsc.testing.matcher_c import self_test_c
 from rcsc.testing.matcher_text import EVERY_KEY, Component, Lookup, MatcherText, ShapeError, matcher_text
@@ -334,12 +333,11 @@ class _Checker:
 def edge_rows(program: Program, table: Table, count: int, seed: int = 1984) -> tuple["array[int]", int]:
     """Complete states on edges, as words, by seed; half of the leaves beside what they are compared with.
 
-    Where an assumption fails that stops the cycle, a condition may be undefined: such states are left out.
+    Those in which the table's conditions may be undefined are left out.
     """
-    stops = [one.condition for one in program.assumptions if one.name in table.stops]
     random = Random(seed)  # noqa: S311  # repeatable
     edges, near = leaf_edges(program), companions(program)
-    rows = array("q")
+    rows, kept = array("q"), 0
     for _ in range(count):
         keys = {str(v.name): random.choice(edges[v.name]) for v in program.variables}
         for variable in program.variables:
@@ -348,10 +346,11 @@ def edge_rows(program: Program, table: Table, count: int, seed: int = 1984) -> t
                 low, high = key_bounds(variable.type)
                 beside = keys[random.choice(others)] + random.choice((-1, 0, 1))
                 keys[variable.name] = min(high, max(low, beside))
-        snapshot = {str(v.name): value_of_key(v.type, keys[v.name]) for v in program.variables}
-        if all(holds(condition, snapshot) for condition in stops):
-            rows.extend(to_word(v.type, snapshot[v.name]) for v in program.variables)
-    return rows, len(rows) // max(1, len(program.variables))
+        state = {str(v.name): value_of_key(v.type, keys[v.name]) for v in program.variables}
+        if may_be_matched(program, table, state):
+            kept += 1
+            rows.extend(to_word(v.type, state[v.name]) for v in program.variables)
+    return rows, kept
 
 
 def check_matcher(
