@@ -15,7 +15,6 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
-from concurrent.futures import Future
 from pathlib import Path
 from typing import Any
 
@@ -301,7 +300,7 @@ def test_after_an_interrupt_no_program_begins(tmp_path: Path) -> None:
             begun.append(at)
             children.run(["sh", "-c", f"echo > {ready}; sleep 100000"] if at == 0 else ["true"])
 
-    waiting: list[Future[None]] = []
+    waiting: list[Any] = []
 
     def interrupted() -> None:
         with children.searchers(1) as pool:
@@ -383,7 +382,6 @@ BEGIN = {"subprocess", "tempfile", "pty", "multiprocessing", "concurrent.futures
 ALLOWED = {
     ("rcsc/system/block.py", "multiprocessing"),  # shared memory, no process
     ("rcsc/system/processes.py", "multiprocessing"),  # a type
-    ("rcsc/cli/promela.py", "concurrent.futures"),  # threads
     ("sim/campaign/crew.py", "concurrent.futures"),  # the classes of executors and what they raise
     ("sim/campaign/runner.py", "concurrent.futures"),
     ("sim/campaign/counterexamples.py", "concurrent.futures"),
