@@ -1,17 +1,20 @@
 """Levels of which something false was once proved: each is as small as shows it, and the interpreter is the judge."""
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
+from random import Random
 
 import pytest
 
 from rcsc.cli import run
 from rcsc.compose.agreed import agreements
+from rcsc.compose.claims import FOUND, SAFE, Claim, Key, closed
 from rcsc.compose.ends import Ending
 from rcsc.compose.finding import of_trace
 from rcsc.compose.frozen import BadCaseError, case_breaks, read_case
-from rcsc.compose.goals import Sort
+from rcsc.compose.goals import Sort, unlooked
 from rcsc.compose.lap import Lap, laps
 from rcsc.compose.level import LevelProof, Verdict, prove_level
 from rcsc.compose.look import Looking, look
@@ -352,7 +355,8 @@ SOLO = 'name = "one"\ngenerated = ".rcsc-cache/g"\ndata = "system.toml"\ntick_ms
 
 
 def solo(folder: Path, text: str) -> Path:
-    """A system of one level without neighbours."""
+    """A system of one level without neighbours, a project of its own."""
+    (folder / "rcsc.toml").write_text('name = "one"\nexclude = []\n', encoding="utf-8")
     (folder / "system.toml").write_text(SOLO, encoding="utf-8")
     (folder / "solo.rcs").write_text(text, encoding="utf-8")
     return folder / "system.toml"
@@ -441,7 +445,7 @@ def test_a_case_that_says_what_no_extern_procedure_gives_is_none(tmp_path: Path)
     for wrong in (["ext", []], ["one", [1]], ["ext", ["x"]], ["ext", [None]], "ext"):
         form["answers"][0]["solo"] = [wrong]
         case.write_text(json.dumps(form), encoding="utf-8")
-        with pytest.raises(BadCaseError, match="extern procedure that gives"):
+        with pytest.raises(BadCaseError, match=r"extern procedure that gives|no frozen finding"):
             case_breaks(read_case(case))
 
 
@@ -461,3 +465,264 @@ def test_a_new_command_whose_line_is_cut_short_is_passed_over(tmp_path: Path) ->
     assert found.steps[-1].fault is Fault.EXTERN
     finding = of_trace(stepper, goal, found)
     assert finding.ticks[-1]["lower"].line == "4"  # done, though it never began
+
+
+# --- what verdicts rest on -------------------------------------------------------------------------
+
+
+FAILS = """enum st {{ a, f_state }}
+input go : bool
+state cur_state : st
+state n : int 0 .. 9
+invariant never_failed : cur_state /= f_state
+assume small monitored : n <= 9 or go
+property never_ten : n /= 10
+procedure step {{ if cur_state = f_state {{ n := {step} }} }}
+table t assuming small {{
+  | line | go    || procedures |
+  |------|-------||------------|
+  | yes  | true  || step       |
+  | no   | false || step       |
+}}
+level solo {{ period 40 [ms] table t }}
+"""
+
+
+@pytest.mark.parametrize(("step", "rests"), [("n + 1", True), ("min(n + 1, 9)", False)])
+def test_what_is_safe_only_under_an_invariant_falls_with_it(step: str, rests: bool, tmp_path: Path) -> None:
+    """A restart breaks the invariant: then the counter leaves its range, if only the invariant kept it there."""
+    path = solo(tmp_path, FAILS.format(step=step))
+    whole = prove_system(path, LITTLE)
+    broken: Key = (Sort.INVARIANT, "", "never_failed")
+    assert whole.of("solo", broken).verdict is Verdict.NOT_PROVED
+    for key in [(Sort.ASSUMPTION, "t", "small"), (Sort.PROPERTY, "", "never_ten"), (Sort.ONE_LINE, "t", "")]:
+        found = whole.of("solo", key)
+        assert found.found
+        assert found.proved is not rests
+        assert found.lacks == ((("solo", broken),) if rests else ())
+
+
+def test_what_a_restart_breaks_is_not_proved_anywhere(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = solo(tmp_path, FAILS.format(step="n + 1"))
+    assert run(["prove", str(path), "--trace", "0"]) == 1
+    said = capsys.readouterr().out
+    assert re.search(r"small +monitored: rests on invariant `never_failed`", said)
+    assert re.search(r"never_ten +rests on invariant `never_failed`", said)
+    assert run(["check", str(tmp_path / "solo.rcs")]) == 0
+    assert "level `solo` is not proved" in (checked := capsys.readouterr().out)
+    assert "kept by the levels together" not in checked
+
+
+def within(text: str) -> str:
+    """The preprocess breaks the invariant, and the postprocess mends it: in between the index is outside."""
+    return f"""state at : int 0 .. 9
+state list : array[4] of int 0 .. 9
+input go : bool
+invariant inside : at <= 3
+module break_it reads go writes at {{ at := {text} }}
+module mend_it writes at {{ at := 0 }}
+procedure use {{ list[at] := 1 }}
+table t {{
+  | line | go    || procedures |
+  |------|-------||------------|
+  | yes  | true  || use        |
+  | no   | false ||            |
+}}
+level solo {{ period 40 [ms] preprocess break_it table t postprocess mend_it }}
+"""
+
+
+@pytest.mark.parametrize(("text", "safe"), [("9", False), ("3", True)])
+def test_an_invariant_that_is_broken_within_a_cycle_keeps_nothing_safe(
+    text: str, safe: bool, tmp_path: Path
+) -> None:
+    whole = prove_system(solo(tmp_path, within(text)), LITTLE)
+    assert whole.of("solo", (Sort.INVARIANT, "", "inside")).found
+    assert whole.of("solo", SAFE).found is safe
+    assert whole.of("solo", (Sort.ONE_LINE, "t", "")).proved is safe
+
+
+def test_a_fault_of_one_level_shows_in_the_verdicts_of_its_neighbours(tmp_path: Path) -> None:
+    """Behind it nobody knows what the level orders."""
+    path = changed(
+        tmp_path,
+        upper=lambda text: text.replace(
+            "| 4    | false               |       | go ", "| 4    | false               | true  | go "
+        ),
+    )
+    text = (tmp_path / "upper.rcs").read_text(encoding="utf-8")
+    (tmp_path / "upper.rcs").write_text(
+        "\n".join(line for line in text.split("\n") if "| 7 " not in line), encoding="utf-8"
+    )
+    whole = prove_system(path, LITTLE)
+    lost = ("upper", (Sort.SOME_LINE, "work", ""))
+    assert whole.closed[lost].verdict is Verdict.NOT_PROVED
+    assert lost in whole.of("lower", (Sort.ECHOES, "", "report")).lacks
+    assert not whole.whole
+
+
+def test_claims_close_over_what_they_rest_on() -> None:
+    """Against the meaning: proved is what reaches nothing that is not found, by any way through the claims."""
+    random = Random(7)  # noqa: S311  # repeatable on purpose
+    for _ in range(300):
+        needs = [("level", ("sort", "", str(at))) for at in range(7)]
+        made = {
+            need: Claim(
+                random.choice(
+                    (
+                        Verdict.PROVED,
+                        Verdict.PROVED,
+                        Verdict.PROVED,
+                        Verdict.TRUSTED,
+                        Verdict.NOT_PROVED,
+                        Verdict.UNDECIDED,
+                    )
+                ),
+                tuple(random.sample(needs, random.choice((0, 1, 1, 2)))),
+                (need[1][2],) if random.random() < 0.2 else (),
+            )
+            for need in needs[: random.randint(4, 7)]
+        }
+        for need, found in closed(made).items():
+            reached, waiting = set(), [need]
+            while waiting:
+                one = waiting.pop()
+                if one not in reached:
+                    reached.add(one)
+                    waiting += made[one].rests_on if one in made else ()
+            bad = {one for one in reached if one not in made or made[one].verdict not in FOUND}
+            assert found.proved == (not bad)
+            assert set(found.lacks) == bad - {need}
+            assert set(found.trusts) == {text for one in reached if one in made for text in made[one].trusts}
+
+
+# --- what the tables say of what comes from outside ------------------------------------------------
+
+
+BELIEVES = """input x : bool
+state y : bool
+assume never assumed : {says}
+property stays : not y
+table t assuming never {{
+  | line | x    || y    |
+  |------|------||------|
+  | 1    | true || true |
+  | 2    | false||      |
+}}
+level solo {{ period 40 [ms] table t }}
+"""
+
+
+def test_what_is_assumed_of_an_input_is_used_and_named_in_every_verdict(tmp_path: Path) -> None:
+    whole = prove_system(solo(tmp_path, BELIEVES.format(says="not x or y")), LITTLE)
+    assert whole.of("solo", (Sort.ASSUMPTION, "t", "never")).verdict is Verdict.TRUSTED
+    stays = whole.of("solo", (Sort.PROPERTY, "", "stays"))
+    assert stays.proved
+    assert stays.trusts == ("assumption `never` of level `solo`, as it is declared",)
+    assert whole.proved
+
+
+def test_what_is_assumed_of_state_alone_is_to_be_proved(tmp_path: Path) -> None:
+    """The level itself decides it, so that nobody has to believe it: and it may be wrong."""
+    path = solo(tmp_path, BELIEVES.format(says="not y"))
+    made, whole = steppers(path), prove_system(path, LITTLE)
+    assert whole.of("solo", (Sort.ASSUMPTION, "t", "never")).verdict is Verdict.NOT_PROVED
+    told = [
+        one for one in look(made, whole, Looking(description(path), 4)) if one.goal.sort is Sort.ASSUMPTION
+    ]
+    assert [(one.finding is not None, one.beside) for one in told] == [(True, ())]
+
+
+# --- what is not recognised ------------------------------------------------------------------------
+
+
+UNREAD = {
+    "the flag": ("new_command", "fresh", "lower", {Sort.ONCE, Sort.ANSWERED}),
+    "the number": ("inc_command(?=_echo|_seen|)", "serial", "lower", {Sort.PROTOCOL}),
+    "the command": ("input_command", "wanted", "lower", {Sort.PROTOCOL}),
+    "the echo": ("ref_command_echo", "answering", "lower", {Sort.PROTOCOL}),
+}
+
+
+@pytest.mark.parametrize("part", UNREAD)
+def test_no_goal_is_left_out_because_of_a_name(part: str, tmp_path: Path) -> None:
+    old, new, level, sorts = UNREAD[part]
+
+    def renamed(text: str) -> str:
+        return re.sub(rf"\b{old}", new, text)
+
+    edits = {"words": renamed} if part != "the flag" else {}
+    path = changed(tmp_path, lower=renamed, upper=renamed, **edits)
+    whole = prove_system(path, LITTLE)
+    left = next(one for one in whole.levels if one.level == level).unlooked
+    assert {one.sort for one in left} >= sorts
+    assert not whole.whole
+    assert run(["prove", str(path), "--trace", "0", "--strict", "--no-cache"]) == 1
+
+
+def test_a_flag_is_looked_for_in_every_cell(tmp_path: Path) -> None:
+    """In an expression it is looked for as well as in a column of its own."""
+    path = changed(
+        tmp_path, lower=lambda text: text.replace("| line | new_command |", "| line | not not new_command |")
+    )
+    stepper = steppers(path)["lower"]
+    assert unlooked(stepper) == ()
+
+
+# --- what is found of lines ------------------------------------------------------------------------
+
+
+ONCE_ONLY = """input go : bool
+state begun : bool
+output o : bool
+procedure begin { begun := true }
+enum step { one, two, never }
+state now : step
+table t {
+  | line  | begun | now      || procedures | o     |
+  |-------|-------|----------||------------|-------|
+  | first | false |          || begin      | true  |
+  | later | true  | /= never ||            | false |
+  | spare | true  | never    ||            | false |
+}
+level solo { period 40 [ms] table t }
+"""
+
+
+def test_a_line_that_only_the_first_cycle_runs_is_reached_and_a_state_that_nothing_enters_is_not(
+    tmp_path: Path,
+) -> None:
+    whole = prove_system(solo(tmp_path, ONCE_ONLY), LITTLE)
+    seen = whole.levels[0].context
+    assert seen is not None
+    assert (seen.unreached, seen.unsure) == ((("t", "spare"),), ())
+
+
+def test_a_fourth_status_answers_nothing(tmp_path: Path) -> None:
+    def waits(text: str) -> str:
+        text = text.replace(
+            "| 4    | false       | /= going  |       ||                | done       |",
+            "| 4    | false       | /= going  |       ||                | waits      |",
+        )
+        return text.replace(
+            "procedure done", "procedure waits {\n  status_report := waiting\n}\n\nprocedure done", 1
+        )
+
+    path = changed(
+        tmp_path, lower=waits, words=swap("done, executing, failed }", "done, executing, failed, waiting }")
+    )
+    proof = prove_level(steppers(path)["lower"], LITTLE)
+    assert "4" in ending(proof, "go").endless
+
+
+def test_a_table_of_several_commands_is_one_goal(tmp_path: Path) -> None:
+    """Or the verdict of one command would stand for that of the other."""
+    path = changed(
+        tmp_path,
+        words=swap("{ pause, go }", "{ pause, go, run }"),
+        lower=swap("    go : go\n", "    go : go\n    run : go\n"),
+    )
+    keys = [goal.key for goal, _ in prove_level(steppers(path)["lower"], LITTLE).found]
+    assert len(keys) == len(set(keys))

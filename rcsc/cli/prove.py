@@ -70,12 +70,14 @@ Examples:
 @click.option("--certify", "confirms", is_flag=True,
               help="Put the same questions to cvc5, which has no part in the proof.")  # fmt: skip
 @click.option("--no-cache", is_flag=True, help="Prove everything anew.")
+@click.option("--strict", is_flag=True,
+              help="Exit status 1 also where something was not looked at, or rests on what is not proved.")  # fmt: skip
 @click.option("--invariants", is_flag=True, help="Print the invariant of each level, too.")
 @click.option("--json", "as_json", is_flag=True, help="The result as JSON.")
 def prove(  # noqa: PLR0913, PLR0917  # as many as there are options
     system: Path | None, only: tuple[str, ...], steps: int, jobs: int, cycles: int, logs: Path | None,
     freeze: Path | None, cases: tuple[Path, ...], without_deferral: bool, first_match: bool, without_default: bool,
-    certificate: Path | None, confirms: bool, no_cache: bool, invariants: bool, as_json: bool,
+    certificate: Path | None, confirms: bool, no_cache: bool, strict: bool, invariants: bool, as_json: bool,
 ) -> int:  # fmt: skip
     """Prove that the levels of SYSTEM work together, however late each sees and answers what another says.
 
@@ -115,10 +117,12 @@ def prove(  # noqa: PLR0913, PLR0917  # as many as there are options
         made = {level: one.of(VARIANTS[name](one.program)) for level, one in made.items()}
     effort = Effort(limits=Limits.of(steps))
     cache = None if no_cache else open_cache(path.parent)
-    proof = prove_steppers(made, effort, jobs, only or tuple(made), None if as_json else _say_level, cache)
+    proof = prove_steppers(made, effort, jobs, only or tuple(made), None, cache)
     if certificate is not None:
         _write(certificate, made, proof)
     if not as_json:
+        for one in proof.levels:
+            _say_level(proof, one)
         if invariants:
             _say_invariants(proof)
         _say_agreements(proof)
@@ -131,7 +135,7 @@ def prove(  # noqa: PLR0913, PLR0917  # as many as there are options
     refused = _refused(made, proof, quiet=as_json) if confirms else []
     if refused or any(one.bug for one in told):
         return 3
-    return 0 if proof.proved else 1
+    return 0 if proof.whole or (proof.proved and not strict) else 1
 
 
 def _refused(made: "dict[str, Stepper]", proof: "SystemProof", *, quiet: bool) -> list[str]:
@@ -154,41 +158,42 @@ def _refused(made: "dict[str, Stepper]", proof: "SystemProof", *, quiet: bool) -
     return refused
 
 
-def _say_level(proof: "LevelProof") -> None:
-    """One level: its assumptions first, then what else is proved of it."""
-    from rcsc.cli.proved import in_context
+def _say_level(whole: "SystemProof", proof: "LevelProof") -> None:
+    """One level: its assumptions first, then what else is proved of it, each with what it rests on that is not."""
+    from rcsc.cli.proved import in_context, not_looked_at, standing, trusting
     from rcsc.compose.goals import Sort
-    from rcsc.compose.level import Verdict, besides
+    from rcsc.compose.level import besides
 
     found_before = ", by an earlier run" if proof.cached else ""
     click.echo(click.style(f"level {proof.level}", bold=True) + f"  {proof.seconds:.1f} s{found_before}")
     for sort in Sort:
-        found = [(goal, verdict) for goal, verdict in proof.found if goal.sort is sort]
+        found = [goal for goal, _ in proof.found if goal.sort is sort]
         if sort is Sort.ASSUMPTION:
-            for goal, verdict in found:
-                standing = (
-                    "proved"
-                    if verdict is Verdict.PROVED
-                    else f"monitored: {verdict.value} of the levels together"
-                )
-                click.echo(f"  {goal.table:28} {goal.name:24} {standing}")
+            for goal in found:
+                said = standing(whole, proof.level, goal.key)
+                monitored = "" if whole.of(proof.level, goal.key).proved else "monitored: "
+                together = " of the levels together" if said in {"not proved", "undecided"} else ""
+                click.echo(f"  {goal.table:28} {goal.name:24} {monitored}{said}{together}")
         elif sort in {Sort.INVARIANT, Sort.PROPERTY}:
-            for goal, verdict in found:
-                click.echo(f"  {sort.value:28} {goal.name:24} {verdict.value}")
+            for goal in found:
+                click.echo(f"  {sort.value:28} {goal.name:24} {standing(whole, proof.level, goal.key)}")
         elif found:
             beside = [goal.name for goal in besides(proof) if goal.sort is sort]
-            good = sum(1 for _, verdict in found if verdict is Verdict.PROVED)
-            click.echo(f"  {sort.value}: {good} of {len(found) - len(beside)} proved")
-            for goal, verdict in found:
-                if verdict is not Verdict.PROVED and goal.name not in beside:
-                    click.echo(f"    {goal.table or goal.name}: {verdict.value}")
+            good = [goal for goal in found if whole.of(proof.level, goal.key).proved]
+            trusts = trusting(whole, proof.level, [goal.key for goal in good])
+            click.echo(f"  {sort.value}: {len(good)} of {len(found) - len(beside)} proved{trusts}")
+            for goal in found:
+                if goal not in good and goal.name not in beside:
+                    click.echo(f"    {goal.table or goal.name}: {standing(whole, proof.level, goal.key)}")
             if beside:
                 click.echo(f"    beside the number, so that nobody relies on it: {', '.join(beside)}")
+    for line in not_looked_at(proof):
+        click.echo(f"  {line}")
     many = len(proof.clauses)
     click.echo(
         f"  invariant: {many} clauses over {len(proof.features)} features; {proof.walked} states walked, {proof.learnt} learnt"
     )
-    for line in in_context(proof):
+    for line in in_context(whole, proof):
         click.echo(f"  {line}")
 
 
@@ -202,17 +207,23 @@ def _say_invariants(proof: "SystemProof") -> None:
 
 
 def _say_whole(made: "dict[str, Stepper]", proof: "SystemProof") -> None:
-    from rcsc.cli.proved import assumptions, reaction
+    from rcsc.cli.proved import assumptions, left_out, reaction, trusted
 
-    for line in (*reaction(made, proof), assumptions(proof), f"{proof.seconds:.1f} s in all"):
+    for line in (*reaction(made, proof), assumptions(proof), *trusted(proof), *left_out(proof)):
         click.echo(line)
+    click.echo(f"{proof.seconds:.1f} s in all")
 
 
 def _say_agreements(proof: "SystemProof") -> None:
+    from rcsc.cli.proved import named
+    from rcsc.compose.claims import CONTRACT
+
     if proof.agreements:
         click.echo("between the levels")
     for one in proof.agreements:
-        standing = "kept by: " if one.outside else "" if one.holds else "NOT "
+        lacks = named(proof, one.level, proof.of(one.level, (CONTRACT, "", one.record)).lacks)
+        standing = "kept by: " if one.outside else "NOT " if not one.holds else ""
+        standing += f"only if {lacks}: " if one.holds and lacks else ""
         click.echo(f"  {one.level} assumes that {one.assumed}")
         click.echo(f"    {standing}{one.reason}")
 
@@ -405,10 +416,11 @@ def _write(folder: Path, made: "dict[str, Stepper]", proof: "SystemProof") -> No
 
 
 def _as_json(proof: "SystemProof", made: "dict[str, Stepper]", told: "list[Told]") -> dict[str, Any]:
-    from rcsc.cli.proved import as_json
+    from rcsc.cli.proved import as_json, claim
 
     return {
         "proved": proof.proved,
+        "whole": proof.whole,
         "findings": [_told_as_json(made, one) for one in told],
         "levels": [
             {
@@ -418,12 +430,16 @@ def _as_json(proof: "SystemProof", made: "dict[str, Stepper]", told: "list[Told]
                         "what": goal.sort.value,
                         "table": goal.table,
                         "name": goal.name,
-                        "verdict": verdict.value,
+                        **claim(proof, one.level, goal.key),
                     }
-                    for goal, verdict in one.found
+                    for goal, _ in one.found
+                ],
+                "not_looked_at": [
+                    {"what": each.sort.value, "table": each.table, "missing": each.missing}
+                    for each in one.unlooked
                 ],
                 "clauses": len(one.clauses),
-                **as_json(one),
+                **as_json(proof, one),
             }
             for one in proof.levels
         ],

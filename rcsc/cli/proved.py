@@ -4,8 +4,10 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
+    from rcsc.compose.claims import Key, Need
+    from rcsc.compose.context import Context
     from rcsc.compose.ends import Ending
     from rcsc.compose.level import LevelProof
     from rcsc.compose.rounds import Counted
@@ -13,20 +15,104 @@ if TYPE_CHECKING:
     from rcsc.compose.transition import Stepper
 
 
-def in_context(proof: "LevelProof") -> Iterator[str]:
-    """Of one level, line by line; nothing where something is not proved."""
+MOST_NAMED = 3
+"""Claims that are named of those that a verdict rests on; then how many more."""
+
+
+def standing(whole: "SystemProof", level: str, key: "Key") -> str:
+    """The verdict of a claim: `proved`, what it rests on that is not proved, or why it is not found itself."""
+    found = whole.of(level, key)
+    if found.proved:
+        if found.verdict.value != "proved":
+            return f"{found.verdict.value}, as the tables declare it"
+        return f"proved{trusting(whole, level, [key])}"
+    return found.verdict.value if not found.found else f"rests on {named(whole, level, found.lacks)}"
+
+
+def trusting(whole: "SystemProof", level: str, keys: "Sequence[Key]") -> str:
+    """The assumptions that these verdicts trust, as the tables declare them; empty for none."""
+    told = {one for key in keys for one in whole.of(level, key).trusts if one.startswith("assumption ")}
+    return (
+        f", trusting {', '.join(sorted(one.removesuffix(', as it is declared') for one in told))}"
+        if told
+        else ""
+    )
+
+
+def named(whole: "SystemProof", level: str, needs: "Sequence[Need]") -> str:
+    """Claims in words."""
+    from rcsc.compose.claims import spelled
+
+    more = f" and {len(needs) - MOST_NAMED} more" if len(needs) > MOST_NAMED else ""
+    return "; ".join(spelled(need, level, whole.closed) for need in needs[:MOST_NAMED]) + more
+
+
+def not_looked_at(proof: "LevelProof") -> Iterator[str]:
+    """Goals that could not be stated."""
+    for one in proof.unlooked:
+        yield f"not looked at: {one.shown}"
+
+
+def in_context(whole: "SystemProof", proof: "LevelProof") -> Iterator[str]:
+    """Of one level, line by line."""
+    from rcsc.compose.claims import UNREACHED
+    from rcsc.compose.goals import Sort
+
     seen = proof.context
     if seen is None:
+        yield "not looked at, as something is not proved: lines never reached, what lines do when they match again, whether commands end"
         return
-    lines = ", ".join(f"{table} {line}" for table, line in seen.unreached)
-    yield f"lines never reached here: {lines or 'none'}"
-    again = "; ".join(f"{one.table} {one.line}: {', '.join(one.leaves)}" for one in seen.repeated)
-    yield f"what a line does when it matches again before its order is echoed: {again or 'nothing'}"
-    if seen.restless:
-        yield "order after order may be given on inputs that stay the same"
+    never = [(" ".join(at), standing(whole, proof.level, (UNREACHED, *at))) for at in seen.unreached]
+    good = ", ".join(name for name, said in never if said == "proved")
+    yield f"lines never reached here: {good or 'none'}"
+    yield from (f"  {name}: {said}" for name, said in never if said != "proved")
+    if seen.unsure:
+        yield f"not shown whether reached: {', '.join(' '.join(at) for at in seen.unsure)}"
+    if seen.orders:
+        yield from _again(whole, proof.level, seen)
     if proof.endings:
         yield "given that every order that is not replaced is answered some time, and stays so,"
-        yield from (f"  {one.table} {_ends(one)}" for one in proof.endings)
+        for one in proof.endings:
+            found = whole.of(proof.level, (Sort.ENDS, one.table, ""))
+            only = (
+                f"; rests on {named(whole, proof.level, found.lacks)}" if one.proved and found.lacks else ""
+            )
+            yield f"  {one.table} {_ends(one)}{only}"
+
+
+def _again(whole: "SystemProof", level: str, seen: "Context") -> Iterator[str]:
+    """What lines do that match again; of a level that gives no orders there is nothing to say."""
+    from rcsc.compose.claims import AGAIN
+
+    again = "; ".join(f"{one.table} {one.line}: {', '.join(one.leaves)}" for one in seen.repeated)
+    rests = "" if seen.repeated or seen.restless else standing(whole, level, (AGAIN, "", ""))
+    only = f" ({rests})" if rests not in {"", "proved"} else ""
+    yield f"what a line does when it matches again before its order is echoed: {again or 'nothing'}{only}"
+    if seen.restless:
+        yield "order after order may be given on inputs that stay the same"
+
+
+def trusted(whole: "SystemProof") -> Iterator[str]:
+    """What is taken for granted that no level is responsible for."""
+    every = sorted({one for found in whole.closed.values() for one in found.trusts})
+    if every:
+        yield "taken for granted"
+        yield from (f"  {one}" for one in every)
+
+
+def left_out(whole: "SystemProof") -> Iterator[str]:
+    """That it is not wholly proved, and why, where no finding says so."""
+    if whole.whole or not whole.proved:
+        return
+    unlooked = sum(len(one.unlooked) for one in whole.levels)
+    rests = sum(found.found and not found.proved for found in whole.closed.values())
+    ends = sum(not one.proved for level in whole.levels for one in level.endings)
+    said = [
+        f"{unlooked} not looked at" if unlooked else "",
+        f"{rests} rest on what is not known" if rests else "",
+        f"{ends} not shown to end" if ends else "",
+    ]
+    yield f"not wholly proved: {', '.join(one for one in said if one)}"
 
 
 def _ends(one: "Ending") -> str:
@@ -52,28 +138,33 @@ def _counted(one: "Counted") -> str:
 def assumptions(proof: "SystemProof") -> str:
     """How many there are, and how they stand."""
     from rcsc.compose.goals import Sort
-    from rcsc.compose.level import Verdict
 
-    verdicts = [
-        verdict for one in proof.levels for goal, verdict in one.found if goal.sort is Sort.ASSUMPTION
+    found = [
+        proof.of(one.level, goal.key)
+        for one in proof.levels
+        for goal, _ in one.found
+        if goal.sort is Sort.ASSUMPTION
     ]
-    good = sum(verdict is Verdict.PROVED for verdict in verdicts)
-    if not verdicts:
+    if not found:
         return "the tables assume nothing"
-    rest = len(verdicts) - good
-    return f"assumptions of tables: {good} proved" + (f", {rest} not proved" if rest else ", none left")
+    believed = sum(one.proved and one.verdict.value != "proved" for one in found)
+    good = sum(one.proved for one in found) - believed
+    rest = len(found) - good - believed
+    trusts = f", {believed} taken for granted" if believed else ""
+    return f"assumptions of tables: {good} proved{trusts}" + (
+        f", {rest} not proved" if rest else ", none left"
+    )
 
 
 def reaction(made: "Mapping[str, Stepper]", proof: "SystemProof") -> Iterator[str]:
     """The way of a PAUSE from the top down, as far as it is proved that it is passed on at once."""
     from rcsc.compose.goals import Sort
-    from rcsc.compose.level import Verdict
 
     passes = {
-        (one.level, goal.name): verdict
+        (one.level, goal.name)
         for one in proof.levels
-        for goal, verdict in one.found
-        if goal.sort is Sort.PAUSES
+        for goal, _ in one.found
+        if goal.sort is Sort.PAUSES and proof.of(one.level, goal.key).proved
     }
     tops = [
         name
@@ -84,7 +175,7 @@ def reaction(made: "Mapping[str, Stepper]", proof: "SystemProof") -> Iterator[st
         reached: dict[str, int] = {top: 1}
         for name in made:
             for below in made[name].links.below if name in reached else ():
-                if passes.get((name, below.order)) is Verdict.PROVED:
+                if (name, below.order) in passes:
                     reached[below.name] = reached[name] + 1
         lowest = {name: cycles - 1 for name, cycles in reached.items() if name != top}
         if lowest:
@@ -102,11 +193,34 @@ def confirmed(stepper: "Stepper", proof: "LevelProof") -> "dict[str, bool]":
     }
 
 
-def as_json(proof: "LevelProof") -> dict[str, Any]:
+def claim(whole: "SystemProof", level: str, key: "Key") -> dict[str, Any]:
+    """A verdict, what it rests on that is not found, and what it trusts."""
+    found = whole.of(level, key)
+    return {
+        "verdict": found.verdict.value if found.proved or not found.found else "rests on what is not proved",
+        "rests_on": [
+            {"level": owner, "what": sort, "table": table, "name": name}
+            for owner, (sort, table, name) in found.lacks
+        ],
+        "trusts": list(found.trusts),
+    }
+
+
+def as_json(whole: "SystemProof", proof: "LevelProof") -> dict[str, Any]:
     """Context and endings of one level."""
     from dataclasses import asdict
 
+    from rcsc.compose.claims import AGAIN, RUNS
+    from rcsc.compose.goals import Sort
+
+    again = (
+        {} if proof.context is None else asdict(proof.context) | claim(whole, proof.level, (AGAIN, "", ""))
+    )
     return {
-        "context": None if proof.context is None else asdict(proof.context),
-        "endings": [{**asdict(one), "proved": one.proved} for one in proof.endings],
+        "runs": claim(whole, proof.level, RUNS),
+        "context": again or None,
+        "endings": [
+            {**asdict(one), "proved": one.proved, **claim(whole, proof.level, (Sort.ENDS, one.table, ""))}
+            for one in proof.endings
+        ],
     }

@@ -3,17 +3,27 @@
 In: steppers of all levels. Out: `Promise`s, each with the goals of the neighbour that keep it, and, for proofs, whether they do.
 """
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import TypeAlias
 
+from rcsc.compose.claims import (
+    AGAIN,
+    CONTRACT,
+    ENDING,
+    FOUND,
+    RUNS,
+    SAFE,
+    UNREACHED,
+    Claim,
+    Key,
+    Need,
+    Verdict,
+    worst,
+)
 from rcsc.compose.contract import COMMAND, ECHO, ECHOED, NUMBER
-from rcsc.compose.goals import Key, Sort
-from rcsc.compose.level import LevelProof, Verdict
+from rcsc.compose.goals import Sort
+from rcsc.compose.level import LevelProof
 from rcsc.compose.transition import NUMBERS, Stepper
-
-Need: TypeAlias = tuple[str, Key]
-"""A level, and which of its goals."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,12 +34,14 @@ class Promise:
         level: Who assumes it.
         assumed: In words.
         reason: Whose guarantee it is, in words.
+        record: In which the level takes what it is about.
         needs: What must be proved of the neighbour.
         begins: Whether both begin in agreement.
         outside: Whether the neighbour stands outside the levels: then it is its own to keep.
     """
 
     level: str
+    record: str
     assumed: str
     reason: str
     needs: tuple[Need, ...] = ()
@@ -45,10 +57,12 @@ class Agreement:
         level: Who assumes it.
         assumed: In words.
         reason: Whose guarantee it is, in words.
-        holds: Whether it is proved; where the neighbour stands outside the levels it is the neighbour's to keep.
+        record: In which it takes what that is about.
+        holds: Whether it is found so of the neighbour, given what that rests on; where it stands outside the levels it is its own to keep.
     """
 
     level: str
+    record: str
     assumed: str
     reason: str
     holds: bool
@@ -61,16 +75,93 @@ def agreements(made: Mapping[str, Stepper], proofs: Mapping[str, LevelProof]) ->
         (name, goal.key)
         for name, proof in proofs.items()
         for goal, verdict in proof.found
-        if verdict is Verdict.PROVED
+        if verdict in FOUND
     }
     return [
-        Agreement(one.level, one.assumed, one.reason, _kept(one, proved), one.outside)
+        Agreement(one.level, one.record, one.assumed, one.reason, _kept(one, proved), one.outside)
         for one in promises(made)
     ]
 
 
 def _kept(promise: Promise, proved: Collection[Need]) -> bool:
     return promise.begins and all(need in proved for need in promise.needs)
+
+
+# --- claims --------------------------------------------------------------------------------
+
+
+def claims(made: Mapping[str, Stepper], proofs: Mapping[str, LevelProof]) -> dict[Need, Claim]:
+    """Everything that is claimed of these levels, and what it rests on."""
+    found: dict[Need, Claim] = {}
+    for one in promises(made):
+        verdict = Verdict.PROVED if one.begins else Verdict.NOT_PROVED
+        trusts = (
+            (one.reason.replace("stands outside the levels", "keeps to the protocol"),) if one.outside else ()
+        )
+        found[one.level, (CONTRACT, "", one.record)] = Claim(verdict, one.needs, trusts)
+    for name, proof in proofs.items():
+        found |= {(name, key): claim for key, claim in of_level(made[name], proof)}
+    return found
+
+
+def of_level(stepper: Stepper, proof: LevelProof) -> Iterator[tuple[Key, Claim]]:
+    """What is claimed of one level, but for the contract."""
+    name = proof.level
+    runs = ((name, RUNS),)
+    yield from _of_runs(stepper, proof)
+    for goal, verdict in proof.found:
+        restart = goal.sort is Sort.ECHOES and _asks(stepper)
+        trusts = ("no extern procedure is refused in the first cycle after a restart",) if restart else ()
+        if goal.key != SAFE:
+            yield goal.key, Claim(verdict, runs, trusts)
+    if proof.context is not None:
+        for line in proof.context.unreached:
+            yield (UNREACHED, *line), Claim(Verdict.PROVED, runs)
+        if not proof.context.repeated and not proof.context.restless:
+            yield (AGAIN, "", ""), Claim(Verdict.PROVED, runs)
+    for ending in proof.endings:
+        verdict = Verdict.PROVED if ending.proved else Verdict.NOT_PROVED
+        yield (Sort.ENDS, ending.table, ""), _of_ending(stepper, ending.still, verdict)
+    if proof.endings:
+        every = tuple((name, (Sort.ENDS, ending.table, "")) for ending in proof.endings)
+        yield ENDING, Claim(Verdict.PROVED, every)
+
+
+def _of_runs(stepper: Stepper, proof: LevelProof) -> Iterator[tuple[Key, Claim]]:
+    """That the level runs as its tables say, in an environment that keeps to its contract, and that its operations are safe."""
+    name, links = proof.level, stepper.links
+    ends = [*([] if links.above is None else [links.above.order]), *(below.report for below in links.below)]
+    needs: list[Key] = [SAFE, *((CONTRACT, "", record) for record in ends)]
+    needs += [goal.key for goal, _ in proof.found if goal.sort in {Sort.SOME_LINE, Sort.ONE_LINE}]
+    trusts = [f"assumption `{one}` of level `{name}`, as it is declared" for one in sorted(stepper.trusted)]
+    trusts += [
+        f"the same question has the same answer in `{asked.into}` of level `{name}`" for asked in links.asked
+    ]
+    yield RUNS, Claim(Verdict.PROVED, tuple((name, key) for key in needs), tuple(trusts))
+    within = [verdict for goal, verdict in proof.found if goal.key == SAFE]
+    invariants = tuple((name, (Sort.INVARIANT, "", one)) for one in stepper.safety.invariants)
+    rests = ((name, RUNS), *invariants) if within else invariants
+    yield SAFE, Claim(worst(within), rests)
+
+
+def _of_ending(stepper: Stepper, still: Iterable[str], verdict: Verdict) -> Claim:
+    """That a command ends, given that what is below answers, and that what has to stand still does."""
+    name, below = stepper.level.name, stepper.links.below
+    trusts = [
+        f"`{one.name}` answers every order that is not replaced, and stays so" for one in below if one.outside
+    ]
+    trusts += [f"the values in `{one}` of level `{name}` stand still meanwhile" for one in still]
+    if _asks(stepper):
+        trusts.append(f"extern procedures of level `{name}` are refused only finitely often")
+    needs = tuple((one.name, ENDING) for one in below if not one.outside)
+    return Claim(verdict, ((name, RUNS), *needs), tuple(trusts))
+
+
+def _asks(stepper: Stepper) -> bool:
+    return any(one.extern is not None for one in stepper.program.procedures)
+
+
+# --- what levels assume of each other ------------------------------------------------------
 
 
 def promises(made: Mapping[str, Stepper]) -> Iterator[Promise]:
@@ -84,14 +175,16 @@ def _of_below(name: str, stepper: Stepper, made: Mapping[str, Stepper]) -> Itera
     for below in stepper.links.below:
         words = f"what `{below.name}` reports under the number of the last order is about that order"
         if below.outside:
-            yield Promise(name, words, f"`{below.name}` stands outside the levels", outside=True)
+            reason = f"`{below.name}` stands outside the levels"
+            yield Promise(name, below.report, words, reason, outside=True)
             continue
         lower = made[below.name].links.above
         if lower is None:
-            yield Promise(name, words, f"`{below.name}` takes no numbered orders", begins=False)
+            yield Promise(name, below.report, words, f"`{below.name}` takes no numbered orders", begins=False)
             continue
         yield Promise(
             name,
+            below.report,
             words,
             f"proved of `{below.name}`: {Sort.ECHOES.value}; both begin with the same order",
             ((below.name, (Sort.ECHOES, "", lower.report)),),
@@ -110,7 +203,7 @@ def _of_above(name: str, stepper: Stepper, made: Mapping[str, Stepper]) -> Itera
         else f"the numbers of `{above.order}` come one after the other"
     )
     if above.outside:
-        yield Promise(name, words, f"`{above.name}` stands outside the levels", outside=True)
+        yield Promise(name, above.order, words, f"`{above.name}` stands outside the levels", outside=True)
         return
     upper = next(one for one in made[above.name].links.below if one.name == name)
     keys: list[Key] = [
@@ -118,7 +211,7 @@ def _of_above(name: str, stepper: Stepper, made: Mapping[str, Stepper]) -> Itera
     ]
     keys.append((Sort.NEXT_NUMBER, "", upper.order))
     needs = tuple((above.name, key) for key in keys)
-    yield Promise(name, words, f"proved of `{above.name}`: {Sort.NUMBERED.value}", needs)
+    yield Promise(name, above.order, words, f"proved of `{above.name}`: {Sort.NUMBERED.value}", needs)
 
 
 def other_end(leaf: str, record: str, other: str) -> str:

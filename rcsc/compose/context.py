@@ -11,8 +11,9 @@ In: a stepper, and what was confirmed of it. Out: a `Context`:
 Each question is answered by Z3 from the invariant; what is not refuted is named, so the lists are never too short.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Container, Iterator, Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 from rcsc.compose.confirm import Confirmation
 from rcsc.compose.contract import NUMBER
@@ -36,23 +37,66 @@ class Again:
 
 @dataclass(frozen=True, slots=True)
 class Context:
-    """What was found of one level; `unreached` are tables and lines."""
+    """What was found of one level.
+
+    Attributes:
+        unreached: Tables and lines that no reachable cycle runs; `unsure`, of which that is not shown and no run was seen either.
+        orders: Whether the level gives orders, so that there is something to repeat.
+    """
 
     unreached: tuple[tuple[str, str], ...]
     repeated: tuple[Again, ...]
     restless: bool
+    unsure: tuple[tuple[str, str], ...] = ()
+    orders: bool = True
 
 
-def context(stepper: Stepper, asked: Confirmation, clauses: Sequence[Clause]) -> Context:
-    """Asks all of it."""
-    cycle = asked.cycle
-    again = stepper.cycle(cycle.after, " again", taken=cycle.taken)
-    sent = gives_an_order(stepper, cycle)
+Line_: TypeAlias = tuple[str, str]
+"""A table and a line."""
+
+
+@dataclass(frozen=True, slots=True)
+class _From:
+    """Where a cycle may begin: in the invariant, or as the level begins; its solver, and the same cycle again."""
+
+    cycle: Cycle
+    again: Cycle
+    solver: Solver
+
+
+def context(
+    stepper: Stepper, asked: Confirmation, clauses: Sequence[Clause], ran: Container[Line_] = frozenset()
+) -> Context:
+    """Asks all of it; lines that `ran` on walks are known to be reached."""
+    every = list(_starts(stepper, asked, clauses))
+    asked.rested_on += [one.solver for one in every]
+    reached = [set(_reached(asked, one)) for one in every]
+    lines = [line for line, _ in _lines(every[0].cycle)]
+    unreached = tuple(line for line in lines if not any(line in found for found in reached))
     return Context(
-        tuple(_unreached(asked, clauses)),
-        tuple(_repeated(stepper, asked, clauses, again, sent)),
-        _possible(asked, clauses, (sent, gives_an_order(stepper, again))),
+        unreached,
+        tuple(_every_repeated(stepper, asked, every)),
+        any(_restless(stepper, asked, one) for one in every),
+        tuple(line for line in lines if line not in unreached and line not in ran),
+        bool(stepper.links.below),
     )
+
+
+def never_run(asked: Confirmation, clauses: Sequence[Clause], ran: Container[Line_]) -> list[Node]:
+    """That lines do not run, one by one, which no walk ran and which the clauses allow: what there is to be shown."""
+    solver = asked.known(clauses)
+    return [
+        values.negation(when)
+        for line, when in _lines(asked.cycle)
+        if line not in ran and may(solver, asked.keyed.term(when))
+    ]
+
+
+def _starts(stepper: Stepper, asked: Confirmation, clauses: Sequence[Clause]) -> Iterator[_From]:
+    """A later cycle, and each with which the level may begin."""
+    for at, cycle in enumerate((asked.cycle, *asked.firsts)):
+        again = stepper.cycle(cycle.after, f" again {at}", taken=cycle.taken)
+        yield _From(cycle, again, asked.beginning(cycle) if at else asked.known(clauses))
 
 
 def gives_an_order(stepper: Stepper, cycle: Cycle) -> Node:
@@ -63,26 +107,28 @@ def gives_an_order(stepper: Stepper, cycle: Cycle) -> Node:
     )
 
 
-def _possible(asked: Confirmation, clauses: Sequence[Clause], conditions: Sequence[Node]) -> bool:
-    terms = [asked.keyed.term(one) for one in conditions]
-    solver = asked.known(clauses)
-    asked.rested_on.append(solver)
-    solver.add(*asked.keyed.ranges, *terms)
-    return solver.check() is not Answer.UNSATISFIABLE
+def _lines(cycle: Cycle) -> Iterator[tuple[Line_, Node]]:
+    """Each line, and when it runs; but for a DEFAULT that is said to be unreachable, which is a goal."""
+    for at in cycle.tables:
+        for line, match in at.lines:
+            if not (isinstance(line, Default) and line.unreachable):
+                yield (str(at.table.name), str(line.name)), values.both(at.runs, match)
 
 
-def _unreached(asked: Confirmation, clauses: Sequence[Clause]) -> Iterator[tuple[str, str]]:
-    lines = [
-        (str(at.table.name), str(line.name), asked.keyed.term(values.both(at.chosen, match)))
-        for at in asked.cycle.tables
-        for line, match in at.lines
-        if not (isinstance(line, Default) and line.unreachable)  # a goal
-    ]
-    solver = asked.known(clauses)
-    asked.rested_on.append(solver)
-    for table, line, runs in lines:
-        if not may(solver, runs):
-            yield table, line
+def _reached(asked: Confirmation, start: _From) -> Iterator[Line_]:
+    """The lines of which it is not refuted that they run."""
+    runs = [(line, asked.keyed.term(when)) for line, when in _lines(start.cycle)]
+    start.solver.add(*asked.keyed.ranges)
+    for line, term in runs:
+        if may(start.solver, term):
+            yield line
+
+
+def _restless(stepper: Stepper, asked: Confirmation, start: _From) -> bool:
+    """Whether an order may be given in both of two cycles on the same inputs."""
+    sent = [asked.keyed.term(gives_an_order(stepper, cycle)) for cycle in (start.cycle, start.again)]
+    start.solver.add(*asked.keyed.ranges)
+    return may(start.solver, *sent)
 
 
 def may(solver: Solver, *terms: Term) -> bool:
@@ -94,35 +140,42 @@ def may(solver: Solver, *terms: Term) -> bool:
     return answer is not Answer.UNSATISFIABLE
 
 
-def _repeated(
-    stepper: Stepper, asked: Confirmation, clauses: Sequence[Clause], again: Cycle, sent: Node
-) -> Iterator[Again]:
-    """Line by line, the leaves that a second match may change."""
-    cycle, keyed = asked.cycle, asked.keyed
+def _every_repeated(stepper: Stepper, asked: Confirmation, every: Sequence[_From]) -> Iterator[Again]:
+    """Line by line, the leaves that a second match may change, wherever the first begins."""
+    found: dict[Line_, dict[str, None]] = {}
+    for start in every:
+        for line, leaves in _repeated(stepper, asked, start):
+            found.setdefault(line, {}).update(dict.fromkeys(leaves))
+    for where, changed in found.items():
+        yield Again(*where, tuple(changed))
+
+
+def _repeated(stepper: Stepper, asked: Confirmation, start: _From) -> Iterator[tuple[Line_, tuple[str, ...]]]:
+    cycle, again, keyed = start.cycle, start.again, asked.keyed
     changed = {
         leaf: keyed.term(values.negation(values.equal(cycle.after[leaf], again.after[leaf])))
         for leaf in _of_lines(stepper)
     }
     lines = [
         (
-            str(one.table.name),
-            str(line.name),
+            (str(one.table.name), str(line.name)),
             keyed.term(values.all_of((one.chosen, match, two.chosen, more))),
         )
         for one, two in zip(cycle.tables, again.tables, strict=True)
-        for line, match, more in zip(one.table.lines, one.matches, two.matches, strict=True)
+        for (line, match), (_, more) in zip(one.lines, two.lines, strict=True)
     ]
-    gives = keyed.term(sent)
-    solver = asked.known(clauses)
-    asked.rested_on.append(solver)
+    gives = keyed.term(gives_an_order(stepper, cycle))
+    solver = start.solver
+    solver.push()
     solver.add(*keyed.ranges, gives)
-    for table, line, twice in lines:
+    for line, twice in lines:
         solver.push()
         solver.add(twice)
         leaves = tuple(_shown(solver, changed))
         solver.pop()
         if leaves:
-            yield Again(table, line, leaves)
+            yield line, leaves
+    solver.pop()
 
 
 def _shown(solver: Solver, changed: dict[str, Term]) -> Iterator[str]:

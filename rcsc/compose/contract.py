@@ -8,7 +8,7 @@ order has `inc_command` and `input_command`, a report `inc_command_echo`, `ref_c
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from rcsc.model import Enum, Int, Kind, Program, Real, Scalar, Variable
+from rcsc.model import Enum, Int, Kind, Level, OneTable, Program, Real, Scalar, Variable
 from rcsc.system.description import BadDescription, Description
 
 NUMBER, COMMAND = "inc_command", "input_command"
@@ -60,13 +60,19 @@ class Asked:
 
 @dataclass(frozen=True, slots=True)
 class Links:
-    """One level's environment; `free` are the inputs that nothing is known of but their ranges."""
+    """One level's environment.
+
+    Attributes:
+        free: Inputs that nothing is known of but their ranges.
+        unread: Buffers that may be meant as orders and reports, and are not taken for such: which, and what is missing.
+    """
 
     level: str
     above: Above | None
     below: tuple[Below, ...]
     asked: tuple[Asked, ...]
     free: tuple[str, ...]
+    unread: tuple[str, ...] = ()
 
 
 def leaves_under(program: Program, record: str) -> tuple[str, ...]:
@@ -90,6 +96,8 @@ def links(system: Description, level: str, program: Program) -> Links:
     used: set[str] = set()
     for record, owner in inputs.items():
         back = [made for made, to in outputs.items() if to == owner]
+        if not _pairs(record, back, names):
+            continue
         if f"{record}.{NUMBER}" in names:
             report = _one(back, names, ECHO, f"{level}.{record}", owner)
             order = leaves_under(program, record)
@@ -108,7 +116,71 @@ def links(system: Description, level: str, program: Program) -> Links:
     asked = tuple(Asked(feed.into, leaves_under(program, feed.into), feed.keys) for feed in feeds)
     used |= {leaf for one in asked for leaf in one.leaves}
     free = tuple(str(v.name) for v in program.variables if v.kind is Kind.INPUT and v.name not in used)
-    return Links(level, above, tuple(below), asked, free)
+    seen = [above.name] if above is not None else []
+    unread = _unread(program, level, inputs, outputs, levels, {*seen, *(one.name for one in below)})
+    if above is None and not isinstance(_level(program, level).tables, OneTable):
+        unread = (*unread, f"no input has `{NUMBER}` and `{COMMAND}`, so that no order selects the table")
+    return Links(level, above, tuple(below), asked, free, unread)
+
+
+def _level(program: Program, name: str) -> Level:
+    found = next((one for one in program.levels if one.name == name), None)
+    if found is None:
+        raise BadDescription(f"program `{program.name}` has no level `{name}`")
+    return found
+
+
+def _pairs(record: str, back: list[str], names: set[str]) -> bool:
+    """Whether the record is an order or a report with all its fields, and so is what goes back."""
+    order, report = (NUMBER, COMMAND), (ECHO, ECHOED)
+    for mine, other in ((order, report), (report, order)):
+        if f"{record}.{mine[0]}" in names:
+            ends = [record, *(one for one in back if f"{one}.{other[0]}" in names)]
+            fields = [mine, *(other for _ in ends[1:])]
+            return all(
+                f"{end}.{part}" in names for end, parts in zip(ends, fields, strict=True) for part in parts
+            )
+    return False
+
+
+def _unread(
+    program: Program,
+    level: str,
+    inputs: Mapping[str, str],
+    outputs: Mapping[str, str],
+    levels: set[str],
+    seen: set[str],
+) -> tuple[str, ...]:
+    """What goes both ways between the level and a neighbour, and is not taken for an order and its report.
+
+    Looked at are neighbours that are levels, records of which some field is one of the protocol's, and, where the level has no
+    superior, every neighbour that gives a record and takes one.
+    """
+    found = []
+    for owner in dict.fromkeys((*inputs.values(), *outputs.values())):
+        if owner in seen:
+            continue
+        ends = [record for wires in (inputs, outputs) for record, to in wires.items() if to == owner]
+        fields = {
+            leaf.rpartition(".")[2]
+            for record in ends
+            for leaf in leaves_under(program, record)
+            if "." in leaf
+        }
+        both = all(
+            any(to == owner and len(leaves_under(program, record)) > 1 for record, to in wires.items())
+            for wires in (inputs, outputs)
+        )
+        if owner in levels or fields & {NUMBER, COMMAND, ECHO, ECHOED} or (both and not seen):
+            missing = [part for part in (NUMBER, COMMAND, ECHO, ECHOED) if part not in fields]
+            lacks = (
+                f"has no {', '.join(f'`{part}`' for part in missing)}"
+                if missing
+                else "is not one order and one report"
+            )
+            said = ", ".join(f"`{record}`" for record in ends)
+            found.append(f"what `{level}` and `{owner}` say to each other ({said}) {lacks}")
+    return tuple(found)
 
 
 def _whole(level: str, names: set[str], order: str, report: str) -> None:

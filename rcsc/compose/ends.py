@@ -72,9 +72,23 @@ def reports(stepper: Stepper) -> bool:
     above = stepper.links.above
     if above is None:
         return False
-    kinds = [stepper.kinds.get(f"{above.report}.{STATUS}")]
-    kinds += [stepper.kinds.get(f"{below.report}.{STATUS}") for below in stepper.links.below]
-    return all(isinstance(kind, Enum) and DONE in kind.members for kind in kinds)
+    return not no_answers(stepper)
+
+
+def no_answers(stepper: Stepper) -> tuple[str, ...]:
+    """Why it is not known which reports answer a command."""
+    above = stepper.links.above
+    if above is None:
+        return ()
+    found = []
+    ends = ((above.order, above.report), *((below.order, below.report) for below in stepper.links.below))
+    for order, report in ends:
+        kind = stepper.kinds.get(f"{report}.{STATUS}")
+        if not isinstance(kind, Enum) or DONE not in kind.members:
+            found.append(f"`{report}` has no `{STATUS}` with a member `{DONE}`")
+        if not isinstance(stepper.kinds[f"{order}.{COMMAND}"], Enum):
+            found.append(f"`{order}.{COMMAND}` is no enumeration")
+    return tuple(found)
 
 
 def command_stays(stepper: Stepper, cycle: Cycle) -> Node:

@@ -11,10 +11,11 @@ from enum import StrEnum
 from itertools import combinations
 from typing import TypeAlias
 
+from rcsc.compose.claims import SAFE
 from rcsc.compose.contract import COMMAND, ECHO, ECHOED, NUMBER, Below, leaves_under
-from rcsc.compose.properties import invariants, properties
+from rcsc.compose.properties import invariants, kept_within, properties
 from rcsc.compose.transition import Cycle, Stepper, TableAt, successor
-from rcsc.model import Line, OneTable, Program, Table, pending
+from rcsc.model import Bool, Enum, Kind, Line, OneTable, Program, Table, pending
 from rcsc.prove import boxes, values
 from rcsc.prove.values import Node
 from rcsc.resolve.leaves import read_by
@@ -43,10 +44,27 @@ class Sort(StrEnum):
     INVARIANT = "invariant"
     PROPERTY = "property"
     ENDS = "the command ends"  # none of one cycle: `ends`, `lap`
+    PROTOCOL = "orders and reports"  # all of its sorts at once
+    SAFE = SAFE[0]
 
 
 Key: TypeAlias = tuple[Sort, str, str]
-"""What tells the goals of a level apart."""
+"""What tells the goals of a level apart: a key of a claim (`claims`)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Unlooked:
+    """Goals of a sort that cannot be stated, as a part of the level was not recognised; `missing`, what was looked for."""
+
+    sort: Sort
+    table: str
+    missing: str
+
+    @property
+    def shown(self) -> str:
+        """In one line."""
+        table = f"table `{self.table}`: " if self.table else ""
+        return f"{table}{self.sort.value}: {self.missing}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,9 +185,7 @@ def _downward(stepper: Stepper, cycle: Cycle) -> Iterator[Goal]:
             command = f"{below.order}.{COMMAND}"
             kept = values.equal(cycle.before[command], cycle.after[command])
             yield Goal(Sort.WAITS, "", below.order, values.follows(_waiting(stepper, cycle, below), kept))
-            if not isinstance(
-                stepper.level.tables, OneTable
-            ):  # one table for each command, the first for PAUSE
+            if not list(_no_pause(stepper, below)):
                 yield Goal(Sort.PAUSES, "", below.order, _passes_on_a_pause(stepper, cycle, below))
 
 
@@ -203,7 +219,7 @@ def _passes_on_a_pause(stepper: Stepper, cycle: Cycle, below: Below) -> Node:
 
 def _own(stepper: Stepper, cycle: Cycle) -> Iterator[Goal]:
     above = stepper.links.above
-    if above is not None and FLAG in cycle.before:
+    if above is not None and has_flag(stepper):
         same = values.equal(cycle.before[f"{above.order}.{NUMBER}"], cycle.taken[f"{above.order}.{NUMBER}"])
         rises = values.both(cycle.after[FLAG], values.negation(cycle.before[FLAG]))
         yield Goal(Sort.ONCE, "", FLAG, values.follows(same, values.negation(rises)))
@@ -218,12 +234,73 @@ def _own(stepper: Stepper, cycle: Cycle) -> Iterator[Goal]:
             yield Goal(Sort.DEFERRED, "", str(variable.name), values.either(untouched, agreed))
 
 
+def has_flag(stepper: Stepper) -> bool:
+    """Whether the level keeps the flag of a new command."""
+    return any(
+        v.name == FLAG and v.kind is Kind.STATE and isinstance(v.type, Bool)
+        for v in stepper.program.variables
+    )
+
+
+def unlooked(stepper: Stepper) -> tuple[Unlooked, ...]:
+    """The goals that are not looked at, and what is missing for them."""
+    return tuple(_unlooked(stepper))
+
+
+def _unlooked(stepper: Stepper) -> Iterator[Unlooked]:
+    links = stepper.links
+    for missing in links.unread:
+        yield Unlooked(Sort.PROTOCOL, "", missing)
+    if links.above is None:
+        if links.below:
+            for sort in (Sort.WAITS, Sort.PAUSES, Sort.ENDS):
+                yield Unlooked(sort, "", "the level takes no orders")
+        return
+    for below in links.below:
+        for missing in _no_pause(stepper, below):
+            yield Unlooked(Sort.PAUSES, "", missing)
+    if not has_flag(stepper):
+        for sort in (Sort.ONCE, Sort.ANSWERED):
+            yield Unlooked(sort, "", f"there is no state `{FLAG} : bool`")
+        return
+    for table in run_by(stepper):
+        if not any(looks_for(FLAG, line) for line in table.lines) and not _rests(stepper, table):
+            yield Unlooked(Sort.ANSWERED, str(table.name), f"no line looks at `{FLAG}`")
+
+
+def _no_pause(stepper: Stepper, below: Below) -> Iterator[str]:
+    """Why it is not known what a PAUSE is: the first command, which has a table of its own."""
+    assert stepper.links.above is not None
+    if isinstance(stepper.level.tables, OneTable):
+        yield "the level has one table for all commands"
+    for leaf in (f"{stepper.links.above.order}.{COMMAND}", f"{below.order}.{COMMAND}"):
+        if not isinstance(stepper.kinds[leaf], Enum):
+            yield f"`{leaf}` is no enumeration"
+
+
+def run_by(stepper: Stepper) -> list[Table]:
+    """The tables that the level runs."""
+    chosen = stepper.level.tables
+    names = {chosen.table} if isinstance(chosen, OneTable) else {table for _, table in chosen.tables}
+    return [one for one in stepper.program.tables if one.name in names]
+
+
+def _rests(stepper: Stepper, table: Table) -> bool:
+    """Whether it is the table of the first command, PAUSE or its like, and of no other: it does the same whether that is new or not."""
+    chosen = stepper.level.tables
+    return not isinstance(chosen, OneTable) and [
+        value for value, name in chosen.tables if name == table.name
+    ] == [0]
+
+
 def _stated(stepper: Stepper, cycle: Cycle) -> Iterator[Goal]:
     """What the program itself states."""
     for name, holds in invariants(stepper.program, cycle):
         yield Goal(Sort.INVARIANT, "", name, holds)
     for name, holds in properties(stepper.program, cycle):
         yield Goal(Sort.PROPERTY, "", name, holds)
+    if stepper.safety.within:
+        yield Goal(Sort.SAFE, "", "", kept_within(stepper.program, cycle, stepper.safety.invariants))
 
 
 def _asks(program: Program) -> bool:

@@ -10,10 +10,11 @@ from dataclasses import asdict, replace
 from typing import Any
 
 from rcsc.cache import Cache
+from rcsc.compose.agreed import of_level
 from rcsc.compose.context import Again, Context
 from rcsc.compose.ends import Ending
 from rcsc.compose.features import CLOSELY, Feature
-from rcsc.compose.goals import Goal, goals
+from rcsc.compose.goals import Goal, Sort, Unlooked, goals
 from rcsc.compose.level import LevelProof, Verdict, essential
 from rcsc.compose.properties import every_feature
 from rcsc.compose.rounds import Counted
@@ -36,7 +37,7 @@ def recall(cache: Cache, stepper: Stepper, effort: Effort) -> LevelProof | None:
         if [one.name for one in chosen] == kept["features"]:
             verdicts = (Verdict(one["verdict"]) for one in kept["found"])
             proof = _proof(kept, tuple(zip(wanted, verdicts, strict=True)), chosen, stepper)
-            keep_verdicts(cache, content(stepper), _shortened(proof))  # they may have been pruned
+            keep_verdicts(cache, content(stepper), _shortened(stepper, proof))  # they may have been pruned
             return proof
     return None
 
@@ -48,6 +49,7 @@ def _proof(
     return LevelProof(
         stepper.level.name, found, chosen, clauses, kept["walked"], kept["learnt"], kept["seconds"], cached=True,
         context=_context(kept["context"]), endings=tuple(_ending(one) for one in kept["endings"]),
+        unlooked=tuple(Unlooked(Sort(sort), table, missing) for sort, table, missing in kept["unlooked"]),
     )  # fmt: skip
 
 
@@ -56,7 +58,8 @@ def _context(kept: dict[str, Any] | None) -> Context | None:
         return None
     unreached = tuple((table, line) for table, line in kept["unreached"])
     repeated = tuple(Again(one["table"], one["line"], tuple(one["leaves"])) for one in kept["repeated"])
-    return Context(unreached, repeated, kept["restless"])
+    unsure = tuple((table, line) for table, line in kept["unsure"])
+    return Context(unreached, repeated, kept["restless"], unsure, kept["orders"])
 
 
 def _ending(kept: dict[str, Any]) -> Ending:
@@ -77,16 +80,16 @@ def keep(cache: Cache, stepper: Stepper, effort: Effort, proof: LevelProof) -> N
         "seconds": proof.seconds,
         "context": None if proof.context is None else asdict(proof.context),
         "endings": [asdict(one) for one in proof.endings],
+        "unlooked": [[one.sort, one.table, one.missing] for one in proof.unlooked],
     }
     cache.store(value, *_key(stepper, effort))
-    keep_verdicts(cache, content(stepper), _shortened(proof))
+    keep_verdicts(cache, content(stepper), _shortened(stepper, proof))
 
 
-def _shortened(proof: LevelProof) -> Verdicts:
+def _shortened(stepper: Stepper, proof: LevelProof) -> Verdicts:
     """The proof without what shows it, for those who only ask what was found."""
-    proved = frozenset(goal.key for goal, verdict in proof.found if verdict is Verdict.PROVED)
-    unreached = () if proof.context is None else proof.context.unreached
-    return Verdicts(proved, tuple(map(_said, essential(proof))), unreached)
+    claims = dict(of_level(stepper, proof))
+    return Verdicts(claims, tuple(map(_said, essential(proof))), tuple(one.shown for one in proof.unlooked))
 
 
 def _said(goal: Goal) -> str:
@@ -99,6 +102,6 @@ def _key(stepper: Stepper, effort: Effort) -> tuple[str, ...]:
 
 def content(stepper: Stepper) -> str:
     """Digest of all that a proof of the level is about: the same wherever the files stand."""
-    tables = tuple(replace(one, file="") for one in stepper.program.tables)
+    tables = tuple(replace(one, file="", stops=()) for one in stepper.program.tables)  # they follow from it
     program = replace(stepper.program, file="", tables=tables)
     return hashlib.sha256(repr((program, stepper.level.name, stepper.links)).encode()).hexdigest()

@@ -90,9 +90,12 @@ def _moving(stepper: Stepper) -> set[str]:
 
 def _told(stepper: Stepper, table: str, run: Unrolled, wrong: Node) -> Lap | NotReproducedError:
     start, given = run.inputs(wrong)
-    steps = ran_on(stepper, start, given)
-    first = lap_of(stepper, table, steps)
     shown = goal_of(table).shown
+    try:
+        steps = ran_on(stepper, start, given)
+        first = lap_of(stepper, table, steps)
+    except (ArithmeticError, IndexError, ValueError):  # an operation that is not defined
+        return NotReproducedError(shown, guessed=True)
     if first is None:
         return NotReproducedError(shown, guessed=run.guessed)
     return Lap(Trace(shown, steps, run.search.restarted, run.search.legal), first)

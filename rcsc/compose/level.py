@@ -7,16 +7,17 @@ does within its contract, and every cycle that begins in it fulfils the goals.
 
 import time
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
-from enum import StrEnum
+from dataclasses import dataclass, field, replace
 
+from rcsc.compose.claims import FOUND
+from rcsc.compose.claims import Verdict as Verdict  # noqa: PLC0414  # it is the verdict of a goal, too
 from rcsc.compose.confirm import Confirmation
-from rcsc.compose.context import Context, context
+from rcsc.compose.context import Context, context, never_run
 from rcsc.compose.contract import COMMAND
-from rcsc.compose.ends import Ending, Flow
+from rcsc.compose.ends import Ending, Flow, no_answers
 from rcsc.compose.features import Feature
 from rcsc.compose.frames import Clause
-from rcsc.compose.goals import Goal, Sort, goals
+from rcsc.compose.goals import Goal, Sort, Unlooked, goals, unlooked
 from rcsc.compose.keyed import Keyed
 from rcsc.compose.sat import GaveUpError
 from rcsc.compose.search import LIMITS, Effort, Found, search, strengthened
@@ -27,16 +28,6 @@ from rcsc.prove.smt import Answer, Limits, Solver, Term
 
 class NotConfirmedError(Exception):
     """Another solver does not say the same, or gave up: nothing may rest on what was found."""
-
-
-class Verdict(StrEnum):
-    """What was found of a goal."""
-
-    PROVED = "proved"
-    NOT_PROVED = (
-        "not proved"  # some state that the invariant allows breaks it: perhaps one that is never reached
-    )
-    UNDECIDED = "undecided"  # the solver gave up
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +43,7 @@ class LevelProof:
         cached: Whether an earlier run made it.
         context: What was found of its lines; None where something is not proved.
         endings: Whether its commands end, table by table.
+        unlooked: Goals that could not be stated, as a part of the level was not recognised.
     """
 
     level: str
@@ -64,6 +56,7 @@ class LevelProof:
     cached: bool = field(default=False, compare=False)
     context: Context | None = None
     endings: tuple[Ending, ...] = ()
+    unlooked: tuple[Unlooked, ...] = ()
 
     def verdict(self, sort: Sort, table: str = "", name: str = "") -> Verdict:
         """Of one goal.
@@ -79,7 +72,7 @@ class LevelProof:
     @property
     def open(self) -> tuple[Goal, ...]:
         """The goals that are not proved."""
-        return tuple(goal for goal, verdict in self.found if verdict is not Verdict.PROVED)
+        return tuple(goal for goal, verdict in self.found if verdict not in FOUND)
 
 
 def essential(proof: LevelProof) -> tuple[Goal, ...]:
@@ -108,13 +101,13 @@ def prove_level(stepper: Stepper, effort: Effort | None = None) -> LevelProof:
         asked = _asked_anew(found.features, firsts, cycle, effort.limits)
         looks = effort.looks and not any(wanted[at].sort is not Sort.NUMBERED for at in found.open)
         flow = Flow(stepper, asked, found.clauses)
-        if looks and (others := flow.ways_round()):
+        if looks and (others := [*flow.ways_round(), *never_run(asked, found.clauses, found.ran)]):
             found = strengthened(stepper, firsts, cycle, found, others, effort)
             flow = Flow(stepper, asked, found.clauses)
         _confirm(asked, found.clauses)
         verdicts = list(_verdicts(stepper, asked, found, wanted))
         if looks:
-            seen, ends = context(stepper, asked, found.clauses), tuple(flow.endings())
+            seen, ends = context(stepper, asked, found.clauses, found.ran), tuple(flow.endings())
         _uncut(cut_before)
     except (GaveUpError, NotConfirmedError):
         found, seen, ends = Found(), None, ()
@@ -129,6 +122,7 @@ def prove_level(stepper: Stepper, effort: Effort | None = None) -> LevelProof:
         time.perf_counter() - begun,
         context=seen,
         endings=ends,
+        unlooked=(*unlooked(stepper), *(Unlooked(Sort.ENDS, "", why) for why in no_answers(stepper))),
     )
 
 
@@ -187,7 +181,8 @@ def _verdicts(
             continue
         answers = {_asked(solver, terms[at]) for solver, terms in zip(solvers, asked, strict=True)}
         if answers == {Answer.UNSATISFIABLE}:
-            yield goal, Verdict.PROVED
+            trusted = goal.sort is Sort.ASSUMPTION and goal.name in stepper.trusted
+            yield goal, Verdict.TRUSTED if trusted else Verdict.PROVED
         else:
             yield goal, Verdict.NOT_PROVED if Answer.SATISFIABLE in answers else Verdict.UNDECIDED
 
@@ -216,7 +211,7 @@ def certificate(stepper: Stepper, proof: LevelProof, limits: Limits = LIMITS) ->
     names = [*(f"step {at.table.name}" for at in cycle.tables), "step of no table"]
     for name, case in zip(names, cycle.cases, strict=False):
         found[name] = asked.step_question(clauses, case).script()
-    proved = {goal.key for goal, verdict in proof.found if verdict is Verdict.PROVED}
+    proved = {goal.key for goal, verdict in proof.found if verdict in FOUND}
     for name, first in firsts.items():
         wanted = [goal for goal in goals(stepper, first) if goal.key in proved]
         found[f"goals {name}"] = _none_broken(asked, asked.beginning(first), wanted)
@@ -231,7 +226,8 @@ def certificate(stepper: Stepper, proof: LevelProof, limits: Limits = LIMITS) ->
 
 def _looked_again(stepper: Stepper, proof: LevelProof, asked: Confirmation) -> dict[str, str]:
     """What `context` and `Flow.endings` rest on."""
-    seen = context(stepper, asked, proof.clauses)
+    assert proof.context is not None
+    seen = replace(context(stepper, asked, proof.clauses), unsure=proof.context.unsure)
     found = {f"lines {number}": text for number, text in enumerate(_refuted(asked), 1)}
     ends = []
     for ending in Flow(stepper, asked, proof.clauses).endings():

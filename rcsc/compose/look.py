@@ -111,7 +111,7 @@ def _level(
         if goal.sort is Sort.ONE_LINE
     }
     asked = [one for goal in wanted for one in parted.get(goal.key) or [goal]]
-    found = _found(stepper, asked, looking)
+    found = _found(stepper, [one for one in asked if one.sort is not Sort.SAFE], looking)
     for goal in wanted:
         if goal.key in parted:
             yield from _pairs(stepper, goal, parted[goal.key], found)

@@ -9,7 +9,7 @@ first after a restart included, of inputs as the cycle took them; before those s
 cycle before a restart and one behind it. What is not defined (a division by zero, an index outside) does not hold.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 
 from rcsc.compose.features import Feature, cone, features, listed
 from rcsc.compose.transition import Cycle, Leaves, Stepper
@@ -48,6 +48,16 @@ def invariants(program: Program, cycle: Cycle) -> Iterator[tuple[str, Node]]:
     """Each invariant by name, before the cycle and behind it."""
     for one in program.invariants:
         yield one.name, values.both(_true(one.condition, cycle.before), _true(one.condition, cycle.after))
+
+
+def kept_within(program: Program, cycle: Cycle, names: Collection[str]) -> Node:
+    """These invariants also hold within the cycle, wherever one of its procedures, conditions or lines is shown to be safe under them."""
+    return values.all_of(
+        _true(one.condition, leaves)
+        for one in program.invariants
+        if one.name in names
+        for leaves in (cycle.settled, cycle.middle, cycle.acted)
+    )
 
 
 def properties(program: Program, cycle: Cycle) -> Iterator[tuple[str, Node]]:

@@ -49,6 +49,7 @@ class Found:
         clauses: The invariant: combinations that never stand.
         open: Goals that were searched for, by position, for which the features do not suffice.
         walked: States seen on walks; `learnt`, those that the solver added.
+        ran: Tables and lines that ran on walks.
     """
 
     features: tuple[Feature, ...] = ()
@@ -56,6 +57,7 @@ class Found:
     open: frozenset[int] = frozenset()
     walked: int = 0
     learnt: int = 0
+    ran: frozenset[tuple[str, str]] = frozenset()
 
 
 def search(
@@ -123,14 +125,15 @@ def _searched(  # what a search is of
     left: Iterable[int],
     effort: Effort,
 ) -> tuple[Found, set[int]]:
-    walked = dict.fromkeys(_states(stepper, chosen, effort))
+    ran = set(before.ran)
+    walked = dict.fromkeys(_states(stepper, chosen, effort, ran))
     reached = Reached.of(walked, len(chosen))
     weights = [2 if one.parts else int(one.size > 2) for one in chosen]
     clauses, left_open = Frames(posed[:-1], posed[-1], reached, weights, before.clauses).search(left)
     for one in posed:
         one.sat.close()
     learnt = before.learnt + reached.many - len(walked)
-    return Found(chosen, tuple(clauses), walked=len(walked), learnt=learnt), left_open
+    return Found(chosen, tuple(clauses), walked=len(walked), learnt=learnt, ran=frozenset(ran)), left_open
 
 
 def read(stepper: Stepper, cycle: Cycle, wanted: Sequence[Goal]) -> list[Node]:
@@ -151,9 +154,14 @@ def _matters(stepper: Stepper, goal: Goal) -> bool:
     return goal.name.endswith(f".{COMMAND}") or any(goal.name in pair for pair in compared(stepper.program))
 
 
-def _states(stepper: Stepper, chosen: tuple[Feature, ...], effort: Effort) -> Iterable[Point]:
-    """The features of states that walks reach."""
+def _states(
+    stepper: Stepper, chosen: tuple[Feature, ...], effort: Effort, ran: set[tuple[str, str]]
+) -> Iterable[Point]:
+    """The features of states that walks reach; takes the lines that run. Where assumptions are trusted no walk keeps to them."""
+    if stepper.trusted:
+        return
     for seed in range(max(1, effort.walks, A_TABLE * len(stepper.program.tables))):
         walk = Walk(stepper.program, stepper.level, stepper.links, Random(seed))  # noqa: S311  # repeatable on purpose
         for state in walk.states(effort.cycles):
             yield point(stepper, chosen, state)
+        ran |= walk.ran

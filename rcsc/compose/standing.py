@@ -6,14 +6,24 @@ to be proved of that neighbour, as it is now, before anything is called proved o
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Any, TypeAlias
+from typing import Any
 
 from rcsc.cache import Cache
-
-Key: TypeAlias = tuple[str, str, str]
-"""Of a goal: sort, table and name, as `goals.Goal` has them."""
+from rcsc.compose.claims import (
+    CONTRACT,
+    FOUND,
+    RUNS,
+    UNREACHED,
+    Claim,
+    Closed,
+    Key,
+    Need,
+    Verdict,
+    closed,
+    spelled,
+)
 
 ASSUMPTION, PROPERTY = "assumption", "property"
 """Sorts of goals: of an assumption of a table, of a property."""
@@ -23,6 +33,7 @@ class Known(StrEnum):
     """What is known of something that the levels together are to keep."""
 
     PROVED = "proved"
+    PARTLY = "proved as far as it was looked at"
     NOT_PROVED = "not proved"
     UNKNOWN = "unknown"  # nobody has looked at this content, or the solver gave up
 
@@ -32,24 +43,37 @@ class Verdicts:
     """What was found of one level, shortened.
 
     Attributes:
-        proved: Goals that are.
+        claims: What was found of each, given what it rests on.
         open: What is not proved and should be, in words.
-        unreached: Tables and lines that no reachable cycle runs, DEFAULT too; none where something is open.
+        unlooked: What was not looked at, in words.
     """
 
-    proved: frozenset[Key]
+    claims: Mapping[Key, Claim]
     open: tuple[str, ...]
-    unreached: tuple[tuple[str, str], ...] = ()
+    unlooked: tuple[str, ...] = ()
+
+    @property
+    def many(self) -> int:
+        """How many claims are found so."""
+        return sum(claim.verdict in FOUND for claim in self.claims.values())
 
 
 def keep_verdicts(cache: Cache, content: str, verdicts: Verdicts) -> None:
     """Keeps what was found, unless more was proved of the same content before, with more effort."""
     before = verdicts_of(cache, content)
-    if before is None or len(before.proved) <= len(verdicts.proved):
+    if before is None or before.many <= verdicts.many:
         value = {
-            "proved": sorted(verdicts.proved),
+            "claims": [
+                [
+                    list(key),
+                    claim.verdict,
+                    [[level, list(need)] for level, need in claim.rests_on],
+                    list(claim.trusts),
+                ]
+                for key, claim in verdicts.claims.items()
+            ],
             "open": list(verdicts.open),
-            "unreached": list(verdicts.unreached),
+            "unlooked": list(verdicts.unlooked),
         }
         cache.store(value, "composed verdicts", content)
     cache.store({}, "composed verdicts")
@@ -60,9 +84,18 @@ def verdicts_of(cache: Cache, content: str) -> Verdicts | None:
     kept = cache.load("composed verdicts", content)
     if kept is None:
         return None
-    proved = frozenset((sort, table, name) for sort, table, name in kept["proved"])
-    unreached = tuple((table, line) for table, line in kept["unreached"])
-    return Verdicts(proved, tuple(kept["open"]), unreached)
+    claims = {
+        _key(key): Claim(
+            Verdict(verdict), tuple((level, _key(need)) for level, need in rests_on), tuple(trusts)
+        )
+        for key, verdict, rests_on, trusts in kept["claims"]
+    }
+    return Verdicts(claims, tuple(kept["open"]), tuple(kept["unlooked"]))
+
+
+def _key(said: list[str]) -> Key:
+    sort, table, name = said
+    return sort, table, name
 
 
 def any_kept(cache: Cache) -> bool:
@@ -111,12 +144,14 @@ class Assumed:
     """What a level assumes of a neighbour; `agreed.Promise`, shortened.
 
     Attributes:
+        record: In which the level takes what it is about.
         needs: Levels with their goals; `begins`, whether the two begin in agreement.
     """
 
     level: str
+    record: str
     words: str
-    needs: tuple[tuple[str, Key], ...]
+    needs: tuple[Need, ...]
     begins: bool
 
 
@@ -143,6 +178,7 @@ def outline_of(form: Mapping[str, Any]) -> Outline:
     assumed = tuple(
         Assumed(
             one["level"],
+            one["record"],
             one["words"],
             tuple((level, (sort, table, name)) for level, (sort, table, name) in one["needs"]),
             one["begins"],
@@ -162,20 +198,30 @@ class Standing:
     Attributes:
         outline: The system.
         known: By level, what a kept proof says.
+        closed: What follows of each claim over the whole chain.
     """
 
     outline: Outline
     known: Mapping[str, Verdicts]
+    closed: Mapping[Need, Closed] = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Closes the claims."""
+        claims: dict[Need, Claim] = {
+            (one.level, (CONTRACT, "", one.record)): Claim(
+                Verdict.PROVED if one.begins else Verdict.NOT_PROVED, one.needs
+            )
+            for one in self.outline.assumed
+        }
+        claims |= {
+            (level, key): claim for level, kept in self.known.items() for key, claim in kept.claims.items()
+        }
+        object.__setattr__(self, "closed", closed(claims))
 
     @property
     def broken(self) -> tuple[Assumed, ...]:
         """What a level assumes although it is not proved of the neighbour, which was looked at."""
         return tuple(one for one in self.outline.assumed if self._kept(one) is Known.NOT_PROVED)
-
-    @property
-    def sound(self) -> bool:
-        """Whether all that levels assume of each other is proved."""
-        return all(self._kept(one) is Known.PROVED for one in self.outline.assumed)
 
     def _kept(self, assumed: Assumed) -> Known:
         found = [self._goal(level, key) for level, key in assumed.needs]
@@ -188,12 +234,22 @@ class Standing:
         verdicts = self.known.get(level)
         if verdicts is None:
             return Known.UNKNOWN
-        return Known.PROVED if key in verdicts.proved else Known.NOT_PROVED
+        claim = verdicts.claims.get(key)
+        return Known.PROVED if claim is not None and claim.verdict in FOUND else Known.NOT_PROVED
 
     def of_goal(self, level: str, key: Key) -> Known:
-        """Whether a goal of a level is proved of the levels together."""
+        """Whether a goal of a level is proved of the levels together; not known where something that it rests on is not."""
         found = self._goal(level, key)
-        return Known.UNKNOWN if found is Known.PROVED and not self.sound else found
+        return Known.UNKNOWN if found is Known.PROVED and not self._proved(level, key) else found
+
+    def _proved(self, level: str, key: Key) -> bool:
+        found = self.closed.get((level, key))
+        return found is not None and found.proved
+
+    def lacking(self, level: str) -> tuple[str, ...]:
+        """What is not found of that on which all verdicts of a level rest, in words."""
+        found = self.closed.get((level, RUNS))
+        return () if found is None else tuple(spelled(need, level, self.closed) for need in found.lacks)
 
     def of_level(self, level: str) -> Known:
         """Whether all that should be is proved of a level."""
@@ -202,7 +258,9 @@ class Standing:
             return Known.UNKNOWN
         if verdicts.open:
             return Known.NOT_PROVED
-        return Known.PROVED if self.sound else Known.UNKNOWN
+        if not self._proved(level, RUNS):
+            return Known.UNKNOWN
+        return Known.PARTLY if verdicts.unlooked else Known.PROVED
 
     @property
     def whole(self) -> Known:
@@ -210,14 +268,18 @@ class Standing:
         found = {self.of_level(one.name) for one in self.outline.levels}
         if Known.NOT_PROVED in found or self.broken:
             return Known.NOT_PROVED
-        return Known.UNKNOWN if Known.UNKNOWN in found else Known.PROVED
+        return next((one for one in (Known.UNKNOWN, Known.PARTLY) if one in found), Known.PROVED)
 
     def unreached(self, level: str, table: str) -> tuple[str, ...]:
         """Lines of a table that no reachable cycle of this system runs."""
         verdicts = self.known.get(level)
-        if verdicts is None or not self.sound:
+        if verdicts is None:
             return ()
-        return tuple(line for at, line in verdicts.unreached if at == table)
+        return tuple(
+            line
+            for sort, at, line in verdicts.claims
+            if (sort, at) == (UNREACHED, table) and self._proved(level, (sort, at, line))
+        )
 
 
 def standing(cache: Cache, outline: Outline) -> Standing:

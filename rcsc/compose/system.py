@@ -6,22 +6,24 @@ they begin in agreement.
 """
 
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from rcsc import children
 from rcsc.cache import Cache
-from rcsc.compose.agreed import Agreement, agreements, other_end
+from rcsc.compose.agreed import Agreement, agreements, claims, other_end
+from rcsc.compose.claims import UNKNOWN, Closed, Key, Need, closed
 from rcsc.compose.contract import Links, check_ends, links
 from rcsc.compose.goals import Goal, goals
 from rcsc.compose.kept import keep, recall
-from rcsc.compose.level import LevelProof, Verdict, essential, prove_level
+from rcsc.compose.level import LevelProof, Verdict, besides, essential, prove_level
 from rcsc.compose.search import Effort
-from rcsc.compose.transition import Stepper
+from rcsc.compose.transition import Safety, Stepper
 from rcsc.diagnostics.codes import Code
+from rcsc.diagnostics.diagnostic import Diagnostic
 from rcsc.meaning import with_stops
-from rcsc.model import Program
+from rcsc.model import AssumptionName, Program
 from rcsc.project import Loaded, load
 from rcsc.prove.values import TRUE
 from rcsc.system.description import BadDescription, Description, description, places
@@ -36,18 +38,37 @@ class NoProgramError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class SystemProof:
-    """What was found of a system; `steppers` by level, to look further."""
+    """What was found of a system.
+
+    Attributes:
+        closed: What follows of each claim over the whole chain; of levels that were not proved nothing is known.
+    """
 
     levels: tuple[LevelProof, ...]
     agreements: tuple[Agreement, ...]
     seconds: float = field(compare=False)
+    closed: Mapping[Need, Closed] = field(default_factory=dict)
 
     @property
     def proved(self) -> bool:
-        """Whether every goal and every agreement between levels is proved."""
+        """Whether every goal that could be stated, and every agreement between levels, is found so."""
         return all(not essential(proof) for proof in self.levels) and all(
             one.holds for one in self.agreements
         )
+
+    @property
+    def whole(self) -> bool:
+        """Whether it is proved, nothing was left out, and nothing rests on what is not known."""
+        besides_ = {(proof.level, goal.key) for proof in self.levels for goal in besides(proof)}
+        return (
+            self.proved
+            and not any(proof.unlooked for proof in self.levels)
+            and all(one.proved for need, one in self.closed.items() if need not in besides_)
+        )
+
+    def of(self, level: str, key: Key) -> Closed:
+        """What follows of a claim."""
+        return self.closed.get((level, key), UNKNOWN)
 
 
 def steppers(path: Path) -> dict[str, Stepper]:
@@ -61,7 +82,9 @@ def steppers(path: Path) -> dict[str, Stepper]:
         NoProgramError: The tables of a level cannot be read.
     """
     system = description(path)
-    return steppers_of(system, {spec.name: program_of(path, spec.program) for spec in system.levels})
+    read = {spec.name: checked(path, spec.program) for spec in system.levels}
+    made = steppers_of(system, {name: program for name, (program, _) in read.items()})
+    return {name: replace_safety(one, read[name][1]) for name, one in made.items()}
 
 
 def steppers_of(system: Description, programs: Mapping[str, Program]) -> dict[str, Stepper]:
@@ -102,8 +125,17 @@ def _narrowed(mine: Links, every: Mapping[str, Links], programs: Mapping[str, Pr
 def program_of(path: Path, name: str) -> Program:
     """The program of a level, beside the description.
 
-    A cycle as nodes is the executors' only where nothing leaves its range and every operation is defined: that is shown of the
-    program by itself, given its assumptions and invariants, which are goals here.
+    Raises:
+        NoProgramError: It is not there, does not resolve, or something in it may leave its range or not be defined.
+    """
+    return checked(path, name)[0]
+
+
+def checked(path: Path, name: str) -> tuple[Program, Safety]:
+    """The program of a level, and why a cycle as nodes is the executors'.
+
+    It is so only where nothing leaves its range and every operation is defined: that is shown of the program by itself, where
+    it has to be given its invariants, which are goals here. An assumption that is needed for it stops the cycle where it fails.
 
     Raises:
         NoProgramError: It is not there, does not resolve, or something in it may leave its range or not be defined.
@@ -113,10 +145,33 @@ def program_of(path: Path, name: str) -> Program:
 
     program = loaded_program(path, name)[0]
     owed = Obligations(program, Options())
-    for one in owed.prove(program.tables):
+    found = owed.prove(program.tables)
+    for one in found:
         if one.code not in SHOWN_HERE:
             raise NoProgramError(f"{one.message}: see `rcsc check {one.primary.span.file}`")
-    return with_stops(program, owed.stops)
+    return with_stops(program, owed.stops), _safety(program, owed.stops, found)
+
+
+def _safety(
+    program: Program, stops: Mapping[str, tuple[AssumptionName, ...]], found: Sequence[Diagnostic]
+) -> Safety:
+    """Whether the invariants are needed: they are not where all is shown without them, under no other stopping assumptions."""
+    from rcsc.prove.obligations import Obligations
+    from rcsc.prove.options import Options
+
+    if not program.invariants:
+        return Safety()
+    without = Obligations(replace(program, invariants=()), Options())
+    wrong = any(one.code not in SHOWN_HERE for one in without.prove(program.tables))
+    if not wrong and all(set(names) <= set(stops.get(table, ())) for table, names in without.stops.items()):
+        return Safety()
+    broken = any(one.code is Code.INVARIANT_BROKEN for one in found)
+    return Safety(tuple(one.name for one in program.invariants), broken)
+
+
+def replace_safety(stepper: Stepper, safety: Safety) -> Stepper:
+    """The stepper with what is known of its program."""
+    return Stepper(stepper.program, stepper.level, stepper.links, safety)
 
 
 def loaded_program(path: Path, name: str) -> tuple[Program, Loaded]:
@@ -167,7 +222,8 @@ def prove_steppers(
         if said is not None:
             said(proof)
     agreed = tuple(agreements(made, proofs)) if set(proofs) == set(made) else ()
-    return SystemProof(tuple(proofs.values()), agreed, time.perf_counter() - begun)
+    follows = closed(claims(made, proofs))
+    return SystemProof(tuple(proofs.values()), agreed, time.perf_counter() - begun, follows)
 
 
 def _each_unless_kept(

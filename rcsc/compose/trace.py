@@ -229,7 +229,10 @@ class Unrolled:
         """
         settled = Simplest(self._run, [self._run.literal(wrong)])
         start, given = self._settled(settled)
-        trace = _ran(self.stepper, goal, given, start, self.search)
+        try:
+            trace = _ran(self.stepper, goal, given, start, self.search)
+        except (ArithmeticError, IndexError, ValueError):  # an operation that is not defined: `SAFE` says so
+            return NotReproducedError(goal.shown, guessed=True)
         if _breaks(self.stepper, goal, trace, len(given)):
             return trace
         beside = self._beside(trace) if self._run.holds(settled.given) else ()
@@ -465,6 +468,8 @@ def broken(stepper: Stepper, goal: Goal, step: Step) -> bool:
         case Sort.PROPERTY:
             kept = property_kept(stepper, goal.name, step.before, step.after)
             return not step.ends_the_run and not kept
+        case Sort.SAFE:
+            return False  # what shows it is no run that the interpreter can do
         case _:
             return _broken_between(stepper, goal, step)
 

@@ -25,6 +25,7 @@ from rcsc.model import (
     Program,
     Scalar,
     Snapshot,
+    Standing,
     Table,
     TableName,
     pending,
@@ -143,23 +144,57 @@ class Cycle:
         return values.all_of(values.follows(at.runs, at.one_line) for at in self.tables)
 
 
+@dataclass(frozen=True, slots=True)
+class Safety:
+    """Why a cycle as nodes is what the executors do: every operation is defined, and every value in range.
+
+    Attributes:
+        invariants: Under which of the program's that was shown; empty where it is so whatever the state.
+        within: Whether they have to be shown to hold within a cycle, too, as some procedure of the program alone can break one.
+    """
+
+    invariants: tuple[str, ...] = ()
+    within: bool = False
+
+
 @dataclass(slots=True)
 class Stepper:
-    """Makes cycles of one level."""
+    """Makes cycles of one level.
+
+    Attributes:
+        trusted: Assumptions that the tables are declared to rely on, of what the environment gives: part of the contract.
+    """
 
     program: Program
     level: Level
     links: Links
+    safety: Safety = Safety()
     procedures: dict[str, Procedure] = field(init=False)
     kinds: dict[str, Scalar] = field(init=False)
+    trusted: frozenset[str] = field(init=False, default=frozenset())
 
     def __post_init__(self) -> None:
+        """Reads what cycles are made of."""
         self.procedures = {one.name: one for one in self.program.procedures}
         self.kinds = {str(v.name): v.type for v in self.program.variables}
         for asked in self.links.asked:
             self.kinds[f"{GHOST}{asked.into}"] = Bool()
             for key in asked.keys:
                 self.kinds[f"{GHOST}{asked.into} {key}"] = self.kinds[key]
+        self.trusted = self._of_the_environment()
+
+    def _of_the_environment(self) -> frozenset[str]:
+        """Assumptions with standing *assumed* that speak of what a cycle takes; what is about state alone is to be proved."""
+        wanted = {str(one.name) for one in self.program.assumptions if one.standing is Standing.ASSUMED}
+        if not wanted:
+            return frozenset()
+        cycle = self.cycle(self.anywhere())
+        return frozenset(
+            name
+            for at in cycle.tables
+            for name, condition in at.assumptions.items()
+            if name in wanted and not set(values.variables([condition])) <= cycle.before.keys()
+        )
 
     def anywhere(self) -> Leaves:
         """Any values at all: the start of a step of induction."""
@@ -204,7 +239,10 @@ class Stepper:
     def of(self, program: Program) -> "Stepper":
         """The same level with another program of the same leaves."""
         return Stepper(
-            program, next(one for one in program.levels if one.name == self.level.name), self.links
+            program,
+            next(one for one in program.levels if one.name == self.level.name),
+            self.links,
+            self.safety,
         )
 
     def table_of(self, snapshot: Snapshot) -> str:
@@ -231,6 +269,7 @@ class Stepper:
         middle = {**before, **run.state.leaves}
         unmatched = run.ended
         tables = tuple(self._tables(run))
+        contract = values.both(contract, self._trusted(tables))
         run.ended = values.either(run.ended, values.any_of(at.stopped for at in tables))
         self._lines(run, tables)
         acted, interrupted = {**before, **run.state.leaves}, run.ended
@@ -252,6 +291,15 @@ class Stepper:
         return tuple(self._tables(run))
 
     # --- the environment ---
+
+    def _trusted(self, tables: tuple[TableAt, ...]) -> Node:
+        """What is declared to be so whenever a table runs."""
+        return values.all_of(
+            values.follows(at.chosen, condition)
+            for at in tables
+            for name, condition in at.assumptions.items()
+            if name in self.trusted
+        )
 
     def _protocol(self, before: Leaves, taken: Leaves) -> Node:
         """What holds of orders and reports, whatever the delay (`compose.__doc__`)."""

@@ -11,8 +11,8 @@ from random import Random
 from rcsc.compose.contract import COMMAND, ECHO, ECHOED, NUMBER, STATUS, Links
 from rcsc.compose.given import at_random
 from rcsc.compose.transition import EARLY, GHOST, NUMBERS
-from rcsc.interpret import Fault, cycle, initial
-from rcsc.model import Enum, Level, Program, Scalar, Value, key_bounds, value_of_key
+from rcsc.interpret import Fault, cycle, evaluate, initial
+from rcsc.model import Enum, Level, OneTable, Program, Scalar, Value, key_bounds, value_of_key
 
 
 @dataclass(slots=True)
@@ -22,6 +22,7 @@ class Walk:
     Attributes:
         now: Every leaf.
         ghosts: What was asked of the database, as `transition` keeps it.
+        ran: The tables and lines that ran.
     """
 
     program: Program
@@ -30,6 +31,7 @@ class Walk:
     random: Random
     now: dict[str, Value] = field(init=False)
     ghosts: dict[str, Value] = field(init=False)
+    ran: set[tuple[str, str]] = field(default_factory=set)
     _kinds: dict[str, Scalar] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -45,12 +47,23 @@ class Walk:
         """The state behind each cycle; ends early where a cycle meets a fault, which is for the proof to find."""
         for _ in range(cycles):
             self._take()
-            with at_random(self.program, self.random):
-                outcome = cycle(self.program, self.level, self.now)
+            try:
+                with at_random(self.program, self.random):
+                    outcome = cycle(self.program, self.level, self.now)
+            except (ArithmeticError, IndexError, ValueError):
+                return  # an operation that is not defined
             if outcome.fault not in {Fault.OK, *EARLY}:
                 return
             self.now = outcome.snapshot
+            if outcome.line is not None:
+                self.ran.add((self._table(), str(outcome.line)))
             yield {**self.now, **self.ghosts}
+
+    def _table(self) -> str:
+        """The table that ran: nobody but the environment writes what selects it."""
+        if isinstance(self.level.tables, OneTable):
+            return str(self.level.tables.table)
+        return str(dict(self.level.tables.tables)[evaluate(self.level.tables.selector, self.now)])
 
     def _any(self, leaf: str) -> Value:
         """A value; of numbers, few different ones where there are many, so that some are equal."""
@@ -100,6 +113,8 @@ class Walk:
         if last == sent or self.random.random() < 0.5 or echo == (int(sent) + 1) % NUMBERS:
             echo = self.now[f"{report}.{ECHO}"] = sent
             if self.random.random() < 0.5:
-                self.now[f"{report}.{STATUS}"] = 0
+                self.now |= {
+                    leaf: 0 for leaf in (f"{report}.{STATUS}",) if isinstance(self._kinds.get(leaf), Enum)
+                }
         if echo == sent:
             self.now[f"{report}.{ECHOED}"] = self.now[f"{order}.{COMMAND}"]
