@@ -307,6 +307,15 @@ def test_families_are_proved_and_each_planted_fault_is_found(lines: list[list[Ex
     assert not wider.gaps
 
 
+@pytest.mark.parametrize("lines", range(3, 6))
+def test_every_pair_is_told_where_two_lines_match_everywhere(lines: int) -> None:
+    """That two of them overlap is known from the first region; that they do with a line that matches one value, only from its own."""
+    for narrow in itertools.combinations(range(lines), lines - 2):
+        conditions = [[compare(Op.EQ, read("x"), number(2))] if at in narrow else [] for at in range(lines)]
+        found = searched(program_of(conditions))[1]
+        assert set(found.overlaps) == set(itertools.combinations(range(lines), 2)), narrow
+
+
 def test_respelt_conditions_meet_in_one_form() -> None:
     universe = Universe()
     x, y = read("x"), read("y")
