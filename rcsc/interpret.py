@@ -5,7 +5,6 @@ enough to believe: it follows the manual's "What a cycle does" word for word and
 """
 
 import importlib
-import math
 import operator
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -287,11 +286,13 @@ def initial(program: Program) -> dict[str, Value]:
 
 def _admitted(variable: Variable, value: Value) -> Value | None:
     """The value a table may see; None where it is refused."""
+    given = _exactly(float if isinstance(variable.type, Real) else int, value)
+    if given is None:
+        return None
+    value = given
     if isinstance(variable.type, Real):
-        if math.isnan(value):
-            return None
         low, high = variable.type.low, variable.type.high
-        value = float(value) + 0.0
+        value = value + 0.0
     else:
         low, high = key_bounds(variable.type)
     if low <= value <= high:
@@ -299,6 +300,17 @@ def _admitted(variable: Variable, value: Value) -> Value | None:
     if variable.admit is Admit.CLAMP:
         return low if value < low else high
     return None
+
+
+def _exactly(kind: type[int | float], value: Any) -> Value | None:
+    """What came from outside as a value of its kind: None for a NaN, a fraction among integers, and what is no number."""
+    if kind is int and isinstance(value, int):
+        return value
+    try:
+        made = kind(value)
+        return made if made == value else None
+    except (TypeError, ValueError, OverflowError):
+        return None
 
 
 def admit(program: Program, snapshot: Snapshot) -> dict[str, Value] | str:
@@ -321,7 +333,8 @@ def unfit(program: Program, snapshot: Snapshot) -> str:
     for variable in program.variables:
         value, kind = snapshot[variable.name], variable.type
         low, high = (kind.low, kind.high) if isinstance(kind, Real) else key_bounds(kind)
-        if variable.kind is not Kind.INPUT and not low <= value <= high:
+        of_kind = isinstance(value, int | float if isinstance(kind, Real) else int)
+        if variable.kind is not Kind.INPUT and not (of_kind and low <= value <= high):
             return variable.name
     broken = (one.name for one in program.invariants if not evaluate(one.condition, snapshot))
     return next(broken, "")

@@ -1,15 +1,22 @@
 """Interpreter = Python = C, over drawn inputs and sequences of cycles; each difference is found once planted."""
 
+import math
+import sys
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from decimal import Decimal
+from fractions import Fraction
 from pathlib import Path
+from types import ModuleType
+from typing import Any
 
+import numpy as np
 import pytest
 
 from rcsc.emit.write import write
-from rcsc.interpret import Fault, admit, call, settle, unfit
-from rcsc.model import Program, Snapshot
+from rcsc.interpret import Fault, admit, call, initial, run_table, settle, unfit
+from rcsc.model import Admit, Kind, Program, Real, Snapshot, Value, Variable, key_bounds
 from rcsc.system.executors import CExecutor, PythonExecutor
 from rcsc.system.executors import build as build_executors
 from rcsc.system.signature import signature
@@ -356,6 +363,87 @@ def test_an_extern_result_outside_its_range_is_refused_by_all(extern: Everything
     unchecked = first(EXTERN, c=swap("s->fault = 4;", "s->fault = 0;"))
     assert unchecked is not None
     assert unchecked.executor == "C"
+
+
+FROM_OUTSIDE = """
+enum light { red, green, blue }
+input digit : int 0 .. 9
+input pulled : int 0 .. 9 clamp
+input wide : int -9223372036854775808 .. 9223372036854775807
+input high : int 0 .. 18446744073709551615 clamp
+input lamp : light
+input seen : bool
+input x : real -2.0 .. 1e17
+input y : real -2.0 .. 2.0 clamp
+state digit_kept : int 0 .. 9
+state wide_kept : int -9223372036854775808 .. 9223372036854775807
+state lamp_kept : light
+state seen_kept : bool
+state x_kept : real -2.0 .. 1e17
+extern procedure ask writes digit_kept, wide_kept, lamp_kept, seen_kept, x_kept python "outside_of_it:ask" c "ask"
+table t {
+  | line | when || procedures |
+  | a    | true || ask        |
+}
+"""
+VALUES_FROM_OUTSIDE: tuple[Any, ...] = (
+    *(0, 1, 3, -1, 2**53 + 1, 2**63, 2**64 - 1, 2**64, 10**400, True, False, 0.0, -0.0, 2.0, 2.5, 0.5, 1e-9, 1e16, 1e300),
+    *(math.nan, math.inf, -math.inf, Fraction(1, 3), Fraction(1, 2), Fraction(4), Decimal("0.1"), Decimal(3), Decimal("NaN")),
+    *(np.uint8(200), np.int64(3), np.float32(0.1), np.float32(2.5), np.float64(1.5), np.float64("nan"), np.bool_(True)),
+    *("3", "", None, b"3", 3j, (), [3], object()),
+)  # fmt: skip
+
+
+def meant_by(variable: Variable, given: Any) -> Value | None:
+    """The value of the variable's type that was given; None where it has to be refused."""
+    plain: Any = given.item() if isinstance(given, np.generic) else given
+    kind = variable.type
+    low, high = (kind.low, kind.high) if isinstance(kind, Real) else key_bounds(kind)
+    exact: Any
+    if isinstance(plain, float) and math.isinf(plain) and isinstance(kind, Real):
+        exact = plain
+    elif isinstance(plain, int | float | Fraction | Decimal) and plain - plain == 0:  # type: ignore[operator]  # one at a time
+        exact = Fraction(plain)
+        if not isinstance(kind, Real) and exact.denominator != 1:
+            return None
+        if isinstance(kind, Real) and (abs(exact) > 10**308 or Fraction(float(exact)) != exact):
+            return None
+    else:
+        return None
+    if not low <= exact <= high:
+        return None if variable.admit is Admit.REJECT else low if exact < low else high
+    return float(exact) if isinstance(kind, Real) else int(exact)
+
+
+@pytest.mark.parametrize("given", VALUES_FROM_OUTSIDE, ids=repr)
+def test_what_comes_from_outside_is_a_value_of_its_type_or_refused(
+    given: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    program = program_of(FROM_OUTSIDE)
+    user: Any = ModuleType("outside_of_it")
+    monkeypatch.setitem(sys.modules, "outside_of_it", user)
+    files, module = emitted(program), ModuleType("outside_made")
+    exec(files[next(name for name in files if name.endswith(".py"))], module.__dict__)  # noqa: S102 - its own
+    written = program.procedures[0].writes
+    for at, variable in enumerate(program.variables):
+        name, state = str(variable.name), module.__dict__["State"]()
+        start: dict[str, Any] = initial(program)
+        answers = tuple(given if one == name else start[one] for one in written)
+        user.ask = lambda answers=answers: answers
+        if variable.kind is Kind.INPUT:
+            start[name] = given
+            setattr(state, name, given)
+        right = run_table(program, program.tables[0], start)
+        fault = module.__dict__["t_step"](state)
+        value, refused = meant_by(variable, given), Fault.ADMIT if name not in written else Fault.EXTERN
+        expected: Any = value if value is not None else start[name]
+        for found, of in ((right.snapshot[name], "interpreter"), (getattr(state, name), "Python")):
+            assert found is expected or (found == expected and type(found) in (int, bool, float)), (name, of)
+            if value is not None:
+                assert isinstance(found, float if isinstance(variable.type, Real) else int), (name, of)
+        assert right.fault == fault == (refused if value is None else Fault.OK), name
+        if value is None:
+            assert (right.fault_at, state.fault_at) == (name, at)
 
 
 SINGLE = """

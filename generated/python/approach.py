@@ -5,6 +5,7 @@ from bisect import bisect_right as _bisect
 from enum import IntEnum
 from functools import reduce as _reduce
 from itertools import product as _product
+from math import nan as _nan
 from operator import and_ as _and
 
 
@@ -164,6 +165,23 @@ def _max(a, b):
     return b if b > a else a
 
 
+def _whole(value):
+    return value if isinstance(value, int) else _exactly(int, value)
+
+
+def _real(value):
+    return value if type(value) is float else _exactly(float, value)
+
+
+def _exactly(kind, value):
+    """The value as one of this kind; a NaN, which no range holds, where it is none."""
+    try:
+        made = kind(value)
+        return made if made == value else _nan
+    except (TypeError, ValueError, OverflowError):
+        return _nan
+
+
 def _refused(s, position):
     s.fault_at = position
     return 1
@@ -264,26 +282,30 @@ def _admit(s):
     s.line = -1
     s.fault_at = -1
     s.assumptions_failed = 0
-    i0 = s.distance_mm
+    i0 = _whole(s.distance_mm)
     if i0 < 0:
         i0 = 0
     elif i0 > 2000:
         i0 = 2000
-    i1 = s.braking_mm
+    if not 0 <= i0 <= 2000:
+        return _refused(s, 0)
+    i1 = _whole(s.braking_mm)
     if not 0 <= i1 <= 500:
         return _refused(s, 1)
-    i2 = s.tolerance_mm
+    i2 = _whole(s.tolerance_mm)
     if not 1 <= i2 <= 20:
         return _refused(s, 2)
-    i3 = s.force_n
+    i3 = _real(s.force_n)
     if not 0.0 <= i3 <= 500.0:
         return _refused(s, 3)
     i3 = i3 + 0.0
-    i4 = s.limit_n
+    i4 = _real(s.limit_n)
     if not 10.0 <= i4 <= 400.0:
         return _refused(s, 4)
     i4 = i4 + 0.0
     s.distance_mm = i0
+    s.braking_mm = i1
+    s.tolerance_mm = i2
     s.force_n = i3
     s.limit_n = i4
     return 0

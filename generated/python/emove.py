@@ -5,6 +5,7 @@ from bisect import bisect_right as _bisect
 from enum import IntEnum
 from functools import reduce as _reduce
 from itertools import product as _product
+from math import nan as _nan
 from operator import and_ as _and
 
 
@@ -400,6 +401,23 @@ def _min(a, b):
 
 def _max(a, b):
     return b if b > a else a
+
+
+def _whole(value):
+    return value if isinstance(value, int) else _exactly(int, value)
+
+
+def _real(value):
+    return value if type(value) is float else _exactly(float, value)
+
+
+def _exactly(kind, value):
+    """The value as one of this kind; a NaN, which no range holds, where it is none."""
+    try:
+        made = kind(value)
+        return made if made == value else _nan
+    except (TypeError, ValueError, OverflowError):
+        return _nan
 
 
 def _refused(s, position):
@@ -1232,163 +1250,198 @@ def _admit(s):
     s.line = -1
     s.fault_at = -1
     s.assumptions_failed = 0
-    i0 = s.command_inc_command
+    i0 = _whole(s.command_inc_command)
     if not 0 <= i0 <= 65535:
         return _refused(s, 0)
-    i1 = s.command_input_command
+    i1 = _whole(s.command_input_command)
     if not 0 <= i1 <= 5:
         return _refused(s, 1)
-    i2 = s.command_obj_ptr
+    i2 = _whole(s.command_obj_ptr)
     if not 0 <= i2 <= 6:
         return _refused(s, 2)
-    i3 = s.command_grasp
+    i3 = _whole(s.command_grasp)
     if not 0 <= i3 <= 9:
         return _refused(s, 3)
-    i4 = s.command_locpt_ptr
+    i4 = _whole(s.command_locpt_ptr)
     if not 0 <= i4 <= 255:
         return _refused(s, 4)
-    i5 = s.command_sector
+    i5 = _whole(s.command_sector)
     if not 0 <= i5 <= 99:
         return _refused(s, 5)
-    i6 = s.command_apoint_pos_flag
+    i6 = _whole(s.command_apoint_pos_flag)
     if not 0 <= i6 <= 1:
         return _refused(s, 6)
-    i7 = s.command_gripped_obj_ptr
+    i7 = _whole(s.command_gripped_obj_ptr)
     if not 0 <= i7 <= 6:
         return _refused(s, 7)
-    i8 = s.primitive_inc_command_echo
+    i8 = _whole(s.primitive_inc_command_echo)
     if not 0 <= i8 <= 65535:
         return _refused(s, 8)
-    i9 = s.primitive_ref_command_echo
+    i9 = _whole(s.primitive_ref_command_echo)
     if not 0 <= i9 <= 5:
         return _refused(s, 9)
-    i10 = s.primitive_status_report
+    i10 = _whole(s.primitive_status_report)
     if not 0 <= i10 <= 2:
         return _refused(s, 10)
-    i11 = s.primitive_failure
+    i11 = _whole(s.primitive_failure)
     if not 0 <= i11 <= 15:
         return _refused(s, 11)
-    i12 = s.primitive_holds
+    i12 = _whole(s.primitive_holds)
     if not 0 <= i12 <= 1:
         return _refused(s, 12)
-    i13 = s.vision_inc_command_echo
+    i13 = _whole(s.vision_inc_command_echo)
     if not 0 <= i13 <= 65535:
         return _refused(s, 13)
-    i14 = s.vision_ref_command_echo
+    i14 = _whole(s.vision_ref_command_echo)
     if not 0 <= i14 <= 2:
         return _refused(s, 14)
-    i15 = s.vision_status_report
+    i15 = _whole(s.vision_status_report)
     if not 0 <= i15 <= 2:
         return _refused(s, 15)
-    i16 = s.vision_failure
+    i16 = _whole(s.vision_failure)
     if not 0 <= i16 <= 15:
         return _refused(s, 16)
-    i17 = s.vision_x_mm
+    i17 = _real(s.vision_x_mm)
     if not -500.0 <= i17 <= 500.0:
         return _refused(s, 17)
     i17 = i17 + 0.0
-    i18 = s.vision_y_mm
+    i18 = _real(s.vision_y_mm)
     if not -500.0 <= i18 <= 500.0:
         return _refused(s, 18)
     i18 = i18 + 0.0
-    i19 = s.vision_c
+    i19 = _real(s.vision_c)
     if not -1.0 <= i19 <= 1.0:
         return _refused(s, 19)
     i19 = i19 + 0.0
-    i20 = s.vision_s
+    i20 = _real(s.vision_s)
     if not -1.0 <= i20 <= 1.0:
         return _refused(s, 20)
     i20 = i20 + 0.0
-    i21 = s.vision_range_mm
+    i21 = _real(s.vision_range_mm)
     if not 0.0 <= i21 <= 2000.0:
         return _refused(s, 21)
     i21 = i21 + 0.0
-    i22 = s.origin_known
+    i22 = _whole(s.origin_known)
     if not 0 <= i22 <= 1:
         return _refused(s, 22)
-    i23 = s.origin_depart_first
+    i23 = _whole(s.origin_depart_first)
     if not 0 <= i23 <= 9999:
         return _refused(s, 23)
-    i24 = s.origin_depart_count
+    i24 = _whole(s.origin_depart_count)
     if not 0 <= i24 <= 31:
         return _refused(s, 24)
-    i25 = s.origin_approach_first
+    i25 = _whole(s.origin_approach_first)
     if not 0 <= i25 <= 9999:
         return _refused(s, 25)
-    i26 = s.origin_approach_count
+    i26 = _whole(s.origin_approach_count)
     if not 0 <= i26 <= 31:
         return _refused(s, 26)
-    i27 = s.origin_hover_point
+    i27 = _whole(s.origin_hover_point)
     if not 0 <= i27 <= 9999:
         return _refused(s, 27)
-    i28 = s.origin_grasp_point
+    i28 = _whole(s.origin_grasp_point)
     if not 0 <= i28 <= 9999:
         return _refused(s, 28)
-    i29 = s.origin_view_point
+    i29 = _whole(s.origin_view_point)
     if not 0 <= i29 <= 9999:
         return _refused(s, 29)
-    i30 = s.target_known
+    i30 = _whole(s.target_known)
     if not 0 <= i30 <= 1:
         return _refused(s, 30)
-    i31 = s.target_depart_first
+    i31 = _whole(s.target_depart_first)
     if not 0 <= i31 <= 9999:
         return _refused(s, 31)
-    i32 = s.target_depart_count
+    i32 = _whole(s.target_depart_count)
     if not 0 <= i32 <= 31:
         return _refused(s, 32)
-    i33 = s.target_approach_first
+    i33 = _whole(s.target_approach_first)
     if not 0 <= i33 <= 9999:
         return _refused(s, 33)
-    i34 = s.target_approach_count
+    i34 = _whole(s.target_approach_count)
     if not 0 <= i34 <= 31:
         return _refused(s, 34)
-    i35 = s.target_hover_point
+    i35 = _whole(s.target_hover_point)
     if not 0 <= i35 <= 9999:
         return _refused(s, 35)
-    i36 = s.target_grasp_point
+    i36 = _whole(s.target_grasp_point)
     if not 0 <= i36 <= 9999:
         return _refused(s, 36)
-    i37 = s.target_view_point
+    i37 = _whole(s.target_view_point)
     if not 0 <= i37 <= 9999:
         return _refused(s, 37)
-    i38 = s.object_data_known
+    i38 = _whole(s.object_data_known)
     if not 0 <= i38 <= 1:
         return _refused(s, 38)
-    i39 = s.object_data_expected_range_mm
+    i39 = _real(s.object_data_expected_range_mm)
     if not 0.0 <= i39 <= 2000.0:
         return _refused(s, 39)
     i39 = i39 + 0.0
-    i40 = s.object_data_grip_range_mm
+    i40 = _real(s.object_data_grip_range_mm)
     if not 0.0 <= i40 <= 2000.0:
         return _refused(s, 40)
     i40 = i40 + 0.0
-    i41 = s.object_data_lift_mm
+    i41 = _real(s.object_data_lift_mm)
     if not -500.0 <= i41 <= 500.0:
         return _refused(s, 41)
     i41 = i41 + 0.0
-    i42 = s.held_data_known
+    i42 = _whole(s.held_data_known)
     if not 0 <= i42 <= 1:
         return _refused(s, 42)
-    i43 = s.held_data_expected_range_mm
+    i43 = _real(s.held_data_expected_range_mm)
     if not 0.0 <= i43 <= 2000.0:
         return _refused(s, 43)
     i43 = i43 + 0.0
-    i44 = s.held_data_grip_range_mm
+    i44 = _real(s.held_data_grip_range_mm)
     if not 0.0 <= i44 <= 2000.0:
         return _refused(s, 44)
     i44 = i44 + 0.0
-    i45 = s.held_data_lift_mm
+    i45 = _real(s.held_data_lift_mm)
     if not -500.0 <= i45 <= 500.0:
         return _refused(s, 45)
     i45 = i45 + 0.0
+    s.command_inc_command = i0
+    s.command_input_command = i1
+    s.command_obj_ptr = i2
+    s.command_grasp = i3
+    s.command_locpt_ptr = i4
+    s.command_sector = i5
+    s.command_apoint_pos_flag = i6
+    s.command_gripped_obj_ptr = i7
+    s.primitive_inc_command_echo = i8
+    s.primitive_ref_command_echo = i9
+    s.primitive_status_report = i10
+    s.primitive_failure = i11
+    s.primitive_holds = i12
+    s.vision_inc_command_echo = i13
+    s.vision_ref_command_echo = i14
+    s.vision_status_report = i15
+    s.vision_failure = i16
     s.vision_x_mm = i17
     s.vision_y_mm = i18
     s.vision_c = i19
     s.vision_s = i20
     s.vision_range_mm = i21
+    s.origin_known = i22
+    s.origin_depart_first = i23
+    s.origin_depart_count = i24
+    s.origin_approach_first = i25
+    s.origin_approach_count = i26
+    s.origin_hover_point = i27
+    s.origin_grasp_point = i28
+    s.origin_view_point = i29
+    s.target_known = i30
+    s.target_depart_first = i31
+    s.target_depart_count = i32
+    s.target_approach_first = i33
+    s.target_approach_count = i34
+    s.target_hover_point = i35
+    s.target_grasp_point = i36
+    s.target_view_point = i37
+    s.object_data_known = i38
     s.object_data_expected_range_mm = i39
     s.object_data_grip_range_mm = i40
     s.object_data_lift_mm = i41
+    s.held_data_known = i42
     s.held_data_expected_range_mm = i43
     s.held_data_grip_range_mm = i44
     s.held_data_lift_mm = i45

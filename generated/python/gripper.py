@@ -5,6 +5,7 @@ from bisect import bisect_right as _bisect
 from enum import IntEnum
 from functools import reduce as _reduce
 from itertools import product as _product
+from math import nan as _nan
 from operator import and_ as _and
 
 
@@ -217,6 +218,23 @@ def _min(a, b):
 
 def _max(a, b):
     return b if b > a else a
+
+
+def _whole(value):
+    return value if isinstance(value, int) else _exactly(int, value)
+
+
+def _real(value):
+    return value if type(value) is float else _exactly(float, value)
+
+
+def _exactly(kind, value):
+    """The value as one of this kind; a NaN, which no range holds, where it is none."""
+    try:
+        made = kind(value)
+        return made if made == value else _nan
+    except (TypeError, ValueError, OverflowError):
+        return _nan
 
 
 def _refused(s, position):
@@ -708,25 +726,25 @@ def _admit(s):
     s.line = -1
     s.fault_at = -1
     s.assumptions_failed = 0
-    i0 = s.command_inc_command
+    i0 = _whole(s.command_inc_command)
     if not 0 <= i0 <= 65535:
         return _refused(s, 0)
-    i1 = s.command_input_command
+    i1 = _whole(s.command_input_command)
     if not 0 <= i1 <= 2:
         return _refused(s, 1)
-    i2 = s.command_opening_mm
+    i2 = _real(s.command_opening_mm)
     if not 0.0 <= i2 <= 200.0:
         return _refused(s, 2)
     i2 = i2 + 0.0
-    i3 = s.command_force_n
+    i3 = _real(s.command_force_n)
     if not 0.0 <= i3 <= 1000.0:
         return _refused(s, 3)
     i3 = i3 + 0.0
-    i4 = s.command_speed_mm_s
+    i4 = _real(s.command_speed_mm_s)
     if not 0.0 <= i4 <= 500.0:
         return _refused(s, 4)
     i4 = i4 + 0.0
-    i5 = s.hand_opening_mm
+    i5 = _real(s.hand_opening_mm)
     if i5 < 0.0:
         i5 = 0.0
     elif i5 > 200.0:
@@ -734,7 +752,7 @@ def _admit(s):
     if not 0.0 <= i5 <= 200.0:
         return _refused(s, 5)
     i5 = i5 + 0.0
-    i6 = s.hand_force_n
+    i6 = _real(s.hand_force_n)
     if i6 < 0.0:
         i6 = 0.0
     elif i6 > 1000.0:
@@ -742,6 +760,8 @@ def _admit(s):
     if not 0.0 <= i6 <= 1000.0:
         return _refused(s, 6)
     i6 = i6 + 0.0
+    s.command_inc_command = i0
+    s.command_input_command = i1
     s.command_opening_mm = i2
     s.command_force_n = i3
     s.command_speed_mm_s = i4

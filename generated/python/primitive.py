@@ -5,6 +5,7 @@ from bisect import bisect_right as _bisect
 from enum import IntEnum
 from functools import reduce as _reduce
 from itertools import product as _product
+from math import nan as _nan
 from operator import and_ as _and
 
 
@@ -413,6 +414,23 @@ def _min(a, b):
 
 def _max(a, b):
     return b if b > a else a
+
+
+def _whole(value):
+    return value if isinstance(value, int) else _exactly(int, value)
+
+
+def _real(value):
+    return value if type(value) is float else _exactly(float, value)
+
+
+def _exactly(kind, value):
+    """The value as one of this kind; a NaN, which no range holds, where it is none."""
+    try:
+        made = kind(value)
+        return made if made == value else _nan
+    except (TypeError, ValueError, OverflowError):
+        return _nan
 
 
 def _refused(s, position):
@@ -1191,188 +1209,197 @@ def _admit(s):
     s.line = -1
     s.fault_at = -1
     s.assumptions_failed = 0
-    i0 = s.command_inc_command
+    i0 = _whole(s.command_inc_command)
     if not 0 <= i0 <= 65535:
         return _refused(s, 0)
-    i1 = s.command_input_command
+    i1 = _whole(s.command_input_command)
     if not 0 <= i1 <= 5:
         return _refused(s, 1)
-    i2 = s.command_obj_ptr
+    i2 = _whole(s.command_obj_ptr)
     if not 0 <= i2 <= 6:
         return _refused(s, 2)
-    i3 = s.command_grasp
+    i3 = _whole(s.command_grasp)
     if not 0 <= i3 <= 9:
         return _refused(s, 3)
-    i4 = s.command_pose_ptr
+    i4 = _whole(s.command_pose_ptr)
     if not 0 <= i4 <= 9999:
         return _refused(s, 4)
-    i5 = s.command_displaced_x
+    i5 = _real(s.command_displaced_x)
     if not -500.0 <= i5 <= 500.0:
         return _refused(s, 5)
     i5 = i5 + 0.0
-    i6 = s.command_displaced_y
+    i6 = _real(s.command_displaced_y)
     if not -500.0 <= i6 <= 500.0:
         return _refused(s, 6)
     i6 = i6 + 0.0
-    i7 = s.command_displaced_z
+    i7 = _real(s.command_displaced_z)
     if not -500.0 <= i7 <= 500.0:
         return _refused(s, 7)
     i7 = i7 + 0.0
-    i8 = s.command_displaced_c
+    i8 = _real(s.command_displaced_c)
     if not -1.0 <= i8 <= 1.0:
         return _refused(s, 8)
     i8 = i8 + 0.0
-    i9 = s.command_displaced_s
+    i9 = _real(s.command_displaced_s)
     if not -1.0 <= i9 <= 1.0:
         return _refused(s, 9)
     i9 = i9 + 0.0
-    i10 = s.robot_inc_command_echo
+    i10 = _whole(s.robot_inc_command_echo)
     if not 0 <= i10 <= 65535:
         return _refused(s, 10)
-    i11 = s.robot_ref_command_echo
+    i11 = _whole(s.robot_ref_command_echo)
     if not 0 <= i11 <= 1:
         return _refused(s, 11)
-    i12 = s.robot_status_report
+    i12 = _whole(s.robot_status_report)
     if not 0 <= i12 <= 2:
         return _refused(s, 12)
-    i13 = s.robot_failure
+    i13 = _whole(s.robot_failure)
     if not 0 <= i13 <= 15:
         return _refused(s, 13)
-    i14 = s.robot_plate_0
+    i14 = _real(s.robot_plate_0)
     if not -4000.0 <= i14 <= 4000.0:
         return _refused(s, 14)
     i14 = i14 + 0.0
-    i15 = s.robot_plate_1
+    i15 = _real(s.robot_plate_1)
     if not -4000.0 <= i15 <= 4000.0:
         return _refused(s, 15)
     i15 = i15 + 0.0
-    i16 = s.robot_plate_2
+    i16 = _real(s.robot_plate_2)
     if not -4000.0 <= i16 <= 4000.0:
         return _refused(s, 16)
     i16 = i16 + 0.0
-    i17 = s.robot_plate_3
+    i17 = _real(s.robot_plate_3)
     if not -4000.0 <= i17 <= 4000.0:
         return _refused(s, 17)
     i17 = i17 + 0.0
-    i18 = s.robot_plate_4
+    i18 = _real(s.robot_plate_4)
     if not -4000.0 <= i18 <= 4000.0:
         return _refused(s, 18)
     i18 = i18 + 0.0
-    i19 = s.robot_plate_5
+    i19 = _real(s.robot_plate_5)
     if not -4000.0 <= i19 <= 4000.0:
         return _refused(s, 19)
     i19 = i19 + 0.0
-    i20 = s.robot_plate_6
+    i20 = _real(s.robot_plate_6)
     if not -4000.0 <= i20 <= 4000.0:
         return _refused(s, 20)
     i20 = i20 + 0.0
-    i21 = s.robot_plate_7
+    i21 = _real(s.robot_plate_7)
     if not -4000.0 <= i21 <= 4000.0:
         return _refused(s, 21)
     i21 = i21 + 0.0
-    i22 = s.robot_plate_8
+    i22 = _real(s.robot_plate_8)
     if not -4000.0 <= i22 <= 4000.0:
         return _refused(s, 22)
     i22 = i22 + 0.0
-    i23 = s.gripper_inc_command_echo
+    i23 = _whole(s.gripper_inc_command_echo)
     if not 0 <= i23 <= 65535:
         return _refused(s, 23)
-    i24 = s.gripper_ref_command_echo
+    i24 = _whole(s.gripper_ref_command_echo)
     if not 0 <= i24 <= 2:
         return _refused(s, 24)
-    i25 = s.gripper_status_report
+    i25 = _whole(s.gripper_status_report)
     if not 0 <= i25 <= 2:
         return _refused(s, 25)
-    i26 = s.gripper_failure
+    i26 = _whole(s.gripper_failure)
     if not 0 <= i26 <= 15:
         return _refused(s, 26)
-    i27 = s.gripper_opening_mm
+    i27 = _real(s.gripper_opening_mm)
     if not 0.0 <= i27 <= 200.0:
         return _refused(s, 27)
     i27 = i27 + 0.0
-    i28 = s.goal_known
+    i28 = _whole(s.goal_known)
     if not 0 <= i28 <= 1:
         return _refused(s, 28)
-    i29 = s.goal_plate_0
+    i29 = _real(s.goal_plate_0)
     if not -4000.0 <= i29 <= 4000.0:
         return _refused(s, 29)
     i29 = i29 + 0.0
-    i30 = s.goal_plate_1
+    i30 = _real(s.goal_plate_1)
     if not -4000.0 <= i30 <= 4000.0:
         return _refused(s, 30)
     i30 = i30 + 0.0
-    i31 = s.goal_plate_2
+    i31 = _real(s.goal_plate_2)
     if not -4000.0 <= i31 <= 4000.0:
         return _refused(s, 31)
     i31 = i31 + 0.0
-    i32 = s.goal_plate_3
+    i32 = _real(s.goal_plate_3)
     if not -4000.0 <= i32 <= 4000.0:
         return _refused(s, 32)
     i32 = i32 + 0.0
-    i33 = s.goal_plate_4
+    i33 = _real(s.goal_plate_4)
     if not -4000.0 <= i33 <= 4000.0:
         return _refused(s, 33)
     i33 = i33 + 0.0
-    i34 = s.goal_plate_5
+    i34 = _real(s.goal_plate_5)
     if not -4000.0 <= i34 <= 4000.0:
         return _refused(s, 34)
     i34 = i34 + 0.0
-    i35 = s.goal_plate_6
+    i35 = _real(s.goal_plate_6)
     if not -4000.0 <= i35 <= 4000.0:
         return _refused(s, 35)
     i35 = i35 + 0.0
-    i36 = s.goal_plate_7
+    i36 = _real(s.goal_plate_7)
     if not -4000.0 <= i36 <= 4000.0:
         return _refused(s, 36)
     i36 = i36 + 0.0
-    i37 = s.goal_plate_8
+    i37 = _real(s.goal_plate_8)
     if not -4000.0 <= i37 <= 4000.0:
         return _refused(s, 37)
     i37 = i37 + 0.0
-    i38 = s.goal_speed_mm_s
+    i38 = _real(s.goal_speed_mm_s)
     if not 1.0 <= i38 <= 2000.0:
         return _refused(s, 38)
     i38 = i38 + 0.0
-    i39 = s.goal_accel_mm_s2
+    i39 = _real(s.goal_accel_mm_s2)
     if not 10.0 <= i39 <= 10000.0:
         return _refused(s, 39)
     i39 = i39 + 0.0
-    i40 = s.goal_breakpoint_mm
+    i40 = _real(s.goal_breakpoint_mm)
     if not 0.0 <= i40 <= 500.0:
         return _refused(s, 40)
     i40 = i40 + 0.0
-    i41 = s.fingers_known
+    i41 = _whole(s.fingers_known)
     if not 0 <= i41 <= 1:
         return _refused(s, 41)
-    i42 = s.fingers_approach_mm
+    i42 = _real(s.fingers_approach_mm)
     if not 0.0 <= i42 <= 200.0:
         return _refused(s, 42)
     i42 = i42 + 0.0
-    i43 = s.fingers_departure_mm
+    i43 = _real(s.fingers_departure_mm)
     if not 0.0 <= i43 <= 200.0:
         return _refused(s, 43)
     i43 = i43 + 0.0
-    i44 = s.fingers_grip_mm
+    i44 = _real(s.fingers_grip_mm)
     if not 0.0 <= i44 <= 200.0:
         return _refused(s, 44)
     i44 = i44 + 0.0
-    i45 = s.fingers_tolerance_mm
+    i45 = _real(s.fingers_tolerance_mm)
     if not 0.0 <= i45 <= 50.0:
         return _refused(s, 45)
     i45 = i45 + 0.0
-    i46 = s.fingers_force_n
+    i46 = _real(s.fingers_force_n)
     if not 0.0 <= i46 <= 1000.0:
         return _refused(s, 46)
     i46 = i46 + 0.0
-    i47 = s.fingers_speed_mm_s
+    i47 = _real(s.fingers_speed_mm_s)
     if not 0.0 <= i47 <= 500.0:
         return _refused(s, 47)
     i47 = i47 + 0.0
+    s.command_inc_command = i0
+    s.command_input_command = i1
+    s.command_obj_ptr = i2
+    s.command_grasp = i3
+    s.command_pose_ptr = i4
     s.command_displaced_x = i5
     s.command_displaced_y = i6
     s.command_displaced_z = i7
     s.command_displaced_c = i8
     s.command_displaced_s = i9
+    s.robot_inc_command_echo = i10
+    s.robot_ref_command_echo = i11
+    s.robot_status_report = i12
+    s.robot_failure = i13
     s.robot_plate_0 = i14
     s.robot_plate_1 = i15
     s.robot_plate_2 = i16
@@ -1382,7 +1409,12 @@ def _admit(s):
     s.robot_plate_6 = i20
     s.robot_plate_7 = i21
     s.robot_plate_8 = i22
+    s.gripper_inc_command_echo = i23
+    s.gripper_ref_command_echo = i24
+    s.gripper_status_report = i25
+    s.gripper_failure = i26
     s.gripper_opening_mm = i27
+    s.goal_known = i28
     s.goal_plate_0 = i29
     s.goal_plate_1 = i30
     s.goal_plate_2 = i31
@@ -1395,6 +1427,7 @@ def _admit(s):
     s.goal_speed_mm_s = i38
     s.goal_accel_mm_s2 = i39
     s.goal_breakpoint_mm = i40
+    s.fingers_known = i41
     s.fingers_approach_mm = i42
     s.fingers_departure_mm = i43
     s.fingers_grip_mm = i44

@@ -5,6 +5,7 @@ from bisect import bisect_right as _bisect
 from enum import IntEnum
 from functools import reduce as _reduce
 from itertools import product as _product
+from math import nan as _nan
 from operator import and_ as _and
 
 
@@ -342,6 +343,23 @@ def _min(a, b):
 
 def _max(a, b):
     return b if b > a else a
+
+
+def _whole(value):
+    return value if isinstance(value, int) else _exactly(int, value)
+
+
+def _real(value):
+    return value if type(value) is float else _exactly(float, value)
+
+
+def _exactly(kind, value):
+    """The value as one of this kind; a NaN, which no range holds, where it is none."""
+    try:
+        made = kind(value)
+        return made if made == value else _nan
+    except (TypeError, ValueError, OverflowError):
+        return _nan
 
 
 def _refused(s, position):
@@ -1055,102 +1073,134 @@ def _admit(s):
     s.line = -1
     s.fault_at = -1
     s.assumptions_failed = 0
-    i0 = s.command_inc_command
+    i0 = _whole(s.command_inc_command)
     if not 0 <= i0 <= 65535:
         return _refused(s, 0)
-    i1 = s.command_input_command
+    i1 = _whole(s.command_input_command)
     if not 0 <= i1 <= 5:
         return _refused(s, 1)
-    i2 = s.command_obj
+    i2 = _whole(s.command_obj)
     if not 0 <= i2 <= 6:
         return _refused(s, 2)
-    i3 = s.command_grasp
+    i3 = _whole(s.command_grasp)
     if not 0 <= i3 <= 9:
         return _refused(s, 3)
-    i4 = s.command_source_locpt
+    i4 = _whole(s.command_source_locpt)
     if not 0 <= i4 <= 255:
         return _refused(s, 4)
-    i5 = s.command_dest_locpt
+    i5 = _whole(s.command_dest_locpt)
     if not 0 <= i5 <= 255:
         return _refused(s, 5)
-    i6 = s.command_end_at_locpt
+    i6 = _whole(s.command_end_at_locpt)
     if not 0 <= i6 <= 255:
         return _refused(s, 6)
-    i7 = s.command_sector
+    i7 = _whole(s.command_sector)
     if not 0 <= i7 <= 99:
         return _refused(s, 7)
-    i8 = s.emove_inc_command_echo
+    i8 = _whole(s.emove_inc_command_echo)
     if not 0 <= i8 <= 65535:
         return _refused(s, 8)
-    i9 = s.emove_ref_command_echo
+    i9 = _whole(s.emove_ref_command_echo)
     if not 0 <= i9 <= 5:
         return _refused(s, 9)
-    i10 = s.emove_status_report
+    i10 = _whole(s.emove_status_report)
     if not 0 <= i10 <= 2:
         return _refused(s, 10)
-    i11 = s.emove_failure
+    i11 = _whole(s.emove_failure)
     if not 0 <= i11 <= 15:
         return _refused(s, 11)
-    i12 = s.source_known
+    i12 = _whole(s.source_known)
     if not 0 <= i12 <= 1:
         return _refused(s, 12)
-    i13 = s.source_vision
+    i13 = _whole(s.source_vision)
     if not 0 <= i13 <= 1:
         return _refused(s, 13)
-    i14 = s.source_buffer
+    i14 = _whole(s.source_buffer)
     if not 0 <= i14 <= 1:
         return _refused(s, 14)
-    i15 = s.source_vupos
+    i15 = _whole(s.source_vupos)
     if not 0 <= i15 <= 255:
         return _refused(s, 15)
-    i16 = s.source_safe
+    i16 = _whole(s.source_safe)
     if not 0 <= i16 <= 255:
         return _refused(s, 16)
-    i17 = s.dest_known
+    i17 = _whole(s.dest_known)
     if not 0 <= i17 <= 1:
         return _refused(s, 17)
-    i18 = s.dest_vision
+    i18 = _whole(s.dest_vision)
     if not 0 <= i18 <= 1:
         return _refused(s, 18)
-    i19 = s.dest_buffer
+    i19 = _whole(s.dest_buffer)
     if not 0 <= i19 <= 1:
         return _refused(s, 19)
-    i20 = s.dest_vupos
+    i20 = _whole(s.dest_vupos)
     if not 0 <= i20 <= 255:
         return _refused(s, 20)
-    i21 = s.dest_safe
+    i21 = _whole(s.dest_safe)
     if not 0 <= i21 <= 255:
         return _refused(s, 21)
-    i22 = s.end_at_known
+    i22 = _whole(s.end_at_known)
     if not 0 <= i22 <= 1:
         return _refused(s, 22)
-    i23 = s.end_at_vision
+    i23 = _whole(s.end_at_vision)
     if not 0 <= i23 <= 1:
         return _refused(s, 23)
-    i24 = s.end_at_buffer
+    i24 = _whole(s.end_at_buffer)
     if not 0 <= i24 <= 1:
         return _refused(s, 24)
-    i25 = s.end_at_vupos
+    i25 = _whole(s.end_at_vupos)
     if not 0 <= i25 <= 255:
         return _refused(s, 25)
-    i26 = s.end_at_safe
+    i26 = _whole(s.end_at_safe)
     if not 0 <= i26 <= 255:
         return _refused(s, 26)
-    i27 = s.here_known
+    i27 = _whole(s.here_known)
     if not 0 <= i27 <= 1:
         return _refused(s, 27)
-    i28 = s.here_vision
+    i28 = _whole(s.here_vision)
     if not 0 <= i28 <= 1:
         return _refused(s, 28)
-    i29 = s.here_buffer
+    i29 = _whole(s.here_buffer)
     if not 0 <= i29 <= 1:
         return _refused(s, 29)
-    i30 = s.here_vupos
+    i30 = _whole(s.here_vupos)
     if not 0 <= i30 <= 255:
         return _refused(s, 30)
-    i31 = s.here_safe
+    i31 = _whole(s.here_safe)
     if not 0 <= i31 <= 255:
         return _refused(s, 31)
+    s.command_inc_command = i0
+    s.command_input_command = i1
+    s.command_obj = i2
+    s.command_grasp = i3
+    s.command_source_locpt = i4
+    s.command_dest_locpt = i5
+    s.command_end_at_locpt = i6
+    s.command_sector = i7
+    s.emove_inc_command_echo = i8
+    s.emove_ref_command_echo = i9
+    s.emove_status_report = i10
+    s.emove_failure = i11
+    s.source_known = i12
+    s.source_vision = i13
+    s.source_buffer = i14
+    s.source_vupos = i15
+    s.source_safe = i16
+    s.dest_known = i17
+    s.dest_vision = i18
+    s.dest_buffer = i19
+    s.dest_vupos = i20
+    s.dest_safe = i21
+    s.end_at_known = i22
+    s.end_at_vision = i23
+    s.end_at_buffer = i24
+    s.end_at_vupos = i25
+    s.end_at_safe = i26
+    s.here_known = i27
+    s.here_vision = i28
+    s.here_buffer = i29
+    s.here_vupos = i30
+    s.here_safe = i31
     return 0
 
 

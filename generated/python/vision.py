@@ -5,6 +5,7 @@ from bisect import bisect_right as _bisect
 from enum import IntEnum
 from functools import reduce as _reduce
 from itertools import product as _product
+from math import nan as _nan
 from operator import and_ as _and
 
 
@@ -239,6 +240,23 @@ def _min(a, b):
 
 def _max(a, b):
     return b if b > a else a
+
+
+def _whole(value):
+    return value if isinstance(value, int) else _exactly(int, value)
+
+
+def _real(value):
+    return value if type(value) is float else _exactly(float, value)
+
+
+def _exactly(kind, value):
+    """The value as one of this kind; a NaN, which no range holds, where it is none."""
+    try:
+        made = kind(value)
+        return made if made == value else _nan
+    except (TypeError, ValueError, OverflowError):
+        return _nan
 
 
 def _refused(s, position):
@@ -658,54 +676,60 @@ def _admit(s):
     s.line = -1
     s.fault_at = -1
     s.assumptions_failed = 0
-    i0 = s.command_inc_command
+    i0 = _whole(s.command_inc_command)
     if not 0 <= i0 <= 65535:
         return _refused(s, 0)
-    i1 = s.command_input_command
+    i1 = _whole(s.command_input_command)
     if not 0 <= i1 <= 2:
         return _refused(s, 1)
-    i2 = s.command_obj_ptr
+    i2 = _whole(s.command_obj_ptr)
     if not 0 <= i2 <= 6:
         return _refused(s, 2)
-    i3 = s.command_expected_range_mm
+    i3 = _real(s.command_expected_range_mm)
     if not 0.0 <= i3 <= 2000.0:
         return _refused(s, 3)
     i3 = i3 + 0.0
-    i4 = s.camera_number
+    i4 = _whole(s.camera_number)
     if not 0 <= i4 <= 65535:
         return _refused(s, 4)
-    i5 = s.camera_matched
+    i5 = _whole(s.camera_matched)
     if not 0 <= i5 <= 1:
         return _refused(s, 5)
-    i6 = s.camera_x_mm
+    i6 = _real(s.camera_x_mm)
     if not -500.0 <= i6 <= 500.0:
         return _refused(s, 6)
     i6 = i6 + 0.0
-    i7 = s.camera_y_mm
+    i7 = _real(s.camera_y_mm)
     if not -500.0 <= i7 <= 500.0:
         return _refused(s, 7)
     i7 = i7 + 0.0
-    i8 = s.camera_c
+    i8 = _real(s.camera_c)
     if not -1.0 <= i8 <= 1.0:
         return _refused(s, 8)
     i8 = i8 + 0.0
-    i9 = s.camera_s
+    i9 = _real(s.camera_s)
     if not -1.0 <= i9 <= 1.0:
         return _refused(s, 9)
     i9 = i9 + 0.0
-    i10 = s.camera_range_mm
+    i10 = _real(s.camera_range_mm)
     if not 0.0 <= i10 <= 2000.0:
         return _refused(s, 10)
     i10 = i10 + 0.0
-    i11 = s.camera_flat
+    i11 = _whole(s.camera_flat)
     if not 0 <= i11 <= 1:
         return _refused(s, 11)
+    s.command_inc_command = i0
+    s.command_input_command = i1
+    s.command_obj_ptr = i2
     s.command_expected_range_mm = i3
+    s.camera_number = i4
+    s.camera_matched = i5
     s.camera_x_mm = i6
     s.camera_y_mm = i7
     s.camera_c = i8
     s.camera_s = i9
     s.camera_range_mm = i10
+    s.camera_flat = i11
     return 0
 
 

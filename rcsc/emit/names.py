@@ -29,7 +29,7 @@ _FILES = (
 )
 _MODULE = frozenset(
     """IntEnum State _Refused _bisect _reduce _product _and _div _mod _min _max _refused _line_of _one_of _joined _lines_of
-    _admit _settle _safe _begin check""".split()
+    _nan _whole _real _exactly _admit _settle _safe _begin check""".split()
 )
 """What the Python module calls its own."""
 OWN = ("t", "init", "check", "begin", "admit", "settle", "safe")

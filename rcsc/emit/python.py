@@ -9,7 +9,20 @@ from rcsc.emit.environment import render
 from rcsc.emit.names import FAILED_BITS, comment, names_of
 from rcsc.emit.pytext import PyText, constant
 from rcsc.interpret import Fault
-from rcsc.model import Admit, Bool, Int, Kind, Level, OneTable, Procedure, Real, Variable, key_bounds, pending
+from rcsc.model import (
+    Admit,
+    Bool,
+    Int,
+    Kind,
+    Level,
+    OneTable,
+    Procedure,
+    Real,
+    Scalar,
+    Variable,
+    key_bounds,
+    pending,
+)
 from rcsc.plan import WORD, Coded, Cuts, Direct, Group, Index, Plan, PlanTable, Truth, grouped
 
 MOST_KEYS = 8192
@@ -141,7 +154,7 @@ class _Maker:
             yield "        raise ValueError(given)"
         for at, name in enumerate(procedure.writes):
             position = next(i for i, v in enumerate(self.program.variables) if v.name == name)
-            yield f"    w{at} = given[{at}]"
+            yield f"    w{at} = {_typed(variables[name].type, f'given[{at}]')}"
             yield from self._admitted(variables[name], f"w{at}", f"raise _Refused({position})", 1)
             yield f"    {self.text.place(name)} = w{at}"
 
@@ -156,9 +169,8 @@ class _Maker:
             yield f"{pad}    {place} = {ends[0]}"
             yield f"{pad}elif {place} > {ends[1]}:"
             yield f"{pad}    {place} = {ends[1]}"
-        if variable.admit is Admit.REJECT or isinstance(kind, Real):
-            yield f"{pad}if not {ends[0]} <= {place} <= {ends[1]}:"
-            yield f"{pad}    {refuse}"
+        yield f"{pad}if not {ends[0]} <= {place} <= {ends[1]}:"
+        yield f"{pad}    {refuse}"
         if isinstance(kind, Real):
             yield f"{pad}{place} = {place} + 0.0"
 
@@ -173,10 +185,9 @@ class _Maker:
         stores = []
         for number, (at, variable) in enumerate(inputs):
             value = f"i{number}"
-            lines.append(f"    {value} = {self.text.place(variable.name)}")
+            lines.append(f"    {value} = {_typed(variable.type, self.text.place(variable.name))}")
             lines += self._admitted(variable, value, f"return _refused(s, {at})", 1)
-            if variable.admit is Admit.CLAMP or isinstance(variable.type, Real):
-                stores.append(f"    {self.text.place(variable.name)} = {value}")
+            stores.append(f"    {self.text.place(variable.name)} = {value}")
         return PyFunction("_admit", "s", "Admits every input; the fault.", (*lines, *stores, "    return 0"))
 
     def _check(self) -> PyFunction:
@@ -384,3 +395,8 @@ def _less(place: str, low: int) -> str:
 def _joined(group: Group, names: dict[int, str]) -> str:
     """The masks of a group, made when the module is imported."""
     return f"_joined({', '.join(names[id(probe)] for probe in group)})"
+
+
+def _typed(kind: Scalar, value: str) -> str:
+    """What gives the value as one of its kind, and a NaN, which no range holds, where it is none."""
+    return f"{'_real' if isinstance(kind, Real) else '_whole'}({value})"
