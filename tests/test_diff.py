@@ -19,7 +19,7 @@ from rcsc.diff.compare import compare
 from rcsc.diff.difference import Basis, Change, Difference, Part, ProgramDifference, Sort, holds_in
 from rcsc.diff.forms import rows
 from rcsc.diff.present import knows, within_reach
-from rcsc.interpret import cycle, execute, initial, matching_lines
+from rcsc.interpret import cycle, evaluate, execute, initial, matching_lines
 from rcsc.model import (
     Bool,
     Default,
@@ -572,6 +572,65 @@ def test_a_table_and_a_level_that_are_new_or_gone_are_said() -> None:
     more = GRIP + "table other {\n  | line | width ||\n  |------|-------||\n  | all  |       ||\n}\n"
     assert part(differ(GRIP, more), "other").said == ("new",)
     assert part(differ(more, GRIP), "other").said == ("gone",)
+
+
+# --- conditions that are not defined everywhere ----------------------------------------------------------
+
+PARTLY = """
+state a : int 0 .. 3
+state b : int 0 .. 3
+state n : int 0 .. 3{until}
+{what}
+table t {{
+  | line | a      ||
+  | l    | 0 .. 3 ||
+}}
+"""
+CONDITIONS = (
+    "a < 3",
+    "a < 3 or 3 / b > 3",
+    "a < 3 or 3 / b > 0",
+    "a < 3 and 3 / b >= 0",
+    "b = 0 and a < 3 or a * 3 / b < 9 and a < 3",
+    "not (b = 0 implies 1 / b > 0) or a < 3",
+)
+WHERE_ASKED = ("assume c monitored : ", "invariant c : ", "property c : ", "deferred until ")
+
+
+@pytest.mark.parametrize("where", WHERE_ASKED)
+def test_a_condition_that_becomes_undefined_changed(where: str) -> None:
+    for pair in product(CONDITIONS, repeat=2):
+        deferred = where.startswith("deferred")
+        texts = [
+            PARTLY.format(until=f" {where}{one}" if deferred else "", what="" if deferred else where + one)
+            for one in pair
+        ]
+        sides = [program(text) for text in texts]
+        worths = [worth(side, where.split(maxsplit=1)[0]) for side in sides]
+        expected = {(one, two) for one, two in zip(*worths, strict=True) if one != two}
+        found = differ(*texts)
+        changed = [change for part in found.parts for change in part.changes if part.what != "table"]
+        assert {(change.before, change.after) for change in changed} == expected, pair
+        for change in changed:
+            point = dict(change.point)
+            at = 4 * int(point["a"]) + int(point["b"])
+            assert (worths[0][at], worths[1][at]) == (change.before, change.after), pair
+
+
+def worth(side: Program, what: str) -> list[str]:
+    """What the condition is for every `a` and, within it, every `b`."""
+    made = side.assumptions or side.invariants or side.properties
+    until = next((v.deferred_until for v in side.variables if v.deferred_until is not None), None)
+    condition = made[0].condition if made else until
+    assert condition is not None
+
+    def at(a: int, b: int) -> str:
+        try:
+            return str(bool(evaluate(condition, {"a": a, "b": b, "n": 0}))).lower()
+        except ZeroDivisionError:
+            return "false" if what == "property" else "undefined"
+
+    return [at(a, b) for a, b in product(range(4), repeat=2)]
 
 
 # --- extern procedures --------------------------------------------------------------------------------

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import fields, is_dataclass, replace
 from enum import StrEnum
 from functools import partial
+from itertools import product
 from typing import Any
 
 from rcsc.diff.contrast import changes, contrast
@@ -36,7 +37,7 @@ from rcsc.model import (
 )
 from rcsc.prove import values
 from rcsc.prove.effect import Effect, Meaning
-from rcsc.prove.values import TRUE, Node
+from rcsc.prove.values import FALSE, TRUE, Node
 from rcsc.resolve.leaves import read_by
 
 
@@ -303,19 +304,20 @@ def _condition(versions: Versions, what: str, name: str, pair: tuple[Expr, Expr]
         return Part(what, name, (f"cannot be compared: `{apart[0]}` changed its kind",))
     before = versions.queries
     one, two = (
-        _holds(meaning, condition) for meaning, condition in zip(versions.meanings(), pair, strict=True)
+        _worth(meaning, condition, undefined="false" if what == "property" else "undefined")
+        for meaning, condition in zip(versions.meanings(), pair, strict=True)
     )
     found: list[Change] = []
-    for labels, region in ((("true", "false"), _but(one, two)), (("false", "true"), _but(two, one))):
-        found += changes(versions, Sort.CONDITION, labels, versions.shared.one(region))
+    for first, second in product(one, two):
+        if first != second:
+            region = versions.shared.one(values.both(one[first], two[second]))
+            found += changes(versions, Sort.CONDITION, (first, second), region)
     return Part(what, name, (), tuple(found), (), Basis.SOLVER, versions.queries - before)
 
 
-def _holds(meaning: Meaning, condition: Expr) -> Node:
-    """That the condition is defined, and holds."""
+def _worth(meaning: Meaning, condition: Expr, undefined: str) -> dict[str, Node]:
+    """Where the condition is true, false and, called as given, undefined."""
     holds = meaning.condition(condition)
-    return values.all_of((*(values.negation(bad) for bad in meaning.bad), holds))
-
-
-def _but(one: Node, two: Node) -> Node:
-    return values.both(one, values.negation(two))
+    good = values.all_of(values.negation(bad) for bad in meaning.bad)
+    found = {"true": values.both(good, holds), "false": values.both(good, values.negation(holds))}
+    return found | {undefined: values.either(found.get(undefined, FALSE), values.negation(good))}
