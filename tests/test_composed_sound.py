@@ -467,6 +467,36 @@ def test_a_new_command_whose_line_is_cut_short_is_passed_over(tmp_path: Path) ->
     assert finding.ticks[-1]["lower"].line == "4"  # done, though it never began
 
 
+def stops(text: str) -> str:
+    """Every line looks for a new command; each divides by an input, which is assumed not to be zero."""
+    text = text.replace(
+        "input there", "input load : int 0 .. 2\nassume loaded monitored : load /= 0\ninput there"
+    )
+    text = text.replace("state cur_state", "state rate : int 0 .. 6\nstate cur_state")
+    text = text.replace("procedure state", "procedure slow { rate := 6 / load }\n\nprocedure state", 1)
+    text = text.replace("|| state(going)   |", "|| slow; state(going) |")
+    return text.replace("table go {", "table go assuming loaded {")
+
+
+def test_a_new_command_is_passed_over_where_a_stopping_assumption_fails(tmp_path: Path) -> None:
+    """Whether or not there are extern procedures."""
+    stepper, proof = proved(tmp_path, stops)
+    goal = next(one for one in proof.open if one.sort is Sort.ANSWERED)
+    found = shortest(stepper, goal, 3)
+    assert found is not None
+    assert (goal.table, found.steps[-1].fault) == ("go", Fault.ASSUMPTION)
+
+
+def test_what_is_trusted_of_a_restart_is_named_of_both_levels(tmp_path: Path) -> None:
+    """The cycle after it may not stop: else an older report follows the one that stood."""
+    whole = prove_system(changed(tmp_path, lower=stops), LITTLE)
+    words = "assumption `loaded` of level `lower` does not fail in the first cycle after a restart"
+    echoes = whole.of("lower", (Sort.ECHOES, "", "report"))
+    assert echoes.found
+    assert words in echoes.trusts
+    assert words in whole.of("upper", (Sort.ONE_LINE, "work", "")).trusts
+
+
 # --- what verdicts rest on -------------------------------------------------------------------------
 
 

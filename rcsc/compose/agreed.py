@@ -110,8 +110,7 @@ def of_level(stepper: Stepper, proof: LevelProof) -> Iterator[tuple[Key, Claim]]
     runs = ((name, RUNS),)
     yield from _of_runs(stepper, proof)
     for goal, verdict in proof.found:
-        restart = goal.sort is Sort.ECHOES and _asks(stepper)
-        trusts = ("no extern procedure is refused in the first cycle after a restart",) if restart else ()
+        trusts = tuple(_of_a_restart(stepper, proof)) if goal.sort is Sort.ECHOES else ()
         if goal.key != SAFE:
             yield goal.key, Claim(verdict, runs, trusts)
     if proof.context is not None:
@@ -125,6 +124,16 @@ def of_level(stepper: Stepper, proof: LevelProof) -> Iterator[tuple[Key, Claim]]
     if proof.endings:
         every = tuple((name, (Sort.ENDS, ending.table, "")) for ending in proof.endings)
         yield ENDING, Claim(Verdict.PROVED, every)
+
+
+def _of_a_restart(stepper: Stepper, proof: LevelProof) -> Iterator[str]:
+    """What else could end the first cycle after a restart early, so that the report that stood before is followed by an older one."""
+    if _asks(stepper):
+        yield "no extern procedure is refused in the first cycle after a restart"
+    stops = {str(name) for table in stepper.program.tables for name in table.stops}
+    failing = {goal.name for goal in proof.open if goal.sort is Sort.ASSUMPTION}
+    for name in sorted(stops & failing):
+        yield f"assumption `{name}` of level `{proof.level}` does not fail in the first cycle after a restart"
 
 
 def _of_runs(stepper: Stepper, proof: LevelProof) -> Iterator[tuple[Key, Claim]]:

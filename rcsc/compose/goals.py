@@ -225,7 +225,8 @@ def _own(stepper: Stepper, cycle: Cycle) -> Iterator[Goal]:
         yield Goal(Sort.ONCE, "", FLAG, values.follows(same, values.negation(rises)))
         for at in cycle.tables:
             overlooking = _overlooking(at)
-            if overlooking or (overlooking is not None and _asks(stepper.program)):
+            ends = bool(at.table.stops) or _asks(stepper.program)
+            if overlooking or (overlooking is not None and ends):
                 yield _answered(stepper, cycle, at, overlooking)
     for variable in stepper.program.variables:
         if variable.deferred_until is not None:
