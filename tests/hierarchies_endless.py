@@ -1,9 +1,9 @@
 """Runs of a level in which a command goes on for ever: looked for among every state that it can reach.
 
 In: a role, its states. Out: why a table's command need not end, or nothing. Written anew, to hold `rcsc.compose.ends` against it. A
-command goes on for ever where states can be gone round under one number, with *executing* reported on the way (of PAUSE anything but
-*done*), and either an order is given on the way, so that there is always another one to be answered, or every cycle is quiet: all
-orders are answered, and none is given.
+command goes on for ever where states can be gone round under one number, with another status than *done* or *failed* reported on the
+way (of PAUSE another than *done*), and either an order is given on the way, so that there is always another one to be answered, or
+every cycle is quiet: all orders are answered, and none is given. Cycles that end early come finitely often.
 """
 
 from collections.abc import Iterator, Mapping
@@ -24,7 +24,7 @@ class Edge:
     """A cycle in which the command is the same.
 
     Attributes:
-        unanswered: It reports *executing*, or of PAUSE anything but *done*.
+        unanswered: It reports neither *done* nor *failed*, or of PAUSE anything but *done*.
         orders: It gives an order; `quiet`, all are answered and none is given.
         values: What it read, echoes and statuses apart.
     """
@@ -67,9 +67,8 @@ def _edge(role: Role, state: State, before: dict[str, Value], taken: dict[str, V
 def _unanswered(role: Role, taken: Mapping[str, Value], ran: Ran) -> bool:
     above = role.links.above
     assert above is not None
-    report = f"{above.report}.status_report"
-    paused = taken[f"{above.order}.input_command"] == 0 and not _says(role, ran.after, report, "done")
-    return paused or _says(role, ran.after, report, "executing")
+    pause = taken[f"{above.order}.input_command"] == 0
+    return not _ended(role, ran.after, f"{above.report}.status_report", pause=pause)
 
 
 def _answered(role: Role, below: Below, before: Mapping[str, Value], taken: Mapping[str, Value]) -> bool:
@@ -77,9 +76,11 @@ def _answered(role: Role, below: Below, before: Mapping[str, Value], taken: Mapp
     said = f"{below.report}.status_report"
     if taken[f"{below.report}.inc_command_echo"] != before[f"{below.order}.inc_command"]:
         return False
-    if before[f"{below.order}.input_command"] == 0:
-        return _says(role, taken, said, "done")
-    return not _says(role, taken, said, "executing")
+    return _ended(role, taken, said, pause=before[f"{below.order}.input_command"] == 0)
+
+
+def _ended(role: Role, now: Mapping[str, Value], leaf: str, *, pause: bool) -> bool:
+    return _says(role, now, leaf, "done") or (not pause and _says(role, now, leaf, "failed"))
 
 
 def _says(role: Role, now: Mapping[str, Value], leaf: str, member: str) -> bool:

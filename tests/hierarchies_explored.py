@@ -13,12 +13,15 @@ from rcsc.interpret import Fault
 from rcsc.model import Enum, Program, Value
 from rcsc.system.adopt import adopt
 from rcsc.system.signature import Leaf, Signature
-from tests.hierarchies_level import Key, Ran, Reading, Role, State, number_type
+from tests.hierarchies_level import EARLY, UNDEFINED, Key, Ran, Role, State, number_type
 from tests.hierarchies_world import broken, canonical, offers
+
+MOST_RUN = 8_000
+"""Cycles that are worth running."""
 
 
 class TooManyError(Exception):
-    """More states than are worth listing."""
+    """More states, or cycles, than are worth listing."""
 
 
 def restarts(role: Role) -> Iterator[dict[str, Value]]:
@@ -62,12 +65,16 @@ class Explored:
         least: Goals that break in a run from the first cycle, with the least number of cycles.
         restarted: Goals that break in a run from a restart only.
         states: How many there are, up to the names of numbers; `cycles`, how many were run.
+        lines: That ran, each with its table.
+        undefined: Whether some cycle computes what is not defined, or a value outside its range.
     """
 
     least: dict[Key, int] = field(default_factory=dict)
     restarted: set[Key] = field(default_factory=set)
     states: int = 0
     cycles: int = 0
+    lines: set[tuple[str, str]] = field(default_factory=set)
+    undefined: bool = False
 
     def breaks(self, key: Key) -> bool:
         """Whether a goal breaks in any run."""
@@ -83,7 +90,7 @@ def explored(role: Role, most: int = 4000, seen: set[State] | None = None) -> Ex
         seen: Takes the states, as `canonical` gives them.
 
     Raises:
-        TooManyError: There are more than `most`.
+        TooManyError: There are more than `most`, or more than `MOST_RUN` cycles.
     """
     found, seen = Explored(), set() if seen is None else seen
 
@@ -114,6 +121,13 @@ def _search(
         for before in wave:
             for taken, ran in successors(role, before):
                 found.cycles += 1
+                if found.cycles > MOST_RUN:
+                    raise TooManyError
+                if ran.fault is UNDEFINED:
+                    found.undefined = True
+                    continue
+                if ran.line:
+                    found.lines.add((ran.table, ran.line))
                 keys = list(broken(role, before, taken, ran))
                 for key in keys:
                     say(key, depth)
@@ -129,7 +143,7 @@ def _search(
 
 def _new(role: Role, ran: Ran, seen: set[State]) -> dict[str, Value] | None:
     """The state that a cycle left, where it was not seen before; a fault ends a run."""
-    if ran.fault is not Fault.OK:
+    if ran.fault not in {Fault.OK, *EARLY}:
         return None
     state = canonical(role, ran.after)
     key = tuple(state.values())
@@ -146,12 +160,16 @@ def successors(
     given: Mapping[str, Value] | None = None,
     also: frozenset[str] = frozenset(),
 ) -> Iterator[tuple[dict[str, Value], Ran]]:
-    """Each different thing that the next cycle can do: inputs that it does not read are not varied (`offers`), but for those in `also`."""
+    """Each different thing that the next cycle can do: inputs that it does not read are not varied (`offers`), but for those in `also`.
+
+    Where what the tables are declared to rely on is not so, there is no such cycle.
+    """
     left = list(offers(role, before, but, given))
     while left:
         taken = left[0]
-        now = Reading({**before, **taken})
-        ran = role.run(now)
-        yield taken, ran
-        used = [leaf for leaf in role.inputs if leaf in now.read or leaf in role.watched | also]
+        read: set[str] = set()
+        for ran in role.ways({**before, **taken}, read):
+            if not ran.failed & role.trusted:
+                yield taken, ran
+        used = [leaf for leaf in role.inputs if leaf in read or leaf in role.watched | also]
         left = [one for one in left if any(one[leaf] != taken[leaf] for leaf in used)]

@@ -4,18 +4,53 @@ In: a program, its level, its links. Out: a `Role`, which runs one cycle from an
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import product
 
 from rcsc.compose.contract import Below, Links
 from rcsc.compose.goals import Sort
-from rcsc.interpret import Fault, call, cycle, evaluate, execute, holds, initial, matching_lines, settle
-from rcsc.model import Kind, Level, OneTable, Program, Table, Value, key_bounds, pending, value_of_key
+from rcsc.interpret import (
+    ExternError,
+    Fault,
+    answering,
+    call,
+    cycle,
+    evaluate,
+    execute,
+    holds,
+    initial,
+    matching_lines,
+    settle,
+)
+from rcsc.model import (
+    BEFORE,
+    Kind,
+    Level,
+    OneTable,
+    Procedure,
+    Program,
+    Real,
+    Standing,
+    Table,
+    Value,
+    key_bounds,
+    pending,
+    value_of_key,
+)
+from rcsc.resolve.leaves import read_by
 
 State = tuple[Value, ...]
+Result = tuple[str, tuple[Value, ...]]
+"""An extern procedure, and what one call of it gave."""
 Key = tuple[Sort, str, str]
 """A goal: its sort, its table, its name."""
 FLAG = "new_command"
+EARLY = frozenset({Fault.EXTERN, Fault.ASSUMPTION})
+"""Faults after which the next cycle runs."""
+UNDEFINED = Fault.STATE
+"""Here: an operation of the cycle is not defined, or a value left its range, so that nobody can say what it does."""
 
 
 class Reading(dict[str, Value]):
@@ -37,8 +72,10 @@ class Ran:
     """One cycle as it ran.
 
     Attributes:
-        middle: What the table saw; `after`, what the cycle left.
+        table: That ran, or would have; `line`, blank where none did.
+        middle: What the table saw, or would have; `after`, what the cycle left.
         outlasts: Whether the flag of a new command, up in this cycle, would be up in the next on the same inputs; true where nobody asks.
+        given: What each call of an extern procedure gave.
     """
 
     table: str
@@ -48,6 +85,67 @@ class Ran:
     middle: dict[str, Value]
     after: dict[str, Value]
     outlasts: bool = True
+    given: tuple[Result, ...] = ()
+
+
+@dataclass
+class Script:
+    """What extern procedures give: of each call one of the results that there are, by its number; the first behind the last number.
+
+    Attributes:
+        taken: The numbers that were taken; `many`, how many results there were to choose from.
+    """
+
+    program: Program
+    numbers: tuple[int, ...] = ()
+    taken: list[int] = field(default_factory=list)
+    many: list[int] = field(default_factory=list)
+    given: list[Result] = field(default_factory=list)
+
+    def __call__(self, procedure: Procedure, _args: list[Value]) -> tuple[Value, ...]:
+        """Answers a call."""
+        every = list(results(self.program, procedure))
+        at = len(self.taken)
+        self.taken.append(self.numbers[at] if at < len(self.numbers) else 0)
+        self.many.append(len(every))
+        self.given.append((str(procedure.name), every[self.taken[at]]))
+        return every[self.taken[at]]
+
+    def others(self) -> Iterator[tuple[int, ...]]:
+        """The numbers with which the calls that were answered with the first result are answered otherwise."""
+        for at in range(len(self.numbers), len(self.taken)):
+            for number in range(1, self.many[at]):
+                yield (*self.taken[:at], number)
+
+
+def results(program: Program, procedure: Procedure) -> Iterator[tuple[Value, ...]]:
+    """All that a call may give: every value in range, and each place refused once for all that stands before it."""
+    kinds = [program.variable(name).type for name in procedure.writes]
+    ends = [key_bounds(kind) for kind in kinds]
+    every = [
+        [value_of_key(kind, key) for key in range(low, high + 1)]
+        for kind, (low, high) in zip(kinds, ends, strict=True)
+    ]
+    yield from product(*every)
+    for at, (_, high) in enumerate(ends):
+        rest = tuple(one[0] for one in every[at + 1 :])
+        yield from ((*before, high + 1, *rest) for before in product(*every[:at]))
+
+
+@dataclass
+class Again:
+    """What extern procedures gave in a cycle that ran; each has its own in order, and the least value behind the last."""
+
+    program: Program
+    given: list[Result]
+
+    def __call__(self, procedure: Procedure, _args: list[Value]) -> tuple[Value, ...]:
+        """Answers a call."""
+        for at, (name, values) in enumerate(self.given):
+            if name == procedure.name:
+                del self.given[at]
+                return values
+        return next(results(self.program, procedure))
 
 
 @dataclass(frozen=True)
@@ -84,13 +182,40 @@ class Role:
         found = {f"{below.report}.inc_command_echo" for below in self.links.below}
         if (above := self.links.above) is not None:
             found |= {f"{above.order}.inc_command", *above.numbered}
-        return frozenset(found)
+        found |= {name.removeprefix(BEFORE) for name in self._stated if name.startswith(BEFORE)}
+        return frozenset(found & set(self.inputs))
+
+    @cached_property
+    def _stated(self) -> frozenset[str]:
+        """What the program's properties read."""
+        return frozenset(str(name) for one in self.program.properties for name in read_by(one.condition))
 
     @cached_property
     def watched(self) -> frozenset[str]:
         """Inputs that a goal reads in the cycle in which they come, or that are remembered."""
         above = self.links.above
-        return self.remembered | ({f"{above.order}.input_command"} if above is not None else set())
+        own = {f"{above.order}.input_command"} if above is not None else set()
+        return self.remembered | own | (self._stated & set(self.inputs))
+
+    @cached_property
+    def trusted(self) -> frozenset[str]:
+        """Assumptions that the tables are declared to rely on, of what a cycle takes: what it reads before the table runs."""
+        early = {str(v.name) for v in self.program.variables if v.deferred_until is not None} | set(
+            self.inputs
+        )
+        for one in self.program.procedures:
+            if one.name in self.level.preprocess:
+                early |= set(map(str, one.writes))
+        return frozenset(
+            str(one.name)
+            for one in self.program.assumptions
+            if one.standing is Standing.ASSUMED and early & set(map(str, read_by(one.condition)))
+        )
+
+    @cached_property
+    def asks(self) -> bool:
+        """Whether it has extern procedures."""
+        return any(one.extern is not None for one in self.program.procedures)
 
     @cached_property
     def tables(self) -> dict[str, Table]:
@@ -133,41 +258,107 @@ class Role:
         low, high = key_bounds(kind)
         return tuple(value_of_key(kind, key) for key in range(low, high + 1))
 
-    def run(self, now: Reading) -> Ran:
+    def ways(self, state: Mapping[str, Value], read: set[str] | None = None) -> Iterator[Ran]:
+        """One cycle from a state, with its inputs, for each way in which extern procedures may answer; takes what all of them read."""
+        waiting: list[tuple[int, ...]] = [()]
+        while waiting:
+            script, now = Script(self.program, waiting.pop()), Reading(state)
+            ran = self.run(now, script)
+            yield replace(ran, given=tuple(script.given))
+            if read is not None:
+                read |= now.read
+            waiting += script.others()
+
+    def run(self, now: Reading, answers: Script | Again | None = None) -> Ran:
         """One cycle, by the interpreter's own parts and in its order; `cycle` confirms it (`confirmed`)."""
+        with answering(answers or Script(self.program)):
+            try:
+                ran = self._ran(now)
+            except (ArithmeticError, IndexError, ValueError):
+                return Ran("", "", UNDEFINED, frozenset(), {}, {})
+        return ran if self._in_range(ran.after) else replace(ran, fault=UNDEFINED)
+
+    def _in_range(self, now: Mapping[str, Value]) -> bool:
+        return all(low <= now[name] <= high for name, low, high in self._ranges)
+
+    @cached_property
+    def _ranges(self) -> list[tuple[str, Value, Value]]:
+        found: list[tuple[str, Value, Value]] = []
+        for v in self.program.variables:
+            low, high = (v.type.low, v.type.high) if isinstance(v.type, Real) else key_bounds(v.type)
+            found.append((str(v.name), low, high))
+        return found
+
+    def _ran(self, now: Reading) -> Ran:
         program = self.program
         settle(program, now)
-        for name in self.level.preprocess:
-            call(program, name, [], now)
-        middle = dict(now)
-        table = self._chosen(now)
+        try:
+            for name in self.level.preprocess:
+                call(program, name, [], now)
+        except ExternError:
+            return self._early(now, self._chosen(now), "", Fault.EXTERN, frozenset(), dict(now))
+        middle, table = dict(now), self._chosen(now)
         failed = frozenset(
             str(one.name)
             for one in program.assumptions
             if one.name in table.assumptions and not holds(one.condition, now)
         )
+        if failed & set(table.stops):
+            return self._early(now, table, "", Fault.ASSUMPTION, failed, middle)
         matching = matching_lines(table, now)
         if len(matching) > 1 or (not matching and table.default is None):
             fault = Fault.SEVERAL_LINES if matching else Fault.NO_LINE
-            return Ran(str(table.name), "", fault, failed, middle, dict(now))
+            return Ran(str(table.name), "", fault, failed, middle, self._shown(now))
         line = next(
             (one for one in table.lines if matching and one.name == matching[0]),
             table.default or table.lines[0],
         )
-        execute(program, [action.statement for action in line.actions], now, {})
-        for name in self.level.postprocess:
-            call(program, name, [], now)
-        after = dict(now)
+        try:
+            execute(program, [action.statement for action in line.actions], now, {})
+        except ExternError:
+            return self._early(now, table, str(line.name), Fault.EXTERN, failed, middle)
+        fault = Fault.OK
+        try:
+            for name in self.level.postprocess:
+                call(program, name, [], now)
+        except ExternError:
+            fault = Fault.EXTERN
+        after = self._shown(now) if fault is Fault.EXTERN else dict(now)
         blind = bool(middle.get(FLAG)) and str(line.name) in self.blind[str(table.name)]
-        outlasts = not blind or self._stands(now)
-        return Ran(str(table.name), str(line.name), Fault.OK, failed, middle, after, outlasts)
+        outlasts = not blind or self._stands(after)
+        return Ran(str(table.name), str(line.name), fault, failed, middle, after, outlasts)
 
-    def _stands(self, now: Reading) -> bool:
-        """Whether the flag is up before the table of the next cycle, on the same inputs."""
-        settle(self.program, now)
-        for name in self.level.preprocess:
-            call(self.program, name, [], now)
-        return bool(now[FLAG])
+    def _early(
+        self,
+        now: Reading,
+        table: Table,
+        line: str,
+        fault: Fault,
+        failed: frozenset[str],
+        middle: dict[str, Value],
+    ) -> Ran:
+        """A cycle that ends before its line is done: nobody answers a new command in it."""
+        after = self._shown(now)
+        missed = bool(middle.get(FLAG)) and looks(table)
+        return Ran(str(table.name), line, fault, failed, middle, after, not missed or self._stands(after))
+
+    def _shown(self, now: Mapping[str, Value]) -> dict[str, Value]:
+        """The state behind a fault: outputs that have a safe value show it."""
+        return {**now, **{str(v.name): v.safe for v in self.program.variables if v.safe is not None}}
+
+    def _stands(self, after: Mapping[str, Value]) -> bool:
+        """Whether the flag is up before the table of the next cycle, on the same inputs, whatever extern procedures give."""
+        waiting: list[tuple[int, ...]] = [()]
+        while waiting:
+            script, now = Script(self.program, waiting.pop()), dict(after)
+            with answering(script), suppress(ExternError):
+                settle(self.program, now)
+                for name in self.level.preprocess:
+                    call(self.program, name, [], now)
+            if not now[FLAG]:
+                return False
+            waiting += script.others()
+        return True
 
     def _chosen(self, now: Reading) -> Table:
         if isinstance(self.level.tables, OneTable):
@@ -180,10 +371,23 @@ class Role:
         Raises:
             AssertionError: It does not.
         """
-        outcome = cycle(self.program, self.level, taken)
+        with answering(Again(self.program, list(ran.given))):
+            outcome = cycle(self.program, self.level, taken)
         assert (outcome.fault, outcome.snapshot) == (ran.fault, ran.after)
         assert str(outcome.line or "") == ran.line
-        assert set(outcome.failed_assumptions) == ran.failed
+        stops = self.tables[ran.table].stops
+        checked = {
+            str(one.name)
+            for one in self.program.assumptions
+            if one.standing is Standing.MONITORED or one.name in stops
+        }
+        assert set(outcome.failed_assumptions) == ran.failed & checked
+
+
+def looks(table: Table) -> bool:
+    """Whether some line looks for a new command."""
+    places = [at for at, column in enumerate(table.columns) if column.variable == FLAG]
+    return any(line.tests[at] is not None for at in places for line in table.lines)
 
 
 def overlooking(table: Table) -> frozenset[str]:

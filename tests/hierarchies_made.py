@@ -10,6 +10,8 @@ from dataclasses import dataclass, field, replace
 from random import Random
 
 STATUSES = ("done", "executing", "failed")
+FOURTH = "lost"
+"""A status that answers no command."""
 SPOTS = ("p", "q")
 MOST_WAITED = 2
 
@@ -42,6 +44,7 @@ class MadeTable:
     lines: tuple[Line, ...]
     default: str = ""
     assumed: bool = False
+    assuming: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +58,9 @@ class MadeLevel:
         assumption: A condition, or blank.
         waits: Whether it has a counter; `field`, whether its order names a spot; `passes`, whether the subordinate's does.
         more: What else it has (`hierarchies_more`).
+        states: What else it states: assumptions, invariants and properties, as declared.
+        statuses: What reports can say.
+        asks: Whom it asks where: extern procedures before and behind its table, by the place in the list that they take.
     """
 
     name: str
@@ -68,6 +74,9 @@ class MadeLevel:
     field: bool = False
     passes: bool = False
     more: tuple[str, ...] = ()
+    states: tuple[str, ...] = ()
+    statuses: tuple[str, ...] = STATUSES
+    asks: tuple[tuple[str, int], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,6 @@ from pathlib import Path
 from tests.hierarchies_made import (
     MOST_WAITED,
     SPOTS,
-    STATUSES,
     Hierarchy,
     Line,
     MadeLevel,
@@ -46,7 +45,7 @@ def _description(made: Hierarchy) -> str:
 
 
 def _words(made: Hierarchy) -> str:
-    text = f"enum level_status {{ {', '.join(STATUSES)} }}\nenum stage {{ {_stages(made)} }}\n"
+    text = f"enum level_status {{ {', '.join(made.levels[0].statuses)} }}\nenum stage {{ {_stages(made)} }}\n"
     text += f"enum spot {{ {', '.join(SPOTS)} }}\ntype number = int 0 .. 65535\n"
     told = [(level.name, level.commands, level.field) for level in made.levels]
     if made.outside:
@@ -78,13 +77,15 @@ def program(level: MadeLevel) -> str:
     said = {name: _meant(text, level.below) for name, text in level.said}
     parts = [_declared(level, said), _modules(level, said), _procedures(level)]
     parts += [_table(table, level) for table in level.tables]
-    post = "send, answer" if level.below else "answer"
-    also = module_of(level)
-    before = "receive, notice" if also else "receive"
-    parts += [
-        also,
-        f"level {level.name} {{\n  period 40 [ms]\n  preprocess {before}\n{tables_of(level)}  postprocess {post}\n}}\n",
-    ]
+    also, asks = module_of(level), dict(level.asks)
+    post = ["send", "answer"] if level.below else ["answer"]
+    before = ["receive", "notice"] if also else ["receive"]
+    for name, modules in (("ask", before), ("tell", post)):
+        if name in asks:
+            modules.insert(asks[name], name)
+    period = f"level {level.name} {{\n  period 40 [ms]\n"
+    runs = f"  preprocess {', '.join(before)}\n{tables_of(level)}  postprocess {', '.join(post)}\n}}\n"
+    parts += [also, period + runs]
     return "\n".join(parts)
 
 
@@ -121,6 +122,7 @@ def _declared(level: MadeLevel, said: dict[str, str]) -> str:
     lines.append(f"output report : {level.name}_report")
     if level.assumption:
         lines.append(f"assume in_step monitored : {level.assumption}")
+    lines += level.states
     return "\n".join(lines) + "\n"
 
 
@@ -157,7 +159,7 @@ def _modules(level: MadeLevel, said: dict[str, str]) -> str:
 
 def _procedures(level: MadeLevel) -> str:
     one = ["procedure state(value : stage) {\n  cur_state := value\n}"]
-    one += [f"procedure {status} {{\n  status_report := {status}\n}}" for status in STATUSES]
+    one += [f"procedure {status} {{\n  status_report := {status}\n}}" for status in level.statuses]
     if level.below:
         one.append("procedure begin {\n  begun := true\n}")
         one.append("procedure nextstate(value : stage) {\n  next cur_state := value\n}")
@@ -182,9 +184,8 @@ def _table(table: MadeTable, level: MadeLevel) -> str:
         rows.append(["99", table.default, *("" for _ in columns[1:])])
         ends.append(("", "", "failed"))
     order = "|| procedures | command_out | status_out |" if level.below else "|| procedures | status_out |"
-    text = (
-        f"table {table.name}" + (" assuming in_step" if table.assumed and level.assumption else "") + " {\n"
-    )
+    names = (*(["in_step"] if table.assumed and level.assumption else []), *table.assuming)
+    text = f"table {table.name}" + (f" assuming {', '.join(names)}" if names else "") + " {\n"
     text += "  | " + " | ".join(head) + " " + order + "\n"
     text += (
         "  |"

@@ -11,9 +11,9 @@ from itertools import product
 
 from rcsc.compose.contract import Below
 from rcsc.compose.goals import Sort
-from rcsc.interpret import Fault
-from rcsc.model import OneTable, Value
-from tests.hierarchies_level import FLAG, Key, Ran, Role, overlooking
+from rcsc.interpret import Fault, holds
+from rcsc.model import Expr, OneTable, Value, earlier
+from tests.hierarchies_level import EARLY, FLAG, UNDEFINED, Key, Ran, Role, looks, overlooking
 
 NUMBERS = 65536
 FAR = 30_000
@@ -118,7 +118,8 @@ def wanted(role: Role) -> frozenset[Key]:
             found.add((Sort.SOME_LINE, name, ""))
         elif table.default.unreachable:
             found.add((Sort.NO_DEFAULT, name, ""))
-        if FLAG in role.leaves and role.links.above is not None and overlooking(table):
+        missed = overlooking(table) or role.asks or table.stops
+        if FLAG in role.leaves and role.links.above is not None and looks(table) and missed:
             found.add((Sort.ANSWERED, name, FLAG))
     if role.links.above is not None:
         found.add((Sort.ECHOES, "", role.links.above.report))
@@ -127,13 +128,18 @@ def wanted(role: Role) -> frozenset[Key]:
         found.add((Sort.NEXT_NUMBER, "", below.order))
         found |= {(Sort.NUMBERED, "", leaf) for leaf in fields}
         if role.links.above is not None:
-            found |= {(Sort.WAITS, "", below.order), (Sort.PAUSES, "", below.order)}
+            found.add((Sort.WAITS, "", below.order))
+            found |= {(Sort.PAUSES, "", below.order)} if not isinstance(chosen, OneTable) else set()
     found |= {(Sort.DEFERRED, "", leaf) for leaf, _ in role.deferred}
+    found |= {(Sort.INVARIANT, "", one.name) for one in role.program.invariants}
+    found |= {(Sort.PROPERTY, "", one.name) for one in role.program.properties}
     return frozenset(found)
 
 
 def broken(role: Role, before: Mapping[str, Value], taken: Mapping[str, Value], ran: Ran) -> Iterator[Key]:
     """The goals that a cycle breaks; one that a fault ends publishes nothing, and breaks those of its table only."""
+    if ran.fault is UNDEFINED:
+        return  # nobody can say what it does
     table = role.tables[ran.table]
     yield from ((Sort.ASSUMPTION, ran.table, name) for name in ran.failed)
     if ran.fault is Fault.SEVERAL_LINES:
@@ -145,21 +151,44 @@ def broken(role: Role, before: Mapping[str, Value], taken: Mapping[str, Value], 
             yield Sort.NO_DEFAULT, ran.table, ""
         if not ran.outlasts:
             yield Sort.ANSWERED, ran.table, FLAG
-        yield from _broken_above(role, before, taken, ran.after)
+        yield from _broken_above(role, before, taken, ran)
         yield from _broken_below(role, before, taken, ran.after)
         for leaf, waiting in role.deferred:
             if ran.after[leaf] not in {ran.middle[leaf], ran.after[waiting]}:
                 yield Sort.DEFERRED, "", leaf
+        yield from _broken_stated(role, before, ran.after)
+
+
+def _broken_stated(role: Role, before: Mapping[str, Value], after: Mapping[str, Value]) -> Iterator[Key]:
+    """Invariants hold before the cycle and behind it; properties of both."""
+    for one in role.program.invariants:
+        if not (_true(one.condition, before) and _true(one.condition, after)):
+            yield Sort.INVARIANT, "", one.name
+    both = {**after, **{str(earlier(name)): value for name, value in before.items()}}
+    for stated in role.program.properties:
+        if not _true(stated.condition, both):
+            yield Sort.PROPERTY, "", stated.name
+
+
+def _true(condition: Expr, state: Mapping[str, Value]) -> bool:
+    """Whether it is defined, and holds."""
+    try:
+        return holds(condition, state)
+    except (ArithmeticError, IndexError, ValueError):
+        return False
 
 
 def _broken_above(
-    role: Role, before: Mapping[str, Value], taken: Mapping[str, Value], after: Mapping[str, Value]
+    role: Role, before: Mapping[str, Value], taken: Mapping[str, Value], ran: Ran
 ) -> Iterator[Key]:
     if (above := role.links.above) is None:
         return
+    after = ran.after
     number, command = f"{above.order}.inc_command", f"{above.order}.input_command"
     said = after[f"{above.report}.inc_command_echo"], after[f"{above.report}.ref_command_echo"]
-    if said != (taken[number], taken[command]):
+    report = [leaf for leaf in role.leaves if leaf.startswith(f"{above.report}.")]
+    late = ran.fault in EARLY and all(after[leaf] == before[leaf] for leaf in report)
+    if said != (taken[number], taken[command]) and not late:
         yield Sort.ECHOES, "", above.report
     again = taken[number] == before[number]
     if again and FLAG in before and after[FLAG] and not before[FLAG]:
