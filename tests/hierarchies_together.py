@@ -20,6 +20,7 @@ from tests.hierarchies_world import FAR, NUMBERS, answered, broken, canonical, g
 GAP = 10
 """Between numbers that follow each other, so that none is the successor of another by accident."""
 TRUSTED = EARLY
+"""Faults that do not end the first cycle of the subordinate after a restart."""
 Record = tuple[Value, ...]
 
 

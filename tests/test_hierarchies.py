@@ -16,7 +16,7 @@ from rcsc.compose.transition import Stepper
 from rcsc.compose.walk import Walk
 from rcsc.prove import values
 from rcsc.prove.symbolic import Run
-from tests import hierarchies, hierarchies_world
+from tests import hierarchies, hierarchies_together, hierarchies_world
 from tests.bench.growth import chain, costs
 from tests.hierarchies import Judged, forget, judged, judged_seed
 from tests.hierarchies_explored import TooManyError, explored
@@ -266,6 +266,20 @@ def test_levels_that_do_not_keep_their_guarantees_break_something_together(
     claimed = frozenset(key for key in both.claimed_upper if key[0] is Sort.NO_DEFAULT)
     found, _ = broken_together(replace(both, claimed_upper=claimed, claimed_lower=frozenset()), most=20_000)
     assert any(one.startswith(breaks) for one in found), found
+
+
+def test_two_levels_see_a_cycle_that_stops_behind_a_restart(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What is trusted is needed: else the report that stood is followed by an older one."""
+    monkeypatch.setattr(hierarchies_together, "TRUSTED", frozenset())
+    upper, lower = saying("slow", "load", "assume loaded monitored : load /= 0").levels
+    tables = tuple(replace(one, assuming=("loaded",)) for one in lower.tables)
+    both = pair(Hierarchy((upper, replace(lower, tables=tables))), tmp_path)
+    found, _ = broken_together(
+        replace(both, claimed_upper=frozenset(), claimed_lower=frozenset()), most=20_000
+    )
+    assert found == ["the contract about the subordinate"]
 
 
 # --- growth ---------------------------------------------------------------------------------
