@@ -173,6 +173,8 @@ def backing(table: TableReport) -> str:
         parts.append("confirmed by Z3")
     if table.assumptions:
         parts.append(f"assuming {', '.join(_assumed(table))}")
+    if table.together is not None:
+        parts += _together(table.together)
     parts += [
         f"{word} where {' or '.join(f'`{escape(name)}`' for name in names)} fails"
         for word, names in (("stops", table.stops), ("only tells", table.tells))
@@ -183,8 +185,6 @@ def backing(table: TableReport) -> str:
         parts.append(
             f"rests on {' and '.join(doubtful)}, which {'is' if len(doubtful) == 1 else 'are'} not proved"
         )
-    if table.together is not None:
-        parts += _together(table.together)
     parts.append(f"{table.proof_ms:.1f} ms{' (earlier run)' if table.cached else ''}")
     return ", ".join(parts)
 
