@@ -251,7 +251,8 @@ def test_order_after_order_goes_round(tmp_path: Path) -> None:
 def test_it_is_shown_drawn_and_frozen(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """By the command: a warning with a time line, a log, and a case that fails until the table is mended."""
     path = changed(tmp_path / "round", upper=again)
-    found, cases = tmp_path / "found", tmp_path / "cases"
+    (path.parent / "rcsc.toml").write_text('name = "round"\n', encoding="utf-8")
+    found, cases = tmp_path / "found", path.parent / "cases"
     assert run(["prove", str(path), "--log", str(found), "--freeze", str(cases), "--no-cache"]) == 0
     said = capsys.readouterr().err
     assert "warning[RCS756]: level `upper`, table `work`: not shown: the command ends" in said

@@ -188,7 +188,7 @@ def part_of(system: Description, programs: Mapping[str, Program]) -> Description
                 target = f"{spec.name}.{record}"
                 if target not in wired:
                     wires.append(Wire(f"{'database' if record in fed else 'environment'}.{target}", target))
-    return replace(system, levels=levels, wires=tuple(wires))
+    return replace(system, levels=levels, wires=tuple(wires), displays={})
 
 
 def _owner(end: str) -> str:
