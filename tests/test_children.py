@@ -312,7 +312,7 @@ def test_after_an_interrupt_no_program_begins(tmp_path: Path) -> None:
         interrupted()
     with pytest.raises(children.WorkerEndedError):
         waiting[0].result()
-    assert begun == [0, 1]
+    assert begun in ([0], [0, 1])  # the second is refused, or the first still was
     assert children.run(["true"]).status == 0  # what comes later may
 
 
