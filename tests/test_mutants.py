@@ -132,6 +132,31 @@ table t {
 """A supervisor of the ordinary kind: a counter that is compared in many lines gets a table of 301 classes."""
 
 
+ENDS_OF_64_BITS = (2**64, 2**63 + 150, 2**63, 2**63 - 7, -(2**63) + 300, 2**32 + 3)
+"""Past the last values of inputs: unsigned, over the middle, signed, and low."""
+
+
+@pytest.mark.parametrize("width", [1, 7, 300])
+def test_a_matcher_is_checked_at_the_ends_of_64_bits(width: int) -> None:
+    def table(number: int, end: int) -> str:
+        odd = ", ".join(f"{n}" for n in range(end - width, end, 2))
+        return f"""
+input x{number} : int {end - width} .. {end - 1}
+table t{number} {{
+  | line | x{number} ||
+  | odd  | in {{{odd}}} ||
+  | even | DEFAULT ||
+}}
+"""
+
+    program = program_of("".join(map(table, range(len(ENDS_OF_64_BITS)), ENDS_OF_64_BITS)))
+    files = emitted(program)
+    source = next(text for name, text in files.items() if name.endswith(".c"))
+    assert ("_i64_of_u64(" in source) == (width == 300)
+    for one in program.tables:
+        assert isinstance(check_matcher(program, symbols_of(program, files), files, one), Checked), one.name
+
+
 @pytest.fixture(scope="module")
 def classed() -> tuple[Program, dict[str, str], Checked, Decider]:
     program = program_of(CLASSED)

@@ -26,12 +26,15 @@ EVERY_KEY = 4096
 UNARY = (
     re.compile(rf"^{PLACE}$"),
     re.compile(rf"^\({PLACE} \? 1u : 0u\)$"),
-    re.compile(rf"^\w+_u32_of_i64\(\(\(int64_t\){PLACE} - {CONSTANT}\)\)$"),
+    re.compile(rf"^\w+_u32_of_[iu]64\(\(\(u?int64_t\){PLACE} - {CONSTANT}\)\)$"),
     re.compile(
         rf"^\(\(\((?:\((?:u?int64_t)\))?{PLACE} >= {CONSTANT}\) \? 1u : 0u\)"
         rf"(?: \+ \(\({AGAIN} >= {CONSTANT}\) \? 1u : 0u\))*\)$"
     ),
-    re.compile(rf"^(?P<search>[A-Za-z_]\w*_class_\w+)\((?:\((?:u?int64_t)\))?{PLACE}(?: - {CONSTANT})?\)$"),
+    re.compile(
+        rf"^(?P<search>[A-Za-z_]\w*_class_\w+)\((?P<wide>\w+_i64_of_u64\(\()?(?:\((?:u?int64_t)\))?{PLACE}(?: - {CONSTANT})?"
+        r"(?(wide)\)\))\)$"
+    ),
 )
 TRUTH = re.compile(r"^\((?P<condition>.*) \? 1u : 0u\)$", re.DOTALL)
 LOAD = re.compile(r"\bt\.t(\d+)\[")
