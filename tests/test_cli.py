@@ -499,6 +499,20 @@ def test_certify_names_what_it_did_not_check(rcsc: Rcsc) -> None:
     assert "of another program" in ran.out
 
 
+@pytest.mark.parametrize("name", ["two words", "-x", "$(touch made)", "it's", "a;b"])
+def test_what_new_says_to_run_next_can_be_pasted(
+    name: str, rcsc: Rcsc, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    said = rcsc("new", "--", name)
+    there = said.err.partition("now: ")[2] or said.out.partition("now: ")[2]
+    shown = subprocess.run(
+        ["sh", "-c", there.replace("rcsc check", "pwd -P")], capture_output=True, text=True, check=True
+    )
+    assert shown.stdout.strip() == str((tmp_path / name).resolve())
+    assert not (tmp_path / "made").exists()
+
+
 def test_new_makes_a_project_that_checks_compiles_and_is_formatted(rcsc: Rcsc) -> None:
     assert rcsc("new", "robot").status == 0
     for command in (["check", "robot"], ["compile", "robot"], ["fmt", "--check", "robot"]):

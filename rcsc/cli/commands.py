@@ -1,6 +1,7 @@
 """The commands: each turns arguments into a call of the driver, shows the report, gives the exit status."""
 
 import importlib.util
+import shlex
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -287,7 +288,8 @@ def new(folder: Path, output: Output) -> int:
     made = scaffold(folder)
     if not isinstance(made, tuple):
         return _finish(Report((made,)), "new", output)
-    closing = f"made {len(made)} files in {folder}; now: cd {folder} && rcsc check"
+    place = shlex.quote(f"./{folder}" if str(folder).startswith("-") else str(folder))
+    closing = f"made {len(made)} files in {folder}; now: cd {place} && rcsc check"
     return _finish(Report(()), "new", output, closing)
 
 
