@@ -475,7 +475,7 @@ def test_nothing_of_the_users_is_called(python: str, c: str) -> None:
     kept = os._exit
     result = run_suite(program := program_of(SINGLE.format(python=python, c=c)), emitted(program), QUICK)
     assert result.found == ()
-    assert result.programs[0].faults[4] > 10
+    assert result.programs[0].faults[4] > 0
     assert result.programs[0].tables[0].cells > 0
     assert os._exit is kept
 

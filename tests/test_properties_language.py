@@ -539,6 +539,7 @@ def test_prove_shows_what_breaks_as_the_executors_ran_it(
         tmp_path, "upper", "property goes_on : to_lower.input_command = go then to_lower.input_command = go\n"
     )
     system, cases = str(tmp_path / "system.toml"), tmp_path / "cases"
+    (tmp_path / "rcsc.toml").write_text('name = "small"\n', encoding="utf-8")  # whose cases are its own
     asked = ["prove", system, "--level", "upper", "--no-cache", "--trace", "3", "--freeze", str(cases)]
     assert run(asked) == 1
     said = capsys.readouterr()
