@@ -390,7 +390,7 @@ VALUES_FROM_OUTSIDE: tuple[Any, ...] = (
     *(0, 1, 3, -1, 2**53 + 1, 2**63, 2**64 - 1, 2**64, 10**400, True, False, 0.0, -0.0, 2.0, 2.5, 0.5, 1e-9, 1e16, 1e300),
     *(math.nan, math.inf, -math.inf, Fraction(1, 3), Fraction(1, 2), Fraction(4), Decimal("0.1"), Decimal(3), Decimal("NaN")),
     *(np.uint8(200), np.int64(3), np.float32(0.1), np.float32(2.5), np.float64(1.5), np.float64("nan"), np.bool_(True)),
-    *("3", "", None, b"3", 3j, (), [3], object()),
+    *("3", "", None, b"3", 3j, (), [3], object),
 )  # fmt: skip
 
 
