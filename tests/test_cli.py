@@ -10,6 +10,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from urllib.parse import unquote_to_bytes
 
 import jsonschema
 import pytest
@@ -207,6 +208,23 @@ def test_forms(rcsc: Rcsc) -> None:
     assert rcsc("check", "--github").out.startswith("::error file=grip.rcs,line=3,endLine=3,col=7,")
     assert rcsc("check", "--format", "line").out.startswith("grip.rcs:3:7: error[RCS401]: ")
     assert "1 table:" not in rcsc("check", "-q").out
+
+
+@pytest.mark.parametrize(
+    "name", ["w\udcff.rcs", "a,b=c%0A.rcs", "a\n::error::b.rcs", "\u202eevil.rcs", 'q"\\.rcs']
+)
+def test_a_report_in_any_form_stands_whatever_the_file_is_called(rcsc: Rcsc, name: str) -> None:
+    write(name, GAP)
+    assert json.loads(rcsc("check", "--json").out)["tables"][0]["file"] == name
+    [place] = json.loads(rcsc("check", "--sarif").out)["runs"][0]["results"][0]["locations"]
+    assert os.fsencode(unquote_to_bytes(place["physicalLocation"]["artifactLocation"]["uri"])) == os.fsencode(
+        name
+    )
+    line, *more = rcsc("check", "--github").out.splitlines()
+    assert more == []
+    assert line.startswith("::error file=")
+    assert line.partition(",")[2].startswith("line=3,endLine=3,col=7,")
+    assert json.loads(rcsc("diff", "--json", name, name).out)["programs"][0]["program"] == name
 
 
 def test_output_goes_to_a_file_whole(rcsc: Rcsc) -> None:

@@ -1,6 +1,5 @@
 """`rcsc diff`: what changed between two versions of the tables, and the proof that nothing else did."""
 
-import json
 import os
 import sys
 from collections.abc import Callable
@@ -10,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from rcsc.cli.options import steps_option
-from rcsc.cli.show import Color, Output, Progress, UnwritableError, show
+from rcsc.cli.show import Color, Output, Progress, UnwritableError, json_text, show
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label
 from rcsc.diagnostics.report import Report
@@ -140,7 +139,7 @@ def _text(found: "Difference", form: str, quiet: bool, color: bool) -> str:
     from rcsc.diff.jsonform import to_json
 
     if form == "json":
-        return json.dumps(to_json(found), indent=2, ensure_ascii=False) + "\n"
+        return json_text(to_json(found))
     if form == "markdown":
         return markdown(found)
     return (paint if color else plain)(rows(found, quiet=quiet))

@@ -89,13 +89,19 @@ def show(report: Report, command: str, output: Output, closing: str = "") -> Non
 def _json(report: Report, command: str, _output: Output, _closing: str) -> str:
     from rcsc.diagnostics.jsonform import report_to_json
 
-    return json.dumps(report_to_json(report, command), indent=2, ensure_ascii=False) + "\n"
+    return json_text(report_to_json(report, command))
 
 
 def _sarif(report: Report, _command: str, _output: Output, _closing: str) -> str:
     from rcsc.diagnostics.sarif import sarif
 
-    return json.dumps(sarif(report), indent=2, ensure_ascii=False) + "\n"
+    return json_text(sarif(report))
+
+
+def json_text(value: object) -> str:
+    r"""Write a value as JSON in UTF-8; a byte of a file's name that is not UTF-8 is escaped, as `\udcff`."""
+    text = json.dumps(value, indent=2, ensure_ascii=False) + "\n"
+    return text.encode(errors="backslashreplace").decode()
 
 
 def _github(report: Report, _command: str, _output: Output, _closing: str) -> str:

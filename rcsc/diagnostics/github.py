@@ -25,7 +25,7 @@ def annotation(diagnostic: Diagnostic, sources: Sources) -> str:
     if span.file:
         source = sources.get(span.file, Source(span.file, ""))
         start, end = source.position(span.start), source.position(max(span.start, span.end - 1))
-        properties = {"file": span.file, "line": str(start.line), "endLine": str(end.line)}
+        properties = {"file": escape(span.file), "line": str(start.line), "endLine": str(end.line)}
         if start.line == end.line:
             properties |= {"col": str(start.column), "endColumn": str(end.column + 1)}
     properties["title"] = diagnostic.code.value

@@ -133,4 +133,4 @@ def _region(span: Span, source: Source | None) -> Json:
 def uri(file: str) -> str:
     """A relative reference for a relative path, a `file:` URI for an absolute one."""
     path = PurePath(file)
-    return path.as_uri() if path.is_absolute() else quote(path.as_posix())
+    return path.as_uri() if path.is_absolute() else quote(path.as_posix(), errors="surrogateescape")
