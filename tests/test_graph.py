@@ -60,7 +60,7 @@ def graph_of(one: Found, state: str = "") -> Derived:
 
 def said(one: Found, text: str, form: str) -> Against:
     """The verdict on the table that the graph's text says."""
-    table = tabled(FORMS[form].read(text)).table
+    table = tabled(FORMS[form].read(text))
     return against(one.loaded, one.root, one.program, one.table, table, OPTIONS)
 
 
@@ -178,6 +178,48 @@ def test_a_table_that_rests_on_other_assumptions_is_not_the_same(shipped: dict[s
     )
     [found] = said(one, text, "mermaid").found
     assert (found.code, "acquire_states" in found.notes[0]) == (Code.GRAPH_DIFFERS, True)
+
+
+WRITES = """
+enum mode { rest, work }
+input x : int 0 .. 9
+state cur_state : mode
+state n : int 0 .. 9
+output o : int 0 .. 9
+extern procedure ask writes n python "m:ask" c "m_ask"
+extern procedure tell reads o python "m:tell" c "m_tell"
+table m {
+  | line | cur_state | x    || procedures     | o |
+  |------|-----------|------||----------------|---|
+  | low  | rest      | < 5  || ask; tell      | 1 |
+  | high | rest      | >= 5 || cur_state := work; ask | 2 |
+  | back | work      |      || cur_state := rest; tell | 3 |
+}
+"""
+
+OTHERWISE = [
+    ("a call that writes nothing left out", "procedures(ask, tell)", "procedures(ask)"),
+    ("two calls exchanged", "procedures(ask, tell)", "procedures(tell, ask)"),
+    ("a call with another value", "procedures(tell) o(3)", "procedures(o := 5, tell) o(3)"),
+    ("a condition that is not defined everywhere", "x < 5", "x < 5 and 10 / x >= 0"),
+    ("an action that is not defined everywhere", "o(1)", "o(1 + 0 / x)"),
+    ("an action that leaves its range before another", "o(1)", "o(x + 9)"),
+    ("another first state", "[*] --> rest", "[*] --> work"),
+]
+
+
+@pytest.mark.parametrize(
+    ("old", "new"), [(old, new) for _, old, new in OTHERWISE], ids=[what for what, *_ in OTHERWISE]
+)
+def test_what_is_not_seen_in_the_variables_afterwards_is_a_difference_too(
+    tmp_path: Path, old: str, new: str
+) -> None:
+    one = found_in(WRITES, tmp_path)
+    text = FORMS["mermaid"].write(graph_of(one).graph)
+    assert old in text
+    assert said(one, text, "mermaid").found == ()
+    [found] = said(one, text.replace(old, new), "mermaid").found
+    assert found.code is Code.GRAPH_DIFFERS
 
 
 # --- steps against the interpreter -----------------------------------------------------------
@@ -427,7 +469,7 @@ def test_a_solver_without_time_draws_nothing(tmp_path: Path, monkeypatch: pytest
     from rcsc.prove.smt import Answer, Solver
 
     one = found_in(DOOR, tmp_path)
-    table = tabled(graph_of(one).graph).table
+    table = tabled(graph_of(one).graph)
     monkeypatch.setattr(Solver, "check", lambda *_: Answer.UNKNOWN)
     file = one.loaded.files[one.table.file]
     for made in (

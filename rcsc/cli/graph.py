@@ -181,7 +181,7 @@ def _read_back(one: "Found", form: str, text: str, options: "Options") -> int:
     from rcsc.graph.tables import tabled
 
     made = tabled(FORMS[form].read(text))
-    verdict = against(one.loaded, one.root, one.program, one.table, made.table, options)
+    verdict = against(one.loaded, one.root, one.program, one.table, made, options)
     if verdict.found:
         raise _WrongError(verdict.found, {**one.loaded.sources, **(verdict.sources or {})})
     return verdict.questions
@@ -254,7 +254,7 @@ def _prove(made: "Tabled", named: str, options: "Options") -> None:
     name = made.table.name.text
     found = _found(f"{named}:{name}" if named.endswith(".rcs") else named)
     one = next((one for one in found if one.table.name == name), found[0])
-    verdict = against(one.loaded, one.root, one.program, one.table, made.table, options)
+    verdict = against(one.loaded, one.root, one.program, one.table, made, options)
     if verdict.found:
         raise _WrongError(verdict.found, {**one.loaded.sources, **(verdict.sources or {})})
     where = f"{one.table.file}:{one.table.name}"

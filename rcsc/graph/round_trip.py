@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label, WitnessColumn
+from rcsc.graph.tables import Tabled
 from rcsc.model import Program, Table, spell
 from rcsc.project import Loaded
 from rcsc.prove.options import Options
@@ -52,20 +53,20 @@ def in_place(file: tree.File, table: tree.TableDecl) -> str:
 
 
 def against(
-    loaded: Loaded, root: str, program: Program, table: Table, new: tree.TableDecl, options: Options
+    loaded: Loaded, root: str, program: Program, table: Table, new: Tabled, options: Options
 ) -> Against:
-    """Whether the new table does what the present one does.
+    """Whether the graph's table does what the present one does, from the same state.
 
     Args:
         loaded: Has the files of the program.
         root: The root file of the program.
         program: What `root` resolves to.
         table: The present table.
-        new: The table to stand in its place.
+        new: The table to stand in its place, and where the graph begins.
         options: Limits of the solver.
     """
     name = f"{table.file} (from the graph)"
-    text = in_place(loaded.files[table.file], new)
+    text = in_place(loaded.files[table.file], new.table)
     parsed = parse(Source(table.file, text))
     if not isinstance(parsed, tree.File):
         return Against(parsed, sources={table.file: Source(table.file, text)})
@@ -79,6 +80,9 @@ def against(
     verdict = compare((program, table), (resolved, other), options)
     if isinstance(verdict, Same) and set(other.assumptions) != set(table.assumptions):
         return Against((_assuming(table, other),))
+    begins = _begins(program, table, new)
+    if isinstance(verdict, Same) and begins is not None:
+        return Against((begins,))
     questions = verdict.questions if isinstance(verdict, Same) else 0
     return Against(_findings(verdict, program, table), questions, loaded.sources)
 
@@ -102,6 +106,16 @@ def _assuming(table: Table, other: Table) -> Diagnostic:
     )
 
 
+def _begins(program: Program, table: Table, new: Tabled) -> Diagnostic | None:
+    """That the graph begins in another state."""
+    name, initial = new.begins
+    state = next((one for one in program.variables if one.name == name), None)
+    if not initial or state is None or spell(state.type, state.initial) == initial:
+        return None
+    message = f"the graph begins in `{initial}`, table `{table.name}` in `{spell(state.type, state.initial)}`"
+    return Diagnostic(Code.GRAPH_DIFFERS, message, Label(table.span))
+
+
 def _findings(verdict: Comparison, program: Program, table: Table) -> tuple[Diagnostic, ...]:
     match verdict:
         case Same():
@@ -120,9 +134,8 @@ def _findings(verdict: Comparison, program: Program, table: Table) -> tuple[Diag
             )
             what = f"the table comes to {_outcome(first)}, the graph to {_outcome(second)}"
             more = f" and {len(changed) - MOST_NAMED} more" if len(changed) > MOST_NAMED else ""
-            after = (
-                f"afterwards these differ: {', '.join(f'`{name}`' for name in changed[:MOST_NAMED])}{more}"
-            )
+            names = ", ".join(name if " " in name else f"`{name}`" for name in changed[:MOST_NAMED])
+            after = f"afterwards these differ: {names}{more}"
             message = f"the graph does not say table `{table.name}`: {what} for some input"
             notes = (after,) if changed else ()
             return (

@@ -31,11 +31,13 @@ class Tabled:
         table: As a declaration.
         uses: As the graph names them.
         notes: Lines that had to be named or split, in sentences.
+        begins: The state variable, and its value before the first cycle; empty where the graph does not say it.
     """
 
     table: tree.TableDecl
     uses: tuple[tree.Use, ...]
     notes: tuple[str, ...]
+    begins: tuple[str, str] = ("", "")
 
     def text(self) -> str:
         """The table, and what it uses, in the one layout."""
@@ -58,7 +60,8 @@ def tabled(graph: StateGraph) -> Tabled:
     if not isinstance(parsed, tree.File):
         raise UnreadableError(f"the table that the graph says is not in the language: {parsed[0].message}")
     [table] = (one for one in parsed.declarations if isinstance(one, tree.TableDecl))
-    return Tabled(table, tuple(tree.Use(path) for path in graph.uses), tuple(notes))
+    uses = tuple(tree.Use(path) for path in graph.uses)
+    return Tabled(table, uses, tuple(notes), (graph.state, graph.initial))
 
 
 # --- lines -------------------------------------------------------------------------------

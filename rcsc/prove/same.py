@@ -1,7 +1,8 @@
 """Whether two tables over the same declarations do the same, whatever the input.
 
-In: two programs that differ in one table. Out: `Same`, `Differs` with the least input, or `NotDecided`. The same line's worth: no
-line, several lines, or one line after whose actions every variable has the same value. Asked of Z3 pair of lines by pair
+In: two programs that differ in one table. Out: `Same`, `Differs` with the least input, or `NotDecided`. The same line's worth: a
+condition that is not defined, no line, several lines, or one line whose actions come to their end alike, call the same extern procedures
+in the same states with the same values, and leave every variable the same. Asked of Z3 pair of lines by pair
 of lines, under the assumptions of the first table and the program's invariants; lines are compared by what they do, not by name.
 """
 
@@ -12,16 +13,17 @@ from typing import TypeAlias
 from rcsc.meaning import relying
 from rcsc.model import Action, Kind, Program, Scalar, Table, Value, Variable, VariableName, value_of_key
 from rcsc.prove import smt, values
-from rcsc.prove.effect import Shared
+from rcsc.prove.effect import Effect, Meaning, Shared, goes_wrong_otherwise, same_calls, value_behind
 from rcsc.prove.encode import Frame, least_witness
-from rcsc.prove.evaluation import State, TooLongError
+from rcsc.prove.evaluation import TooLongError
 from rcsc.prove.options import Options
 from rcsc.prove.smt import Answer, Solver
 from rcsc.prove.steps import assumed
 from rcsc.prove.symbolic import Run
 from rcsc.prove.values import Node
 
-NO_LINE, SEVERAL_LINES = "no line", "several lines"
+NO_LINE, SEVERAL_LINES, UNDEFINED = "no line", "several lines", "an undefined condition"
+RUN, CALLS = "whether the actions come to their end", "which extern procedures are called, or with what"
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,9 +43,9 @@ class Differs:
 
     Attributes:
         witness: By variable, in declared order.
-        first: What the first table does: a line's name, `no line` or `several lines`.
+        first: What the first table does: a line's name, `no line`, `several lines` or `an undefined condition`.
         second: What the second does.
-        changed: Variables that have different values afterwards; empty where the lines differ in kind.
+        changed: What differs afterwards: variables by name, `RUN` and `CALLS`; empty where the lines differ in kind.
     """
 
     witness: tuple[tuple[Variable, Value], ...]
@@ -65,11 +67,11 @@ Comparison: TypeAlias = Same | Differs | NotDecided
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Outcome:
-    """What one table does for some inputs: the condition, and the leaves written; None where nothing runs."""
+    """What one table does for some inputs: the condition, and what its actions do; None where nothing runs."""
 
     name: str
     when: Node
-    leaves: dict[str, Node] | None
+    effect: Effect | None
 
 
 def compare(first: tuple[Program, Table], second: tuple[Program, Table], options: Options) -> Comparison:
@@ -90,6 +92,8 @@ class _Question:
         program = relying(first[0])
         self.variables = program.variables
         self.kinds = {str(v.name): v.type for v in program.variables}
+        for name, kind in self.kinds.items():
+            self.start[name] = self.shared.one(values.variable(name, kind))
         self.one, self.two = list(self._outcomes(*first)), list(self._outcomes(*second))
         table = next(one for one in program.tables if one.name == first[1].name)
         run = Run({}, self.kinds, self.start)
@@ -111,42 +115,43 @@ class _Question:
 
     def _outcomes(self, program: Program, table: Table) -> Iterator[_Outcome]:
         """What the table can come to; the conditions exclude each other and leave nothing out."""
-        run = Run({}, self.kinds, self.start)
-        lines = [values.all_of(run.evaluate(t.condition) for t in line.tests if t) for line in table.lines]
-        none = values.negation(values.any_of(lines))
+        meaning = Meaning(program, self.kinds, self.shared)
+        lines = [
+            values.all_of(meaning.condition(t.condition) for t in line.tests if t) for line in table.lines
+        ]
+        undefined = values.any_of(meaning.bad)
+        defined, none = values.negation(undefined), values.negation(values.any_of(lines))
         before, twice = values.FALSE, values.FALSE
         for when in lines:
             twice = values.either(twice, values.both(before, when))
             before = values.either(before, when)
         for line, when in zip(table.lines, lines, strict=True):
-            alone = values.both(when, values.negation(twice))
-            yield _Outcome(line.name, alone, self._done(program, line.actions))
+            alone = values.all_of((when, values.negation(twice), defined))
+            yield _Outcome(line.name, alone, _done(meaning, line.actions))
+        none = values.both(none, defined)
         if table.default is None:
             yield _Outcome(NO_LINE, none, None)
         else:
-            yield _Outcome(table.default.name, none, self._done(program, table.default.actions))
-        yield _Outcome(SEVERAL_LINES, twice, None)
-
-    def _done(self, program: Program, actions: tuple[Action, ...]) -> dict[str, Node]:
-        run = Run({str(p.name): p for p in program.procedures}, self.kinds, self.start)
-        for action in actions:
-            run.state = State(dict(run.state.leaves))
-            run.execute((action.statement,))
-        return dict(run.state.leaves)
+            yield _Outcome(table.default.name, none, _done(meaning, table.default.actions))
+        yield _Outcome(SEVERAL_LINES, values.both(twice, defined), None)
+        yield _Outcome(UNDEFINED, undefined, None)
 
     def _unlike(self, one: _Outcome, two: _Outcome) -> Node:
-        if one.leaves is None or two.leaves is None:
+        if one.effect is None or two.effect is None:
             return values.truth(one.name != two.name)
-        return values.any_of(node for _, node in self._changes(one.leaves, two.leaves))
+        return values.any_of(node for _, node in self._changes(one.effect, two.effect))
 
-    def _changes(self, one: dict[str, Node], two: dict[str, Node]) -> Iterator[tuple[str, Node]]:
-        run = Run({}, self.kinds, self.start)
-        for name in {**one, **two}:
-            a = one[name] if name in one else run.leaf(name)
-            b = two[name] if name in two else run.leaf(name)
-            same = self.shared.equal(a, b)
+    def _changes(self, one: Effect, two: Effect) -> Iterator[tuple[str, Node]]:
+        """What can differ afterwards, and where it does."""
+        leaves = [name for name in self.kinds if name in one.leaves or name in two.leaves]
+        good = values.both(one.good, two.good)
+        yield RUN, goes_wrong_otherwise(one, two, self.shared)
+        yield CALLS, values.both(good, values.negation(same_calls(one, two, leaves, self.shared)))
+        for name in leaves:
+            pair = [value_behind(effect, name, self.shared) for effect in (one, two)]
+            same = self.shared.equal(*pair)
             if same is not values.TRUE:
-                yield name, values.negation(same)
+                yield name, values.both(good, values.negation(same))
 
     def _check(self, wrong: Node) -> tuple[Answer, Solver | None, dict[str, Node]]:
         """Whether it can be, the solver that says so, and the variables that it is about."""
@@ -176,13 +181,17 @@ class _Question:
         if least is None:
             return NotDecided(one.name, two.name)
         changed: tuple[str, ...] = ()
-        if one.leaves is not None and two.leaves is not None:
+        if one.effect is not None and two.effect is not None:
             changed = tuple(
                 name
-                for name, node in self._changes(one.leaves, two.leaves)
+                for name, node in self._changes(one.effect, two.effect)
                 if solver.check(values.term_of(node)) is Answer.SATISFIABLE
             )
         return Differs(tuple((v, least[v.name]) for v in shown), one.name, two.name, changed)
+
+
+def _done(meaning: Meaning, actions: tuple[Action, ...]) -> Effect:
+    return meaning.effect(action.statement for action in actions)
 
 
 def _shown(name: str, kind: Scalar) -> Variable:
