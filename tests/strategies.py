@@ -1,9 +1,10 @@
 """Texts of typed expressions over a few declared variables, and snapshots of any program, leaning on edges."""
 
 from dataclasses import dataclass
+from functools import cache
 
 from hypothesis import strategies as st
-from hypothesis.strategies import DrawFn, SearchStrategy
+from hypothesis.strategies import SearchStrategy
 
 from rcsc.model import Program, Snapshot
 from rcsc.testing.strategies import declarations, snapshots
@@ -46,44 +47,49 @@ def _over(names: Names, operators: tuple[str, ...]) -> SearchStrategy[str]:
     return st.recursive(leaves, grown, max_leaves=6)
 
 
+@cache  # Hypothesis examines a recursive strategy at its first draw: one that is built again costs more than its draws
 def integers_over(names: Names = INTS) -> SearchStrategy[str]:
     """An integer expression."""
     return _over(names, ("+", "-", "*", "/", "mod"))
 
 
+@cache
 def reals_over(names: Names = REALS) -> SearchStrategy[str]:
     """A real expression."""
     return _over(names, ("+", "-", "*", "/"))
 
 
-def _compared(subject: str, constants: SearchStrategy[str], sets: bool) -> SearchStrategy[str]:
-    comparison = st.builds(
-        "{} {} {}".format, st.just(subject), st.sampled_from(("=", "/=", "<", "<=", ">", ">=")), constants
-    )
-    turned = st.builds(
-        "{} {} {}".format, constants, st.sampled_from(("=", "/=", "<", ">=")), st.just(subject)
-    )
+EQUAL = ("=", "/=")
+ORDERED = (*EQUAL, "<", "<=", ">", ">=")
+
+
+def _compared(
+    subject: str, constants: SearchStrategy[str], sets: bool, operators: tuple[str, ...]
+) -> SearchStrategy[str]:
+    operator = st.sampled_from(operators)
+    comparison = st.builds("{} {} {}".format, st.just(subject), operator, constants)
+    turned = st.builds("{} {} {}".format, constants, operator, st.just(subject))
     if not sets:
         return st.one_of(comparison, turned)
     among = st.builds("{} in {{{}, {}}}".format, st.just(subject), constants, constants)
     return st.one_of(comparison, turned, among)
 
 
-@st.composite
 def conditions(
-    draw: DrawFn, subjects: tuple[str, ...], constants: SearchStrategy[str], sets: bool = True
-) -> str:
+    subjects: tuple[str, ...],
+    constants: SearchStrategy[str],
+    sets: bool = True,
+    operators: tuple[str, ...] = ORDERED,
+) -> SearchStrategy[str]:
     """A boolean combination of conditions of subjects against constants."""
-    leaf = st.sampled_from(subjects).flatmap(lambda one: _compared(one, constants, sets))
-    return draw(
-        st.recursive(
-            leaf,
-            lambda inner: st.one_of(
-                st.builds("({} {} {})".format, inner, st.sampled_from(("and", "or", "implies")), inner),
-                st.builds("not ({})".format, inner),
-            ),
-            max_leaves=5,
-        )
+    leaf = st.one_of([_compared(one, constants, sets, operators) for one in subjects])
+    return st.recursive(
+        leaf,
+        lambda inner: st.one_of(
+            st.builds("({} {} {})".format, inner, st.sampled_from(("and", "or", "implies")), inner),
+            st.builds("not ({})".format, inner),
+        ),
+        max_leaves=5,
     )
 
 

@@ -1,5 +1,7 @@
 """Arbitrary programs as trees: every kind of node, in the form that the parser gives."""
 
+from functools import cache
+
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
@@ -66,11 +68,13 @@ def _deeper(inner: SearchStrategy[tree.Expr]) -> SearchStrategy[tree.Expr]:
     )
 
 
+@cache  # Hypothesis examines a strategy at its first draw: one that is built again costs more than its draws
 def expressions() -> SearchStrategy[tree.Expr]:
     """Any expression."""
     return st.recursive(st.one_of(LITERALS, REFERENCES), _deeper, max_leaves=8)
 
 
+@cache
 def places() -> SearchStrategy[tree.Expr]:
     """Anything that can be assigned."""
     fields = st.builds(tree.FieldOf, REFERENCES, NAMES)
@@ -82,6 +86,7 @@ BARE: SearchStrategy[tree.Expr] = st.one_of(
 )
 
 
+@cache
 def types() -> SearchStrategy[tree.TypeExpr]:
     """Any type; a bound does not carry the unit, which is the type's."""
     simple: SearchStrategy[tree.TypeExpr] = st.one_of(
@@ -94,11 +99,13 @@ def types() -> SearchStrategy[tree.TypeExpr]:
     return st.recursive(simple, lambda inner: st.builds(tree.ArrayType, BARE, inner), max_leaves=2)
 
 
+@cache
 def calls() -> SearchStrategy[tree.Statement]:
     """A call."""
     return st.builds(tree.Call, NAMES, st.lists(expressions(), max_size=2).map(tuple), comments=WORDS)
 
 
+@cache
 def assignments() -> SearchStrategy[tree.Statement]:
     """An assignment, deferred or not."""
     return st.builds(tree.Assign, places(), expressions(), st.booleans(), comments=WORDS)
@@ -116,6 +123,7 @@ def _blocks(inner: SearchStrategy[tree.Statement]) -> SearchStrategy[tree.Statem
     )
 
 
+@cache
 def statements() -> SearchStrategy[tree.Statement]:
     """Any statement."""
     local = st.builds(tree.Local, NAMES, types(), st.none() | expressions(), comments=WORDS)
@@ -125,6 +133,7 @@ def statements() -> SearchStrategy[tree.Statement]:
 COMPARISONS = st.sampled_from(["=", "/=", "<", "<=", ">", ">="])
 
 
+@cache
 def conditions() -> SearchStrategy[tree.Condition]:
     """A condition cell."""
     several = st.lists(expressions(), min_size=1, max_size=3).map(tuple)
@@ -135,26 +144,39 @@ def conditions() -> SearchStrategy[tree.Condition]:
     )
 
 
+@cache
+def _columns() -> SearchStrategy[list[tree.Expr | None]]:
+    return st.lists(st.one_of(st.just(None), expressions()), min_size=1, max_size=3)
+
+
+@cache
+def _cells() -> SearchStrategy[tuple[tree.Statement, ...]]:
+    return st.lists(calls() | assignments(), max_size=2).map(lambda found: tuple(_bare(one) for one in found))
+
+
+ACTIONS = st.lists(st.sampled_from(["procedures", "command_out", "status_out", "place"]), max_size=3)
+FEW = st.lists(NAMES, max_size=2).map(tuple)
+
+
 @st.composite
 def tables(draw: st.DrawFn) -> tree.TableDecl:
     """A table with even rows."""
-    columns = draw(st.lists(st.one_of(st.just(None), expressions()), min_size=1, max_size=3))
-    words = draw(st.lists(st.sampled_from(["procedures", "command_out", "status_out", "place"]), max_size=3))
+    columns = draw(_columns())
+    words = draw(ACTIONS)
     headings = tuple(tree.Heading(one, "when" if one is None else "") for one in columns)
     actions = tuple(
         tree.Heading(draw(places()), "") if w == "place" else tree.Heading(None, w) for w in words
     )
-    cell = st.lists(calls() | assignments(), max_size=2).map(lambda found: tuple(_bare(one) for one in found))
     rows = []
     for number in range(draw(st.integers(0, 3))):
         default = number == 2 and draw(st.booleans())
         conditions_ = tuple(
             None if default or draw(st.booleans()) else _condition(draw, heading) for heading in headings
         )
-        done = tuple(draw(cell) if h.subject is None else _value(draw) for h in actions)
+        done = tuple(draw(_cells()) if h.subject is None else _value(draw) for h in actions)
         unreachable = default and draw(st.booleans())
         rows.append(tree.Row(f"l{number}", conditions_, done, default, unreachable, comments=draw(WORDS)))
-    assuming = draw(st.lists(NAMES, max_size=2).map(tuple))
+    assuming = draw(FEW)
     return tree.TableDecl(
         draw(NAMES), assuming, headings, actions, tuple(rows), comments=draw(WORDS), doc=draw(DOCS)
     )
@@ -178,24 +200,29 @@ def _value(draw: st.DrawFn) -> tuple[tree.Statement, ...] | tree.Comparison:
     return tree.Comparison("=", draw(expressions())) if draw(st.booleans()) else ()
 
 
+@cache
+def _dispatches() -> SearchStrategy[tuple[tree.Dispatch, ...]]:
+    return st.lists(st.builds(tree.Dispatch, expressions(), NAMES), min_size=1, max_size=2).map(tuple)
+
+
 @st.composite
 def levels(draw: st.DrawFn) -> tree.LevelDecl:
     """A level of either kind."""
     many = draw(st.booleans())
-    dispatch = st.lists(st.builds(tree.Dispatch, expressions(), NAMES), min_size=1, max_size=2).map(tuple)
     return tree.LevelDecl(
         draw(NAMES),
         draw(st.none() | LITERALS),
-        draw(st.lists(NAMES, max_size=2).map(tuple)),
+        draw(FEW),
         None if many else draw(NAMES),
         draw(places()) if many else None,
-        draw(dispatch) if many else (),
-        draw(st.lists(NAMES, max_size=2).map(tuple)),
+        draw(_dispatches()) if many else (),
+        draw(FEW),
         comments=draw(WORDS),
         doc=draw(DOCS),
     )
 
 
+@cache
 def declarations() -> SearchStrategy[tree.Declaration]:
     """Any declaration."""
     some_names = st.lists(NAMES, min_size=1, max_size=3).map(tuple)
@@ -255,6 +282,7 @@ def declarations() -> SearchStrategy[tree.Declaration]:
     )
 
 
+@cache
 def files() -> SearchStrategy[tree.File]:
     """A file of a few declarations."""
     return st.builds(tree.File, st.lists(declarations(), max_size=3).map(tuple), WORDS)

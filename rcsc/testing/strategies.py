@@ -5,7 +5,7 @@ suite that imports Hypothesis.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from random import Random
 
 from hypothesis import strategies as st
@@ -13,6 +13,7 @@ from hypothesis.strategies import DrawFn, SearchStrategy
 
 from rcsc.interpret import evaluate
 from rcsc.model import (
+    Expr,
     Kind,
     Line,
     Program,
@@ -37,11 +38,42 @@ MOST_DRAWN = 3  # leaves of a snapshot that are drawn one by one
 
 @dataclass(slots=True)
 class Declarations:
-    """What the strategies know of a program."""
+    """What the strategies know of a program.
+
+    Strategies are made once: Hypothesis examines each at its first draw, which costs more than the draw.
+
+    Attributes:
+        program: The program.
+        edges: For every leaf the keys at which something may turn.
+        near: For every leaf those it is compared with.
+        key: For every leaf the strategy of its keys.
+        some: A few leaves that are drawn one by one.
+        strange: For every input that can hold what lies outside its range, the strategy of such readings.
+        few: A few of the strange inputs; None where there is none.
+        checked: The conditions that the executors check, and the leaves that each reads.
+    """
 
     program: Program
     edges: dict[str, tuple[int, ...]]
     near: dict[str, tuple[str, ...]]
+    key: dict[str, SearchStrategy[int]] = field(init=False)
+    some: SearchStrategy[list[Variable]] = field(init=False)
+    strange: dict[str, SearchStrategy[Value]] = field(init=False)
+    few: SearchStrategy[list[str]] | None = field(init=False)
+    checked: list[tuple[Expr, list[Variable]]] = field(init=False)
+
+    def __post_init__(self) -> None:
+        variables, names = self.program.variables, set(monitored(self.program))
+        self.key = {v.name: keys(v, self.edges[v.name]) for v in variables}
+        self.some = st.lists(st.sampled_from(variables), max_size=MOST_DRAWN)
+        self.strange = {
+            v.name: st.sampled_from(beyond)
+            for v in variables
+            if v.kind is Kind.INPUT and (beyond := outside(v.type))
+        }
+        self.few = st.lists(st.sampled_from(list(self.strange)), max_size=2) if self.strange else None
+        conditions = [a.condition for a in self.program.assumptions if a.name in names]
+        self.checked = [(one, [v for v in variables if v.name in set(read_by(one))]) for one in conditions]
 
 
 def declarations(program: Program) -> Declarations:
@@ -70,13 +102,9 @@ def _aim(known: Declarations, line: Line, drawn: dict[str, int], random: Random)
 
 def _break(known: Declarations, drawn: dict[str, int], random: Random) -> None:
     """Moves the drawn keys to where some assumption that is checked is false, if such a place is met."""
-    program = known.program
-    names = set(monitored(program))
-    checked = [a for a in program.assumptions if a.name in names]
-    if not checked:
+    if not known.checked:
         return
-    condition = random.choice(checked).condition
-    read = [v for v in program.variables if v.name in set(read_by(condition))]
+    condition, read = random.choice(known.checked)
     for _ in range(TRIES):
         tried = drawn | {str(v.name): random.choice(known.edges[v.name]) for v in read}
         values = {str(v.name): value_of_key(v.type, tried[v.name]) for v in read}
@@ -106,8 +134,8 @@ def _scattered(known: Declarations, random: Random) -> dict[str, int]:
 def _draw_keys(draw: DrawFn, known: Declarations) -> dict[str, int]:
     """All leaves from one drawn seed, then a few drawn one by one: a draw for each leaf costs too much."""
     found = _scattered(known, Random(draw(st.binary(min_size=8, max_size=8))))  # noqa: S311  # drawn, so repeatable
-    for variable in draw(st.lists(st.sampled_from(known.program.variables), max_size=MOST_DRAWN)):
-        found[variable.name] = draw(keys(variable, known.edges[variable.name]))
+    for variable in draw(known.some):
+        found[variable.name] = draw(known.key[variable.name])
     return found
 
 
@@ -123,23 +151,24 @@ def snapshots(draw: DrawFn, known: Declarations, table: Table | None = None) -> 
 
 
 @st.composite
-def readings(draw: DrawFn, known: Declarations, table: Table | None, wild: bool) -> Snapshot:
+def _readings(draw: DrawFn, known: Declarations, whole: SearchStrategy[Snapshot], wild: bool) -> Snapshot:
     """A value for every input; where `wild`, some may lie outside the range, NaN and infinities too."""
-    whole = draw(snapshots(known, table))
+    given = draw(whole)
     found: dict[str, Value] = {
-        str(v.name): whole[v.name] for v in known.program.variables if v.kind is Kind.INPUT
+        str(v.name): given[v.name] for v in known.program.variables if v.kind is Kind.INPUT
     }
-    strange = [v for v in known.program.variables if v.kind is Kind.INPUT and outside(v.type)]
-    if wild and strange:
-        for variable in draw(st.lists(st.sampled_from(strange), max_size=2)):
-            found[variable.name] = draw(st.sampled_from(outside(variable.type)))
+    if wild and known.few is not None:
+        for name in draw(known.few):
+            found[name] = draw(known.strange[name])
     return found
 
 
-@st.composite
-def sessions(draw: DrawFn, known: Declarations, table: Table | None = None, most: int = 8) -> Session:
+def sessions(known: Declarations, table: Table | None = None, most: int = 8) -> SearchStrategy[Session]:
     """A start state and up to `most` cycles of changing inputs; a third of the sessions has wild inputs."""
-    start = draw(snapshots(known, table))
-    wild = draw(st.integers(0, 2)) == 0
-    cycles = draw(st.lists(readings(known, table, wild), min_size=1, max_size=most))
-    return Session(start, tuple(cycles))
+    whole = snapshots(known, table)
+    tame, wild = (
+        st.lists(_readings(known, whole, wild), min_size=1, max_size=most).map(tuple)
+        for wild in (False, True)
+    )
+    cycles = st.integers(0, 2).flatmap(lambda third: wild if third == 0 else tame)
+    return st.builds(Session, whole, cycles)
