@@ -224,7 +224,7 @@ class Document:
         return error(found=found, sources={self.name: self.source})
 
     def _check(self, kind: Kind, value: object, path: KeyPath) -> None:
-        if not _fits(kind, value):
+        if not fits(kind, value):
             what = f"`{shown_path(path)}` must be {kind.shown}" if path else f"the file must be {kind.shown}"
             self.wrong(path, f"{what}, not {_said(value)}")
             return
@@ -247,14 +247,14 @@ class Document:
                     self.wrong(path, f"{where} lacks `{key}`: {needed[key].shown}")
                 yield from ((key, value[key], every[key]) for key in value.keys() & every.keys())
             case Either(kinds):
-                yield from self._parts(next(one for one in kinds if _fits(one, value)), value, path)
+                yield from self._parts(next(one for one in kinds if fits(one, value)), value, path)
             case Number() | Text() | Name() | Word() | Member() | Flag():
                 return
             case _:
                 assert_never(kind)
 
 
-def _fits(kind: Kind, value: Any) -> bool:
+def fits(kind: Kind, value: Any) -> bool:
     """Whether a value, but not what stands in it, is of a kind."""
     match kind:
         case Number(low, high, whole):
@@ -277,7 +277,7 @@ def _fits(kind: Kind, value: Any) -> bool:
         case Record():
             return isinstance(value, dict)
         case Either(kinds):
-            return any(_fits(one, value) for one in kinds)
+            return any(fits(one, value) for one in kinds)
         case _:
             assert_never(kind)
 

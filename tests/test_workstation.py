@@ -2,6 +2,7 @@
 
 import json
 import shutil
+import sqlite3
 from pathlib import Path
 
 import pytest
@@ -76,6 +77,60 @@ def test_a_missing_or_broken_database_is_a_coded_error(
         said = capfd.readouterr()
         assert "error[RCS722]" in said.err
         assert said.out == ""
+
+
+FOREIGN = {
+    "a view in place of a table": "drop table parts; create view parts as with recursive n(x) as (select 1 union all select x + 1 from n) "
+    "select 1, 1.0, 1.0, 1.0, 1.0 from n",
+    "a column that is computed": "drop table meta; "
+    "create table meta (x, digest text as (hex(zeroblob(400000000)))); insert into meta (x) values (1)",
+    "a table beside its own": "create table more (x)",
+    "a trigger": "create trigger t after insert on meta begin delete from parts; end",
+    "a column less": "alter table robot drop column pad_mm",
+    "a text for a number": "update points set x0 = 'far'",
+    "bytes for a text": "update locations set name = x'ff' where number = 1",
+    "a number for no number": "update grasps set force_n = 9e999",
+    "a number that nothing is as long as": "update objects set length_mm = 1e300",
+    "a length below 0": "update stations set length_mm = -5",
+    "text that a terminal obeys": "update locations set name = 'a' || char(27) || '[2J' where number = 1",
+    "text that turns about": "update objects set name = char(8238) || name where number = 1",
+    "text that is not UTF-8": "update trajectories set name = cast(x'ff' as text) where name = 'fast'",
+    "a part that is not described": "update parts set object = 99",
+    "a way without its points": "update places set approach_count = 1000000",
+    "no robot": "delete from robot",
+    "a fixture without its numbers": "update stations set vise = '{}' where name = 'fixture'",
+    "a fixture that is nested deep": "update stations set vise = replace(hex(zeroblob(5000)), '0', '[')",
+}
+
+
+@pytest.mark.parametrize("what", list(FOREIGN))
+def test_a_database_of_somebody_else_is_read_as_what_it_must_be(
+    what: str, project: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    build(project / "tables/cell.toml", project / "a?b%.sqlite", PARTS)
+    held = sqlite3.connect(project / "a?b%.sqlite")
+    assert run(["db", "show", "stations", "--database", "a?b%.sqlite"]) == 0
+    held.executescript(FOREIGN[what])
+    held.close()
+    for command in (["db", "show", "locations"], ["run", "make_boxt", *QUICK]):
+        capfd.readouterr()
+        assert run([*command, "--database", "a?b%.sqlite"]) == 1
+        said = capfd.readouterr()
+        assert said.err.startswith("error[RCS722]: `a?b%.sqlite` is no database of a cell: ")
+        assert (said.err.strip().isprintable(), said.out) == (True, "")
+
+
+def test_a_long_text_is_shown_short(project: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    build(project / "tables/cell.toml", project / "my.sqlite", PARTS)
+    held = sqlite3.connect(project / "my.sqlite")
+    held.executescript(
+        "update objects set name = replace(hex(zeroblob(5000)), '0', 'long' || char(9)) where number = 1"
+    )
+    held.close()
+    assert run(["db", "show", "objects", "--database", "my.sqlite"]) == 0
+    shown = capfd.readouterr().out.splitlines()
+    assert max(map(len, shown)) < 2500
+    assert {line.count("\t") for line in shown} == {shown[0].count("\t")}
 
 
 def test_a_pallet_has_a_place_for_each_sector_and_others_ignore_it(tmp_path: Path) -> None:

@@ -219,8 +219,7 @@ def _built(system: Path | None, output: Path | None, *, writes: bool) -> Path:
 @click.argument("table", required=False, metavar="[TABLE]")
 def show(system: Path | None, database: Path | None, table: str | None) -> int:
     """Show a TABLE of the database, or how many rows each has."""
-    import sqlite3
-
+    from rcsc.database.ask import tables_of
     from rcsc.database.build import BadData
     from rcsc.system.cell import signatures
     from rcsc.system.description import BadDescription, description
@@ -229,21 +228,27 @@ def show(system: Path | None, database: Path | None, table: str | None) -> int:
     try:
         said = description(system_path(system))
         database_of(said, signatures(said), database)
+        held = tables_of(database or database_path(said))
     except (BadData, BadDescription) as error:
         stop(error)
-    held = sqlite3.connect(f"file:{database or database_path(said)}?mode=ro", uri=True)
-    names = [
-        name for (name,) in held.execute("select name from sqlite_master where type = 'table' order by name")
-    ]
     if table is None:
-        for name in names:
-            [(count,)] = held.execute(f"select count(*) from {name}")  # noqa: S608  # names of our own schema
-            click.echo(f"{name:14}{count:6} rows")
+        for name in sorted(held):
+            click.echo(f"{name:14}{len(held[name].rows):6} rows")
         return 0
-    if table not in names:
-        raise click.BadParameter(f"choose from {', '.join(names)}", param_hint="TABLE")
-    found = held.execute(f"select * from {table}")  # noqa: S608  # one of the names above
-    click.echo("\t".join(column[0] for column in found.description))
-    for row in found:
-        click.echo("\t".join("" if value is None else str(value) for value in row))
+    if table not in held:
+        raise click.BadParameter(f"choose from {', '.join(sorted(held))}", param_hint="TABLE")
+    click.echo("\t".join(held[table].columns))
+    for row in held[table].rows:
+        click.echo("\t".join(_shown(value) for value in row))
     return 0
+
+
+MOST_SHOWN = 400
+"""Characters of a value that `db show` prints."""
+
+
+def _shown(value: object) -> str:
+    from rcsc.diagnostics.spelling import escape
+
+    text = "" if value is None else str(value)
+    return escape(text[:MOST_SHOWN]) + ("..." if len(text) > MOST_SHOWN else "")

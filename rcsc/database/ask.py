@@ -3,15 +3,22 @@
 In: the SQLite file. Out: a `Database` whose answers are tuples in the order of the records that they fill.
 """
 
+import functools
+import itertools
 import sqlite3
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from rcsc.database.build import BadData
+from rcsc.database.build import COLUMNS, SCHEMA, VBLOCK, VISE, BadData
 from rcsc.database.pose import Pose, Vector, about_z, pose_of
-from rcsc.files.read import json_of
+from rcsc.described import Document, Kind, Record, fits
+from rcsc.diagnostics.codes import Code
+from rcsc.diagnostics.spelling import escape
+from rcsc.files.names import shown
+from rcsc.files.read import MOST_BYTES, Malformed, json_of, opened, plain
+from rcsc.source import Source
 from rcsc.system.signature import Values
 
 NO_PLACE: Values = (False, False, False, 0, 0)
@@ -147,79 +154,177 @@ class Database:
         }
 
 
+# --- the file ---
+
+MOST_ROWS = 1_000_000
+MOST_STEPS, STEPS_APART = 500, 1_000_000
+"""Of SQLite's own machine, in units of the second: a file that is made to can keep it busy for ever."""
+
+
+@dataclass(frozen=True, slots=True)
+class Listed:
+    """A table of the file: its rows, in the order of its columns."""
+
+    columns: tuple[str, ...]
+    rows: tuple[tuple[Any, ...], ...]
+
+
+def tables_of(path: Path) -> dict[str, Listed]:
+    """Read every table of a database whole; each value is what its column says.
+
+    A file may come from anybody. Only the tables of `SCHEMA`, as they stand there, are looked at: a view, a trigger or a column
+    that is computed would be a program of the file's own.
+
+    Raises:
+        BadData: It is not there, or is no database of a cell.
+    """
+    try:
+        opened(path).close()
+        if path.stat().st_size > MOST_BYTES:
+            raise Malformed(f"has more than {MOST_BYTES} bytes")
+        held = sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro&immutable=1", uri=True)
+        try:
+            return _listed(held)
+        finally:
+            held.close()
+    except FileNotFoundError as error:
+        raise BadData((f"there is no database {shown(str(path))}: run `rcsc db build`",)) from error
+    except OSError as error:
+        raise BadData((f"{shown(str(path))} cannot be read: {error.strerror}",)) from error
+    except (sqlite3.Error, ValueError, MemoryError) as error:
+        raise BadData((f"{shown(str(path))} is no database of a cell: {escape(str(error))}",)) from error
+
+
+def _listed(held: sqlite3.Connection) -> dict[str, Listed]:
+    turns = itertools.count(1)
+    held.set_progress_handler(lambda: next(turns) > MOST_STEPS, STEPS_APART)
+    if sorted(held.execute(_MASTER)) != _schema()[0]:
+        raise Malformed("it has other tables, or something beside them: run `rcsc db build`")
+    found, left = {}, MOST_ROWS
+    for name, columns in _schema()[1].items():
+        rows = tuple(itertools.islice(held.execute(f"select * from {name}"), left + 1))  # noqa: S608  # of our schema
+        left -= len(rows)
+        if left < 0:
+            raise Malformed(f"it has more than {MOST_ROWS} rows")
+        for row in rows:
+            for column, value in zip(columns, row, strict=True):
+                column.check(name, value)
+        found[name] = Listed(tuple(column.name for column in columns), rows)
+    if held.execute("pragma foreign_key_check").fetchone() is not None:
+        raise Malformed("it names what it does not hold")
+    return found
+
+
+_MASTER = "select type, name, tbl_name, coalesce(sql, '') from sqlite_master"
+
+
+@dataclass(frozen=True, slots=True)
+class _Column:
+    name: str
+    kind: str
+    needed: bool
+
+    def check(self, table: str, value: object) -> None:
+        """Raises: Malformed: The value is not of the column; SQLite itself takes any."""
+        if value is None and not self.needed:
+            return
+        if not fits(COLUMNS[self.kind], value) or (isinstance(value, str) and plain(value) != value):
+            what = shown(value if isinstance(value, str) else repr(value)[:40])
+            raise Malformed(f"`{table}.{self.name}` is {what}, and must be {COLUMNS[self.kind].shown}")
+
+
+@functools.cache
+def _schema() -> tuple[list[Any], Mapping[str, tuple[_Column, ...]]]:
+    """What stands in the table of tables, and the columns of each."""
+    held = sqlite3.connect(":memory:")
+    try:
+        held.executescript(SCHEMA)
+        tables = [name for (name,) in held.execute("select name from sqlite_master where type = 'table'")]
+        columns = {
+            name: tuple(
+                _Column(column, kind.lower(), bool(needed or key))
+                for _, column, kind, needed, _, key in held.execute(f"pragma table_info({name})")
+            )
+            for name in tables
+        }
+        return sorted(held.execute(_MASTER)), columns
+    finally:
+        held.close()
+
+
 def fresh(path: Path, expected: str) -> bool:
     """Whether the file is a database made of what `expected` is the digest of."""
     try:
-        held = sqlite3.connect(f"file:{path}?mode=ro", uri=True)
-        try:
-            return list(held.execute("select digest from meta")) == [(expected,)]
-        finally:
-            held.close()
-    except sqlite3.Error:
+        return tables_of(path)["meta"].rows == ((expected,),)
+    except BadData:
         return False
 
 
 def open_database(path: Path) -> Database:
-    """Reads a database whole.
+    """Read a database whole.
 
     Raises:
-        BadData: It is not there, or is no database of the cell's.
+        BadData: It is not there, or is no database of a cell.
     """
-    if not path.is_file():
-        raise BadData((f"there is no database `{path}`: run `rcsc db build`",))
+    held = tables_of(path)
     try:
-        held = sqlite3.connect(f"file:{path}?mode=ro", uri=True)
-        try:
-            return _read(held)
-        finally:
-            held.close()
-    except (sqlite3.Error, KeyError, TypeError, ValueError, IndexError) as error:
-        raise BadData((f"`{path}` is no database of a cell: {error}",)) from error
+        return _read({name: listed.rows for name, listed in held.items()})
+    except (KeyError, IndexError, Malformed) as error:
+        raise BadData((f"{shown(str(path))} is no database of a cell: {escape(str(error))}",)) from error
 
 
-def _read(held: sqlite3.Connection) -> Database:
-    def rows(query: str) -> list[tuple[Any, ...]]:
-        return list(held.execute(query))
-
-    robot = rows("select * from robot")[0]
-    motion = {name: tuple(row) for name, *row in rows("select * from trajectories")}
-    points = {
-        number: (True, *plate, *motion[trajectory])
-        for number, *plate, trajectory in rows(
-            "select number, x0, y0, z0, x1, y1, z1, x2, y2, z2, trajectory from points"
-        )
-    }
+def _read(held: Mapping[str, tuple[tuple[Any, ...], ...]]) -> Database:
+    robot = held["robot"][0]
+    _check_ways(held)
+    motion = {name: tuple(row) for name, *row in held["trajectories"]}
     return Database(
-        {name: number for number, name in rows("select number, name from locations")},
-        {name: number for number, name in rows("select number, name from objects")},
-        {
-            number: (a, b, c)
-            for number, a, b, c in rows("select number, length_mm, width_mm, height_mm from objects")
-        },
-        dict(rows("select number, stock from objects")),
-        tuple(Part(*row) for row in rows("select * from parts")),
-        tuple(robot[:9]),
-        Hand(robot[9], robot[10], (robot[11], robot[12], robot[13])),
-        {name: _station(name, rest) for name, *rest in rows("select * from stations")},
-        {
+        locations={name: number for number, name, *_ in held["locations"]},
+        objects={name: number for number, name, *_ in held["objects"]},
+        sizes={number: (a, b, c) for number, _, a, b, c, *_ in held["objects"]},
+        stock={number: stock for number, _, _, _, _, stock, *_ in held["objects"]},
+        parts=tuple(Part(*row) for row in held["parts"]),
+        home=tuple(robot[:9]),
+        hand=Hand(robot[9], robot[10], (robot[11], robot[12], robot[13])),
+        stations={name: _station(name, rest) for name, *rest in held["stations"]},
+        _places={
             number: (True, bool(vision), bool(buffer), vupos or 0, safe or 0)
-            for number, vision, buffer, vupos, safe in rows(
-                "select number, vision, buffer, vupos, safe from locations"
-            )
+            for number, _, vision, buffer, vupos, safe in held["locations"]
         },
-        {(location, sector): (True, *rest) for location, sector, *rest in rows("select * from places")},
-        {
-            number: (True, *ranges)
-            for number, *ranges in rows(
-                "select number, expected_range_mm, grip_range_mm, lift_mm from objects"
-            )
+        _routes={(location, sector): (True, *rest) for location, sector, *rest in held["places"]},
+        _parts={number: (True, *ranges) for number, _, _, _, _, _, *ranges in held["objects"]},
+        _points={
+            number: (True, *plate, *motion[trajectory])
+            for number, _, _, _, *plate, trajectory in held["points"]
         },
-        points,
-        {(number, grasp): (True, *rest) for number, grasp, *rest in rows("select * from grasps")},
+        _fingers={(number, grasp): (True, *rest) for number, grasp, *rest in held["grasps"]},
     )
+
+
+def _check_ways(held: Mapping[str, tuple[tuple[Any, ...], ...]]) -> None:
+    """Raises: Malformed: A place's way has points that are not there; the schema cannot say it."""
+    points = {number for number, *_ in held["points"]}
+    for *_, leaves, many, comes, more, hover, grasp, view in held["places"]:
+        ways = [leaves, leaves + many - 1] * (many > 0) + [comes, comes + more - 1, hover, grasp, view]
+        if more == 0 or max(many, more) > len(points) or not points.issuperset(ways):
+            raise Malformed("a place of it has a way without its points")
 
 
 def _station(name: str, row: Sequence[Any]) -> Station:
     x, y, z, yaw, length, width, vise, vblock = row
     frame = Pose(about_z(yaw), (x, y, z))
-    return Station(name, frame, yaw, (length, width), json_of(vise or "{}"), json_of(vblock or "{}"))
+    return Station(name, frame, yaw, (length, width), _fixture(vise, VISE), _fixture(vblock, VBLOCK))
+
+
+def _fixture(said: str | None, kind: Mapping[str, Kind]) -> Mapping[str, Any]:
+    """The numbers of a fixture, as the data file may say them.
+
+    Raises:
+        Malformed: They are others.
+    """
+    if said is None:
+        return {}
+    page = Document("", Source("", ""), json_of(said), Code.BAD_DATA)
+    page.check(Record(kind))
+    if page.faults:
+        raise Malformed(f"of a fixture {page.faults[0].message}")
+    return page.value

@@ -36,27 +36,38 @@ from rcsc.source import Source
 
 SCHEMA = """
 create table meta (digest text not null);
-create table objects (number integer primary key, name text unique not null, length_mm real not null, width_mm real not null,
-  height_mm real not null, stock integer not null, expected_range_mm real not null, grip_range_mm real not null, lift_mm real not null);
-create table grasps (object integer not null references objects, grasp integer not null, approach_mm real not null,
-  departure_mm real not null, grip_mm real not null, tolerance_mm real not null, force_n real not null, speed_mm_s real not null,
+create table objects (number integer primary key, name text unique not null, length_mm size real not null, width_mm size real not null,
+  height_mm size real not null, stock integer not null,
+  expected_range_mm size real not null, grip_range_mm size real not null, lift_mm real not null);
+create table grasps (object integer not null references objects, grasp integer not null, approach_mm size real not null,
+  departure_mm size real not null, grip_mm size real not null, tolerance_mm size real not null,
+  force_n force real not null, speed_mm_s room real not null,
   primary key (object, grasp));
 create table locations (number integer primary key, name text unique not null, vision integer not null, buffer integer not null,
   vupos integer references locations, safe integer references locations);
-create table trajectories (name text primary key, speed_mm_s real not null, accel_mm_s2 real not null, breakpoint_mm real not null);
+create table trajectories (name text primary key not null, speed_mm_s room real not null,
+  accel_mm_s2 rate real not null, breakpoint_mm size real not null);
 create table points (number integer primary key, location integer not null references locations, sector integer not null,
-  role text not null, x0 real, y0 real, z0 real, x1 real, y1 real, z1 real, x2 real, y2 real, z2 real,
+  role text not null,
+  x0 real not null, y0 real not null, z0 real not null,
+  x1 real not null, y1 real not null, z1 real not null,
+  x2 real not null, y2 real not null, z2 real not null,
   trajectory text not null references trajectories);
-create table stations (name text primary key, x_mm real not null, y_mm real not null, z_mm real not null, yaw_deg real not null,
-  length_mm real not null, width_mm real not null, vise text, vblock text);
+create table stations (name text primary key not null, x_mm real not null, y_mm real not null, z_mm real not null, yaw_deg real not null,
+  length_mm room real not null, width_mm room real not null, vise text, vblock text);
 create table places (location integer not null references locations, sector integer not null, depart_first integer not null,
   depart_count integer not null, approach_first integer not null, approach_count integer not null, hover integer not null,
   grasp integer not null, view integer not null, primary key (location, sector));
-create table robot (x0 real, y0 real, z0 real, x1 real, y1 real, z1 real, x2 real, y2 real, z2 real, tool_mm real, pad_mm real,
-  camera_x_mm real, camera_y_mm real, camera_z_mm real);
+create table robot (
+  x0 real not null, y0 real not null, z0 real not null,
+  x1 real not null, y1 real not null, z1 real not null,
+  x2 real not null, y2 real not null, z2 real not null,
+  tool_mm size real not null, pad_mm size real not null,
+  camera_x_mm real not null, camera_y_mm real not null, camera_z_mm real not null);
 create table parts (object integer not null references objects, x_mm real not null, y_mm real not null, z_mm real not null,
   yaw_deg real not null);
 """
+"""Each type's last word is SQLite's, all of it a key of `COLUMNS`."""
 HOVER_MM = 100.0
 """How far above a part the robot turns its hand before it goes down."""
 DEPTH_MM, CLEARANCE_MM = 12.0, 4.0
@@ -136,6 +147,11 @@ CELL = Record(
     },
 )
 """What a data file may say: lengths in mm, angles in degrees, forces in N, speeds in mm/s."""
+COLUMNS: Mapping[str, Kind] = {
+    "integer": Number(0, 1_000_000, whole=True), "real": Number(), "size real": Number(0, 1_000_000), "room real": ROOM,
+    "force real": FORCE, "rate real": RATE, "text": Text(),
+}  # fmt: skip
+"""What a column of the database may hold, by its type."""
 
 
 @dataclass(frozen=True, slots=True)
