@@ -23,12 +23,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rcsc import reserved
+from rcsc.diagnostics.codes import Code
 from rcsc.emit.environment import environment
 from rcsc.emit.names import C_WORDS, PYTHON_WORDS, comment
 from rcsc.emit.write import write
+from rcsc.files.read import Said, json_of
 from rcsc.interpret import Fault
 from rcsc.resolve import compile_text
-from rcsc.system.signature import generated_files
+from rcsc.system.signature import generated_files, signature_of
 from rcsc.testing.cortex import CortexRun, run_cortex
 from rcsc.testing.externs import python_stand_ins
 from rcsc.testing.symbols import symbols_of
@@ -462,8 +464,26 @@ def test_texts_never_become_code(text: str, tmp_path: Path) -> None:
     assert [type(node) for node in tree.body] == [type(node) for node in right.body]
 
 
+@given(
+    st.text(st.characters(codec="utf-8"), max_size=8),
+    st.sampled_from([0, 1, 980, 999, 1000, 5000, 70_000]),
+    st.sampled_from([0, 1, 990, 1200, 5000]),
+)
+def test_a_symbol_file_is_read_back_or_none_is_made(said: str, more: int, long: int) -> None:
+    name = "n" * long
+    text = f"record r{name} {{ f{name} : int 0 .. 9 }}\n## {said}{'word ' * more}\nstate s : array[2] of r{name}\n"
+    program = compile_text(text + all_named(f"a{name}"), "case.rcs")
+    if isinstance(program, tuple):
+        assert {one.code for one in program} <= {Code.UNPRINTED, Code.NUL_BYTE, Code.LONG_NAME, Code.SYNTAX}
+        assert long >= 990 or not said.isprintable()
+        return
+    [made] = [text for name, text in emitted(program).items() if name.endswith(".json")]
+    read = signature_of(Said(json_of(made)))
+    assert [leaf.name for leaf in read.leaves] == [str(one.name) for one in program.variables]
+
+
 def test_names_may_be_very_long(tmp_path: Path) -> None:
-    name = "a" * 5000
+    name = "a" * 990
     files = emitted(program_of(all_named(name)))
     compiled(files, tmp_path)
     for path in ("c/case_.h", "c/case_.c"):

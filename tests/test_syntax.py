@@ -106,6 +106,12 @@ CASES = [
     ("table t {\n | name | x ||\n}", [("RCS101", 2)]),
     ("input \u0430 : bool", [("RCS109", 1)]),
     ("input x : bool\0", [("RCS106", 1)]),
+    *(
+        (f"input x : bool\n{where.replace('@', char)}", [("RCS114", 2)])
+        for char in "\x1b\x7f\x85\u061c\u200f\u202e\u2066"
+        for where in ("# @", "##@ x", "@input y : bool", 'use "a@.rcs"')
+    ),
+    ("# fine\ninput " + "a" * 1001 + " : bool", [("RCS115", 2)]),
     ('extern procedure p python "a', [("RCS101", 1)]),
     ("invariant i : " + "(" * 200 + "a" + ")" * 200, [("RCS103", 1)]),
     ("invariant i : " + "not " * 5000 + "a", [("RCS103", 1)]),

@@ -25,6 +25,8 @@ class Code(StrEnum):
     NO_TABLES = "RCS111"
     NOT_FORMATTED = "RCS112"
     DEFAULT_ELSEWHERE = "RCS113"
+    UNPRINTED = "RCS114"
+    LONG_NAME = "RCS115"
     # 2xx names and writers
     UNKNOWN_NAME = "RCS201"
     DUPLICATE_NAME = "RCS202"

@@ -64,10 +64,19 @@ def unit_text(unit: Unit) -> str:
     return "*".join(name if power == 1 else f"{name}^{power}" for name, power in unit)
 
 
+MOST_DOC = 1000
+"""Characters of what is said of a leaf; an array says it of each of its elements."""
+
+
+def shortened(text: str) -> str:
+    """A text as a symbol file has it."""
+    return text if len(text) <= MOST_DOC else f"{text[:MOST_DOC]}..."
+
+
 def _described(variable: Variable) -> dict[str, object]:
     """What a log or a shell shows of a leaf: its range, unit or members, initial value and doc."""
     kind = variable.type
-    said: dict[str, object] = {"initial": variable.initial, "doc": variable.doc}
+    said: dict[str, object] = {"initial": variable.initial, "doc": shortened(variable.doc)}
     if variable.safe is not None:
         said["safe"] = variable.safe
     match kind:

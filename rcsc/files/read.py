@@ -36,8 +36,8 @@ _TOML = re.compile(
     re.DOTALL,
 )
 _DOTTED = re.compile(rf"(?<![\w-])(?:[\w-]++[ \t]*+\.[ \t]*+){{{DEEPEST_TOML},}}")
-_UNPRINTED = re.compile(
-    "[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u200e\u200f\u202a-\u202e\u2066-\u2069\ud800-\udfff]"
+UNPRINTED = re.compile(
+    "[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069\ud800-\udfff]"
 )
 """Control characters but tab and ends of lines, overrides of writing direction, and halves of characters."""
 
@@ -256,7 +256,7 @@ def _check_texts(value: object) -> None:
     while waiting:
         one = waiting.pop()
         if isinstance(one, str):
-            bad = _UNPRINTED.search(one)
+            bad = UNPRINTED.search(one)
             if bad is not None:
                 raise Malformed(
                     f"has a character that does not print, in {shown(one[max(0, bad.start() - 20) :])}"

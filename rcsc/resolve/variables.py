@@ -31,6 +31,7 @@ from rcsc.resolve.scope import Body, Constant, Scope
 from rcsc.resolve.types import MOST_LEAVES, constant, size, type_of
 from rcsc.source import Span
 from rcsc.syntax import tree
+from rcsc.syntax.screen import MOST_NAME
 
 
 def declare_enum(scope: Scope, written: tree.EnumDecl) -> Enum:
@@ -87,6 +88,10 @@ def declare_variable(scope: Scope, written: tree.VariableDecl) -> None:
         )
         return
     flat = list(_leaves(written.name.text, kind))
+    if max((len(name) for name, _ in flat), default=0) > MOST_NAME:
+        message = f"a part of `{written.name.text}`, written out, has more than {MOST_NAME} characters"
+        scope.report(Code.LONG_NAME, message, written.name.span)
+        return
     initial, safe = _constant(scope, written.initial, kind, "initial"), _safe(scope, written, kind)
     deferred = written.deferred_until is not None and _may_be_deferred(scope, written, kind)
     for name, leaf in flat:

@@ -1,18 +1,23 @@
 """What is refused before parsing, and where to go on after an error.
 
-In: a text. Out: diagnostics for a text that no parser should see: too large, too deep, with a NUL.
+In: a text. Out: diagnostics for a text that no parser should see: too large, too deep, with a NUL, with a character that changes what
+a reader sees, or with a name that nobody can read.
 """
 
 import re
+import unicodedata
 
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label
+from rcsc.files.read import UNPRINTED
 from rcsc.source import Source, Span
 
 MOST_CHARACTERS = 16 * 1024 * 1024
 DEEPEST = 100
+MOST_NAME = 1000
 
 _TOKEN = re.compile(r'#[^\r\n]*|"[^"\\\n]*"|[(\[{)\]}]')
+_LONG = re.compile(rf'#[^\r\n]*|"[^"\\\n]*"|(?P<name>[A-Za-z0-9_]{{{MOST_NAME + 1},}})')
 _DECLARATION = re.compile(
     r"^[ \t]*(?:use|unit|const|enum|type|record|input|state|output|assume|invariant|property|procedure|module|extern"
     r"|owner|table|level)\b",
@@ -28,6 +33,15 @@ def refuse(source: Source) -> tuple[Diagnostic, ...]:
     nul = text.find("\0")
     if nul >= 0:
         return (_error(Code.NUL_BYTE, "the text contains a NUL character", source, nul, nul + 1),)
+    unprinted = UNPRINTED.search(text)
+    if unprinted is not None:
+        named = f"U+{ord(unprinted[0]):04X}"
+        said = f"the text contains {unicodedata.name(unprinted[0], 'the control character')} ({named}), which a reader does not see"
+        return (_error(Code.UNPRINTED, said, source, *unprinted.span()),)
+    for word in _LONG.finditer(text):
+        if word.lastgroup:
+            message = f"a name has {len(word[0])} characters, more than {MOST_NAME}"
+            return (_error(Code.LONG_NAME, message, source, *word.span()),)
     deep = _too_deep(text)
     if deep is not None:
         return (too_deep(source, deep, deep + 1),)
