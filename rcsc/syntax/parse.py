@@ -6,6 +6,7 @@ In: a `Source`. Out: a `tree.File`, or every syntax error that was found. No tex
 from dataclasses import dataclass, field
 from functools import cache
 from importlib.resources import files as package_files
+from operator import itemgetter
 from pathlib import Path
 from typing import Any, cast
 
@@ -31,7 +32,20 @@ def _parser() -> lark.Lark:
     beside = Path(__file__).parents[2] / "grammar" / "rcs.lark"
     text = (packaged if packaged.is_file() else beside).read_text(encoding="utf-8")
     starts = ["file", "cell", "when", "heading", "actions"]
-    return lark.Lark(text, parser="lalr", start=starts, propagate_positions=True)
+    parser = lark.Lark(text, parser="lalr", start=starts, propagate_positions=True)
+    _hand_on(parser.parser.parser_conf)
+    return parser
+
+
+def _hand_on(conf: Any) -> None:
+    """Make rules like `?sum: product` hand on their child as it is, which every operand passes some ten of.
+
+    Lark would find out the child's position again and write it where it stands already.
+    """
+    for rule in conf.callbacks:
+        alone = len(rule.expansion) == 1 and not rule.expansion[0].is_term
+        if alone and rule.options.expand1 and not rule.alias and not rule.expansion[0].name.startswith("_"):
+            conf.callbacks[rule] = itemgetter(0)
 
 
 def parse(source: Source) -> tree.File | tuple[Diagnostic, ...]:
