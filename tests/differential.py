@@ -749,7 +749,7 @@ class Maker:
         made.after = [at for at in plain if rng.randrange(3) == 0]
         by = [
             leaf
-            for leaf in made.leaves("input", "state")
+            for leaf in made.leaves("input")
             if leaf.kind.sort == "enum" and leaf.name.isidentifier()
         ]
         chosen = f"table {made.tables[0].name}"

@@ -72,6 +72,14 @@ CASES: dict[str, tuple[str, list[tuple[int, str, str]]]] = {
         "enum e { a, b, c }\ninput s : e\ntable t {\n| line | s ||\n| x | a ||\n}\nlevel l {\n table by s { a : t }\n}",
         [(8, "RCS211", "s")],
     ),
+    "selector that a line changes": (
+        "state s : bool\ntable t {\n| line | s || s |\n| x | DEFAULT || not s |\n}\nlevel l { table by s { true : t  false : t } }",
+        [(6, "RCS214", "s")],
+    ),
+    "selector by index": (
+        "state s : array[2] of bool\ninput n : int 0..1\ntable t {\n| line ||\n| x ||\n}\nlevel l { table by s[n] { true : t false : t } }",
+        [(7, "RCS214", "s[n]")],
+    ),
     "two DEFAULT lines": (
         "input a : bool\ntable t {\n| line | a ||\n| x | DEFAULT ||\n| y | DEFAULT ||\n}",
         [(5, "RCS212", "y")],
@@ -227,6 +235,52 @@ def test_every_code_of_names_kinds_and_ranges_has_a_case() -> None:
     cased = {code for _, expected in CASES.values() for _, code, _ in expected}
     elsewhere = {"RCS204", "RCS205"}  # of several files: test_project
     assert {c.value for c in Code if c.value[3] in "23"} - cased == elsewhere
+
+
+CHOOSING = """input a : bool
+{selector}
+procedure p {{ q }}
+procedure q {{ s := a }}
+procedure r {{ next s := a }}
+extern procedure e reads a writes s python "m:f" c "m_f"
+table t {{
+  | line | a       || procedures |
+  | x    | DEFAULT || {calls}    |
+}}
+table u {{
+  | line | a       || procedures |
+  | x    | DEFAULT || p          |
+}}
+level k {{ table u }}
+level l {{ {before} table by s {{ true : t  false : t }} {after} }}
+"""
+PLAIN, LATER, SAFE = "state s : bool", "state s : bool deferred until a", "output s : bool safe true"
+
+
+@pytest.mark.parametrize(
+    ("selector", "before", "calls", "after", "steady"),
+    [
+        (PLAIN, "", "", "", True),
+        (PLAIN, "preprocess p", "", "", True),
+        (LATER, "preprocess p", "r", "postprocess r", True),
+        (PLAIN, "", "p", "", False),
+        (PLAIN, "", "e", "", False),
+        (LATER, "", "r; q", "", False),
+        (PLAIN, "", "", "postprocess p", False),
+        (PLAIN, "", "", "postprocess e", False),
+        (SAFE, "", "", "", False),
+    ],
+)
+def test_what_chooses_the_table_stays_from_the_preprocess_on(  # the places that may write it
+    selector: str, before: str, calls: str, after: str, steady: bool
+) -> None:
+    """Else a state that a cycle leaves would show another table than the one that ran; another level's lines do no harm."""
+    text = CHOOSING.format(selector=selector, before=before, calls=calls, after=after)
+    if selector != LATER:
+        text = text.replace("procedure r { next s := a }\n", "")
+    found = compile_text(text)
+    codes = [] if isinstance(found, Program) else [one.code.value for one in found]
+    assert codes == ([] if steady else ["RCS214"])
 
 
 def test_many_errors_are_reported_in_one_run_in_order_of_position() -> None:

@@ -246,7 +246,7 @@ class Stepper:
         )
 
     def table_of(self, snapshot: Snapshot) -> str:
-        """The table that ran in a cycle, by what the cycle left: nobody but the environment writes what selects it."""
+        """The table that ran in a cycle, by what the cycle left: what selects it stays from the preprocess on (`UNSTEADY_SELECTOR`)."""
         if isinstance(self.level.tables, OneTable):
             return str(self.level.tables.table)
         return str(dict(self.level.tables.tables)[evaluate(self.level.tables.selector, snapshot)])

@@ -60,7 +60,7 @@ class Walk:
             yield {**self.now, **self.ghosts}
 
     def _table(self) -> str:
-        """The table that ran: nobody but the environment writes what selects it."""
+        """The table that ran, by what the cycle left (`Stepper.table_of`)."""
         if isinstance(self.level.tables, OneTable):
             return str(self.level.tables.table)
         return str(dict(self.level.tables.tables)[evaluate(self.level.tables.selector, self.now)])

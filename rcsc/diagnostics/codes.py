@@ -41,6 +41,7 @@ class Code(StrEnum):
     MISSING_TABLE = "RCS211"
     SEVERAL_DEFAULTS = "RCS212"
     OWNER_CYCLE = "RCS213"
+    UNSTEADY_SELECTOR = "RCS214"
     # 3xx kinds, units, ranges
     KIND = "RCS301"
     UNIT = "RCS302"

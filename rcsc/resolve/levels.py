@@ -1,12 +1,19 @@
 """Control levels: a period, what runs before and after, and the table of each command."""
 
+from collections.abc import Iterable, Mapping
+
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Label
 from rcsc.model import (
+    Default,
     Int,
     Level,
+    Line,
     OneTable,
+    Procedure,
+    Read,
     Scalar,
+    Table,
     TableByCommand,
     TableName,
     Value,
@@ -16,6 +23,7 @@ from rcsc.model import (
 )
 from rcsc.resolve.expressions import typed
 from rcsc.resolve.owners import Owners
+from rcsc.resolve.procedures import touched
 from rcsc.resolve.scope import Body, Scope, spell_number
 from rcsc.resolve.types import constant
 from rcsc.resolve.variables import fits
@@ -26,12 +34,22 @@ USUAL_PERIOD = 40
 LONGEST_PERIOD = 3_600_000
 
 
-def level(scope: Scope, written: tree.LevelDecl, tables: set[TableName], owners: Owners) -> Level | None:
+def level(
+    scope: Scope,
+    written: tree.LevelDecl,
+    tables: Mapping[TableName, Table],
+    owners: Owners,
+    procedures: Mapping[str, Procedure],
+) -> Level | None:
     """The level; None after an error in its tables."""
     before, after = owners.laid_out(written.preprocess), owners.laid_out(written.postprocess)
-    period, chosen = _period(scope, written), _chosen(scope, written, tables)
+    period, chosen = _period(scope, written), _chosen(scope, written, set(tables))
     if chosen is None:
         return None
+    if isinstance(chosen, TableByCommand):
+        assert written.selector is not None
+        runs = [tables[name] for name in dict.fromkeys(name for _, name in chosen.tables)]
+        _stays(scope, chosen, written.selector.span, _written(runs, after, procedures))
     return Level(written.name.text, period, before, chosen, after, " ".join(written.doc), written.name.span)
 
 
@@ -85,6 +103,38 @@ def _chosen(
     if not sound or not _complete(scope, selector.expr.type, pairs, written.selector.span):
         return None
     return TableByCommand(selector.expr, tuple(sorted(pairs.items())))
+
+
+def _stays(scope: Scope, chosen: TableByCommand, span: Span, written: Mapping[str, str]) -> None:
+    """Reports a selector that a cycle may leave other than it chose by: which table ran would show nowhere."""
+    if not isinstance(chosen.selector, Read):
+        scope.report(Code.UNSTEADY_SELECTOR, "an element that is chosen by its index chooses the table", span)
+        return
+    name = str(chosen.selector.name)
+    who = "its safe value" if scope.leaves[chosen.selector.name].safe is not None else written.get(name)
+    if who is not None:
+        scope.report(
+            Code.UNSTEADY_SELECTOR,
+            f"`{name}` chooses the table, and {who} may change it after that",
+            span,
+            "let the preprocess alone write it, or give it its next value with `next`",
+        )
+
+
+def _written(
+    tables: Iterable[Table], after: Iterable[str], procedures: Mapping[str, Procedure]
+) -> dict[str, str]:
+    """What lines of the tables and the postprocess may write, each with one that does."""
+    found: dict[str, str] = {}
+    for table in tables:
+        lines: list[Line | Default] = [*table.lines, *([] if table.default is None else [table.default])]
+        for line in lines:
+            _, writes = touched([action.statement for action in line.actions], procedures)
+            found |= dict.fromkeys(map(str, writes), f"line `{line.name}` of table `{table.name}`")
+    for one in after:
+        if one in procedures:
+            found |= dict.fromkeys(map(str, procedures[one].writes), f"`{one}` in the postprocess")
+    return found
 
 
 def _table(scope: Scope, name: tree.Name, tables: set[TableName]) -> bool:

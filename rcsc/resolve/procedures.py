@@ -1,6 +1,6 @@
 """Procedures, modules and extern procedures; owners; what calls what."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from typing import TypeAlias
 
 from rcsc.diagnostics.codes import Code
@@ -106,7 +106,7 @@ def _procedure(
     body: _Body,
     known: dict[str, Procedure],
 ) -> Procedure:
-    reads, writes = _touched(body[1], known)
+    reads, writes = touched(body[1], known)
     if written.kind != "procedure":
         declared_reads = _places(scope, written.reads, writing=False)
         declared_writes = _places(scope, written.writes, writing=True)
@@ -126,9 +126,10 @@ def _procedure(
     )
 
 
-def _touched(
-    body: tuple[Statement, ...], known: dict[str, Procedure]
+def touched(
+    body: Iterable[Statement], known: Mapping[str, Procedure]
 ) -> tuple[set[VariableName], set[VariableName]]:
+    """The leaves that statements may read, and those that they may write, calls included."""
     reads: set[VariableName] = set()
     writes: set[VariableName] = set()
     for statement in everything(body):

@@ -12,6 +12,7 @@ from rcsc.model import (
     Invariant,
     Kind,
     Level,
+    Procedure,
     Program,
     Property,
     Standing,
@@ -98,7 +99,7 @@ class _Resolver:
         invariants = self._invariants(all_)
         properties = self._properties(all_)
         tables = self._tables(all_, {a.name for a in assumptions})
-        levels = self._levels(all_, {table.name for table in tables}, owners)
+        levels = self._levels(all_, tables, owners, procedures)
         if scope.found:
             return tuple(sorted(set(scope.found), key=sort_key))
         own = tuple(TableName(d.name.text) for d in root.declarations if isinstance(d, tree.TableDecl))
@@ -156,10 +157,16 @@ class _Resolver:
         return tuple(one for one in made if one is not None)
 
     def _levels(
-        self, all_: list[tree.Declaration], tables: set[TableName], owners: Owners
+        self,
+        all_: list[tree.Declaration],
+        tables: tuple[Table, ...],
+        owners: Owners,
+        procedures: tuple[Procedure, ...],
     ) -> tuple[Level, ...]:
+        by_name = {one.name: one for one in tables}
+        bodies = {str(one.name): one for one in procedures}
         written = [d for d in all_ if isinstance(d, tree.LevelDecl) and self.scope.claim(d.name, "table")]
-        made = (level(self.scope, one, tables, owners) for one in written)
+        made = (level(self.scope, one, by_name, owners, bodies) for one in written)
         return tuple(one for one in made if one is not None)
 
     def _tables(self, all_: list[tree.Declaration], assumptions: set[AssumptionName]) -> tuple[Table, ...]:
