@@ -4,9 +4,11 @@ import json
 import shutil
 from collections.abc import Callable
 from dataclasses import asdict
+from importlib import resources
 from pathlib import Path
 from typing import Any
 
+import jsonschema
 import pytest
 
 from rcsc.cache import Cache
@@ -76,7 +78,9 @@ def test_an_assumption_is_proved_where_the_levels_together_are(check: Said) -> N
     form = check("--json", "upper.rcs")
     assert table(form)["assumptions"] == [{"name": "in_step", "standing": "proved"}]
     assert table(form)["together"]["proved"] == ["in_step"]
-    assert json.loads(form)["systems"] == [{"system": "system.toml", "standing": "proved", "wanted": False}]
+    assert json.loads(form)["systems"] == [
+        {"system": "system.toml", "standing": "proved", "wanted": False, "missing": []}
+    ]
     properties = json.loads(check("--sarif", "upper.rcs"))["runs"][0]["properties"]
     assert properties["tables"][0]["assumptions"] == [{"name": "in_step", "standing": "proved"}]
 
@@ -203,13 +207,87 @@ def test_nothing_is_proved_of_levels_that_do_not_agree(check: Said) -> None:
     edit("lower", ("report.ref_command_echo := command.input_command", "report.ref_command_echo := pause"))
     assert prove() == 1
     said = check()
-    assert "in_step (monitored), " in said
+    assert (
+        "in_step (monitored, conditional of the levels together), conditional in system.toml: rests on"
+        in said
+    )
+    assert "level `lower`: the report echoes the command that it answers `report`" in said
+    form = json.loads(check("--json", "upper.rcs"))
+    assert table(json.dumps(form))["together"]["conditional"] == ["in_step"]
+    assert form["systems"][0] | {"missing": []} == {
+        "system": "system.toml", "standing": "not proved", "wanted": False, "missing": [],
+    }  # fmt: skip
     assert "error" not in said.splitlines()[0]
     assert (
         "warning[RCS752]: level `upper` assumes that what `lower` reports under the number of the last"
         in said
     )
     assert "warning[RCS751]: level `lower` is not proved" in check("lower.rcs")
+
+
+@pytest.mark.usefixtures("here")
+def test_what_the_tables_declare_is_not_called_proved_and_is_named_by_what_rests_on_it(check: Said) -> None:
+    """What is assumed of an input is as true as somebody believes it, however much the levels prove from it."""
+    solo(
+        "input x : int 0 .. 9\nstate n : int 0 .. 9\nassume small assumed : x < 5\nassume kept monitored : n < 5\n"
+        "property below : n < 5\n"
+        "table t assuming small, kept {\n| line | x | n || n |\n| a | 0 .. 4 | < 5 || x |\n}"
+    )
+    assert prove() == 0
+    said = check("solo.rcs")
+    trusting = "system.toml, trusting assumption `small` of level `solo`"
+    assert f"assuming small (assumed), kept (proved), kept by the levels together, {trusting}, " in said
+    assert f"= note: proved of the levels together, {trusting}" in said
+    found = table(check("--json", "solo.rcs"), "t")
+    assert found["together"]["proved"] == ["kept"]
+    assert found["together"]["trusts"] == ["assumption `small` of level `solo`"]
+
+
+@pytest.mark.usefixtures("here")
+def test_what_rests_on_what_is_not_proved_is_conditional_and_says_on_what(check: Said) -> None:
+    """Every verdict of a level whose index is safe only under an invariant that does not hold within the cycle."""
+    solo(
+        "input x : bool\nstate at : int 0 .. 9\nstate n : int 0 .. 9\nstate list : array[3] of bool\n"
+        "invariant inside : at < 3\nassume fine monitored : n < 9\nproperty stays : n < 9\n"
+        "procedure mark { list[at] := x }\nmodule spoil writes at { at := 5 }\nmodule mend writes at { at := 0 }\n"
+        "table t assuming fine {\n| line | x | n || procedures |\n| a | true | < 9 || mark |\n| b | false | < 9 || |\n}",
+        "preprocess spoil",
+        "postprocess mend",
+    )
+    assert prove() == 1
+    said = check("solo.rcs", status=1)
+    rests = "rests on every operation is defined and in range within a cycle"
+    assert (
+        f"fine (monitored, conditional of the levels together), conditional in system.toml: {rests}" in said
+    )
+    assert f"= note: conditional in system.toml: {rests}" in said
+
+
+@pytest.mark.usefixtures("here")
+def test_what_was_not_looked_at_is_named(check: Said) -> None:
+    for name in ("lower", "upper"):
+        text = Path(f"{name}.rcs").read_text(encoding="utf-8")
+        Path(f"{name}.rcs").write_text(text.replace("new_command", "fresh"), encoding="utf-8")
+    assert prove() == 0
+    said = check()
+    missing = "level `upper`: not looked at: a command number is taken up once: there is no state `new_command : bool`"
+    assert f"system.toml is proved as far as it was looked at: {missing}; " in said
+    assert " and 1 more\n" in said
+    assert DECIDES not in said
+    form = check("--json", "upper.rcs")
+    assert missing in json.loads(form)["systems"][0]["missing"]
+    schema = json.loads(resources.files("rcsc.diagnostics").joinpath("schema/report.schema.json").read_text())
+    jsonschema.validate(json.loads(form), schema, jsonschema.Draft202012Validator)
+
+
+def solo(text: str, before: str = "", after: str = "") -> None:
+    """A system of one level without neighbours."""
+    Path("system.toml").write_text(
+        'name = "one"\ngenerated = ".rcsc-cache/g"\ndata = "system.toml"\ntick_ms = 40\n[[level]]\nname = "solo"\n[buffers]\n',
+        encoding="utf-8",
+    )
+    level = f"level solo {{ period 40 [ms] {before} table t {after} }}"
+    Path("solo.rcs").write_text(f"{text}\n{level}\n", encoding="utf-8")
 
 
 # --- properties ---------------------------------------------------------------------------------

@@ -3,6 +3,8 @@
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
+from rcsc.diagnostics import report
+
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
@@ -13,10 +15,6 @@ if TYPE_CHECKING:
     from rcsc.compose.rounds import Counted
     from rcsc.compose.system import SystemProof
     from rcsc.compose.transition import Stepper
-
-
-MOST_NAMED = 3
-"""Claims that are named of those that a verdict rests on; then how many more."""
 
 
 def standing(whole: "SystemProof", level: str, key: "Key") -> str:
@@ -31,20 +29,16 @@ def standing(whole: "SystemProof", level: str, key: "Key") -> str:
 
 def trusting(whole: "SystemProof", level: str, keys: "Sequence[Key]") -> str:
     """The assumptions that these verdicts trust, as the tables declare them; empty for none."""
-    told = {one for key in keys for one in whole.of(level, key).trusts if one.startswith("assumption ")}
-    return (
-        f", trusting {', '.join(sorted(one.removesuffix(', as it is declared') for one in told))}"
-        if told
-        else ""
-    )
+    from rcsc.compose.claims import declared
+
+    return report.trusting(declared(one for key in keys for one in whole.of(level, key).trusts))
 
 
 def named(whole: "SystemProof", level: str, needs: "Sequence[Need]") -> str:
     """Claims in words."""
     from rcsc.compose.claims import spelled
 
-    more = f" and {len(needs) - MOST_NAMED} more" if len(needs) > MOST_NAMED else ""
-    return "; ".join(spelled(need, level, whole.closed) for need in needs[:MOST_NAMED]) + more
+    return report.named([spelled(need, level, whole.closed) for need in needs])
 
 
 def not_looked_at(proof: "LevelProof") -> Iterator[str]:

@@ -14,7 +14,16 @@ import click
 
 from rcsc.diagnostics.diagnostic import Severity
 from rcsc.diagnostics.render import OF_SEVERITY, Piece, Row, Style, full, one_line, paint, plain
-from rcsc.diagnostics.report import NOT_PROVED, InSystem, Report, SystemReport, TableReport, Verdict
+from rcsc.diagnostics.report import (
+    NOT_PROVED,
+    InSystem,
+    Report,
+    SystemReport,
+    TableReport,
+    Verdict,
+    named,
+    trusting,
+)
 from rcsc.diagnostics.spelling import escape, pad, width
 from rcsc.files import write_atomically
 
@@ -166,6 +175,8 @@ def summary(report: Report) -> Iterator[Row]:
     for system in report.systems:
         if system.wanted:
             yield (Piece(_of_system(system), Style.NOTE),)
+        elif system.missing:
+            yield (Piece(_missing(system), Style.NOTE),)
     if report.tables or report.found:
         yield tuple(_counts(report))
 
@@ -197,16 +208,20 @@ def backing(table: TableReport) -> str:
 
 def _assumed(table: TableReport) -> Iterator[str]:
     """Each assumption with its state."""
-    left = () if table.together is None else table.together.not_proved
+    made = table.together
+    said = {} if made is None else dict.fromkeys(made.not_proved, ", not proved of the levels together")
+    said |= {} if made is None else dict.fromkeys(made.conditional, ", conditional of the levels together")
     for name, standing in table.assumptions:
-        yield f"{escape(name)} ({standing}{', not proved of the levels together' if name in left else ''})"
+        yield f"{escape(name)} ({standing}{said.get(name, '')})"
 
 
 def _together(known: InSystem) -> Iterator[str]:
     """What the levels together make of a table."""
     system = escape(known.system)
     if known.proved:
-        yield f"kept by the levels together, {system}"
+        yield f"kept by the levels together, {system}{escape(trusting(known.trusts))}"
+    if known.conditional:
+        yield f"conditional in {system}: rests on {escape(named(known.rests))}"
     if known.unreached:
         noun = "line" if len(known.unreached) == 1 else "lines"
         yield f"{noun} {', '.join(map(escape, known.unreached))} never reached in {system}"
@@ -215,6 +230,10 @@ def _together(known: InSystem) -> Iterator[str]:
 def _of_system(one: SystemReport) -> str:
     command = f"`rcsc prove {escape(one.system)}`"
     return f"whether the levels together keep what these tables assume is not known: {command} decides it"
+
+
+def _missing(one: SystemReport) -> str:
+    return f"{escape(one.system)} is {one.standing}: {escape(named(one.missing))}"
 
 
 def _counts(report: Report) -> Iterator[Piece]:

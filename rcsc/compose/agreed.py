@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from rcsc.compose.claims import (
     AGAIN,
     CONTRACT,
+    DECLARED,
     ENDING,
     FOUND,
     RUNS,
@@ -142,7 +143,7 @@ def _of_runs(stepper: Stepper, proof: LevelProof) -> Iterator[tuple[Key, Claim]]
     ends = [*([] if links.above is None else [links.above.order]), *(below.report for below in links.below)]
     needs: list[Key] = [SAFE, *((CONTRACT, "", record) for record in ends)]
     needs += [goal.key for goal, _ in proof.found if goal.sort in {Sort.SOME_LINE, Sort.ONE_LINE}]
-    trusts = [f"assumption `{one}` of level `{name}`, as it is declared" for one in sorted(stepper.trusted)]
+    trusts = [f"assumption `{one}` of level `{name}`{DECLARED}" for one in sorted(stepper.trusted)]
     trusts += [
         f"the same question has the same answer in `{asked.into}` of level `{name}`" for asked in links.asked
     ]

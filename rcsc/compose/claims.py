@@ -120,6 +120,15 @@ def worst(verdicts: Iterable[Verdict]) -> Verdict:
     return next((one for one in order if one in every), Verdict.PROVED)
 
 
+DECLARED = ", as it is declared"
+"""How what is trusted ends of which a table says that it is assumed."""
+
+
+def declared(trusts: Iterable[str]) -> tuple[str, ...]:
+    """The assumptions of tables among what is trusted, in order."""
+    return tuple(sorted(one.removesuffix(DECLARED) for one in set(trusts) if one.endswith(DECLARED)))
+
+
 def spelled(need: Need, level: str, claims: Collection[Need] | None = None) -> str:
     """A claim in words; of another level than this with its name."""
     owner, (sort, table, name) = need

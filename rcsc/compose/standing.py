@@ -22,8 +22,10 @@ from rcsc.compose.claims import (
     Need,
     Verdict,
     closed,
+    declared,
     spelled,
 )
+from rcsc.compose.claims import UNKNOWN as UNLOOKED_AT
 
 ASSUMPTION, PROPERTY = "assumption", "property"
 """Sorts of goals: of an assumption of a table, of a property."""
@@ -33,7 +35,9 @@ class Known(StrEnum):
     """What is known of something that the levels together are to keep."""
 
     PROVED = "proved"
+    TRUSTED = "assumed"  # the tables say so, of what comes from outside
     PARTLY = "proved as far as it was looked at"
+    CONDITIONAL = "conditional"  # found so given what it rests on, of which something is not proved
     NOT_PROVED = "not proved"
     UNKNOWN = "unknown"  # nobody has looked at this content, or the solver gave up
 
@@ -238,18 +242,32 @@ class Standing:
         return Known.PROVED if claim is not None and claim.verdict in FOUND else Known.NOT_PROVED
 
     def of_goal(self, level: str, key: Key) -> Known:
-        """Whether a goal of a level is proved of the levels together; not known where something that it rests on is not."""
+        """Whether a goal of a level is proved of the levels together."""
         found = self._goal(level, key)
-        return Known.UNKNOWN if found is Known.PROVED and not self._proved(level, key) else found
+        if found is not Known.PROVED:
+            return found
+        if not self._proved(level, key):
+            return self._given(level, key)
+        return Known.TRUSTED if self._closed(level, key).verdict is Verdict.TRUSTED else Known.PROVED
+
+    def _given(self, level: str, key: Key) -> Known:
+        """What is known of a claim that is found so, but not all that it rests on: not even that where nobody looked at it."""
+        whole = all(owner in self.known for owner, _ in self._closed(level, key).lacks)
+        return Known.CONDITIONAL if whole else Known.UNKNOWN
+
+    def _closed(self, level: str, key: Key) -> Closed:
+        return self.closed.get((level, key), UNLOOKED_AT)
 
     def _proved(self, level: str, key: Key) -> bool:
-        found = self.closed.get((level, key))
-        return found is not None and found.proved
+        return self._closed(level, key).proved
 
-    def lacking(self, level: str) -> tuple[str, ...]:
-        """What is not found of that on which all verdicts of a level rest, in words."""
-        found = self.closed.get((level, RUNS))
-        return () if found is None else tuple(spelled(need, level, self.closed) for need in found.lacks)
+    def lacking(self, level: str, key: Key = RUNS) -> tuple[str, ...]:
+        """What is not found of that on which a claim of a level rests, in words; by default, all of its claims."""
+        return tuple(spelled(need, level, self.closed) for need in self._closed(level, key).lacks)
+
+    def trusting(self, level: str, key: Key) -> tuple[str, ...]:
+        """What a claim takes for granted that is written in tables, in words."""
+        return declared(self._closed(level, key).trusts)
 
     def of_level(self, level: str) -> Known:
         """Whether all that should be is proved of a level."""
@@ -259,7 +277,7 @@ class Standing:
         if verdicts.open:
             return Known.NOT_PROVED
         if not self._proved(level, RUNS):
-            return Known.UNKNOWN
+            return self._given(level, RUNS)
         return Known.PARTLY if verdicts.unlooked else Known.PROVED
 
     @property
@@ -268,7 +286,16 @@ class Standing:
         found = {self.of_level(one.name) for one in self.outline.levels}
         if Known.NOT_PROVED in found or self.broken:
             return Known.NOT_PROVED
-        return next((one for one in (Known.UNKNOWN, Known.PARTLY) if one in found), Known.PROVED)
+        worst = (Known.UNKNOWN, Known.CONDITIONAL, Known.PARTLY)
+        return next((one for one in worst if one in found), Known.PROVED)
+
+    def missing(self, level: str) -> tuple[str, ...]:
+        """Why a level of which nothing is found wrong is not wholly proved: what it rests on, and what was not looked at."""
+        verdicts = self.known.get(level)
+        if verdicts is None:
+            return ()
+        rests = (f"rests on {one}" for one in self.lacking(level))
+        return (*rests, *(f"not looked at: {one}" for one in verdicts.unlooked))
 
     def unreached(self, level: str, table: str) -> tuple[str, ...]:
         """Lines of a table that no reachable cycle of this system runs."""

@@ -10,7 +10,7 @@ from typing import Any
 from rcsc import __version__
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label, MatchedLine, Severity, WitnessColumn
-from rcsc.diagnostics.report import InSystem, Report, TableReport, Verdict
+from rcsc.diagnostics.report import InSystem, Report, SystemReport, TableReport, Verdict
 from rcsc.source import Source, Sources, Span
 
 FORM = 1
@@ -33,7 +33,7 @@ def report_to_json(report: Report, command: str) -> Json:
         "counts": {f"{severity.value}s": report.count(severity) for severity in Severity},
         "diagnostics": [diagnostic_to_json(one, report.sources) for one in report.found],
         "tables": [table_to_json(table) for table in report.tables],
-        "systems": [asdict(one) for one in report.systems],
+        "systems": [_listed(one) for one in report.systems],
     }
 
 
@@ -55,14 +55,13 @@ def table_to_json(table: TableReport) -> Json:
     }
 
 
-def _listed(together: InSystem) -> Json:
-    return {name: list(one) if isinstance(one, tuple) else one for name, one in asdict(together).items()}
+def _listed(known: InSystem | SystemReport) -> Json:
+    return {name: list(one) if isinstance(one, tuple) else one for name, one in asdict(known).items()}
 
 
 def _together(form: Mapping[str, Any]) -> InSystem:
-    return InSystem(
-        form["system"], tuple(form["proved"]), tuple(form["not_proved"]), tuple(form["unreached"])
-    )
+    listed = {name: tuple(one) for name, one in form.items() if name != "system"}
+    return InSystem(form["system"], **listed)
 
 
 def table_from_json(form: Mapping[str, Any], *, cached: bool) -> TableReport:

@@ -27,7 +27,8 @@ class InSystem:
 
     Attributes:
         system: The system's description.
-        proved: Assumptions that the levels keep, all of this content.
+        proved: Assumptions that the levels keep, all of this content; `trusts`, what that takes for granted, as tables declare it.
+        conditional: Assumptions that they keep if what that rests on is so; `rests`, what of it is not proved, in words.
         not_proved: Assumptions of which an earlier run could not show that.
         unreached: Lines that no reachable cycle of this system runs, DEFAULT too.
     """
@@ -36,6 +37,9 @@ class InSystem:
     proved: tuple[str, ...] = ()
     not_proved: tuple[str, ...] = ()
     unreached: tuple[str, ...] = ()
+    conditional: tuple[str, ...] = ()
+    rests: tuple[str, ...] = ()
+    trusts: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,13 +48,15 @@ class SystemReport:
 
     Attributes:
         system: Its description.
-        standing: `proved`, `not proved` or `unknown`.
+        standing: `proved`, `proved as far as it was looked at`, `conditional`, `not proved` or `unknown`.
         wanted: Whether `rcsc prove` would say something of these tables that is not known.
+        missing: Why nothing is found wrong of it and it is not wholly proved: in words, level by level.
     """
 
     system: str
     standing: str
     wanted: bool = False
+    missing: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,6 +89,21 @@ class TableReport:
     together: InSystem | None = None
     stops: tuple[str, ...] = ()
     tells: tuple[str, ...] = ()
+
+
+MOST_NAMED = 3
+"""Claims that are named of those that a verdict rests on; then how many more."""
+
+
+def named(words: Collection[str]) -> str:
+    """What a verdict rests on, as far as it is named."""
+    more = f" and {len(words) - MOST_NAMED} more" if len(words) > MOST_NAMED else ""
+    return "; ".join(list(words)[:MOST_NAMED]) + more
+
+
+def trusting(words: Collection[str]) -> str:
+    """What a verdict takes for granted, to be put after it; empty for nothing."""
+    return f", trusting {', '.join(words)}" if words else ""
 
 
 def resting(table: TableReport, unproved: Collection[str]) -> TableReport:

@@ -6,7 +6,7 @@ them changes nothing is read but these and the verdicts.
 """
 
 import os
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -14,7 +14,7 @@ from rcsc.cache import Cache, cache_of
 from rcsc.compose.standing import ASSUMPTION, PROPERTY, Assumed, Known, LevelOutline, Standing
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label, Severity, sort_key
-from rcsc.diagnostics.report import NOT_PROVED, InSystem, Report, SystemReport, TableReport
+from rcsc.diagnostics.report import NOT_PROVED, InSystem, Report, SystemReport, TableReport, named, trusting
 from rcsc.driver.outline import known
 from rcsc.project import PROJECT_FILE
 from rcsc.source import Source, Span
@@ -54,6 +54,14 @@ class _Place:
         """What is known of one of the table's assumptions."""
         return self.standing.of_goal(self.level.name, (ASSUMPTION, self.table, assumption))
 
+    def rests(self, assumption: str) -> tuple[str, ...]:
+        """What it rests on that is not proved, in words."""
+        return self.standing.lacking(self.level.name, (ASSUMPTION, self.table, assumption))
+
+    def trusts(self, assumption: str) -> tuple[str, ...]:
+        """What it trusts, in words."""
+        return self.standing.trusting(self.level.name, (ASSUMPTION, self.table, assumption))
+
     @property
     def unreached(self) -> tuple[str, ...]:
         """The table's lines that never run here."""
@@ -85,7 +93,7 @@ class _Seen:
             made = self._standing(system)
             if made is None:
                 if _beside(system, table.file):
-                    self._say(name, Known.UNKNOWN, wanted=bool(_open(table)))
+                    self._say(name, None, wanted=bool(_open(table)))
                     return table
                 continue
             if at := list(_places(made, table)):
@@ -102,25 +110,31 @@ class _Seen:
         """A table that levels of a system run: what is known in all of them."""
         for one in at:
             self.levels.setdefault((system, one.level.name), (one.standing, one.level))
-        states = {name: {one.known(name) for one in at} for name in _open(table)}
-        proved = tuple(name for name, found in states.items() if found == {Known.PROVED})
-        not_proved = tuple(name for name, found in states.items() if Known.NOT_PROVED in found)
+        states = {name: _worst({one.known(name) for one in at}) for name in _open(table)}
+        by = {known: tuple(name for name, found in states.items() if found is known) for known in Known}
+        proved, conditional = by[Known.PROVED], by[Known.CONDITIONAL]
         unreached = tuple(line for line in at[0].unreached if all(line in one.unreached for one in at))
         if at[0].default in unreached:
             self.idle[table.file, table.table] = system
         made = at[0].standing
-        wanted = len(proved) + len(not_proved) < len(states) and not made.broken
-        self._say(system, made.whole, wanted=wanted)
+        self._say(system, made, wanted=bool(by[Known.UNKNOWN]) and not made.broken)
         assumptions = tuple(
             (name, Known.PROVED.value if name in proved else was) for name, was in table.assumptions
         )
-        together = InSystem(system, proved, not_proved, unreached)
+        rests = tuple(dict.fromkeys(word for one in at for name in conditional for word in one.rests(name)))
+        trusts = tuple(dict.fromkeys(word for one in at for name in proved for word in one.trusts(name)))
+        together = InSystem(system, proved, by[Known.NOT_PROVED], unreached, conditional, rests, trusts)
         return replace(table, assumptions=assumptions, together=together)
 
-    def _say(self, system: str, whole: Known, *, wanted: bool) -> None:
+    def _say(self, system: str, made: Standing | None, *, wanted: bool) -> None:
         before = self.systems.get(system)
         wanted = wanted or (before is not None and before.wanted)
-        self.systems[system] = SystemReport(system, whole.value, wanted)
+        whole = Known.UNKNOWN if made is None else made.whole
+        missing: tuple[str, ...] = ()
+        if made is not None and whole in {Known.PARTLY, Known.CONDITIONAL}:
+            levels = [one.name for one in made.outline.levels]
+            missing = tuple(f"level `{name}`: {why}" for name in levels for why in made.missing(name))
+        self.systems[system] = SystemReport(system, whole.value, wanted, missing)
 
     # --- findings ---
 
@@ -140,15 +154,24 @@ class _Seen:
         """That properties of a file are not proved here: where they are, if each is in every level that states it."""
         file = os.path.realpath(found.primary.span.file)
         stated = [
-            (system, made.of_goal(level.name, (PROPERTY, "", name)))
+            (system, made, level.name, (PROPERTY, "", name))
             for (system, _), (made, level) in self.levels.items()
             for name, at in level.properties
             if at == file
         ]
-        if not stated or any(state is not Known.PROVED for _, state in stated):
+        state = _worst({made.of_goal(level, key) for _, made, level, key in stated})
+        systems = ", ".join(dict.fromkeys(system for system, *_ in stated))
+        if state is Known.PROVED:
+            words = dict.fromkeys(
+                word for _, made, level, key in stated for word in made.trusting(level, key)
+            )
+            note = f"proved of the levels together, {systems}{trusting(words)}"
+        elif state is Known.CONDITIONAL:
+            words = dict.fromkeys(word for _, made, level, key in stated for word in made.lacking(level, key))
+            note = f"conditional in {systems}: rests on {named(words)}"
+        else:
             return found
-        systems = ", ".join(dict.fromkeys(system for system, _ in stated))
-        return replace(found, notes=(*found.notes, f"proved of the levels together, {systems}"), help=())
+        return replace(found, notes=(*found.notes, note), help=())
 
     def warnings(self) -> Iterator[Diagnostic]:
         """What is not proved of the levels that run the tables."""
@@ -213,6 +236,12 @@ def _places(made: Standing, table: TableReport) -> Iterator[_Place]:
         for one in level.tables:
             if (one.file, one.name) == (real, table.table):
                 yield _Place(made, level, one.name, one.default)
+
+
+def _worst(found: Collection[Known]) -> Known:
+    """What is known of something of which several levels say this; unknown where none does."""
+    order = (Known.NOT_PROVED, Known.UNKNOWN, Known.CONDITIONAL, Known.TRUSTED, Known.PROVED)
+    return next((one for one in order if one in found), Known.UNKNOWN)
 
 
 def _open(table: TableReport) -> list[str]:

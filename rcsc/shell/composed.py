@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from rcsc.cache import Cache, open_cache
 from rcsc.compose.standing import Known, Standing
 from rcsc.diagnostics.codes import Code
+from rcsc.diagnostics.report import named
 from rcsc.driver.outline import known
 from rcsc.shell.refusal import Refused
 from rcsc.shell.reload import Plant, source_of
@@ -46,7 +47,7 @@ def together(plant: Plant, level: str, runs: Mapping[str, Kept | None], *, prove
         raise _refused(plant, level, "".join(f"\nnot proved: {one}" for one in made.known[level].open))
     if found is Known.PROVED:
         return f"level `{level}` is proved together with its neighbours, as the files of {plant.path} stand"
-    why = _unknown(plant, made, edited)
+    why = _unknown(plant, level, made, edited)
     if prove:
         raise _refused(plant, level, f": {why}")
     return f"level `{level}` is not known to be proved together with its neighbours: {why}"
@@ -63,12 +64,14 @@ def _prove(plant: Plant, cache: Cache) -> None:
     prove_steppers(made, None, 1, tuple(made), None, cache)
 
 
-def _unknown(plant: Plant, made: Standing | None, edited: Sequence[str]) -> str:
+def _unknown(plant: Plant, level: str, made: Standing | None, edited: Sequence[str]) -> str:
     if edited:
         return f"level `{edited[0]}` runs other tables than its file holds"
     if made is not None and made.broken:
         one = made.broken[0]
         return f"level `{one.level}` assumes that {one.words}, which its neighbour is not proved to keep"
+    if made is not None and made.of_level(level) is not Known.UNKNOWN:
+        return named(made.missing(level))
     return f"`rcsc prove {plant.path}` decides it"
 
 
