@@ -747,11 +747,7 @@ class Maker:
         plain = [at for at, (_, kinds, _) in enumerate(made.procedures) if not kinds]
         made.before = [at for at in plain if rng.randrange(3) == 0]
         made.after = [at for at in plain if rng.randrange(3) == 0]
-        by = [
-            leaf
-            for leaf in made.leaves("input")
-            if leaf.kind.sort == "enum" and leaf.name.isidentifier()
-        ]
+        by = [leaf for leaf in made.leaves("input") if leaf.kind.sort == "enum" and leaf.name.isidentifier()]
         chosen = f"table {made.tables[0].name}"
         if by and rng.randrange(2):
             leaf = rng.choice(by)
