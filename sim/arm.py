@@ -78,6 +78,11 @@ def _frames(joints: Sequence[float]) -> list[Pose]:
 
 def solutions(wanted: Pose) -> list[Joints]:
     """Every way to bring the plate there, at most eight, limits not looked at."""
+    return [one for arm in _arms(wanted) for one in _wrist(wanted.turn, *arm)]
+
+
+def _arms(wanted: Pose) -> list[tuple[float, float, float]]:
+    """The first three joints of every way to bring the plate there."""
     x, y, z = wanted.point((0.0, 0.0, -FLANGE_MM))
     z -= SHOULDER_MM
     far = hypot(x, y)
@@ -85,11 +90,11 @@ def solutions(wanted: Pose) -> list[Joints]:
         return []
     reach = sqrt(far * far - OFFSET_MM * OFFSET_MM)
     around, lean = atan2(y, x), asin(OFFSET_MM / far)
-    found = []
-    for out, first in ((reach, around + lean), (-reach, around + pi - lean)):
-        for second, third in _elbow(out, z):
-            found += _wrist(wanted.turn, first, second, third)
-    return found
+    return [
+        (first, *others)
+        for out, first in ((reach, around + lean), (-reach, around + pi - lean))
+        for others in _elbow(out, z)
+    ]
 
 
 def _elbow(out_mm: float, up_mm: float) -> list[tuple[float, float]]:
@@ -137,22 +142,23 @@ def solve(wanted: Pose, near: Sequence[float]) -> Joints | None:
         near: The joints as they are.
     """
     best, least = None, float("inf")
-    for one in solutions(wanted):
-        joints = _unwound(one, near)
-        if joints is not None:
-            far = max(abs(a - b) for a, b in zip(joints, near, strict=True))
-            if far < least:
-                best, least = joints, far
+    for arm in _arms(wanted):
+        if _unwound(arm, near, least) is None:
+            continue
+        for one in _wrist(wanted.turn, *arm):
+            joints = _unwound(one, near, least)
+            if joints is not None:
+                best, least = joints, max(abs(a - b) for a, b in zip(joints, near, strict=True))
     return best
 
 
-def _unwound(joints: Joints, near: Sequence[float]) -> Joints | None:
-    """The same by the turns that are nearest and within the limits."""
+def _unwound(joints: Joints, near: Sequence[float], least: float) -> Joints | None:
+    """The first joints, or all, by the turns that are nearest and within the limits; None where one turns as far as `least`."""
     made = []
-    for angle, before, (low, high) in zip(joints, near, LIMITS, strict=True):
+    for angle, before, (low, high) in zip(joints, near, LIMITS, strict=False):
         turned = angle - 2 * pi * round((angle - before) / (2 * pi))
         turned += 2 * pi * ((turned < low) - (turned > high))
-        if not low <= turned <= high:
+        if not low <= turned <= high or abs(turned - before) >= least:
             return None
         made.append(turned)
     return tuple(made)

@@ -69,8 +69,13 @@ def transposed(turn: Rotation) -> Rotation:
 
 def product(first: Rotation, second: Rotation) -> Rotation:
     """Second, then first."""
-    columns = transposed(second)
-    return transposed((apply(first, columns[0]), apply(first, columns[1]), apply(first, columns[2])))
+    (a, b, c), (d, e, f), (g, h, i) = first
+    (j, k, m), (n, p, q), (r, s, t) = second
+    return (
+        (a * j + b * n + c * r, a * k + b * p + c * s, a * m + b * q + c * t),
+        (d * j + e * n + f * r, d * k + e * p + f * s, d * m + e * q + f * t),
+        (g * j + h * n + i * r, g * k + h * p + i * s, g * m + h * q + i * t),
+    )
 
 
 def minus(a: Vector, b: Vector) -> Vector:

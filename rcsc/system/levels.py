@@ -88,7 +88,7 @@ class RunningLevel:
     values: Values = ()
     initial: Values = field(init=False)
     _taken: dict[str, Values] = field(default_factory=dict)
-    _asked: dict[int, Values] = field(default_factory=dict)
+    _asked: dict[int, list[Value]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Reads the initial state."""
@@ -106,7 +106,7 @@ class RunningLevel:
                 now[take.first : take.first + take.count] = latest
         seen: Sequence[Value] = self.values if now is None else now
         for fill in self.fills:
-            keys = tuple(seen[at] for at in fill.keys)
+            keys = [seen[at] for at in fill.keys]
             if self._asked.get(fill.first) != keys:
                 self._asked[fill.first] = keys
                 self.executor.put(fill.first, fill.query(*keys))

@@ -8,6 +8,7 @@ import re
 import struct
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 from typing import TypeAlias
 
@@ -205,7 +206,7 @@ def generated_files(generated: Path, program: str) -> tuple[Path, ...]:
     try:
         symbols = inside(generated, "c", f"{identifier(program, 'program')}.json")
         try:
-            word = Said(json_of(text(symbols, MOST_SYMBOL_BYTES))).name("program")
+            word = _said(text(symbols, MOST_SYMBOL_BYTES)).name("program")
         except (OSError, Malformed):
             word = program
         return symbols, *sources_of(generated, word)
@@ -232,9 +233,19 @@ def signature(path: Path) -> Signature:
         ValueError: It is no symbol file.
     """
     try:
-        return signature_of(Said(json_of(text(path, MOST_SYMBOL_BYTES))))
+        return _signature(text(path, MOST_SYMBOL_BYTES))
     except Malformed as error:
         raise ValueError(f"{path} is no symbol file of rcsc's: {error}") from error
+
+
+@lru_cache(maxsize=16)  # to assemble a system reads each symbol file several times
+def _said(found: str) -> Said:
+    return Said(json_of(found))
+
+
+@lru_cache(maxsize=16)
+def _signature(found: str) -> Signature:
+    return signature_of(_said(found))
 
 
 def signature_of(said: Said) -> Signature:
