@@ -2,12 +2,13 @@
 
 from dataclasses import dataclass
 from functools import cache
+from random import Random
 
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
 from rcsc.model import Program, Snapshot
-from rcsc.testing.strategies import declarations, snapshots
+from rcsc.testing.drawn import declarations, snapshot
 
 __all__ = ["INTS", "REALS", "conditions", "integers_over", "reals_over", "snapshots_of"]
 
@@ -95,4 +96,7 @@ def conditions(
 
 def snapshots_of(program: Program) -> SearchStrategy[Snapshot]:
     """A value for every leaf: bounds, constants it meets and their neighbours, or any value of its range."""
-    return snapshots(declarations(program))
+    known = declarations(program)
+    return st.integers(0, 2**64 - 1).map(
+        lambda seed: snapshot(known, None, Random(seed))  # noqa: S311  # drawn, so repeatable
+    )

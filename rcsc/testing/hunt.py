@@ -1,13 +1,10 @@
 """Looks for inputs on which the executors disagree; what it finds is the simplest such session.
 
-In: executors, a target, how many examples. Out: a disagreement, or None. Imported only where a search runs,
-since it brings Hypothesis.
+In: executors, a target, how many examples. Out: a disagreement, or None. The examples are the same each time.
 """
 
 from collections.abc import Callable, Iterator
-
-from hypothesis import HealthCheck, Phase, Verbosity, assume, given, settings
-from hypothesis import strategies as st
+from random import Random
 
 from rcsc.model import OneTable, Program, Table
 from rcsc.testing.agree import (
@@ -18,27 +15,14 @@ from rcsc.testing.agree import (
     run_lines,
     run_session,
 )
+from rcsc.testing.drawn import declarations, session, snapshot
 from rcsc.testing.sessions import Session
-from rcsc.testing.strategies import declarations, sessions, snapshots
 from rcsc.testing.targets import Target
 
-
-class _FoundError(Exception):
-    """Tells Hypothesis that an example fails."""
-
-
-def _settings(examples: int) -> settings:
-    return settings(
-        max_examples=examples,
-        derandomize=True,
-        database=None,
-        deadline=None,
-        phases=(Phase.generate,),
-        suppress_health_check=list(HealthCheck),
-        verbosity=Verbosity.quiet,
-        print_blob=False,
-        report_multiple_bugs=False,
-    )
+TRIES = 10
+"""Sessions that are drawn for each that starts where the invariants hold."""
+TOGETHER = 8
+"""Snapshots that go through a matcher at once."""
 
 
 def table_of(program: Program, target: Target) -> Table | None:
@@ -63,54 +47,47 @@ def hunt_sessions(
         most_cycles: Longest session.
     """
     program = executors.program
-    found: list[Disagreement] = []
+    known, table = declarations(program), table_of(program, target)
+    random = Random(target.function)  # noqa: S311  # repeatable on purpose
+    left = examples
+    for _ in range(TRIES * examples):
+        drawn = session(known, table, most_cycles, random)
+        if not keeps_invariants(program, drawn):
+            continue
+        if found := run_session(executors, target, drawn, compared):
+            return simplest(program, found, lambda one: _differs(executors, target, one, compared))
+        left -= 1
+        if not left:
+            break
+    return None
 
-    def differs(session: Session) -> Disagreement | None:
-        if not keeps_invariants(program, session):
-            return None
-        return run_session(executors, target, session, compared)
 
-    @_settings(examples)
-    @given(sessions(declarations(program), table_of(program, target), most_cycles))
-    def check(session: Session) -> None:
-        assume(keeps_invariants(program, session))
-        if (disagreement := differs(session)) is not None:
-            found.append(disagreement)
-            raise _FoundError
-
-    first = _run(check, found)
-    return None if first is None else simplest(program, first, differs)
+def _differs(executors: Executors, target: Target, one: Session, compared: Compared) -> Disagreement | None:
+    if not keeps_invariants(executors.program, one):
+        return None
+    return run_session(executors, target, one, compared)
 
 
 def hunt_lines(
     executors: Executors, target: Target, compared: Compared, examples: int
 ) -> Disagreement | None:
-    """Runs drawn snapshots through the matchers, eight at a time."""
+    """Runs drawn snapshots through a matcher, some at a time."""
     program = executors.program
-    found: list[Disagreement] = []
-    one = snapshots(declarations(program), table_of(program, target))
-
-    def differs(session: Session) -> Disagreement | None:
-        return run_lines(executors, target, [session.start], compared)
-
-    @_settings(max(1, examples // 8))
-    @given(st.lists(one, min_size=1, max_size=8))
-    def check(drawn: list[dict[str, bool | int | float]]) -> None:
-        disagreement = run_lines(executors, target, drawn, compared)
-        if disagreement is not None:
-            found.append(disagreement)
-            raise _FoundError
-
-    first = _run(check, found)
-    return None if first is None else simplest(program, first, differs)
+    known, table = declarations(program), table_of(program, target)
+    random = Random(target.function)  # noqa: S311  # repeatable on purpose
+    for _ in range(max(1, examples // TOGETHER)):
+        drawn = [snapshot(known, table, random) for _ in range(TOGETHER)]
+        if found := run_lines(executors, target, drawn, compared):
+            return simplest(program, found, lambda one: run_lines(executors, target, [one.start], compared))
+    return None
 
 
 def simplest(
     program: Program, found: Disagreement, differs: Callable[[Session], Disagreement | None]
 ) -> Disagreement:
     """A disagreement with as few cycles, and as few values that are not initial, as can be had one by one."""
-    for session in _shorter(found):
-        found = differs(session) or found
+    for one in _shorter(found):
+        found = differs(one) or found
     for variable in program.variables:
         name = str(variable.name)
         start = {**found.session.start, name: variable.initial}
@@ -121,17 +98,8 @@ def simplest(
 
 def _shorter(found: Disagreement) -> Iterator[Session]:
     """The session cut after the cycle that differs, then its last cycles alone."""
-    session = found.session
-    kept = session.readings[: found.cycle]
-    yield Session(session.start, kept)
+    start, kept = found.session.start, found.session.readings[: found.cycle]
+    yield Session(start, kept)
     for count in (4, 2, 1):
         if count < len(kept):
-            yield Session(session.start, kept[-count:])
-
-
-def _run(check: object, found: list[Disagreement]) -> Disagreement | None:
-    try:
-        check()  # type: ignore[operator]  # what @given makes has no type that says so
-    except _FoundError:
-        return found[-1]
-    return None
+            yield Session(start, kept[-count:])

@@ -96,17 +96,11 @@ class Native:
 
     def results(self, made: "array[int]") -> list[Result]:
         """Rows of words as results."""
-        width = words(self.program)
-        return [self._result(made[at : at + width]) for at in range(0, len(made), width)]
-
-    def _result(self, row: Sequence[int]) -> Result:
-        count = len(monitored(self.program))
-        failed = tuple(at for at in range(count) if row[TRACE_WORDS + at])
-        snapshot = {
-            str(v.name): of_word(v.type, word, self.symbols.c_type(v.name) == "uint64_t")
-            for v, word in zip(self.program.variables, row[TRACE_WORDS + count :], strict=True)
-        }
-        return Result(row[0], row[1], row[2], row[3], failed, snapshot)
+        width, count = words(self.program), len(monitored(self.program))
+        leaves = [
+            (str(v.name), v.type, self.symbols.c_type(v.name) == "uint64_t") for v in self.program.variables
+        ]
+        return [_result(leaves, count, made[at : at + width]) for at in range(0, len(made), width)]
 
     def run_checked(
         self, sessions: Sequence[tuple[int, int, Sequence[Snapshot]]]
@@ -133,6 +127,14 @@ class Native:
             found.append(results[at : at + length])
             at += length
         return found
+
+
+def _result(leaves: Sequence[tuple[str, Scalar, bool]], count: int, row: Sequence[int]) -> Result:
+    """A row as a result; of a leaf its name, its type, and whether C holds it in 64 bits without a sign."""
+    failed = tuple(at for at in range(count) if row[TRACE_WORDS + at])
+    given = zip(leaves, row[TRACE_WORDS + count :], strict=True)
+    snapshot = {name: of_word(kind, word, unsigned) for (name, kind, unsigned), word in given}
+    return Result(row[0], row[1], row[2], row[3], failed, snapshot)
 
 
 def build(
