@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from math import prod
 from typing import TypeAlias
 
+from rcsc.files.write import UNPROVED
 from rcsc.model import Action, Expr, LineName, Program, Scalar, Table, VariableName
 
 WORD = 64
@@ -150,10 +151,6 @@ class PlanTable:
         """What must hold where the table is matched by itself, in words; empty for nothing."""
         names = " and ".join(self.table.stops)
         return f" where {names} {'holds' if len(self.stops) == 1 else 'hold'}" if names else ""
-
-
-UNPROVED = "NOT PROVED: made by force to run a finding; no cell runs it"
-"""What every file says that is emitted of a program that is not proved."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,12 +10,15 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatch
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label, sort_key
 from rcsc.files.read import Malformed, toml_of
 from rcsc.source import Source, Span
-from rcsc.syntax import tree
+
+if TYPE_CHECKING:  # who only looks for the folder of a project, as a running level does, needs no syntax
+    from rcsc.syntax import tree
 
 PROJECT_FILE = "rcsc.toml"
 MOST_BYTES = 16 * 1024 * 1024
@@ -36,7 +39,7 @@ class Loaded:
 
     given: tuple[str, ...]
     roots: tuple[str, ...]
-    files: Mapping[str, tree.File]
+    files: "Mapping[str, tree.File]"
     uses: Mapping[str, tuple[str, ...]]
     sources: Mapping[str, Source]
     found: tuple[Diagnostic, ...]
@@ -108,7 +111,7 @@ class _Loader:
 
     stdin: str | bytes | None
     stdin_name: str
-    files: dict[str, tree.File] = field(default_factory=dict)
+    files: "dict[str, tree.File]" = field(default_factory=dict)
     uses: dict[str, list[str]] = field(default_factory=dict)
     sources: dict[str, Source] = field(default_factory=dict)
     found: list[Diagnostic] = field(default_factory=list)
@@ -220,12 +223,15 @@ class _Loader:
             elif self._read(target, use.span):
                 path[target] = self._used_by(target)
 
-    def _used_by(self, file: str) -> Iterator[tree.Use]:
-        return iter([one for one in self.files[file].declarations if isinstance(one, tree.Use)])
+    def _used_by(self, file: str) -> "Iterator[tree.Use]":
+        from rcsc.syntax.tree import Use
+
+        return iter([one for one in self.files[file].declarations if isinstance(one, Use)])
 
     def _read(self, file: str, asked: Span) -> bool:
         """Whether the file is now read and parsed, for the first time."""
         from rcsc.syntax.parse import parse
+        from rcsc.syntax.tree import File
 
         if file in self.sources:
             return False
@@ -236,14 +242,14 @@ class _Loader:
             return False
         self.sources[file] = Source(file, text)
         parsed = parse(self.sources[file])
-        if not isinstance(parsed, tree.File):
+        if not isinstance(parsed, File):
             self.found.extend(parsed)
             return False
         self.files[file] = parsed
         self.uses[file] = []
         return True
 
-    def _target(self, file: str, use: tree.Use) -> str | None:
+    def _target(self, file: str, use: "tree.Use") -> str | None:
         folder = os.path.dirname(file)
         bases = (folder, self._root(folder))
         tried = dict.fromkeys(os.path.normpath(os.path.join(base, use.path + ".rcs")) for base in bases)

@@ -8,6 +8,7 @@ import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rcsc.system.cell import Outside, signatures
 from rcsc.system.description import description
@@ -16,7 +17,9 @@ from rcsc.system.signature import Values
 from rcsc.workstation.cell import database_of, script_path
 from rcsc.workstation.script import read_script
 from rcsc.workstation.station import Workstation, workstation
-from sim.cell import Backend, plant
+
+if TYPE_CHECKING:  # a level's process asks for `queries` alone, and needs no simulator
+    from sim.cell import Backend
 
 
 @dataclass(slots=True)
@@ -74,7 +77,7 @@ class Joined:
 
 
 def outside(
-    system: str, script: str, database: str, results: str, first: int = 0, backend: Backend = "mujoco"
+    system: str, script: str, database: str, results: str, first: int = 0, backend: "Backend" = "mujoco"
 ) -> list[Outside]:
     """Workstation and plant.
 
@@ -86,6 +89,8 @@ def outside(
         first: The row to begin at, from 0, as if those before were done.
         backend: Physics, or kinematics alone.
     """
+    from sim.cell import plant
+
     path = Path(system)
     said = description(path)
     signs = signatures(said)

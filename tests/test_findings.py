@@ -35,11 +35,11 @@ from rcsc.compose.trace import (
 from rcsc.compose.transition import Stepper
 from rcsc.compose.variants import VARIANTS, defaults_reported, first_match, undeferred
 from rcsc.compose.weakest import helps, weakest_condition
+from rcsc.files.write import UNPROVED
 from rcsc.interpret import Fault, holds, matching_lines
 from rcsc.log.read import read
 from rcsc.log.replay import Replay
 from rcsc.model import LineName, Program, Table, Value, VariableName, key_bounds, spell, value_of_key
-from rcsc.plan import UNPROVED
 from rcsc.prove.options import Options
 from rcsc.prove.table import prove_table
 from rcsc.system.cell import assemble

@@ -336,9 +336,20 @@ def answered_once(path: Path, count: int, first: int) -> None:
     assert [number for at, number in enumerate(begun) if at == 0 or begun[at - 1] != number] == numbers
 
 
+COMPILER = {"rcsc.model", "rcsc.plan", "rcsc.prove", "rcsc.resolve", "rcsc.syntax.tree", "numpy", "mujoco"}
+
+
+def test_a_level_s_process_loads_neither_the_compiler_nor_a_simulator() -> None:
+    """It begins again in the middle of a run: what it loads is how long the others wait."""
+    load = "import rcsc.system.serve, sim.processes, sys; print(*sys.modules)"
+    ran = subprocess.run([sys.executable, "-c", load], capture_output=True, text=True, check=True)
+    assert {"rcsc.system.serve", "sim.processes"} <= set(ran.stdout.split())
+    assert set(ran.stdout.split()) & COMPILER == set()
+
+
 def test_kill_minus_nine_loses_no_command_and_runs_none_twice(repo: Path, tmp_path: Path) -> None:
     """Killed at random instants; numbers of both levels wrap on the way; orders are those of a run without a kill."""
-    rounds, below = 8, 65516
+    rounds, below, most = 8, 65516, 24
     expected = reference(repo, tmp_path / "reference", rounds, FIRST, below)
     chance, kills, orders = seeded(1), 0, tmp_path / "below"
     orders.touch()
@@ -352,7 +363,7 @@ def test_kill_minus_nine_loses_no_command_and_runs_none_twice(repo: Path, tmp_pa
             goal = len(lines(orders)) + chance.randint(0, 2)
             until(lambda: system.over or len(lines(orders)) >= goal, "TASK gives no orders")  # noqa: B023  # called here
             time.sleep(chance.uniform(0, 0.03))
-            if kills < 60:
+            if kills < most:
                 system.stop("task", signal.SIGKILL)
                 assert system.code("task") == -signal.SIGKILL
                 system.start("task")

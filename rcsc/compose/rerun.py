@@ -4,7 +4,7 @@ In: steppers, a system's description, and a run as the interpreter did it. Out: 
 `rcsc replay` steps, and the proof of the pudding: the Python and the C executors leave in every cycle what the interpreter left.
 
 Where a program does not prove, or is looked at under another rule than the language's (`variants`), its executors are made by force:
-the same emitters, and every file marked (`plan.UNPROVED`), which no cell runs (`system.unproved`).
+the same emitters, and every file marked (`files.write.UNPROVED`), which no cell runs (`system.unproved`).
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence

@@ -9,6 +9,9 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
+UNPROVED = "NOT PROVED: made by force to run a finding; no cell runs it"
+"""What every file says that is emitted of a program that is not proved."""
+
 
 def write_atomically(path: Path, content: bytes, mode: int = 0o666, *, durable: bool = True) -> None:
     """Write a file so that a reader, or a kill at any time, sees all of it or the one before.

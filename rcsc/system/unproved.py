@@ -1,12 +1,12 @@
 """Executors that were made by force, of tables that do not prove: the cell does not run them.
 
-In: a description. Out: the generated files that bear the mark (`plan.UNPROVED`).
+In: a description. Out: the generated files that bear the mark (`files.write.UNPROVED`).
 """
 
 from pathlib import Path
 
 from rcsc.files.read import content
-from rcsc.plan import UNPROVED
+from rcsc.files.write import UNPROVED
 from rcsc.system.description import BadDescription, Description
 from rcsc.system.signature import generated_files
 
