@@ -574,6 +574,17 @@ def test_an_invariant_that_is_broken_within_a_cycle_keeps_nothing_safe(
     assert whole.of("solo", (Sort.ONE_LINE, "t", "")).proved is safe
 
 
+def test_what_breaks_where_invariants_are_broken_within_a_cycle_is_shown_by_a_run(tmp_path: Path) -> None:
+    text = within("9").replace("table t", "procedure hop { next later := 0 later := 1 }\ntable t", 1)
+    text = text.replace("| false ||            |", "| false || hop        |")
+    text = text.replace("input go", "state later : int 0 .. 1 deferred until go\ninput go")
+    made = steppers(solo(tmp_path, text))["solo"]
+    goal = next(one for one in prove_level(made, LITTLE).open if one.sort is Sort.DEFERRED)
+    trace = shortest(made, goal, 3)
+    assert trace is not None
+    assert [step.line for step in trace.steps] == ["no"]
+
+
 def test_a_fault_of_one_level_shows_in_the_verdicts_of_its_neighbours(tmp_path: Path) -> None:
     """Behind it nobody knows what the level orders."""
     path = changed(

@@ -481,7 +481,7 @@ def _broken_between(stepper: Stepper, goal: Goal, step: Step) -> bool:
 
 
 def as_cycle(stepper: Stepper, step: Step) -> Cycle:
-    """A cycle as it ran, all its nodes constants."""
+    """A cycle as it ran, all its nodes constants; what stands within it, which no run is shown to break, as the table saw it."""
     before, after = _constants(stepper, step.before), _constants(stepper, step.after)
     taken = {name: after[name] for name in step.taken}
     half = halfway(stepper, step)
@@ -496,6 +496,8 @@ def as_cycle(stepper: Stepper, step: Step) -> Cycle:
         values.truth(step.fault in EARLY),
         values.truth(not half.matched),
         values.truth(not half.acted),
+        settled=middle,
+        acted=middle,
     )
 
 
