@@ -3,11 +3,11 @@
 In: a program, its level, its links. Out: a `Role`, which runs one cycle from any state (`run`), and what is to be known of its leaves.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import product
+from itertools import count, groupby, product
 
 from rcsc.compose.contract import Below, Links
 from rcsc.compose.goals import Sort
@@ -40,10 +40,12 @@ from rcsc.model import (
     value_of_key,
 )
 from rcsc.resolve.leaves import read_by
+from tests.hierarchies_compiled import Compiled, compiled
 
 State = tuple[Value, ...]
 Result = tuple[str, tuple[Value, ...]]
 """An extern procedure, and what one call of it gave."""
+_Begins = Callable[[dict[str, Value], set[str], "Script"], None]
 Key = tuple[Sort, str, str]
 """A goal: its sort, its table, its name."""
 FLAG = "new_command"
@@ -51,6 +53,9 @@ EARLY = frozenset({Fault.EXTERN, Fault.ASSUMPTION})
 """Faults after which the next cycle runs."""
 UNDEFINED = Fault.STATE
 """Here: an operation of the cycle is not defined, or a value left its range, so that nobody can say what it does."""
+
+FEW = 64
+"""One compiled cycle of so many is run once more by the interpreter's parts."""
 
 
 class Reading(dict[str, Value]):
@@ -96,7 +101,7 @@ class Script:
         taken: The numbers that were taken; `many`, how many results there were to choose from.
     """
 
-    program: Program
+    role: "Role"
     numbers: tuple[int, ...] = ()
     taken: list[int] = field(default_factory=list)
     many: list[int] = field(default_factory=list)
@@ -104,7 +109,7 @@ class Script:
 
     def __call__(self, procedure: Procedure, _args: list[Value]) -> tuple[Value, ...]:
         """Answers a call."""
-        every = list(results(self.program, procedure))
+        every = self.role.results[str(procedure.name)]
         at = len(self.taken)
         self.taken.append(self.numbers[at] if at < len(self.numbers) else 0)
         self.many.append(len(every))
@@ -177,6 +182,11 @@ class Role:
         return tuple(str(v.name) for v in self.program.variables if v.kind is Kind.INPUT)
 
     @cached_property
+    def taken(self) -> tuple[tuple[str, ...], ...]:
+        """The inputs, record by record."""
+        return tuple(tuple(leaves) for _, leaves in groupby(self.inputs, lambda leaf: leaf.partition(".")[0]))
+
+    @cached_property
     def remembered(self) -> frozenset[str]:
         """Inputs whose last values the contract, or a goal, speaks of."""
         found = {f"{below.report}.inc_command_echo" for below in self.links.below}
@@ -235,6 +245,19 @@ class Role:
         )
 
     @cached_property
+    def report(self) -> tuple[str, ...]:
+        """The leaves of its report."""
+        above = self.links.above
+        return (
+            () if above is None else tuple(one for one in self.leaves if one.startswith(f"{above.report}."))
+        )
+
+    @cached_property
+    def forgotten(self) -> dict[str, Value]:
+        """Inputs that nobody remembers, with the values before the first cycle."""
+        return {leaf: self.start[leaf] for leaf in self.inputs if leaf not in self.remembered}
+
+    @cached_property
     def deferred(self) -> tuple[tuple[str, str], ...]:
         """States that wait, and where their next values stand."""
         return tuple(
@@ -258,28 +281,73 @@ class Role:
         low, high = key_bounds(kind)
         return tuple(value_of_key(kind, key) for key in range(low, high + 1))
 
-    def ways(self, state: Mapping[str, Value], read: set[str] | None = None) -> Iterator[Ran]:
+    @cached_property
+    def results(self) -> dict[str, list[tuple[Value, ...]]]:
+        """All that a call of each extern procedure may give."""
+        every = [one for one in self.program.procedures if one.extern is not None]
+        return {str(one.name): list(results(self.program, one)) for one in every}
+
+    @cached_property
+    def compiled(self) -> Compiled:
+        """Its cycle as Python functions."""
+        return compiled(self.program, self.level)
+
+    def ways(self, state: Mapping[str, Value], read: set[str]) -> Iterator[Ran]:
         """One cycle from a state, with its inputs, for each way in which extern procedures may answer; takes what all of them read."""
         waiting: list[tuple[int, ...]] = [()]
         while waiting:
-            script, now = Script(self.program, waiting.pop()), Reading(state)
-            ran = self.run(now, script)
-            yield replace(ran, given=tuple(script.given))
-            if read is not None:
-                read |= now.read
+            script = Script(self, waiting.pop())
+            ran = self.quick(dict(state), script, read)
+            if next(self._runs) % FEW == 0:
+                self.same(state, ran, read)
+            yield ran
             waiting += script.others()
+
+    def quick(self, now: dict[str, Value], script: Script, read: set[str]) -> Ran:
+        """One cycle, compiled; takes the inputs that it reads."""
+        try:
+            table, line, fault, failed, middle, cut = self.compiled.run(now, read, script)
+            if fault is not Fault.OK:
+                now |= self._safe
+            new = middle.get(FLAG)
+            missed = new and (table in self._looking if cut else line in self.blind[table])
+            outlasts = not missed or self._stands(now, read, self.compiled.settle)
+        except (ArithmeticError, IndexError, ValueError):
+            return Ran("", "", UNDEFINED, frozenset(), {}, {}, given=tuple(script.given))
+        fault = fault if self.compiled.in_range(now) else UNDEFINED
+        return Ran(table, line, fault, failed, middle, now, outlasts, tuple(script.given))
+
+    def same(self, taken: Mapping[str, Value], ran: Ran, read: set[str]) -> None:
+        """That the interpreter's parts do the same, and read nothing else.
+
+        Raises:
+            AssertionError: They do not, or do.
+        """
+        now = Reading(taken)
+        assert replace(self.run(now, Again(self.program, list(ran.given))), given=ran.given) == ran
+        assert now.read & set(self.inputs) <= read
+
+    @cached_property
+    def _runs(self) -> Iterator[int]:
+        return count()
+
+    @cached_property
+    def _safe(self) -> dict[str, Value]:
+        return {str(v.name): v.safe for v in self.program.variables if v.safe is not None}
+
+    @cached_property
+    def _looking(self) -> frozenset[str]:
+        return frozenset(name for name, table in self.tables.items() if looks(table))
 
     def run(self, now: Reading, answers: Script | Again | None = None) -> Ran:
         """One cycle, by the interpreter's own parts and in its order; `cycle` confirms it (`confirmed`)."""
-        with answering(answers or Script(self.program)):
+        with answering(answers or Script(self)):
             try:
                 ran = self._ran(now)
             except (ArithmeticError, IndexError, ValueError):
                 return Ran("", "", UNDEFINED, frozenset(), {}, {})
-        return ran if self._in_range(ran.after) else replace(ran, fault=UNDEFINED)
-
-    def _in_range(self, now: Mapping[str, Value]) -> bool:
-        return all(low <= now[name] <= high for name, low, high in self._ranges)
+        in_range = all(low <= ran.after[name] <= high for name, low, high in self._ranges)
+        return ran if in_range else replace(ran, fault=UNDEFINED)
 
     @cached_property
     def _ranges(self) -> list[tuple[str, Value, Value]]:
@@ -325,7 +393,7 @@ class Role:
             fault = Fault.EXTERN
         after = self._shown(now) if fault is Fault.EXTERN else dict(now)
         blind = bool(middle.get(FLAG)) and str(line.name) in self.blind[str(table.name)]
-        outlasts = not blind or self._stands(after)
+        outlasts = not blind or self._stands(after, now.read, self._begins)
         return Ran(str(table.name), str(line.name), fault, failed, middle, after, outlasts)
 
     def _early(
@@ -340,25 +408,43 @@ class Role:
         """A cycle that ends before its line is done: nobody answers a new command in it."""
         after = self._shown(now)
         missed = bool(middle.get(FLAG)) and looks(table)
-        return Ran(str(table.name), line, fault, failed, middle, after, not missed or self._stands(after))
+        return Ran(
+            str(table.name),
+            line,
+            fault,
+            failed,
+            middle,
+            after,
+            not missed or self._stands(after, now.read, self._begins),
+        )
 
     def _shown(self, now: Mapping[str, Value]) -> dict[str, Value]:
         """The state behind a fault: outputs that have a safe value show it."""
-        return {**now, **{str(v.name): v.safe for v in self.program.variables if v.safe is not None}}
+        return {**now, **self._safe}
 
-    def _stands(self, after: Mapping[str, Value]) -> bool:
+    def _stands(self, after: Mapping[str, Value], read: set[str], begins: "_Begins") -> bool:
         """Whether the flag is up before the table of the next cycle, on the same inputs, whatever extern procedures give."""
         waiting: list[tuple[int, ...]] = [()]
         while waiting:
-            script, now = Script(self.program, waiting.pop()), dict(after)
-            with answering(script), suppress(ExternError):
-                settle(self.program, now)
-                for name in self.level.preprocess:
-                    call(self.program, name, [], now)
+            script, now = Script(self, waiting.pop()), dict(after)
+            with suppress(ExternError):
+                begins(now, read, script)
             if not now[FLAG]:
                 return False
             waiting += script.others()
         return True
+
+    def _begins(self, now: dict[str, Value], read: set[str], script: Script) -> None:
+        """Deferred states and preprocess, by the interpreter's parts."""
+        seen = Reading(now)
+        try:
+            with answering(script):
+                settle(self.program, seen)
+                for name in self.level.preprocess:
+                    call(self.program, name, [], seen)
+        finally:
+            now |= seen
+            read |= seen.read
 
     def _chosen(self, now: Reading) -> Table:
         if isinstance(self.level.tables, OneTable):

@@ -7,12 +7,13 @@ last order; where a program computes with an echo (`Role.odd`), the ones near it
 """
 
 from collections.abc import Iterator, Mapping
-from itertools import product
+from itertools import chain, product
 
 from rcsc.compose.contract import Below
 from rcsc.compose.goals import Sort
-from rcsc.interpret import Fault, holds
-from rcsc.model import Expr, OneTable, Value, earlier
+from rcsc.interpret import Fault
+from rcsc.model import OneTable, Value
+from tests.hierarchies_compiled import Stated
 from tests.hierarchies_level import EARLY, FLAG, UNDEFINED, Key, Ran, Role, looks, overlooking
 
 NUMBERS = 65536
@@ -53,14 +54,25 @@ def answered(below: Below, before: Mapping[str, Value], taken: Mapping[str, Valu
 
 def offers(
     role: Role, before: Mapping[str, Value], but: str = "", given: Mapping[str, Value] | None = None
-) -> Iterator[dict[str, Value]]:
+) -> list[tuple[Value, ...]]:
     """Every input that the environment may give after a state, numbers up to their names; the record `but` is given."""
     given = given or {}
-    choices = [(given[leaf],) if leaf in given else _choices(role, leaf, before) for leaf in role.inputs]
-    for values in product(*choices):
-        taken = dict(zip(role.inputs, values, strict=True))
-        if allowed(role, before, taken, but):
-            yield taken
+    records = []
+    for leaves in role.taken:
+        choices = [(given[leaf],) if leaf in given else _choices(role, leaf, before) for leaf in leaves]
+        kept = (dict(zip(leaves, values, strict=True)) for values in product(*choices))
+        records.append([tuple(one.values()) for one in kept if _fits(role, before, one, but)])
+    return [tuple(chain.from_iterable(values)) for values in product(*records)]
+
+
+def _fits(role: Role, before: Mapping[str, Value], taken: Mapping[str, Value], but: str) -> bool:
+    """Whether the environment may give this record, of which alone it is asked (`allowed`)."""
+    record = next(iter(taken)).partition(".")[0]
+    above = role.links.above
+    if above is not None and record == above.order and record != but:
+        return ordered(role, before, taken)
+    reports = [below for below in role.links.below if below.report == record != but]
+    return all(answered(below, before, taken) for below in reports)
 
 
 def _choices(role: Role, leaf: str, before: Mapping[str, Value]) -> tuple[Value, ...]:
@@ -87,10 +99,7 @@ def given_numbers(role: Role) -> tuple[str, ...]:
 
 def canonical(role: Role, state: Mapping[str, Value], but: str = "") -> dict[str, Value]:
     """The same state with the first names for its numbers, but for those exchanged with `but`, and without inputs that nobody remembers."""
-    found = dict(state)
-    for leaf in role.inputs:
-        if leaf not in role.remembered:
-            found[leaf] = role.start[leaf]
+    found = {**state, **role.forgotten}
     names: dict[Value, int] = {}
     for leaf in given_numbers(role):
         if role.links.above is not None and role.links.above.name != but:
@@ -161,19 +170,20 @@ def broken(role: Role, before: Mapping[str, Value], taken: Mapping[str, Value], 
 
 def _broken_stated(role: Role, before: Mapping[str, Value], after: Mapping[str, Value]) -> Iterator[Key]:
     """Invariants hold before the cycle and behind it; properties of both."""
-    for one in role.program.invariants:
-        if not (_true(one.condition, before) and _true(one.condition, after)):
+    stated = role.compiled.stated
+    many = len(role.program.invariants)
+    for one, condition in zip(role.program.invariants, stated[:many], strict=True):
+        if not (_true(condition, before, before) and _true(condition, after, before)):
             yield Sort.INVARIANT, "", one.name
-    both = {**after, **{str(earlier(name)): value for name, value in before.items()}}
-    for stated in role.program.properties:
-        if not _true(stated.condition, both):
-            yield Sort.PROPERTY, "", stated.name
+    for other, condition in zip(role.program.properties, stated[many:], strict=True):
+        if not _true(condition, after, before):
+            yield Sort.PROPERTY, "", other.name
 
 
-def _true(condition: Expr, state: Mapping[str, Value]) -> bool:
-    """Whether it is defined, and holds."""
+def _true(condition: Stated, now: Mapping[str, Value], before: Mapping[str, Value]) -> bool:
+    """Whether a condition is defined, and holds."""
     try:
-        return holds(condition, state)
+        return condition(now, before)
     except (ArithmeticError, IndexError, ValueError):
         return False
 
@@ -186,8 +196,7 @@ def _broken_above(
     after = ran.after
     number, command = f"{above.order}.inc_command", f"{above.order}.input_command"
     said = after[f"{above.report}.inc_command_echo"], after[f"{above.report}.ref_command_echo"]
-    report = [leaf for leaf in role.leaves if leaf.startswith(f"{above.report}.")]
-    late = ran.fault in EARLY and all(after[leaf] == before[leaf] for leaf in report)
+    late = ran.fault in EARLY and all(after[leaf] == before[leaf] for leaf in role.report)
     if said != (taken[number], taken[command]) and not late:
         yield Sort.ECHOES, "", above.report
     again = taken[number] == before[number]

@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from random import Random
@@ -25,7 +26,7 @@ from tests.hierarchies_made import ODD, RIGHT, WRONG, Hierarchy, hierarchy
 from tests.hierarchies_more import EVERY, furnished
 from tests.hierarchies_text import files, written
 from tests.hierarchies_together import Pair, broken_together
-from tests.hierarchies_world import canonical, wanted
+from tests.hierarchies_world import canonical, offers, wanted
 
 LITTLE = 12
 """Lines of the tables of a hierarchy that is quickly judged."""
@@ -98,6 +99,23 @@ def test_every_state_of_a_random_walk_is_among_those_that_are_listed(seed: int, 
 
 def _bare(role: Role, state: dict[str, bool | int | float]) -> dict[str, bool | int | float]:
     return {leaf: state[leaf] for leaf in role.leaves}
+
+
+@pytest.mark.parametrize("seed", [420_009, 420_015, 420_024])
+def test_compiled_cycles_are_the_interpreters(seed: int, tmp_path: Path) -> None:
+    """With what they read; extern procedures, deferred states, faults and assumptions that stop are among them."""
+    for role in roles(furnished(seed), tmp_path).values():
+        listed: set[tuple[bool | int | float, ...]] = set()
+        with suppress(TooManyError):
+            explored(role, seen=listed)
+        assert listed
+        for state in sorted(listed)[:40]:
+            before = dict(zip(role.leaves, state, strict=True))
+            for taken in offers(role, before)[:20]:
+                read: set[str] = set()
+                now = {**before, **dict(zip(role.inputs, taken, strict=True))}
+                for ran in role.ways(now, read):
+                    role.same(now, ran, read)
 
 
 def test_a_level_without_slips_breaks_nothing(tmp_path: Path) -> None:
