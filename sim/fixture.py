@@ -8,6 +8,7 @@ position is in mm from where it touches a part: open is positive. The jaws are o
 from dataclasses import dataclass, field
 from math import isfinite
 
+from rcsc.files.kept import Kept
 from rcsc.system.signature import Values
 from rcsc.workstation.orders import (
     CLOSED_MM,
@@ -16,7 +17,6 @@ from rcsc.workstation.orders import (
     FAILED,
     OPEN_MM,
 )
-from sim.restore import Kept
 
 OUT_MM = 20.0
 """Where an open jaw is sent."""

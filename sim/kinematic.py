@@ -6,20 +6,20 @@ air it falls. A test holds this mechanism to the same statuses as physics over t
 
 import copy
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import atan2, hypot
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
 from rcsc.database.ask import Database
 from rcsc.database.pose import Pose, Rotation, Vector, apply, cross, dot, minus, transposed, unit
+from rcsc.files.kept import finite, plain, read
 from sim.arm import Joints, plate
 from sim.faults import Faults
 from sim.model import GAIN_N_M, OPEN_MM, Body
-from sim.physical import CLEAR, EMPTY_MM, JAWS_MM, NOISY
+from sim.physical import CLEAR, EMPTY_MM, JAWS_MM, NOISY, Noise, noise_of, put_noise
 from sim.plant import CYCLE_S, Grip
-from sim.restore import plain, read
 from sim.vision.flood import Features, Found
 from sim.vision.line import Surface
 from sim.vision.model import Top, perceive, perceive_surface
@@ -32,6 +32,20 @@ LINE_MM = 60.0
 REST_MM = 40.0
 """A part whose lowest point is less above a fixture's station lies in the fixture."""
 UPRIGHT: Rotation = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+
+@dataclass(frozen=True, slots=True)
+class _State:
+    """What the next cycle hangs on; faults are none of it."""
+
+    joints: Joints
+    poses: list[Pose]
+    opening_mm: float
+    force_n: float
+    jaws_mm: tuple[float, float]
+    held: int | None
+    in_hand: Pose
+    noise: Noise
 
 
 class Kinematic:
@@ -94,16 +108,15 @@ class Kinematic:
 
     def state(self) -> dict[str, Any]:
         """All that the next cycle hangs on, in plain values; faults are none of it."""
-        return {
-            "joints": list(self._joints),
-            "poses": [plain(pose) for pose in self._poses],
-            "opening_mm": self._opening_mm,
-            "force_n": self._force_n,
-            "jaws_mm": list(self._jaws_mm),
-            "held": self._held,
-            "in_hand": plain(self._in_hand),
-            "noise": self._rng.bit_generator.state,
-        }
+        return cast(
+            dict[str, Any],
+            plain(
+                _State(
+                    self._joints, self._poses, self._opening_mm, self._force_n, self._jaws_mm, self._held,
+                    self._in_hand, noise_of(self._rng),
+                )
+            ),
+        )  # fmt: skip
 
     def restore(self, said: Mapping[str, Any]) -> None:
         """Takes a state of the same cell.
@@ -111,14 +124,15 @@ class Kinematic:
         Raises:
             ValueError: It is of another.
         """
-        poses = [read(Pose, one) for one in said["poses"]]
-        if len(poses) != len(self.bodies):
+        held: _State = read(_State, said)
+        if len(held.poses) != len(self.bodies) or not 0 <= (held.held or 0) < max(1, len(self.bodies)):
             raise ValueError("the state is of a cell with other parts")
-        self._joints, self._poses = tuple(said["joints"]), poses
-        self._opening_mm, self._force_n = float(said["opening_mm"]), float(said["force_n"])
-        self._jaws_mm = (float(said["jaws_mm"][0]), float(said["jaws_mm"][1]))
-        self._held, self._in_hand = said["held"], read(Pose, said["in_hand"])
-        self._rng.bit_generator.state = said["noise"]
+        if len(held.joints) != len(self._joints) or not finite(said):
+            raise ValueError("the state is of another arm")
+        put_noise(self._rng, held.noise)
+        self._joints, self._poses, self._in_hand = held.joints, held.poses, held.in_hand
+        self._opening_mm, self._force_n = held.opening_mm, held.force_n
+        self._jaws_mm, self._held = held.jaws_mm, held.held
 
     # --- one cycle ---
 

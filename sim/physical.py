@@ -6,14 +6,15 @@ a part; and the image processing is given pictures, never a pose. tests/test_hon
 
 import copy
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, Literal, cast
 
 import mujoco
 import numpy as np
 
 from rcsc.database.ask import Database
 from rcsc.database.pose import Pose, Rotation, Vector
+from rcsc.files.kept import finite, plain, read
 from sim.arm import Joints
 from sim.faults import Faults
 from sim.model import GAIN_N_M, USUAL, Body, Make, mjcf
@@ -34,6 +35,51 @@ EMPTY_MM = 95.0
 """Between the pads at first."""
 JAWS_MM = 20.0
 """How far the jaws are open at first."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Words:
+    state: int
+    inc: int
+
+
+@dataclass(frozen=True, slots=True)
+class Noise:
+    """A generator of noise, as numpy says it."""
+
+    bit_generator: Literal["PCG64"]
+    state: _Words
+    has_uint32: Literal[0, 1]
+    uinteger: int
+
+
+def noise_of(rng: np.random.Generator) -> Noise:
+    """The generator's state."""
+    made: Noise = read(Noise, dict(rng.bit_generator.state))
+    return made
+
+
+def put_noise(rng: np.random.Generator, noise: Noise) -> None:
+    """Puts a generator into a state.
+
+    Raises:
+        ValueError: It has none such.
+    """
+    try:
+        rng.bit_generator.state = plain(noise)
+    except OverflowError as error:
+        raise ValueError("the state is of no noise") from error
+
+
+@dataclass(frozen=True, slots=True)
+class _State:
+    """What the next cycle hangs on; faults are none of it."""
+
+    physics: list[float]
+    goal: Joints
+    setpoint_m: float
+    jaws_mm: tuple[float, float]
+    noise: Noise
 
 
 class Physical:
@@ -136,13 +182,8 @@ class Physical:
         """All that the next cycle hangs on, in plain values; faults are none of it."""
         held = np.empty(mujoco.mj_stateSize(self.model, STATE))
         mujoco.mj_getState(self.model, self.data, held, STATE)
-        return {
-            "physics": held.tolist(),
-            "goal": list(self._goal),
-            "setpoint_m": self._setpoint_m,
-            "jaws_mm": list(self._jaw_goal),
-            "noise": self._rng.bit_generator.state,
-        }
+        state = _State(held.tolist(), self._goal, self._setpoint_m, self._jaw_goal, noise_of(self._rng))
+        return cast(dict[str, Any], plain(state))
 
     def restore(self, said: Mapping[str, Any]) -> None:
         """Takes a state of the same cell.
@@ -150,13 +191,15 @@ class Physical:
         Raises:
             ValueError: It is of another.
         """
-        if len(said["physics"]) != mujoco.mj_stateSize(self.model, STATE):
+        held: _State = read(_State, said)
+        if len(held.physics) != mujoco.mj_stateSize(self.model, STATE):
             raise ValueError("the state is of a cell with other parts")
-        mujoco.mj_setState(self.model, self.data, np.array(said["physics"]), STATE)
+        if len(held.goal) != len(self._goal) or not finite(said):
+            raise ValueError("the state is of another arm")
+        put_noise(self._rng, held.noise)
+        mujoco.mj_setState(self.model, self.data, np.array(held.physics), STATE)
         mujoco.mj_forward(self.model, self.data)
-        self._goal, self._setpoint_m = tuple(said["goal"]), float(said["setpoint_m"])
-        self._jaw_goal = (float(said["jaws_mm"][0]), float(said["jaws_mm"][1]))
-        self._rng.bit_generator.state = said["noise"]
+        self._goal, self._setpoint_m, self._jaw_goal = held.goal, held.setpoint_m, held.jaws_mm
 
     # --- one cycle ---
 

@@ -11,12 +11,12 @@ from typing import Any, Protocol, get_type_hints
 
 from rcsc.database.ask import Database
 from rcsc.database.pose import Pose, nine
+from rcsc.files.kept import alike, plain, read
 from rcsc.system.signature import Value, Values
 from rcsc.workstation.orders import MACHINE_ORDER, MACHINE_REPORT, VISE_ORDER, VISE_REPORT
 from sim.arm import Joints, plate
 from sim.faults import Faults
 from sim.fixture import MachineController, ViseController
-from sim.restore import plain, read
 from sim.robot import FOLLOW, Robot
 from sim.vision.flood import Features, Found
 from sim.vision.line import Surface
@@ -168,6 +168,9 @@ class Plant:
             raise ValueError("not the state of a plant")
         hints = get_type_hints(Plant)
         held = {name: read(hints[name], said[name]) for name in CONTROLLERS}
+        strange = [name for name, one in held.items() if not alike(getattr(self, name), one)]
+        if strange:
+            raise ValueError(f"not the state of the plant's `{strange[0]}`")
         self.mechanism.restore(said["mechanism"])
         for name, value in held.items():
             setattr(self, name, value)

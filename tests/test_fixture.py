@@ -5,10 +5,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import pairwise
 from math import nan
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 import pytest
 
+from rcsc.files.kept import Kept, plain, read
 from rcsc.system.signature import Values
 from rcsc.workstation.orders import (
     DONE,
@@ -32,7 +33,6 @@ from sim.fixture import (
 )
 from sim.model import Body
 from sim.plant import WEAK_MM, Plant
-from sim.restore import Kept, plain, read
 from tests.cells import database
 
 CLOSE: Values = (1, False, False)
@@ -306,10 +306,11 @@ def test_plain_values_say_what_they_were() -> None:
 
 @pytest.mark.parametrize(
     ("kind", "said"),
-    [(int, 1.0), (int, True), (float, "1"), (tuple[int, int], [1]), (list[int], {"a": 1}), (Inner, {"name": "a"}), (int | None, "x")],
+    [(int, 1.0), (int, True), (float, "1"), (tuple[int, int], [1]), (list[int], {"a": 1}), (Inner, {"name": "a"}), (int | None, "x"),
+     (float, 1e300), (int, 2**200), (Literal["a", 1], True)],
 )  # fmt: skip
 def test_what_was_no_such_value_is_refused(kind: object, said: object) -> None:
-    with pytest.raises(ValueError, match=r"is no|values for|not the state|none of"):
+    with pytest.raises(ValueError, match=r"is no|values for|not the values|none of|too large"):
         read(kind, said)
 
 

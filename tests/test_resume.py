@@ -1,5 +1,7 @@
 """A script that stops is resumed: in the same process, in another one, by the command that is printed; or it is said why not."""
 
+import copy
+import hashlib
 import json
 import re
 import shlex
@@ -8,13 +10,15 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterable
 from pathlib import Path
+from random import Random
+from typing import Any
 
 import pytest
 
 from rcsc.cli import run
 from rcsc.database.ask import Database
 from rcsc.diagnostics.codes import Code
-from rcsc.system.cell import Outside, signatures
+from rcsc.system.cell import Outside, StateTableError, signatures
 from rcsc.system.description import description
 from rcsc.system.signature import Value, Values
 from rcsc.workstation.cell import Run, prepare
@@ -504,6 +508,76 @@ def test_what_is_not_resumed_is_said_with_its_code_and_nothing_moves(
     assert f"error[{code.value}]: " in shown.err
     assert said in shown.err
     assert shown.out == ""
+
+
+ODD = [
+    0,
+    -1,
+    2**31,
+    2**200,
+    1e308,
+    float("nan"),
+    float("inf"),
+    0.5,
+    70_000,
+    "x",
+    "",
+    None,
+    True,
+    [],
+    {},
+    [1],
+    {"a": 1},
+    [[]],
+]
+
+
+def _places(value: object, path: tuple[str | int, ...] = ()) -> Iterable[tuple[str | int, ...]]:
+    """Where anything stands in plain values."""
+    inner = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    for key, one in inner:
+        yield (*path, key)
+        yield from _places(one, (*path, key))
+
+
+def _odd(said: dict[str, Any], rnd: Random) -> None:
+    """Puts something odd somewhere, beside something, or nowhere in its place."""
+    part = rnd.choice(["tick", "station", "levels", "buffers", "outside", "outside"])
+    *path, last = rnd.choice([one for one in _places(said) if one[0] == part])
+    held: Any = said
+    for key in path:
+        held = held[key]
+    how = rnd.random()
+    if how < 0.1:
+        del held[last]
+    elif how < 0.2 and isinstance(held, list):
+        held.append(rnd.choice(ODD))
+    else:
+        held[last] = rnd.choice(ODD)
+
+
+@pytest.mark.usefixtures("project")
+@pytest.mark.parametrize("seed", range(2))
+def test_a_stopped_run_that_was_changed_anywhere_is_taken_or_refused(seed: int) -> None:
+    path = keep(stopped_at_vise(), "go.csv")
+    good = path.read_bytes()
+    rnd = Random(seed)  # noqa: S311  # drawn by seed
+    made, refused = begun(), 0
+    first = copy.deepcopy((made.station.state(), plant_of(made).state()))
+    for _ in range(40):
+        said = json.loads(good)["stopped"]
+        _odd(said, rnd)
+        digest = hashlib.sha256(json.dumps(said, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
+        path.write_text(json.dumps({"digest": digest, "stopped": said}), encoding="utf-8")
+        made.station.restore(first[0])
+        plant_of(made).restore(first[1])
+        try:
+            go_on(made)
+            for _ in range(4):
+                made.system.step()
+        except (NotResumed, StateTableError):
+            refused += 1
+    assert refused > 15
 
 
 def other_parts(database: Database) -> list[Timed]:

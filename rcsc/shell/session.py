@@ -226,7 +226,7 @@ class Session:
 
     def _answer_by_hand(self, level: RunningLevel) -> None:
         level.fills = tuple(
-            Fill(self._query(level.name, fill), fill.first, fill.keys) for fill in level.fills
+            Fill(self._query(level.name, fill), fill.first, fill.keys, fill.form) for fill in level.fills
         )
 
     def _query(self, level: str, fill: Fill) -> Query:

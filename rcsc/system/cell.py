@@ -4,6 +4,7 @@ In each tick every level that is due takes the buffers as the tick before left t
 level sees does not hang on the order of the levels, and is the same with every executor.
 """
 
+import struct
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal, Protocol
@@ -37,6 +38,7 @@ class System:
         tick: Ticks done so far.
         watch: Called after each tick.
         restarts: Levels that were started again before the present tick, in order; who watches the tick sees them.
+        forms: For each buffer with a level at an end, the format of what it can hold (`Signature.form`).
     """
 
     description: Description
@@ -46,12 +48,22 @@ class System:
     tick: int = 0
     watch: list[Callable[["System", tuple[RunningLevel, ...]], None]] = field(default_factory=list)
     restarts: list[Restarted] = field(default_factory=list)
+    forms: Mapping[str, str] = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Finds what the buffers with a level at an end can hold."""
+        taken = {take.buffer: take.form for level in self.levels for take in level.takes}
+        self.forms = taken | {
+            give.buffer: level.sign.form(range(give.first, give.end))
+            for level in self.levels
+            for give in level.gives
+        }
 
     def step(self) -> None:
         """One control tick.
 
         Raises:
-            StateTableError: A level was refused an input, or no line or several matched.
+            StateTableError: A level was refused an input, no line or several matched, or what stands outside published no such values.
         """
         due = tuple(
             one for one in self.levels if self.tick * self.description.tick_ms % one.level.period_ms == 0
@@ -64,13 +76,22 @@ class System:
             level.give(self.buffers)
         for published in given:
             for name, values in published.items():
-                self.buffers.publish(name, values)
+                self._publish(name, values)
         self.tick += 1
         for watch in self.watch:
             watch(self, due)
         self.restarts.clear()
         for level in faulty:
             raise StateTableError(_said(level, self.tick))
+
+    def _publish(self, name: str, values: Values) -> None:
+        """Raises: StateTableError: What stands outside published what the buffer cannot hold."""
+        try:
+            if name in self.forms:
+                struct.pack(self.forms[name], *values)
+        except struct.error as error:
+            raise StateTableError(f"buffer `{name}` cannot hold what was published: {error}") from error
+        self.buffers.publish(name, values)
 
     def restart(self, name: str, checkpoint: Values | None = None) -> None:
         """Has a level lose what it was doing, as one whose process is killed and started again, before the next tick.

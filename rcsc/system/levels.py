@@ -22,6 +22,7 @@ class Take:
     buffer: str
     first: int
     count: int
+    form: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +41,7 @@ class Fill:
     query: Query
     first: int
     keys: tuple[int, ...]
+    form: str
 
 
 class StateTableError(Exception):
@@ -59,10 +61,11 @@ def put_checked(name: str, sign: Signature, executor: Executor, values: Values) 
     count = len(sign.leaves)
     kept = executor.values()[:count]
     try:
+        struct.pack(sign.form(range(count)), *values[:count])
         executor.put(0, values[:count])
         at = executor.check()
         wrong = "" if at < 0 else sign.unfit(at, values)
-    except (struct.error, OverflowError, TypeError) as error:
+    except struct.error as error:
         wrong = str(error)
     if wrong:
         executor.put(0, kept)
@@ -95,13 +98,17 @@ class RunningLevel:
         self.values = self.initial = self.executor.values()
 
     def take(self, buffers: Buffers) -> None:
-        """Copies the latest value of every input buffer, then has the database fill what depends on them."""
+        """Copies the latest value of every input buffer, then has the database fill what depends on them.
+
+        Raises:
+            StateTableError: What somebody outside published, or the database answered, are no values of these leaves.
+        """
         now: list[Value] | None = None
         for take in self.takes:
             latest = buffers.latest(take.buffer)
             if latest is not None and latest is not self._taken.get(take.buffer):
                 self._taken[take.buffer] = latest
-                self.executor.put(take.first, latest)
+                self._put(f"buffer `{take.buffer}`", take.form, take.first, latest)
                 now = list(self.values) if now is None else now
                 now[take.first : take.first + take.count] = latest
         seen: Sequence[Value] = self.values if now is None else now
@@ -109,7 +116,14 @@ class RunningLevel:
             keys = [seen[at] for at in fill.keys]
             if self._asked.get(fill.first) != keys:
                 self._asked[fill.first] = keys
-                self.executor.put(fill.first, fill.query(*keys))
+                self._put("the answer of the database", fill.form, fill.first, fill.query(*keys))
+
+    def _put(self, what: str, form: str, first: int, values: Values) -> None:
+        try:
+            struct.pack(form, *values)
+        except struct.error as error:
+            raise StateTableError(f"level `{self.name}` cannot take {what}: {error}") from error
+        self.executor.put(first, values)
 
     def run(self) -> int:
         """One cycle; the fault, 0 for none."""
@@ -199,7 +213,7 @@ def running_level(
         sign,
         level,
         executor,
-        tuple(Take(*one) for one in takes),
+        tuple(Take(*one, sign.form(range(one[1], one[1] + one[2]))) for one in takes),
         tuple(Give(name, first, first + count) for name, first, count in gives),
         tuple(_fill(spec, sign, feed, queries) for feed in spec.feeds),
     )
@@ -222,4 +236,4 @@ def _fill(spec: LevelSpec, sign: Signature, feed: Feed, queries: Mapping[str, Qu
     answer = query(*(0 for _ in keys))
     if len(answer) != len(run):
         raise BadDescription(f"{where}: {len(answer)} values for {len(run)} leaves")
-    return Fill(query, run.start, keys)
+    return Fill(query, run.start, keys, sign.form(run))

@@ -145,6 +145,11 @@ class Signature:
         """Leaves and trace as canonical bytes."""
         return struct.Struct("<" + "".join(FORMATS[leaf.c_type] for leaf in self.leaves) + self.trace_format)
 
+    def form(self, run: range) -> str:
+        """The format of these leaves in which `struct.pack` refuses what is not of their types; a bool is packed as a number."""
+        types = (FORMATS[self.leaves[at].c_type] for at in run)
+        return "<" + "".join("B" if one == "?" else one for one in types)
+
     def record(self, name: str) -> range:
         """Positions of the leaves of a variable: a record's or array's are next to each other.
 

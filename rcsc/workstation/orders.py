@@ -20,6 +20,12 @@ MACHINE_REPORT = "machine.report"
 BETWEEN = (VISE_ORDER, VISE_REPORT, MACHINE_ORDER, MACHINE_REPORT)
 """Buffers that have no level at either end."""
 
+KINDS = {
+    VISE_ORDER: tuple[int, bool, bool], VISE_REPORT: tuple[int, int, float, float],
+    MACHINE_ORDER: tuple[int, int], MACHINE_REPORT: tuple[int, int],
+}  # fmt: skip
+"""What each of them holds."""
+
 DONE, EXECUTING, FAILED = 0, 1, 2
 """`level_status` of tables/vocabulary.rcs: how it stands in every report, the robot's too."""
 NUMBERS = 65536

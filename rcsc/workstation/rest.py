@@ -6,8 +6,7 @@ that lets go of nothing (tables/task).
 """
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
-from typing import Any
+from dataclasses import dataclass, field, replace
 
 from rcsc.workstation.interlocks import FIXTURE, Cell
 from rcsc.workstation.script import Row
@@ -47,19 +46,6 @@ class Progress:
         """TASK has given up."""
         lets_go = row.robot in PUTS and in_gripper == NOTHING
         self.put = self.put or (self.taken and lets_go and failure == MOVE_FAILED)
-
-    def state(self) -> dict[str, Any]:
-        """In plain values."""
-        return asdict(self)
-
-
-def progress_of(said: Mapping[str, Any]) -> Progress:
-    """What `Progress.state` said.
-
-    Raises:
-        KeyError, TypeError: It said something else.
-    """
-    return Progress(**{**said, "before": Cell(**said["before"])})
 
 
 def stands(row: Row, progress: Progress, in_gripper: str, cell: Cell) -> Cell:

@@ -4,9 +4,10 @@ In: a script, the database's names, the words of TASK's command buffer. Out: one
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
-from typing import Any, Literal
+from dataclasses import dataclass, field
+from typing import Any, Literal, cast
 
+from rcsc.files.kept import plain, read
 from rcsc.system.signature import Leaf, Signature, Value, Values
 from rcsc.workstation.interlocks import Cell, after, refusal
 from rcsc.workstation.orders import (
@@ -21,7 +22,7 @@ from rcsc.workstation.orders import (
     Orders,
     ajar,
 )
-from rcsc.workstation.rest import NOTHING, Progress, progress_of, rest, stands
+from rcsc.workstation.rest import NOTHING, Progress, rest, stands
 from rcsc.workstation.script import MACHINE, ROBOT, BadScript, Row
 
 ANSWER_TICKS = 75
@@ -48,6 +49,16 @@ class Result:
     reason: str
     first_tick: int
     ticks: int
+
+
+@dataclass(frozen=True, slots=True)
+class _State:
+    """What a stopped workstation goes on from; its orders stand in their buffers."""
+
+    at: int
+    cell: Cell
+    progress: Progress
+    trouble: str
 
 
 @dataclass(slots=True)
@@ -138,17 +149,18 @@ class Workstation:
     def state(self) -> dict[str, Any]:
         """What a stopped workstation goes on from, in plain values; its orders stand in their buffers."""
         trouble = self.trouble if self.at_rest else "TASK has not paused"
-        known = {"at": self.at, "cell": asdict(self.cell), "progress": self.progress.state()}
-        return known | {"trouble": trouble}
+        return cast(dict[str, Any], plain(_State(self.at, self.cell, self.progress, trouble)))
 
     def restore(self, said: Mapping[str, Any]) -> None:
         """Stands as the one that said this, and tries its row again; numbers go on from what stands in the buffers.
 
         Raises:
-            KeyError, TypeError, ValueError: Nothing of ours said it.
+            ValueError: Nothing of ours said it.
         """
-        self.at, self.cell, self.trouble = int(said["at"]), Cell(**said["cell"]), str(said["trouble"])
-        self.progress = progress_of(said["progress"])
+        held: _State = read(_State, said)
+        if not 0 <= held.at <= len(self.rows):
+            raise ValueError(f"the script has {len(self.rows)} rows, and was stopped in row {held.at + 1}")
+        self.at, self.cell, self.trouble, self.progress = held.at, held.cell, held.trouble, held.progress
         self.results.clear()
         self._since = self._paused = -1
 

@@ -7,25 +7,30 @@ whole, of the script that is run, and of the executors and locations that are th
 import contextlib
 import hashlib
 import json
+import struct
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Literal, Protocol, runtime_checkable
 
 from rcsc.diagnostics.codes import Code
 from rcsc.files import write_atomically
+from rcsc.files.kept import read
+from rcsc.files.names import shown
 from rcsc.files.read import content, json_of
 from rcsc.system.cell import Outside
 from rcsc.system.description import Description
 from rcsc.system.levels import BadState, RunningLevel
 from rcsc.system.signature import generated_files
 from rcsc.workstation.cell import Run
-from rcsc.workstation.orders import BETWEEN
+from rcsc.workstation.orders import BETWEEN, KINDS
 from rcsc.workstation.script import Row
 from rcsc.workstation.station import Workstation
 
 FORM = 1
 """Of the file; another is not read."""
+LATEST_TICK = 2**40
+"""Ticks count up from where the stopped run was; a log has 64 bits for nanoseconds."""
 
 
 class NotResumed(Exception):  # noqa: N818  # what happened, not an error of ours
@@ -48,7 +53,7 @@ class Restorable(Protocol):
         """Takes a state.
 
         Raises:
-            KeyError, TypeError, ValueError: Nothing of its kind said it.
+            ValueError: Nothing of its kind said it.
         """
         ...
 
@@ -106,7 +111,7 @@ def go_on(run: Run) -> None:
     _same(run, said)
     try:
         _put(run, said)
-    except (KeyError, TypeError, ValueError, IndexError) as error:
+    except (ValueError, struct.error) as error:
         raise NotResumed(Code.BAD_SYSTEM, f"the stopped run is of another cell: {error}") from error
 
 
@@ -124,61 +129,99 @@ def tables_digest(system: Description) -> str:
     return hashed.hexdigest()
 
 
-def _read(path: Path) -> dict[str, Any]:
+@dataclass(frozen=True, slots=True)
+class _Stopped:
+    """What the file holds."""
+
+    form: Literal[1]
+    script: str
+    rows: str
+    tables: str
+    locations: Mapping[str, int]
+    tick: int
+    station: Mapping[str, Any]
+    levels: Mapping[str, list[bool | int | float]]
+    buffers: Mapping[str, list[bool | int | float]]
+    outside: Mapping[str, Mapping[str, Any]]
+
+
+@dataclass(frozen=True, slots=True)
+class _Whole:
+    digest: str
+    stopped: Any
+
+
+def _held(text: bytes) -> _Stopped:
+    """Raises: ValueError: The file is not whole, or says what no stopped run does."""
+    whole: _Whole = read(_Whole, json_of(text))
+    said: _Stopped = read(_Stopped, whole.stopped)
+    if whole.digest != _digest(_text(whole.stopped)):
+        raise ValueError("its digest is another")
+    if not 0 <= said.tick < LATEST_TICK:
+        raise ValueError("its tick is none")
+    return said
+
+
+def _read(path: Path) -> _Stopped:
     try:
-        whole = json_of(content(path))
-        said: dict[str, Any] = whole["stopped"]
-        whole_and_ours = whole["digest"] == _digest(_text(said)) and said["form"] == FORM
+        return _held(content(path))
     except FileNotFoundError as error:
         raise NotResumed(
             Code.NOT_RESUMED, "there is nothing to resume: the last run was not stopped"
         ) from error
     except OSError as error:
         raise NotResumed(Code.NOT_RESUMED, f"the stopped run cannot be read: {error.strerror}") from error
-    except (ValueError, KeyError, TypeError):
-        whole_and_ours = False
-    if not whole_and_ours:
-        raise NotResumed(
-            Code.NOT_RESUMED, f"the stopped run in {path.name} is damaged, or of another version of rcsc"
-        )
-    return said
-
-
-def _same(run: Run, said: Mapping[str, Any]) -> None:
-    """Whether it is this script, these executors and this cell."""
-    if said["rows"] != rows_digest(run.station.rows):
+    except ValueError as error:
         raise NotResumed(
             Code.NOT_RESUMED,
-            f"script `{said['script']}` was stopped, and this is another, or it has changed since",
+            f"the stopped run in {path.name} is damaged, or of another version of rcsc: {error}",
+        ) from error
+
+
+def _same(run: Run, said: _Stopped) -> None:
+    """Whether it is this script, these executors and this cell."""
+    if said.rows != rows_digest(run.station.rows):
+        raise NotResumed(
+            Code.NOT_RESUMED,
+            f"script `{said.script}` was stopped, and this is another, or it has changed since",
         )
-    if said["tables"] != tables_digest(run.system.description):
+    if said.tables != tables_digest(run.system.description):
         raise NotResumed(
             Code.BAD_SYSTEM,
             "the tables have changed since the script was stopped: its levels' states mean nothing to them",
         )
-    if said["locations"] != dict(run.database.locations):
+    if said.locations != dict(run.database.locations):
         raise NotResumed(
             Code.BAD_DATA,
             "locations have come or gone since the script was stopped: levels point to the old ones",
         )
 
 
-def _put(run: Run, said: Mapping[str, Any]) -> None:
-    system = run.system
-    outside = dict(_restorable(system.outside))
-    for name, state in said["outside"].items():
+def _put(run: Run, said: _Stopped) -> None:
+    """Raises: ValueError, struct.error: Something in it is no state of this cell; NotResumed: a level cannot go on from its own."""
+    system, outside = run.system, dict(_restorable(run.system.outside))
+    if said.levels.keys() != {level.name for level in system.levels}:
+        raise ValueError("it has other levels")
+    for name, state in said.outside.items():
         if name not in outside:
-            raise ValueError(f"nothing outside is a `{name}`")
+            raise ValueError(f"nothing outside is a {shown(name)}")
         outside[name].restore(state)
     for level in system.levels:
         try:
-            level.restore(_values(level, said["levels"][level.name]))
+            level.restore(_values(level, said.levels[level.name]))
         except BadState as error:
             raise NotResumed(Code.NOT_RESUMED, str(error)) from error
-    for name, values in said["buffers"].items():
+    forms = system.forms
+    for name, values in said.buffers.items():
+        if name in BETWEEN:
+            read(KINDS[name], values)
+        elif name in forms:
+            struct.pack(forms[name], *values)
+        else:
+            raise ValueError(f"there is no buffer {shown(name)}")
         system.buffers.publish(name, tuple(values))
-    run.station.restore(said["station"])
-    system.tick = int(said["tick"])
+    run.station.restore(said.station)
+    system.tick = said.tick
 
 
 def _values(level: RunningLevel, said: Sequence[Any]) -> tuple[Any, ...]:

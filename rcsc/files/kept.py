@@ -1,15 +1,21 @@
-"""Things outside that can be put back: their state as plain values, which JSON keeps exactly.
+"""Values kept as plain ones, which JSON keeps exactly, and read back by their declared types.
 
-In: a dataclass whose fields are plain values, tuples, lists, dictionaries by text, and dataclasses of these. Out: `state` and `restore` of
-`rcsc.workstation.stopped.Restorable`. Each field is written by its declared type and read by it; what cannot be is refused.
+In: dataclasses whose fields are plain values, literals, tuples, lists, dictionaries by text, and dataclasses of these. Out: the same after
+`plain` and `read`; what no such value was written as is refused. `Kept` has `state` and `restore` of
+`rcsc.workstation.stopped.Restorable`.
 """
 
 import types
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, is_dataclass
-from typing import Any, ClassVar, Union, cast, get_args, get_origin, get_type_hints
+from math import isfinite
+from typing import Any, ClassVar, Literal, Union, cast, get_args, get_origin, get_type_hints
+
+from rcsc.files.names import shown
 
 PLAIN = (bool, int, float, str, type(None))
+MOST_WHOLE, MOST_REAL = 2**128, 1e12
+"""What a number that is read back may be at most; a generator of noise has whole numbers of 128 bits."""
 
 
 class Kept:
@@ -77,6 +83,10 @@ def read(kind: Any, said: Any) -> Any:
     origin, args = get_origin(kind), get_args(kind)
     if origin in (types.UnionType, Union):
         return _any(args, said)
+    if kind is Any:
+        return said
+    if origin is Literal:
+        return _one_of(args, said)
     if is_dataclass(kind):
         return _made(cast(type, kind), said)
     if origin is list:
@@ -90,13 +100,53 @@ def read(kind: Any, said: Any) -> Any:
     if origin is not None and isinstance(said, dict) and issubclass(origin, Mapping):
         return {key: read(args[1], one) for key, one in said.items()}
     if type(said) is kind or (kind is float and type(said) is int):
-        return said
-    raise ValueError(f"{said!r} is no {kind}")
+        return _bounded(said)
+    raise ValueError(f"{_shown(said)} is no {getattr(kind, '__name__', kind)}")
+
+
+def _bounded(said: Any) -> Any:
+    """The value, unless it is a number that nothing is as large as; NaN is a reading that could not be taken."""
+    large = (isinstance(said, int) and abs(said) > MOST_WHOLE) or (
+        isinstance(said, float) and abs(said) > MOST_REAL
+    )
+    if large:
+        raise ValueError(f"{_shown(said)} is too large")
+    return said
+
+
+def _one_of(allowed: Sequence[Any], said: Any) -> Any:
+    if not any(type(said) is type(one) and said == one for one in allowed):
+        raise ValueError(f"{_shown(said)} is none of {', '.join(map(str, allowed))}")
+    return said
+
+
+def _shown(said: Any) -> str:
+    return shown(said if isinstance(said, str) else repr(said)[:80])
+
+
+def alike(now: Any, then: Any) -> bool:
+    """Whether two values have the same shape: tuples as long, and their values of one type; what is declared need not say it."""
+    if isinstance(now, tuple):
+        return isinstance(then, tuple) and len(now) == len(then) and all(map(alike, now, then))
+    if is_dataclass(now):
+        return type(now) is type(then) and all(
+            alike(getattr(now, one), getattr(then, one)) for one in _names(now)
+        )
+    return type(now) is type(then) or None in (now, then) or {type(now), type(then)} == {int, float}
+
+
+def finite(value: Any) -> bool:
+    """Whether every number in a plain value is one."""
+    if isinstance(value, Mapping):
+        return all(map(finite, value.values()))
+    if isinstance(value, (list, tuple)):
+        return all(map(finite, value))
+    return not isinstance(value, float) or isfinite(value)
 
 
 def _items(said: Any) -> Sequence[Any]:
     if not isinstance(said, list):
-        raise ValueError(f"{said!r} is no list")  # noqa: TRY004  # what was read, not what was called
+        raise ValueError(f"{_shown(said)} is no list")  # noqa: TRY004  # what was read, not what was called
     return said
 
 
@@ -107,13 +157,13 @@ def _any(kinds: Sequence[Any], said: Any) -> Any:
             return None if kind is type(None) and said is None else read(kind, said)
         except ValueError:
             continue
-    raise ValueError(f"{said!r} is none of its types")
+    raise ValueError(f"{_shown(said)} is none of its types")
 
 
 def _made(kind: type, said: Any) -> Any:
     hints = get_type_hints(kind)
     if not isinstance(said, dict) or set(said) != set(_names(kind)):
-        raise ValueError(f"not the state of a {kind.__name__}")
+        raise ValueError(f"not the values of a {kind.__name__}")
     given = {name: read(hints[name], one) for name, one in said.items()}
     asked = {one.name for one in fields(kind) if one.init}
     made = kind(**{name: value for name, value in given.items() if name in asked})
