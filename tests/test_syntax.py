@@ -1,7 +1,10 @@
 """Text to tree and back: round trips, errors with a place, nothing that makes the parser raise."""
 
 from pathlib import Path
+from random import Random
+from typing import Any
 
+import lark
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -10,6 +13,7 @@ from rcsc.diagnostics.codes import Code
 from rcsc.source import Source, Span
 from rcsc.syntax import tree
 from rcsc.syntax.format import format_file, format_text
+from rcsc.syntax.lalr import Node, Tables
 from rcsc.syntax.parse import MOST_ERRORS, parse
 from rcsc.syntax.spell import spell_expr
 from tests.strategies_syntax import expressions, files
@@ -223,3 +227,45 @@ def test_values_and_variables_called_like_words_stay_what_they_are() -> None:
     [table] = [one for one in parsed.declarations if isinstance(one, tree.TableDecl)]
     assert not any(row.default for row in table.rows)
     assert [heading.word for heading in (*table.conditions, *table.actions)] == ["", "", "when", ""]
+
+
+def by_lark(found: Any) -> object:
+    """A tree of Lark's as plain data: names, texts and places."""
+    if isinstance(found, lark.Token):
+        return found.type, str(found), found.start_pos, found.end_pos
+    place = (-1, -1) if found.meta.empty else (found.meta.start_pos, found.meta.end_pos)
+    return str(found.data), place, [by_lark(child) for child in found.children]
+
+
+def by_tables(found: Any) -> object:
+    """A tree of ours likewise."""
+    if isinstance(found, Node):
+        return found.data, (found.start_pos, found.end_pos), [by_tables(child) for child in found.children]
+    return found.type, str(found), found.start_pos, found.end_pos
+
+
+def test_trees_are_those_of_lark_and_texts_are_refused_where_lark_refuses_them() -> None:
+    grammar = (REPO / "grammar" / "rcs.lark").read_text(encoding="utf-8")
+    starts = ["file", "cell", "when", "heading", "actions"]
+    parser = lark.Lark(grammar, parser="lalr", start=starts, propagate_positions=True)
+    tables, rng = Tables(parser), Random(20261122)  # noqa: S311  # texts to try
+    texts = [path.read_text(encoding="utf-8") for path in SHIPPED]
+    asked = [(text, "file") for text in texts]
+    for _ in range(400):  # pieces of texts, and texts with a slip
+        text = rng.choice(texts)
+        at = rng.randrange(len(text))
+        asked += [(text[at : at + rng.randrange(60)], start) for start in starts]
+        slip = rng.choice(
+            ("", "|", "(", ")", "safe ", "in ", "..", "\u00e9", "@", "#", "\n", "int", "1.5", "\0")
+        )
+        asked.append((text[max(0, at - 300) : at] + slip + text[at + rng.randrange(5) : at + 300], "file"))
+    right = 0
+    for text, start in asked:
+        try:
+            wanted = by_lark(parser.parse(text, start=start))
+        except lark.UnexpectedInput:
+            wanted = None
+        found = tables.parse(text, start)
+        assert (None if found is None else by_tables(found)) == wanted, (start, text)
+        right += found is not None
+    assert 100 < right < len(asked) - 500

@@ -6,19 +6,7 @@ from typing import Any, ClassVar, Protocol
 from rcsc.source import Span
 from rcsc.syntax import tree
 from rcsc.syntax.comments import Comments, split, words
-
-
-class Node(Protocol):
-    """A parse-tree node: the rule's name and what it matched (nodes and tokens)."""
-
-    @property
-    def data(self) -> Any: ...
-
-    @property
-    def children(self) -> list[Any]: ...
-
-    @property
-    def meta(self) -> Any: ...
+from rcsc.syntax.lalr import Node
 
 
 class Rows(Protocol):
@@ -40,9 +28,9 @@ class Build:
     # --- pieces ---
 
     def _span(self, node: Node) -> Span:
-        if node.meta.empty:
+        if node.start_pos < 0:
             return Span(self.file, 0, 0)
-        return Span(self.file, node.meta.start_pos, node.meta.end_pos)
+        return Span(self.file, node.start_pos, node.end_pos)
 
     def _name(self, token: Any) -> tree.Name:
         return tree.Name(str(token), Span(self.file, token.start_pos, token.end_pos))
@@ -52,17 +40,17 @@ class Build:
 
     def _head(self, node: Node) -> dict[str, Any]:
         """Span, comments and doc lines of a declaration."""
-        plain, doc = split(self.comments.take(node.meta.start_pos))
+        plain, doc = split(self.comments.take(node.start_pos))
         return {"span": self._span(node), "comments": plain, "doc": doc}
 
     def _above(self, node: Node) -> dict[str, Any]:
         """Span and comments of a statement or an arm."""
-        comments = self.comments.take(node.meta.start_pos)
+        comments = self.comments.take(node.start_pos)
         return {"span": self._span(node), "comments": tuple(words(text) for text in comments)}
 
     @staticmethod
     def _rule(item: Any) -> str:
-        return str(item.data) if hasattr(item, "data") else ""
+        return item.data if isinstance(item, Node) else ""
 
     def _find(self, items: list[Any], rule: str) -> Any:
         return next((item for item in items if self._rule(item) == rule), None)
@@ -133,9 +121,9 @@ class Build:
 
     def _property_decl(self, node: Node) -> tree.PropertyDecl:
         head = self._head(node)
-        name, condition, last = node.children
-        word = self._rule(last)  # the rule is called as the word is
-        other = self.expr(last.children[0]) if word else None
+        name, condition, *last = node.children
+        word = self._rule(last[0]) if last else ""  # the rule is called as the word is
+        other = self.expr(last[0].children[0]) if last else None
         return tree.PropertyDecl(self._name(name), self.expr(condition), word, other, **head)
 
     def _procedure_decl(self, node: Node) -> tree.ProcedureDecl:
@@ -207,7 +195,7 @@ class Build:
     def type(self, node: Node) -> tree.TypeExpr:
         """Any type."""
         span = self._span(node)
-        match str(node.data):
+        match node.data:
             case "bool_type":
                 return tree.BoolType(span)
             case "named_type":
@@ -231,8 +219,8 @@ class Build:
         node = self._find(items, "unit")
         if node is None:
             return None
-        product, *divisors = [item for item in node.children if hasattr(item, "data")]
-        factors = [self._factor(f, 1) for f in product.children if hasattr(f, "data")]
+        product, *divisors = [item for item in node.children if isinstance(item, Node)]
+        factors = [self._factor(f, 1) for f in product.children if isinstance(f, Node)]
         factors += [self._factor(f, -1) for f in divisors]
         return tree.Unit(tuple(factor for factor in factors if factor is not None), self._span(node))
 
@@ -249,7 +237,7 @@ class Build:
 
     def expr(self, node: Node) -> tree.Expr:
         """Any expression."""
-        rule, span, parts = str(node.data), self._span(node), node.children
+        rule, span, parts = node.data, self._span(node), node.children
         if rule in self._BINARY:
             return tree.Binary(self._BINARY[rule], self.expr(parts[0]), self.expr(parts[1]), span)
         if rule in ("compare", "arithmetic"):
@@ -303,17 +291,17 @@ class Build:
     def cell(self, node: Node) -> Any:
         """A condition, an expression or a list of actions, by the start rule that parsed it."""
         part = node.children[0]
-        match str(node.data):
+        match node.data:
             case "cell":
                 return self._condition(part)
             case "actions":
-                return tuple(self.statement(item) for item in node.children if hasattr(item, "data"))
+                return tuple(self.statement(item) for item in node.children if isinstance(item, Node))
             case _:
                 return self.expr(part)
 
     def _condition(self, node: Node) -> tree.Condition:
         span, parts = self._span(node), node.children
-        match str(node.data):
+        match node.data:
             case "equals":
                 return tree.Comparison("=", self.expr(parts[0]), span)
             case "comparison":
@@ -327,7 +315,7 @@ class Build:
 
     def block(self, node: Node) -> tuple[tree.Statement, ...]:
         """The statements between braces."""
-        return tuple(self.statement(item) for item in node.children if hasattr(item, "data"))
+        return tuple(self.statement(item) for item in node.children if isinstance(item, Node))
 
     def statement(self, node: Node) -> tree.Statement:
         """Any statement."""

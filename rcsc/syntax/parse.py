@@ -6,12 +6,10 @@ In: a `Source`. Out: a `tree.File`, or every syntax error that was found. No tex
 from dataclasses import dataclass, field
 from functools import cache
 from importlib.resources import files as package_files
-from operator import itemgetter
 from pathlib import Path
 from typing import Any, cast
 
 import lark
-from lark import Token, Tree
 
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label
@@ -19,6 +17,7 @@ from rcsc.source import Source, Span
 from rcsc.syntax import screen, tree
 from rcsc.syntax.build import Build
 from rcsc.syntax.comments import Comments, words
+from rcsc.syntax.lalr import Leaf, Node, Tables
 from rcsc.syntax.rows import ACTION_WORDS, NAME, Cell, Cells, cut, is_separator
 from rcsc.syntax.words import expected
 
@@ -32,20 +31,25 @@ def _parser() -> lark.Lark:
     beside = Path(__file__).parents[2] / "grammar" / "rcs.lark"
     text = (packaged if packaged.is_file() else beside).read_text(encoding="utf-8")
     starts = ["file", "cell", "when", "heading", "actions"]
-    parser = lark.Lark(text, parser="lalr", start=starts, propagate_positions=True)
-    _hand_on(parser.parser.parser_conf)
-    return parser
+    return lark.Lark(text, parser="lalr", start=starts)
 
 
-def _hand_on(conf: Any) -> None:
-    """Make rules like `?sum: product` hand on their child as it is, which every operand passes some ten of.
+@cache
+def _tables() -> Tables:
+    return Tables(_parser())
 
-    Lark would find out the child's position again and write it where it stands already.
+
+def _parsed(text: str, start: str) -> Node:
+    """The parse tree of a text by one of the start rules.
+
+    Raises:
+        lark.UnexpectedInput: It has none.
     """
-    for rule in conf.callbacks:
-        alone = len(rule.expansion) == 1 and not rule.expansion[0].is_term
-        if alone and rule.options.expand1 and not rule.alias and not rule.expansion[0].name.startswith("_"):
-            conf.callbacks[rule] = itemgetter(0)
+    found = _tables().parse(text, start)
+    if found is None:
+        _parser().parse(text, start=start)  # says what is wrong
+        raise AssertionError("Lark takes a text that its tables refuse")
+    return found
 
 
 def parse(source: Source) -> tree.File | tuple[Diagnostic, ...]:
@@ -69,15 +73,15 @@ def parse(source: Source) -> tree.File | tuple[Diagnostic, ...]:
     return tree.File(declarations, tuple(words(text) for text in comments.rest()), source.name)
 
 
-def _deep_in(root: Tree[Token]) -> tuple[int, int] | None:
+def _deep_in(root: Node) -> tuple[int, int] | None:
     """Start and end of the first node that lies too deep; what follows may then call itself at each depth."""
     waiting = [(root, 0)]
     while waiting:
         node, depth = waiting.pop()
         if depth > screen.DEEPEST:
-            return node.meta.start_pos, node.meta.start_pos + 1
-        deeper = depth + (str(node.data) not in ("block", "arm"))
-        waiting.extend((child, deeper) for child in reversed(node.children) if isinstance(child, Tree))
+            return node.start_pos, node.start_pos + 1
+        deeper = depth + (node.data not in ("block", "arm"))
+        waiting.extend((child, deeper) for child in reversed(node.children) if isinstance(child, Node))
     return None
 
 
@@ -86,7 +90,7 @@ class _Pieces:
     """The declarations of one text, parsed together or, after an error, from keyword to keyword."""
 
     source: Source
-    nodes: list[Tree[Token]] = field(default_factory=list)
+    nodes: list[Node] = field(default_factory=list)
 
     def parse(self) -> list[Diagnostic]:
         """Fills `nodes`; what was wrong."""
@@ -95,7 +99,7 @@ class _Pieces:
         while len(found) < MOST_ERRORS:
             blank = screen.blank_before(text, offset)
             try:
-                self.nodes.extend(cast("list[Tree[Token]]", _parser().parse(blank, start="file").children))
+                self.nodes.extend(_parsed(blank, "file").children)
                 return found
             except lark.UnexpectedInput as error:
                 found.append(_syntax_error(error, self.source.name, 0, len(text), text))
@@ -146,7 +150,7 @@ class _Rows:
     memory: dict[tuple[str, str], Any] = field(default_factory=dict)
 
     def table(
-        self, rows: list[Token]
+        self, rows: list[Leaf]
     ) -> tuple[tuple[tree.Heading, ...], tuple[tree.Heading, ...], tuple[tree.Row, ...]]:
         """Condition headings, action headings and lines of a table."""
         head = self._cut(rows[0])
@@ -159,8 +163,8 @@ class _Rows:
         lines = [self._row(row, head, conditions, actions) for row in rows[1:] if not is_separator(str(row))]
         return conditions, actions, tuple(line for line in lines if line is not None)
 
-    def _cut(self, row: Token) -> Cells | None:
-        start = cast(int, row.start_pos)
+    def _cut(self, row: Leaf) -> Cells | None:
+        start = row.start_pos
         cells = cut(str(row), start)
         if isinstance(cells, str):
             self.found.append(
@@ -178,7 +182,7 @@ class _Rows:
         return tree.Heading(subject, "", span)
 
     def _row(
-        self, row: Token, head: Cells, conditions: tuple[tree.Heading, ...], actions: tuple[tree.Heading, ...]
+        self, row: Leaf, head: Cells, conditions: tuple[tree.Heading, ...], actions: tuple[tree.Heading, ...]
     ) -> tree.Row | None:
         cells = self._cut(row)
         if cells is None or not self._even(row, cells, head):
@@ -200,7 +204,7 @@ class _Rows:
             for cell, heading in zip(tests, conditions, strict=True)
         )
         everything = (*cells.conditions, *cells.actions)
-        start = cast(int, row.start_pos)
+        start = row.start_pos
         return tree.Row(
             name.text,
             parsed,
@@ -212,13 +216,13 @@ class _Rows:
             tuple(words(text) for text in self.comments.take(start)),
         )
 
-    def _even(self, row: Token, cells: Cells, head: Cells) -> bool:
+    def _even(self, row: Leaf, cells: Cells, head: Cells) -> bool:
         for side, got, want in (
             ("conditions", cells.conditions, head.conditions),
             ("actions", cells.actions, head.actions),
         ):
             if len(got) != len(want):
-                start = cast(int, row.start_pos)
+                start = row.start_pos
                 self.found.append(
                     _error(
                         Code.RAGGED_ROW,
@@ -251,7 +255,7 @@ class _Rows:
         if (start, cell.text) in self.memory:
             return self.memory[start, cell.text]
         try:
-            node = _parser().parse(cell.text, start=start)
+            node = _parsed(cell.text, start)
             if _deep_in(node):
                 self.found.append(screen.too_deep(self.source, cell.start, cell.end))
                 return None

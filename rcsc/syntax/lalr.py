@@ -1,0 +1,208 @@
+"""Runs the LALR tables that Lark makes of a grammar, in a third of its time: text to parse tree, or None where the text is wrong.
+
+In: a Lark parser, whose terminals, tables and rules are read once. Out: nodes with positions. The trees are Lark's: rules whose names
+begin with `_` are part of their parent, `?` rules of one child are that child, and a node's span includes the parentheses around its
+parts, not those around itself. What a text should have been only Lark says.
+"""
+
+import re
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+SKIPPED = r"(?:[ \t\f\r\n]+|#[^\r\n]*)*+"
+"""What may stand before any word; the grammar's ignored terminals."""
+END = "$END"
+
+
+class Leaf(str):
+    """A terminal: its text, its name and where it stands."""
+
+    __slots__ = ("end_pos", "start_pos", "type")
+    type: str
+    start_pos: int
+    end_pos: int
+
+
+@dataclass(slots=True)
+class Node:
+    """A rule's name, what it matched (nodes and leaves), and where; both positions are -1 where it matched nothing."""
+
+    data: str
+    children: list[Any]
+    start_pos: int
+    end_pos: int
+
+
+@dataclass(frozen=True, slots=True)
+class _Reduction:
+    """A rule as its reduction needs it.
+
+    Attributes:
+        size: How many symbols it takes from the stack.
+        origin: The symbol that it makes.
+        name: Of its nodes; empty where the children go to the parent.
+        picked: Which of the symbols become children, and whether their own children do; None for all as they are.
+        alone: Whether a single child stands for the node.
+        handed: Whether it always hands on what it takes.
+    """
+
+    size: int
+    origin: str
+    name: str
+    picked: tuple[tuple[int, bool], ...] | None
+    alone: bool
+    handed: bool
+
+
+@dataclass(frozen=True, slots=True)
+class _Words:
+    """The terminals that some state takes: how to match one, and names of words that look like another terminal."""
+
+    match: Callable[[str, int], re.Match[str] | None]
+    special: Mapping[str, Mapping[str, str]]
+
+
+class Tables:
+    """The tables of one grammar.
+
+    Args:
+        parser: A `lark.Lark` for LALR.
+    """
+
+    def __init__(self, parser: Any) -> None:
+        table = parser.parser.parser.parser.parse_table
+        self._starts: Mapping[str, int] = table.start_states
+        self._ends: Mapping[str, int] = table.end_states
+        reductions: dict[int, _Reduction] = {}
+        self._states: dict[int, dict[str, int | _Reduction]] = {
+            state: {
+                symbol: arg if isinstance(arg, int) else reductions.setdefault(id(arg), _reduction(arg))
+                for symbol, (_, arg) in actions.items()
+            }
+            for state, actions in table.states.items()
+        }
+        self._terminals = sorted(parser.terminals, key=_rank)
+        self._words: dict[frozenset[str], _Words] = {}
+        self._words_of: dict[int, _Words] = {}
+        self._skip = re.compile(SKIPPED).match
+
+    def parse(self, text: str, start: str) -> Node | None:
+        """The tree of a text by a start rule; None where it has none."""
+        states, last, position = self._states, self._ends[start], 0
+        stack, values, begins, ends = [self._starts[start]], list[Any](), list[int](), list[int]()
+        while True:
+            words = self._words_of.get(stack[-1]) or self._words_at(stack[-1])
+            found = words.match(text, position)
+            if found is not None:
+                kind = found.lastgroup or ""
+                begin, position = found.span(kind)
+                leaf = Leaf(text[begin:position])
+                if kind in words.special:
+                    kind = words.special[kind].get(leaf, kind)
+            elif self._skip(text, position).end() == len(text):  # type: ignore[union-attr]  # it matches always
+                kind = END
+            else:
+                return None
+            action = states[stack[-1]].get(kind)
+            while isinstance(action, _Reduction):
+                if action.handed:
+                    stack.pop()
+                else:
+                    _reduce(action, stack, values, begins, ends)
+                stack.append(states[stack[-1]][action.origin])  # type: ignore[arg-type]  # a state: what follows a symbol
+                if kind == END and stack[-1] == last:
+                    return values[-1]  # type: ignore[no-any-return]
+                action = states[stack[-1]].get(kind)
+            if action is None:
+                return None
+            leaf.type, leaf.start_pos, leaf.end_pos = kind, begin, position
+            stack.append(action)
+            values.append(leaf)
+            begins.append(begin)
+            ends.append(position)
+
+    def _words_at(self, state: int) -> _Words:
+        """What may stand next in a state; the same for all states that take the same terminals."""
+        taken = frozenset(self._states[state])
+        if taken not in self._words:
+            self._words[taken] = _words([one for one in self._terminals if one.name in taken])
+        return self._words_of.setdefault(state, self._words[taken])
+
+
+def _rank(terminal: Any) -> tuple[int, int, int, str]:
+    """Lark's order of terminals: the first that matches is taken."""
+    pattern = terminal.pattern
+    return -terminal.priority, -pattern.max_width, -len(pattern.value), terminal.name
+
+
+def _words(terminals: Sequence[Any]) -> _Words:
+    """One expression for these terminals; a word that another of the same priority matches whole is told by its text."""
+    special: dict[str, dict[str, str]] = {}
+    for wide in (one for one in terminals if one.pattern.type == "re"):
+        whole = re.compile(wide.pattern.to_regexp()).fullmatch
+        words = (one for one in terminals if one.pattern.type == "str" and one.priority == wide.priority)
+        found = {one.pattern.value: one.name for one in words if whole(one.pattern.value)}
+        if found:
+            special[wide.name] = found
+    inside = {name for found in special.values() for name in found.values()}
+    parts = (f"(?P<{one.name}>{one.pattern.to_regexp()})" for one in terminals if one.name not in inside)
+    return _Words(re.compile(f"{SKIPPED}(?:{'|'.join(parts) or '(?!)'})").match, special)
+
+
+def _reduction(rule: Any) -> _Reduction:
+    kept: Collection[tuple[int, bool]] = tuple(
+        (at, not symbol.is_term and symbol.name.startswith("_"))
+        for at, symbol in enumerate(rule.expansion)
+        if not (symbol.is_term and symbol.filter_out)
+    )
+    size, name = len(rule.expansion), str(rule.alias or rule.origin.name)
+    whole = len(kept) == size and not any(inner for _, inner in kept)
+    alone = rule.options.expand1 and not rule.alias
+    return _Reduction(
+        size,
+        rule.origin.name,
+        "" if name.startswith("_") else name,
+        None if whole else tuple(kept),
+        alone,
+        alone and whole and size == 1,
+    )
+
+
+def _reduce(
+    rule: _Reduction, stack: list[int], values: list[Any], begins: list[int], ends: list[int]
+) -> None:
+    """Takes the symbols of a rule from the stacks and puts there what it makes of them; the state after it is left to do."""
+    if not rule.size:
+        values.append([] if not rule.name else Node(rule.name, [], -1, -1))
+        begins.append(-1)
+        ends.append(-1)
+        return
+    size = rule.size
+    parts = values[-size:]
+    begin = begins[-size] if begins[-size] >= 0 else next((one for one in begins[-size:] if one >= 0), -1)
+    end = ends[-1] if ends[-1] >= 0 else next((one for one in ends[: -size - 1 : -1] if one >= 0), -1)
+    del stack[-size:], values[-size:], begins[-size:], ends[-size:]
+    if rule.picked is not None:
+        parts = _picked(rule.picked, parts)
+    values.append(
+        parts[0]
+        if rule.alone and len(parts) == 1
+        else Node(rule.name, parts, begin, end)
+        if rule.name
+        else parts
+    )
+    begins.append(begin)
+    ends.append(end)
+
+
+def _picked(picked: Sequence[tuple[int, bool]], parts: Sequence[Any]) -> list[Any]:
+    children: list[Any] = []
+    for at, inner in picked:
+        if not inner:
+            children.append(parts[at])
+        elif children:
+            children += parts[at]
+        else:
+            children = parts[at]  # a list that grows at its end is not copied each time
+    return children
