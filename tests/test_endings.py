@@ -7,7 +7,7 @@ import pytest
 
 from rcsc.cli import run
 from rcsc.compose.context import gives_an_order
-from rcsc.compose.ends import Ending
+from rcsc.compose.ends import Ending, longest
 from rcsc.compose.lap import Lap, laps
 from rcsc.compose.level import certificate, prove_level
 from rcsc.compose.measured import Measured
@@ -329,6 +329,56 @@ def test_what_is_not_reached_forbids_nothing() -> None:
     far = values.compare(Op.LE, number(50.0), x)
     taken = values.choice(far, inside, number(0.0))
     assert not refuted(values.both(values.compare(Op.LT, x, number(1.0)), values.compare(Op.LE, taken, x)))
+
+
+FLAGS = """table go {
+  | line | new_command | first | second | third || procedures                     | status_out |
+  | 1    | true        |       |        |       || clear                          | executing  |
+  | 2    | false       | false |        |       || first := true                  | executing  |
+  | 3    | false       | true  | false  |       || second := true                 | executing  |
+  | 4    | false       | true  | true   | false || first := not there; third := true | executing  |
+  | 5    | false       | true  | true   | true  ||                                | done       |
+}
+
+table pause {
+  | line | first || procedures                               | status_out |
+  | 1    | false || first := true; second := true; third := true | executing  |
+  | 2    | true  ||                                          | done       |
+}
+
+level lower"""
+
+
+def flagged(text: str) -> str:
+    """The lower level with flags that its lines set, one after the other, and a first command that sets all in its first cycle."""
+    before, _, after = text.partition("table go {")
+    flags = "".join(f"state {name} : bool\n" for name in ("first", "second", "third"))
+    before = before.replace("state cur_state", f"{flags}state cur_state")
+    clear = "procedure clear {\n  first := false\n  second := false\n  third := false\n}\n\n"
+    return f"{before}{clear}{FLAGS}{after.partition('level lower')[2]}"
+
+
+def test_changes_of_state_are_counted_after_the_cycle_that_takes_the_command(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As often as an enumeration of all runs finds: but not in the cycle that takes it, as the first of a run does."""
+    path = changed(tmp_path, lower=flagged)
+    one = steppers(path)["lower"]
+    role, seen = Role(one.program, one.level, one.links), set[State]()
+    explored(role, seen=seen)
+    names = list(role.start)
+    places = [names.index(name) for name in ("new_command", "first", "second", "third")]
+    every = edges(role, seen)  # from behind some cycle on
+    found = {end.table: end.changes for end in prove_level(one, LITTLE).endings}
+    for table in ("go", "pause"):
+        steps = {
+            (tuple(int(edge.start[at]) for at in places), tuple(int(edge.end[at]) for at in places))
+            for edge in every
+            if edge.table == table
+        }
+        assert found[table] == longest({(here, there) for here, there in steps if here != there})
+    assert run(["prove", str(path), "--level", "lower", "--no-cache"]) == 0
+    assert f"go ends, once taken, after at most {found['go']} changes of state" in capsys.readouterr().out
 
 
 # --- the enumeration that holds it ----------------------------------------------------------------

@@ -113,7 +113,7 @@ def _ends(one: "Ending") -> str:
     if one.changes is None:
         return "is not shown to end: its states may go round"
     changes = "one change" if one.changes == 1 else f"{one.changes} changes"
-    said = f"ends after at most {changes} of state"
+    said = f"ends, once taken, after at most {changes} of state"
     if one.endless:
         lines = ", ".join(f"`{line}`" for line in one.endless)
         return f"is not shown to end: {'line' if len(one.endless) == 1 else 'lines'} {lines} may run for ever"

@@ -7,7 +7,8 @@ is *unanswered* while it reports neither; a fourth status answers nothing. The a
 
 - Its *table* stays, or what selects it is no part of the command: then from table to table there is no way round.
 - Its *phase* is its pending next states, and the flags that its lines write. From phase to phase there is no way round (all
-  steps are listed by the solver, from the invariant), so the phase changes at most `changes` times; but for ways round on which
+  steps are listed by the solver, from the invariant), so after the cycle that takes the command, which may be the first of all, the phase
+  changes at most `changes` times; but for ways round on which
   the command is answered in every cycle: whoever stays on one has answered for good.
 - While the phase stays, lines follow one another. A line that comes again and again stands on a way round among them. It
   comes finitely often if there is a *counter*, a number of the level that rises whenever the line runs and never falls on that
@@ -49,7 +50,8 @@ class Ending:
     """What was found of one table.
 
     Attributes:
-        changes: How often the phase can change while the command lasts; None where it could go round, or the table could.
+        changes: How often the phase can change while the command lasts, after the cycle that takes it; None where it could go round,
+            or the table could.
         counted: Lines that may run for as long as a counter rises.
         still: Inputs whose values, echoes and statuses apart, are taken to stand still meanwhile.
         endless: Lines of which it is not shown that they end.
