@@ -244,6 +244,19 @@ def test_what_the_tables_declare_is_not_called_proved_and_is_named_by_what_rests
 
 
 @pytest.mark.usefixtures("here")
+def test_lines_that_never_run_because_of_what_is_declared_say_so(
+    check: Said, capfd: pytest.CaptureFixture[str]
+) -> None:
+    solo(
+        "input x : int 0 .. 9\nassume small assumed : x < 5\ntable t assuming small {\n| line | x ||\n| a | < 5 ||\n| b | >= 5 ||\n}"
+    )
+    assert prove() == 0
+    trusting = "trusting assumption `small` of level `solo`"
+    assert f"lines never reached here:\n    t b: proved, {trusting}\n" in capfd.readouterr().out
+    assert f"line b never reached in system.toml, {trusting}, " in check("solo.rcs")
+
+
+@pytest.mark.usefixtures("here")
 def test_what_rests_on_what_is_not_proved_is_conditional_and_says_on_what(check: Said) -> None:
     """Every verdict of a level whose index is safe only under an invariant that does not hold within the cycle."""
     solo(

@@ -58,7 +58,7 @@ def in_context(whole: "SystemProof", proof: "LevelProof") -> Iterator[str]:
         return
     never = [(" ".join(at), standing(whole, proof.level, (UNREACHED, *at))) for at in seen.unreached]
     good = ", ".join(name for name, said in never if said == "proved")
-    yield f"lines never reached here: {good or 'none'}"
+    yield f"lines never reached here: {good or ('none' if not never else '')}".rstrip()
     yield from (f"  {name}: {said}" for name, said in never if said != "proved")
     if seen.unsure:
         yield f"not shown whether reached: {', '.join(' '.join(at) for at in seen.unsure)}"

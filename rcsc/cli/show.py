@@ -224,7 +224,8 @@ def _together(known: InSystem) -> Iterator[str]:
         yield f"conditional in {system}: rests on {escape(named(known.rests))}"
     if known.unreached:
         noun = "line" if len(known.unreached) == 1 else "lines"
-        yield f"{noun} {', '.join(map(escape, known.unreached))} never reached in {system}"
+        lines = ", ".join(map(escape, known.unreached))
+        yield f"{noun} {lines} never reached in {system}{'' if known.proved else escape(trusting(known.trusts))}"
 
 
 def _of_system(one: SystemReport) -> str:

@@ -27,7 +27,8 @@ class InSystem:
 
     Attributes:
         system: The system's description.
-        proved: Assumptions that the levels keep, all of this content; `trusts`, what that takes for granted, as tables declare it.
+        proved: Assumptions that the levels keep, all of this content; `trusts`, what that and `unreached` take for granted,
+            as tables declare it.
         conditional: Assumptions that they keep if what that rests on is so; `rests`, what of it is not proved, in words.
         not_proved: Assumptions of which an earlier run could not show that.
         unreached: Lines that no reachable cycle of this system runs, DEFAULT too.

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from rcsc.cache import Cache, cache_of
+from rcsc.compose.claims import UNREACHED
 from rcsc.compose.standing import ASSUMPTION, PROPERTY, Assumed, Known, LevelOutline, Standing
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label, Severity, sort_key
@@ -58,9 +59,9 @@ class _Place:
         """What it rests on that is not proved, in words."""
         return self.standing.lacking(self.level.name, (ASSUMPTION, self.table, assumption))
 
-    def trusts(self, assumption: str) -> tuple[str, ...]:
-        """What it trusts, in words."""
-        return self.standing.trusting(self.level.name, (ASSUMPTION, self.table, assumption))
+    def trusts(self, sort: str, name: str) -> tuple[str, ...]:
+        """What a claim of a sort about an assumption or a line of the table trusts, in words."""
+        return self.standing.trusting(self.level.name, (sort, self.table, name))
 
     @property
     def unreached(self) -> tuple[str, ...]:
@@ -122,7 +123,8 @@ class _Seen:
             (name, Known.PROVED.value if name in proved else was) for name, was in table.assumptions
         )
         rests = tuple(dict.fromkeys(word for one in at for name in conditional for word in one.rests(name)))
-        trusts = tuple(dict.fromkeys(word for one in at for name in proved for word in one.trusts(name)))
+        claims = [*((ASSUMPTION, name) for name in proved), *((UNREACHED, line) for line in unreached)]
+        trusts = tuple(dict.fromkeys(word for one in at for claim in claims for word in one.trusts(*claim)))
         together = InSystem(system, proved, by[Known.NOT_PROVED], unreached, conditional, rests, trusts)
         return replace(table, assumptions=assumptions, together=together)
 
