@@ -5,11 +5,14 @@ the same outcome in every process and with both kinds of executors.
 """
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
+from itertools import chain
 from pathlib import Path
-from typing import Any, Literal, NamedTuple, get_args
+from typing import Literal, NamedTuple, get_args
 
+from rcsc.files.kept import plain, read
+from rcsc.files.names import shown
 from rcsc.files.read import json_of
 from rcsc.system.cell import Kind
 from sim.cell import Backend
@@ -35,6 +38,14 @@ FAULTS: Mapping[str, str] = {
     "changed command": "the script: another command comes before the last one has ended",
 }
 """Fault classes, and how each is injected."""
+
+
+REACH: Mapping[str, tuple[float, float]] = {
+    "seed": (0, 2**64), "step_s": (0.0002, 0.04), "tick": (0, 1_000_000), "first_tick": (0, 1_000_000),
+    "last_tick": (-1, 2_000_000), "ticks": (0, 10_000), "part": (0, 1000), "value": (-1e6, 1e6), "x_mm": (-1e4, 1e4),
+    "y_mm": (-1e4, 1e4), "yaw_deg": (-1e4, 1e4), "size_mm": (0.1, 1000.0), "density_kg_m3": (1.0, 1e5), "friction": (0.0, 100.0),
+}  # fmt: skip
+"""Between what each number of an episode lies; what is drawn lies well within."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,7 +141,7 @@ class Episode:
         """Refuses what no episode can be.
 
         Raises:
-            ValueError: A backend, an executor, a fault or a harm that nobody knows; a push with physics.
+            ValueError: A backend, an executor, a fault or a harm that nobody knows; a number that is out of reach; a push with physics.
         """
         known = {one.name for one in fields(Faults)}
         for said, words in (
@@ -140,9 +151,31 @@ class Episode:
             *((one.kind, get_args(HARM)) for one in self.transport),
         ):
             if said not in words:
-                raise ValueError(f"`{said}` is none of {', '.join(sorted(words))}")
+                raise ValueError(f"{shown(said)} is none of {', '.join(sorted(words))}")
+        for what, number in self._numbers():
+            low, high = REACH[what]
+            if not low <= number <= high:
+                raise ValueError(f"`{what}` is {number:g}, and lies between {low:g} and {high:g}")
+        if any(len(part.size_mm) not in (0, 3) for part in self.parts):
+            raise ValueError("a size is a length, a width and a height")
         if self.pushes and self.backend != "kinematic":
             raise ValueError("with physics nothing but a force moves a part")
+
+    def _numbers(self) -> Iterator[tuple[str, float]]:
+        """Every number in it, by the name of its field."""
+        yield from (("seed", self.seed), ("step_s", self.step_s))
+        lists: tuple[tuple[object, ...], ...] = (
+            self.parts,
+            self.faults,
+            self.transport,
+            self.restarts,
+            self.interruptions,
+            self.pushes,
+        )
+        for one in chain.from_iterable(lists):
+            for name in REACH:
+                value = getattr(one, name, ())
+                yield from ((name, number) for number in (value if isinstance(value, tuple) else (value,)))
 
     def to_json(self) -> str:
         """As text that `from_json` reads; the same text for the same episode."""
@@ -155,29 +188,11 @@ class Episode:
         Raises:
             ValueError: The text is none.
         """
-        try:
-            said = {**json_of(text)}
-            for name, kind in _LISTS.items():
-                said[name] = tuple(kind(**_tuples(one)) for one in said.get(name, ()))
-            said["rows"] = tuple(said.get("rows", ()))
-            return cls(**said)
-        except (TypeError, AttributeError) as error:
-            raise ValueError(f"no episode: {error}") from error
-
-
-_LISTS: Mapping[str, type] = {
-    "parts": PartSpec,
-    "faults": FaultSpec,
-    "transport": TransportSpec,
-    "restarts": Restart,
-    "interruptions": Interruption,
-    "pushes": Push,
-}
-
-
-def _tuples(said: Mapping[str, Any]) -> dict[str, Any]:
-    """JSON has no tuples."""
-    return {name: tuple(value) if isinstance(value, list) else value for name, value in said.items()}
+        said = json_of(text)
+        if not isinstance(said, dict):
+            raise ValueError("no episode: no table of names and values")  # noqa: TRY004  # what was read, not what was called
+        made: Episode = read(cls, {**plain(Episode()), **said})
+        return made
 
 
 class RowEnd(NamedTuple):

@@ -1,5 +1,6 @@
 """Campaigns: the same outcomes with any crew, kills survived on both sides, journals, shrinking, counterexamples, the command."""
 
+import copy
 import json
 import os
 import subprocess
@@ -39,7 +40,18 @@ from sim.campaign.runner import campaign
 from sim.campaign.shrink import shrink
 from sim.campaign.summary import as_json, as_text, summary
 from sim.campaign.work import OtherTables, play
-from sim.episode import FAULTS, SYSTEM, Episode, FaultSpec, Finding, PartSpec, Restart, TransportSpec
+from sim.episode import (
+    FAULTS,
+    SYSTEM,
+    Episode,
+    FaultSpec,
+    Finding,
+    Interruption,
+    PartSpec,
+    Push,
+    Restart,
+    TransportSpec,
+)
 from tests import episodes as fake
 
 CALM = Rig(draw=fake.calm, run=fake.play)
@@ -304,10 +316,34 @@ def test_damage_before_the_last_line_is_refused(tmp_path: Path) -> None:
     with Journal(path, head) as journal:
         journal.add(alone(CALM, 4).values())
     lines = path.read_bytes().splitlines(keepends=True)
-    for bad in (b"{}\n", lines[2][:9] + b"\n", b'{"index":1,"faults":3}\n', b"null\n"):
+    good = json.loads(lines[2])
+    odd = [
+        {"index": -1},
+        {"index": "1"},
+        {"ticks": 1.5},
+        {"ticks": -1},
+        {"faults": [1]},
+        {"end": None},
+        {"lines": "zz"},
+    ]
+    odd += [
+        {"lines": "f" * 200_000},
+        {"findings": [["a", "b", "c"]]},
+        {"findings": [["a", -1, "c"]]},
+        {"more": 1},
+        {"digest": True},
+    ]
+    changed = [json.dumps(good | one).encode() + b"\n" for one in odd]
+    for bad in (b"{}\n", lines[2][:9] + b"\n", b'{"index":1,"faults":3}\n', b"null\n", *changed):
         path.write_bytes(b"".join([*lines[:2], bad, *lines[3:]]))
         with pytest.raises(BadJournal, match="line 3 is damaged"):
             Journal(path, head)
+
+
+def test_a_pipe_is_no_journal(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "j")
+    with pytest.raises(BadJournal, match="is no journal"):
+        Journal(tmp_path / "j", header(CALM, 5))
 
 
 def test_two_campaigns_do_not_write_one_journal(tmp_path: Path) -> None:
@@ -553,6 +589,39 @@ def test_a_file_without_an_episode_is_refused(tmp_path: Path) -> None:
             again(tmp_path)
     with pytest.raises(BadEpisode, match="cannot be read"):
         again(tmp_path / "none.json")
+
+
+EVERYTHING = Episode(
+    parts=(PartSpec("tbox", size_mm=(1.0, 2.0, 3.0)),), rows=("MOVE,,,WS-SAFE,",), faults=(FaultSpec("slips", 3, 4),),
+    transport=(TransportSpec("task.report", "lost", 3, 4),), restarts=(Restart(3, "task"),),
+    interruptions=(Interruption(3, "MOVE,,,WS-SAFE,"),), pushes=(Push(3, 0, 1.0, 1.0),),
+)  # fmt: skip
+
+
+def _changed(value: Any) -> Iterator[Any]:
+    """The value with one thing in it that cannot stand there, for each thing in it."""
+    yield from (
+        (3, None) if not isinstance(value, int | float) else ("x", None, True, 1e300, -(2**70), [value])
+    )
+    keys = value if isinstance(value, dict) else range(len(value)) if isinstance(value, list) else ()
+    for key in keys:
+        for odd in _changed(value[key]):
+            made = copy.copy(value)
+            made[key] = odd
+            yield made
+    if isinstance(value, dict):
+        yield value | {"more": 1}
+
+
+def test_an_episode_is_read_by_what_its_fields_are(tmp_path: Path) -> None:
+    assert Episode.from_json(EVERYTHING.to_json()) == EVERYTHING
+    for changed in _changed(json.loads(EVERYTHING.to_json())):
+        (tmp_path / "episode.json").write_text(json.dumps(changed))
+        with pytest.raises(BadEpisode, match=r"episode\.json"):
+            saved_episode(tmp_path)
+    (tmp_path / "episode.json").write_text(replace(EVERYTHING, restarts=(Restart(3, "nobody"),)).to_json())
+    with pytest.raises(BadEpisode, match="there is no level `nobody`"):
+        again(tmp_path)
 
 
 # --- the summary ---

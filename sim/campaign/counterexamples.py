@@ -12,8 +12,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rcsc.files import write_atomically
+from rcsc.files.names import shown
 from rcsc.files.read import json_of, text
 from rcsc.system.cell import Kind
+from rcsc.system.description import description
 from sim.campaign.crew import Crashed, Crew
 from sim.campaign.journal import Record
 from sim.campaign.rig import Rig, digest
@@ -27,6 +29,10 @@ if TYPE_CHECKING:
 
 MOST = 20
 """Counterexamples that are made of one campaign; the others stay in its journal."""
+
+
+MOST_CHARACTERS = 120
+"""Of a property, in the name of a folder."""
 
 
 class BadEpisode(Exception):  # noqa: N818  # what happened, not an error of ours
@@ -43,7 +49,7 @@ class Choice:
 
     def name(self, seed: int) -> str:
         """Of its folder."""
-        return f"{seed}-{self.index}-{re.sub('[^a-z0-9]+', '-', self.property.lower()).strip('-')}"
+        return f"{seed}-{self.index}-{re.sub('[^a-z0-9]+', '-', self.property.lower()).strip('-')[:MOST_CHARACTERS]}"
 
 
 def choices(records: Iterable[Record]) -> tuple[Choice, ...]:
@@ -182,4 +188,9 @@ def again(path: Path, rig: Rig | None = None, executor: Kind | None = None) -> O
         BadDescription, BadData, NotBuilt: The system is not in order.
     """
     episode = saved_episode(path)
-    return attempt(rig or Rig(), replace(episode, executor=executor) if executor else episode)
+    rig = rig or Rig()
+    levels = {level.name for level in description(rig.system).levels}
+    for one in episode.restarts:
+        if one.level not in levels:
+            raise BadEpisode(f"{path}: there is no level {shown(one.level)} to start again")
+    return attempt(rig, replace(episode, executor=executor) if executor else episode)

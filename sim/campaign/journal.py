@@ -7,6 +7,7 @@ is dropped; anything else that is wrong is refused, and the file is left as it i
 import fcntl
 import json
 import os
+import stat
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +15,7 @@ from types import TracebackType
 from typing import Any, BinaryIO, Self
 
 from rcsc import __version__
+from rcsc.files.kept import read
 from rcsc.files.read import json_of
 from sim.campaign.rig import Rig, digest
 from sim.episode import Finding
@@ -21,6 +23,9 @@ from sim.episode import Finding
 FORM = 1
 """Of the file; another is not read."""
 
+MOST_BYTES = 256 * 1024 * 1024
+MOST_DIGITS = 100_000
+"""Of the lines that ran: a bit each."""
 _SHOWN = 16
 """Digits of a digest that are shown."""
 
@@ -97,7 +102,7 @@ class Journal:
         path.parent.mkdir(parents=True, exist_ok=True)
         self.path = path
         self.records: dict[int, Record] = {}
-        self._file = open(os.open(path, os.O_RDWR | os.O_CREAT, 0o666), "r+b")  # noqa: SIM115  # closed by `close`
+        self._file = _opened(path)
         try:
             _lock(self._file, path)
             self._take(head)
@@ -112,7 +117,7 @@ class Journal:
         if not whole and not first.startswith(content):
             raise BadJournal(f"{self.path} is no journal")
         if whole:
-            begun, *rest = whole.splitlines()
+            begun, *rest = whole[:-1].split(b"\n")
             _compare(self.path, begun, head)
             for number, line in enumerate(rest, 2):
                 record = _read(self.path, number, line)
@@ -147,6 +152,16 @@ class Journal:
         self.close()
 
 
+def _opened(path: Path) -> BinaryIO:
+    """The file, open for reading and writing; it is made where there is none."""
+    handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NONBLOCK, 0o666)
+    kind = os.fstat(handle)
+    if not stat.S_ISREG(kind.st_mode) or kind.st_size > MOST_BYTES:
+        os.close(handle)
+        raise BadJournal(f"{path} is no journal: no regular file, or larger than {MOST_BYTES} bytes")
+    return open(handle, "r+b")
+
+
 def _lock(file: BinaryIO, path: Path) -> None:
     """The kernel lets go when the process ends, however it does."""
     try:
@@ -157,8 +172,8 @@ def _lock(file: BinaryIO, path: Path) -> None:
 
 def _compare(path: Path, line: bytes, head: dict[str, Any]) -> None:
     try:
-        found = dict(json_of(line))
-    except (ValueError, TypeError) as error:
+        found = read(dict[str, str | int], json_of(line))
+    except ValueError as error:
         raise BadJournal(f"{path} is no journal") from error
     if not found.keys() >= {"form", "seed"}:
         raise BadJournal(f"{path} is no journal")
@@ -183,17 +198,26 @@ def _said(one: Record) -> dict[str, Any]:
     }
 
 
+@dataclass(frozen=True, slots=True)
+class _Line:
+    """A record, as its line has it."""
+
+    index: int
+    faults: list[str]
+    end: str
+    ticks: int
+    findings: list[tuple[str, int, str]]
+    lines: str
+    digest: str
+
+
 def _read(path: Path, number: int, line: bytes) -> Record:
     try:
-        said = json_of(line)
-        return Record(
-            int(said["index"]),
-            tuple(map(str, said["faults"])),
-            str(said["end"]),
-            int(said["ticks"]),
-            tuple(Finding(str(name), int(tick), str(why)) for name, tick, why in said["findings"]),
-            int(said["lines"], 16),
-            str(said["digest"]),
-        )
-    except (ValueError, KeyError, TypeError) as error:
+        said: _Line = read(_Line, json_of(line))
+        found = tuple(Finding(*one) for one in said.findings)
+        if min(said.index, said.ticks, *(one.tick for one in found), 0) < 0 or len(said.lines) > MOST_DIGITS:
+            raise ValueError  # noqa: TRY301  # told below
+        lines = int(said.lines, 16)
+        return Record(said.index, tuple(said.faults), said.end, said.ticks, found, lines, said.digest)
+    except ValueError as error:
         raise BadJournal(f"{path}, line {number} is damaged") from error
