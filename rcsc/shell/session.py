@@ -187,7 +187,10 @@ class Session:
         said = []
         for level in self.levels:
             old, values = self._past[-1].of(level.name)
+            alike = old.sign is level.sign
             for at, leaf in enumerate(level.sign.leaves):
+                if alike and values[at] == level.values[at]:
+                    continue
                 before = old.sign.index.get(leaf.name)
                 shown = "" if before is None else old.sign.leaves[before].shown(values[before])
                 if shown != leaf.shown(level.values[at]):

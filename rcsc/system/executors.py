@@ -22,7 +22,8 @@ from rcsc.files.names import BadName
 from rcsc.files.read import Malformed, content
 from rcsc.system.signature import FORMATS, LevelSign, Signature, Value, Values, sources_of
 
-FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared")
+FLAGS = ("-std=c99", "-O1", "-ffp-contract=off", "-fPIC", "-shared")
+"""A cycle takes microseconds; more optimization would only be waited for at each start."""
 
 
 class NotBuilt(Exception):  # noqa: N818  # what happened, not an error of ours
