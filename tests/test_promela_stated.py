@@ -146,8 +146,8 @@ def test_of_statements_at_random_spin_finds_broken_what_is_not_proved_and_no_mor
     seed: int, tmp_path: Path
 ) -> None:
     random = Random(seed)  # noqa: S311  # repeatable on purpose
-    stated = [f"property p{at} : {some_property(random)}" for at in range(9)]
-    stated += [f"invariant i{at} : {some_condition(random, LASTING)}" for at in range(3)]
+    stated = [f"property p{at} : {some_property(random)}" for at in range(5)]
+    stated += [f"invariant i{at} : {some_condition(random, LASTING)}" for at in range(2)]
     system = changed(tmp_path, lower=added("\n".join(stated)))
     proof = prove_level(system["lower"], Effort(walks=6, cycles=40))
     sorts = {Sort.PROPERTY, Sort.INVARIANT}

@@ -4,7 +4,7 @@ In: a `Source`. Out: a `tree.File`, or every syntax error that was found. No tex
 """
 
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, lru_cache
 from importlib.resources import files as package_files
 from pathlib import Path
 from typing import Any, cast
@@ -52,6 +52,7 @@ def _parsed(text: str, start: str) -> Node:
     return found
 
 
+@lru_cache(maxsize=128)  # one run reads a file for each root that uses it, and a shell at each reload
 def parse(source: Source) -> tree.File | tuple[Diagnostic, ...]:
     """The tree of `source`, or what is wrong with its text.
 
