@@ -88,6 +88,17 @@ def below(*arguments: object) -> tuple[Below, ...]:
     return (Below(*arguments),)  # type: ignore[arg-type]  # likewise
 
 
+class Wrong:
+    """Publishes what the buffer cannot hold."""
+
+    def step(self, _tick: int, _latest: Callable[[str], Values | None]) -> Mapping[str, Values]:
+        return {"emove.report": (-1, 0.5, 300, 0)}
+
+
+def wrong() -> tuple[Wrong, ...]:
+    return (Wrong(),)
+
+
 def alone(repo: Path) -> Description:
     """TASK between a sender and a stand-in of E-MOVE."""
     whole = description(repo / "tables/system.toml")

@@ -20,7 +20,7 @@ from hypothesis import strategies as st
 from rcsc.system.adopt import adopt
 from rcsc.system.block import FOLDER, PREFIX, Block
 from rcsc.system.buffers import Buffers, CommonMemory
-from rcsc.system.cell import Outside, assemble, executors
+from rcsc.system.cell import Outside, StateTableError, assemble, executors
 from rcsc.system.description import BadDescription, Description, LevelSpec, Wire, description
 from rcsc.system.processes import Supervisor, run_processes
 from rcsc.system.serve import Factory, begin, cycle
@@ -506,6 +506,27 @@ def test_an_exception_outside_is_reported(repo: Path, capfd: pytest.CaptureFixtu
     with pytest.raises(ChildProcessError, match="process `bad` ended with code 1"):
         run_processes(alone(repo), "python", {"bad": Factory("no_such_module:f")}, queries=QUERIES, rate=0)
     assert "no_such_module" in capfd.readouterr().err
+
+
+def test_a_state_that_no_cycle_may_begin_with_is_refused_by_name(
+    repo: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    values, sign = list(started(repo, 0)), sign_of(repo, "task")
+    values[sign.index["tbuffer_boxt"]] = 255
+    system = Supervisor(alone(repo), "python", outside(tmp_path, 1, 1), queries=QUERIES, rate=0)
+    system.buffers.commit("task", tuple(values))
+    with system:
+        until(lambda: system.code("task") is not None, "TASK goes on")
+        with pytest.raises(
+            StateTableError, match=r"level `task` cannot go on from this state: `tbuffer_boxt` = 255"
+        ):
+            system.check()
+    assert "Traceback" not in capfd.readouterr().err
+
+
+def test_what_no_buffer_can_hold_is_refused_by_name(repo: Path) -> None:
+    with pytest.raises(StateTableError, match=r"buffer `emove\.report` cannot hold what was published"):
+        run_processes(alone(repo), "python", {"wrong": Factory(f"{HERE}:wrong")}, queries=QUERIES, rate=0)
 
 
 # --- adopt ---

@@ -8,6 +8,7 @@ What it sees is at times older or newer than in one process; tables that keep th
 """
 
 import contextlib
+import multiprocessing
 import os
 import signal
 import sys
@@ -21,11 +22,12 @@ from typing import TYPE_CHECKING, Any, Self
 from rcsc import children
 from rcsc.system.cell import Kind, StateTableError, signatures
 from rcsc.system.description import Description
-from rcsc.system.serve import FAULTY, Factory, Setting, serve_level, serve_outside
+from rcsc.system.serve import FAULTY, MOST_TOLD, REFUSED, Factory, Setting, serve_level, serve_outside
 from rcsc.system.shared import Absent, SharedMemoryBuffers, layout
 from rcsc.system.unproved import refuse_unproved
 
 if TYPE_CHECKING:
+    from multiprocessing.connection import Connection
     from multiprocessing.context import SpawnProcess
 
 PATIENCE_S = 5.0
@@ -71,6 +73,7 @@ class Supervisor:
         laid = layout(description, self._signs)
         self._outside = outside
         self._running: dict[str, SpawnProcess] = {}
+        self._told: dict[str, Connection] = {}
         self._pulses: dict[str, _Pulse] = {}
         tick_s = description.tick_ms / 1000
         periods_s = dict.fromkeys(outside, tick_s) | {
@@ -111,15 +114,20 @@ class Supervisor:
         """
         if self.runs(name):
             raise ValueError(f"`{name}` runs")
+        told, tells = multiprocessing.Pipe(duplex=False)
         work: tuple[Callable[..., None], tuple[Any, ...]] = (
-            (serve_level, (self._setting, name))
+            (serve_level, (self._setting, name, tells))
             if name in self._signs
-            else (serve_outside, (self._setting, self._outside[name]))
+            else (serve_outside, (self._setting, self._outside[name], tells))
         )
         made = children.process(name, work[0], *work[1])
         with children.interrupts_held():
             made.start()
+        tells.close()
         self._running[name] = made
+        if name in self._told:
+            self._told[name].close()
+        self._told[name] = told
         self._pulses.pop(name, None)
 
     def stop(self, name: str, how: signal.Signals = signal.SIGTERM) -> None:
@@ -151,11 +159,13 @@ class Supervisor:
         """Looks for processes that ended by themselves.
 
         Raises:
-            StateTableError: A level met a fault.
+            StateTableError: A level met a fault, or was refused a state or values.
             ChildProcessError: A process ended by an exception; what it was stands on the standard error stream.
         """
         for name in self._running:
             code = self.code(name)
+            if code == REFUSED and self._told[name].poll():
+                raise StateTableError(self._told[name].recv_bytes(MOST_TOLD).decode(errors="replace"))
             if code == FAULTY and name in self._signs:
                 raise StateTableError(self._said(name))
             if code is not None and code > 0:
@@ -197,6 +207,8 @@ class Supervisor:
                 self.stop(name)
                 self._running[name].close()
             self._running.clear()
+            for told in self._told.values():
+                told.close()
             self.buffers.block.unlink()
             self.buffers.close()
 

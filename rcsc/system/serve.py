@@ -8,9 +8,11 @@ import contextlib
 import importlib
 import os
 import signal
+import struct
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from multiprocessing.connection import Connection
 from typing import Any, Protocol
 
 from rcsc.system.adopt import restart
@@ -18,11 +20,13 @@ from rcsc.system.buffers import Buffers
 from rcsc.system.cell import Kind, Outside, signatures
 from rcsc.system.description import Description
 from rcsc.system.executors import CExecutor, PythonExecutor, build
-from rcsc.system.levels import RunningLevel, running_level
+from rcsc.system.levels import RunningLevel, StateTableError, running_level
 from rcsc.system.shared import Absent, SharedMemoryBuffers, layout
 from rcsc.system.signature import Signature, Values
 
 FAULTY = 3  # a level's exit code after a fault; which one stands in its checkpoint
+REFUSED = 4  # of a process that was refused a state or values; it has told why
+MOST_TOLD = 4096
 NAP_S = 20e-6
 
 
@@ -120,9 +124,9 @@ def fault_of(sign: Signature, values: Values) -> int:
     return int(values[len(sign.leaves) + 1])
 
 
-def serve_level(setting: Setting, name: str) -> None:
-    """A level's process, from its start to SIGTERM or a fault."""
-    with _attached(setting) as (signs, transport):
+def serve_level(setting: Setting, name: str, told: Connection) -> None:
+    """A level's process, from its start to SIGTERM or a fault; what it was refused is sent."""
+    with _telling(told), _attached(setting) as (signs, transport):
         level = _level(setting, name, signs[name])
         begin(level, transport)
         period_s = level.level.period_ms / 1000 / setting.rate if setting.rate else 0.0
@@ -131,17 +135,34 @@ def serve_level(setting: Setting, name: str) -> None:
                 raise SystemExit(FAULTY)
 
 
-def serve_outside(setting: Setting, factory: Factory) -> None:
+def serve_outside(setting: Setting, factory: Factory, told: Connection) -> None:
     """A process for what stands outside the levels, until it is over: until one part of it says `over`."""
-    with _attached(setting) as (_, transport):
+    with _telling(told), _attached(setting) as (_, transport):
         made: tuple[Outside, ...] = tuple(factory.make())
         period_s = setting.description.tick_ms / 1000 / setting.rate if setting.rate else 0.0
         for tick in _rounds(setting, period_s):
             for one in made:
                 for name, values in one.step(tick, transport.latest).items():
-                    transport.publish(name, values)
+                    _publish(transport, name, values)
             if any(getattr(one, "over", False) for one in made):
                 return
+
+
+def _publish(transport: Transport, name: str, values: Values) -> None:
+    try:
+        transport.publish(name, values)
+    except struct.error as error:
+        raise StateTableError(f"buffer `{name}` cannot hold what was published: {error}") from error
+
+
+@contextlib.contextmanager
+def _telling(told: Connection) -> Iterator[None]:
+    """Sends why a level was refused a state or values, and ends the process with `REFUSED`."""
+    try:
+        yield
+    except StateTableError as error:
+        told.send_bytes(str(error).encode()[:MOST_TOLD])
+        raise SystemExit(REFUSED) from None
 
 
 @contextlib.contextmanager
