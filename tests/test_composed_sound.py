@@ -665,6 +665,41 @@ def test_what_is_assumed_of_an_input_is_used_and_named_in_every_verdict(tmp_path
     assert whole.proved
 
 
+IMPOSSIBLE = """input x : int 0 .. 4
+state n : int 1 .. 4
+{more}
+assume odd assumed : x * 2 = n * 2 + {by}
+invariant above : n > 1
+property never : x = 9 - n
+table t assuming odd {{
+  | line | when ||
+  |------|------||
+  | 1    | true ||
+}}
+level solo {{ period 40 [ms] {before} table t }}
+"""
+SPOILT = "module spoil reads x, n writes n { n := min(n + x, 4) }"
+
+
+@pytest.mark.parametrize(
+    ("by", "more", "before", "possible"),
+    [(2, "", "", True), (1, "", "", False), (1, SPOILT, "preprocess spoil", False)],
+)
+def test_nothing_is_proved_of_what_no_cycle_can_be(
+    by: int, more: str, before: str, possible: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """From a contradiction everything follows, even an invariant that is broken from the beginning."""
+    path = solo(tmp_path, IMPOSSIBLE.format(by=by, more=more, before=before))
+    whole = prove_system(path, LITTLE)
+    odd = Sort.ASSUMPTION, "t", "odd"
+    assert whole.of("solo", odd).verdict is (Verdict.TRUSTED if possible else Verdict.NOT_PROVED)
+    assert not whole.of("solo", (Sort.INVARIANT, "", "above")).proved
+    if not possible:
+        assert ("solo", odd) in whole.of("solo", (Sort.PROPERTY, "", "never")).lacks
+        assert run(["prove", str(path), "--no-cache"]) == 1
+        assert "no first cycle can be as the tables declare" in capsys.readouterr().err
+
+
 def test_what_is_assumed_of_state_alone_is_to_be_proved(tmp_path: Path) -> None:
     """The level itself decides it, so that nobody has to believe it: and it may be wrong."""
     path = solo(tmp_path, BELIEVES.format(says="not y"))

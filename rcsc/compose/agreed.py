@@ -143,6 +143,9 @@ def _of_runs(stepper: Stepper, proof: LevelProof) -> Iterator[tuple[Key, Claim]]
     ends = [*([] if links.above is None else [links.above.order]), *(below.report for below in links.below)]
     needs: list[Key] = [SAFE, *((CONTRACT, "", record) for record in ends)]
     needs += [goal.key for goal, _ in proof.found if goal.sort in {Sort.SOME_LINE, Sort.ONE_LINE}]
+    needs += [
+        goal.key for goal, _ in proof.found if goal.sort is Sort.ASSUMPTION and goal.name in stepper.trusted
+    ]
     trusts = [f"assumption `{one}` of level `{name}`{DECLARED}" for one in sorted(stepper.trusted)]
     trusts += [
         f"the same question has the same answer in `{asked.into}` of level `{name}`" for asked in links.asked

@@ -175,6 +175,7 @@ def _verdicts(
     every = [wanted, *(goals(stepper, first) for first in inference.firsts)]
     asked = [[keyed.term(values.negation(goal.holds)) for goal in each] for each in every]
     solvers = [inference.known(found.clauses), *(inference.beginning(first) for first in inference.firsts)]
+    believed = _believed(stepper, solvers[1:])
     for at, goal in enumerate(wanted):
         if at in found.open:
             yield goal, Verdict.NOT_PROVED
@@ -182,9 +183,17 @@ def _verdicts(
         answers = {_asked(solver, terms[at]) for solver, terms in zip(solvers, asked, strict=True)}
         if answers == {Answer.UNSATISFIABLE}:
             trusted = goal.sort is Sort.ASSUMPTION and goal.name in stepper.trusted
-            yield goal, Verdict.TRUSTED if trusted else Verdict.PROVED
+            yield goal, believed if trusted else Verdict.PROVED
         else:
             yield goal, Verdict.NOT_PROVED if Answer.SATISFIABLE in answers else Verdict.UNDECIDED
+
+
+def _believed(stepper: Stepper, beginnings: Sequence[Solver]) -> Verdict:
+    """What becomes of what the tables declare: where no first cycle can keep to all of it, all that rests on it says nothing."""
+    answers = {solver.check() for solver in beginnings} if stepper.trusted else set()
+    if Answer.UNSATISFIABLE in answers:
+        return Verdict.NOT_PROVED
+    return Verdict.UNDECIDED if Answer.UNKNOWN in answers else Verdict.TRUSTED
 
 
 def _asked(solver: Solver, term: Term) -> Answer:
