@@ -248,9 +248,14 @@ def call(program: Program, name: str, args: list[Value], snapshot: dict[str, Val
 def _call_extern(
     program: Program, procedure: Procedure, args: list[Value], snapshot: dict[str, Value]
 ) -> None:
-    """The user's function takes the reads and the arguments, and gives the writes in order: one as it is or in a tuple."""
+    """The user's function takes the reads and the arguments, and gives the writes in order: one as it is or in a tuple.
+
+    What it gives where nothing is written does not matter; another number of values than are written is refused.
+    """
     given = (_ANSWERS.get() or _of_user)(procedure, [*(snapshot[name] for name in procedure.reads), *args])
-    for name, value in zip(procedure.writes, given, strict=True):
+    if procedure.writes and len(given) != len(procedure.writes):
+        raise ExternError(procedure.writes[0])
+    for name, value in zip(procedure.writes, given, strict=bool(procedure.writes)):
         admitted = _admitted(program.variable(name), value)
         if admitted is None:
             raise ExternError(name)
@@ -261,9 +266,9 @@ def _of_user(procedure: Procedure, args: list[Value]) -> tuple[Value, ...]:
     assert procedure.extern is not None
     module, _, function = procedure.extern.python.partition(":")
     results = getattr(importlib.import_module(module), function)(*args)
-    if isinstance(results, tuple):
-        return results
-    return (results,) if procedure.writes else ()
+    if not procedure.writes:
+        return ()
+    return results if isinstance(results, tuple) else (results,)
 
 
 @contextmanager

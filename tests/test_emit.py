@@ -28,7 +28,7 @@ from rcsc.emit.environment import environment
 from rcsc.emit.names import C_WORDS, PYTHON_WORDS, comment
 from rcsc.emit.write import write
 from rcsc.files.read import Said, json_of
-from rcsc.interpret import Fault
+from rcsc.interpret import Fault, initial, run_table
 from rcsc.resolve import compile_text
 from rcsc.system.signature import generated_files, signature_of
 from rcsc.testing.cortex import CortexRun, run_cortex
@@ -381,6 +381,48 @@ def compared() -> str:
 @pytest.mark.parametrize("cc", COMPILERS)
 def test_no_comparison_is_what_a_compiler_finds_idle(cc: str, tmp_path: Path) -> None:
     compiled(emitted(program_of(compared())), tmp_path, cc=cc)
+
+
+GIVEN = [
+    None,
+    3,
+    12,
+    True,
+    "3",
+    3.0,
+    3.5,
+    (),
+    (3,),
+    (3, 4),
+    (3, 12),
+    (3, 4, 5),
+    (None, 4),
+    [3],
+    {"n": 3},
+    ((3,),),
+]
+
+
+@pytest.mark.parametrize("writes", ["", "writes n", "writes n, k"])
+def test_whatever_an_extern_gives_the_executor_does_as_the_interpreter(
+    writes: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    program = program_of(
+        "input x : int 0 .. 9\nstate n : int 0 .. 9\nstate k : int 0 .. 9\noutput o : bool\n"
+        f'extern procedure p reads x {writes} python "some_users:p" c "some_users_p"\n'
+        "table t {\n| line | x || procedures | o |\n| a | || p | true |\n}\n"
+    )
+    users = ModuleType("some_users")
+    monkeypatch.setitem(sys.modules, "some_users", users)
+    made = imported(emitted(program))
+    for one in GIVEN:
+        users.__dict__["p"] = lambda *_, one=one: one
+        state = made.State()
+        fault = made.t_step(state)
+        outcome = run_table(program, program.tables[0], initial(program))
+        shown = {name: getattr(state, name) for name in ("n", "k", "o")}
+        assert (fault, shown) == (outcome.fault, {name: outcome.snapshot[name] for name in shown}), one
+        assert fault in ((Fault.OK,) if not writes else (Fault.OK, Fault.EXTERN))
 
 
 def test_what_externs_are_called_meets_nothing_of_ours(tmp_path: Path) -> None:

@@ -141,6 +141,7 @@ class _Maker:
     def _extern(self, procedure: Procedure) -> Iterator[str]:
         assert procedure.extern is not None
         variables = {v.name: v for v in self.program.variables}
+        positions = {v.name: at for at, v in enumerate(self.program.variables)}
         module, _, function = procedure.extern.python.partition(":")
         given = [self.text.place(name) for name in procedure.reads] + [
             f"v_{p.name}" for p in procedure.params
@@ -151,11 +152,10 @@ class _Maker:
             yield "    if not isinstance(given, tuple):"
             yield "        given = (given,)"
             yield f"    if len(given) != {len(procedure.writes)}:"
-            yield "        raise ValueError(given)"
+            yield f"        raise _Refused({positions[procedure.writes[0]]})"
         for at, name in enumerate(procedure.writes):
-            position = next(i for i, v in enumerate(self.program.variables) if v.name == name)
             yield f"    w{at} = {_typed(variables[name].type, f'given[{at}]')}"
-            yield from self._admitted(variables[name], f"w{at}", f"raise _Refused({position})", 1)
+            yield from self._admitted(variables[name], f"w{at}", f"raise _Refused({positions[name]})", 1)
             yield f"    {self.text.place(name)} = w{at}"
 
     # --- admission ---
