@@ -102,7 +102,7 @@ def prove_level(stepper: Stepper, effort: Effort | None = None) -> LevelProof:
         looks = effort.looks and not any(wanted[at].sort is not Sort.NUMBERED for at in found.open)
         flow = Flow(stepper, asked, found.clauses)
         if looks and (others := [*flow.ways_round(), *never_run(asked, found.clauses, found.ran)]):
-            found = strengthened(stepper, firsts, cycle, found, others, effort)
+            found = strengthened(stepper, firsts, cycle, found, others)
             flow = Flow(stepper, asked, found.clauses)
         _confirm(asked, found.clauses)
         verdicts = list(_verdicts(stepper, asked, found, wanted))

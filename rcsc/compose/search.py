@@ -3,18 +3,19 @@
 In: a stepper, its cycles and goals. Out: `Found`. What is found is not to be trusted before it is confirmed (`confirm`).
 """
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from random import Random
 
 from rcsc.compose.contract import COMMAND
-from rcsc.compose.cubes import Point, Reached
+from rcsc.compose.cubes import Reached
 from rcsc.compose.features import CLOSELY, Feature, compared, point
 from rcsc.compose.frames import Clause, Frames, Posed
 from rcsc.compose.goals import Goal, Sort, goals
 from rcsc.compose.properties import every_feature
 from rcsc.compose.transition import Cycle, Stepper
 from rcsc.compose.walk import Walk
+from rcsc.model import Value
 from rcsc.prove.smt import Limits
 from rcsc.prove.values import TRUE, Node
 
@@ -22,6 +23,10 @@ LIMITS = Limits.of(80_000_000)
 """A question about a cycle is larger than one about a table."""
 A_TABLE = 4
 """Walks for each table, at least, so that there are some of every command: what walks show need not be asked."""
+BURST, ANEW = 20, 5
+"""Cycles between two states from which walks go on; one walk in so many begins anew."""
+LONGER = 4
+"""Walks are at most so many times longer than was asked where they still come to new lines."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +54,7 @@ class Found:
         clauses: The invariant: combinations that never stand.
         open: Goals that were searched for, by position, for which the features do not suffice.
         walked: States seen on walks; `learnt`, those that the solver added.
-        ran: Tables and lines that ran on walks.
+        ran: Tables and lines that ran on walks; `states`, what stood behind their cycles.
     """
 
     features: tuple[Feature, ...] = ()
@@ -58,6 +63,7 @@ class Found:
     walked: int = 0
     learnt: int = 0
     ran: frozenset[tuple[str, str]] = frozenset()
+    states: tuple[Mapping[str, Value], ...] = field(default=(), repr=False)
 
 
 def search(
@@ -70,13 +76,14 @@ def search(
     """
     matter = [at for at, goal in enumerate(wanted) if _matters(stepper, goal)]
     reads = read(stepper, cycle, wanted)
-    found = Found(open=frozenset(matter))
+    states, ran = _walked(stepper, effort)
+    found = Found(open=frozenset(matter), states=states, ran=ran)
     for closely in range(CLOSELY + 1):
         chosen = every_feature(stepper, cycle, reads, closely)
         if closely and len(chosen) == len(found.features):
             break
         left = sorted(found.open)
-        found = _with(chosen, stepper, firsts, cycle, effort, found, left)
+        found = _with(chosen, stepper, firsts, cycle, found, left)
         if not any(wanted[at].sort is not Sort.NUMBERED for at in found.open):
             break
     return found
@@ -88,7 +95,6 @@ def strengthened(
     cycle: Cycle,
     found: Found,
     wanted: Sequence[Node],
-    effort: Effort,
 ) -> Found:
     """What was found, with clauses added from which as many as can be of these conditions on a later cycle follow.
 
@@ -98,7 +104,7 @@ def strengthened(
     chosen, every = found.features, range(len(wanted))
     posed = [Posed(chosen, one, dict.fromkeys(every, TRUE)) for one in firsts]
     posed.append(Posed(chosen, cycle, dict(enumerate(wanted))))
-    made, _ = _searched(stepper, chosen, posed, found, every, effort)
+    made, _ = _searched(stepper, chosen, posed, found, every)
     return replace(made, open=found.open, walked=found.walked)
 
 
@@ -107,33 +113,27 @@ def _with(  # what a search is of
     stepper: Stepper,
     firsts: Sequence[Cycle],
     cycle: Cycle,
-    effort: Effort,
     before: Found,
     left: Sequence[int],
 ) -> Found:
     """One search, from the invariant that is known already, for the goals that are left."""
     posed = [Posed(chosen, one, _conditions(stepper, one, left)) for one in (*firsts, cycle)]
-    made, left_open = _searched(stepper, chosen, posed, before, left, effort)
+    made, left_open = _searched(stepper, chosen, posed, before, left)
     return replace(made, open=frozenset(left_open))
 
 
-def _searched(  # what a search is of
-    stepper: Stepper,
-    chosen: tuple[Feature, ...],
-    posed: Sequence[Posed],
-    before: Found,
-    left: Iterable[int],
-    effort: Effort,
+def _searched(
+    stepper: Stepper, chosen: tuple[Feature, ...], posed: Sequence[Posed], before: Found, left: Iterable[int]
 ) -> tuple[Found, set[int]]:
-    ran = set(before.ran)
-    walked = dict.fromkeys(_states(stepper, chosen, effort, ran))
+    walked = dict.fromkeys(point(stepper, chosen, state) for state in before.states)
     reached = Reached.of(walked, len(chosen))
     weights = [2 if one.parts else int(one.size > 2) for one in chosen]
     clauses, left_open = Frames(posed[:-1], posed[-1], reached, weights, before.clauses).search(left)
     for one in posed:
         one.sat.close()
     learnt = before.learnt + reached.many - len(walked)
-    return Found(chosen, tuple(clauses), walked=len(walked), learnt=learnt, ran=frozenset(ran)), left_open
+    found = replace(before, features=chosen, clauses=tuple(clauses), walked=len(walked), learnt=learnt)
+    return found, left_open
 
 
 def read(stepper: Stepper, cycle: Cycle, wanted: Sequence[Goal]) -> list[Node]:
@@ -154,14 +154,32 @@ def _matters(stepper: Stepper, goal: Goal) -> bool:
     return goal.name.endswith(f".{COMMAND}") or any(goal.name in pair for pair in compared(stepper.program))
 
 
-def _states(
-    stepper: Stepper, chosen: tuple[Feature, ...], effort: Effort, ran: set[tuple[str, str]]
-) -> Iterable[Point]:
-    """The features of states that walks reach; takes the lines that run. Where assumptions are trusted no walk keeps to them."""
+def _walked(
+    stepper: Stepper, effort: Effort
+) -> tuple[tuple[Mapping[str, Value], ...], frozenset[tuple[str, str]]]:
+    """States that walks reach, and the lines that ran; where assumptions are trusted no walk keeps to them.
+
+    Most walks go on from where one came to a line for the first time, as coverage guides a fuzzer (Zalewski, "american fuzzy lop",
+    2013): lines that only a long run of answers leads to are come to so.
+    """
     if stepper.trusted:
-        return
-    for seed in range(max(1, effort.walks, A_TABLE * len(stepper.program.tables))):
-        walk = Walk(stepper.program, stepper.level, stepper.links, Random(seed))  # noqa: S311  # repeatable on purpose
-        for state in walk.states(effort.cycles):
-            yield point(stepper, chosen, state)
-        ran |= walk.ran
+        return (), frozenset()
+    random = Random(0)  # noqa: S311  # repeatable on purpose
+    found: dict[tuple[Value, ...], Mapping[str, Value]] = {}
+    new: list[Mapping[str, Value]] = []
+    ran: set[tuple[str, str]] = set()
+    many = max(1, effort.walks, A_TABLE * len(stepper.program.tables)) * effort.cycles // BURST
+    least = most = many
+    at = 0
+    while at < most:
+        walk = Walk(stepper.program, stepper.level, stepper.links, Random(at))  # noqa: S311  # as above
+        if new and at % ANEW:
+            walk.begin_at(new[max(random.randrange(len(new)), random.randrange(len(new)))])
+        for state in walk.states(BURST):
+            found.setdefault(tuple(state.values()), state)
+            if walk.ran - ran:
+                ran |= walk.ran
+                new.append(state)
+                most = min(LONGER * least, at + many)
+        at += 1
+    return tuple(found.values()), frozenset(ran)

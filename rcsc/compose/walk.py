@@ -4,7 +4,7 @@ In: a program, its level, its links, a seed. Out: states that can be reached, so
 state comes from the meaning of the language itself, not from its translation. A walk proves nothing, and no proof rests on one.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from random import Random
 
@@ -42,6 +42,11 @@ class Walk:
             self.ghosts[f"{GHOST}{asked.into}"] = False
             for key in asked.keys:
                 self.ghosts[f"{GHOST}{asked.into} {key}"] = value_of_key(self._kinds[key], 0)
+
+    def begin_at(self, state: Mapping[str, Value]) -> None:
+        """Goes on from a state that a walk has come to."""
+        self.now = {leaf: state[leaf] for leaf in self.now}
+        self.ghosts = {leaf: state[leaf] for leaf in self.ghosts}
 
     def states(self, cycles: int) -> Iterator[dict[str, Value]]:
         """The state behind each cycle; ends early where a cycle meets a fault, which is for the proof to find."""
