@@ -439,6 +439,57 @@ def test_two_programs_of_one_name_are_refused(rcsc: Rcsc) -> None:
     assert "error[RCS503]" in ran.out
 
 
+def told(table: str = "t", more: str = "", calls: str = "") -> str:
+    """A program with a table of this name."""
+    return f"input x : int 0 .. 9\nstate n : int 0 .. 9\n{more}table {table} {{\n| line | x || procedures |\n| a | || {calls} |\n}}\n"
+
+
+F = 'extern procedure f reads x {} python "m:f" c "m_f"\n'
+TOGETHER = {
+    "a table": ("a", told("b_c"), "a_b", told("c"), "a_b_c_line"),
+    "an enumeration and a program": ("a", told(more="enum b { p }\n"), "a_b", told(), "a_b_t"),
+    "a record and an enumeration": ("a", told(more="record b_c { f : bool }\n"), "a_b", told(more="enum c { p }\n"), "a_b_c_t"),
+    "members": ("a", told(more="enum b_c { p }\n"), "a_b", told(more="enum c { p }\n"), "a_b_c_t"),
+    "a guard": ("a", told(more="enum b { h }\n"), "a_b", told(), "A_B_H"),
+    "files": ("a-b", told("one"), "a_b", told("two"), "a_b.py"),
+    "files of a library's name": ("time", told("one"), "time_", told("two"), "time_.py"),
+    "an extern and a step": ("a", told("b"), "c", told(more=F.format("").replace("m_f", "a_b_step"), calls="f"), "a_b_step"),
+    "externs of other types": ("a", told(more=F.format(""), calls="f"), "b", told(more=F.format("writes n"), calls="f"), "m_f"),
+    "externs of one program": (
+        "a", told(more=F.format("") + F.format("writes n").replace(" f ", " g "), calls="f; g"), "b", told(), "m_f"
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("what", list(TOGETHER))
+def test_what_could_not_be_linked_together_is_refused(what: str, rcsc: Rcsc) -> None:
+    first, one, second, two, name = TOGETHER[what]
+    write(f"{first}.rcs", one)
+    write(f"{second}.rcs", two)
+    ran = rcsc("compile")
+    assert (ran.status, Path("generated").exists()) == (1, False)
+    assert "error[RCS503]: " in ran.out
+    assert name in ran.out
+
+
+def test_what_is_compiled_together_can_be_linked_together(rcsc: Rcsc) -> None:
+    same = F.format("writes n")
+    more = "enum k { p, q }\nrecord r { f : bool }\n"
+    write("a.rcs", told("b", more + same, "f"))
+    write("a_c.rcs", told("b_c", more + same + same.replace(" f ", " g "), "f; g"))
+    write("b_c.rcs", told("a", more))
+    assert rcsc("compile").status == 0
+    everything = "".join(f'#include "{one.name}"\n' for one in sorted(Path("generated/c").glob("*.h")))
+    Path("generated/c/all.c").write_text(
+        everything + "void m_f(uint8_t x, uint8_t *n) { *n = x; }\nint main(void) { return 0; }\n"
+    )
+    made = subprocess.run(
+        ["cc", "-Wall", "-Wextra", "-Werror", *map(str, Path("generated/c").glob("*.c")), "-o", "all"],
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert (made.returncode, made.stderr) == (0, "")
+
+
 def test_fmt(rcsc: Rcsc, monkeypatch: pytest.MonkeyPatch) -> None:
     ragged = RIGHT.replace("| <= 40    ||", "|<= 40||")
     write("grip.rcs", ragged)

@@ -20,6 +20,7 @@ from rcsc.source import Span
 if TYPE_CHECKING:
     from rcsc.driver.certified import Checking
     from rcsc.model import Program, ProvedProgram
+    from rcsc.plan import Plan
     from rcsc.project import Loaded
 
 TARGETS = ("python", "c")
@@ -82,7 +83,7 @@ def test(settings: Settings, effort: Effort) -> Made:
     programs = [proof.proved for proof in proofs if proof.proved is not None and _runs(proof.proved.program)]
     for proved in programs:
         one, text = try_out(
-            proved.program, _emitted(proved, TARGETS), settings.options, effort, settings.progress
+            proved.program, _emitted(_plan(proved), TARGETS), settings.options, effort, settings.progress
         )
         found += one
         figures.append(text)
@@ -162,25 +163,48 @@ def _executors(
     """The generated files of every program that declares a table or a level, by path under the folder."""
     files: dict[str, str] = {}
     found = []
-    owner: dict[str, str] = {}
+    paths: dict[str, str] = {}
+    names: dict[str, tuple[str, str]] = {}
     for proof in proofs:
         if proof.proved is None or not _runs(proof.proved.program):
             continue
-        name = proof.proved.program.name
-        if owner.setdefault(name.casefold(), proof.root) != proof.root:
-            found.append(_same_name(name, proof.root, owner[name.casefold()]))
+        plan = _plan(proof.proved, defensive=defensive)
+        made = _emitted(plan, targets)
+        taken = next((path for path in made if paths.get(path.casefold(), proof.root) != proof.root), None)
+        if taken is not None:
+            found.append(_same_file(taken, proof.root, paths[taken.casefold()]))
             continue
-        files |= _emitted(proof.proved, targets, defensive=defensive)
+        paths |= {path.casefold(): proof.root for path in made}
+        if "c" in targets:
+            found += _same_names(plan, proof.root, names)
+        files |= made
     return files, tuple(found)
 
 
-def _emitted(proved: "ProvedProgram", targets: tuple[str, ...], *, defensive: bool = False) -> dict[str, str]:
+def _same_names(plan: "Plan", root: str, names: dict[str, tuple[str, str]]) -> Iterator[Diagnostic]:
+    """The first name in C that this program shares with another, or gives to two things; `names` has who has which, and gets its own."""
+    from rcsc.emit.c99 import outward
+
+    for name, what in outward(plan):
+        other, said = names.setdefault(name, (root, what))
+        if said != what:
+            message = f"`{name}` would be two things in C: {said} in `{other}`, and {what} in `{root}`"
+            helps = ("rename one of the programs, or the table, level or type",)
+            yield Diagnostic(Code.NAME_COLLISION, message, Label(Span(root, 0, 0)), help=helps)
+            return
+
+
+def _emitted(plan: "Plan", targets: tuple[str, ...]) -> dict[str, str]:
     from rcsc.emit import emit_c, emit_python
+
+    return (emit_python(plan) if "python" in targets else {}) | (emit_c(plan) if "c" in targets else {})
+
+
+def _plan(proved: "ProvedProgram", *, defensive: bool = False) -> "Plan":
     from rcsc.lower import lower
     from rcsc.project import project_root
 
-    plan = lower(proved, project_root(proved.program.file), defensive=defensive)
-    return (emit_python(plan) if "python" in targets else {}) | (emit_c(plan) if "c" in targets else {})
+    return lower(proved, project_root(proved.program.file), defensive=defensive)
 
 
 def _runs(program: "Program") -> bool:
@@ -188,8 +212,8 @@ def _runs(program: "Program") -> bool:
     return own_levels or bool(program.own_tables)
 
 
-def _same_name(name: str, root: str, other: str) -> Diagnostic:
-    message = f"`{root}` and `{other}` would both be compiled to files named `{name}`"
+def _same_file(path: str, root: str, other: str) -> Diagnostic:
+    message = f"`{root}` and `{other}` would both be compiled to `{path}`"
     return Diagnostic(
         Code.NAME_COLLISION, message, Label(Span(root, 0, 0)), help=("rename one of the files",)
     )

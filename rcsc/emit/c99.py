@@ -99,6 +99,24 @@ def emit_c(plan: Plan) -> dict[str, str]:
     }
 
 
+def outward(plan: Plan) -> Iterator[tuple[str, str]]:
+    """Give each name in C that others than the program's own file see, and what it is.
+
+    Two programs that are linked, or whose headers are included together, may share a name only where both declare it, and alike: an extern
+    procedure.
+    """
+    maker = _Maker(plan)
+    names, p = maker.names, maker.names.program
+    own = [guard(p), *(f"{p}_{end}" for end in ("t", "init", "check"))]
+    own += [f"{p}_{stem}_{end}" for stem in names.tables.values() for end in ("line", "lines", "step")]
+    own += [f"{p}_{stem}_cycle" for stem in names.levels.values()]
+    own += [f"{p}_{stem}_t" for stem in (*names.records.values(), *names.enums.values())]
+    own += [member for members in names.constants.values() for member in members]
+    yield from ((name, f"a name of program `{plan.program.name}`") for name in own)
+    for one, types in maker.declared():
+        yield one, f"a function of yours of {', '.join(types) or 'nothing'}"
+
+
 def helper(program: str, name: str) -> Function:
     """A function of one operator or conversion, by its name in `CText.helpers`; what it means is `interpret.OPERATORS`'s."""
     types = {"f64": "double"} | {
@@ -204,8 +222,17 @@ class _Maker:
                 doc = f"state; the deferred next value of {root}"
                 yield Field(f"{c_type(variables[later].type)} {self.names.paths[later]}", doc)
 
+    def declared(self) -> Iterator[tuple[str, tuple[str, ...]]]:
+        """Each function of the user's, and the types of its parameters."""
+        for text in self._externs():
+            head, _, rest = text.partition("(")
+            words = [one.strip() for one in rest.rstrip(");").split(",")]
+            types = tuple(one.rpartition(" ")[0] + "*" * one.count("*") for one in words)
+            yield head.rpartition(" ")[2], types
+
     def _externs(self) -> Iterator[str]:
         kinds = {v.name: v.type for v in self.program.variables}
+        seen: set[str] = set()
         for one in self.program.procedures:
             if one.extern is not None:
                 word = Scope().fresh
@@ -214,7 +241,10 @@ class _Maker:
                 outs = [
                     f"{c_type(kinds[name])} *{word(f'{parameter_word(name)}_out')}" for name in one.writes
                 ]
-                yield f"extern void {one.extern.c}({', '.join([*ins, *outs]) or 'void'});"
+                said = f"extern void {one.extern.c}({', '.join([*ins, *outs]) or 'void'});"
+                if said not in seen:
+                    yield said
+                seen.add(said)
 
     # --- helpers ---
 
