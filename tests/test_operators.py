@@ -41,6 +41,7 @@ from rcsc.model import (
     Int,
     Literal,
     Op,
+    Program,
     ReadLocal,
     Real,
     Scalar,
@@ -52,8 +53,10 @@ from rcsc.prove.encode import Frame, encode
 from rcsc.prove.evaluation import Evaluation
 from rcsc.prove.options import Options
 from rcsc.prove.program import prove_program
+from rcsc.prove.table import prove_table
 from rcsc.prove.values import Node
-from rcsc.resolve import intervals
+from rcsc.prove.verdict import Gap, Overlap
+from rcsc.resolve import compile_text, intervals
 from rcsc.resolve.folding import fold
 from rcsc.smtlib import cvc5_refutes
 from rcsc.testing.reference import Writer, c_type
@@ -563,3 +566,30 @@ def test_words_turn_no_comparison_of_what_may_be_no_number() -> None:
         one, two = values.variable("a", kind), values.variable("b", kind)
         assert said(values.negation(values.compare(Op.LT, one, two))) == words
         assert said(values.negation(values.compare(Op.EQ, one, two))) == "a /= b"
+
+
+FAR = "x * 1e308 * 10.0 - y * 1e308 * 10.0"
+NO_NUMBER = {  # two lines, of which none matches what is no number, or both do
+    "a difference": (f"{FAR} > 2.0", f"{FAR} <= 2.0", Gap),
+    "a whole number beside it": (f"{FAR} > 2.0 or n > 3", f"{FAR} <= 2.0 and n <= 3", Gap),
+    "a product": ("x * 1e308 * 10.0 * (y - y) < 0.0", "x * 1e308 * 10.0 * (y - y) >= 0.0", Gap),
+    "negations": (f"not ({FAR} > 2.0)", f"not ({FAR} <= 2.0)", Overlap),
+}
+
+
+@pytest.mark.parametrize("kind", NO_NUMBER)
+def test_where_no_line_matches_what_is_no_number_an_input_is_tried(kind: str) -> None:
+    """Whatever Z3 can tell within so few steps: doubles are slow for it."""
+    one, two, wanted = NO_NUMBER[kind]
+    program = compile_text(
+        "input n : int 0 .. 3\ninput x : real -10.0 .. 10.0\ninput y : real -10.0 .. 10.0\nassume low monitored : x <= y + 20.0\n"
+        f"table t assuming low {{\n| line | when ||\n| a | {one} ||\n| b | {two} ||\n}}\n"
+    )
+    assert isinstance(program, Program)
+    found = prove_table(program, program.tables[0], Options(steps=20_000)).found
+    [witness] = [
+        one.witnesses[0] if isinstance(one, Gap) else one.witness
+        for one in found
+        if isinstance(one, Gap | Overlap) and isinstance(one, wanted)
+    ]
+    assert len(matching_lines(program.tables[0], {"n": 0, **witness})) == (0 if wanted is Gap else 2)

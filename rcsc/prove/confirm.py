@@ -3,6 +3,7 @@
 In: a table and what was found. Out: whether Z3 agrees. Source: `notes/formal.md`, 1.2.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 from enum import Enum, auto
 
@@ -45,17 +46,29 @@ def confirm(program: Program, table: Table, found: tuple[Found, ...], options: O
         options = replace(options, steps=min(options.steps, _STEPS))
     asked = Asked(program, table, options)
     overlap = _some_overlap(asked)
-    gap = (
-        asked.holds(asked.none()) if must_cover(table) or any(isinstance(one, Gap) for one in found) else None
-    )
+    gaps = [one for one in found if isinstance(one, Gap)]
+    gap = _some_gap(asked, gaps) if must_cover(table) or gaps else None
     said = (
         (overlap, any(isinstance(one, Overlap) for one in found)),
-        (gap, any(isinstance(one, Gap) for one in found)),
+        (gap, bool(gaps)),
     )
     if any(answer is Answer.UNKNOWN for answer, _ in said):
         return Agreement.UNKNOWN
     agrees = all(answer is None or (answer is Answer.SATISFIABLE) == wrong for answer, wrong in said)
     return Agreement.AGREES if agrees else Agreement.DISAGREES
+
+
+def _some_gap(asked: Asked, gaps: Sequence[Gap]) -> Answer:
+    """Whether no line matches some input: first at one that was found, which costs little."""
+    for witness in (one.witnesses[0] for one in gaps if one.witnesses):
+        here = [
+            smt.equal(asked.frame.leaves[v.name], smt.literal(v.type, witness[v.name]), v.type)
+            for v in asked.program.variables
+            if v.name in witness
+        ]
+        if asked.holds(asked.none(), *here) is Answer.SATISFIABLE:
+            return Answer.SATISFIABLE
+    return asked.holds(asked.none())
 
 
 def _some_overlap(asked: Asked) -> Answer:

@@ -5,12 +5,25 @@ of a table in order. Linear arithmetic settles what it can; terms that are not l
 one solver that is made when first needed; *unknown* is a finding, never a proof.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import combinations
 
-from rcsc.interpret import matching_lines
-from rcsc.model import AssumptionName, Program, Read, Snapshot, Standing, Table, Value, key_of, value_of_key
+from rcsc.interpret import holds, matching_lines
+from rcsc.model import (
+    AssumptionName,
+    Expr,
+    Program,
+    Read,
+    Real,
+    Snapshot,
+    Standing,
+    Table,
+    Value,
+    key_of,
+    value_of_key,
+)
+from rcsc.prove import trial
 from rcsc.prove.asked import Asked, shown
 from rcsc.prove.atoms import Formula, Universe, assumptions_of, lines_of, some
 from rcsc.prove.certificate import must_cover, tree_certificate
@@ -32,6 +45,10 @@ _MOST_LINES_GROWN = 64
 """Lines of a table above which no region is grown around a gap."""
 _MOST_GAPS = 64
 """Regions of a gap among which linear arithmetic looks for the least input."""
+_MOST_LINES_TRIED = 200
+"""Lines of a table above which no inputs are tried by the interpreter."""
+_STEPS_OF_LEAST = 2_000_000
+"""Budget of a search for the least input, where some is known."""
 _MOST_REPROVED = 2_000
 """Nodes of a tree above which it is not tried whether an assumption can be spared."""
 
@@ -82,6 +99,28 @@ class _Decision:
         self.lines = [whole(line) for line in self.clauses]
         self.assumed = [whole(assumption) for assumption in self.assumptions]
         self._asked: Asked | None = None
+        self._tried: tuple[Snapshot, ...] | None = None
+
+    @property
+    def tried(self) -> tuple[Snapshot, ...]:
+        """Inputs that the assumptions allow, tried before Z3 is asked: for it doubles are slow. None where there are none."""
+        if self._tried is None:
+            few = len(self.table.lines) <= _MOST_LINES_TRIED
+            reals = few and any(isinstance(v.type, Real) for v in self.variables)
+            every = trial.points(self.program.variables) if reals else ()
+            self._tried = tuple(one for one in every if self.allowed(one))
+        return self._tried
+
+    def allowed(self, snapshot: Snapshot) -> bool:
+        """Whether the table's assumptions hold, and every condition of its lines is defined."""
+        names = self.table.assumptions
+        if not all(_holds(one.condition, snapshot) for one in self.program.assumptions if one.name in names):
+            return False
+        try:
+            self.matching(snapshot)
+        except (ArithmeticError, IndexError, ValueError):
+            return False
+        return True
 
     @property
     def asked(self) -> Asked:
@@ -163,9 +202,9 @@ class _Decision:
         kept = everything
         for at in everything:
             fewer = tuple(one for one in kept if one != at)
-            trial = self.search(fewer, 2 * _MOST_REPROVED, alone=True)
-            if trial.proved:
-                kept, search = fewer, trial
+            again = self.search(fewer, 2 * _MOST_REPROVED, alone=True)
+            if again.proved:
+                kept, search = fewer, again
         return kept, search
 
     def oracle(self, asked: Question) -> Snapshot | Unsettled:
@@ -178,6 +217,9 @@ class _Decision:
             for form, low, high in asked.bounds
         }
         conditions = question(self.program, self.table, self.table.assumptions, bounds, asked.candidates)
+        for snapshot in self.tried:
+            if all(_holds(one, snapshot) for one in conditions):
+                return snapshot
         z3 = self.asked
         answer = z3.holds(*(encode(condition, z3.frame) for condition in conditions))
         if answer is Answer.SATISFIABLE:
@@ -215,7 +257,8 @@ class _Decision:
         both = [self.lines[first], self.lines[second]]
         point = least(self.universe, [*both, *self.assumed], self.columns)
         if isinstance(point, Unsettled):
-            witness = self.asked.witness(self.asked.line(first), self.asked.line(second))
+            seen = [one for one in self.tried if {first, second} <= set(self.matching(one))]
+            witness = self.witness(seen, lambda z3: (z3.line(first), z3.line(second)))
             pair = f"lines `{self.table.lines[first].name}` and `{self.table.lines[second].name}`"
             return Undecided(pair) if witness is None else Overlap(first, second, witness)
         outside = some(negated(self.universe, line) for line in both)
@@ -224,7 +267,7 @@ class _Decision:
 
     def gap(self, search: Search) -> list[Found]:
         """The least input that no line matches, if there is one; also where DEFAULT takes it."""
-        seen = any(not self.matching(snapshot) for snapshot in search.witnesses)
+        seen = [snapshot for snapshot in search.witnesses if not self.matching(snapshot)]
         if must_cover(self.table) and not search.gaps and not seen:
             return []
         if search.gaps and not seen and len(search.gaps) <= _MOST_GAPS:
@@ -237,10 +280,12 @@ class _Decision:
                 few = len(self.lines) <= _MOST_LINES_GROWN
                 region = self.around(point, [[line] for line in self.lines]) if few else None
                 return [Gap((self.snapshot(point),), (region,))]
-        z3 = self.asked
-        if not must_cover(self.table) and z3.holds(z3.none()) is Answer.UNSATISFIABLE:
-            return []
-        witness = z3.witness(z3.none())
+        seen += [snapshot for snapshot in self.tried if not self.matching(snapshot)]
+        if not must_cover(self.table) and not seen:
+            z3 = self.asked
+            if z3.holds(z3.none()) is Answer.UNSATISFIABLE:
+                return []
+        witness = self.witness(seen, lambda z3: (z3.none(),))
         return [Undecided("what no line matches")] if witness is None else [Gap((witness,), (None,))]
 
     def dead(self) -> list[Found]:
@@ -253,7 +298,9 @@ class _Decision:
             point = find(self.universe, [line, *self.assumed])
             if isinstance(point, Unsettled):
                 answer = Answer.UNSATISFIABLE
-                if point is Unsettled.UNKNOWN:
+                if point is Unsettled.UNKNOWN and any(at in self.matching(one) for one in self.tried):
+                    answer = Answer.SATISFIABLE
+                elif point is Unsettled.UNKNOWN:
                     answer = self.asked.holds(self.asked.line(at))
                 if answer is Answer.UNSATISFIABLE:
                     assuming = len(sure) < len(self.assumed)
@@ -261,6 +308,20 @@ class _Decision:
                     found.append(DeadLine(at, assuming))
                 elif answer is Answer.UNKNOWN:
                     found.append(Undecided(f"whether line `{self.table.lines[at].name}` can match"))
+        return found
+
+    def witness(
+        self, seen: Sequence[Snapshot], terms: Callable[[Asked], tuple[Term, ...]]
+    ) -> Snapshot | None:
+        """The least input for which the terms hold; where Z3 gives up, the least of those that are known."""
+        z3 = self.asked
+        if seen:
+            few = replace(self.options, steps=min(self.options.steps, _STEPS_OF_LEAST))
+            z3 = Asked(self.program, self.table, few)
+        found = z3.witness(*terms(z3))
+        if found is None and seen:
+            best = min(seen, key=lambda one: [key_of(v.type, one[v.name]) for v in self.variables])
+            found = {v.name: best[v.name] for v in self.variables}
         return found
 
     # --- witnesses ---------------------------------------------------------------------
@@ -289,3 +350,11 @@ class _Decision:
     def _extent(self, column: int) -> Bounds:
         found = self.universe.columns[column]
         return found.low, found.high
+
+
+def _holds(condition: Expr, snapshot: Snapshot) -> bool:
+    """Whether a condition is defined and true."""
+    try:
+        return holds(condition, snapshot)
+    except (ArithmeticError, IndexError, ValueError):
+        return False

@@ -3,12 +3,13 @@
 In: conditions. Out: values for which all hold, or nothing, which proves nothing. The same conditions give the same values.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from random import Random
 
 from rcsc.interpret import operated
-from rcsc.model import Bool, Op, Real, Value, key_bounds, key_of, real_key, value_of_key
+from rcsc.model import Bool, Op, Real, Value, Variable, key_bounds, key_of, real_key, value_of_key
 from rcsc.prove.values import CHOICE, CONSTANT, NARROWED, VARIABLE, Node, parts_first
+from rcsc.prove.values import variable as variable_of
 
 SAMPLES = 400
 MOST_NODES = 1_500
@@ -29,6 +30,14 @@ def found(conditions: Sequence[Node], variables: Sequence[Node]) -> Point | None
         if _all_hold(order, conditions, point) and (best is None or _less(point, best, variables)):
             best = point
     return None if best is None else _lowered(order, conditions, variables, best)
+
+
+def points(variables: Sequence[Variable]) -> Iterator[Point]:
+    """Values of these variables to try: ends first, then edges and others; always the same."""
+    random = Random(0)  # noqa: S311  # a sample, not a secret
+    nodes = [variable_of(str(one.name), one.type) for one in variables]
+    for number in range(SAMPLES):
+        yield {one.name: _pick(one, number, random) for one in nodes}
 
 
 def holds_at(condition: Node, point: Mapping[str, Value]) -> bool:
