@@ -20,9 +20,11 @@ _LONG = 33
 """Characters of an assignment that a column has room for, whatever the others hold."""
 _HARD = "\ue000"
 """A space at which a time line does not break, while it is laid out; of private use, since every other one may."""
+_WORTH_PROCESSES = 40
+"""Lines of the levels' tables from which several processes are quicker than one: each takes a second to begin."""
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
 
     from rich.table import Table
 
@@ -49,7 +51,7 @@ Examples:
 )
 @click.option("--level", "only", multiple=True, metavar="NAME", help="Only this level (repeatable).")
 @steps_option(80)
-@click.option("--jobs", "-j", type=click.IntRange(min=1), default=min(2, os.cpu_count() or 1), show_default=True,
+@click.option("--jobs", "-j", type=click.IntRange(min=1), default=None, show_default="2, or 1 for small levels",
               help="Levels proved at once.")  # fmt: skip
 @click.option("--trace", "cycles", type=click.IntRange(min=0, max=40), default=8, show_default=True, metavar="N",
               help="For what is not proved, look for a trace of at most N cycles; 0 does not look.")  # fmt: skip
@@ -75,7 +77,7 @@ Examples:
 @click.option("--invariants", is_flag=True, help="Print the invariant of each level, too.")
 @click.option("--json", "as_json", is_flag=True, help="The result as JSON.")
 def prove(  # noqa: PLR0913, PLR0917  # as many as there are options
-    system: Path | None, only: tuple[str, ...], steps: int, jobs: int, cycles: int, logs: Path | None,
+    system: Path | None, only: tuple[str, ...], steps: int, jobs: int | None, cycles: int, logs: Path | None,
     freeze: Path | None, cases: tuple[Path, ...], without_deferral: bool, first_match: bool, without_default: bool,
     certificate: Path | None, confirms: bool, no_cache: bool, strict: bool, invariants: bool, as_json: bool,
 ) -> int:  # fmt: skip
@@ -117,7 +119,8 @@ def prove(  # noqa: PLR0913, PLR0917  # as many as there are options
         made = {level: one.of(VARIANTS[name](one.program)) for level, one in made.items()}
     effort = Effort(limits=Limits.of(steps))
     cache = None if no_cache else open_cache(path.parent)
-    proof = prove_steppers(made, effort, jobs, only or tuple(made), None, cache)
+    names = only or tuple(made)
+    proof = prove_steppers(made, effort, jobs or _jobs([made[name] for name in names]), names, None, cache)
     if certificate is not None:
         _write(certificate, made, proof)
     if not as_json:
@@ -136,6 +139,12 @@ def prove(  # noqa: PLR0913, PLR0917  # as many as there are options
     if refused or any(one.bug for one in told):
         return 3
     return 0 if proof.whole or (proof.proved and not strict) else 1
+
+
+def _jobs(levels: "Iterable[Stepper]") -> int:
+    """How many levels to prove at once where nobody says."""
+    lines = sum(len(table.lines) for one in levels for table in one.program.tables)
+    return min(2, os.cpu_count() or 1) if lines >= _WORTH_PROCESSES else 1
 
 
 def _refused(made: "dict[str, Stepper]", proof: "SystemProof", *, quiet: bool) -> list[str]:
