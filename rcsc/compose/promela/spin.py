@@ -1,8 +1,8 @@
 """Spin on a model: is a check ever broken, and by which run?
 
 In: a `Model`. Out: a `Checked`. Spin makes a program of the model, the C compiler compiles it, and it looks through every state that can be
-reached, or with `bitstate` through as many as it comes by. Where a check is broken the search is done again breadth first,
-so that the run that is shown is short. Source: the manual pages of Spin and of the verifiers that it makes (`pan`), version 6.5.
+reached, or with `bitstate` through as many as it comes by. A small model is searched breadth first, and one that breaks a check is
+searched again so: the run that is shown is short. Source: the manual pages of Spin and of the verifiers that it makes (`pan`), version 6.5.
 """
 
 import re
@@ -94,6 +94,9 @@ def check(model: Model, search: Search | None = None) -> Checked | Absent:
         _run([found[0], "-a", MODEL], place)
         kind = ["-DNP"] if model.progress else ["-DSAFETY"]
         kind += ["-DBITSTATE"] if search.bitstate else ["-DCOLLAPSE"]
+        small = model.text.count("\n") <= LARGE
+        if small and not model.progress and not search.bitstate:
+            return _searched(found[1], [*kind, "-DBFS"], [], place, search)
         checked = _searched(found[1], kind, ["-l"] if model.progress else [], place, search)
         if checked.failed and not model.progress:
             shorter = Search(min(search.seconds, 20.0), search.memory_mb, search.depth)
