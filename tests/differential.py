@@ -883,25 +883,32 @@ class Built:
     files: Mapping[str, str]
 
 
-def built(drawn: Drawn, name: str) -> Built | tuple[str, ...]:
-    """The program emitted; the codes of what was refused."""
+def modelled(drawn: Drawn, name: str) -> Program | tuple[str, ...]:
+    """The program in rcsc's model; the codes of what was refused."""
     program = compile_text("\n".join(drawn.text) + "\n", f"{name}.rcs")
     if not isinstance(program, Program):
         return tuple(d.code.value for d in program)
     stops = {table.name: tuple(map(AssumptionName, table.stops)) for table in drawn.tables}
     tables = tuple(replace(table, stops=stops.get(table.name, ())) for table in program.tables)
-    program = replace(program, tables=tables)
+    return replace(program, tables=tables)
+
+
+def built(drawn: Drawn, name: str) -> Built | tuple[str, ...]:
+    """The program emitted; the codes of what was refused."""
+    program = modelled(drawn, name)
+    if not isinstance(program, Program):
+        return program
     plan = lower(ProvedProgram(program, (), seal_of_proof()))
     files = emit_c(plan) | emit_python(plan)
     [symbols] = [json.loads(text) for path, text in files.items() if path.endswith(".json")]
     return Built(drawn, program, symbols, files)
 
 
-def interpreted(one: Built, state: State) -> tuple[Seen, State]:
+def interpreted(drawn: Drawn, program: Program, state: State) -> tuple[Seen, State]:
     """One cycle by the interpreter."""
-    did = cycle(one.program, one.program.levels[0], state)
+    did = cycle(program, program.levels[0], state)
     now = dict(did.snapshot)
-    return seen(one.drawn, int(did.fault), did.fault_at, did.line_index, did.failed_assumptions, now), now
+    return seen(drawn, int(did.fault), did.fault_at, did.line_index, did.failed_assumptions, now), now
 
 
 class InPython:
@@ -1009,11 +1016,10 @@ HELD = {"uint8_t": (0, 255), "int8_t": (-128, 127), "uint16_t": (0, 65535), "int
         "int32_t": (-(2**31), 2**31 - 1), "uint64_t": (0, U64), "int64_t": (-I64 - 1, I64)}  # fmt: skip
 
 
-def readings(one: Built, rng: random.Random) -> State:
-    """A value for every input: in its range more often than not, else what its C type can hold."""
+def readings(drawn: Drawn, held: Mapping[str, tuple[int, int]], rng: random.Random) -> State:
+    """A value for every input: in its range more often than not, else between what is given of a leaf that is no real."""
     maker, given = Maker(rng), dict[str, Value]()
-    types = {leaf["name"]: leaf["c_type"] for leaf in one.symbols["leaves"]}
-    for leaf in one.drawn.leaves("input"):
+    for leaf in drawn.leaves("input"):
         value = maker.value(leaf.kind)
         if rng.randrange(12) == 0 and leaf.kind.sort != "bool":
             if leaf.kind.sort == "real":
@@ -1028,7 +1034,7 @@ def readings(one: Built, rng: random.Random) -> State:
                     )
                 )
             else:
-                low, high = HELD[types[leaf.name]]
+                low, high = held[leaf.name]
                 value = rng.choice(
                     (low, high, max(low, int(leaf.kind.low) - 1), min(high, int(leaf.kind.high) + 1))
                 )
@@ -1041,12 +1047,13 @@ def readings(one: Built, rng: random.Random) -> State:
 
 def compare(one: Built, made: ctypes.CDLL, rng: random.Random, count: Counter[str]) -> None:
     """Some cycles of one program; AssertionError where two of the four differ."""
-    state, modelled = begun(one.drawn), dict(initial(one.program))
+    state, state_of_model = begun(one.drawn), dict(initial(one.program))
     python, in_c = InPython(one), InC(one, made)
+    held = {leaf["name"]: HELD.get(leaf["c_type"], (0, 0)) for leaf in one.symbols["leaves"]}
     for number in range(CYCLES):
-        inputs = readings(one, rng)
+        inputs = readings(one.drawn, held, rng)
         right, state = evaluated(one.drawn, {**state, **inputs})
-        other, modelled = interpreted(one, {**modelled, **inputs})
+        other, state_of_model = interpreted(one.drawn, one.program, {**state_of_model, **inputs})
         for who, found in (("interpreter", other), ("Python", python.run(inputs)), ("C", in_c.run(inputs))):
             assert found == right, difference(one, who, number, inputs, found, right)
         count[f"fault {right.fault}"] += 1

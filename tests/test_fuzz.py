@@ -104,5 +104,5 @@ def test_what_an_input_s_type_can_hold_is_admitted_alike(tmp_path: Path) -> None
         for value in (one for one in sorted(ends) if least <= one <= most):
             inputs = {**start, leaf["name"]: value}
             right, _ = differential.evaluated(drawn, inputs)
-            assert differential.interpreted(one, inputs)[0] == right
+            assert differential.interpreted(one.drawn, one.program, inputs)[0] == right
             assert (in_c.run(inputs), python.run(inputs)) == (right, right), (leaf["name"], value)

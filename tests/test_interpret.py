@@ -2,6 +2,8 @@
 
 import math
 import sys
+from collections import Counter
+from random import Random
 from types import ModuleType
 
 import pytest
@@ -19,9 +21,11 @@ from rcsc.interpret import (
     initial,
     matching_lines,
     run_table,
+    unfit,
 )
 from rcsc.model import Apply, Program, Value
 from rcsc.resolve import compile_text
+from tests import differential
 
 
 def program(text: str) -> Program:
@@ -319,3 +323,71 @@ def test_what_an_extern_procedure_gives_is_admitted() -> None:
     done = run_table(made, made.tables[0], {**initial(made), "a": 1, "b": 3})
     assert (done.fault, done.fault_at, done.line) == (Fault.EXTERN, "c", "x")
     assert done.snapshot["done"] is False
+
+
+def test_cycles_of_drawn_programs_are_those_of_an_evaluator_of_its_own() -> None:
+    ended: Counter[int] = Counter()
+    for number in range(60):
+        rng = Random(f"interpreted {number}")  # noqa: S311  # programs to try
+        drawn = differential.Maker(rng).draw()
+        made = differential.modelled(drawn, f"p{number}")
+        if not isinstance(made, Program):
+            continue
+        held = {leaf.name: (int(leaf.kind.low) - 1, int(leaf.kind.high) + 1) for leaf in drawn.leaves()}
+        state, model = differential.begun(drawn), dict(initial(made))
+        for _ in range(8):
+            inputs = differential.readings(drawn, held, rng)
+            right, state = differential.evaluated(drawn, {**state, **inputs})
+            found, model = differential.interpreted(drawn, made, {**model, **inputs})
+            assert found == right, (inputs, "\n".join(drawn.text))
+            ended[right.fault] += 1
+    assert all(ended[fault] > 10 for fault in (0, 1, 2, 3, 5)), ended
+
+
+REFUSED = EXTERN.replace(
+    "table t {", "assume early monitored : a < 5\nprocedure ask { look(1) }\ntable t assuming early {"
+)
+
+
+@pytest.mark.usefixtures("_extern")
+@pytest.mark.parametrize(
+    ("before", "does", "after", "line", "failed"),
+    [
+        ("preprocess ask", "", "", -1, ()),
+        ("", "look(2)", "", 0, ("early",)),
+        ("", "", "postprocess ask", 0, ("early",)),
+    ],
+)
+def test_a_cycle_that_an_extern_stops_tells_how_far_it_came(
+    before: str, does: str, after: str, line: int, failed: tuple[str, ...]
+) -> None:
+    text = REFUSED.replace("|| look(2) ", f"|| {does} ")
+    made = program(f"{text}level l {{ period 10 [ms] {before} table t {after} }}")
+    out = cycle(made, made.levels[0], dict(initial(made)) | {"a": 9, "b": 9})  # which sum is no value of b
+    assert (out.fault, out.fault_at, out.line_index, out.failed_assumptions) == (
+        Fault.EXTERN,
+        "b",
+        line,
+        failed,
+    )
+    assert (out.line is None) == (line < 0)
+
+
+UNFIT = program(
+    "input i : int 0 .. 3\nstate s : int 1 .. 3\nstate r : real 0.0 .. 1.0\noutput b : bool\n"
+    "invariant low : s <= 2\ninvariant both : s = 1 or b\n"
+)
+
+
+@pytest.mark.parametrize(
+    ("given", "first"),
+    [
+        ({}, ""), ({"i": 9}, ""), ({"s": 0}, "s"), ({"s": 4}, "s"), ({"s": 1.0}, "s"), ({"s": 3, "b": True}, "low"),
+        ({"s": 3}, "low"), ({"s": 2}, "both"), ({"s": 2, "b": True}, ""), ({"r": 1}, ""), ({"r": 1.0}, ""), ({"r": 1.5}, "r"),
+        ({"r": -0.5}, "r"), ({"r": math.nan}, "r"), ({"r": -0.5, "s": 0}, "s"), ({"b": 2}, "b"), ({"b": 2, "s": 3}, "b"),
+    ],
+)  # fmt: skip
+def test_a_state_that_no_cycle_may_begin_with_tells_what_is_wrong_first(
+    given: dict[str, Value], first: str
+) -> None:
+    assert unfit(UNFIT, {**initial(UNFIT), **given}) == first
