@@ -1131,3 +1131,44 @@ def test_what_no_region_shows_is_said(change: tuple[str, str], said: str) -> Non
     found = compare("case", program(EVERYTHING), made, Options())
     assert found.changed
     assert said in plain(list(rows(Difference("a", "b", (found,)))))
+
+
+STOPPED = """
+input place : int 0 .. 20
+state counts : array[8] of int 0 .. 9
+state low : int 0 .. 9
+assume near monitored : place < 8
+assume odd monitored : place /= 4
+procedure count { counts[place] := 9 }
+table tally assuming near, odd {
+  | line | place || procedures |
+  | a    | < 4   || count      |
+  | b    | >= 4  || count      |
+}
+table other assuming odd {
+  | line | place || low |
+  | a    |       || 1   |
+}
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("array[8] of", "array[21] of", "no longer stops"),
+        ("counts[place] := 9", "counts[min(place, 7)] := 9", "no longer stops"),
+        ("| >= 4  || count", "| >= 4  ||      ", "no longer stops"),
+        ("place : int 0 .. 20", "place : int 0 .. 7", "no longer stops"),
+        ("procedure count {", "invariant little : low < 9\nprocedure count {", ""),
+        ("|| 1   |", "|| 2   |", ""),
+    ],
+)
+def test_an_assumption_that_newly_stops_or_no_longer_does_is_said(old: str, new: str, said: str) -> None:
+    assert old in STOPPED
+    before, after = program(STOPPED), program(STOPPED.replace(old, new))
+    for one, two, word in ((before, after, said), (after, before, said.replace("no longer", "newly"))):
+        found = compare("case", one, two, Options())
+        assert (found.changed, found.undecided) == (True, ())
+        text = plain(list(rows(Difference("a", "b", (found,)))))
+        assert text.count(f"`near` {word} the cycle where it fails") == bool(word)
+        assert "`odd` n" not in text

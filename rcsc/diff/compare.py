@@ -3,7 +3,8 @@
 In: resolved programs. Out: a `ProgramDifference`. What a solver gives up on is named, and then nothing is called proved.
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 
 from rcsc.diff import parts
 from rcsc.diff.align import aligned
@@ -18,6 +19,7 @@ from rcsc.model import Program
 from rcsc.prove import smt
 from rcsc.prove.cover import UndecidedError
 from rcsc.prove.evaluation import TooLongError
+from rcsc.prove.obligations import Obligations
 from rcsc.prove.options import Options
 
 
@@ -44,6 +46,10 @@ def compare(
         *(one.what for one in made.changes),
         *(f"{one.what} `{one.name}`" for one in found if one.changed),
     ]
+    try:
+        found = _with_stops(versions, found, everywhere=bool(made.changes or undecided))
+    except given_up:
+        undecided.append("which assumptions stop")
     found += parts.unsaid(versions, told)
     seen: tuple[Traces, ...] = ()
     if not undecided:
@@ -72,6 +78,44 @@ def _steps(versions: Versions) -> Iterator[tuple[str, Callable[[], Iterable[Part
     yield "procedures", lambda: list(parts.procedures(versions))
     yield "levels", lambda: list(parts.levels(versions))
     yield "assumptions, invariants and properties", lambda: list(parts.conditions(versions))
+
+
+_APART = frozenset({"table", "level", "property", "preprocess", "postprocess"})
+"""Parts on which the stopping assumptions of another table do not rest."""
+
+
+def _with_stops(versions: Versions, found: Sequence[Part], *, everywhere: bool) -> list[Part]:
+    """The parts, tables with which assumptions newly stop the cycle where they fail, or no longer do.
+
+    Args:
+        versions: The two programs.
+        found: All parts.
+        everywhere: Whether more changed than these.
+    """
+    everywhere = everywhere or any(one.changed and one.what not in _APART for one in found)
+    wanted = {one.name for one in found if one.what == "table" and (one.changed or one.moved or everywhere)}
+    before, after = (
+        {str(table.name): table for table in program.tables if table.name in wanted and table.assumptions}
+        for program in (versions.before, versions.after)
+    )
+    stops = [
+        Obligations(program, versions.options).stopping(tables.values())
+        for program, tables in ((versions.before, before), (versions.after, after))
+        if before.keys() | after.keys()
+    ]
+    alone = {one.name for one in found if one.said in (("gone",), ("new",))}
+    return [
+        replace(one, said=(*one.said, *_stops(stops, one.name)))
+        if one.what == "table" and stops and one.name not in alone
+        else one
+        for one in found
+    ]
+
+
+def _stops(stops: Sequence[Mapping[str, Sequence[str]]], table: str) -> Iterator[str]:
+    before, after = (one.get(table, ()) for one in stops)
+    yield from (f"`{name}` no longer stops the cycle where it fails" for name in before if name not in after)
+    yield from (f"`{name}` newly stops the cycle where it fails" for name in after if name not in before)
 
 
 def difference(

@@ -115,7 +115,9 @@ class Obligations:
     stops: dict[str, tuple[AssumptionName, ...]] = field(default_factory=dict)
     _causes: dict[tuple[Code, Span, str], Cause] = field(default_factory=dict)
     _start: dict[str, Node] = field(default_factory=dict)
-    _clean: dict[str, bool] = field(default_factory=dict)
+    _clean: dict[str, bool] = field(
+        default_factory=dict
+    )  # procedures that owe nothing; one that is not looked at may
     _too_long: list[Diagnostic] = field(default_factory=list)
     _asker: Asker = field(init=False)
     _procedures: dict[str, Procedure] = field(init=False)
@@ -141,6 +143,12 @@ class Obligations:
         for table in tables:
             self._table(table)
         return [*self._too_long, *(diagnostic(*key, cause) for key, cause in self._causes.items())]
+
+    def stopping(self, tables: Iterable[Table]) -> dict[str, tuple[AssumptionName, ...]]:
+        """The stopping assumptions of the tables alone; what they owe besides is not told."""
+        for table in tables:
+            self._table(table)
+        return self.stops
 
     # --- what is known ---
 
@@ -347,7 +355,7 @@ class Obligations:
             case Assign(place=ToLeaf(name=name, type=kind), value=Literal(value=value)):
                 low, high = values.bounds(kind)
                 return {name} if low <= value <= high else None
-            case Call(procedure=name, args=args) if self._clean[name]:
+            case Call(procedure=name, args=args) if self._clean.get(name):
                 procedure = self._procedures[name]
                 for param, arg in zip(procedure.params, args, strict=True):
                     low, high = values.bounds(param.type)
