@@ -6,6 +6,9 @@ from pathlib import Path
 import pytest
 from _pytest.mark import ParameterSet
 
+from rcsc.compose import claims
+from rcsc.compose.standing import Known
+from rcsc.diagnostics import report
 from rcsc.diagnostics.diagnostic import Severity
 from rcsc.model import Program
 from rcsc.prove.options import Options
@@ -52,3 +55,13 @@ def test_the_manual_has_examples_of_both_kinds() -> None:
     wrong = [text for text in texts if EXPECTED.search(text)]
     assert len(wrong) >= 6
     assert len(texts) - len(wrong) >= 12
+
+
+def test_the_manual_says_what_every_verdict_means() -> None:
+    """Of a claim, of a system, and of a table."""
+    page = (REPO / "grammar" / "manual.md").read_text(encoding="utf-8")
+    section = page.partition("## What a verdict says\n")[2].partition("\n## ")[0]
+    meant = {word for row in section.splitlines() for word in re.findall(r"\*([^*]+)\*", row.split(" | ")[0])}
+    printed = {one.value for kind in (claims.Verdict, Known, report.Verdict) for one in kind}
+    assert printed <= meant
+    assert {"rests on", "proved, trusting"} <= meant
