@@ -802,3 +802,71 @@ def test_a_table_of_several_commands_is_one_goal(tmp_path: Path) -> None:
     )
     keys = [goal.key for goal, _ in prove_level(steppers(path)["lower"], LITTLE).found]
     assert len(keys) == len(set(keys))
+
+
+# --- what is shown -----------------------------------------------------------------------------------
+
+
+def test_a_report_without_a_status_is_an_error_that_names_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = changed(tmp_path)
+    for file in tmp_path.glob("*.rcs"):
+        file.write_text(
+            file.read_text(encoding="utf-8").replace("status_report", "outcome"), encoding="utf-8"
+        )
+    assert run(["prove", str(path)]) == 1
+    assert "there is no `upper.report.status_report`" in capsys.readouterr().err
+
+
+STOPPED = """input at : int 0 .. 3
+input go : bool
+state seen : array[2] of bool
+state was_asked : bool
+output hold : bool safe true
+assume room monitored : at < 2
+property answered : go implies was_asked
+property moves : not hold
+procedure mark {{ seen[at] := true }}
+module ask reads go writes was_asked {{ was_asked := go }}
+table t assuming room {{
+  | line | go    || procedures | hold  |
+  | yes  | true  || mark{calls} | false |
+  | no   | false || {idle} | false |
+}}
+level solo {{ period 40 [ms] {before} table t {after} }}
+"""
+
+
+@pytest.mark.parametrize(
+    ("calls", "idle", "before", "after", "broken"),
+    [
+        ("", "", "", "postprocess ask", {"answered", "moves"}),
+        ("; ask", "ask", "", "", {"answered", "moves"}),
+        ("", "", "preprocess ask", "", {"moves"}),
+    ],
+)
+def test_a_cycle_that_a_stopping_assumption_ends_is_shown_as_it_ran(  # where it may be asked
+    calls: str,
+    idle: str,
+    before: str,
+    after: str,
+    broken: set[str],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """No line, no postprocess, the safe value: by the interpreter and by both executors, and in words."""
+    path = solo(tmp_path, STOPPED.format(calls=calls, idle=idle, before=before, after=after))
+    whole = prove_system(path, LITTLE)
+    stated = {"answered", "moves"}
+    assert {name for name in stated if not whole.of("solo", (Sort.PROPERTY, "", name)).proved} == broken
+    assert run(["prove", str(path), "--log", str(tmp_path / "found"), "--json"]) == 1
+    told = {one["name"]: one for one in json.loads(capsys.readouterr().out)["findings"]}
+    assert told.keys() == {*broken, "room"}
+    for name, one in told.items():
+        [row] = one["time_line"]
+        assert one["reproduces"]
+        assert (row["line"], row["takes"]["at"]) == ("none", "2")
+        assert row["leaves"]["hold"] == "true"
+        wrong = "" if name == "room" else f"; property `{name}` is broken"
+        assert row["wrong"] == f"assumption `room` fails; the cycle ends there{wrong}"
