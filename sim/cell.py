@@ -9,8 +9,7 @@ from rcsc.database.build import BadData
 from rcsc.database.pose import about_z
 from sim.kinematic import Kinematic
 from sim.model import USUAL, Body, Make
-from sim.physical import Physical
-from sim.plant import Plant
+from sim.plant import Mechanism, Plant
 from sim.reach import home
 from sim.robot import Robot
 
@@ -58,9 +57,11 @@ def plant(
         raise BadData(("the robot cannot be at its home",))
     here = lying(database) if parts is None else tuple(parts)
     bodies = [one.body for one in here]
-    mechanism = (
-        Physical(database, bodies, start, seed, make)
-        if backend == "mujoco"
-        else Kinematic(database, bodies, start, seed)
-    )
+    mechanism: Mechanism
+    if backend == "mujoco":
+        from sim.physical import Physical  # MuJoCo is loaded only where it is asked for
+
+        mechanism = Physical(database, bodies, start, seed, make)
+    else:
+        mechanism = Kinematic(database, bodies, start, seed)
     return Plant(database, mechanism, Robot(start), tuple(one.object for one in here))

@@ -18,12 +18,11 @@ from rcsc.files.kept import finite, plain, read
 from sim.arm import Joints, plate
 from sim.faults import Faults
 from sim.model import GAIN_N_M, OPEN_MM, Body
-from sim.physical import CLEAR, EMPTY_MM, JAWS_MM, NOISY, Noise, noise_of, put_noise
-from sim.plant import CYCLE_S, Grip
+from sim.plant import CYCLE_S, EMPTY_MM, JAWS_MM, Grip, Noise, noise_of, put_noise
 from sim.vision.flood import Features, Found
 from sim.vision.line import Surface
 from sim.vision.model import Top, perceive, perceive_surface
-from sim.vision.optics import Optics
+from sim.vision.optics import CLEAR, NOISY, Optics
 
 JAW_MM_S = 100.0
 PAD_WIDTH_MM = 24.0

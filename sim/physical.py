@@ -7,7 +7,7 @@ a part; and the image processing is given pictures, never a pose. tests/test_hon
 import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal, cast
+from typing import Any, cast
 
 import mujoco
 import numpy as np
@@ -18,57 +18,17 @@ from rcsc.files.kept import finite, plain, read
 from sim.arm import Joints
 from sim.faults import Faults
 from sim.model import GAIN_N_M, USUAL, Body, Make, mjcf
-from sim.plant import CYCLE_S, Grip
+from sim.plant import CYCLE_S, EMPTY_MM, JAWS_MM, Grip, Noise, noise_of, put_noise
 from sim.vision.camera import Camera
 from sim.vision.flood import Features, Found, find
 from sim.vision.line import Surface, measure
-from sim.vision.optics import Optics
+from sim.vision.optics import CLEAR, NOISY, Optics
 
 STATE = mujoco.mjtState.mjSTATE_INTEGRATION
 SLIPPERY = 0.002
 """Half a kilogram between pads that push 445 N each slips below 0.006."""
 CLOSED_MM = 0.5
 """Fingers that are closer touch each other: what their motor pushes is what they push on each other."""
-CLEAR = Optics()
-NOISY = replace(CLEAR, noise=5 * CLEAR.noise, peak_px=5 * CLEAR.peak_px, aim_rad=5 * CLEAR.aim_rad)
-EMPTY_MM = 95.0
-"""Between the pads at first."""
-JAWS_MM = 20.0
-"""How far the jaws are open at first."""
-
-
-@dataclass(frozen=True, slots=True)
-class _Words:
-    state: int
-    inc: int
-
-
-@dataclass(frozen=True, slots=True)
-class Noise:
-    """A generator of noise, as numpy says it."""
-
-    bit_generator: Literal["PCG64"]
-    state: _Words
-    has_uint32: Literal[0, 1]
-    uinteger: int
-
-
-def noise_of(rng: np.random.Generator) -> Noise:
-    """The generator's state."""
-    made: Noise = read(Noise, dict(rng.bit_generator.state))
-    return made
-
-
-def put_noise(rng: np.random.Generator, noise: Noise) -> None:
-    """Puts a generator into a state.
-
-    Raises:
-        ValueError: It has none such.
-    """
-    try:
-        rng.bit_generator.state = plain(noise)
-    except OverflowError as error:
-        raise ValueError("the state is of no noise") from error
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,9 @@ gripper's level, vision and the workstation. Buffers out: what robot, hand, came
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from math import atan2, cos, nan, pi, sin
-from typing import Any, Protocol, get_type_hints
+from typing import Any, Literal, Protocol, get_type_hints
+
+import numpy as np
 
 from rcsc.database.ask import Database
 from rcsc.database.pose import Pose, nine
@@ -22,6 +24,10 @@ from sim.vision.flood import Features, Found
 from sim.vision.line import Surface
 
 CYCLE_S = 0.04
+EMPTY_MM = 95.0
+"""Between the pads at first."""
+JAWS_MM = 20.0
+"""How far the jaws are open at first."""
 PICTURE_TICKS = 3
 """From the flash to what the image processing says."""
 DARK, FLOOD, LINE = 0, 1, 2
@@ -38,6 +44,40 @@ CONTROLLERS = ("robot", "vise", "machine", "_grip", "_asked", "_picture", "_deve
 """What a plant remembers from one cycle to the next, beside its mechanism."""
 
 Latest = Callable[[str], Values | None]
+
+
+@dataclass(frozen=True, slots=True)
+class _Words:
+    state: int
+    inc: int
+
+
+@dataclass(frozen=True, slots=True)
+class Noise:
+    """A generator of noise, as numpy says it."""
+
+    bit_generator: Literal["PCG64"]
+    state: _Words
+    has_uint32: Literal[0, 1]
+    uinteger: int
+
+
+def noise_of(rng: np.random.Generator) -> Noise:
+    """The generator's state."""
+    made: Noise = read(Noise, dict(rng.bit_generator.state))
+    return made
+
+
+def put_noise(rng: np.random.Generator, noise: Noise) -> None:
+    """Puts a generator into a state.
+
+    Raises:
+        ValueError: It has none such.
+    """
+    try:
+        rng.bit_generator.state = plain(noise)
+    except OverflowError as error:
+        raise ValueError("the state is of no noise") from error
 
 
 @dataclass(frozen=True, slots=True)

@@ -336,15 +336,22 @@ def answered_once(path: Path, count: int, first: int) -> None:
     assert [number for at, number in enumerate(begun) if at == 0 or begun[at - 1] != number] == numbers
 
 
-COMPILER = {"rcsc.model", "rcsc.plan", "rcsc.prove", "rcsc.resolve", "rcsc.syntax.tree", "numpy", "mujoco"}
+COMPILER = {"rcsc.model", "rcsc.plan", "rcsc.prove", "rcsc.resolve", "rcsc.syntax.tree"}
 
 
-def test_a_level_s_process_loads_neither_the_compiler_nor_a_simulator() -> None:
-    """It begins again in the middle of a run: what it loads is how long the others wait."""
-    load = "import rcsc.system.serve, sim.processes, sys; print(*sys.modules)"
-    ran = subprocess.run([sys.executable, "-c", load], capture_output=True, text=True, check=True)
-    assert {"rcsc.system.serve", "sim.processes"} <= set(ran.stdout.split())
-    assert set(ran.stdout.split()) & COMPILER == set()
+@pytest.mark.parametrize(
+    ("loads", "never"),
+    [
+        ("rcsc.system.serve, sim.processes", COMPILER | {"numpy", "mujoco"}),  # a level
+        ("sim.campaign.work", COMPILER | {"mujoco"}),  # episodes by kinematics
+    ],
+)
+def test_a_process_loads_only_what_it_needs(loads: str, never: set[str]) -> None:
+    """A level begins again in the middle of a run: what it loads is how long the others wait."""
+    told = f"import {loads}, sys; print(*sys.modules)"
+    ran = subprocess.run([sys.executable, "-c", told], capture_output=True, text=True, check=True)
+    assert set(loads.split(", ")) <= set(ran.stdout.split())
+    assert set(ran.stdout.split()) & never == set()
 
 
 def test_kill_minus_nine_loses_no_command_and_runs_none_twice(repo: Path, tmp_path: Path) -> None:

@@ -1,6 +1,6 @@
 """What is known of the camera, its flash and its projector, and what a picture holds. No MuJoCo."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import radians, tan
 
 import numpy as np
@@ -77,6 +77,10 @@ class Optics:
 
 STANDARD = Optics()
 """The sensor of the cell."""
+
+
+CLEAR = Optics()
+NOISY = replace(CLEAR, noise=5 * CLEAR.noise, peak_px=5 * CLEAR.peak_px, aim_rad=5 * CLEAR.aim_rad)
 
 
 @dataclass(frozen=True, slots=True)
