@@ -7,7 +7,7 @@ Three layers see to that, since a process can end without a chance to clear up (
    in a thread that lives as long as the pool.
 2. That does not reach a grandchild, such as the compiler proper below its driver. Each program leads a process group of its own, and
    `rcsc.keeper`, a small process that notices the end of this one by the end of its input, kills the groups and removes the paths
-   that are still held.
+   that are still held. It kills processes of this program, too: one that is still starting has not yet asked the kernel.
 3. Where even the keeper is killed, paths are locked for as long as their maker lives, and the next `scratch` or `lock` of that kind
    sweeps those that nobody locks.
 """
@@ -32,6 +32,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 if TYPE_CHECKING:
     from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+    from multiprocessing.connection import Connection
     from multiprocessing.context import SpawnProcess
 
 T = TypeVar("T")
@@ -117,6 +118,7 @@ class _Keeper:
             [sys.executable, "-I", "-S", str(_KEEPER)], stdin=subprocess.PIPE, bufsize=0, cwd="/",
             stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
         )  # fmt: skip
+        self._held = {one: None for one in self._held if _still(one)}
         self._write([f"+{one}" for one in self._held])
 
     def _write(self, lines: Sequence[str]) -> None:
@@ -131,6 +133,18 @@ class _Keeper:
             self._process.stdin.close()
             self._process.wait()
             self._process = None
+
+
+def _still(what: str) -> bool:
+    """Whether a number still means what was held: a process that has ended and was waited for may have left it to another."""
+    kind, _, name = what.partition(" ")
+    if kind != "process":
+        return True
+    try:
+        os.waitid(os.P_PID, int(name), os.WEXITED | os.WNOHANG | os.WNOWAIT)
+    except ChildProcessError:
+        return False
+    return True
 
 
 _keeper = _Keeper()
@@ -198,6 +212,20 @@ def scratch(kind: str) -> Iterator[Path]:
 
 # --- programs ---
 
+_folders: dict[int, tuple[Path, int | None]] = {}
+"""Of this process, by its number: where the programs that it runs put what is temporary, and its lock."""
+
+
+def _programs_folder() -> Path:
+    """The folder for what programs leave when they are killed; the keeper removes it when this process ends."""
+    if os.getpid() not in _folders:
+        prefix, parent = "rcsc-programs-", Path(tempfile.gettempdir())
+        sweep(parent, prefix)
+        path = Path(tempfile.mkdtemp(prefix=prefix))
+        hold(path)
+        _folders[os.getpid()] = path, lock(path)
+    return _folders[os.getpid()][0]
+
 
 def run(
     command: Sequence[str],
@@ -224,6 +252,7 @@ def run(
         child = subprocess.Popen(
             list(command), cwd=folder, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
             preexec_fn=_prepared(memory_mb), start_new_session=True,  # noqa: PLW1509  # it takes no lock and imports nothing
+            env={**os.environ, "TMPDIR": str(_programs_folder())},
         )  # fmt: skip
         group = f"group {child.pid}"
         _keeper.hold(group)
@@ -356,9 +385,16 @@ def executor(workers: int, then: Callable[[], None] | None = None) -> "ProcessPo
     from concurrent.futures import ProcessPoolExecutor
     from multiprocessing import get_context
 
-    return ProcessPoolExecutor(
-        workers, mp_context=get_context("spawn"), initializer=_begin, initargs=(os.getpid(), then)
-    )
+    class Held(ProcessPoolExecutor):
+        """One that names each worker to the keeper as soon as it has begun."""
+
+        def _spawn_process(self) -> None:
+            known = set(self._processes)
+            super()._spawn_process()  # type: ignore[misc]  # what the library calls for each worker
+            for worker in self._processes.keys() - known:
+                _keeper.hold(f"process {worker}")
+
+    return Held(workers, mp_context=get_context("spawn"), initializer=_begin, initargs=(os.getpid(), then))
 
 
 @contextlib.contextmanager
@@ -393,12 +429,26 @@ def answer(future: Future[T]) -> T:
 
 
 def process(name: str, target: Callable[..., None], *args: Any) -> "SpawnProcess":
-    """A process of this program, not begun yet; it dies with this one."""
+    """A process of this program, for `start` to begin; it dies with this one."""
     from multiprocessing import get_context
 
     return get_context("spawn").Process(
         target=_as_child, args=(os.getpid(), target, args), name=name, daemon=True
     )
+
+
+def pipe() -> "tuple[Connection, Connection]":
+    """The end that reads, and the one that a process is given to tell something."""
+    from multiprocessing import Pipe
+
+    return Pipe(duplex=False)
+
+
+def start(made: "SpawnProcess") -> None:
+    """Begin a process that `process` made."""
+    with interrupts_held():
+        made.start()
+        _keeper.hold(f"process {made.pid}")
 
 
 def _as_child(parent: int, target: Callable[..., None], args: tuple[Any, ...]) -> None:

@@ -8,7 +8,6 @@ What it sees is at times older or newer than in one process; tables that keep th
 """
 
 import contextlib
-import multiprocessing
 import os
 import signal
 import sys
@@ -114,15 +113,14 @@ class Supervisor:
         """
         if self.runs(name):
             raise ValueError(f"`{name}` runs")
-        told, tells = multiprocessing.Pipe(duplex=False)
+        told, tells = children.pipe()
         work: tuple[Callable[..., None], tuple[Any, ...]] = (
             (serve_level, (self._setting, name, tells))
             if name in self._signs
             else (serve_outside, (self._setting, self._outside[name], tells))
         )
         made = children.process(name, work[0], *work[1])
-        with children.interrupts_held():
-            made.start()
+        children.start(made)
         tells.close()
         self._running[name] = made
         if name in self._told:

@@ -12,8 +12,7 @@ import struct
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from multiprocessing.connection import Connection
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from rcsc.system.adopt import restart
 from rcsc.system.buffers import Buffers
@@ -23,6 +22,9 @@ from rcsc.system.executors import CExecutor, PythonExecutor, build
 from rcsc.system.levels import RunningLevel, StateTableError, running_level
 from rcsc.system.shared import Absent, SharedMemoryBuffers, layout
 from rcsc.system.signature import Signature, Values
+
+if TYPE_CHECKING:
+    from multiprocessing.connection import Connection
 
 FAULTY = 3  # a level's exit code after a fault; which one stands in its checkpoint
 REFUSED = 4  # of a process that was refused a state or values; it has told why
@@ -124,7 +126,7 @@ def fault_of(sign: Signature, values: Values) -> int:
     return int(values[len(sign.leaves) + 1])
 
 
-def serve_level(setting: Setting, name: str, told: Connection) -> None:
+def serve_level(setting: Setting, name: str, told: "Connection") -> None:
     """A level's process, from its start to SIGTERM or a fault; what it was refused is sent."""
     with _telling(told), _attached(setting) as (signs, transport):
         level = _level(setting, name, signs[name])
@@ -135,7 +137,7 @@ def serve_level(setting: Setting, name: str, told: Connection) -> None:
                 raise SystemExit(FAULTY)
 
 
-def serve_outside(setting: Setting, factory: Factory, told: Connection) -> None:
+def serve_outside(setting: Setting, factory: Factory, told: "Connection") -> None:
     """A process for what stands outside the levels, until it is over: until one part of it says `over`."""
     with _telling(told), _attached(setting) as (_, transport):
         made: tuple[Outside, ...] = tuple(factory.make())
@@ -156,7 +158,7 @@ def _publish(transport: Transport, name: str, values: Values) -> None:
 
 
 @contextlib.contextmanager
-def _telling(told: Connection) -> Iterator[None]:
+def _telling(told: "Connection") -> Iterator[None]:
     """Sends why a level was refused a state or values, and ends the process with `REFUSED`."""
     try:
         yield
