@@ -1,5 +1,6 @@
 """The search under the composed proof: nodes as bits, frames, and what is asked in the context of an invariant."""
 
+import json
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import product
@@ -10,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rcsc.cache import Cache
+from rcsc.cli import run
 from rcsc.compose.bits import Bits, few, key_of_bits
 from rcsc.compose.context import Again
 from rcsc.compose.cubes import Masks, Pair, Reached, shown
@@ -373,6 +375,26 @@ def test_a_system_is_not_proved_twice(cache: Cache, monkeypatch: pytest.MonkeyPa
     assert all(one.cached for one in again.levels)
     with pytest.raises(AssertionError):
         prove_steppers(made, LITTLE, 1, tuple(made), None, None)
+
+
+def test_levels_are_said_as_they_are_done_where_it_is_asked_for(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each before the next one is begun, and nothing of it among what was found."""
+    said: list[str] = []
+
+    def proving(stepper: Stepper, _: Effort) -> LevelProof:
+        said.append(capsys.readouterr().err)
+        return LevelProof(stepper.level.name, (), (), (), 0, 0, 0.0)
+
+    monkeypatch.setattr("rcsc.compose.system.prove_level", proving)
+    asked = ["prove", str(SMALL / "system.toml"), "--no-cache", "--jobs", "1", "--trace", "0", "--json"]
+    run([*asked, "--progress"])
+    assert said == ["", "level upper: 0 of 0 found proved, 0.0 s\n"]
+    json.loads(capsys.readouterr().out)
+    said.clear()
+    run(asked)
+    assert said == ["", ""]
 
 
 @pytest.mark.parametrize("lie", [2, ~0])

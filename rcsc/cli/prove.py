@@ -12,7 +12,7 @@ import click
 
 from rcsc.cli.cell import Stopped, stop, system_path
 from rcsc.cli.options import steps_option
-from rcsc.cli.show import UnwritableError
+from rcsc.cli.show import Progress, UnwritableError
 
 _WIDTH = 118
 """Columns of a time line."""
@@ -24,7 +24,7 @@ _WORTH_PROCESSES = 40
 """Lines of the levels' tables from which several processes are quicker than one: each takes a second to begin."""
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Sequence
 
     from rich.table import Table
 
@@ -72,6 +72,8 @@ Examples:
 @click.option("--certify", "confirms", is_flag=True,
               help="Put the same questions to cvc5, which has no part in the proof.")  # fmt: skip
 @click.option("--no-cache", is_flag=True, help="Prove everything anew.")
+@click.option("--progress", is_flag=True,
+              help="Say each level on standard error as it is done, which is so on a terminal anyway.")  # fmt: skip
 @click.option("--strict", is_flag=True,
               help="Exit status 1 also where something was not looked at, or rests on what is not proved.")  # fmt: skip
 @click.option("--invariants", is_flag=True, help="Print the invariant of each level, too.")
@@ -79,7 +81,7 @@ Examples:
 def prove(  # noqa: PLR0913, PLR0917  # as many as there are options
     system: Path | None, only: tuple[str, ...], steps: int, jobs: int | None, cycles: int, logs: Path | None,
     freeze: Path | None, cases: tuple[Path, ...], without_deferral: bool, first_match: bool, without_default: bool,
-    certificate: Path | None, confirms: bool, no_cache: bool, strict: bool, invariants: bool, as_json: bool,
+    certificate: Path | None, confirms: bool, no_cache: bool, progress: bool, strict: bool, invariants: bool, as_json: bool,
 ) -> int:  # fmt: skip
     """Prove that the levels of SYSTEM work together, however late each sees and answers what another says.
 
@@ -120,7 +122,10 @@ def prove(  # noqa: PLR0913, PLR0917  # as many as there are options
     effort = Effort(limits=Limits.of(steps))
     cache = None if no_cache else open_cache(path.parent)
     names = only or tuple(made)
-    proof = prove_steppers(made, effort, jobs or _jobs([made[name] for name in names]), names, None, cache)
+    with _Said(names, wanted=progress) as said:
+        proof = prove_steppers(
+            made, effort, jobs or _jobs([made[name] for name in names]), names, said, cache
+        )
     if certificate is not None:
         _write(certificate, made, proof)
     if not as_json:
@@ -145,6 +150,33 @@ def _jobs(levels: "Iterable[Stepper]") -> int:
     """How many levels to prove at once where nobody says."""
     lines = sum(len(table.lines) for one in levels for table in one.program.tables)
     return min(2, os.cpu_count() or 1) if lines >= _WORTH_PROCESSES else 1
+
+
+class _Said:
+    """Says each level on standard error as it is done, and on a terminal those that are still to come."""
+
+    def __init__(self, names: "Sequence[str]", *, wanted: bool) -> None:
+        self._left = list(names)
+        self._line = Progress()
+        self._wanted = wanted or self._line.shown
+
+    def __enter__(self) -> "Callable[[LevelProof], None]":
+        self._doing()
+        return self._done
+
+    def __exit__(self, *_: object) -> None:
+        self._line("")
+
+    def _doing(self) -> None:
+        self._line(f"proving {', '.join(self._left)}" if self._left else "")
+
+    def _done(self, proof: "LevelProof") -> None:
+        self._line("")
+        found = f"{len(proof.found) - len(proof.open)} of {len(proof.found)} found proved"
+        if self._wanted:
+            click.echo(f"level {proof.level}: {found}, {proof.seconds:.1f} s", err=True)
+        self._left.remove(proof.level)
+        self._doing()
 
 
 def _refused(made: "dict[str, Stepper]", proof: "SystemProof", *, quiet: bool) -> list[str]:

@@ -260,15 +260,19 @@ def _verdicts(report: Report) -> Iterator[Piece]:
 
 
 class Progress:
-    """One line on a terminal's standard error that says what is being worked at."""
+    """One line on a terminal's standard error that says what is being worked at.
+
+    Attributes:
+        shown: Whether there is a terminal, and it is wanted.
+    """
 
     def __init__(self, *, wanted: bool = True) -> None:
-        self._shown = wanted and _is_terminal(2)
+        self.shown = wanted and _is_terminal(2)
         self._width = 0
 
     def __call__(self, doing: str) -> None:
         """Say what is being done now; an empty text clears the line."""
-        if not self._shown:
+        if not self.shown:
             return
         text = escape(doing)[:100]
         sys.stderr.write(f"\r{pad(text, self._width)}" + ("" if text else "\r"))
