@@ -43,12 +43,12 @@ from tests.hierarchies_text import files, written
 from tests.hierarchies_together import Pair, broken_together
 from tests.hierarchies_world import allowed, broken, wanted
 
-LITTLE = Effort(walks=12, cycles=40)
+LITTLE = Effort(walks=6, cycles=20)
 MOST_CYCLES = 7
 """Of a trace that is looked for; longer ones are rare and cost much."""
-MOST_TOGETHER = 2000
+MOST_TOGETHER = 3000
 """States of two levels together that are worth listing."""
-LIKELY = 800
+LIKELY = 4000
 """Product of the states of two levels up to which those of both are likely to be fewer."""
 
 
