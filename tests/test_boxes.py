@@ -2,7 +2,7 @@
 
 import re
 from itertools import pairwise, product
-from typing import Any
+from typing import Any, Literal
 
 import pytest
 from hypothesis import given, reject
@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from rcsc.interpret import matching_lines
 from rcsc.model import Program, key_bounds, key_of, value_of_key
 from rcsc.prove import boxes
+from rcsc.prove.confirm import Agreement, confirm
 from rcsc.prove.options import Options
 from rcsc.prove.repair import closing_line, parting_cell
 from rcsc.prove.report import diagnostics
@@ -230,3 +231,52 @@ def test_joined_is_what_was_apart_and_no_neighbours(keys: set[int]) -> None:
     found = boxes.joined((key, key) for key in sorted(keys))
     assert {at for low, high in found for at in range(low, high + 1)} == keys
     assert all(one[1] + 1 < two[0] for one, two in pairwise(found))
+
+
+# --- what Z3 says of a verdict ---
+
+
+PARTED = {
+    "right": ("<= 1", "> 1"),
+    "gap": ("<= 0", "> 1"),
+    "overlap": ("<= 1", "> 0"),
+    "gap and overlap": ("<= 1", "in {1, 3}"),
+}
+ANSWERED = {
+    name: program_of(written([["x", "", "", low], ["y", "", "", high]]))
+    for name, (low, high) in PARTED.items()
+}
+
+
+@pytest.mark.parametrize("solver", ["auto", "both"])
+@pytest.mark.parametrize(("asked", "claimed"), list(product(PARTED, PARTED)))
+def test_z3_disagrees_with_every_verdict_that_is_of_another_kind(
+    asked: str, claimed: str, solver: Literal["auto", "both"]
+) -> None:
+    other, program = ANSWERED[claimed], ANSWERED[asked]
+    found = prove_table(other, other.tables[0], Options(solver="boxes")).found
+    agreed = confirm(program, program.tables[0], found, Options(solver=solver))
+    assert agreed is (Agreement.AGREES if asked == claimed else Agreement.DISAGREES)
+
+
+@pytest.mark.parametrize(("solver", "spare", "asked"), [
+    ("boxes", 0, False), ("auto", 0, True), ("auto", -1, False), ("both", 0, True), ("both", -1, True),
+])  # fmt: skip
+def test_z3_is_asked_as_the_options_say(
+    monkeypatch: pytest.MonkeyPatch, solver: Literal["auto", "both", "boxes"], spare: int, asked: bool
+) -> None:
+    program = ANSWERED["right"]
+    monkeypatch.setattr("rcsc.prove.confirm._COSTLY", 2 * 2 + spare)  # two conditions, two lines
+    options = Options(solver=solver)
+    agreed = confirm(program, program.tables[0], (), options)
+    assert agreed is (Agreement.AGREES if asked else Agreement.NOT_ASKED)
+    assert prove_table(program, program.tables[0], options).backing.confirmed_by_z3 == asked
+    undecided = confirm(program, program.tables[0], (Undecided("too large"),), options)
+    assert undecided is Agreement.NOT_ASKED
+
+
+def test_z3_out_of_steps_confirms_nothing() -> None:
+    program = ANSWERED["gap"]
+    options = Options(solver="both", steps=1)
+    assert confirm(program, program.tables[0], (), options) is Agreement.UNKNOWN
+    assert not prove_table(program, program.tables[0], options).backing.confirmed_by_z3
