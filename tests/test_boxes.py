@@ -13,10 +13,11 @@ from rcsc.model import Program, key_bounds, key_of, value_of_key
 from rcsc.prove import boxes
 from rcsc.prove.confirm import Agreement, confirm
 from rcsc.prove.options import Options
+from rcsc.prove.program import prove_program
 from rcsc.prove.repair import closing_line, parting_cell
 from rcsc.prove.report import diagnostics
 from rcsc.prove.table import prove_table
-from rcsc.prove.verdict import DeadLine, Gap, Overlap, Region, Undecided
+from rcsc.prove.verdict import ContradictoryAssumptions, DeadLine, Gap, Overlap, Region, Undecided
 from rcsc.resolve import compile_text
 from tests.bench import families
 
@@ -280,3 +281,23 @@ def test_z3_out_of_steps_confirms_nothing() -> None:
     options = Options(solver="both", steps=1)
     assert confirm(program, program.tables[0], (), options) is Agreement.UNKNOWN
     assert not prove_table(program, program.tables[0], options).backing.confirmed_by_z3
+
+
+ALLOWED = [
+    ("n > 0", True), ("n > 0 and n < 1", False), ("a and n = 3", True), ("a = (not a)", False), ("n + n = 1", False), ("n * 2 = 6", True),
+    ("c = colour.red and c in {colour.green, colour.blue}", False), ("n < 0 implies n > 5", True), ("real(n) > 3.0", False),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("column", ["n", "n + n"])
+@pytest.mark.parametrize(("claim", "possible"), ALLOWED)
+def test_a_table_is_not_decided_under_what_cannot_hold(column: str, claim: str, possible: bool) -> None:
+    text = f"assume it assumed : {claim}\ntable t assuming it {{\n| line | {column} | n ||\n| x | <= 1 | ||\n| y | > 1 | ||\n}}\n"
+    program = program_of(HEAD + text)
+    options = Options(solver="boxes")
+    [whole] = prove_program(program, options).tables
+    assert any(isinstance(one, ContradictoryAssumptions) for one in whole.found) is not possible
+    assert not any(isinstance(one, Gap | Overlap | Undecided) for one in whole.found)
+    if "n" in re.findall(r"\w+", claim):  # what the table reads: found where it is decided
+        alone = prove_table(program, program.tables[0], options).found
+        assert any(isinstance(one, ContradictoryAssumptions) for one in alone) is not possible

@@ -229,23 +229,6 @@ def admitted(term: Term, inside: Term, other: Term) -> Term:
     return choice(inside, term, other)
 
 
-def constants(term: Term) -> frozenset[str]:
-    """Names of the constants in the term."""
-    z3: Any = _z3()
-    names: set[str] = set()
-    waiting: list[Any] = [term]
-    seen: set[int] = set()
-    while waiting:
-        one = waiting.pop()
-        if one.get_id() in seen:
-            continue
-        seen.add(one.get_id())
-        if z3.is_const(one) and one.decl().kind() == z3.Z3_OP_UNINTERPRETED:
-            names.add(str(one.decl().name()))
-        waiting.extend(one.children())
-    return frozenset(names)
-
-
 class Solver:
     """One incremental solver.
 
