@@ -585,6 +585,33 @@ def test_what_breaks_where_invariants_are_broken_within_a_cycle_is_shown_by_a_ru
     assert [step.line for step in trace.steps] == ["no"]
 
 
+@pytest.mark.parametrize("runs", [True, False])
+def test_what_is_not_safe_within_a_cycle_is_shown_by_a_run_that_no_executor_does(
+    runs: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Where the run meets what is not defined, the interpreter cannot do it either: then that is said."""
+    text = (
+        within("9")
+        if runs
+        else within("9").replace("| no   | false ||            |", "| no | false || use |")
+    )
+    path = solo(tmp_path, text)
+    kept, found = tmp_path / "cases", tmp_path / "found"
+    assert run(["prove", str(path), "--log", str(found), "--freeze", str(kept)]) == 1
+    said = capsys.readouterr()
+    assert "within a cycle: not proved" in said.out
+    assert ("as the interpreter runs it; executors are to run nothing that is not safe" in said.err) is runs
+    assert ("the run that shows it meets an operation that is not defined" in said.err) is not runs
+    assert "or fewer shows it" not in said.err
+    assert not list(found.glob("*.mcap"))
+    cases = list(kept.glob("*.json"))
+    assert len(cases) == runs
+    for case in cases:
+        assert case_breaks(read_case(case))
+        path.with_name("solo.rcs").write_text(within("3"), encoding="utf-8")
+        assert not case_breaks(read_case(case))
+
+
 def test_a_fault_of_one_level_shows_in_the_verdicts_of_its_neighbours(tmp_path: Path) -> None:
     """Behind it nobody knows what the level orders."""
     path = changed(

@@ -225,7 +225,9 @@ def _say_level(whole: "SystemProof", proof: "LevelProof") -> None:
             click.echo(f"  {sort.value}: {len(good)} of {len(found) - len(beside)} proved{trusts}")
             for goal in found:
                 if goal not in good and goal.name not in beside:
-                    click.echo(f"    {goal.table or goal.name}: {standing(whole, proof.level, goal.key)}")
+                    click.echo(
+                        f"    {goal.table or goal.name or 'within a cycle'}: {standing(whole, proof.level, goal.key)}"
+                    )
             if beside:
                 click.echo(f"    beside the number, so that nobody relies on it: {', '.join(beside)}")
     for line in not_looked_at(proof):
@@ -343,6 +345,7 @@ def _again(cases: tuple[Path, ...]) -> int:
 
 def _say_told(made: "dict[str, Stepper]", told: "Told", cycles: int) -> None:
     """One thing that is not proved; runs of as many cycles were looked for."""
+    from rcsc.compose.claims import SAFE
     from rcsc.diagnostics.codes import Code
 
     where = f"level `{told.level}`" + (f", table `{told.goal.table}`" if told.goal.table else "")
@@ -361,6 +364,8 @@ def _say_told(made: "dict[str, Stepper]", told: "Told", cycles: int) -> None:
         click.echo(f"  = note: {line}", err=True)
     if told.finding is not None and not told.beside:
         _say_finding(made, told.finding, in_c=told.in_c)
+    elif told.guessed and told.goal.key == SAFE:
+        click.echo("  = note: the run that shows it meets an operation that is not defined", err=True)
     elif told.guessed:
         click.echo("  = note: a trace that was found does not run: arithmetic was left open", err=True)
     elif told.goal.sort.value == "assumption" and told.goal.name in made[told.level].trusted:
@@ -393,13 +398,15 @@ def _say_finding(made: "dict[str, Stepper]", finding: "Finding", *, in_c: bool) 
     """The time line."""
     from rich.console import Console
 
+    from rcsc.compose.claims import SAFE
+
     begins = ", after a restart" if finding.restarted else ""
     legal = "" if finding.legal else "; numbers have gone round, or a neighbour was restarted"
-    run_by = (
-        "as the interpreter, the Python and the C executors run it"
-        if in_c
-        else "as the interpreter and the Python executor run it (no C function can give what is refused)"
-    )
+    run_by = "as the interpreter, the Python and the C executors run it"
+    if finding.goal.key == SAFE:
+        run_by = "as the interpreter runs it; executors are to run nothing that is not safe"
+    elif not in_c:
+        run_by = "as the interpreter and the Python executor run it (no C function can give what is refused)"
     what = (
         f"goes round from cycle {finding.lap} to cycle {finding.broken_at}"
         if finding.lap

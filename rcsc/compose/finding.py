@@ -107,6 +107,7 @@ _WRONG = {
     Sort.DEFERRED: "`{}` is written directly while another value is pending",
     Sort.INVARIANT: "invariant `{}` does not hold",
     Sort.PROPERTY: "property `{}` is broken",
+    Sort.SAFE: "within it an invariant does not hold under which its operations are safe",
     Sort.ENDS: "all is as it was before cycle {}: so it may go on for ever",
     Sort.SAME_ORDER: "another order under the number that was taken last: it is not seen as new",
     Sort.OF_ITS_ORDER: "what is reported under the number of the last order is not about it",

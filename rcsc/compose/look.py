@@ -111,7 +111,7 @@ def _level(
         if goal.sort is Sort.ONE_LINE
     }
     asked = [one for goal in wanted for one in parted.get(goal.key) or [goal]]
-    found = _found(stepper, [one for one in asked if one.sort is not Sort.SAFE], looking)
+    found = _found(stepper, asked, looking)
     for goal in wanted:
         if goal.key in parted:
             yield from _pairs(stepper, goal, parted[goal.key], found)
@@ -202,7 +202,7 @@ class _Rerun:
     def run(self, told: Told) -> Told:
         """With the log of its run, and what would mend the table."""
         finding = told.finding
-        if finding is None:
+        if finding is None or told.goal.sort is Sort.SAFE:  # what is not safe no executor is to run
             return told
         system = replace(self.looking.system, generated=self.folder / "generated")
         programs = {name: self.made[name].program for name in finding.levels if name not in self._ready}

@@ -361,11 +361,14 @@ class Halfway:
 
     Attributes:
         middle: Every leaf as the table saw it: inputs taken, deferred values settled, preprocess run, as far as it came.
+        settled: Every leaf before the preprocess; `done`, before the postprocess, as far as it came.
         matched: Whether it came to the table.
         acted: Whether its line, if one ran, was done.
     """
 
     middle: dict[str, Value]
+    settled: dict[str, Value]
+    done: dict[str, Value]
     matched: bool = False
     acted: bool = False
 
@@ -376,7 +379,7 @@ def halfway(stepper: Stepper, step: Step) -> Halfway:
     now = admit(program, {**step.before, **step.taken})
     assert not isinstance(now, str)
     settle(program, now)
-    found = Halfway(now)
+    found = Halfway(now, dict(now), now)
     try:
         with scripted(program, step.answers):
             for name in stepper.level.preprocess:
@@ -469,7 +472,7 @@ def broken(stepper: Stepper, goal: Goal, step: Step) -> bool:
             kept = property_kept(stepper, goal.name, step.before, step.after)
             return not step.ends_the_run and not kept
         case Sort.SAFE:
-            return False  # what shows it is no run that the interpreter can do
+            return not step.ends_the_run and _broken_between(stepper, goal, step)
         case _:
             return _broken_between(stepper, goal, step)
 
