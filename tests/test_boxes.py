@@ -1,7 +1,7 @@
 """Tables of boxes against brute force: overlaps, gaps, least witnesses, regions, counts, and repairs that repair."""
 
 import re
-from itertools import pairwise, product
+from itertools import combinations, pairwise, product
 from typing import Any, Literal
 
 import pytest
@@ -301,3 +301,21 @@ def test_a_table_is_not_decided_under_what_cannot_hold(column: str, claim: str, 
     if "n" in re.findall(r"\w+", claim):  # what the table reads: found where it is decided
         alone = prove_table(program, program.tables[0], options).found
         assert any(isinstance(one, ContradictoryAssumptions) for one in alone) is not possible
+
+
+@pytest.mark.parametrize("many", [False, True])
+def test_without_the_crossing_lines_no_two_overlap(monkeypatch: pytest.MonkeyPatch, many: bool) -> None:
+    if many:
+        monkeypatch.setattr(boxes, "MOST_PAIRS", 0)
+    for chosen in product((False, True), repeat=10):  # every graph of five lines
+        pairs = [pair for pair, meet in zip(combinations(range(5), 2), chosen, strict=True) if meet]
+        met: dict[int, int] = {}
+        for first, second in pairs:
+            met[first] = met.get(first, 0) | 1 << second
+        near, crossing = boxes._crossing(met)
+        assert all(first in crossing or second in crossing for first, second in pairs)
+        if not (many and pairs):
+            wanted = {at: {a + b - at for a, b in pairs if at in (a, b)} for at in range(5)}
+            assert {at: set(boxes.bits_of(mask)) for at, mask in near.items()} == {
+                at: others for at, others in wanted.items() if others
+            }
