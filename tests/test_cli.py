@@ -105,6 +105,20 @@ def test_1_findings_with_the_witness_its_region_and_a_repair(rcsc: Rcsc) -> None
     assert "0 proved, 1 refuted" in ran.out
 
 
+@pytest.mark.parametrize("cached", [(), ("--no-cache",)])
+def test_a_table_whose_line_can_go_wrong_is_not_called_proved(rcsc: Rcsc, cached: tuple[str, ...]) -> None:
+    over = "input x : int 0 .. 9\nstate n : int 0 .. 9\nprocedure p { n := n + x }\n"
+    write(
+        "over.rcs",
+        over
+        + "table t {\n| line | x || procedures |\n| a | || p |\n}\ntable u {\n| line | x ||\n| a | ||\n}\n",
+    )
+    for _ in range(2):
+        form = json.loads(rcsc("check", "--json", *cached).out)
+        assert [one["code"] for one in form["diagnostics"]] == ["RCS413"]
+        assert {one["table"]: one["verdict"] for one in form["tables"]} == {"t": "conditional", "u": "proved"}
+
+
 @pytest.mark.parametrize("args", [["check", "--frob"], ["frob"], ["check", "--steps", "0"], ["explain", "1"]])
 def test_2_usage(rcsc: Rcsc, args: list[str]) -> None:
     ran = rcsc(*args)

@@ -107,10 +107,14 @@ def trusting(words: Collection[str]) -> str:
     return f", trusting {', '.join(words)}" if words else ""
 
 
-def resting(table: TableReport, unproved: Collection[str]) -> TableReport:
-    """The report where these invariants and assumptions are not proved: what rests on one of them is conditional."""
+def resting(table: TableReport, unproved: Collection[str], unsafe: Collection[str] = ()) -> TableReport:
+    """The report where these invariants and assumptions are not proved, and lines of these tables can go wrong.
+
+    What rests on one of them is conditional: exactly one line matches, as long as all goes well.
+    """
     assumptions = tuple((name, NOT_PROVED if name in unproved else was) for name, was in table.assumptions)
-    if table.verdict is Verdict.PROVED and any(standing == NOT_PROVED for _, standing in assumptions):
+    shaken = table.table in unsafe or any(standing == NOT_PROVED for _, standing in assumptions)
+    if table.verdict is Verdict.PROVED and shaken:
         return replace(table, verdict=Verdict.CONDITIONAL, assumptions=assumptions)
     return replace(table, assumptions=assumptions)
 

@@ -37,7 +37,9 @@ def prove(root: str, program: Program, loaded: Loaded, options: Options, cache: 
     options = options if cells >= WORTH_A_PROCESS else replace(options, jobs=1)
     if cache is None:
         verdict = prove_program(program, options)
-        tables = tuple(resting(table_report(one, program), verdict.unproved) for one in verdict.tables)
+        tables = tuple(
+            resting(table_report(one, program), verdict.unproved, verdict.unsafe) for one in verdict.tables
+        )
         return Proof(root, verdict.findings, program, tables, verdict.proved, verdict.certificate)
     memory = _Memory(program, loaded, options, cache)
     known = {table.name: one for table in program.tables if (one := memory.table(table)) is not None}
@@ -49,7 +51,7 @@ def prove(root: str, program: Program, loaded: Loaded, options: Options, cache: 
     if not any(one.severity is Severity.ERROR for one in verdict.findings):
         memory.keep([one for one in verdict.findings if one not in elsewhere], verdict.tables)
     new = {one.table.name: _Kept(table_report(one, program), ()) for one in verdict.tables}
-    return _proof(root, program, verdict.findings, {**known, **new}, verdict.unproved)
+    return _proof(root, program, verdict.findings, {**known, **new}, verdict.unproved, verdict.unsafe)
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,10 +68,11 @@ def _proof(
     found: Sequence[Diagnostic],
     known: dict[Any, _Kept],
     unproved: Collection[str] = (),
+    unsafe: Collection[str] = (),
 ) -> Proof:
     tables = [known[table.name] for table in program.tables]
     every = {*found, *(note for one in tables for note in one.notes)}
-    reports = tuple(resting(one.report, unproved) for one in tables)
+    reports = tuple(resting(one.report, unproved, unsafe) for one in tables)
     return Proof(root, tuple(sorted(every, key=sort_key)), program, reports)
 
 

@@ -105,6 +105,7 @@ class Obligations:
     Attributes:
         tally: How it was settled.
         undefined: Tables with a condition, or an assumption, that is not defined for every input.
+        unsafe: Tables of which a line or a condition owes what is not shown.
         stops: By table, the assumptions on which the safety of its conditions and lines rests.
     """
 
@@ -112,6 +113,7 @@ class Obligations:
     options: Options
     tally: Tally = field(default_factory=Tally)
     undefined: set[str] = field(default_factory=set)
+    unsafe: set[str] = field(default_factory=set)
     stops: dict[str, tuple[AssumptionName, ...]] = field(default_factory=dict)
     _causes: dict[tuple[Code, Span, str], Cause] = field(default_factory=dict)
     _start: dict[str, Node] = field(default_factory=dict)
@@ -230,9 +232,11 @@ class Obligations:
                 if assumptions and not self._asker.all_hold(run.obligations, known):
                     needing.append(owing)
                     run, known = owing.run(self._known(one.condition for one in assumptions))
-                if not self._settle(run, known, owing.where, table.name) and owing.condition:
-                    self.undefined.add(table.name)
+                if not self._settle(run, known, owing.where, table.name):
+                    self.unsafe.add(table.name)
+                    self.undefined.update([table.name] if owing.condition else [])
             except (TooLongError, RecursionError):
+                self.unsafe.add(table.name)
                 self._give_up(owing.where, owing.span)
         if needing:
             chosen = fewest(assumptions, partial(self._suffice, needing))

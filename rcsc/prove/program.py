@@ -43,6 +43,7 @@ class ProgramVerdict:
         tally: How the obligations of procedures and conditions were settled.
         program: What was proved, with the stopping assumptions of the tables that were looked at.
         unproved: Invariants, and assumptions declared `proved`, that are not proved: what rests on one is not, either.
+        unsafe: Tables of which a line owes what is not shown.
     """
 
     findings: tuple[Diagnostic, ...]
@@ -52,6 +53,7 @@ class ProgramVerdict:
     tally: Tally
     program: Program
     unproved: frozenset[str] = frozenset()
+    unsafe: frozenset[str] = frozenset()
 
 
 def prove_program(
@@ -78,7 +80,8 @@ def prove_program(
     findings = tuple(sorted(dict.fromkeys(found), key=sort_key))
     wrong = any(one.severity is Severity.ERROR for one in findings)
     if wrong or only is not None:
-        return ProgramVerdict(findings, None, verdicts, None, owed.tally, program, unproved)
+        unsafe = frozenset(owed.unsafe)
+        return ProgramVerdict(findings, None, verdicts, None, owed.tally, program, unproved, unsafe)
     backings = tuple((verdict.table.name, verdict.backing) for verdict in verdicts)
     proved = ProvedProgram(program, backings, seal_of_proof())
     certificate = _certificate(program, verdicts)
