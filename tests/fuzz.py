@@ -183,7 +183,7 @@ DOCS = (
     "coding: latin-1",
     "// /* {{ 7 }} {% x %} {# #}",
     "${HOME} #[[ ]]",
-    "\u202e\u2066 \u0430",
+    "\u05d0\u0627\u0301 \u0430",
     "x" * 3000,
     "cppcheck-suppress all",
     "#define x",
