@@ -54,7 +54,7 @@ FORMATS_OF_OURS = {
     "rcsc/model.py", "rcsc/prove/smt.py", "rcsc/smtlib.py", "rcsc/testing/native.py", "rcsc/testing/externs.py",  # doubles as bits
     "rcsc/system/signature.py", "rcsc/system/executors.py", "rcsc/log/read.py", "rcsc/log/write.py",  # `FORMATS` by checked types
     "rcsc/log/records.py", "rcsc/log/replay.py", "rcsc/system/shared.py", "rcsc/system/block.py", "rcsc/system/serve.py",
-    "rcsc/system/answers.py", "rcsc/system/levels.py",
+    "rcsc/system/answers.py", "rcsc/system/levels.py", "rcsc/system/cell.py", "rcsc/workstation/stopped.py",
     "rcsc/certify", "sim/loop.py", "sim/campaign/work.py",
 }  # fmt: skip
 """Who may name `struct`: their formats are written in them, or taken from `FORMATS` for a type that was checked."""
