@@ -59,7 +59,7 @@ TESTS = tuple(
     f"tests/test_{name}.py"
     for name in """
     boxes operators bounds regions obligations invariants interpret proofs certify verdicts stops properties_language composed_sound
-    composed_search endings standing hierarchies
+    composed_search endings standing hierarchies compose diff
     """.split()
 )
 Key = TypeVar("Key")

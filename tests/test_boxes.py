@@ -1,13 +1,14 @@
 """Tables of boxes against brute force: overlaps, gaps, least witnesses, regions, counts, and repairs that repair."""
 
 import re
-from itertools import combinations, pairwise, product
+from itertools import combinations, pairwise, permutations, product
 from typing import Any, Literal
 
 import pytest
 from hypothesis import given, reject
 from hypothesis import strategies as st
 
+from rcsc.diagnostics.codes import Code
 from rcsc.interpret import matching_lines
 from rcsc.model import Program, key_bounds, key_of, value_of_key
 from rcsc.prove import boxes
@@ -35,18 +36,19 @@ Point = tuple[int, ...]
 
 
 @st.composite
-def texts(draw: st.DrawFn) -> str:
+def texts(draw: st.DrawFn, columns: str = "acn") -> str:
     """A table of up to six lines, sometimes with a DEFAULT line."""
-    rows = [[f"l{at}", *(draw(CELLS[name]) for name in "acn")] for at in range(draw(st.integers(1, 6)))]
+    rows = [[f"l{at}", *(draw(CELLS[name]) for name in columns)] for at in range(draw(st.integers(1, 6)))]
     if draw(st.booleans()):
-        rows.append(["d", draw(st.sampled_from(["DEFAULT", "DEFAULT unreachable"])), "", ""])
-    return written(rows)
+        default = draw(st.sampled_from(["DEFAULT", "DEFAULT unreachable"]))
+        rows.append(["d", default, *[""] * (len(columns) - 1)])
+    return written(rows, columns)
 
 
-def written(rows: list[list[str]]) -> str:
+def written(rows: list[list[str]], columns: str = "acn") -> str:
     """The text of the table."""
     lines = "\n".join("| " + " | ".join(row) + " ||" for row in rows)
-    return f"{HEAD}table t {{\n| line | a | c | n ||\n{lines}\n}}\n"
+    return f"{HEAD}table t {{\n| line | {' | '.join(columns)} ||\n{lines}\n}}\n"
 
 
 def program_of(text: str) -> Program:
@@ -84,8 +86,9 @@ def inside(program: Program, region: Region) -> set[Point]:
     return set(product(*axes))
 
 
-@given(texts())
+@given(st.sampled_from(["acn", "acnn"]).flatmap(texts))
 def test_findings_are_those_of_brute_force(text: str) -> None:
+    """Where `n` has two columns a line may be dead, which must hide no other."""
     program = program_of(text)
     table, right = program.tables[0], matched(program)
     assert boxes.applies(table)
@@ -258,6 +261,20 @@ def test_z3_disagrees_with_every_verdict_that_is_of_another_kind(
     found = prove_table(other, other.tables[0], Options(solver="boxes")).found
     agreed = confirm(program, program.tables[0], found, Options(solver=solver))
     assert agreed is (Agreement.AGREES if asked == claimed else Agreement.DISAGREES)
+
+
+@pytest.mark.parametrize(("asked", "claimed"), list(permutations(PARTED, 2)))
+def test_a_verdict_that_z3_disagrees_with_is_told_as_a_fault_of_rcsc(
+    monkeypatch: pytest.MonkeyPatch, asked: str, claimed: str
+) -> None:
+    other, program = ANSWERED[claimed], ANSWERED[asked]
+    claim = prove_table(other, other.tables[0], Options(solver="boxes")).found
+    monkeypatch.setattr("rcsc.prove.table._by_boxes", lambda *_: claim)
+    monkeypatch.setattr("rcsc.prove.table.box_certificate", lambda *_: {})
+    verdict = prove_program(program, Options())
+    assert verdict.proved is None
+    assert not verdict.tables[0].backing.confirmed_by_z3
+    assert Code.SOLVERS_DISAGREE in {one.code for one in verdict.findings}
 
 
 @pytest.mark.parametrize(("solver", "spare", "asked"), [

@@ -247,7 +247,9 @@ table t assuming small {
     )
     assert codes(proved(text).findings) == []
     assert codes(proved(text.replace("assuming small ", "")).findings) == ["RCS412"]
-    assert codes(proved(text.replace("a < 4", "9 / a > 2")).findings) == ["RCS411"]
+    [found] = proved(text.replace("a < 4", "9 / a > 2")).findings
+    assert found.code is Code.DIVISION_BY_ZERO
+    assert [(one.table, one.variables, one.values) for one in found.witnesses] == [("", ("a",), ("0",))]
 
 
 def test_every_condition_is_defined_whatever_the_others_say() -> None:
@@ -334,11 +336,33 @@ def test_one_query_shows_all_that_a_line_owes() -> None:
     assert (verdict.tally.by_solver, verdict.tally.queries) == (3, 1)
 
 
-def test_runs_that_are_too_long_to_follow_are_undecided(monkeypatch: pytest.MonkeyPatch) -> None:
+LONG = "procedure p { for i in 0 .. 99 { n := 0 } }\n"
+LINE = "table t {\n| line | a || procedures |\n| all | >= 0 || p |\n}\n"
+LEVEL = (
+    LINE.replace("p |", "|").replace("{", "{{").replace("}", "}}")
+    + "level l {{ period 40 [ms] {} table t {} }}\n"
+)
+
+
+@pytest.mark.parametrize(
+    ("text", "place", "what"),
+    [
+        (LONG, "p {", "in procedure `p`"),
+        (LONG + LINE, "all", "in line `all` of table `t`"),
+        (LONG + LEVEL.format("preprocess p", ""), "l {", "in `preprocess` of level `l`"),
+        (LONG + LEVEL.format("", "postprocess p"), "l {", "in `postprocess` of level `l`"),
+    ],
+)
+def test_runs_that_are_too_long_to_follow_are_undecided(
+    monkeypatch: pytest.MonkeyPatch, text: str, place: str, what: str
+) -> None:
     monkeypatch.setattr("rcsc.prove.evaluation.MOST_STEPS", 50)
-    found = proved(f"{VARIABLES}procedure p {{ for i in 0 .. 99 {{ n := 0 }} }}")
-    assert codes(found.findings) == ["RCS409"]
+    found = proved(VARIABLES + text)
     assert found.proved is None
+    [one] = found.findings
+    assert one.code is Code.UNDECIDED
+    assert what in one.message
+    assert (VARIABLES + text)[one.primary.span.start :].startswith(place)
 
 
 def test_long_loops_are_followed() -> None:

@@ -130,6 +130,7 @@ CELLS = {
     "p": ("", "true", "false"),
     "x": ("", "0", "< 2", "/= 1", ">= 1", "2"),
     "y": ("", "0 .. 1", "> 1", "/= 2", "in {0, 3}", "x"),
+    "when": ("", "", "", "x * y > 1", "not (x * y > 1)", "(x + y) mod 2 = 0", "x * x < y"),
 }
 ASSUMED = (
     "p",
@@ -149,10 +150,12 @@ ASSUMED = (
 def tables(draw: st.DrawFn) -> str:
     """A small table; its lines often split one column, so that it is often right but for what is assumed."""
     count = draw(st.integers(1, 3))
-    rows = [tuple(draw(st.sampled_from(CELLS[name])) for name in RANGES) for _ in range(count)]
+    rows = [tuple(draw(st.sampled_from(cells)) for cells in CELLS.values()) for _ in range(count)]
     if draw(st.booleans()):
-        rows = [("true", *row[1:]) if at == 0 else ("false", "", "") for at, row in enumerate(rows[:2])]
-    default = draw(st.sampled_from(["", "  | d | DEFAULT | | ||\n", "  | d | DEFAULT unreachable | | ||\n"]))
+        rows = [("true", *row[1:]) if at == 0 else ("false", "", "", "") for at, row in enumerate(rows[:2])]
+    default = draw(
+        st.sampled_from(["", "  | d | DEFAULT | | | ||\n", "  | d | DEFAULT unreachable | | | ||\n"])
+    )
     assumed = draw(st.lists(st.sampled_from(ASSUMED), max_size=2, unique=True))
     standing = draw(st.sampled_from(["assumed", "monitored"]))
     names = [f"a{at}" for at in range(len(assumed))]
@@ -161,7 +164,7 @@ def tables(draw: st.DrawFn) -> str:
     assuming = f"assuming {', '.join(names)} " if names else ""
     return (
         "input p : bool\ninput x : int 0 .. 2\ninput y : int 0 .. 3\n"
-        f"{head}table t {assuming}{{\n  | line | p | x | y ||\n{lines}{default}}}\n"
+        f"{head}table t {assuming}{{\n  | line | p | x | y | when ||\n{lines}{default}}}\n"
     )
 
 
