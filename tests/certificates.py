@@ -151,6 +151,8 @@ class _Truth:
             if leaf.deferred_until is not None and self.value(leaf.deferred_until, state, {}):
                 taken[leaf.name] = state[pending(leaf.name)]
         self.owe(self.kept(taken), "an invariant where deferred values are taken")
+        safe = {str(leaf.name): leaf.safe for leaf in self.program.variables if leaf.safe is not None}
+        self.owe(self.kept(state | safe), "an invariant where safe values are shown")
         for level in self.program.levels:
             if isinstance(level.tables, TableByCommand):
                 self.value(level.tables.selector, state, {})
@@ -348,7 +350,8 @@ class _Text:
             self.first[name] = rng.randint(0, high)
             self.states *= (high + 1) ** (2 if until else 1)
             lines.append(f"state {name} : int 0 .. {high} = {self.first[name]}{until}")
-        lines.append("output o : bool")
+        safe = rng.choice(("", "", " safe false", " safe true"))
+        lines.append(f"output o : bool{' = true' if safe else ''}{safe}")
         if rng.random() < 0.25 and self.states * 4 <= MOST_STATES:
             lines.append("state k : array[2] of int 0 .. 1")
             self.ints["k"] = 0, 1

@@ -21,7 +21,7 @@ from rcsc.certify.settle import script, values_in
 from rcsc.certify.values import parts_first
 from rcsc.interpret import evaluate, matching_lines
 from rcsc.meaning import digest
-from rcsc.model import AssumptionName, Program, Table
+from rcsc.model import AssumptionName, Program, Read, Table
 from rcsc.prove.options import Options
 from rcsc.prove.program import prove_program
 from rcsc.resolve import compile_text
@@ -701,3 +701,46 @@ def test_assumptions_are_shown_to_hold_together_at_values_of_the_types() -> None
     for witness in wrong:
         made = signed(program, {**certificate, "tables": [{**entry, "witness": witness}]})
         assert certify(program, made).problems, witness
+
+
+@pytest.mark.parametrize(
+    ("safe", "right"), [("", True), ("safe 1", True), ("safe 9", True), ("safe 0", False)]
+)
+def test_invariants_hold_where_outputs_show_their_safe_values(safe: str, right: bool) -> None:
+    def with_safe(said: str) -> Program:
+        return program_of(
+            f"input a : int 0 .. 9\noutput o : int 0 .. 9 = 1 {said}\ninvariant lit : o >= 1\nprocedure p {{ o := 2 }}\n"
+            "table t {\n| line | a || procedures |\n| one | < 4 || p |\n| two | >= 4 || |\n}\n"
+        )
+
+    program = with_safe(safe)
+    assert bool(wrong_with(program)) is not right
+    found = certify(program, signed(program, certificate_of(with_safe(""))))
+    assert found.whole is right
+    assert right or "showing safe values after a fault: invariant `lit`" in found.problems[0]
+
+
+def test_an_expression_that_is_gone_lends_its_meaning_to_no_other() -> None:
+    program = program_of(RELATED)
+    start = Start(program)
+    for one in (*program.variables, *program.variables) * 20:
+        assert start.condition(Read(one.name, one.type)) is start.leaves[one.name]
+
+
+def test_obligations_of_one_name_are_each_asked() -> None:
+    program = program_of(
+        "input n : int 0 .. 1000000\ninput m : int 0 .. 1000000\nstate s : int 0 .. 1000000\n"
+        "procedure p { if m <= n { s := n - m }\n if n <= m { s := m - n } }\n"
+        "table t {\n| line | n ||\n| one | < 4 ||\n| two | >= 4 ||\n}\n"
+    )
+    certificate = certificate_of(program)
+    asked: list[str] = []
+
+    def ask(question: str) -> Answer:
+        asked.append(question)
+        return Answer.UNKNOWN
+
+    left = certify(program, certificate, ask).unchecked
+    assert len(left) == 2
+    assert {one.question for one in left} == set(asked)
+    assert len({one.name for one in left}) == 2

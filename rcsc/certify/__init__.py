@@ -223,7 +223,17 @@ class _Check:
                 )
                 self.problems.append(problem)
             case Left(question):
-                self.unchecked.setdefault(owed.name, Unchecked(owed.name, owed.written, question))
+                self.leave(owed.name, owed.written, question)
+
+    def leave(self, name: str, written: Span, question: str) -> None:
+        """Enters an obligation that is not settled; those of one name are numbered, so that each question is told."""
+        same = [
+            one for one in self.unchecked.values() if one.name == name or one.name.startswith(f"{name} (")
+        ]
+        if any(one.question == question and one.written == written for one in same):
+            return
+        shown = f"{name} ({len(same) + 1})" if same else name
+        self.unchecked[shown] = Unchecked(shown, written, question)
 
 
 def _is_value(kind: Scalar, value: object) -> bool:

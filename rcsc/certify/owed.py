@@ -4,8 +4,9 @@ In: a program, and for each table the assumptions whose failure stops the cycle.
 which hypotheses. A cycle admits inputs, takes deferred values, runs preprocess, stops where a stopping assumption fails, matches, runs a
 line's actions and then postprocess; it may also end wherever an extern procedure's result is refused. Owed is:
 
-- every invariant is defined for all values, holds at first, and is kept by each step of a cycle, also where it ends early;
-- initial values lie in their ranges;
+- every invariant is defined for all values, holds at first, and is kept by each step of a cycle, also where it ends early, and where
+  outputs then show their safe values;
+- initial and safe values lie in their ranges;
 - assumptions, selectors and the conditions of deferred values are defined wherever the invariants hold; a table's conditions
   wherever its stopping assumptions hold, too;
 - an assumption that is declared `proved` follows from ranges and invariants;
@@ -35,6 +36,8 @@ from rcsc.model import (
     Standing,
     Table,
     TableByCommand,
+    Value,
+    Variable,
     pending,
 )
 from rcsc.resolve.leaves import everything, read_by
@@ -80,6 +83,7 @@ class Debts:
         yield self._first()
         yield from self._conditions()
         yield self._deferred()
+        yield self._safe_values()
         for level in self.program.levels:
             yield self._calls(level, "preprocess", level.preprocess)
             yield self._calls(level, "postprocess", level.postprocess)
@@ -97,12 +101,7 @@ class Debts:
     def _first(self) -> Debt:
         run = Run(self.start, "at first")
         for one in self.program.variables:
-            initial = self.terms.constant(sort_of(one.type), one.initial)
-            run.state.leaves[one.name] = initial
-            low, high = ends_of(one.type)
-            good = low <= initial.low and initial.high <= high
-            if not good:
-                run.owe(f"`{one.name}` lies in its range", self.terms.false, one.span)
+            self._set(run, one, one.initial)
         for name, condition, reads in self.invariants:
             inputs = [
                 one.name for one in self.program.variables if one.kind is Kind.INPUT and one.name in reads
@@ -154,6 +153,22 @@ class Debts:
             run.write(name, value, when)
         run.keeps(self.invariants)
         return Debt(self.holding, tuple(run.owed))
+
+    def _safe_values(self) -> Debt:
+        """After a fault every output that has a safe value shows it; where the cycle ended, the invariants held."""
+        run = Run(self.start, "showing safe values after a fault")
+        for one in self.program.variables:
+            if one.safe is not None:
+                self._set(run, one, one.safe)
+        run.keeps(self.invariants)
+        return Debt(self.holding, tuple(run.owed))
+
+    def _set(self, run: Run, one: Variable, declared: Value) -> None:
+        """Gives a leaf a value that its declaration names, which is owed to be one of its type."""
+        value = run.state.leaves[one.name] = self.terms.constant(sort_of(one.type), declared)
+        low, high = ends_of(one.type)
+        if not (low <= value.low and value.high <= high):
+            run.owe(f"`{one.name}` lies in its range", self.terms.false, one.span)
 
     def _running(self, where: str, cell: Written) -> _Running:
         run = _Running(self.start, where, cell)

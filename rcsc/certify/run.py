@@ -92,14 +92,16 @@ class Start:
         self.types = {str(v.name): v.type for v in program.variables}
         self.leaves = {name: self.terms.variable(name, kind) for name, kind in self.types.items()}
         self.procedures = {str(one.name): one for one in program.procedures}
-        self._conditions: dict[int, Term] = {}  # by identity: the program keeps its expressions
+        self._conditions: dict[
+            int, tuple[Expr, Term]
+        ] = {}  # an expression is kept, so that its identity is not used again
 
     def condition(self, expr: Expr) -> Term:
         """A condition of the program before a run; what evaluating it owes is owed elsewhere."""
         known = self._conditions.get(id(expr))
         if known is None:
-            known = self._conditions[id(expr)] = Run(self, "").evaluate(expr)
-        return known
+            known = self._conditions[id(expr)] = expr, Run(self, "").evaluate(expr)
+        return known[1]
 
 
 class Run:
