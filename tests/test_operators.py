@@ -542,10 +542,14 @@ def test_no_table_is_proved_that_an_edge_refutes(one: str, two: str, sign: str) 
         )
         [table] = program.tables
         edges = (-1.7e308, -1e308, -1.0, 0.0, 1.0, 1e308, 1.7e308)
-        wrong = any(len(matching_lines(table, {"x": x, "y": y})) != 1 for x, y in product(edges, edges))
+        matching = [matching_lines(table, {"x": x, "y": y}) for x, y in product(edges, edges)]
         verdict = prove_program(program, Options(steps=20_000, solver="boxes"))
-        if wrong:
+        found = {one.code for one in verdict.findings}
+        if any(len(one) != 1 for one in matching):
             assert not verdict.proved
+        elif other.startswith("not") and Code.DEAD_LINE in found:
+            assert found == {Code.DEAD_LINE}
+            assert len({line for one in matching for line in one}) == 1
         elif other.startswith("not"):
             assert verdict.proved or verdict.tables[0].undecided
 
