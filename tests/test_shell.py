@@ -22,6 +22,7 @@ from rcsc.shell.commands import HELP, Commands
 from rcsc.shell.refusal import Refused
 from rcsc.shell.reload import Plant
 from rcsc.shell.session import Session, silent_queries
+from rcsc.shell.sources import kept, laid_out
 from rcsc.system.cell import Kind, assemble, signatures
 from rcsc.system.description import description
 from rcsc.workstation.cell import database_of
@@ -845,3 +846,89 @@ def test_a_file_that_is_used_is_kept_too(walker: Path) -> None:
         enum.replace("start, middle", "middle, start"), encoding="utf-8"
     )
     assert "  enumeration `place`: start, middle, end -> middle, start, end" in do(commands, "reload")
+
+
+@pytest.mark.parametrize("kind", ["python", "c"])
+def test_what_runs_is_not_tried_out_of_a_state_in_which_its_proof_does_not_hold(
+    walker: Path, kind: Kind
+) -> None:
+    held = "state seen : bool\nstate kept : array[3] of bool\nstate i : int 0 .. 2000000000\n"
+    text = WALKER.replace("state seen : bool\n", f"{held}invariant inside : i <= 2\n")
+    text = text.replace("{ seen := go }", "{ seen := go  kept[i] := go }")
+    write(walker, text=text)
+    made = compile_(
+        Settings((str(walker),), Options()), walker.parent / "generated", TARGETS, only_check=False
+    )
+    assert not made.report.failed, made.report.found
+    commands = alone(walker.parent / "system.toml", kind)
+    do(commands, "i = 2000000000")
+    guarded = ("kept[i] := go }", "if i <= 2 { kept[i] := go } }"), ("invariant inside : i <= 2\n", "")
+    write(walker, *guarded, ON, text=text)
+    before = state(commands)
+    error = refused(commands, "reload")
+    assert error.code is Code.SHELL_OTHERWISE
+    assert "cannot go on from this state: invariant `inside` does not hold" in str(error)
+    assert state(commands) == before
+    do(commands, "reload anyway", "step")
+
+
+def test_a_part_that_has_no_whole_number_is_refused(walker: Path) -> None:
+    held = "state x : real 0.0 .. 1.0e308\nstate whole : int 0 .. 9\ninvariant small : x <= 1.0\n"
+    text = WALKER.replace("procedure sense {", f"{held}procedure sense {{")
+    text = text.replace("{ seen := go }", "{ seen := go  whole := int(min(abs(x * 10.0 - x * 10.0), 9.0)) }")
+    write(walker, text=text)
+    made = compile_(
+        Settings((str(walker),), Options()), walker.parent / "generated", TARGETS, only_check=False
+    )
+    assert not made.report.failed, made.report.found
+    commands = walking(walker)
+    do(commands, "sense", "x = 1e308")
+    before = state(commands)
+    assert refused(commands, "sense").code is Code.SHELL_PART
+    assert state(commands) == before
+
+
+USES: dict[str, tuple[str, str]] = {
+    "on its line": ("use words\n", ""),
+    "after a declaration": ("const one = 1 use words\n", ""),
+    "over two lines": ("use\n  words\n", ""),
+    "after a comment": ("use # what is said\n words\n", ""),
+}
+
+
+@pytest.mark.parametrize("case", USES)
+def test_a_used_file_is_kept_however_its_use_is_written(case: str, tmp_path: Path) -> None:
+    (tmp_path / "words.rcs").write_text("enum word { one, two }\n")
+    (tmp_path / "t.rcs").write_text(f"{USES[case][0]}input w : word\n")
+    before = kept(tmp_path / "t.rcs")
+    assert before.texts["words.rcs"] == b"enum word { one, two }\n"
+    (tmp_path / "words.rcs").write_text("enum word { two, one }\n")
+    assert kept(tmp_path / "t.rcs") != before
+
+
+def test_sources_are_laid_out_in_their_folder_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for folder in ("project/tables", "outside", "user"):
+        (tmp_path / folder).mkdir(parents=True)
+    (tmp_path / "project" / "rcsc.toml").touch()
+    (tmp_path / "project" / "tables" / "t.rcs").write_text("use near use lib/far\ninput n : bool\n")
+    (tmp_path / "project" / "tables" / "near.rcs").write_text("const one = 1\n")
+    (tmp_path / "outside" / "far.rcs").write_text("const two = 2\n")
+    (tmp_path / "project" / "tables" / "lib").symlink_to(tmp_path / "outside")
+    (tmp_path / "user" / "link").symlink_to(tmp_path / "project" / "tables")
+    monkeypatch.chdir(tmp_path / "user")
+    for source in (Path("link/t.rcs"), tmp_path / "project" / "tables" / "t.rcs"):
+        held = kept(source)
+        assert "tables/near.rcs" in held.texts
+        with laid_out(held) as there:
+            folder = there.parents[1]
+            written = {
+                str(one.relative_to(folder)): one.read_bytes() for one in folder.rglob("*") if one.is_file()
+            }
+            assert there.read_text() == "use near use lib/far\ninput n : bool\n"
+        assert written == {name: text for name, text in held.texts.items() if not os.path.isabs(name)}
+
+
+def test_a_pipe_that_is_used_is_not_waited_for(tmp_path: Path) -> None:
+    (tmp_path / "t.rcs").write_text("use words\n")
+    os.mkfifo(tmp_path / "words.rcs")
+    assert "words.rcs" not in kept(tmp_path / "t.rcs").texts

@@ -97,6 +97,10 @@ def judge(old: Running, new: RunningLevel, program: Program, buffers: Buffers) -
     if not quiet or _extern(old.program):
         why = "the next cycle was not tried out, and assumptions not looked at: an extern procedure might do something"
         return Judged(said, (why,) if met or not quiet else ())
+    at = old.level.executor.check()
+    if at >= 0:
+        wrong = old.level.sign.unfit(at, old.level.values)
+        return Judged(said, (f"what runs was not tried out, as it cannot go on from this state: {wrong}",))
     left = _tried(old.level, buffers, run=True).left
     return Judged(said, tuple(_otherwise(met, old.level, new, (left, tried.left))))
 

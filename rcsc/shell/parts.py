@@ -45,7 +45,7 @@ from rcsc.system.signature import Values
 STEPS = ("preprocess", "state_table", "postprocess")
 """Of a cycle; run one after the other they are one."""
 _CALL = re.compile(r"(?P<name>[\w.\-]+)\s*(?:\((?P<inside>.*)\)|(?P<after>[^()]*))$")
-UNDEFINED = (ArithmeticError, IndexError, KeyError)
+UNDEFINED = (ArithmeticError, IndexError, KeyError, ValueError)  # the last is of a NaN without a whole number
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,7 +114,8 @@ def run_part(running: RunningLevel, program: Program, name: str, args: Sequence[
         ) from error
     except UNDEFINED as error:
         raise Refused(
-            Code.SHELL_PART, f"`{meant}` divides by zero or leaves an array: nothing was changed"
+            Code.SHELL_PART,
+            f"`{meant}` divides by zero, leaves an array or takes the whole number of a NaN: nothing was changed",
         ) from error
     _within(part, running, meant)
     return Ran((*(part.now[one] for one in names), *part.trace), said)

@@ -4,17 +4,13 @@ In: a root file. Out: `Kept`, and the same files laid out elsewhere.
 """
 
 import os
-import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 from rcsc.children import scratch
-from rcsc.project import PROJECT_FILE, project_root
-
-# A line that uses a file; whether it is in order is for whoever reads the file.
-_USE = re.compile(rb"^[ \t]*use[ \t]+([A-Za-z_]\w*(?:/[A-Za-z_]\w*)*)", re.MULTILINE)
+from rcsc.project import PROJECT_FILE, load, project_root
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,31 +27,32 @@ class Kept:
 
 
 def kept(source: Path) -> Kept:
-    """The texts as they are now; what cannot be read is left out."""
-    project = Path(project_root(str(source)))
-    texts: dict[str, bytes] = {}
-    waiting = [source]
-    while waiting:
-        file = waiting.pop()
-        name = os.path.relpath(file, project)
-        if name in texts:
-            continue
-        try:
-            texts[name] = file.read_bytes()
-        except OSError:
-            continue
-        for use in _USE.findall(texts[name]):
-            waiting += [base / f"{use.decode()}.rcs" for base in (file.parent, project)]
-    settings = project / PROJECT_FILE
-    texts[PROJECT_FILE] = settings.read_bytes() if settings.is_file() else b""
-    return Kept(os.path.relpath(source, project), texts)
+    """The texts as they are now, of exactly the files that a check reads; what cannot be read is left out."""
+    project = os.path.abspath(project_root(str(source)))
+    texts = {_below(name, project): one.text.encode() for name, one in load([str(source)]).sources.items()}
+    return Kept(_below(str(source), project), {PROJECT_FILE: b"", **texts})
+
+
+def _below(file: str, project: str) -> str:
+    """The path below the project's folder, by names or else by where links lead; the whole path of what is elsewhere."""
+    whole = os.path.abspath(file)
+    folder, name = os.path.split(whole)
+    for path, above in (
+        (whole, project),
+        (os.path.join(os.path.realpath(folder), name), os.path.realpath(project)),
+    ):
+        if os.path.commonpath((path, above)) == above:
+            return os.path.relpath(path, above)
+    return whole
 
 
 @contextmanager
 def laid_out(held: Kept) -> Iterator[Path]:
-    """The root file among the others, in a folder that is gone afterwards."""
+    """The root file among the others, in a folder that is gone afterwards; nothing is written anywhere else."""
     with scratch("reload") as place:
         for name, text in held.texts.items():
+            if os.path.isabs(name):
+                continue
             path = place / name
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_bytes(text)
