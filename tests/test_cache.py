@@ -187,3 +187,24 @@ def test_whatever_newly_stands_where_a_use_looks_first_is_noticed(
     said = re.sub(r"[0-9.]+ ms( \(earlier run\))?", "", capsys.readouterr().out)
     assert cli.run(["check", "in/t.rcs", "--no-cache"]) == status
     assert re.sub(r"[0-9.]+ ms", "", capsys.readouterr().out) == said
+
+
+def test_a_link_by_which_a_use_is_found_is_looked_at_though_its_file_is_known_by_another_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "home"))
+    (tmp_path / "in").mkdir()
+    (tmp_path / "rcsc.toml").touch()
+    (tmp_path / "two.rcs").write_text("enum mode { a, b }\n")
+    (tmp_path / "three.rcs").write_text("enum mode { a, b, c }\n")
+    (tmp_path / "words.rcs").symlink_to("two.rcs")
+    table = "use words\ninput m : mode\noutput o : bool\ntable t {\n| line | m || o |\n| 1 | a || true |\n| 2 | b || false |\n}\n"
+    (tmp_path / "in" / "t.rcs").write_text(table)
+    command = ["check", "two.rcs", "in/t.rcs"]
+    assert [cli.run(command), cli.run(command)] == [0, 0]
+    (tmp_path / "words.rcs").unlink()
+    (tmp_path / "words.rcs").symlink_to("three.rcs")
+    capsys.readouterr()
+    assert cli.run(command) == 1
+    assert "RCS401" in capsys.readouterr().out

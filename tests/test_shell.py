@@ -920,9 +920,9 @@ def test_sources_are_laid_out_in_their_folder_alone(tmp_path: Path, monkeypatch:
         held = kept(source)
         assert "tables/near.rcs" in held.texts
         with laid_out(held) as there:
-            folder = there.parents[1]
+            place = there.parents[1]
             written = {
-                str(one.relative_to(folder)): one.read_bytes() for one in folder.rglob("*") if one.is_file()
+                str(one.relative_to(place)): one.read_bytes() for one in place.rglob("*") if one.is_file()
             }
             assert there.read_text() == "use near use lib/far\ninput n : bool\n"
         assert written == {name: text for name, text in held.texts.items() if not os.path.isabs(name)}

@@ -120,7 +120,7 @@ def prove(  # noqa: PLR0913, PLR0917  # as many as there are options
     for name in variants:
         made = {level: one.of(VARIANTS[name](one.program)) for level, one in made.items()}
     effort = Effort(limits=Limits.of(steps))
-    cache = None if no_cache else open_cache(path.parent)
+    cache = None if no_cache or variants else open_cache(path.parent)  # a variant is nobody's tables
     names = only or tuple(made)
     with _Said(names, wanted=progress) as said:
         proof = prove_steppers(

@@ -15,7 +15,7 @@ from rcsc.cache import Cache
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.report import Report
 from rcsc.files.read import Malformed, content
-from rcsc.project import MOST_BYTES, PROJECT_FILE, Loaded, listed
+from rcsc.project import MOST_BYTES, PROJECT_FILE, Loaded, listed, project_root
 from rcsc.source import Source
 
 if TYPE_CHECKING:
@@ -102,7 +102,8 @@ def _looked_at(loaded: Loaded) -> list[str]:
         here = Path(folder or ".").resolve()
         names.update(str(above / PROJECT_FILE) for above in (here, *here.parents))
     for folder, used in _uses(loaded):
-        names.add(os.path.normpath(os.path.join(folder, used)))
+        for base in (folder, project_root(os.path.join(folder, "_"))):
+            names.add(os.path.normpath(os.path.join(base, used)))
     return sorted(names)
 
 
