@@ -282,7 +282,9 @@ def _forked(
 ) -> Iterator[tuple[Key, Given, Mapping[str, Any] | None]]:
     """Runs each key in a fork, `jobs` at a time; what each told last, None where it told nothing."""
     waiting, running = iter(keys), dict[int, tuple[Key, Given, Path]]()
-    with tempfile.TemporaryDirectory(prefix="rcsc-mutants-") as place:
+    with tempfile.TemporaryDirectory(
+        prefix="prover-mutants-"
+    ) as place:  # rcsc sweeps what is left of its own names
         for number in range(sys.maxsize):
             key = next(waiting, None) if len(running) < jobs else None
             if key is not None:
@@ -295,6 +297,9 @@ def _forked(
             with contextlib.suppress(ProcessLookupError):
                 os.killpg(pid, signal.SIGKILL)  # what it began
             key, given, path = running.pop(pid)
+            if not path.parent.is_dir():
+                message = f"somebody removed {place}: what was run last told nothing"
+                raise FileNotFoundError(message)
             yield key, given, json.loads(path.read_text(encoding="utf-8")) if path.exists() else None
 
 
