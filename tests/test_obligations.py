@@ -270,6 +270,34 @@ table t {
     assert "RCS411" not in codes(proved(guarded).findings)
 
 
+OUTSIDE = {
+    "invariant": "invariant claim : {}\n",
+    "assumption": "assume claim assumed : {}\n",
+    "deferred value": "state later : int 0 .. 3 deferred until {}\n",
+}
+
+
+@pytest.mark.parametrize("place", OUTSIDE)
+@pytest.mark.parametrize(
+    ("condition", "code"),
+    [
+        ("9 / q > 2", "RCS411"),
+        ("xs[q - 1] < 2", "RCS412"),
+        ("s + q < 9", "RCS410"),
+        ("q = 0 or 9 / q > 2", ""),
+    ],
+)
+def test_a_condition_outside_tables_is_defined_under_the_invariants_and_an_invariant_by_itself(
+    place: str, condition: str, code: str
+) -> None:
+    text = f"{VARIABLES}state q : int 0 .. 4 = 1\n{OUTSIDE[place].format(condition)}"
+    wrong = [code] if code else []
+    assert codes(proved(text).findings) == wrong
+    assert codes(proved(text + "invariant above : q > 0 and s <= 0\n").findings) == (
+        wrong if place == "invariant" else []
+    )
+
+
 def test_extern_results_are_any_values_in_range() -> None:
     text = (
         VARIABLES
