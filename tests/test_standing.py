@@ -169,6 +169,12 @@ def test_an_unchanged_system_is_not_read_again(check: Said, monkeypatch: pytest.
     assert run(["check", "upper.rcs"]) == 3  # it would have been
 
 
+@pytest.mark.usefixtures("here")
+def test_a_variant_of_the_tables_is_not_kept(check: Said) -> None:
+    assert prove("--first-match") == 0
+    assert KEPT not in check()
+
+
 # --- what is not proved -----------------------------------------------------------------------
 
 FAILED = next(
