@@ -173,6 +173,20 @@ def test_ctrl_c_ends_a_long_run_and_leaves_nothing(folder: Path) -> None:
     assert [path.name for path in folder.iterdir()] == ["slow.rcs"]
 
 
+@pytest.mark.usefixtures("folder")
+def test_who_is_interrupted_does_not_wait_for_the_interpreter() -> None:
+    script = (
+        "import atexit, rcsc.driver as d, rcsc.cli as c, sys\n"
+        "atexit.register(print, 'cleared up')\n"
+        "def interrupted(*a, **k):\n    print('begun'); raise KeyboardInterrupt\n"
+        "d._load = interrupted\nsys.argv[1:] = ['compile', 'slow.rcs']\nc.main()"
+    )
+    write("slow.rcs")
+    ran = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    assert (ran.returncode, ran.stdout) == (130, "begun\n")
+    assert "interrupted" in ran.stderr
+
+
 BAD_INPUTS = [
     ("RCS107", None),
     ("RCS101", b"table { }"),

@@ -17,6 +17,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rcsc.system import processes, serve
 from rcsc.system.adopt import adopt
 from rcsc.system.block import FOLDER, PREFIX, Block
 from rcsc.system.buffers import Buffers, CommonMemory
@@ -713,3 +714,47 @@ def test_still_is_told_from_late(
     finally:
         system._running.clear()
         system.close()
+
+
+def test_a_signal_is_heeded_in_a_long_period(monkeypatch: pytest.MonkeyPatch) -> None:
+    told: list[int] = []
+    slept: list[float] = []
+
+    def sleep(seconds: float) -> None:
+        slept.append(seconds)
+        told.append(signal.SIGTERM)
+
+    monkeypatch.setattr(time, "sleep", sleep)
+    serve.Paced(3600.0).wait(told)
+    serve.Paced(3600.0).wait(told)
+    assert slept == [serve.HEED_S]
+
+
+def test_processes_that_do_not_end_share_one_grace(repo: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = [0.0]
+
+    class Deaf:
+        """Ends of nothing but SIGKILL."""
+
+        pid, killed = None, False
+
+        def join(self, timeout: float | None = None) -> None:
+            clock[0] += timeout or 0.0
+
+        def is_alive(self) -> bool:
+            return not self.killed
+
+        def kill(self) -> None:
+            self.killed = True
+
+        def terminate(self) -> None: ...
+
+        def close(self) -> None: ...
+
+    monkeypatch.setattr(time, "monotonic", lambda: clock[0])
+    system = Supervisor(alone(repo), "python", {})
+    deaf = [Deaf() for _ in range(5)]
+    system._running = dict(enumerate(deaf))  # type: ignore[arg-type]
+    system.close()
+    assert all(one.killed for one in deaf)
+    assert clock[0] == processes.GRACE_S

@@ -21,6 +21,10 @@ def main() -> None:
     except OSError as error:
         status = status or _unwritable("standard output", error.strerror)
         _forget_stdout()
+    if status == INTERRUPTED:
+        from rcsc.children import leave
+
+        leave(status)
     sys.exit(status)
 
 

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from multiprocessing.connection import Connection
     from multiprocessing.context import SpawnProcess
 
-PATIENCE_S = 5.0
+PATIENCE_S, GRACE_S = 5.0, 0.5
 MOST_RESTARTS = 20
 STILL_PERIODS, STILL_S = 25, 0.2
 """A process that has committed nothing for so many periods, and so many seconds, is looked at."""
@@ -133,12 +133,7 @@ class Supervisor:
         process = self._running[name]
         if process.pid is not None and process.is_alive():
             os.kill(process.pid, how)
-            if _state(process.pid)[0] in STOPPED:  # it would take nothing else
-                process.kill()
-        process.join(PATIENCE_S)
-        if process.is_alive():
-            process.kill()
-            process.join()
+        _ended(process, time.monotonic() + PATIENCE_S)
 
     def runs(self, name: str) -> bool:
         """Whether it has been started and has not ended."""
@@ -201,9 +196,10 @@ class Supervisor:
         with children.interrupts_held():
             for process in self._running.values():
                 process.terminate()
-            for name in self._running:
-                self.stop(name)
-                self._running[name].close()
+            until_s = time.monotonic() + GRACE_S
+            for process in self._running.values():
+                _ended(process, until_s)
+                process.close()
             self._running.clear()
             for told in self._told.values():
                 told.close()
@@ -280,6 +276,16 @@ def _state(pid: int) -> tuple[str, float]:
         return "", 0.0
     fields = text.rpartition(")")[2].split()
     return fields[0], (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def _ended(process: "SpawnProcess", until_s: float) -> None:
+    """Waits for the end of a process that was told, and kills it then; at once where it stands still and hears nothing."""
+    if process.pid is not None and _state(process.pid)[0] in STOPPED:
+        process.kill()
+    process.join(max(0.0, until_s - time.monotonic()))
+    if process.is_alive():
+        process.kill()
+        process.join()
 
 
 def _say(text: str) -> None:

@@ -10,7 +10,7 @@ import os
 import signal
 import struct
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sized
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -30,6 +30,8 @@ FAULTY = 3  # a level's exit code after a fault; which one stands in its checkpo
 REFUSED = 4  # of a process that was refused a state or values; it has told why
 MOST_TOLD = 4096
 NAP_S = 20e-6
+HEED_S = 0.1
+"""A signal does not end a sleep; a period may be long where the system runs slower than the clock."""
 
 
 class Transport(Buffers, Protocol):
@@ -92,14 +94,16 @@ class Paced:
     period_s: float
     _due: float = field(default_factory=time.monotonic)
 
-    def wait(self) -> None:
-        """Until the next cycle is due."""
+    def wait(self, told: Sized = ()) -> None:
+        """Until the next cycle is due, or not much longer than until something is `told`."""
         if self.period_s == 0:
             time.sleep(NAP_S)  # lets others run: there may be more processes than processors
             return
         now = time.monotonic()
         self._due = max(self._due + self.period_s, now)
-        time.sleep(self._due - now)
+        while now < self._due and not told:
+            time.sleep(min(self._due - now, HEED_S))
+            now = time.monotonic()
 
 
 def begin(level: RunningLevel, transport: Transport) -> None:
@@ -187,7 +191,7 @@ def _rounds(setting: Setting, period_s: float) -> Iterator[int]:
     while not told and os.getppid() == setting.parent:
         yield tick
         tick += 1
-        pace.wait()
+        pace.wait(told)
 
 
 def _level(setting: Setting, name: str, sign: Signature) -> RunningLevel:

@@ -26,7 +26,7 @@ from sim.live.guard import HEADERS, policy, refusal
 ADDRESS = "127.0.0.1"
 PUSH_S = 0.1
 """The page is told what is new so often."""
-GOODBYE_S = 1.0
+GOODBYE_S = 0.4
 """A page that does not answer is waited for no longer when the run ends."""
 MOST_WATCHED = 256
 DEEPEST_MESSAGE = 4
