@@ -11,6 +11,8 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, settings
 
+from rcsc.cli import run
+
 settings.register_profile(
     "ci", derandomize=True, deadline=None, print_blob=True, suppress_health_check=[HealthCheck.too_slow]
 )
@@ -22,6 +24,17 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci"))
 def repo() -> Path:
     """The checkout's root."""
     return Path(__file__).parents[1]
+
+
+@pytest.fixture(scope="session")
+def small_proved(repo: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A copy of the small system of two levels after `rcsc prove`; its cache holds what was proved. Only to be copied."""
+    folder = tmp_path_factory.mktemp("proved") / "small"
+    shutil.copytree(repo / "tests/data/composed", folder, ignore=shutil.ignore_patterns(".rcsc-cache"))
+    with pytest.MonkeyPatch.context() as set_:
+        set_.delenv("RCSC_CACHE_DIR", raising=False)
+        assert run(["prove", str(folder / "system.toml"), "--trace", "0"]) == 0
+    return folder
 
 
 TOOLS = ("arm-none-eabi-gcc", "chromium", "clang", "cmake", "pkg-config", "qemu-system-arm", "spin")

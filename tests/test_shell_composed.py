@@ -30,14 +30,25 @@ PROVED = "level `upper` is proved together with its neighbours, as the files of 
 UNKNOWN = "level `upper` is not known to be proved together with its neighbours: `rcsc prove {}` decides it"
 
 
+@pytest.fixture(scope="module")
+def compiled(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The small system, compiled, and its lower level proved: half of every proof here. Only to be copied."""
+    folder = tmp_path_factory.mktemp("compiled") / "small"
+    shutil.copytree(SMALL, folder, ignore=shutil.ignore_patterns(".rcsc-cache"))
+    paths = tuple(str(folder / f"{name}.rcs") for name in ("upper", "lower"))
+    made = compile_(Settings(paths, Options()), folder / "generated", TARGETS, only_check=False)
+    assert not made.report.failed
+    with pytest.MonkeyPatch.context() as set_:
+        set_.delenv("RCSC_CACHE_DIR", raising=False)
+        assert run(["prove", str(folder / "system.toml"), "--level", "lower", "--trace", "0"]) == 0
+    return folder
+
+
 @pytest.fixture
-def system(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def system(compiled: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The small system, compiled; its description."""
     monkeypatch.delenv("RCSC_CACHE_DIR", raising=False)
-    shutil.copytree(SMALL, tmp_path, dirs_exist_ok=True, ignore=shutil.ignore_patterns(".rcsc-cache"))
-    paths = tuple(str(tmp_path / f"{name}.rcs") for name in ("upper", "lower"))
-    made = compile_(Settings(paths, Options()), tmp_path / "generated", TARGETS, only_check=False)
-    assert not made.report.failed
+    shutil.copytree(compiled, tmp_path, dirs_exist_ok=True)
     return tmp_path / "system.toml"
 
 
