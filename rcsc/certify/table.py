@@ -370,8 +370,8 @@ class TableChecker:
         if any(term.sort == REAL for term, _ in parts):
             if len(parts) == 1:
                 ends = [
-                    real_of_key(max(low, self.span_of(form)[0])),
-                    real_of_key(min(high, self.span_of(form)[1])),
+                    real_of_key(max(low, self.terms.span(form)[0])),
+                    real_of_key(min(high, self.terms.span(form)[1])),
                 ]
                 least, greatest = (terms.constant(REAL, end) for end in ends)
                 return [make("<=", least, parts[0][0]), make("<=", parts[0][0], greatest)]
@@ -394,10 +394,6 @@ class TableChecker:
             )
             total = make("+", total, make("*", terms.constant(INT, k), number))
         return [make("<=", terms.constant(INT, low), total), make("<=", total, terms.constant(INT, high))]
-
-    def span_of(self, form: Form) -> tuple[int, int]:
-        """The form's range over the declared ranges."""
-        return self.terms.span(form)
 
     def is_empty(self, bounds: Bounds, multipliers: list[list[int]]) -> bool:
         """Whether the bounds, times the multipliers, add up to 0 <= a negative number."""

@@ -22,9 +22,7 @@ from rcsc.model import (
     Op,
     Real,
     Scalar,
-    Value,
     real_key,
-    value_of_key,
 )
 from rcsc.prove import smt, values
 from rcsc.prove.smt import Term
@@ -61,10 +59,6 @@ class Keyed:
         for one in parts_first(node, known=self._terms):
             self._terms[one] = self._made(one)
         return self._terms[node]
-
-    def met(self, node: Node) -> bool:
-        """Whether a term was made of the node."""
-        return node in self._terms
 
     def variable(self, name: str, kind: Scalar) -> Term:
         """The term of a variable, in its declared range."""
@@ -183,10 +177,3 @@ class Keyed:
 
 def _key(kind: Scalar, key: int) -> Term:
     return smt.member_literal(key) if isinstance(kind, Enum) else smt.literal(KEY, key)
-
-
-def value_in(solver: smt.Solver, term: Term, kind: Scalar) -> Value:
-    """The value of a term in the solver's model, as the language has it."""
-    if isinstance(kind, Bool):
-        return solver.value(term, kind)
-    return value_of_key(kind, int(solver.value(term, KEY)))

@@ -52,10 +52,6 @@ class Frame:
     leaves: dict[str, Term]
     local: dict[str, Term] = field(default_factory=dict)
 
-    def copy(self) -> "Frame":
-        """A frame that can go its own way."""
-        return Frame(dict(self.leaves), dict(self.local))
-
 
 def encode(expr: Expr, frame: Frame) -> Term:
     """The term of `expr` in the frame."""

@@ -224,11 +224,6 @@ def to_integer(term: Term) -> Term:
     return Term(z3.ToInt(z3.fpToReal(z3.fpRoundToIntegral(z3.RTZ(), term))))
 
 
-def admitted(term: Term, inside: Term, other: Term) -> Term:
-    """`term` where it is inside its range, else `other`: any value of the range."""
-    return choice(inside, term, other)
-
-
 class Solver:
     """One incremental solver.
 
