@@ -113,7 +113,8 @@ def test_a_script_moves_the_robot_and_says_so(tmp_path: Path, kind: str) -> None
 
 
 def test_a_script_stops_at_the_first_command_that_fails(tmp_path: Path) -> None:
-    done = script("step 2\nexpect task.idle = false\nstep 3\n", "--alone", tmp_path=tmp_path)
+    text = "step 2\nexpect task.idle = false\nstep 3\n"
+    done = script(text, "--alone", "--executor", "python", tmp_path=tmp_path)
     assert done.returncode == 1
     assert "cycle 2" in done.stdout
     assert "cycle 5" not in done.stdout
