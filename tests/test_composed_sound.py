@@ -10,20 +10,25 @@ import pytest
 
 from rcsc.cli import run
 from rcsc.compose.agreed import agreements
-from rcsc.compose.claims import FOUND, SAFE, Claim, Key, closed
+from rcsc.compose.claims import CONTRACT, FOUND, RUNS, SAFE, Claim, Key, closed
 from rcsc.compose.ends import Ending
 from rcsc.compose.finding import of_trace
 from rcsc.compose.frozen import BadCaseError, case_breaks, read_case
 from rcsc.compose.goals import Sort, unlooked
+from rcsc.compose.keyed import Keyed
 from rcsc.compose.lap import Lap, laps
 from rcsc.compose.level import LevelProof, Verdict, prove_level
 from rcsc.compose.look import Looking, look
+from rcsc.compose.properties import property_kept
 from rcsc.compose.system import NoProgramError, prove_system, steppers
 from rcsc.compose.trace import Search, one_cycle, ran, ran_on, shortest
 from rcsc.compose.transition import Stepper
 from rcsc.interpret import Fault, initial
 from rcsc.model import Value
+from rcsc.prove import values
+from rcsc.prove.smt import Answer, Solver
 from rcsc.system.description import BadDescription, description
+from tests.hierarchies_explored import adopted
 from tests.hierarchies_level import Reading, Role
 from tests.test_compose import LITTLE, SMALL, Edit, changed, swap
 from tests.test_endings import WAY, go
@@ -155,6 +160,140 @@ def test_a_restart_adopts_an_order_only_under_the_name_that_the_system_knows(tmp
     step = one_cycle(stepper, start, {"orders.inc_command": 7})
     assert step.after["new_command"]
     assert prove_level(stepper, LITTLE).verdict(Sort.ONCE, "", "new_command") is not Verdict.PROVED
+
+
+@pytest.mark.parametrize(
+    ("stands", "echo"),
+    [(None, 4), (None, 65535), (4, 4), (5, 4), (9, 4), (0, 65535), (65535, 65535), (65535, 65000)],
+)
+def test_the_proof_knows_every_state_that_a_restart_makes(stands: int | None, echo: int) -> None:
+    """The order that stands in the level's own buffer may not be echoed yet: the next number is the one after that."""
+    stepper = steppers(SMALL / "system.toml")["upper"]
+    role = Role(stepper.program, stepper.level, stepper.links)
+    now = role.start | {"command.inc_command": 7, "lower.inc_command_echo": echo}
+    made = adopted(role, now, {} if stands is None else {"to_lower.inc_command": stands})
+    assert made["to_lower.inc_command"] == ((echo if stands is None else stands) + 1) % 65536
+    keyed, known = Keyed(), stepper.restarted()
+    same = [
+        keyed.term(values.equal(known[leaf], values.constant(stepper.kinds[leaf], int(value))))
+        for leaf, value in made.items()
+    ]
+    solver = Solver()
+    solver.add(*keyed.ranges, *same)
+    assert solver.check() is Answer.SATISFIABLE
+
+
+# --- who is above whom ---------------------------------------------------------------------------
+
+
+RANKED = """use words
+
+input command : lower_order
+input below : lower_report
+
+output to_below : lower_order
+output report : lower_report
+
+module receive reads command, below writes report {
+  report.inc_command_echo := command.inc_command
+  report.ref_command_echo := command.input_command
+  report.status_report := below.status_report
+}
+
+procedure stay {
+}
+
+table work {
+  | line | when || procedures |
+  |------|------||------------|
+  | 1    | true || stay       |
+}
+
+level NAME {
+  period 40 [ms]
+  preprocess receive
+  table work
+}
+"""
+"""It is done when the level below is."""
+
+
+@pytest.mark.parametrize("many", [1, 2, 3])
+@pytest.mark.parametrize("ring", [True, False])
+def test_levels_that_take_orders_in_a_ring_are_no_system(many: int, ring: bool, tmp_path: Path) -> None:
+    """Each would be shown to end its commands given that the next one does, and all of them may wait for ever."""
+    names = [f"level{at}" for at in range(many)]
+    (tmp_path / "words.rcs").write_text((SMALL / "words.rcs").read_text(encoding="utf-8"), encoding="utf-8")
+    wires = ['name = "ring"\ngenerated = "generated"\ntick_ms = 40\noutside = ["station"]']
+    wires += [f'[[level]]\nname = "{name}"' for name in names] + ["[buffers]"]
+    for name, below in zip(names, (*names[1:], names[0] if ring else "station"), strict=True):
+        (tmp_path / f"{name}.rcs").write_text(RANKED.replace("NAME", name), encoding="utf-8")
+        wires += [f'"{name}.to_below" = "{below}.command"', f'"{below}.report" = "{name}.below"']
+    path = tmp_path / "system.toml"
+    path.write_text("\n".join(wires) + "\n", encoding="utf-8")
+    if ring:
+        with pytest.raises(BadDescription, match="no highest level: `level0` takes orders of"):
+            steppers(path)
+    else:
+        assert list(steppers(path)) == names
+
+
+# --- what is assumed of a report, where the level does not number its orders ----------------------
+
+
+def unnumbered(text: str) -> str:
+    """Another command under the same number; and what is then no longer so, however honest the level below is."""
+    said = (
+        "property about : lower.inc_command_echo = was to_lower.inc_command"
+        " implies lower.ref_command_echo = was to_lower.input_command\n\nmodule receive"
+    )
+    text = text.replace("module receive", said, 1)
+    return text.replace(
+        "    to_lower.inc_command := (to_lower.inc_command + 1) mod 65536\n",
+        "    new_command := new_command\n",
+    ).replace(
+        "module send reads to_lower, old_command writes to_lower,",
+        "module send reads to_lower, old_command, new_command writes to_lower, new_command,",
+    )
+
+
+def skipping(text: str) -> str:
+    """Every other number: one may be echoed that is the one after the last."""
+    return text.replace("(to_lower.inc_command + 1)", "(to_lower.inc_command + 65535)")
+
+
+@pytest.mark.parametrize("outside", [True, False])
+@pytest.mark.parametrize(
+    ("edit", "sort", "name"),
+    [
+        (unnumbered, Sort.NUMBERED, "to_lower.input_command"),
+        (skipping, Sort.NEXT_NUMBER, "to_lower"),
+    ],
+)
+def test_what_a_level_assumes_of_a_report_rests_on_how_it_numbers_its_orders(
+    edit: Edit, sort: Sort, name: str, outside: bool, tmp_path: Path
+) -> None:
+    """The neighbour keeps to the protocol as far as the level does, whether it is a level or not."""
+    path = changed(tmp_path, upper=edit)
+    if outside:
+        said = path.read_text(encoding="utf-8")
+        path.write_text(said.replace('[[level]]\nname = "lower"\n', ""), encoding="utf-8")
+    proof = prove_system(path, LITTLE)
+    wrong = ("upper", (sort, "", name))
+    assert wrong not in {need for need, one in proof.closed.items() if one.found}
+    for key in ((CONTRACT, "", "lower"), RUNS, *(goal.key for goal, _ in proof.levels[0].found)):
+        assert (sort, "", name) == key or wrong in proof.of("upper", key).lacks, key
+
+
+def test_an_honest_report_is_not_about_an_order_whose_number_stays(tmp_path: Path) -> None:
+    """What the property says is broken by a run in which the level below echoes what it took."""
+    stepper = steppers(changed(tmp_path, upper=unnumbered))["upper"]
+    start = initial(stepper.program)
+    order = {"command.inc_command": 1, "command.input_command": 1}
+    first = one_cycle(stepper, start, order)
+    assert first.after["to_lower.input_command"] == 1
+    second = one_cycle(stepper, first.after, order)
+    assert not property_kept(stepper, "about", first.after, second.after)
 
 
 # --- both ends of a buffer -----------------------------------------------------------------------

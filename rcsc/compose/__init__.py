@@ -42,9 +42,10 @@ What it rests on besides:
   is so late that all numbers go round meanwhile, which takes at least 65536 cycles, 43 minutes at 40 ms. A level that
   waits for echoes before it orders again cannot come near it (`WAITS`).
 - *Restarts.* A level may begin anew at any moment as `system.adopt` says: its order is PAUSE under the number after the
-  one that it finds echoed, and what it takes counts as seen. Such a beginning is proved like the first. For its
-  neighbours it is an order that is superseded, or a report that failed; freshness then asks more: no order that the
-  level gave before and that is not echoed yet may still be on its way, for it has the number that is now used again.
+  order that stands in its buffer, or after the echo where none stands, and what it takes counts as seen. Such a
+  beginning is proved like the first. For its neighbours it is an order that is superseded, or a report that failed;
+  freshness then asks more where none stands: no order that the level gave before and that is not echoed yet may still
+  be on its way, for it has the number that is now used again.
 - *Reals* and arithmetic are followed as far as `keyed` says, and `measured` where a way has to end; the rest may take any value.
 - That commands *end* rests on more than the contract: an order that is not replaced is answered some time, and stays so; and
   where it is said, the values in an input stand still meanwhile. Of a level below the first is what is shown of it in turn.

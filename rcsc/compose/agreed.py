@@ -37,6 +37,7 @@ class Promise:
         reason: Whose guarantee it is, in words.
         record: In which the level takes what it is about.
         needs: What must be proved of the neighbour.
+        own: What the level has to keep itself: reports are about its orders only as far as it numbers them.
         begins: Whether both begin in agreement.
         outside: Whether the neighbour stands outside the levels: then it is its own to keep.
     """
@@ -46,6 +47,7 @@ class Promise:
     assumed: str
     reason: str
     needs: tuple[Need, ...] = ()
+    own: tuple[Need, ...] = ()
     begins: bool = True
     outside: bool = False
 
@@ -99,7 +101,7 @@ def claims(made: Mapping[str, Stepper], proofs: Mapping[str, LevelProof]) -> dic
         trusts = (
             (one.reason.replace("stands outside the levels", "keeps to the protocol"),) if one.outside else ()
         )
-        found[one.level, (CONTRACT, "", one.record)] = Claim(verdict, one.needs, trusts)
+        found[one.level, (CONTRACT, "", one.record)] = Claim(verdict, (*one.needs, *one.own), trusts)
     for name, proof in proofs.items():
         found |= {(name, key): claim for key, claim in of_level(made[name], proof)}
     return found
@@ -187,9 +189,14 @@ def promises(made: Mapping[str, Stepper]) -> Iterator[Promise]:
 def _of_below(name: str, stepper: Stepper, made: Mapping[str, Stepper]) -> Iterator[Promise]:
     for below in stepper.links.below:
         words = f"what `{below.name}` reports under the number of the last order is about that order"
+        keys: tuple[Key, ...] = (
+            (Sort.NUMBERED, "", f"{below.order}.{COMMAND}"),
+            (Sort.NEXT_NUMBER, "", below.order),
+        )
+        own = tuple((name, key) for key in keys)
         if below.outside:
             reason = f"`{below.name}` stands outside the levels"
-            yield Promise(name, below.report, words, reason, outside=True)
+            yield Promise(name, below.report, words, reason, own=own, outside=True)
             continue
         lower = made[below.name].links.above
         if lower is None:
@@ -201,6 +208,7 @@ def _of_below(name: str, stepper: Stepper, made: Mapping[str, Stepper]) -> Itera
             words,
             f"proved of `{below.name}`: {Sort.ECHOES.value}; both begin with the same order",
             ((below.name, (Sort.ECHOES, "", lower.report)),),
+            own,
             _begin(stepper, below.order, made[below.name], lower.order),
         )
 

@@ -149,13 +149,14 @@ class Assumed:
 
     Attributes:
         record: In which the level takes what it is about.
-        needs: Levels with their goals; `begins`, whether the two begin in agreement.
+        needs: Goals of the neighbour, `own`, of the level itself; `begins`, whether the two begin in agreement.
     """
 
     level: str
     record: str
     words: str
     needs: tuple[Need, ...]
+    own: tuple[Need, ...]
     begins: bool
 
 
@@ -184,12 +185,17 @@ def outline_of(form: Mapping[str, Any]) -> Outline:
             one["level"],
             one["record"],
             one["words"],
-            tuple((level, (sort, table, name)) for level, (sort, table, name) in one["needs"]),
+            _needs(one["needs"]),
+            _needs(one["own"]),
             one["begins"],
         )
         for one in form["assumed"]
     )
     return Outline(levels, assumed)
+
+
+def _needs(form: list[Any]) -> tuple[Need, ...]:
+    return tuple((level, _key(key)) for level, key in form)
 
 
 # --- what is known of it -----------------------------------------------------------------------
@@ -213,7 +219,7 @@ class Standing:
         """Closes the claims."""
         claims: dict[Need, Claim] = {
             (one.level, (CONTRACT, "", one.record)): Claim(
-                Verdict.PROVED if one.begins else Verdict.NOT_PROVED, one.needs
+                Verdict.PROVED if one.begins else Verdict.NOT_PROVED, (*one.needs, *one.own)
             )
             for one in self.outline.assumed
         }

@@ -8,6 +8,7 @@ they begin in agreement.
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from pathlib import Path
 
 from rcsc import children
@@ -96,6 +97,7 @@ def steppers_of(system: Description, programs: Mapping[str, Program]) -> dict[st
     """
     check_ends(system, programs)
     every = {name: links(system, name, program) for name, program in programs.items()}
+    _check_ranks(every)
     found = {}
     for name, program in programs.items():
         level = next((one for one in program.levels if one.name == name), None)
@@ -103,6 +105,21 @@ def steppers_of(system: Description, programs: Mapping[str, Program]) -> dict[st
             raise NoProgramError(f"program `{program.name}` has no level `{name}`")
         found[name] = Stepper(program, level, _narrowed(every[name], every, programs))
     return found
+
+
+def _check_ranks(every: Mapping[str, Links]) -> None:
+    """No level is its own superior, at whatever distance: each would end its commands given that the other does, and neither might.
+
+    Raises:
+        BadDescription: One is.
+    """
+    for name in every:
+        way = [name]
+        while (above := every[way[-1]].above) is not None and above.name in every and above.name not in way:
+            way.append(above.name)
+        if above is not None and above.name == name:
+            said = ", ".join(f"`{one}` takes orders of `{two}`" for one, two in pairwise((*way, name)))
+            raise BadDescription(f"there is no highest level: {said}")
 
 
 def _narrowed(mine: Links, every: Mapping[str, Links], programs: Mapping[str, Program]) -> Links:

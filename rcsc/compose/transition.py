@@ -211,7 +211,8 @@ class Stepper:
     def restarted(self) -> Leaves:
         """The values before the first cycle after a restart, as `system.adopt` makes them, whatever stood in the buffers.
 
-        A member that a state has no name for leaves it as it is initially, as there.
+        A member that a state has no name for leaves it as it is initially, as there. An order has a number that no report can echo
+        yet: the one after the order that stands in the buffer, which may be late; after the echo where none stands.
         """
         start = self.first()
         inputs = {str(v.name) for v in self.program.variables if v.kind is Kind.INPUT}
@@ -233,7 +234,8 @@ class Stepper:
             if part == COMMAND:
                 start[leaf] = values.constant(self.kinds[leaf], 0)
             elif echo in start:
-                start[leaf] = successor(start[echo])
+                late = values.variable(f"{leaf} before restart", self.kinds[leaf])
+                start[leaf] = values.choice(values.equal(late, start[echo]), successor(start[echo]), late)
         return start
 
     def of(self, program: Program) -> "Stepper":

@@ -88,7 +88,7 @@ def outline(made: "Mapping[str, Stepper]") -> Outline:
         for name, one in made.items()
     )
     assumed = tuple(
-        Assumed(one.level, one.record, one.assumed, one.needs, one.begins) for one in promises(made)
+        Assumed(one.level, one.record, one.assumed, one.needs, one.own, one.begins) for one in promises(made)
     )
     return Outline(levels, assumed)
 
