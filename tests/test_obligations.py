@@ -1,9 +1,11 @@
 """What procedures, lines and conditions owe: each kind found at its line, and nothing found where all is well."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
+from rcsc.cli import run
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic
 from rcsc.model import Int, Program
@@ -442,3 +444,81 @@ def test_a_table_of_which_a_question_was_cut_short_is_undecided(monkeypatch: pyt
     verdict = proved("input a : bool\ntable t {\n| line | a ||\n| x | true ||\n| y | false ||\n}\n")
     assert verdict.proved is None
     assert codes(verdict.findings) == ["RCS409"]
+
+
+# --- all questions together -------------------------------------------------------------------------
+
+
+PAIR = "input x : int 0 .. 10\ninput y : int 0 .. 10\nstate m : int 0 .. 10\n"
+LESS = "procedure p {\n  if x <= y { m := y - x }\n}\n"
+ODD = "100 / (2 * x - 2 * y + 1) > 3"
+OWED = {  # each owes what bounds alone do not settle
+    "a procedure": LESS,
+    "a line": f"{LESS}table t {{\n| line | when || procedures |\n| a | true || p |\n}}\n",
+    "a cell": f"table t {{\n| line | when ||\n| a | {ODD} ||\n| b | not ({ODD}) ||\n}}\n",
+    "an assumption": f"assume odd monitored : {ODD}\ntable t assuming odd {{\n| line | x ||\n| a | < 5 ||\n| b | >= 5 ||\n}}\n",
+    "a preprocess": "module q reads x, y writes m {\n  if x <= y { m := y - x }\n}\n"
+    "table t {\n| line | x ||\n| a | < 5 ||\n| b | >= 5 ||\n}\nlevel l {\n  period 40 [ms]\n  preprocess q\n  table t\n}\n",
+    "a table": "table t {\n| line | when ||\n| a | x * y > 50 and x * m > 7 ||\n| b | x * y <= 50 and x * m > 7 ||\n"
+    "| c | x * m <= 7 and m * y > 9 ||\n| d | x * m <= 7 and m * y <= 9 ||\n}\n",
+}
+
+
+@pytest.mark.parametrize("place", OWED)
+def test_no_question_is_asked_past_what_all_of_them_may_cost(
+    place: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = PAIR + OWED[place]
+    assert proved(text).proved is not None
+    monkeypatch.setattr("rcsc.prove.options.TOGETHER", 0)
+    found = proved(text)
+    assert found.proved is None
+    assert set(codes(found.findings)) == {"RCS409"}
+
+
+def test_questions_that_are_decided_one_by_one_may_be_too_many_together(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    options = Options(solver="boxes", steps=20_000)
+    text = PAIR + OWED["a table"]
+    assert proved(text, options).proved is not None
+    spent: list[int] = []
+    monkeypatch.setattr("rcsc.prove.options.TOGETHER", 1)
+    for steps in (20_000, 400):
+        found = [proved(text, replace(options, steps=steps)) for _ in range(2)]
+        assert found[0].findings == found[1].findings
+        spent.append(len(found[0].findings))
+    assert spent == [0, 1]
+    assert "together" in found[0].findings[0].message
+
+
+def test_a_budget_is_for_all_solvers_inside_it_and_for_nothing_after_it() -> None:
+    kind = Int(2, 10**6)
+    x, y = (smt.variable(name, kind) for name in "xy")
+
+    def asked() -> Answer:
+        solver = Solver(Limits(steps=1_000_000))
+        solver.add(within(x, kind), within(y, kind))
+        solver.add(smt.equal(smt.integer_operation("*", x, y), smt.literal(kind, 899), kind))
+        return solver.check()
+
+    with smt.together(10**9) as budget:
+        assert asked() is Answer.SATISFIABLE
+    few = 5 * (10**9 - budget.left)
+    for inner in (10**9, few):
+        with smt.together(few), smt.together(inner):
+            answers = [asked() for _ in range(40)]
+        many = answers.count(Answer.SATISFIABLE)
+        assert 0 < many < 40
+        assert answers == [Answer.SATISFIABLE] * many + [Answer.UNKNOWN] * (40 - many)
+    assert asked() is Answer.SATISFIABLE
+
+
+def test_the_manual_and_the_help_say_what_all_questions_together_get(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    said = f"{smt.TOGETHER} times"
+    assert run(["check", "--help"]) == 0
+    assert said in " ".join(capsys.readouterr().out.split())
+    manual = Path(__file__).parents[1] / "grammar" / "manual.md"
+    assert f"{said} the steps of one" in manual.read_text(encoding="utf-8")

@@ -177,7 +177,8 @@ Examples:
 @click.option("--deep", is_flag=True,
               help="Also prove the C functions with the model checker ESBMC, and try mutants of the C.")  # fmt: skip
 @click.option("--esbmc", type=click.FloatRange(min=0), default=None, metavar="SECONDS",
-              help="Time limit of ESBMC for one C function; 0 leaves it out.  [default: 60 with --deep, else 0]")  # fmt: skip
+              help="Time limit of ESBMC for one C function, by the clock, as it counts no steps: what it did not decide another run may. "
+              "0 leaves it out.  [default: 60 with --deep, else 0]")  # fmt: skip
 @click.option("--cortex/--no-cortex", default=True, show_default=True,
               help="Run the C on an emulated Cortex-M3, too.")  # fmt: skip
 @click.option("--vectors", type=click.Path(dir_okay=False, path_type=Path), default=None, metavar="FILE",

@@ -29,8 +29,8 @@ class _Millions(click.FloatRange):
         return max(1, round(super().convert(value, param, ctx) * 1_000_000))
 
 
-def steps_option(default: float) -> Callable[[Command], Command]:
-    """Adds `--steps`, in millions; the command gets `steps`, in single ones."""
+def steps_option(default: float, also: str = "") -> Callable[[Command], Command]:
+    """Adds `--steps`, in millions, and what else it bounds; the command gets `steps`, in single ones."""
     return click.option(
         "--steps",
         type=_Millions(min=0, min_open=True),
@@ -38,14 +38,14 @@ def steps_option(default: float) -> Callable[[Command], Command]:
         show_default=True,
         metavar="MILLIONS",
         help="Budget of each question to the solver, in its own steps, which are the same on every machine: a million takes "
-        "some tenths of a second. Past it the answer is `undecided`, never `proved`.",
+        f"some tenths of a second.{also} Past it the answer is `undecided`, never `proved`.",
     )
 
 
 def proving(command: Command) -> Command:
     """Adds the options that say how to prove; the command gets them as `options` and `use_cache`."""
 
-    @steps_option(20)
+    @steps_option(20, " All questions about one table, or one procedure, get 20 times as many together.")
     @click.option(
         "--memory",
         type=click.IntRange(min=64),

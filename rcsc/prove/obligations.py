@@ -13,6 +13,7 @@ count as safety: one that a failed assumption breaks would take the ground from 
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from functools import partial
 from typing import TypeAlias
@@ -47,11 +48,12 @@ from rcsc.model import (
     ToLeaf,
     pending,
 )
-from rcsc.prove import values
+from rcsc.prove import smt, values
 from rcsc.prove.causes import MOST_WITNESSES, Cause, diagnostic
 from rcsc.prove.discharge import Asker, Tally, fewest
 from rcsc.prove.evaluation import Evaluation, Obligation, State, TooLongError
 from rcsc.prove.options import Options
+from rcsc.prove.smt import Budget
 from rcsc.prove.symbolic import Run
 from rcsc.prove.values import FALSE, TRUE, Node
 from rcsc.resolve.leaves import everything, read_by
@@ -137,20 +139,27 @@ class Obligations:
 
     def prove(self, tables: Iterable[Table]) -> list[Diagnostic]:
         """What is wrong with conditions, deferred values, procedures, levels, and the lines of `tables`."""
-        self._conditions()
-        self._deferred()
-        self._safe_values()
+        with self._budget():
+            self._conditions()
+            self._deferred()
+            self._safe_values()
         self._levels()
         self._uncalled()
         for table in tables:
-            self._table(table)
+            with self._budget():
+                self._table(table)
         return [*self._too_long, *(diagnostic(*key, cause) for key, cause in self._causes.items())]
 
     def stopping(self, tables: Iterable[Table]) -> dict[str, tuple[AssumptionName, ...]]:
         """The stopping assumptions of the tables alone; what they owe besides is not told."""
         for table in tables:
-            self._table(table)
+            with self._budget():
+                self._table(table)
         return self.stops
+
+    def _budget(self) -> AbstractContextManager[Budget]:
+        """For all questions about a table, a procedure or a list of them, or all conditions outside tables."""
+        return smt.together(self.options.together)
 
     # --- what is known ---
 
@@ -284,7 +293,8 @@ class Obligations:
             for words, names in (("preprocess", level.preprocess), ("postprocess", level.postprocess)):
                 calls = [Call(self._procedures[name].name) for name in names]
                 where = f"in `{words}` of level `{level.name}`"
-                self._sequence(calls, where, level.span)
+                with self._budget():
+                    self._sequence(calls, where, level.span)
 
     def _sequence(self, calls: Sequence[Call], where: str, span: Span) -> None:
         base = self._invariants()
@@ -317,7 +327,8 @@ class Obligations:
                 if run is None:
                     self._give_up(f"in procedure `{procedure.name}`", procedure.span)
                 else:
-                    self._settle(run, list, "", "")
+                    with self._budget():
+                        self._settle(run, list, "", "")
 
     def _closure(self, called: set[str]) -> set[str]:
         """The procedures that run when these do."""

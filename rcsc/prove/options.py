@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal
 
-from rcsc.prove.smt import STEPS, Limits
+from rcsc.prove.smt import STEPS, TOGETHER, Limits
 
 
 @dataclass(frozen=True, slots=True)
@@ -11,7 +11,8 @@ class Options:
     """Limits and the part that Z3 plays in deciding tables.
 
     Attributes:
-        steps: Budget of each solver query; past it the verdict is *undecided*, never *proved*.
+        steps: Budget of each solver query, and, `TOGETHER` times, of all queries about a table or a procedure; past it the verdict
+            is *undecided*, never *proved*.
         memory_mb: For the solver.
         solver: `auto` lets Z3 confirm every table that should cost it little, `both` every
             table, `boxes` none (procedures are still Z3's).
@@ -27,3 +28,8 @@ class Options:
     def limits(self) -> Limits:
         """What one question to the solver may cost."""
         return Limits.of(self.steps, self.memory_mb)
+
+    @property
+    def together(self) -> int:
+        """What all questions about one table, or one procedure, may cost."""
+        return TOGETHER * self.steps

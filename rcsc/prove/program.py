@@ -28,7 +28,9 @@ from rcsc.prove.options import Options
 from rcsc.prove.report import diagnostics
 from rcsc.prove.smt import Answer
 from rcsc.prove.table import prove_table
-from rcsc.prove.verdict import ContradictoryAssumptions, TableVerdict, Undecided
+from rcsc.prove.verdict import ContradictoryAssumptions, Found, TableVerdict, Undecided
+
+TOO_MANY_STEPS = f"the questions about it take, together, more than {smt.TOGETHER} times the steps of one"
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,11 +135,18 @@ def _verdicts(
 def _verdict(program: Program, table: Table, options: Options) -> TableVerdict:
     """One table; where the solver was cut short, which another machine might not have done, it is left open."""
     before = smt.cut_short()
-    verdict = _uncut_verdict(program, table, options)
+    with smt.together(options.together) as budget:
+        verdict = _uncut_verdict(program, table, options)
+    if budget.spent and verdict.undecided:
+        verdict = replace(verdict, found=(*_decided(verdict), Undecided(TOO_MANY_STEPS)), certificate=None)
     if smt.cut_short() > before:
         left = Undecided("a question to the solver took more processor time than it may")
         verdict = replace(verdict, found=(*verdict.found, left), certificate=None)
     return verdict
+
+
+def _decided(verdict: TableVerdict) -> tuple[Found, ...]:
+    return tuple(one for one in verdict.found if not isinstance(one, Undecided))
 
 
 def _uncut_verdict(program: Program, table: Table, options: Options) -> TableVerdict:

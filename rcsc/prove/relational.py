@@ -23,7 +23,7 @@ from rcsc.model import (
     key_of,
     value_of_key,
 )
-from rcsc.prove import trial
+from rcsc.prove import smt, trial
 from rcsc.prove.asked import Asked, shown
 from rcsc.prove.atoms import Formula, Universe, assumptions_of, lines_of, some
 from rcsc.prove.certificate import must_cover, tree_certificate
@@ -209,7 +209,7 @@ class _Decision:
 
     def oracle(self, asked: Question) -> Snapshot | Unsettled:
         """Z3's answer about a region, as the tree asks it."""
-        if len(asked.candidates) > _MOST_CANDIDATES:
+        if len(asked.candidates) > _MOST_CANDIDATES or smt.spent():
             return Unsettled.UNKNOWN
         columns, forms = self.universe.columns, self.universe.forms
         bounds = {

@@ -7,7 +7,8 @@ In: terms built by the functions here. Out: `Answer`s. A time-out, exhausted mem
 import struct
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import Enum, auto
 from fractions import Fraction
@@ -30,6 +31,8 @@ class Answer(Enum):
 
 STEPS = 20_000_000
 """Steps of Z3 (its `rlimit`) a question: some seconds, and the same verdict on every machine."""
+TOGETHER = 20
+"""All questions about a table, or about a procedure, take at most as many steps as so many of them may."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +69,41 @@ _cut: list[int] = []
 def cut_short() -> int:
     """How many questions of this process were ended by the processor time that they took: no verdict that saw one is kept."""
     return len(_cut)
+
+
+@dataclass(slots=True)
+class Budget:
+    """What all questions that are asked inside `together` may cost.
+
+    Attributes:
+        left: Steps; with none left nothing more is asked, and every answer is `UNKNOWN`.
+    """
+
+    left: int
+
+    @property
+    def spent(self) -> bool:
+        """Whether there are none left."""
+        return self.left <= 0
+
+
+_budgets: list[Budget] = []
+
+
+@contextmanager
+def together(steps: int) -> Iterator[Budget]:
+    """Inside, all questions of all solvers take at most so many steps."""
+    budget = Budget(steps)
+    _budgets.append(budget)
+    try:
+        yield budget
+    finally:
+        _budgets.remove(budget)
+
+
+def spent() -> bool:
+    """Whether no question is asked any more, so that none need be made."""
+    return any(one.spent for one in _budgets)
 
 
 def troubles() -> tuple[type[BaseException], ...]:
@@ -236,6 +274,7 @@ class Solver:
         z3 = _z3()
         z3.set_param("memory_max_size", limits.memory_mb)
         self._solver: Any = z3.Solver()
+        self._steps = self._given = limits.steps
         self._solver.set("rlimit", limits.steps)
         self._cpu_s = self._patience_s = limits.cpu_s
         self._wait()
@@ -263,8 +302,11 @@ class Solver:
 
     def check(self, *assuming: Term) -> Answer:
         """Whether all asserted terms, and these, hold together for some values."""
+        if spent():
+            return Answer.UNKNOWN
         z3 = _z3()
         self.queries += 1
+        self._give(min([self._steps, *(one.left for one in _budgets)]))
         try:
             answer, why = self._answer(assuming)
         except (z3.Z3Exception, MemoryError) as error:
@@ -281,19 +323,38 @@ class Solver:
         """Z3's answer and why there is none; asked again where other processes took the time that it was given."""
         z3 = _z3()
         while True:
+            counted = self._count()
             used_s, passed_s = time.thread_time(), time.monotonic()
             answer = self._solver.check(*assuming)
             if answer != z3.unknown:
+                self._charge(counted)
                 return answer, ""
             used_s, passed_s = time.thread_time() - used_s, time.monotonic() - passed_s
             why = str(self._solver.reason_unknown())
             if passed_s < 0.9 * self._patience_s or "interrupted" in why:
+                self._charge(counted)
                 return answer, why
             if used_s >= 0.9 * self._cpu_s:
                 _cut.append(round(used_s))
                 return answer, why
             self._patience_s *= 4
             self._wait()
+
+    def _give(self, steps: int) -> None:
+        """Has Z3 end the next question after so many steps."""
+        if steps != self._given:
+            self._given = steps
+            self._solver.set("rlimit", steps)
+
+    def _count(self) -> int:
+        """Steps that Z3 has counted so far, where anybody wants to know."""
+        return int(self._solver.statistics().get_key_value("rlimit count")) if _budgets else 0
+
+    def _charge(self, before: int) -> None:
+        """Takes what a question cost from all budgets; not what an attempt cost that only the clock ended."""
+        used = self._count() - before
+        for one in _budgets:
+            one.left -= used
 
     def _wait(self) -> None:
         """Has Z3 end a question after so much time as passes, which on a busy machine is more than it gets."""
