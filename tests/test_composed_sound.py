@@ -866,6 +866,44 @@ def test_nothing_is_proved_of_what_no_cycle_can_be(
         assert "no first cycle can be as the tables declare" in capsys.readouterr().err
 
 
+BY_TURNS = """enum which {{ rest, work, never }}
+input command : which
+input x : int 0 .. 4
+state y : bool
+{states}
+assume odd assumed : {says}
+property stays : not y
+table idle {{
+  | line | when || y |
+  |------|------||---|
+  | 1    | true ||   |
+}}
+table busy assuming odd {{
+  | line | when || y    |
+  |------|------||------|
+  | 1    | true || true |
+}}
+level solo {{ period 40 [ms] table by command {{ rest : idle work : busy never : idle }} }}
+"""
+
+
+@pytest.mark.parametrize(
+    ("says", "states", "verdict"),
+    [
+        ("x * 2 = 3", "", Verdict.NOT_PROVED),  # the table by itself is told, too
+        ("x < 3 and on", "state on : bool", Verdict.NOT_PROVED),  # no state in which it can be
+        ("x < 3 or on", "state on : bool", Verdict.TRUSTED),
+    ],
+)
+def test_nothing_is_proved_of_a_table_that_cannot_run_as_it_declares(
+    says: str, states: str, verdict: Verdict, tmp_path: Path
+) -> None:
+    """Other tables can, and every cycle that would run this one is left out as impossible."""
+    whole = prove_system(solo(tmp_path, BY_TURNS.format(says=says, states=states)), LITTLE)
+    assert whole.of("solo", (Sort.ASSUMPTION, "busy", "odd")).verdict is verdict
+    assert not whole.of("solo", (Sort.PROPERTY, "", "stays")).proved
+
+
 def test_what_is_assumed_of_state_alone_is_to_be_proved(tmp_path: Path) -> None:
     """The level itself decides it, so that nobody has to believe it: and it may be wrong."""
     path = solo(tmp_path, BELIEVES.format(says="not y"))

@@ -370,7 +370,9 @@ def _say_told(made: "dict[str, Stepper]", told: "Told", cycles: int) -> None:
         click.echo("  = note: a trace that was found does not run: arithmetic was left open", err=True)
     elif told.goal.sort.value == "assumption" and told.goal.name in made[told.level].trusted:
         click.echo(
-            "  = note: no first cycle can be as the tables declare: what rests on it says nothing", err=True
+            "  = note: no first cycle can be as the tables declare, or no later one, or none that runs this table: "
+            "what rests on it says nothing",
+            err=True,
         )
     elif cycles and not told.beside:
         click.echo(f"  = note: no run of {cycles} cycles or fewer shows it", err=True)

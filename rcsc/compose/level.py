@@ -175,7 +175,7 @@ def _verdicts(
     every = [wanted, *(goals(stepper, first) for first in inference.firsts)]
     asked = [[keyed.term(values.negation(goal.holds)) for goal in each] for each in every]
     solvers = [inference.known(found.clauses), *(inference.beginning(first) for first in inference.firsts)]
-    believed = _believed(stepper, solvers[1:])
+    believed = _believed(stepper, inference, found.clauses, solvers)
     for at, goal in enumerate(wanted):
         if at in found.open:
             yield goal, Verdict.NOT_PROVED
@@ -183,17 +183,52 @@ def _verdicts(
         answers = {_asked(solver, terms[at]) for solver, terms in zip(solvers, asked, strict=True)}
         if answers == {Answer.UNSATISFIABLE}:
             trusted = goal.sort is Sort.ASSUMPTION and goal.name in stepper.trusted
-            yield goal, believed if trusted else Verdict.PROVED
+            yield goal, believed[goal.table] if trusted else Verdict.PROVED
         else:
             yield goal, Verdict.NOT_PROVED if Answer.SATISFIABLE in answers else Verdict.UNDECIDED
 
 
-def _believed(stepper: Stepper, beginnings: Sequence[Solver]) -> Verdict:
-    """What becomes of what the tables declare: where no first cycle can keep to all of it, all that rests on it says nothing."""
-    answers = {solver.check() for solver in beginnings} if stepper.trusted else set()
+def _believed(
+    stepper: Stepper, inference: Confirmation, clauses: Sequence[Clause], solvers: Sequence[Solver]
+) -> dict[str, Verdict]:
+    """What becomes of what each table declares: where no cycle can keep to it, all that rests on it says nothing.
+
+    So it is where none of some sort of cycle can, a later one, the first, or that after a restart; and for a table where none that
+    runs it can, although one would run it otherwise.
+    """
+    names = [str(at.table.name) for at in inference.cycle.tables]
+    if not stepper.trusted:
+        return dict.fromkeys(names, Verdict.TRUSTED)
+    whole = _of_possible({solver.check() for solver in solvers})
+    if whole is not Verdict.TRUSTED:
+        return dict.fromkeys(names, whole)
+    return {name: _can_run(inference, clauses, solvers, at) for at, name in enumerate(names)}
+
+
+def _of_possible(answers: set[Answer]) -> Verdict:
+    """Whether all of it is possible, as a verdict on what was declared."""
     if Answer.UNSATISFIABLE in answers:
         return Verdict.NOT_PROVED
     return Verdict.UNDECIDED if Answer.UNKNOWN in answers else Verdict.TRUSTED
+
+
+def _can_run(
+    inference: Confirmation, clauses: Sequence[Clause], solvers: Sequence[Solver], at: int
+) -> Verdict:
+    """Whether a table can run in some cycle that is as declared, if it can in one that need not be."""
+    chosen = [inference.keyed.term(one.tables[at].chosen) for one in (inference.cycle, *inference.firsts)]
+    answers = {_asked(solver, term) for solver, term in zip(solvers, chosen, strict=True)}
+    if Answer.SATISFIABLE in answers:
+        return Verdict.TRUSTED
+    if Answer.UNKNOWN in answers:
+        return Verdict.UNDECIDED
+    cycle, *firsts = (replace(one, contract=one.undeclared) for one in (inference.cycle, *inference.firsts))
+    free = replace(inference, cycle=cycle, firsts=firsts)
+    others = [free.known(clauses), *(free.beginning(first) for first in firsts)]
+    without = {_asked(solver, term) for solver, term in zip(others, chosen, strict=True)}
+    if Answer.SATISFIABLE in without:
+        return Verdict.NOT_PROVED
+    return _of_possible(without - {Answer.UNSATISFIABLE})
 
 
 def _asked(solver: Solver, term: Term) -> Answer:

@@ -109,7 +109,7 @@ class Cycle:
     Attributes:
         before: Every leaf as the last cycle left it, and the ghosts; inputs as last taken.
         taken: The inputs of this cycle.
-        contract: What the environment keeps to.
+        contract: What the environment keeps to; `undeclared`, the same without what tables are declared to rely on.
         middle: Every leaf that the table sees.
         tables: Each table that may run.
         after: Every leaf and ghost behind the cycle.
@@ -131,6 +131,7 @@ class Cycle:
     calls: tuple[ExternResults, ...] = ()
     settled: Leaves = field(default_factory=dict)
     acted: Leaves = field(default_factory=dict)
+    undeclared: Node = TRUE
 
     @property
     def cases(self) -> tuple[Node, ...]:
@@ -264,7 +265,7 @@ class Stepper:
         run = Run(self.procedures, self.kinds, dict(before), suffix=suffix, refusals=True)
         run.state.leaves.update(taken)
         ghosts, answers = self._database(before, taken)
-        contract = values.both(self._protocol(before, taken), answers)
+        contract = undeclared = values.both(self._protocol(before, taken), answers)
         self._settle(run)
         settled = {**before, **run.state.leaves}
         run.execute(Call(self.procedures[name].name) for name in self.level.preprocess)
@@ -284,7 +285,7 @@ class Stepper:
         calls = tuple(run.answered)
         return Cycle(
             before, taken, contract, middle, tables, after,
-            run.ended, unmatched, interrupted, calls, settled, acted,
+            run.ended, unmatched, interrupted, calls, settled, acted, undeclared,
         )  # fmt: skip
 
     def tables(self, middle: Leaves, *, matched: bool) -> tuple[TableAt, ...]:
