@@ -347,6 +347,32 @@ def test_a_level_has_one_superior(tmp_path: Path) -> None:
         steppers(path)
 
 
+@pytest.mark.parametrize(
+    ("keys", "wrong"), [(["command"], False), (["first.at"], True), (["command", "second.at"], True)]
+)
+def test_no_answer_of_the_database_is_a_key_of_a_question(
+    keys: list[str], wrong: bool, tmp_path: Path
+) -> None:
+    """A level asks with what the cycle before left there: the key that the cycle sees has another answer."""
+    text = (
+        "enum which { a, b }\nrecord answer { at : which }\ninput command : which\ninput first : answer\ninput second : answer\n"
+        "state y : bool\ntable t {\n  | line | second.at || y |\n  |---|---||---|\n  | 1 | a || true |\n  | 2 | b || false |\n}\n"
+        "level solo { period 40 [ms] table t }\n"
+    )
+    path = solo(tmp_path, text)
+    feeds = f'feed = [{{ into = "first", query = "q", keys = ["command"] }}, {{ into = "second", query = "q", keys = {json.dumps(keys)} }}]'
+    said = path.read_text(encoding="utf-8")
+    path.write_text(
+        said.replace('[[level]]\nname = "solo"\n', f'[[level]]\nname = "solo"\n{feeds}\n'), encoding="utf-8"
+    )
+    assert "feed" in path.read_text(encoding="utf-8")
+    if wrong:
+        with pytest.raises(BadDescription, match="answer of the database itself"):
+            steppers(path)
+    else:
+        assert [one.into for one in steppers(path)["solo"].links.asked] == ["first", "second"]
+
+
 # --- how levels begin ----------------------------------------------------------------------------
 
 

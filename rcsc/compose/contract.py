@@ -85,7 +85,8 @@ def links(system: Description, level: str, program: Program) -> Links:
     """The environment of a level, with every leaf of its order taken to be numbered.
 
     Raises:
-        BadDescription: An order has no report to answer it, a report no order, or one lacks a field; or there are two superiors.
+        BadDescription: An order has no report to answer it, a report no order, or one lacks a field; there are two superiors;
+            or a question to the database has an answer of it as a key.
     """
     inputs = {_variable(w.target): _owner(w.source) for w in system.wires if _owner(w.target) == level}
     outputs = {_variable(w.source): _owner(w.target) for w in system.wires if _owner(w.source) == level}
@@ -114,7 +115,14 @@ def links(system: Description, level: str, program: Program) -> Links:
             used |= {*leaves_under(program, record)}
     feeds = next((spec.feeds for spec in system.levels if spec.name == level), ())
     asked = tuple(Asked(feed.into, leaves_under(program, feed.into), feed.keys) for feed in feeds)
-    used |= {leaf for one in asked for leaf in one.leaves}
+    answers = {leaf for one in asked for leaf in one.leaves}
+    for one in asked:
+        if late := sorted(answers & set(one.keys)):
+            raise BadDescription(
+                f"`{level}.{one.into}` is asked of the database by `{late[0]}`, which is an answer of the database itself: "
+                "of the cycle before, so that the same question need not have the same answer"
+            )
+    used |= answers
     free = tuple(str(v.name) for v in program.variables if v.kind is Kind.INPUT and v.name not in used)
     seen = [above.name] if above is not None else []
     unread = _unread(program, level, inputs, outputs, levels, {*seen, *(one.name for one in below)})
