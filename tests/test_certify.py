@@ -18,7 +18,7 @@ from rcsc.certify import Answer, certify, check_certificate
 from rcsc.certify.known import Known
 from rcsc.certify.run import Run, Start
 from rcsc.certify.settle import script, values_in
-from rcsc.certify.values import parts_first
+from rcsc.certify.values import Term, parts_first
 from rcsc.interpret import evaluate, matching_lines
 from rcsc.meaning import digest
 from rcsc.model import AssumptionName, Program, Read, Table
@@ -744,3 +744,37 @@ def test_obligations_of_one_name_are_each_asked() -> None:
     assert len(left) == 2
     assert {one.question for one in left} == set(asked)
     assert len({one.name for one in left}) == 2
+
+
+def test_a_long_run_is_followed_in_one_pass_and_work_has_an_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    def text(count: int, step: str) -> str:
+        return (
+            f"input a : int 0 .. 9\nstate s : int 0 .. 999\nprocedure p {{ {' '.join([step] * count)} }}\n"
+            "table t {\n| line | a || procedures |\n| one | < 4 || p |\n| two | >= 4 || |\n}\n"
+        )
+
+    looked: list[Term] = []
+    found = Known._found
+
+    def counted(known: Known, term: Term) -> Any:
+        looked.append(term)
+        return found(known, term)
+
+    monkeypatch.setattr(Known, "_found", counted)
+    counts = []
+    for count in (50, 100):
+        program = program_of(text(count, "s := s / 2 + a"))
+        certificate = certificate_of(program)
+        looked.clear()
+        assert certify(program, certificate).whole
+        counts.append(len(looked))
+    assert counts[1] < 2.5 * counts[0]
+    program = program_of(text(30, "if s > a { s := s / 2 + a }"))
+    certificate = certificate_of(program)
+    assert certify(program, certificate).whole
+    monkeypatch.setattr("rcsc.certify.MOST_WORK", 2_000)
+    cut = certify(program, certificate)
+    assert cut.problems == ()
+    assert cut.unchecked
+    assert not {one.name for one in cut.unchecked} & set(cut.checked)
+    assert cut == certify(program, certificate)

@@ -21,10 +21,11 @@ class Known:
     Attributes:
         shown: Numbers of obligations that hold under these hypotheses.
         impossible: Whether the hypotheses contradict each other.
+        work: Spans computed so far.
     """
 
     def __init__(self, hypotheses: Collection[Term], shown: Collection[int]) -> None:
-        self.shown, self.impossible = shown, False
+        self.shown, self.impossible, self.work = shown, False, 0
         self._facts: Facts = {}
         self._spans: dict[Term, Span] = {}
         for _ in range(ROUNDS):
@@ -35,10 +36,9 @@ class Known:
 
     def span(self, term: Term) -> Span:
         """The span of the term."""
-        if term not in self._spans:
-            for part in parts_first(term):
-                if part not in self._spans:
-                    self._spans[part] = self._found(part)
+        for part in parts_first(term, but=self._spans):
+            self._spans[part] = self._found(part)
+            self.work += 1
         return self._spans[term]
 
     def _found(self, term: Term) -> Span:

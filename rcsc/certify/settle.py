@@ -23,6 +23,8 @@ MOST_WORK = 4_000_000
 """Cases times terms that are tried for one obligation."""
 SAMPLES = 200
 """Cases picked from the ends of variables and the constants they meet, where there are too many to try all."""
+CASES_A_SPAN = 40
+"""Values of terms that are computed with numpy for the work of one span."""
 _FIT = 2**62
 
 
@@ -69,14 +71,18 @@ class Settler:
 
     Attributes:
         first: A value for each variable, of the first cycle.
+        work: Done so far, in spans of terms.
     """
 
     def __init__(self, terms: Terms, ask: Ask | None, first: Mapping[str, Number]) -> None:
-        self.terms, self.ask, self.first = terms, ask, first
+        self.terms, self.ask, self.first, self.work = terms, ask, first, 0
 
     def settle(self, hypotheses: Sequence[Term], path: Term, good: Term, known: Known) -> Outcome:
         """Whether `good` holds wherever the path is taken; `known` are the spans on the path."""
-        if known.impossible or known.span(good) == (1, 1):
+        before = known.work
+        by_spans = known.impossible or known.span(good) == (1, 1)
+        self.work += known.work - before
+        if by_spans:
             return Shown("spans")
         bad = self.terms.every((path, self.terms.negation(good)))
         if bad is self.terms.false:
@@ -101,7 +107,7 @@ class Settler:
             together = _tied(wanted, rest, known)
             if together is None:
                 return None
-            found = _where(
+            found = self._where(
                 self.terms.every((wanted, *together)), cases := _crossed(variables(wanted, *together), known)
             )
             if found is None:
@@ -129,12 +135,21 @@ class Settler:
             columns[one] = _array(
                 one.sort, [start, one.low, one.high, *picked.choices(ends, k=SAMPLES)], wide=True
             )
-        failing = _where(wrong, columns)
+        failing = self._where(wrong, columns)
         return (
             Fails(tuple(sorted(_row(columns, int(failing[0])))))
             if failing is not None and len(failing)
             else None
         )
+
+    def _where(self, condition: Term, cases: Cases) -> Any:
+        """Numbers of the cases in which the condition is true; None where numpy's doubles cannot say."""
+        count = max((len(column) for column in cases.values()), default=1)
+        self.work += (1 + count // CASES_A_SPAN) * len(parts_first(condition))
+        try:
+            return np.flatnonzero(values_in(condition, cases, count))
+        except OverflowError:
+            return None
 
 
 # --- cases -----------------------------------------------------------------------------
@@ -221,15 +236,6 @@ def _edges(term: Term) -> Mapping[str, list[Number]]:
         if part.op == "constant" and part.sort != BOOL:
             found[part.sort] += [part.low, part.low - 1, part.low + 1]
     return {sort: sorted(set(values)) for sort, values in found.items()}
-
-
-def _where(condition: Term, cases: Cases) -> Any:
-    """Numbers of the cases in which the condition is true; None where numpy's doubles cannot say."""
-    count = max((len(column) for column in cases.values()), default=1)
-    try:
-        return np.flatnonzero(values_in(condition, cases, count))
-    except OverflowError:
-        return None
 
 
 def values_in(wanted: Term, cases: Cases, count: int) -> Any:

@@ -9,7 +9,7 @@ are no NaN. Doubles round to nearest even, which is monotone: the ends of a resu
 """
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Container, Iterable, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -250,8 +250,8 @@ def _of_doubles(op: str, spans: Sequence[tuple[Number, Number]]) -> Span:
 # --- walks -----------------------------------------------------------------------------
 
 
-def parts_first(*terms: Term) -> list[Term]:
-    """Every term once, parts before wholes; without recursion, since runs are long."""
+def parts_first(*terms: Term, but: Container[Term] = ()) -> list[Term]:
+    """Every term once, parts before wholes, `but` these and what is only below them; without recursion, since runs are long."""
     found: list[Term] = []
     seen: set[Term] = set()
     stack = [(term, False) for term in reversed(terms)]
@@ -259,7 +259,7 @@ def parts_first(*terms: Term) -> list[Term]:
         term, ready = stack.pop()
         if ready:
             found.append(term)
-        elif term not in seen:
+        elif term not in seen and term not in but:
             seen.add(term)
             stack.append((term, True))
             stack += [(part, False) for part in reversed(term.args)]
