@@ -335,6 +335,20 @@ def test_tables_with_other_lines_and_leaves(log: Log, edited: Path) -> None:
     assert moment.tick == 43
 
 
+def test_what_other_tables_lack_is_named_and_not_said_to_be_the_same(tmp_path: Path, logged: Path) -> None:
+    folder = tmp_path / "generated"
+    shutil.copytree(REPO / "generated", folder)
+    symbols = folder / "c" / "gripper.json"
+    said = json.loads(symbols.read_text(encoding="utf-8"))
+    next(one for one in said["leaves"] if one["name"] == "report.opening_mm")["name"] = "report.width_mm"
+    symbols.write_text(json.dumps(said), encoding="utf-8")
+    result = run("replay", logged, "--executor", "python", "--generated", folder)
+    assert "nothing differs" not in result.output
+    assert "nothing that these tables have differs" in result.output
+    assert "not compared: gripper.report.opening_mm" in result.output
+    assert "not compared" not in run("replay", logged, "--executor", "python").output
+
+
 def test_a_log_that_cannot_be_written_leaves_nothing(tmp_path: Path) -> None:
     (tmp_path / "run.mcap").mkdir()
     with pytest.raises(OSError, match=r"run\.mcap"):
@@ -574,7 +588,7 @@ def test_the_first_cycle_where_something_holds(log: Log) -> None:
         "", "1 +", "task.nothing == 1", "task.cur_state", "task.cur_state == wrong", "task.cur_state < d_state",
         "task.cur_state == 1", "d_state == d_state", "__import__('os').system('true')", "task.cur_state is d_state",
         "(lambda: 1)() == 1", "task.command.inc_command + 1 == 2", "task['x'] == 1", "x.y.z", "[1] == [1]",
-        "(" * 500,
+        "(" * 500, "not " * 2_000 + "task.new_command",
     ],
 )  # fmt: skip
 def test_a_question_that_cannot_be_asked(log: Log, text: str) -> None:

@@ -258,7 +258,12 @@ def replay(
     if moment is not None and moment.differs:
         return _differs(file, again, moment)
     if tick is None:
-        click.echo(f"{len(found.ticks)} ticks replayed: nothing differs; {found.checked.said}")
+        lacking = again.lacking
+        differs = "nothing that these tables have differs" if lacking else "nothing differs"
+        click.echo(f"{len(found.ticks)} ticks replayed: {differs}; {found.checked.said}")
+        if lacking:
+            more = f", and {len(lacking) - _SHOWN} more" if len(lacking) > _SHOWN else ""
+            click.echo(f"not in these tables, and so not compared: {', '.join(lacking[:_SHOWN])}{more}")
     if not found.complete:
         return _refuse(file, Code.LOG_NOT_WHOLE, f"the log is {found.checked.said}")
     return 0

@@ -59,11 +59,11 @@ def predicate(text: str, log: Log) -> Predicate:
     marked = _KEYWORD.sub(lambda found: found[0] + _MARK * keyword.iskeyword(found[0]), text)
     try:
         parsed = ast.parse(marked.strip(), mode="eval").body
+        return _Building(named_columns(log)).predicate(parsed)
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         raise BadExpression(
-            f"`{text}` cannot be read: write such as `level.leaf == value and ...`"
+            f"`{text[:200]}` cannot be read: write such as `level.leaf == value and ...`"
         ) from error
-    return _Building(named_columns(log)).predicate(parsed)
 
 
 def named_columns(log: Log) -> dict[str, tuple[str, Column]]:

@@ -74,6 +74,7 @@ class _Again:
     Attributes:
         same: Whether the signature is the recorded one, so that bytes can be compared.
         aside: What is shown but makes no difference alone: in a what-if, which line it was.
+        lacking: What the log has and these tables have not: leaves, and values that were put as the initial one.
     """
 
     logged: LoggedLevel
@@ -85,6 +86,7 @@ class _Again:
     aside: frozenset[str]
     inputs: frozenset[int] = frozenset()
     carried: tuple[tuple[int, int], ...] = ()
+    lacking: dict[str, None] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         then = self.logged.sign
@@ -92,6 +94,8 @@ class _Again:
         self.carried = tuple(
             (then.index[leaf.name], at) for at, leaf in enumerate(self.sign.leaves) if leaf.name in then.index
         )
+        gone = (leaf.name for leaf in then.leaves if leaf.name not in self.sign.index)
+        self.lacking = dict.fromkeys(f"{self.logged.name}.{name}" for name in gone)
 
     def cycle(self, at: int, answers: Answers) -> Cycle | None:
         """Run the cycle whose record has this place; None for the state that recording started from."""
@@ -129,9 +133,10 @@ class _Again:
             return
         values = list(self.executor.values()[: len(self.sign.leaves)])
         for source, target in self.carried:
-            values[target] = _translated(
-                self.logged.sign.leaves[source], self.sign.leaves[target], start[source]
-            )
+            then, now = self.logged.sign.leaves[source], self.sign.leaves[target]
+            values[target] = _translated(then, now, start[source])
+            if then.members != now.members and then.shown(start[source]) not in now.members:
+                self.lacking[f"{self.logged.name}.{then.name} = {then.shown(start[source])}"] = None
         put_checked(self.logged.name, self.sign, self.executor, tuple(values))
 
     def _differences(self, recorded: Values, now: Values) -> tuple[Difference, ...]:
@@ -232,6 +237,11 @@ class Replay:
     def moments(self) -> Iterator[Moment]:
         """Every tick from the first."""
         return (self.go(tick) for tick in self.log.ticks)
+
+    @property
+    def lacking(self) -> tuple[str, ...]:
+        """What the log has and these tables have not, as far as it was run: it was not compared, or stood at its initial value."""
+        return tuple(one for level in self._levels for one in level.lacking)
 
     def first_difference(self) -> Moment | None:
         """The first tick in which a level leaves something else than was recorded; None for none."""
