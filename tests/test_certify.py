@@ -5,6 +5,7 @@ import copy
 import json
 import random
 from dataclasses import fields, is_dataclass, replace
+from itertools import product
 from math import isnan
 from pathlib import Path
 from typing import Any
@@ -18,10 +19,11 @@ from rcsc.certify import Answer, certify, check_certificate
 from rcsc.certify.known import Known
 from rcsc.certify.run import Run, Start
 from rcsc.certify.settle import script, values_in
+from rcsc.certify.table import TableChecker
 from rcsc.certify.values import Term, parts_first
-from rcsc.interpret import evaluate, matching_lines
+from rcsc.interpret import evaluate, holds, matching_lines
 from rcsc.meaning import digest
-from rcsc.model import AssumptionName, Program, Read, Table
+from rcsc.model import AssumptionName, Program, Read, Table, Value, key_of
 from rcsc.prove.options import Options
 from rcsc.prove.program import prove_program
 from rcsc.resolve import compile_text
@@ -778,3 +780,85 @@ def test_a_long_run_is_followed_in_one_pass_and_work_has_an_end(monkeypatch: pyt
     assert cut.unchecked
     assert not {one.name for one in cut.unchecked} & set(cut.checked)
     assert cut == certify(program, certificate)
+
+
+# --- what a leaf of a tree leaves to be settled ---------------------------------------------
+
+MIXED = """
+enum colour {{ red, green, blue }}
+input c : colour
+input p : bool
+input r : real 0.0 .. 1.0
+input s : real 0.0 .. 1.0
+input x : int -1 .. 2
+input y : int 0 .. 2
+{assumption}
+table t {{
+  | line | when ||
+  | one | {0} ||
+  | two | {1} ||
+  | three | {2} ||
+{default}}}
+"""
+SOME_CONDITIONS = (
+    "x * y > 1", "x * x = y", "(x + y) mod 2 = 0", "r < s", "r + s >= 0.75", "r = s and p",
+    "c = colour.green", "not p", "x < y or p", "x <= 0",
+)  # fmt: skip
+SOME_VALUES: dict[str, tuple[Value, ...]] = {
+    "c": (0, 1, 2), "p": (False, True), "r": (0.0, 0.5, 1.0), "s": (0.0, 0.5, 0.75), "x": (-1, 0, 1, 2), "y": (0, 1, 2),
+}  # fmt: skip
+SOME_FORMS = [
+    {"c": 1}, {"p": 1}, {"r": 1}, {"s": -1}, {"x": 1}, {"y": -1}, {"r": 1, "s": -1}, {"r": -1, "s": 1}, {"r": 1, "s": 1}, {"x": 1, "y": -2},
+    {"x": -3, "y": 1}, {"p": 2, "x": 1}, {"c": 1, "y": 1},
+]  # fmt: skip
+
+
+@given(
+    st.lists(st.sampled_from(SOME_CONDITIONS), min_size=3, max_size=3),
+    st.sampled_from(["", "| d | DEFAULT ||\n", "| d | DEFAULT unreachable ||\n"]),
+    st.sampled_from(["", "x <= y", "p or r > s"]),
+    st.sampled_from(SOME_FORMS),
+    st.data(),
+)
+def test_each_region_that_is_left_is_asked_of_all_its_inputs(
+    lines: list[str], default: str, assumed: str, form: dict[str, int], data: st.DataObject
+) -> None:
+    """Both questions of a split, at every input: the hypotheses hold in the region, and what is owed wherever one line matches."""
+    claim = f"assume it assumed : {assumed}" if assumed else ""
+    text = MIXED.format(*lines, assumption=claim, default=default)
+    program = program_of(text.replace("table t", "table t assuming it") if assumed else text)
+    start, table = Start(program), program.tables[0]
+    types = {str(v.name): v.type for v in program.variables}
+    points = [dict(zip(SOME_VALUES, values, strict=True)) for values in product(*SOME_VALUES.values())]
+    at = [sum(k * key_of(types[name], point[name]) for name, k in form.items()) for point in points]
+    cut = data.draw(
+        st.sampled_from(
+            [*sorted(set(at))[:-1], *([-1, 0] if form in ({"r": 1, "s": -1}, {"r": -1, "s": 1}) else [])]
+        )
+    )
+    names = list(form)
+    entry = {
+        "assumptions": [str(one.name) for one in program.assumptions],
+        "columns": names,
+        "forms": [[[number, form[name]] for number, name in enumerate(names)]],
+        "tree": [["s", 0, cut], ["z"], ["z"]],
+    }
+    checker = TableChecker(start, table, entry)
+    checker.check()
+    cases = {start.leaves[name]: np.array([point[name] for point in points]) for name in SOME_VALUES}
+    for debt, side in zip(checker.questions, (True, False), strict=True):
+        [owed] = debt.owed
+        known, good = (
+            np.broadcast_to(values_in(term, cases, len(points)), len(points))
+            for term in (start.terms.every(debt.hypotheses), owed.good)
+        )
+        for number, point in enumerate(points):
+            inside = (at[number] <= cut) == side and all(
+                holds(a.condition, point) for a in program.assumptions
+            )
+            matching = len(matching_lines(table, point))
+            if inside:
+                assert known[number], point
+                assert good[number] == (matching == 1 or (matching == 0 and not checker.cover)), point
+            elif "r" not in form or len(form) == 1:
+                assert not known[number], point  # what is left is no more than the region
