@@ -134,6 +134,17 @@ def test_nothing_is_claimed_while_a_neighbour_runs_other_tables(system: Path) ->
     assert PROVED.format(system) in do(commands, "reload upper")
 
 
+def test_nothing_is_claimed_while_a_neighbour_was_compiled_of_other_tables(system: Path) -> None:
+    edit(system, "lower", ("table go {", "state spare : bool\ntable go {"))
+    commands = alone(system, "python")
+    edit(system, "upper", SLOWER)
+    assert prove(system) == 0
+    [said] = [one for one in do(commands, "diff upper") if "neighbours" in one]
+    assert said.endswith(": level `lower` runs other tables than its file holds")
+    do(commands, "reload lower anyway")
+    assert PROVED.format(system) in do(commands, "reload upper")
+
+
 def test_a_neighbour_that_does_not_keep_what_is_assumed_is_named(system: Path) -> None:
     edit(
         system,

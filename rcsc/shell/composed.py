@@ -4,7 +4,7 @@ In: where the system comes from, and a level. Out: a line to show, or a refusal 
 that were proved, so that nothing is claimed while a level runs other tables than its file holds. No search is begun unless it is asked for.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from rcsc.cache import Cache, open_cache
 from rcsc.compose.standing import Known, Standing
@@ -25,13 +25,21 @@ def held_by(plant: Plant, spec: LevelSpec) -> Kept | None:
         return None
 
 
-def together(plant: Plant, level: str, runs: Mapping[str, Kept | None], *, prove: bool) -> str:
+def together(
+    plant: Plant,
+    level: str,
+    runs: Mapping[str, Kept | None],
+    compiled: Callable[[str], bool],
+    *,
+    prove: bool,
+) -> str:
     """What is known of the level with the tables that its file holds.
 
     Args:
         plant: Where the system comes from.
         level: Its name.
         runs: What each level runs, this one if it takes the new tables.
+        compiled: Whether a level's executors were made of that; asked of its neighbours before anything is called proved.
         prove: Whether the levels are proved first where nothing is kept, and refused unless that succeeds.
 
     Raises:
@@ -46,6 +54,9 @@ def together(plant: Plant, level: str, runs: Mapping[str, Kept | None], *, prove
     if made is not None and found is Known.NOT_PROVED:
         raise _refused(plant, level, "".join(f"\nnot proved: {one}" for one in made.known[level].open))
     if found is Known.PROVED:
+        others = (spec.name for spec in plant.system.levels if spec.name != level)
+        edited = [name for name in others if not compiled(name)]
+    if found is Known.PROVED and not edited:
         return f"level `{level}` is proved together with its neighbours, as the files of {plant.path} stand"
     why = _unknown(plant, level, made, edited)
     if prove:

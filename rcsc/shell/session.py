@@ -296,8 +296,16 @@ class Session:
             program = None
         judged = judge(Running(old, program), made.level, made.program, self.memory)
         runs = {one.name: made.sources if one is old else self._made[id(one)][2] for one in self.levels}
-        known = together(self.plant, name, runs, prove=prove)
+        known = together(self.plant, name, runs, self._compiled, prove=prove)
         return old, made, replace(judged, said=(*judged.said, known))
+
+    def _compiled(self, name: str) -> bool:
+        """Whether a level's executors were made of the sources that were there when it began to run."""
+        try:
+            self.program(self.system.level(name))
+        except Refused:
+            return False
+        return True
 
     def _keep(self) -> None:
         self._past.append(history.kept(self.system, self.memory, self._answers))
