@@ -573,6 +573,37 @@ table t assuming small {
 """
 
 
+@pytest.mark.usefixtures("folder")
+def test_certify_of_a_system_drops_no_option(rcsc: Rcsc, monkeypatch: pytest.MonkeyPatch) -> None:
+    from rcsc.cli.prove import prove
+
+    given: dict[str, object] = {}
+
+    def proved(**said: object) -> int:
+        given.update(said)
+        return 0
+
+    monkeypatch.setattr(prove, "callback", proved)
+    Path("system.toml").touch()
+    for options, strict, no_cache in (
+        ((), False, False),
+        (("--strict",), True, False),
+        (("--certify", "--no-cache"), False, True),
+    ):
+        assert rcsc("certify", "system.toml", *options).status == 0
+        assert (given["confirms"], given["strict"], given["no_cache"]) == (True, strict, no_cache)
+    for more in (
+        ("--steps", "5"),
+        ("--memory", "100"),
+        ("--write", "a.json"),
+        ("--solver", "both"),
+        ("-j", "2"),
+    ):
+        ran = rcsc("certify", "system.toml", *more)
+        assert ran.status == 2
+        assert "rcsc prove" in ran.err
+
+
 def test_certify_names_what_it_did_not_check(rcsc: Rcsc) -> None:
     write("hard.rcs", HARD)
     ran = rcsc("certify", "hard.rcs", "--write", "a.json", "--questions", "left")

@@ -205,6 +205,11 @@ def test(
     return _finish(made.report, "test", output, made.closing)
 
 
+def _is_given(here: click.Context, name: str) -> bool:
+    """Whether an option stands on the command line."""
+    return here.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE
+
+
 @commands.command(
     short_help="Re-check a proof without the prover.",
     epilog="""\b
@@ -248,7 +253,14 @@ def certify(
 
         if write is not None or against is not None or questions is not None:
             raise click.UsageError("the certificate of a system is written by `rcsc prove --certificate`")
-        found: int = click.get_current_context().invoke(prove, system=Path(source), confirms=True)
+        here = click.get_current_context()
+        given = {one.name for one in here.command.params if _is_given(here, str(one.name))}
+        if more := sorted(str(name) for name in given - {"source", "cvc5", "strict", "no_cache"}):
+            named = ", ".join(f"--{name.replace('_', '-')}" for name in more)
+            raise click.UsageError(f"{named}: not of a system; `rcsc prove --certify` has options of its own")
+        found: int = here.invoke(
+            prove, system=Path(source), confirms=True, strict=strict, no_cache=not use_cache
+        )
         return found
     if cvc5 and importlib.util.find_spec("cvc5") is None:
         raise click.UsageError("--certify needs the extra `certify`: pip install 'rcsc[certify]'")
