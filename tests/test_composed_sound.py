@@ -853,7 +853,10 @@ def test_what_is_assumed_of_an_input_is_used_and_named_in_every_verdict(tmp_path
     assert whole.of("solo", (Sort.ASSUMPTION, "t", "never")).verdict is Verdict.TRUSTED
     stays = whole.of("solo", (Sort.PROPERTY, "", "stays"))
     assert stays.proved
-    assert stays.trusts == ("assumption `never` of level `solo`, as it is declared",)
+    assert stays.trusts == (
+        "assumption `never` of level `solo`, as it is declared",
+        "level `solo` can be as its tables declare in every state that it comes to",
+    )
     assert whole.proved
 
 
@@ -928,6 +931,35 @@ def test_nothing_is_proved_of_a_table_that_cannot_run_as_it_declares(
     whole = prove_system(solo(tmp_path, BY_TURNS.format(says=says, states=states)), LITTLE)
     assert whole.of("solo", (Sort.ASSUMPTION, "busy", "odd")).verdict is verdict
     assert not whole.of("solo", (Sort.PROPERTY, "", "stays")).proved
+
+
+LATER = """input x : int 0 .. 4
+state n : int 0 .. 9
+assume room assumed : x + n <= 5
+property few : n <= 6
+procedure count { n := min(n + 1, 9) }
+table t assuming room {
+  | line | when || procedures |
+  |------|------||------------|
+  | 1    | true || count      |
+}
+level solo { period 40 [ms] table t }
+"""
+
+
+def test_what_cannot_be_as_declared_in_a_later_state_is_told_as_taken_for_granted(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """After six cycles no input is: that the property holds says nothing of the seventh."""
+    path = solo(tmp_path, LATER)
+    stepper = steppers(path)["solo"]
+    now = initial(stepper.program)
+    for _ in range(7):
+        now = dict(one_cycle(stepper, now, {"x": 0}).after)
+    assert not property_kept(stepper, "few", now, now)
+    assert run(["prove", str(path), "--no-cache"]) in {0, 1}
+    said = capsys.readouterr().out.partition("taken for granted\n")[2]
+    assert "level `solo` can be as its tables declare in every state that it comes to" in said
 
 
 def test_what_is_assumed_of_state_alone_is_to_be_proved(tmp_path: Path) -> None:

@@ -149,6 +149,8 @@ def _of_runs(stepper: Stepper, proof: LevelProof) -> Iterator[tuple[Key, Claim]]
         goal.key for goal, _ in proof.found if goal.sort is Sort.ASSUMPTION and goal.name in stepper.trusted
     ]
     trusts = [f"assumption `{one}` of level `{name}`{DECLARED}" for one in sorted(stepper.trusted)]
+    if stepper.trusted:
+        trusts.append(f"level `{name}` can be as its tables declare in every state that it comes to")
     trusts += [
         f"the same question has the same answer in `{asked.into}` of level `{name}`" for asked in links.asked
     ]
