@@ -21,9 +21,9 @@ from rcsc.certify.run import Run, Start
 from rcsc.certify.settle import script, values_in
 from rcsc.certify.table import TableChecker
 from rcsc.certify.values import Term, parts_first
-from rcsc.interpret import evaluate, holds, matching_lines
+from rcsc.interpret import call, evaluate, holds, matching_lines
 from rcsc.meaning import digest
-from rcsc.model import AssumptionName, Program, Read, Table, Value, key_of
+from rcsc.model import AssumptionName, Program, Read, Table, Value, key_bounds, key_of, value_of_key
 from rcsc.prove.options import Options
 from rcsc.prove.program import prove_program
 from rcsc.resolve import compile_text
@@ -780,6 +780,66 @@ def test_a_long_run_is_followed_in_one_pass_and_work_has_an_end(monkeypatch: pyt
     assert cut.unchecked
     assert not {one.name for one in cut.unchecked} & set(cut.checked)
     assert cut == certify(program, certificate)
+
+
+STATE = """
+enum colour {{ red, green, blue }}
+state i : int -1 .. 3
+state j : int 0 .. 3
+state c : colour
+state b : bool
+state n : int 0 .. 3
+state k : array[3] of int 0 .. 3
+procedure put(m : int 0 .. 2) {{ k[m] := 3 - m n := m }}
+procedure p {{ {body} }}
+"""
+BODIES = [
+    "n := k[i]", "n := k[1]", "k[i] := j", "k[2] := j", "k[i] := k[j]", "k[k[i]] := 3", "for q in 0 .. 2 { k[q] := k[i] + q }",
+    "for q in 0 .. 1 { k[q] := k[q + 1] } n := k[2]", "case i { 0 { n := 1 } 1, 2 { n := 2 } } k[n] := 0",
+    "case c { red { n := i } green { k[j] := 1 } blue { b := true } }", "if b { n := i } if not b { k[i] := 1 } else { k[0] := n }",
+    "local m : int 0 .. 2 := j k[m] := 1 n := k[2]", "local m : int 0 .. 3 if b { m := 1 } k[0] := m", "put(j)", "put(1) k[j] := n",
+    "put(i + 1) if k[1] = 2 { n := 3 }", "n := 3 - i", "n := j / i", "n := 7 mod k[j]", "b := j > 1 and 6 / j > i or k[0] = i c := green",
+    "b := b implies i in {0, 2} n := min(j, 2) k[0] := max(i, 0)", "n := abs(i) + -i",
+    "local m : int -3 .. 3 := -i n := m", "b := k[j] = 0 and b", "for q in 0 .. 2 { if k[q] < j { k[q] := q n := q } }",
+    "if i > 0 { if b { n := 1 } else { n := i - 1 } } else { n := 2 }", "for q in 0 .. 3 { if q < i { n := k[q] } }",
+    "n := i", "for q in 2 .. 3 { n := q }",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("body", BODIES)
+def test_a_run_leaves_what_the_interpreter_does_wherever_it_owes_nothing(body: str) -> None:
+    program = program_of(STATE.format(body=body))
+    start = Start(program)
+    run = Run(start, "p")
+    run.call(start.procedures["p"], ())
+    owed = start.terms.every(start.terms.follows(one.path, one.good) for one in run.owed)
+    types = {str(v.name): v.type for v in program.variables}
+    drawn = random.Random(body)  # noqa: S311 - the same states in every run
+    every = list(product(*(range(key_bounds(kind)[0], key_bounds(kind)[1] + 1) for kind in types.values())))
+    before = [
+        {name: value_of_key(kind, key) for (name, kind), key in zip(types.items(), keys, strict=True)}
+        for keys in drawn.sample(every, 300)
+    ]
+    cases = {start.leaves[name]: np.array([one[name] for one in before]) for name in types}
+    names = [*run.state.leaves]
+    kept, *after = (
+        np.broadcast_to(values_in(term, cases, len(before)), len(before))
+        for term in (owed, *(run.state.leaves[name] for name in names))
+    )
+    assert kept.any()
+    for number, state in enumerate(before):
+        now = dict(state)
+        try:
+            call(program, "p", [], now)
+        except (ArithmeticError, IndexError, KeyError):
+            assert not kept[number], state
+            continue
+        if kept[number]:
+            assert now == state | {name: found[number] for name, found in zip(names, after, strict=True)}
+        if "put" not in body and "local" not in body:  # what is out of its range stays there
+            assert all(0 <= value <= 3 for name, value in now.items() if name[0] in "nk") == kept[number], (
+                state
+            )
 
 
 # --- what a leaf of a tree leaves to be settled ---------------------------------------------
