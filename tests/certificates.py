@@ -374,6 +374,8 @@ class _Text:
         if rng.random() < 0.5:
             name = rng.choice(self.kept)
             found.append(f"invariant bound : {name} <= {rng.randint(self.first[name], self.ints[name][1])}")
+        if rng.random() < 0.15:
+            found.append(f"invariant lit : o or s <= {self.first['s']}")
         if len(self.kept) == 2 and rng.random() < 0.4:
             s, t = self.first["s"], self.first["t"]
             order = "s <= t" if s <= t else "t <= s"
