@@ -397,16 +397,17 @@ def test_levels_are_said_as_they_are_done_where_it_is_asked_for(
     assert said == ["", ""]
 
 
-@pytest.mark.parametrize("lie", [2, ~0])
-def test_what_z3_does_not_confirm_is_not_proved(monkeypatch: pytest.MonkeyPatch, lie: int) -> None:
-    """The search is made to lie: it says that the level is never under way, or always done."""
+@pytest.mark.parametrize("lies", [[2], [~0], [2, ~2]])
+def test_what_z3_does_not_confirm_is_not_proved(monkeypatch: pytest.MonkeyPatch, lies: list[int]) -> None:
+    """The search lies: the level is never under way, is always done, or is in no state at all, which only the first cycle breaks."""
 
     def lying(
         stepper: Stepper, firsts: Sequence[Cycle], cycle: Cycle, wanted: Sequence[Goal], effort: Effort
     ) -> Found:
         found = search(stepper, firsts, cycle, wanted, effort)
         names = [one.name for one in found.features]
-        return replace(found, clauses=(*found.clauses, ((names.index("cur_state"), lie),)))
+        at = names.index("cur_state")
+        return replace(found, clauses=(*found.clauses, *(((at, lie),) for lie in lies)))
 
     monkeypatch.setattr("rcsc.compose.level.search", lying)
     proof = prove_level(steppers(SMALL / "system.toml")["upper"], LITTLE)
