@@ -20,7 +20,7 @@ from rcsc.interpret import holds, matching_lines
 from rcsc.model import Program, Value
 from rcsc.prove.options import Options
 from rcsc.prove.program import prove_program
-from rcsc.prove.verdict import ContradictoryAssumptions, DeadLine, Gap, Overlap
+from rcsc.prove.verdict import ContradictoryAssumptions, DeadLine, Gap, Overlap, Undecided
 from rcsc.resolve import compile_text
 
 HERE = {
@@ -253,3 +253,35 @@ def test_what_an_unproved_invariant_kills_says_so() -> None:
     assert isinstance(program, Program)
     notes = {one.code: one.notes for one in prove_program(program, Options()).findings}
     assert notes[Code.DEFAULT_DEAD] == ("under `small` (not proved)",)
+
+
+PRODUCTS: list[tuple[str, str, set[type]]] = [
+    ("r * s > 1.0", "r * s >= 1.0", {Overlap, Gap}),
+    ("r * s > 1.0", "r * s < 1.0", {Gap}),
+    ("r * s > 1.0", "r * s <= 1.0", set()),
+    ("r * s >= 1.0", "not (r * s > 1.0)", {Overlap}),
+    ("r * s >= 0.0", "r * s < 0.0", {DeadLine}),
+]
+
+
+@pytest.mark.parametrize("assumed", ["", "assuming low "])
+@pytest.mark.parametrize("steps", [1, 300_000])
+@pytest.mark.parametrize(("one", "two", "wrong"), PRODUCTS)
+def test_what_inputs_show_of_products_of_doubles_is_told_though_z3_gives_up(
+    one: str, two: str, wrong: set[type], steps: int, assumed: str
+) -> None:
+    program = compile_text(
+        "input r : real 0.0 .. 2.0\ninput s : real 0.0 .. 2.0\nassume low assumed : r <= 1.5\n"
+        f"table t {assumed}{{\n| line | when ||\n| a | {one} ||\n| b | {two} ||\n}}\n"
+    )
+    assert isinstance(program, Program)
+    [table] = prove_program(program, Options(solver="boxes", steps=steps)).tables
+    kinds = {type(found) for found in table.found}
+    assert kinds - {Undecided} <= wrong
+    assert wrong & {Overlap, Gap} <= kinds
+    assert wrong <= kinds or Undecided in kinds
+    for found in table.found:
+        if isinstance(found, Overlap | Gap):
+            witness = found.witness if isinstance(found, Overlap) else found.witnesses[0]
+            assert not assumed or holds(program.assumptions[0].condition, witness)
+            assert len(matching_lines(program.tables[0], witness)) == (2 if isinstance(found, Overlap) else 0)
