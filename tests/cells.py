@@ -5,14 +5,14 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from rcsc.database.ask import Database
-from rcsc.system.buffers import CommonMemory
-from rcsc.system.cell import Kind, System, assemble, signatures
-from rcsc.system.description import description
-from rcsc.system.levels import RunningLevel
-from rcsc.system.signature import Value, Values
-from rcsc.workstation.cell import database_of
-from sim.cell import Lying, plant
+from rcsc.run.buffers import CommonMemory
+from rcsc.run.description import description
+from rcsc.run.levels import RunningLevel
+from rcsc.run.signature import Value, Values
+from rcsc.run.system import Kind, System, assemble, signatures
+from rcsc_cell.cell.ready import Lying, plant
+from rcsc_cell.database.ask import Database
+from rcsc_cell.workstation.prepared import database_of
 
 REPO = Path(__file__).parents[1]
 SYSTEM = REPO / "tables" / "system.toml"

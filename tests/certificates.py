@@ -3,7 +3,7 @@
 `python -m tests.certificates --count 10000 --seed 1` makes random small programs. Of each that the prover proves, the
 certificate is put before the checker: none may be refused. Then certificates are damaged (values dropped, changed, cut short, put
 elsewhere, taken from another program) and programs are edited under a certificate that is kept, both mostly signed anew; what is
-still accepted must be true. What is true is told here by brute force: every value of every leaf, run by `rcsc.interpret`'s operators.
+still accepted must be true. What is true is told here by brute force: every value of every leaf, run by `rcsc.lang.interpret`'s operators.
 """
 
 import argparse
@@ -18,9 +18,9 @@ from itertools import islice, product
 from typing import Any
 
 from rcsc.certify import certify
-from rcsc.interpret import OPERATORS, divide, initial
-from rcsc.meaning import digest
-from rcsc.model import (
+from rcsc.lang.interpret import OPERATORS, divide, initial
+from rcsc.lang.meaning import digest
+from rcsc.lang.model import (
     COMPARISONS,
     Among,
     Apply,
@@ -54,9 +54,9 @@ from rcsc.model import (
     pending,
     value_of_key,
 )
-from rcsc.prove.options import Options
-from rcsc.prove.program import prove_program
-from rcsc.resolve import compile_text
+from rcsc.lang.resolve import compile_text
+from rcsc.solvers.options import Options
+from rcsc.table.program import prove_program
 
 OPTIONS = Options(solver="boxes")
 MOST_STATES = 1_000

@@ -28,10 +28,10 @@ from types import ModuleType
 from typing import Any
 
 from rcsc.emit import emit_c, emit_python
-from rcsc.interpret import cycle, initial
-from rcsc.lower import lower
-from rcsc.model import AssumptionName, Program, ProvedProgram, seal_of_proof
-from rcsc.resolve import compile_text
+from rcsc.emit.lower import lower
+from rcsc.lang.interpret import cycle, initial
+from rcsc.lang.model import AssumptionName, Program, ProvedProgram, seal_of_proof
+from rcsc.lang.resolve import compile_text
 
 I64, U64 = 2**63 - 1, 2**64 - 1
 BATCH = 50

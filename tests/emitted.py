@@ -3,13 +3,13 @@
 from pathlib import Path
 
 from rcsc.emit.c99 import emit_c
+from rcsc.emit.lower import lower
 from rcsc.emit.python import emit_python
-from rcsc.lower import lower
-from rcsc.model import Program, ProvedProgram, seal_of_proof
-from rcsc.project import load
-from rcsc.prove.options import Options
-from rcsc.prove.program import prove_program
-from rcsc.resolve import compile_text, resolve
+from rcsc.lang.model import Program, ProvedProgram, seal_of_proof
+from rcsc.lang.project import load
+from rcsc.lang.resolve import compile_text, resolve
+from rcsc.solvers.options import Options
+from rcsc.table.program import prove_program
 
 SHIPPED = ("tables/task/acquire.rcs", "tables/examples/approach.rcs")
 

@@ -13,10 +13,11 @@ from dataclasses import replace
 from pathlib import Path
 from random import Random
 
-from sim.campaign.rig import known_lines
-from sim.cell import Backend
-from sim.episode import SYSTEM, Episode, FaultSpec, Finding, Outcome, PartSpec, RowEnd
-from sim.episode import run as run_in_cell
+from rcsc_cell.campaign.rig import known_lines
+from rcsc_cell.cell.ready import Backend
+from rcsc_cell.episodes.episode import SYSTEM, Episode, FaultSpec, Finding, Outcome, PartSpec
+from rcsc_cell.episodes.loop import run as run_in_cell
+from rcsc_cell.workstation.script import RowEnd
 
 KILLS, HANGS, STUCK, RAISES, BREAKS = "slips", "dark", "jammed", "blind", "drops"
 HELD, FAST = "what is held stays", "nothing is fast"

@@ -26,20 +26,20 @@ from multiprocessing import get_context
 from pathlib import Path
 
 from rcsc import driver
-from rcsc.compose.goals import Goal, Sort
-from rcsc.compose.level import LevelProof, prove_level
-from rcsc.compose.search import Effort
-from rcsc.compose.system import NoProgramError, steppers
-from rcsc.compose.transition import Stepper
+from rcsc.compose.contract.obligations import Goal, Sort
+from rcsc.compose.contract.transition import Stepper
+from rcsc.compose.invariant.search import Effort
+from rcsc.compose.proof.level import LevelProof, prove_level
+from rcsc.compose.proof.system import NoProgramError, steppers
 from rcsc.diagnostics.diagnostic import Severity
-from rcsc.driver.work import Settings
+from rcsc.driver.settings import Settings
 from rcsc.emit.write import write
-from rcsc.model import Program
-from rcsc.project import load
-from rcsc.prove.options import Options
-from rcsc.resolve import resolve
-from sim.episode import Episode, FaultSpec, Interruption, Restart
-from sim.loop import Loop
+from rcsc.lang.model import Program
+from rcsc.lang.project import load
+from rcsc.lang.resolve import resolve
+from rcsc.solvers.options import Options
+from rcsc_cell.episodes.episode import Episode, FaultSpec, Interruption, Restart
+from rcsc_cell.episodes.loop import Loop
 from tests.emitted import emitted
 from tests.faults_made import LEVELS, Fault, sample
 from tests.matrix import ACQUIRE, project
@@ -64,10 +64,11 @@ EPISODES: tuple[Episode, ...] = (
     ),
 )
 """A part is fetched; the same, interrupted, and with levels that begin anew; and none is there to be gripped."""
+PROVER = ("rcsc/solvers", "rcsc/symbolic", "rcsc/procedures", "rcsc/table")
 READ_BY: Mapping[str, tuple[str, ...]] = {
-    "check": ("rcsc/syntax", "rcsc/resolve", "rcsc/prove", "rcsc/driver"),
-    "compose": ("rcsc/syntax", "rcsc/resolve", "rcsc/prove", "rcsc/compose"),
-    "campaign": ("rcsc/resolve", "rcsc/emit", "rcsc/system", "sim"),
+    "check": ("rcsc/lang", *PROVER, "rcsc/driver"),
+    "compose": ("rcsc/lang", *PROVER, "rcsc/compose"),
+    "campaign": ("rcsc/lang", "rcsc/emit", "rcsc/run", "sim"),
 }
 """Folders of rcsc on which an answer rests, besides the tables."""
 

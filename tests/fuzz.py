@@ -18,15 +18,15 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from rcsc import reserved
 from rcsc.diagnostics.diagnostic import Diagnostic
 from rcsc.emit.c99 import emit_c
+from rcsc.emit.lower import lower
 from rcsc.emit.python import emit_python
-from rcsc.lower import lower
-from rcsc.model import Program
-from rcsc.prove.options import Options
-from rcsc.prove.program import prove_program
-from rcsc.resolve import compile_text
+from rcsc.lang import reserved
+from rcsc.lang.model import Program
+from rcsc.lang.resolve import compile_text
+from rcsc.solvers.options import Options
+from rcsc.table.program import prove_program
 from tests import differential
 
 REPO = Path(__file__).parents[1]

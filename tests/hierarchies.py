@@ -24,16 +24,16 @@ from multiprocessing import get_context
 from pathlib import Path
 from random import Random
 
-from rcsc.compose.agreed import agreements, claims
-from rcsc.compose.claims import FOUND, SAFE, Closed, Need, closed
-from rcsc.compose.goals import Goal, Sort
-from rcsc.compose.level import LevelProof, Verdict, essential, prove_level
-from rcsc.compose.search import Effort
-from rcsc.compose.system import NoProgramError, steppers
-from rcsc.compose.trace import NotReproducedError, Trace, shortest
-from rcsc.compose.transition import Stepper
-from rcsc.interpret import Fault
-from rcsc.prove.values import TRUE
+from rcsc.compose.contract.claims import FOUND, SAFE, Closed, Need, closed
+from rcsc.compose.contract.obligations import Goal, Sort
+from rcsc.compose.contract.transition import Stepper
+from rcsc.compose.counterexample.trace import NotReproducedError, Trace, shortest
+from rcsc.compose.invariant.search import Effort
+from rcsc.compose.proof.assume_guarantee import agreements, claims
+from rcsc.compose.proof.level import LevelProof, Verdict, essential, prove_level
+from rcsc.compose.proof.system import NoProgramError, steppers
+from rcsc.lang.interpret import Fault
+from rcsc.symbolic.values import TRUE
 from tests.hierarchies_endless import edges, endless
 from tests.hierarchies_explored import Explored, TooManyError, explored
 from tests.hierarchies_level import EARLY, Again, Key, Reading, Role, State

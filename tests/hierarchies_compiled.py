@@ -9,8 +9,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
-from rcsc.interpret import OPERATORS, ExternError, Fault, _admitted
-from rcsc.model import (
+from rcsc.lang.interpret import OPERATORS, ExternError, Fault, _admitted
+from rcsc.lang.model import (
     BEFORE,
     Among,
     Apply,

@@ -1,17 +1,17 @@
 """Runs of a level in which a command goes on for ever: looked for among every state that it can reach.
 
-In: a role, its states. Out: why a table's command need not end, or nothing. Written anew, to hold `rcsc.compose.ends` against it. A
-command goes on for ever where states can be gone round under one number, with another status than *done* or *failed* reported on the
-way (of PAUSE another than *done*), and either an order is given on the way, so that there is always another one to be answered, or
-every cycle is quiet: all orders are answered, and none is given. Cycles that end early come finitely often.
+In: a role, its states. Out: why a table's command need not end, or nothing. Written anew, to hold `rcsc.compose.proof.termination`
+against it. A command goes on for ever where states can be gone round under one number, with another status than *done* or *failed*
+reported on the way (of PAUSE another than *done*), and either an order is given on the way, so that there is always another one to be
+answered, or every cycle is quiet: all orders are answered, and none is given. Cycles that end early come finitely often.
 """
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from rcsc.compose.contract import Below
-from rcsc.interpret import Fault
-from rcsc.model import Enum, Value
+from rcsc.compose.contract.environment import Below
+from rcsc.lang.interpret import Fault
+from rcsc.lang.model import Enum, Value
 from tests.hierarchies_explored import successors
 from tests.hierarchies_level import Ran, Role, State
 from tests.hierarchies_world import canonical

@@ -11,10 +11,10 @@ from dataclasses import dataclass, field
 from itertools import product
 from operator import itemgetter
 
-from rcsc.interpret import Fault
-from rcsc.model import Enum, Program, Value
-from rcsc.system.adopt import adopt
-from rcsc.system.signature import Leaf, Signature
+from rcsc.lang.interpret import Fault
+from rcsc.lang.model import Enum, Program, Value
+from rcsc.run.adopt import adopt
+from rcsc.run.signature import Leaf, Signature
 from tests.hierarchies_level import EARLY, UNDEFINED, Key, Ran, Role, State, number_type
 from tests.hierarchies_world import broken, canonical, offers
 

@@ -9,9 +9,9 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import count, groupby, product
 
-from rcsc.compose.contract import Below, Links
-from rcsc.compose.goals import Sort
-from rcsc.interpret import (
+from rcsc.compose.contract.environment import Below, Links
+from rcsc.compose.contract.obligations import Sort
+from rcsc.lang.interpret import (
     ExternError,
     Fault,
     answering,
@@ -24,7 +24,8 @@ from rcsc.interpret import (
     matching_lines,
     settle,
 )
-from rcsc.model import (
+from rcsc.lang.leaves import read_by
+from rcsc.lang.model import (
     BEFORE,
     Kind,
     Level,
@@ -39,7 +40,6 @@ from rcsc.model import (
     pending,
     value_of_key,
 )
-from rcsc.resolve.leaves import read_by
 from tests.hierarchies_compiled import Compiled, compiled
 
 State = tuple[Value, ...]

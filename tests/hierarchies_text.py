@@ -5,15 +5,7 @@ In: a hierarchy. Out: the text of each file (`files`), or the files themselves (
 
 from pathlib import Path
 
-from tests.hierarchies_made import (
-    MOST_WAITED,
-    SPOTS,
-    Hierarchy,
-    Line,
-    MadeLevel,
-    MadeTable,
-    domains_of,
-)
+from tests.hierarchies_made import MOST_WAITED, SPOTS, Hierarchy, Line, MadeLevel, MadeTable, domains_of
 from tests.hierarchies_more import columns_of, module_of, procedures_of, states_of, tables_of
 
 

@@ -10,9 +10,9 @@ subordinate keep to their contracts.
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
-from rcsc.compose.contract import Below
-from rcsc.interpret import Fault
-from rcsc.model import Value
+from rcsc.compose.contract.environment import Below
+from rcsc.lang.interpret import Fault
+from rcsc.lang.model import Value
 from tests.hierarchies_explored import TooManyError, adopted, successors
 from tests.hierarchies_level import EARLY, Key, Ran, Role, State
 from tests.hierarchies_world import FAR, NUMBERS, answered, broken, canonical, given_numbers, ordered

@@ -1,7 +1,7 @@
 """What the environment of a level may do, and what is to be true of every cycle: on concrete states, in the words of `rcsc.compose`.
 
-Nothing of `rcsc.compose.transition` and `goals` is used but the names of the sorts: this is written anew, to hold them against it. What
-makes the inputs few: programs compare numbers for equality and add one (or two, in slips); so a state is the same under another
+Nothing of `rcsc.compose.contract.transition` and `goals` is used but the names of the sorts: this is written anew, to hold them against
+it. What makes the inputs few: programs compare numbers for equality and add one (or two, in slips); so a state is the same under another
 name for each number that the superior gave, and under a shift of those that go down. Of echoes it matters whether they are of the
 last order; where a program computes with an echo (`Role.odd`), the ones near it are tried, too.
 """
@@ -9,10 +9,10 @@ last order; where a program computes with an echo (`Role.odd`), the ones near it
 from collections.abc import Iterator, Mapping
 from itertools import chain, product
 
-from rcsc.compose.contract import Below
-from rcsc.compose.goals import Sort
-from rcsc.interpret import Fault
-from rcsc.model import OneTable, Value
+from rcsc.compose.contract.environment import Below
+from rcsc.compose.contract.obligations import Sort
+from rcsc.lang.interpret import Fault
+from rcsc.lang.model import OneTable, Value
 from tests.hierarchies_compiled import Stated
 from tests.hierarchies_level import EARLY, FLAG, UNDEFINED, Key, Ran, Role, looks, overlooking
 

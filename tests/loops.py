@@ -3,9 +3,9 @@
 from pathlib import Path
 from typing import ClassVar
 
-from sim.episode import SYSTEM, Episode, Outcome, PartSpec, run, script
-from sim.loop import Loop
-from sim.properties.cycle import Cycle
+from rcsc_cell.episodes.episode import SYSTEM, Episode, Outcome, PartSpec, script
+from rcsc_cell.episodes.loop import Loop, run
+from rcsc_cell.properties.cycle import Cycle
 
 KEPT = Path(__file__).parents[1] / ".rcsc-cache" / "loop"
 TBOX = (PartSpec("tbox", "buffer", 20.0, -30.0, 10.0),)

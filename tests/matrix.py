@@ -12,15 +12,15 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from rcsc import driver
-from rcsc.driver.work import Settings
+from rcsc.driver.settings import Settings
 from rcsc.emit.write import write
-from rcsc.model import Program
-from rcsc.project import load
-from rcsc.prove.options import Options
-from rcsc.resolve import resolve
-from sim.episode import Episode, FaultSpec, Finding, Interruption, PartSpec, Restart
-from sim.loop import Loop
-from sim.properties import PROPERTIES
+from rcsc.lang.model import Program
+from rcsc.lang.project import load
+from rcsc.lang.resolve import resolve
+from rcsc.solvers.options import Options
+from rcsc_cell.episodes.episode import Episode, FaultSpec, Finding, Interruption, PartSpec, Restart
+from rcsc_cell.episodes.loop import Loop
+from rcsc_cell.properties import PROPERTIES
 from tests.emitted import emitted
 
 REPO = Path(__file__).parents[1]

@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.terminal_theme import MONOKAI
 from rich.text import Text
 
-from rcsc.cli.commands import commands
+from rcsc.commands.group import commands
 
 REPO = Path(__file__).parents[1]
 PICTURE = REPO / "tests" / "pictures" / "first_minute.svg"

@@ -4,11 +4,11 @@ import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from rcsc.system.description import Description, LevelSpec, Wire, description
-from rcsc.system.serve import Factory
-from rcsc.system.shared import Layout, SharedMemoryBuffers, layout
-from rcsc.system.signature import Leaf, LevelSign, Signature, Values
-from rcsc.workstation.orders import DONE, EXECUTING
+from rcsc.run.description import Description, LevelSpec, Wire, description
+from rcsc.run.processes.memory import Layout, SharedMemoryBuffers, layout
+from rcsc.run.processes.serve import Factory
+from rcsc.run.signature import Leaf, LevelSign, Signature, Values
+from rcsc_cell.workstation.orders import DONE, EXECUTING
 
 PAUSE, ACQUIRE, MOVE, RELEASE = 0, 1, 2, 3
 TBOX = 1

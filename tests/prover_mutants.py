@@ -8,7 +8,7 @@ function, and prints for each module how many were caught. Every survivor is sho
 mutmut makes the mutants. A test runs once by itself, in a fork, to learn which functions it enters and what it costs. Then each mutant
 takes the place of its function in a fork of its own, in which everything is imported and collected, and its tests run until the first
 that fails: first those that caught most of their like for their cost. A test that takes ten times as long has noticed, too. `--seconds`
-is what a mutant may cost before it counts as a survivor. `--only PATTERN` draws by name (`rcsc.prove.boxes.*`), `--tests PATTERN` takes
+is what a mutant may cost before it counts as a survivor. `--only PATTERN` draws by name (`rcsc.table.boxes.*`), `--tests PATTERN` takes
 some of the test files, `--covering FILE` keeps what is learnt of the tests from run to run.
 """
 
@@ -39,7 +39,7 @@ import libcst
 import pytest
 from mutmut.mutation.file_mutation import create_mutations, deep_replace
 
-from rcsc.resolve import compile_text
+from rcsc.lang.resolve import compile_text
 
 REPO = Path(__file__).parents[1]
 REASONS = REPO / "tests" / "data" / "prover_mutants.toml"
@@ -47,11 +47,16 @@ ENOUGH = 0.95
 MODULES = tuple(
     f"rcsc/{room}{name}.py"
     for room, names in {
-        "": "interpret",
-        "certify/": "__init__ known owed run settle table values",
-        "prove/": """atoms boxes boxleaf confirm discharge effect encode evaluation invariants linear obligations program regions
-            relational search smt symbolic table trial values""",
-        "compose/": "agreed claims confirm context contract ends goals keyed level measured properties rounds system transition",
+        "lang/": "interpret interval_sets",
+        "certify/": "__init__ known owed execution settle table values",
+        "table/regions/": "atoms boxleaf linear region splitting",
+        "table/": "boxes confirm program relational decide",
+        "procedures/": "discharge invariants obligations",
+        "symbolic/": "effect encode evaluation execution trial values keyed measured",
+        "solvers/": "smt",
+        "compose/proof/": "assume_guarantee context termination level ranking system",
+        "compose/contract/": "claims environment obligations properties transition",
+        "compose/invariant/": "confirm",
     }.items()
     for name in names.split()
 )
@@ -74,7 +79,7 @@ CAUGHT, SURVIVED, UNTESTED = "caught", "survived", "no test"
 Tell = Callable[[Mapping[str, Any]], None]
 """Hands what is known so far from a fork to its parent."""
 Function = str
-"""A function by module and qualified name, `rcsc.prove.boxes:Search.split`."""
+"""A function by module and qualified name, `rcsc.table.boxes:Search.split`."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,10 +7,10 @@ compiled of them), with the protocol of section 9 and a level below that takes t
 from dataclasses import dataclass
 from pathlib import Path
 
-from rcsc.interpret import initial, run_table
-from rcsc.model import Enum, Program, Value, Variable
-from rcsc.project import load
-from rcsc.resolve import resolve
+from rcsc.lang.interpret import initial, run_table
+from rcsc.lang.model import Enum, Program, Value, Variable
+from rcsc.lang.project import load
+from rcsc.lang.resolve import resolve
 
 FILE = Path(__file__).parents[1] / "tables" / "examples" / "acquire_published.rcs"
 ECHO_AFTER = 2

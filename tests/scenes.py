@@ -9,10 +9,10 @@ from math import cos, pi, sin
 import mujoco
 import numpy as np
 
-from sim.vision.blobs import half_turn
-from sim.vision.camera import Camera
-from sim.vision.flood import Features
-from sim.vision.optics import STANDARD, Floats, Optics
+from rcsc_cell.vision.blobs import half_turn
+from rcsc_cell.vision.camera import Camera
+from rcsc_cell.vision.flood import Features
+from rcsc_cell.vision.optics import STANDARD, Floats, Optics
 
 ABOVE_MM = 500.0
 Size = tuple[float, float, float]

@@ -5,8 +5,8 @@ from functools import cache
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
-from rcsc.syntax import tree
-from rcsc.syntax.tree import Name
+from rcsc.lang.syntax import tree
+from rcsc.lang.syntax.tree import Name
 
 NAMES = st.sampled_from(
     [

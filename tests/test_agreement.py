@@ -15,29 +15,23 @@ import numpy as np
 import pytest
 
 from rcsc.emit.write import write
-from rcsc.interpret import Fault, admit, call, initial, run_table, settle, unfit
-from rcsc.model import Admit, Kind, Program, Real, Snapshot, Value, Variable, key_bounds
-from rcsc.system.executors import CExecutor, PythonExecutor
-from rcsc.system.executors import build as build_executors
-from rcsc.system.signature import signature
-from rcsc.testing.agree import (
-    Compared,
-    Disagreement,
-    Executors,
-    run_init,
-    run_sanitized,
-)
-from rcsc.testing.bits import same_value
+from rcsc.host.tools import Absent, BuildFailed, c_compiler
+from rcsc.lang.interpret import Fault, admit, call, initial, run_table, settle, unfit
+from rcsc.lang.model import Admit, Kind, Program, Real, Snapshot, Value, Variable, key_bounds
+from rcsc.run.executors import CExecutor, PythonExecutor
+from rcsc.run.executors import build as build_executors
+from rcsc.run.signature import signature
+from rcsc.testing.agree import Compared, Disagreement, Executors, run_init, run_sanitized
+from rcsc.testing.differential_search import hunt_lines, hunt_sessions
 from rcsc.testing.esbmc import Said, prove_function
-from rcsc.testing.externs import python_stand_ins, with_c_stand_ins
-from rcsc.testing.hunt import hunt_lines, hunt_sessions
-from rcsc.testing.native import Native, build
-from rcsc.testing.python_executor import python_executor
-from rcsc.testing.sessions import Seen
+from rcsc.testing.executors.equality import same_value
+from rcsc.testing.executors.externs import python_stand_ins, with_c_stand_ins
+from rcsc.testing.executors.native import Native, build
+from rcsc.testing.executors.python import python_executor
+from rcsc.testing.executors.sessions import Seen
+from rcsc.testing.executors.symbols import symbols_of
+from rcsc.testing.executors.targets import is_matcher, targets
 from rcsc.testing.suite import SuiteOptions, run_suite
-from rcsc.testing.symbols import symbols_of
-from rcsc.testing.targets import is_matcher, targets
-from rcsc.testing.tools import Absent, BuildFailed, c_compiler
 from tests.emitted import (
     EXTERN,
     FAULTED,

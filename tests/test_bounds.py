@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, reject, settings
 from hypothesis import strategies as st
 
-from rcsc.interpret import evaluate, holds
-from rcsc.model import (
+from rcsc.lang.interpret import evaluate, holds
+from rcsc.lang.model import (
     Among,
     Apply,
     Expr,
@@ -22,7 +22,7 @@ from rcsc.model import (
     real_key,
     value_of_key,
 )
-from rcsc.resolve import compile_text
+from rcsc.lang.resolve import compile_text
 from tests.strategies import EQUAL, INTS, REALS, conditions, integers_over, reals_over, snapshots_of
 
 

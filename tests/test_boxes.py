@@ -9,17 +9,18 @@ from hypothesis import given, reject
 from hypothesis import strategies as st
 
 from rcsc.diagnostics.codes import Code
-from rcsc.interpret import matching_lines
-from rcsc.model import Program, key_bounds, key_of, value_of_key
-from rcsc.prove import boxes
-from rcsc.prove.confirm import Agreement, confirm
-from rcsc.prove.options import Options
-from rcsc.prove.program import prove_program
-from rcsc.prove.repair import closing_line, parting_cell
-from rcsc.prove.report import diagnostics
-from rcsc.prove.table import prove_table
-from rcsc.prove.verdict import ContradictoryAssumptions, DeadLine, Gap, Overlap, Region, Undecided
-from rcsc.resolve import compile_text
+from rcsc.lang.interpret import matching_lines
+from rcsc.lang.interval_sets import furthest, joined
+from rcsc.lang.model import Program, key_bounds, key_of, value_of_key
+from rcsc.lang.resolve import compile_text
+from rcsc.solvers.options import Options
+from rcsc.table import boxes
+from rcsc.table.confirm import Agreement, confirm
+from rcsc.table.decide import prove_table
+from rcsc.table.diagnose import diagnostics
+from rcsc.table.program import prove_program
+from rcsc.table.repair import closing_line, parting_cell
+from rcsc.table.verdict import ContradictoryAssumptions, DeadLine, Gap, Overlap, Region, Undecided
 from tests.bench import families
 
 HEAD = """enum colour { red, green, blue }
@@ -225,14 +226,14 @@ def test_furthest_is_the_last_that_fits_and_asks_little(start: int, length: int,
         asked.append(at)
         return at <= last
 
-    assert boxes.furthest(start, end, fits) == last
+    assert furthest(start, end, fits) == last
     assert all(start < at <= end for at in asked)
     assert len(asked) <= (1 if last == end else 2 + length.bit_length())
 
 
 @given(st.sets(st.integers(0, 12)))
 def test_joined_is_what_was_apart_and_no_neighbours(keys: set[int]) -> None:
-    found = boxes.joined((key, key) for key in sorted(keys))
+    found = joined((key, key) for key in sorted(keys))
     assert {at for low, high in found for at in range(low, high + 1)} == keys
     assert all(one[1] + 1 < two[0] for one, two in pairwise(found))
 
@@ -269,8 +270,8 @@ def test_a_verdict_that_z3_disagrees_with_is_told_as_a_fault_of_rcsc(
 ) -> None:
     other, program = ANSWERED[claimed], ANSWERED[asked]
     claim = prove_table(other, other.tables[0], Options(solver="boxes")).found
-    monkeypatch.setattr("rcsc.prove.table._by_boxes", lambda *_: claim)
-    monkeypatch.setattr("rcsc.prove.table.box_certificate", lambda *_: {})
+    monkeypatch.setattr("rcsc.table.decide._by_boxes", lambda *_: claim)
+    monkeypatch.setattr("rcsc.table.decide.box_certificate", lambda *_: {})
     verdict = prove_program(program, Options())
     assert verdict.proved is None
     assert not verdict.tables[0].backing.confirmed_by_z3
@@ -284,7 +285,7 @@ def test_z3_is_asked_as_the_options_say(
     monkeypatch: pytest.MonkeyPatch, solver: Literal["auto", "both", "boxes"], spare: int, asked: bool
 ) -> None:
     program = ANSWERED["right"]
-    monkeypatch.setattr("rcsc.prove.confirm._COSTLY", 2 * 2 + spare)  # two conditions, two lines
+    monkeypatch.setattr("rcsc.table.confirm._COSTLY", 2 * 2 + spare)  # two conditions, two lines
     options = Options(solver=solver)
     agreed = confirm(program, program.tables[0], (), options)
     assert agreed is (Agreement.AGREES if asked else Agreement.NOT_ASKED)

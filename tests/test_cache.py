@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from rcsc import cache as cache_module
-from rcsc import cli
-from rcsc.cache import Cache, digest_of_tool, open_cache
-from rcsc.files import write_atomically
+from rcsc import commands
+from rcsc.host import cache as cache_module
+from rcsc.host.cache import Cache, digest_of_tool, open_cache
+from rcsc.host.files import write_atomically
 
 
 @pytest.fixture
@@ -93,9 +93,9 @@ def test_the_secret_is_the_users_own_and_stays(tmp_path: Path, monkeypatch: pyte
 
 def test_the_tools_digest_changes_with_its_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     package = tmp_path / "rcsc"
-    package.mkdir()
-    (package / "cache.py").write_text("old")
-    monkeypatch.setattr(cache_module, "__file__", str(package / "cache.py"))
+    (package / "host").mkdir(parents=True)
+    (package / "host" / "cache.py").write_text("old")
+    monkeypatch.setattr(cache_module, "__file__", str(package / "host" / "cache.py"))
     before = digest_of_tool()
     assert digest_of_tool() == before
     (package / "prove.py").write_text("new")
@@ -141,8 +141,8 @@ def test_a_symbolic_link_stays_a_link(tmp_path: Path) -> None:
 def test_the_tools_digest_is_of_contents_not_of_times(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    package = tmp_path / "rcsc"
-    package.mkdir()
+    package = tmp_path / "rcsc" / "host"
+    package.mkdir(parents=True)
     part = package / "cache.py"
     part.write_text("old")
     monkeypatch.setattr(cache_module, "__file__", str(part))
@@ -179,13 +179,13 @@ def test_whatever_newly_stands_where_a_use_looks_first_is_noticed(
     (tmp_path / "in").mkdir()
     table = "use words\ninput m : mode\noutput o : bool\ntable t {\n| line | m || o |\n| 1 | a || true |\n| 2 | b || false |\n}\n"
     (tmp_path / "in" / "t.rcs").write_text(table)
-    assert cli.run(["check", "in/t.rcs"]) == 0
-    assert cli.run(["check", "in/t.rcs"]) == 0
+    assert commands.run(["check", "in/t.rcs"]) == 0
+    assert commands.run(["check", "in/t.rcs"]) == 0
     assert "(earlier run)" in capsys.readouterr().out
     SHADOWS[shadow](tmp_path / "in" / "words.rcs", tmp_path / "words.rcs")
-    status = cli.run(["check", "in/t.rcs"])
+    status = commands.run(["check", "in/t.rcs"])
     said = re.sub(r"[0-9.]+ ms( \(earlier run\))?", "", capsys.readouterr().out)
-    assert cli.run(["check", "in/t.rcs", "--no-cache"]) == status
+    assert commands.run(["check", "in/t.rcs", "--no-cache"]) == status
     assert re.sub(r"[0-9.]+ ms", "", capsys.readouterr().out) == said
 
 
@@ -202,9 +202,9 @@ def test_a_link_by_which_a_use_is_found_is_looked_at_though_its_file_is_known_by
     table = "use words\ninput m : mode\noutput o : bool\ntable t {\n| line | m || o |\n| 1 | a || true |\n| 2 | b || false |\n}\n"
     (tmp_path / "in" / "t.rcs").write_text(table)
     command = ["check", "two.rcs", "in/t.rcs"]
-    assert [cli.run(command), cli.run(command)] == [0, 0]
+    assert [commands.run(command), commands.run(command)] == [0, 0]
     (tmp_path / "words.rcs").unlink()
     (tmp_path / "words.rcs").symlink_to("three.rcs")
     capsys.readouterr()
-    assert cli.run(command) == 1
+    assert commands.run(command) == 1
     assert "RCS401" in capsys.readouterr().out

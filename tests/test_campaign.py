@@ -19,11 +19,10 @@ from click.testing import CliRunner, Result
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rcsc import cli
-from rcsc.cli.commands import commands
-from rcsc.workstation.script import read_script
-from sim.campaign import crew as crew_module
-from sim.campaign.counterexamples import (
+from rcsc import commands as cli
+from rcsc.commands.group import commands
+from rcsc_cell.campaign import worker_pool as crew_module
+from rcsc_cell.campaign.counterexamples import (
     BadEpisode,
     Choice,
     again,
@@ -33,14 +32,14 @@ from sim.campaign.counterexamples import (
     save,
     saved_episode,
 )
-from sim.campaign.crew import Crew, WorkersGone, crew_of, processes
-from sim.campaign.journal import BadJournal, Journal, Record, header, journal_path
-from sim.campaign.rig import Rig, digest, episode_seed, known_lines, mask
-from sim.campaign.runner import campaign
-from sim.campaign.shrink import shrink
-from sim.campaign.summary import as_json, as_text, summary
-from sim.campaign.work import OtherTables, play
-from sim.episode import (
+from rcsc_cell.campaign.journal import BadJournal, Journal, Record, header, journal_path
+from rcsc_cell.campaign.rig import Rig, digest, episode_seed, known_lines, mask
+from rcsc_cell.campaign.runner import campaign
+from rcsc_cell.campaign.shrink import shrink
+from rcsc_cell.campaign.summary import as_json, as_text, summary
+from rcsc_cell.campaign.work import OtherTables, play
+from rcsc_cell.campaign.worker_pool import Crew, WorkersGone, crew_of, processes
+from rcsc_cell.episodes.episode import (
     FAULTS,
     SYSTEM,
     Episode,
@@ -52,6 +51,7 @@ from sim.episode import (
     Restart,
     TransportSpec,
 )
+from rcsc_cell.workstation.script import read_script
 from tests import episodes as fake
 
 CALM = Rig(draw=fake.calm, run=fake.play)
@@ -686,7 +686,8 @@ def test_findings_are_saved_and_told_and_the_status_is_1(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(
-        "sim.campaign.rig.Rig.__init__.__defaults__", ("kinematic", "c", SYSTEM, 120.0, fake.calm, fake.play)
+        "rcsc_cell.campaign.rig.Rig.__init__.__defaults__",
+        ("kinematic", "c", SYSTEM, 120.0, fake.calm, fake.play),
     )
     args = ["campaign", "--system", str(SYSTEM), "--no-compile", "--workers", "1", "--episodes", "30"]
     args += ["--journal", str(tmp_path / "j"), "--save", str(tmp_path / "c"), "--seed", "5"]

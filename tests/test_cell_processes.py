@@ -6,9 +6,9 @@ import signal
 import time
 from pathlib import Path
 
-from rcsc.system.description import description
-from rcsc.system.processes import Supervisor, run_processes
-from rcsc.system.serve import Factory
+from rcsc.run.description import description
+from rcsc.run.processes.serve import Factory
+from rcsc.run.processes.supervisor import Supervisor, run_processes
 from tests.cells import SYSTEM
 
 RATE = 4.0
@@ -36,8 +36,10 @@ def replace(system: Supervisor, name: str) -> None:
 def test_make_boxt_ends_though_every_level_is_killed_once(tmp_path: Path) -> None:
     results = tmp_path / "results"
     results.touch()
-    outside = Factory("sim.processes:outside", (str(SYSTEM), "make_boxt", "", str(results), 0, "kinematic"))
-    queries = Factory("sim.processes:queries", (str(SYSTEM), ""))
+    outside = Factory(
+        "rcsc_cell.episodes.processes:outside", (str(SYSTEM), "make_boxt", "", str(results), 0, "kinematic")
+    )
+    queries = Factory("rcsc_cell.episodes.processes:queries", (str(SYSTEM), ""))
     killed: list[str] = []
 
     def watch(system: Supervisor) -> None:

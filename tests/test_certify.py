@@ -16,18 +16,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rcsc.certify import Answer, certify, check_certificate
+from rcsc.certify.execution import Run, Start
 from rcsc.certify.known import Known
-from rcsc.certify.run import Run, Start
 from rcsc.certify.settle import script, values_in
 from rcsc.certify.table import TableChecker
 from rcsc.certify.values import Term, parts_first
-from rcsc.interpret import call, evaluate, holds, matching_lines
-from rcsc.meaning import digest
-from rcsc.model import AssumptionName, Program, Read, Table, Value, key_bounds, key_of, value_of_key
-from rcsc.prove.options import Options
-from rcsc.prove.program import prove_program
-from rcsc.resolve import compile_text
-from rcsc.smtlib import cvc5_says
+from rcsc.lang.interpret import call, evaluate, holds, matching_lines
+from rcsc.lang.meaning import digest
+from rcsc.lang.model import AssumptionName, Program, Read, Table, Value, key_bounds, key_of, value_of_key
+from rcsc.lang.resolve import compile_text
+from rcsc.solvers.options import Options
+from rcsc.solvers.smtlib import cvc5_says
+from rcsc.table.program import prove_program
 from tests.bench import families
 from tests.certificates import Attack, signed, wrong_with
 from tests.emitted import EXTERN, RICH, program_of, shipped
@@ -206,8 +206,8 @@ def every_input(program: Program) -> list[dict[str, Any]]:
     """All inputs that the assumptions admit."""
     from itertools import product
 
-    from rcsc.interpret import evaluate
-    from rcsc.model import key_bounds, value_of_key
+    from rcsc.lang.interpret import evaluate
+    from rcsc.lang.model import key_bounds, value_of_key
 
     keys = [range(key_bounds(v.type)[0], key_bounds(v.type)[1] + 1) for v in program.variables]
     found = []
@@ -228,7 +228,7 @@ def test_the_checker_imports_nothing_of_the_prover(repo: Path) -> None:
     ours = {
         name for name in froms if name and name.startswith("rcsc") and not name.startswith("rcsc.certify")
     }
-    assert ours == {"rcsc.meaning", "rcsc.model", "rcsc.resolve.leaves", "rcsc.source"}
+    assert ours == {"rcsc.lang.meaning", "rcsc.lang.model", "rcsc.lang.leaves", "rcsc.diagnostics.source"}
 
 
 def test_a_gap_and_an_overlap_have_no_certificate() -> None:

@@ -20,8 +20,9 @@ from typing import Any
 
 import pytest
 
-from rcsc import children, cli
-from rcsc.system.block import FOLDER
+from rcsc import commands
+from rcsc.host import children
+from rcsc.run.processes.block import FOLDER
 
 IN_PROCESS = {
     "Z3": """
@@ -36,7 +37,7 @@ def work(fifo):
     "a SAT solver": """
 def work(fifo):
     import itertools
-    from rcsc.compose.sat import Sat
+    from rcsc.solvers.sat import Sat
     holes = 14
     at = lambda i, j: i * holes + j + 1
     clauses = [[at(i, j) for j in range(holes)] for i in range(holes + 1)]
@@ -50,7 +51,7 @@ def work(fifo):
 """,
     "cvc5": """
 def work(fifo):
-    from rcsc.smtlib import cvc5_refutes
+    from rcsc.solvers.smtlib import cvc5_refutes
     import cvc5
     tell(fifo)
     cubes = "(+ (* x x x) (* y y y) (* z z z))"
@@ -59,7 +60,7 @@ def work(fifo):
 """,
     "a compiler below its driver": """
 def work(fifo):
-    from rcsc.children import run
+    from rcsc.host.children import run
     run(["sh", "-c", f"mktemp -t cc.XXXXXX; exec 9>{fifo}; echo ready >&9; sleep 100000 & sleep 100000"])
 """,
 }
@@ -76,8 +77,8 @@ HEAD = """
 import os, sys, threading, signal
 from pathlib import Path
 
-from rcsc import children
-from rcsc.system.block import Block
+from rcsc.host import children
+from rcsc.run.processes.block import Block
 
 HELD = []
 
@@ -369,10 +370,10 @@ def test_a_worker_that_ends_without_an_answer_is_status_3(
     (tmp_path / "two.rcs").write_text(TWO, encoding="utf-8")
     monkeypatch.setattr("rcsc.driver.proofs.WORTH_A_PROCESS", 0)
     with monkeypatch.context() as patched:
-        patched.setattr("rcsc.prove.program._verdict", die)
-        assert cli.run(["check", "--jobs", "2", "two.rcs"]) == 3
+        patched.setattr("rcsc.table.program._verdict", die)
+        assert commands.run(["check", "--jobs", "2", "two.rcs"]) == 3
     assert "error[RCS904]: a worker process ended without an answer" in capsys.readouterr().err
-    assert cli.run(["check", "--jobs", "2", "two.rcs"]) == 0
+    assert commands.run(["check", "--jobs", "2", "two.rcs"]) == 0
     assert "2 proved" in capsys.readouterr().out
 
 
@@ -394,13 +395,16 @@ def test_a_worker_answers_or_is_said_to_have_ended(
 BEGIN = {"subprocess", "tempfile", "pty", "multiprocessing", "concurrent.futures"}
 """Modules by which processes begin and temporary things are made."""
 ALLOWED = {
-    ("rcsc/system/block.py", "multiprocessing"),  # shared memory, no process
-    ("rcsc/system/processes.py", "multiprocessing"),  # a type
-    ("rcsc/system/serve.py", "multiprocessing"),  # likewise
-    ("sim/campaign/crew.py", "concurrent.futures"),  # the classes of executors and what they raise
-    ("sim/campaign/runner.py", "concurrent.futures"),
-    ("sim/campaign/counterexamples.py", "concurrent.futures"),
-    ("sim/live/server.py", "concurrent.futures"),
+    ("rcsc/run/processes/block.py", "multiprocessing"),  # shared memory, no process
+    ("rcsc/run/processes/supervisor.py", "multiprocessing"),  # a type
+    ("rcsc/run/processes/serve.py", "multiprocessing"),  # likewise
+    (
+        "sim/rcsc_cell/campaign/worker_pool.py",
+        "concurrent.futures",
+    ),  # the classes of executors and what they raise
+    ("sim/rcsc_cell/campaign/runner.py", "concurrent.futures"),
+    ("sim/rcsc_cell/campaign/counterexamples.py", "concurrent.futures"),
+    ("sim/rcsc_cell/live/server.py", "concurrent.futures"),
 }
 
 
@@ -422,5 +426,5 @@ def test_processes_and_temporary_folders_begin_in_one_place(repo: Path) -> None:
         text = path.read_text(encoding="utf-8")
         found |= {(name, one) for one in imported(ast.parse(text))}
         words = ("os.fork", "os.spawn", "os.posix_spawn", "os.system", "os.popen", "ProcessPoolExecutor(")
-        assert name == "rcsc/children.py" or not any(word in text for word in words), name
-    assert {one for one in found if one[0] != "rcsc/children.py"} <= ALLOWED
+        assert name == "rcsc/host/children.py" or not any(word in text for word in words), name
+    assert {one for one in found if one[0] != "rcsc/host/children.py"} <= ALLOWED

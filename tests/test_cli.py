@@ -15,8 +15,8 @@ from urllib.parse import unquote_to_bytes
 import jsonschema
 import pytest
 
-from rcsc import cli, driver
-from rcsc.cli import run
+from rcsc import commands, driver
+from rcsc.commands import run
 
 REPO = Path(__file__).parents[1]
 GAP = """\
@@ -71,7 +71,7 @@ def rcsc(capfd: pytest.CaptureFixture[str]) -> Rcsc:
 
 def process(*args: str, **environment: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        [sys.executable, "-c", "from rcsc.cli import main; main()", *args],
+        [sys.executable, "-c", "from rcsc.commands import main; main()", *args],
         capture_output=True, text=True, check=False, env={**os.environ, **environment},
     )  # fmt: skip
 
@@ -157,7 +157,7 @@ def test_130_interrupted(rcsc: Rcsc, monkeypatch: pytest.MonkeyPatch) -> None:
 def test_ctrl_c_ends_a_long_run_and_leaves_nothing(folder: Path) -> None:
     write("slow.rcs")
     script = (
-        "import time, rcsc.driver as d, rcsc.cli as c, sys\n"
+        "import time, rcsc.driver as d, rcsc.commands as c, sys\n"
         "def slow(*a, **k):\n    print('ready', flush=True); time.sleep(60)\n"
         "d._load = slow\nsys.exit(c.run(['compile', 'slow.rcs']))"
     )
@@ -176,7 +176,7 @@ def test_ctrl_c_ends_a_long_run_and_leaves_nothing(folder: Path) -> None:
 @pytest.mark.usefixtures("folder")
 def test_who_is_interrupted_does_not_wait_for_the_interpreter() -> None:
     script = (
-        "import atexit, rcsc.driver as d, rcsc.cli as c, sys\n"
+        "import atexit, rcsc.driver as d, rcsc.commands as c, sys\n"
         "atexit.register(print, 'cleared up')\n"
         "def interrupted(*a, **k):\n    print('begun'); raise KeyboardInterrupt\n"
         "d._load = interrupted\nsys.argv[1:] = ['compile', 'slow.rcs']\nc.main()"
@@ -273,7 +273,7 @@ def test_a_full_disk_is_a_coded_error(rcsc: Rcsc) -> None:
     )
     with open("/dev/full", "w", encoding="utf-8") as full:
         ran = subprocess.run(
-            [sys.executable, "-c", "from rcsc.cli import main; main()", "check"],
+            [sys.executable, "-c", "from rcsc.commands import main; main()", "check"],
             stdout=full, stderr=subprocess.PIPE, text=True, check=False,
         )  # fmt: skip
     assert ran.returncode == 1
@@ -289,7 +289,7 @@ def test_colour_when_asked_for_and_not_else(rcsc: Rcsc, monkeypatch: pytest.Monk
 
 def test_a_reader_that_goes_away_is_no_bug() -> None:
     write("grip.rcs", GAP)
-    command = f"{sys.executable} -c 'from rcsc.cli import main; main()' check --no-cache"
+    command = f"{sys.executable} -c 'from rcsc.commands import main; main()' check --no-cache"
     script = f"{command} | true; echo ${{PIPESTATUS[0]}}"
     ran = subprocess.run(["bash", "-c", script], capture_output=True, text=True, check=False)
     assert ran.stdout in {"1\n", "141\n"}
@@ -307,9 +307,7 @@ def test_standard_input(rcsc: Rcsc, monkeypatch: pytest.MonkeyPatch) -> None:
 # --- the second run ------------------------------------------------------------------
 
 HEAVY = {"lark", "z3", "jinja2", "numpy", "rich", "hypothesis", "cvc5", "pysat", "pytest"}
-LOADED = (
-    "import sys\nfrom rcsc.cli import run\nstatus = run(sys.argv[1:])\nprint(status, *sorted(sys.modules))"
-)
+LOADED = "import sys\nfrom rcsc.commands import run\nstatus = run(sys.argv[1:])\nprint(status, *sorted(sys.modules))"
 
 
 def loaded(*args: str) -> tuple[str, set[str]]:
@@ -575,7 +573,7 @@ table t assuming small {
 
 @pytest.mark.usefixtures("folder")
 def test_certify_of_a_system_drops_no_option(rcsc: Rcsc, monkeypatch: pytest.MonkeyPatch) -> None:
-    from rcsc.cli.prove import prove
+    from rcsc.commands.prove import prove
 
     given: dict[str, object] = {}
 
@@ -653,7 +651,7 @@ def test_new_makes_a_project_that_checks_compiles_and_is_formatted(rcsc: Rcsc) -
 
 def test_help_teaches(rcsc: Rcsc) -> None:
     assert "Exit status: 0 proved, 1 findings, 2 usage, 3 a bug in rcsc." in rcsc("--help").out
-    for name in cli.commands.commands.commands:
+    for name in commands.group.commands.commands:
         ran = rcsc(name, "--help")
         assert ran.status == 0
         assert "Example" in ran.out

@@ -11,26 +11,26 @@ from random import Random
 
 import pytest
 
-from rcsc.cli import run
-from rcsc.compose.agreed import agreements
-from rcsc.compose.cubes import Reached
-from rcsc.compose.features import point
-from rcsc.compose.finding import of_trace, time_line
-from rcsc.compose.goals import Goal, Sort, goals
-from rcsc.compose.level import LevelProof, Verdict, certificate, essential, prove_level
-from rcsc.compose.search import Effort
-from rcsc.compose.system import NoProgramError, SystemProof, prove_system, steppers
-from rcsc.compose.trace import Trace, broken, shortest
-from rcsc.compose.transition import Cycle, Stepper
-from rcsc.compose.variants import undeferred
-from rcsc.compose.walk import Walk
-from rcsc.interpret import Fault, cycle, initial
-from rcsc.model import Kind, Real
-from rcsc.prove import values
-from rcsc.smtlib import cvc5_refutes
-from rcsc.system.adopt import adopt
-from rcsc.system.cell import signatures
-from rcsc.system.description import BadDescription, description
+from rcsc.commands import run
+from rcsc.compose.contract.obligations import Goal, Sort, goals
+from rcsc.compose.contract.predicates import point
+from rcsc.compose.contract.transition import Cycle, Stepper
+from rcsc.compose.contract.variants import undeferred
+from rcsc.compose.contract.walk import Walk
+from rcsc.compose.counterexample.finding import of_trace, time_line
+from rcsc.compose.counterexample.trace import Trace, broken, shortest
+from rcsc.compose.invariant.cubes import Reached
+from rcsc.compose.invariant.search import Effort
+from rcsc.compose.proof.assume_guarantee import agreements
+from rcsc.compose.proof.level import LevelProof, Verdict, certificate, essential, prove_level
+from rcsc.compose.proof.system import NoProgramError, SystemProof, prove_system, steppers
+from rcsc.lang.interpret import Fault, cycle, initial
+from rcsc.lang.model import Kind, Real
+from rcsc.run.adopt import adopt
+from rcsc.run.description import BadDescription, description
+from rcsc.run.system import signatures
+from rcsc.solvers.smtlib import cvc5_refutes
+from rcsc.symbolic import values
 
 REPO = Path(__file__).parents[1]
 SMALL = REPO / "tests" / "data" / "composed"
@@ -392,7 +392,9 @@ def test_rcsc_prove_certify_asks_cvc5(
     assert said is not None
     assert said[1] == said[2]
     assert int(said[1]) > 10
-    monkeypatch.setattr("rcsc.smtlib.cvc5_refutes", lambda text, **_: "step" not in text and len(text) < 3000)
+    monkeypatch.setattr(
+        "rcsc.solvers.smtlib.cvc5_refutes", lambda text, **_: "step" not in text and len(text) < 3000
+    )
     assert run(asked) == 3
     assert "error[RCS901]: level `lower`: cvc5 does not confirm" in capsys.readouterr().err
 

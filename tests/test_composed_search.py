@@ -10,27 +10,27 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rcsc.cache import Cache
-from rcsc.cli import run
-from rcsc.compose.bits import Bits, few, key_of_bits
-from rcsc.compose.context import Again
-from rcsc.compose.cubes import Masks, Pair, Reached, shown
-from rcsc.compose.ends import Phase, longest
-from rcsc.compose.features import Feature
-from rcsc.compose.goals import Goal
-from rcsc.compose.kept import keep, recall
-from rcsc.compose.keyed import Keyed
-from rcsc.compose.level import LevelProof, Verdict, prove_level
-from rcsc.compose.rounds import parts
-from rcsc.compose.sat import Sat
-from rcsc.compose.search import Effort, Found, search
-from rcsc.compose.system import prove_steppers, steppers
-from rcsc.compose.transition import Cycle, Stepper
-from rcsc.interpret import divide
-from rcsc.model import Bool, Enum, Int, Op, Real, Scalar, real_key
-from rcsc.prove import values
-from rcsc.prove.smt import Answer, Solver
-from rcsc.prove.values import Node
+from rcsc.commands import run
+from rcsc.compose.contract.obligations import Goal
+from rcsc.compose.contract.predicates import Feature
+from rcsc.compose.contract.transition import Cycle, Stepper
+from rcsc.compose.invariant.cubes import Masks, Pair, Reached, shown
+from rcsc.compose.invariant.search import Effort, Found, search
+from rcsc.compose.proof.context import Again
+from rcsc.compose.proof.kept import keep, recall
+from rcsc.compose.proof.level import LevelProof, Verdict, prove_level
+from rcsc.compose.proof.ranking import parts
+from rcsc.compose.proof.system import prove_steppers, steppers
+from rcsc.compose.proof.termination import Phase, longest
+from rcsc.host.cache import Cache
+from rcsc.lang.interpret import divide
+from rcsc.lang.model import Bool, Enum, Int, Op, Real, Scalar, real_key
+from rcsc.solvers.sat import Sat
+from rcsc.solvers.smt import Answer, Solver
+from rcsc.symbolic import values
+from rcsc.symbolic.bits import Bits, few, key_of_bits
+from rcsc.symbolic.keyed import Keyed
+from rcsc.symbolic.values import Node
 from tests.test_compose import LITTLE, SMALL, Edit, changed, swap
 
 INT = Int(-9, 9)
@@ -367,7 +367,7 @@ def test_a_system_is_not_proved_twice(cache: Cache, monkeypatch: pytest.MonkeyPa
     def never(*_: object) -> LevelProof:
         raise AssertionError
 
-    monkeypatch.setattr("rcsc.compose.system.prove_level", never)
+    monkeypatch.setattr("rcsc.compose.proof.system.prove_level", never)
     again = prove_steppers(made, LITTLE, 1, tuple(made), None, cache)
     assert [one.clauses for one in again.levels] == [one.clauses for one in first.levels]
     assert again.agreements == first.agreements
@@ -387,7 +387,7 @@ def test_levels_are_said_as_they_are_done_where_it_is_asked_for(
         said.append(capsys.readouterr().err)
         return LevelProof(stepper.level.name, (), (), (), 0, 0, 0.0)
 
-    monkeypatch.setattr("rcsc.compose.system.prove_level", proving)
+    monkeypatch.setattr("rcsc.compose.proof.system.prove_level", proving)
     asked = ["prove", str(SMALL / "system.toml"), "--no-cache", "--jobs", "1", "--trace", "0", "--json"]
     run([*asked, "--progress"])
     assert said == ["", "level upper: 0 of 0 found proved, 0.0 s\n"]
@@ -409,6 +409,6 @@ def test_what_z3_does_not_confirm_is_not_proved(monkeypatch: pytest.MonkeyPatch,
         at = names.index("cur_state")
         return replace(found, clauses=(*found.clauses, *(((at, lie),) for lie in lies)))
 
-    monkeypatch.setattr("rcsc.compose.level.search", lying)
+    monkeypatch.setattr("rcsc.compose.proof.level.search", lying)
     proof = prove_level(steppers(SMALL / "system.toml")["upper"], LITTLE)
     assert {verdict for _, verdict in proof.found} == {Verdict.UNDECIDED}

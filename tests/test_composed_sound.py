@@ -8,26 +8,26 @@ from random import Random
 
 import pytest
 
-from rcsc.cli import run
-from rcsc.compose.agreed import agreements
-from rcsc.compose.claims import CONTRACT, FOUND, RUNS, SAFE, Claim, Key, closed
-from rcsc.compose.ends import Ending
-from rcsc.compose.finding import of_trace
-from rcsc.compose.frozen import BadCaseError, case_breaks, read_case
-from rcsc.compose.goals import Sort, unlooked
-from rcsc.compose.keyed import Keyed
-from rcsc.compose.lap import Lap, laps
-from rcsc.compose.level import LevelProof, Verdict, prove_level
-from rcsc.compose.look import Looking, look
-from rcsc.compose.properties import property_kept
-from rcsc.compose.system import NoProgramError, prove_system, steppers
-from rcsc.compose.trace import Search, one_cycle, ran, ran_on, shortest
-from rcsc.compose.transition import Stepper
-from rcsc.interpret import Fault, initial
-from rcsc.model import Value
-from rcsc.prove import values
-from rcsc.prove.smt import Answer, Solver
-from rcsc.system.description import BadDescription, description
+from rcsc.commands import run
+from rcsc.compose.contract.claims import CONTRACT, FOUND, RUNS, SAFE, Claim, Key, closed
+from rcsc.compose.contract.obligations import Sort, unlooked
+from rcsc.compose.contract.properties import property_kept
+from rcsc.compose.contract.transition import Stepper
+from rcsc.compose.counterexample.explain import Looking, look
+from rcsc.compose.counterexample.finding import of_trace
+from rcsc.compose.counterexample.frozen import BadCaseError, case_breaks, read_case
+from rcsc.compose.counterexample.lasso import Lap, laps
+from rcsc.compose.counterexample.trace import Search, one_cycle, ran, ran_on, shortest
+from rcsc.compose.proof.assume_guarantee import agreements
+from rcsc.compose.proof.level import LevelProof, Verdict, prove_level
+from rcsc.compose.proof.system import NoProgramError, prove_system, steppers
+from rcsc.compose.proof.termination import Ending
+from rcsc.lang.interpret import Fault, initial
+from rcsc.lang.model import Value
+from rcsc.run.description import BadDescription, description
+from rcsc.solvers.smt import Answer, Solver
+from rcsc.symbolic import values
+from rcsc.symbolic.keyed import Keyed
 from tests.hierarchies_explored import adopted
 from tests.hierarchies_level import Reading, Role
 from tests.test_compose import LITTLE, SMALL, Edit, changed, swap

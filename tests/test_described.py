@@ -14,9 +14,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rcsc import cli
-from rcsc.database.build import BadData, build
-from rcsc.described import (
+from rcsc import commands
+from rcsc.diagnostics.codes import Code
+from rcsc.diagnostics.source import Source
+from rcsc.host.described import (
     MOST_FAULTS,
     BadFile,
     Document,
@@ -33,14 +34,13 @@ from rcsc.described import (
     _Scan,
     read_document,
 )
-from rcsc.diagnostics.codes import Code
-from rcsc.files.names import MOST_FILE_CHARACTERS
-from rcsc.files.read import MOST_TOML_BYTES
-from rcsc.source import Source
-from rcsc.system.cell import signatures
-from rcsc.system.description import BadDescription, description
-from rcsc.system.signature import Signature
-from rcsc.workstation.cell import limits_of, needs_data, parts_of
+from rcsc.host.files.names import MOST_FILE_CHARACTERS
+from rcsc.host.files.read import MOST_TOML_BYTES
+from rcsc.run.description import BadDescription, description
+from rcsc.run.signature import Signature
+from rcsc.run.system import signatures
+from rcsc_cell.database.build import BadData, build
+from rcsc_cell.workstation.prepared import limits_of, needs_data, parts_of
 
 SHIPPED = ("tables/system.toml", "tables/cell.toml")
 
@@ -235,7 +235,7 @@ def test_what_is_no_toml_is_a_coded_error(
         (tmp_path / name).mkdir()
     if (name, text) == ("system.toml", None):
         return  # the command line asks for a file
-    assert cli.run(["db", "check", "--system", str(tmp_path / "system.toml")]) == 1
+    assert commands.run(["db", "check", "--system", str(tmp_path / "system.toml")]) == 1
     said = capsys.readouterr().err
     assert why in said
     assert said.startswith("error[RCS721]" if name == "system.toml" else "error[RCS722]")
@@ -420,11 +420,11 @@ def test_faults_are_told_as_text_and_as_json(
     path = laid(repo, tmp_path)
     cell = tmp_path / "cell.toml"
     cell.write_text(cell.read_text(encoding="utf-8").replace("stock = 10", "stok = 10"), encoding="utf-8")
-    assert cli.run(["db", "check", "--system", str(path)]) == 1
+    assert commands.run(["db", "check", "--system", str(path)]) == 1
     said = capsys.readouterr().err
     assert said.count("error[RCS722]") == said.count("did you mean `stock`?") == 4
     assert f"{cell}:34:1" in said
-    assert cli.run(["db", "check", "--system", str(path), "--json"]) == 1
+    assert commands.run(["db", "check", "--system", str(path), "--json"]) == 1
     report = json.loads(capsys.readouterr().out)
     assert [one["primary"]["place"]["start"]["line"] for one in report["diagnostics"]] == [34, 53, 64, 75]
     assert report["ok"] is False

@@ -13,14 +13,14 @@ from random import Random
 
 import pytest
 
-from rcsc.cli import run
+from rcsc.commands import run
 from rcsc.diagnostics.render import plain
+from rcsc.diff.changes.difference import Basis, Change, Difference, Part, ProgramDifference, Sort, holds_in
 from rcsc.diff.compare import compare
-from rcsc.diff.difference import Basis, Change, Difference, Part, ProgramDifference, Sort, holds_in
-from rcsc.diff.forms import rows
 from rcsc.diff.present import knows, within_reach
-from rcsc.interpret import cycle, evaluate, execute, initial, matching_lines
-from rcsc.model import (
+from rcsc.diff.text import rows
+from rcsc.lang.interpret import cycle, evaluate, execute, initial, matching_lines
+from rcsc.lang.model import (
     Bool,
     Default,
     Enum,
@@ -39,11 +39,11 @@ from rcsc.model import (
     spell,
     value_of_key,
 )
-from rcsc.project import load
-from rcsc.prove.options import Options
-from rcsc.prove.smt import Answer, Solver
-from rcsc.prove.steps import UnansweredError
-from rcsc.resolve import compile_text, resolve
+from rcsc.lang.project import load
+from rcsc.lang.resolve import compile_text, resolve
+from rcsc.relation.steps import UnansweredError
+from rcsc.solvers.options import Options
+from rcsc.solvers.smt import Answer, Solver
 
 REPO = Path(__file__).parents[1]
 
@@ -852,7 +852,7 @@ def test_a_question_without_an_answer_leaves_the_steps_open(monkeypatch: pytest.
     def unanswered(*_: object) -> None:
         raise UnansweredError
 
-    monkeypatch.setattr("rcsc.diff.follows.following", unanswered)
+    monkeypatch.setattr("rcsc.diff.changes.follows.following", unanswered)
     found = compare(
         "case", program(LEVEL), program(LEVEL.replace("to(end)    |", "to(start)  |")), Options(), follow=True
     )

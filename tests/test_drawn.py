@@ -12,31 +12,31 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-import sim.trace
-from rcsc.cli import run
-from rcsc.compose.finding import Finding, of_trace
-from rcsc.compose.goals import Key, Sort
-from rcsc.compose.rerun import _begun, part_of, record
-from rcsc.compose.system import steppers
-from rcsc.compose.trace import Search, Trace, traces
-from rcsc.compose.transition import Stepper
-from rcsc.database.ask import Database
-from rcsc.database.pose import nine, pose_of
-from rcsc.files.names import BadName
-from rcsc.log.finding import LoggedCycle, LoggedFinding, finding_facts, finding_of
-from rcsc.log.frames import Frame, frames
-from rcsc.log.read import Log, read
-from rcsc.log.write import Recorder
-from rcsc.system.cell import signatures
-from rcsc.system.description import description
-from rcsc.workstation.cell import database_of
-from sim.arm import skeleton, solve
-from sim.named import Cell, cell, same_system
-from sim.pictures.page import quoted
-from sim.pictures.stick import Scene, pads, stick
-from sim.pictures.things import NAMED, Block, Mark
-from sim.pictures.views import ALONE, TOP
-from sim.reach import home
+import rcsc_cell.pictures.finding_page
+from rcsc.commands import run
+from rcsc.compose.contract.obligations import Key, Sort
+from rcsc.compose.contract.transition import Stepper
+from rcsc.compose.counterexample.finding import Finding, of_trace
+from rcsc.compose.counterexample.replay import _begun, part_of, record
+from rcsc.compose.counterexample.trace import Search, Trace, traces
+from rcsc.compose.proof.system import steppers
+from rcsc.host.files.names import BadName
+from rcsc.run.description import description
+from rcsc.run.log.finding import LoggedCycle, LoggedFinding, finding_facts, finding_of
+from rcsc.run.log.read import Log, read
+from rcsc.run.log.ticks import Frame, frames
+from rcsc.run.log.write import Recorder
+from rcsc.run.system import signatures
+from rcsc_cell.cell.arm import skeleton, solve
+from rcsc_cell.cell.reach import home
+from rcsc_cell.database.ask import Database
+from rcsc_cell.database.pose import nine, pose_of
+from rcsc_cell.pictures.page import quoted
+from rcsc_cell.pictures.scene import Cell, cell, same_system
+from rcsc_cell.pictures.stick import Scene, pads, stick
+from rcsc_cell.pictures.things import NAMED, Block, Mark
+from rcsc_cell.pictures.views import ALONE, TOP
+from rcsc_cell.workstation.prepared import database_of
 from tests.browser import Browser
 from tests.test_findings import LAST_ECHO, PUBLISHED, REPO, goal_of
 
@@ -428,7 +428,9 @@ def test_a_level_that_does_not_run_says_nothing(last_echo: Path) -> None:
         ("upper", True, True), ("lower", False, False)
     ]  # fmt: skip
     assert log.finding is not None
-    assert "does not run in this cycle" in Page(sim.trace.page(without, log.finding, None)).words(2)
+    assert "does not run in this cycle" in Page(
+        rcsc_cell.pictures.finding_page.page(without, log.finding, None)
+    ).words(2)
 
 
 # --- the page ------------------------------------------------------------------------------
@@ -438,9 +440,15 @@ def test_the_page_is_the_same_again_and_escaped(published: Path) -> None:
     log = read(published / "task_acquire_one_line_10_and_14.mcap")
     assert log.finding is not None
     with pytest.raises(BadName):
-        sim.trace.page(replace(log, facts={**log.facts, "name": "<b>&"}), log.finding, None)
-    text = sim.trace.page(log, replace(log.finding, goal="<i> `a<b`"), None, "for <u> reasons.")
-    assert text == sim.trace.page(log, replace(log.finding, goal="<i> `a<b`"), None, "for <u> reasons.")
+        rcsc_cell.pictures.finding_page.page(
+            replace(log, facts={**log.facts, "name": "<b>&"}), log.finding, None
+        )
+    text = rcsc_cell.pictures.finding_page.page(
+        log, replace(log.finding, goal="<i> `a<b`"), None, "for <u> reasons."
+    )
+    assert text == rcsc_cell.pictures.finding_page.page(
+        log, replace(log.finding, goal="<i> `a<b`"), None, "for <u> reasons."
+    )
     for said in ("&lt;i&gt; <code>a&lt;b</code>", "for &lt;u&gt; reasons."):
         assert said in text
     assert quoted("one ` alone <b>") == "one ` alone &lt;b&gt;"
@@ -457,8 +465,8 @@ def test_the_page_is_the_same_again_and_escaped(published: Path) -> None:
 def test_what_holds_of_the_whole_run_is_said(published: Path, change: dict[str, Any], said: str) -> None:
     log = read(published / "task_acquire_one_line_10_and_14.mcap")
     assert log.finding is not None
-    assert said not in sim.trace.page(log, log.finding, None)
-    assert said in sim.trace.page(log, replace(log.finding, **change), None)
+    assert said not in rcsc_cell.pictures.finding_page.page(log, log.finding, None)
+    assert said in rcsc_cell.pictures.finding_page.page(log, replace(log.finding, **change), None)
 
 
 def test_parts_and_marks_are_where_they_are() -> None:

@@ -22,18 +22,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rcsc import reserved
 from rcsc.diagnostics.codes import Code
-from rcsc.emit.environment import environment
-from rcsc.emit.names import C_WORDS, PYTHON_WORDS, comment
+from rcsc.emit.identifiers import C_WORDS, PYTHON_WORDS, comment
+from rcsc.emit.rendering import environment
 from rcsc.emit.write import write
-from rcsc.files.read import Said, json_of
-from rcsc.interpret import Fault, initial, run_table
-from rcsc.resolve import compile_text
-from rcsc.system.signature import generated_files, signature_of
+from rcsc.host.files.read import Said, json_of
+from rcsc.lang import reserved
+from rcsc.lang.interpret import Fault, initial, run_table
+from rcsc.lang.resolve import compile_text
+from rcsc.run.signature import generated_files, signature_of
 from rcsc.testing.cortex import CortexRun, run_cortex
-from rcsc.testing.externs import python_stand_ins
-from rcsc.testing.symbols import symbols_of
+from rcsc.testing.executors.externs import python_stand_ins
+from rcsc.testing.executors.symbols import symbols_of
 from tests.emitted import EXTERN, RICH, emitted, program_of
 
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Wpedantic", "-Wtrigraphs", "-Wshadow", "-Werror")

@@ -5,20 +5,21 @@ from pathlib import Path
 
 import pytest
 
-from rcsc.cli import run
-from rcsc.compose.context import gives_an_order
-from rcsc.compose.ends import Ending, longest
-from rcsc.compose.lap import Lap, laps
-from rcsc.compose.level import certificate, prove_level
-from rcsc.compose.measured import Measured
-from rcsc.compose.rounds import Counted, least_power, parts
-from rcsc.compose.system import steppers
-from rcsc.compose.trace import NotReproducedError, Search
-from rcsc.model import Int, Op, Real
-from rcsc.prove import smt, values
-from rcsc.prove.smt import Answer, Solver
-from rcsc.prove.values import Node
-from rcsc.smtlib import cvc5_refutes
+from rcsc.commands import run
+from rcsc.compose.counterexample.lasso import Lap, laps
+from rcsc.compose.counterexample.trace import NotReproducedError, Search
+from rcsc.compose.proof.context import gives_an_order
+from rcsc.compose.proof.level import certificate, prove_level
+from rcsc.compose.proof.ranking import Counted, least_power, parts
+from rcsc.compose.proof.system import steppers
+from rcsc.compose.proof.termination import Ending, longest
+from rcsc.lang.model import Int, Op, Real
+from rcsc.solvers import smt
+from rcsc.solvers.smt import Answer, Solver
+from rcsc.solvers.smtlib import cvc5_refutes
+from rcsc.symbolic import values
+from rcsc.symbolic.measured import Measured
+from rcsc.symbolic.values import Node
 from tests.hierarchies_endless import Edge, edges, endless
 from tests.hierarchies_explored import explored
 from tests.hierarchies_level import Role, State

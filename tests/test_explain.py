@@ -3,14 +3,14 @@
 import pytest
 from click.testing import CliRunner
 
-from rcsc.cli.commands import commands
+from rcsc.commands.group import commands
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Severity
 from rcsc.diagnostics.explanations import explain, explanations
-from rcsc.model import Program
-from rcsc.prove.options import Options
-from rcsc.prove.program import prove_program
-from rcsc.resolve import compile_text
+from rcsc.lang.model import Program
+from rcsc.lang.resolve import compile_text
+from rcsc.solvers.options import Options
+from rcsc.table.program import prove_program
 
 NOTES = {Code.DEFAULT_COVERS, Code.PROPERTY_ELSEWHERE}
 """Codes whose right form is the wrong one's, or that are said of what is right."""

@@ -11,18 +11,20 @@ from random import Random
 
 import pytest
 
-import rcsc.compose.look
-import rcsc.compose.trace
-import rcsc.interpret
-from rcsc.cli import run
-from rcsc.compose.contract import leaves_under
-from rcsc.compose.finding import Finding, of_trace, rows, time_line
-from rcsc.compose.frozen import BadCaseError, case_breaks, frozen, read_case
-from rcsc.compose.goals import Goal, Key, Sort, goals, may_meet, pairs
-from rcsc.compose.rerun import ExecutorsDifferError, make, record
-from rcsc.compose.system import steppers
-from rcsc.compose.together import broken_together
-from rcsc.compose.trace import (
+import rcsc.compose.counterexample.explain
+import rcsc.compose.counterexample.trace
+import rcsc.lang.interpret
+from rcsc.commands import run
+from rcsc.compose.contract.environment import leaves_under
+from rcsc.compose.contract.obligations import Goal, Key, Sort, goals, may_meet, pairs
+from rcsc.compose.contract.transition import Stepper
+from rcsc.compose.contract.variants import VARIANTS, defaults_reported, first_match, undeferred
+from rcsc.compose.counterexample.finding import Finding, of_trace, rows, time_line
+from rcsc.compose.counterexample.frozen import BadCaseError, case_breaks, frozen, read_case
+from rcsc.compose.counterexample.pair import broken_together
+from rcsc.compose.counterexample.repair import helps, weakest_condition
+from rcsc.compose.counterexample.replay import ExecutorsDifferError, make, record
+from rcsc.compose.counterexample.trace import (
     Found,
     NotReproducedError,
     Search,
@@ -32,19 +34,17 @@ from rcsc.compose.trace import (
     shortest,
     traces,
 )
-from rcsc.compose.transition import Stepper
-from rcsc.compose.variants import VARIANTS, defaults_reported, first_match, undeferred
-from rcsc.compose.weakest import helps, weakest_condition
-from rcsc.files.write import UNPROVED
-from rcsc.interpret import Fault, holds, matching_lines
-from rcsc.log.read import read
-from rcsc.log.replay import Replay
-from rcsc.model import LineName, Program, Table, Value, VariableName, key_bounds, spell, value_of_key
-from rcsc.prove.options import Options
-from rcsc.prove.table import prove_table
-from rcsc.system.cell import assemble
-from rcsc.system.description import Description, description
-from rcsc.system.unproved import UnprovedExecutors, marked
+from rcsc.compose.proof.system import steppers
+from rcsc.host.files.write import UNPROVED
+from rcsc.lang.interpret import Fault, holds, matching_lines
+from rcsc.lang.model import LineName, Program, Table, Value, VariableName, key_bounds, spell, value_of_key
+from rcsc.run.description import Description, description
+from rcsc.run.log.read import read
+from rcsc.run.log.replay import Replay
+from rcsc.run.system import assemble
+from rcsc.run.unproved import UnprovedExecutors, marked
+from rcsc.solvers.options import Options
+from rcsc.table.decide import prove_table
 from tests.emitted import shipped
 
 REPO = Path(__file__).parents[1]
@@ -290,7 +290,7 @@ def test_a_run_can_begin_with_a_restart(tmp_path: Path) -> None:
 def test_a_run_that_the_interpreter_does_not_do_is_a_bug(monkeypatch: pytest.MonkeyPatch) -> None:
     stepper = steppers(LAST_ECHO)["upper"]
     goal = goal_of(stepper, (Sort.NUMBERED, "", "to_lower.input_command"))
-    monkeypatch.setattr(rcsc.compose.trace, "broken", lambda *_: False)
+    monkeypatch.setattr(rcsc.compose.counterexample.trace, "broken", lambda *_: False)
     with pytest.raises(NotReproducedError) as raised:
         shortest(stepper, goal)
     assert not raised.value.guessed
@@ -300,14 +300,14 @@ def test_a_run_that_the_interpreter_does_not_do_is_a_bug(monkeypatch: pytest.Mon
 def test_where_the_interpreter_parts_from_the_solver_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
     stepper = steppers(LAST_ECHO)["upper"]
     goal = goal_of(stepper, (Sort.NUMBERED, "", "to_lower.input_command"))
-    true_cycle = rcsc.interpret.cycle
+    true_cycle = rcsc.lang.interpret.cycle
 
     def other(*args: object) -> object:
         outcome = true_cycle(*args)  # type: ignore[arg-type]  # as it is called
         outcome.snapshot["to_lower.input_command"] = 0
         return outcome
 
-    monkeypatch.setattr(rcsc.compose.trace, "cycle", other)
+    monkeypatch.setattr(rcsc.compose.counterexample.trace, "cycle", other)
     with pytest.raises(NotReproducedError) as raised:
         shortest(stepper, goal)
     assert raised.value.beside == ("cycle 2: `to_lower.input_command` = drill by the solver, rest as it ran",)
@@ -461,7 +461,7 @@ def _commented(path: Path, text: str) -> str:
 
 
 def test_no_process_runs_what_bears_the_mark(made_by_force: Description) -> None:
-    from rcsc.system.processes import run_processes
+    from rcsc.run.processes.supervisor import run_processes
 
     with pytest.raises(UnprovedExecutors):
         run_processes(made_by_force, "python", {})
@@ -804,7 +804,7 @@ def test_an_executor_that_differs_is_reported_side_by_side(
         module.write_text(text.replace("s.cur_state = v_value", "s.cur_state = 0"), encoding="utf-8")
         return made
 
-    monkeypatch.setattr(rcsc.compose.look, "make", tampered)
+    monkeypatch.setattr(rcsc.compose.counterexample.explain, "make", tampered)
     assert run(["prove", str(FIRST_MATCH), "--level", "upper"]) == 3
     said = capsys.readouterr().err
     assert "error[RCS903]" in said
@@ -823,7 +823,7 @@ def test_a_case_that_breaks_again_fails(tmp_path: Path, capsys: pytest.CaptureFi
 
 
 def test_every_rule_that_can_be_off_has_an_option() -> None:
-    from rcsc.cli.commands import commands
+    from rcsc.commands.group import commands
 
     options = {name for param in commands.commands["prove"].params for name in param.opts}
     assert {f"--{name}" for name in VARIANTS} <= options

@@ -9,9 +9,21 @@ from typing import ClassVar, Literal
 
 import pytest
 
-from rcsc.files.kept import Kept, plain, read
-from rcsc.system.signature import Values
-from rcsc.workstation.orders import (
+from rcsc.host.files.plain import Kept, plain, read
+from rcsc.run.signature import Values
+from rcsc_cell.cell.fixture import (
+    IN_MM,
+    MOST_TICKS,
+    OPERATION_TICKS,
+    OUT_MM,
+    START_TICKS,
+    MachineController,
+    ViseController,
+)
+from rcsc_cell.cell.mujoco_model import Body
+from rcsc_cell.cell.plant import WEAK_MM, Plant
+from rcsc_cell.cell.ready import Lying, plant
+from rcsc_cell.workstation.orders import (
     DONE,
     EXECUTING,
     FAILED,
@@ -21,18 +33,6 @@ from rcsc.workstation.orders import (
     VISE_REPORT,
     ajar,
 )
-from sim.cell import Lying, plant
-from sim.fixture import (
-    IN_MM,
-    MOST_TICKS,
-    OPERATION_TICKS,
-    OUT_MM,
-    START_TICKS,
-    MachineController,
-    ViseController,
-)
-from sim.model import Body
-from sim.plant import WEAK_MM, Plant
 from tests.cells import database
 
 CLOSE: Values = (1, False, False)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from rcsc import cli
+from rcsc import commands
 
 SOLO = """
 input go : bool
@@ -98,7 +98,7 @@ def foreign(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFac
     shutil.copy(repo / "tables/cell.toml", folder)
     (folder / "scripts").mkdir()
     shutil.copy(repo / "tables/scripts/make_boxt.csv", folder / "scripts/day.csv")
-    assert cli.run(["compile", str(folder), "--out", str(folder / "generated")]) == 0
+    assert commands.run(["compile", str(folder), "--out", str(folder / "generated")]) == 0
     return folder
 
 
@@ -131,7 +131,7 @@ def test_every_command_answers(
     monkeypatch.chdir(foreign)
     (foreign / "steps.txt").write_text(STEPS, encoding="utf-8")
     monkeypatch.setattr(sys, "stdin", io.StringIO(STEPS))
-    status = cli.run(command.split())
+    status = commands.run(command.split())
     said = capsys.readouterr()
     assert status in {0, 1, 2}, said.err
     assert "Traceback" not in said.out + said.err
@@ -145,7 +145,7 @@ def test_the_shell_runs_what_is_no_cell(
 ) -> None:
     monkeypatch.chdir(foreign)
     monkeypatch.setattr(sys, "stdin", io.StringIO("step 4\n"))
-    assert cli.run(["shell", "--executor", "python"]) == 0
+    assert commands.run(["shell", "--executor", "python"]) == 0
     assert "cycle 4" in capsys.readouterr().out
 
 
@@ -154,6 +154,6 @@ def test_what_runs_a_cell_says_what_it_needs(
 ) -> None:
     monkeypatch.chdir(foreign)
     for command in ("run day --executor python", "campaign --episodes 1 --workers 1"):
-        assert cli.run(command.split()) == 1
+        assert commands.run(command.split()) == 1
         said = capsys.readouterr().err
         assert "error[RCS721]: the cell needs" in said or "names no `data`" in said

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from rcsc.model import Program
-from rcsc.resolve import compile_text
+from rcsc.lang.model import Program
+from rcsc.lang.resolve import compile_text
 from tests import differential
 from tests.fuzz import campaign, names_campaign, strictly
 

@@ -11,27 +11,27 @@ from xml.etree import ElementTree as ET
 import pytest
 from click.testing import CliRunner
 
-from rcsc.cli.commands import commands
+from rcsc.commands.group import commands
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic
+from rcsc.diagnostics.source import Source
 from rcsc.graph.derive import Derived, derive
 from rcsc.graph.drawing import plain, svg
 from rcsc.graph.find import Found, NotFound, tables
-from rcsc.graph.forms import FORMS, form_of
+from rcsc.graph.formats.choice import FORMS, form_of
+from rcsc.graph.formats.reading import UnreadableError, diagnosed
+from rcsc.graph.formats.state_graph import ANY, StateGraph
 from rcsc.graph.lines import derive_lines
-from rcsc.graph.model import ANY, StateGraph
-from rcsc.graph.reading import UnreadableError, diagnosed
 from rcsc.graph.round_trip import Against, against, in_place
-from rcsc.graph.tables import tabled
-from rcsc.interpret import cycle, holds, initial, run_table
-from rcsc.model import Enum, Program, Snapshot, Table, Value, key_bounds, value_of_key
-from rcsc.project import load
-from rcsc.prove.follow import following
-from rcsc.prove.options import Options
-from rcsc.prove.same import Differs, Same, compare
-from rcsc.prove.steps import Steps
-from rcsc.resolve import compile_text
-from rcsc.source import Source
+from rcsc.graph.to_table import tabled
+from rcsc.lang.interpret import cycle, holds, initial, run_table
+from rcsc.lang.model import Enum, Program, Snapshot, Table, Value, key_bounds, value_of_key
+from rcsc.lang.project import load
+from rcsc.lang.resolve import compile_text
+from rcsc.relation.follow import following
+from rcsc.relation.same import Differs, Same, compare
+from rcsc.relation.steps import Steps
+from rcsc.solvers.options import Options
 
 ROOT = Path(__file__).parents[1]
 OPTIONS = Options()
@@ -466,7 +466,7 @@ def test_a_state_is_chosen_or_asked_for(tmp_path: Path) -> None:
 
 
 def test_a_solver_without_time_draws_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from rcsc.prove.smt import Answer, Solver
+    from rcsc.solvers.smt import Answer, Solver
 
     one = found_in(DOOR, tmp_path)
     table = tabled(graph_of(one).graph)

@@ -9,14 +9,14 @@ from random import Random
 
 import pytest
 
-from rcsc.compose.claims import Claim, Closed, Need, closed
-from rcsc.compose.goals import Goal, Sort
-from rcsc.compose.system import steppers
-from rcsc.compose.trace import NotReproducedError, Trace, shortest
-from rcsc.compose.transition import Stepper
-from rcsc.compose.walk import Walk
-from rcsc.prove import values
-from rcsc.prove.symbolic import Run
+from rcsc.compose.contract.claims import Claim, Closed, Need, closed
+from rcsc.compose.contract.obligations import Goal, Sort
+from rcsc.compose.contract.transition import Stepper
+from rcsc.compose.contract.walk import Walk
+from rcsc.compose.counterexample.trace import NotReproducedError, Trace, shortest
+from rcsc.compose.proof.system import steppers
+from rcsc.symbolic import values
+from rcsc.symbolic.execution import Run
 from tests import hierarchies, hierarchies_together, hierarchies_world
 from tests.bench.growth import chain, costs
 from tests.hierarchies import Judged, forget, judged, judged_seed

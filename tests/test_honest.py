@@ -1,4 +1,7 @@
-"""What would be cheating in the physical cell (it is listed in sim/physical.py), looked for in the model, in the code and in runs."""
+"""What would be cheating in the physical cell, looked for in the model, in the code and in runs.
+
+`rcsc_cell.cell.physical` lists it.
+"""
 
 import ast
 from functools import partial
@@ -8,17 +11,17 @@ import mujoco
 import numpy as np
 import pytest
 
-from rcsc.database.ask import Database
-from rcsc.workstation.cell import prepare
-from sim.cell import lying, plant
-from sim.model import mjcf
-from sim.physical import Physical
-from sim.plant import Grip, Plant
-from sim.reach import home
-from sim.vision.flood import Features
+from rcsc_cell.cell.mujoco_model import mjcf
+from rcsc_cell.cell.physical import Physical
+from rcsc_cell.cell.plant import Grip, Plant
+from rcsc_cell.cell.reach import home
+from rcsc_cell.cell.ready import lying, plant
+from rcsc_cell.database.ask import Database
+from rcsc_cell.vision.flood import Features
+from rcsc_cell.workstation.prepared import prepare
 from tests.cells import SYSTEM, database
 
-SIM = Path(__file__).parents[1] / "sim"
+CELL = Path(__file__).parents[1] / "sim" / "rcsc_cell"
 FIRST_ROW = "command,part,source,dest,end_at\nMOVE,BOXT (2),BUFFER,FIX-MAC1,\n"
 
 
@@ -114,7 +117,7 @@ def test_nothing_writes_where_a_part_is_after_the_first_cycle() -> None:
     """Positions, speeds and outside forces are written where a cell begins and where a stopped one is put back; nowhere else."""
     allowed = {"reset", "restore"}
     found = set()
-    for path in SIM.rglob("*.py"):
+    for path in CELL.rglob("*.py"):
         for function in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(function, ast.FunctionDef):
                 for name in _written(function):
@@ -156,7 +159,7 @@ def _written(function: ast.FunctionDef) -> set[str]:
 def test_controllers_never_ask_where_a_part_is(file: str) -> None:
     names = {
         node.attr
-        for node in ast.walk(ast.parse((SIM / file).read_text(encoding="utf-8")))
+        for node in ast.walk(ast.parse((CELL / "cell" / file).read_text(encoding="utf-8")))
         if isinstance(node, ast.Attribute)
     }
     assert not names & {"parts", "touching", "bodies", "data", "model"}
@@ -164,7 +167,7 @@ def test_controllers_never_ask_where_a_part_is(file: str) -> None:
 
 def test_the_image_processing_knows_no_physics() -> None:
     for file in ("blobs.py", "flood.py", "line.py", "optics.py"):
-        tree = ast.parse((SIM / "vision" / file).read_text(encoding="utf-8"))
+        tree = ast.parse((CELL / "vision" / file).read_text(encoding="utf-8"))
         imported = {
             name.name if isinstance(node, ast.Import) else node.module or ""
             for node in ast.walk(tree)
@@ -172,7 +175,10 @@ def test_the_image_processing_knows_no_physics() -> None:
             for name in node.names
         }
         assert not any(
-            name.startswith(("mujoco", "sim.physical", "sim.plant", "sim.model")) for name in imported
+            name.startswith(
+                ("mujoco", "rcsc_cell.cell.physical", "rcsc_cell.cell.plant", "rcsc_cell.cell.mujoco_model")
+            )
+            for name in imported
         ), (file, imported)
 
 
@@ -201,8 +207,8 @@ def test_a_run_needs_no_true_pose(monkeypatch: pytest.MonkeyPatch, tmp_path: Pat
 
 
 def _above_the_buffer(held: Database) -> Physical:
-    from rcsc.database.pose import pose_of
-    from sim.arm import solve
+    from rcsc_cell.cell.arm import solve
+    from rcsc_cell.database.pose import pose_of
 
     start = home(held)
     assert start is not None

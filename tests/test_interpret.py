@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rcsc.interpret import (
+from rcsc.lang.interpret import (
     Fault,
     Outcome,
     admit,
@@ -23,8 +23,8 @@ from rcsc.interpret import (
     run_table,
     unfit,
 )
-from rcsc.model import Apply, Program, Value
-from rcsc.resolve import compile_text
+from rcsc.lang.model import Apply, Program, Value
+from rcsc.lang.resolve import compile_text
 from tests import differential
 
 

@@ -4,12 +4,12 @@ import pytest
 
 from rcsc.certify import certify
 from rcsc.diagnostics.diagnostic import Diagnostic
-from rcsc.model import Program
-from rcsc.prove.invariants import assumptions_satisfiable
-from rcsc.prove.options import Options
-from rcsc.prove.program import ProgramVerdict, prove_program
-from rcsc.prove.smt import Answer
-from rcsc.resolve import compile_text
+from rcsc.lang.model import Program
+from rcsc.lang.resolve import compile_text
+from rcsc.procedures.invariants import assumptions_satisfiable
+from rcsc.solvers.options import Options
+from rcsc.solvers.smt import Answer
+from rcsc.table.program import ProgramVerdict, prove_program
 
 OPTIONS = Options(solver="boxes")
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from sim.faults import Faults
+from rcsc_cell.cell.faults import Faults
 from tests.cells import COMMAND_ENDS, Cell, through_script
 
 Line = tuple[str, str]

@@ -18,13 +18,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rcsc.database.pose import nine
-from sim.arm import plate
-from sim.live import Live
-from sim.live.board import MOST_MOMENTS, Board, Display, History, display_names, problems
-from sim.live.guard import refusal
-from sim.live.server import MOST_BYTES, MOST_WATCHED, watched
-from sim.pictures.stick import stick
+from rcsc_cell.cell.arm import plate
+from rcsc_cell.database.pose import nine
+from rcsc_cell.live import Live
+from rcsc_cell.live.board import MOST_MOMENTS, Board, Display, History, display_names, problems
+from rcsc_cell.live.guard import refusal
+from rcsc_cell.live.server import MOST_BYTES, MOST_WATCHED, watched
+from rcsc_cell.pictures.stick import stick
 from tests.browser import Browser
 
 X, Z, OPENING = "primitive.to_robot.plate[0]", "primitive.to_robot.plate[2]", "gripper.opening_mm"
@@ -548,6 +548,6 @@ def test_another_page_gets_nowhere_with_the_token(
 def test_the_files_of_the_page_are_in_the_package(repo: Path) -> None:
     """The page names no other machine."""
     for name in ("page.html", "page.js", "page.css"):
-        text = (repo / "sim" / "live" / name).read_text(encoding="utf-8")
+        text = (repo / "sim" / "rcsc_cell" / "live" / name).read_text(encoding="utf-8")
         assert "https:" not in text
         assert text.count("http:") == text.count("http://www.w3.org/2000/svg")

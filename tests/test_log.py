@@ -16,19 +16,19 @@ from click.testing import CliRunner, Result
 from mcap.reader import make_reader
 from mcap.writer import Writer
 
-from rcsc.cli.commands import commands
-from rcsc.log.export import coverage, csv_text, json_text
-from rcsc.log.expression import BadExpression, predicate
-from rcsc.log.read import Log, UnreadableLog, read
-from rcsc.log.records import CHAIN, SEAL
-from rcsc.log.replay import Replay, find
-from rcsc.log.words import words
-from rcsc.log.write import CHUNK_MS, Recorder
-from rcsc.system.adopt import Begun
-from rcsc.system.cell import Kind, StateTableError, System, assemble
-from rcsc.system.description import Description, LevelSpec, Wire, description
-from rcsc.system.levels import Query
-from rcsc.system.signature import Values
+from rcsc.commands.group import commands
+from rcsc.run.adopt import Begun
+from rcsc.run.description import Description, LevelSpec, Wire, description
+from rcsc.run.levels import Query
+from rcsc.run.log.export import coverage, csv_text, json_text
+from rcsc.run.log.queries import BadExpression, predicate
+from rcsc.run.log.read import Log, UnreadableLog, read
+from rcsc.run.log.records import CHAIN, SEAL
+from rcsc.run.log.replay import Replay, find
+from rcsc.run.log.states import words
+from rcsc.run.log.write import CHUNK_MS, Recorder
+from rcsc.run.signature import Values
+from rcsc.run.system import Kind, StateTableError, System, assemble
 from tests.emitted import emitted, program_of
 
 REPO = Path(__file__).parents[1]
@@ -658,7 +658,7 @@ def test_a_planted_difference_by_the_command(
     tmp_path: Path, logged: Path, edited: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The same tables, an executor that does otherwise: that is a finding of its own."""
-    monkeypatch.setattr("rcsc.log.replay.fingerprints", lambda _: dict(read(logged).programs))
+    monkeypatch.setattr("rcsc.run.log.replay.fingerprints", lambda _: dict(read(logged).programs))
     result = run("replay", logged, "--generated", edited, "--executor", "python")
     assert result.return_value == 1
     assert "RCS702" in result.output

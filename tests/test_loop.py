@@ -1,7 +1,8 @@
 """The cell in the loop under Hypothesis: whatever is commanded and whatever goes wrong, the properties hold.
 
 `HYPOTHESIS_PROFILE=long pytest tests/test_loop.py` looks for new episodes and for longer. What does not hold is kept in `.rcsc-cache/loop`
-as an episode, a script and a log; `sim.episode.run` gives the same again. The episode goes to `tests/regress`, and is run for ever.
+as an episode, a script and a log; `rcsc_cell.episodes.episode.run` gives the same again. The episode goes to `tests/regress`, and is run
+for ever.
 """
 
 import os
@@ -16,11 +17,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
-from rcsc.database.build import BadData
-from rcsc.log.read import read
-from rcsc.log.replay import Replay
-from rcsc.system.adopt import Begun
-from sim.episode import (
+from rcsc.run.adopt import Begun
+from rcsc.run.log.read import read
+from rcsc.run.log.replay import Replay
+from rcsc_cell.database.build import BadData
+from rcsc_cell.episodes.episode import (
     FAULTS,
     HARM,
     SYSTEM,
@@ -31,15 +32,13 @@ from sim.episode import (
     Push,
     Restart,
     TransportSpec,
-    draw,
-    fault_classes,
-    run,
     script,
 )
-from sim.loop import Loop
-from sim.sampling import LEVELS
-from sim.strategies import episodes, faults, harms, rows
-from sim.transport import Harmed
+from rcsc_cell.episodes.loop import Loop, run
+from rcsc_cell.episodes.part_faults import fault_classes
+from rcsc_cell.episodes.sampling import LEVELS, draw
+from rcsc_cell.episodes.strategies import episodes, faults, harms, rows
+from rcsc_cell.episodes.transport import Harmed
 from tests.loops import ACQUIRE, TBOX, keep
 
 HERE = Path(__file__).parent
@@ -175,7 +174,10 @@ def test_both_executors_give_the_same_log(backend: str, tmp_path: Path) -> None:
 
 
 def test_the_digest_is_the_same_in_another_process_and_another_for_another_seed() -> None:
-    code = "import sys; from sim.episode import Episode, run; print(run(Episode.from_json(sys.stdin.read())).digest)"
+    code = (
+        "import sys; from rcsc_cell.episodes.episode import Episode; from rcsc_cell.episodes.loop import run; "
+        "print(run(Episode.from_json(sys.stdin.read())).digest)"
+    )
     ran = subprocess.run(
         [sys.executable, "-c", code],
         input=ODD.to_json(),

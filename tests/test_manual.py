@@ -6,15 +6,15 @@ from pathlib import Path
 import pytest
 from _pytest.mark import ParameterSet
 
-from rcsc.compose import claims
-from rcsc.compose.standing import Known
+from rcsc.compose.contract import claims
+from rcsc.compose.proof.standing import Known
 from rcsc.diagnostics import report
 from rcsc.diagnostics.diagnostic import Severity
-from rcsc.model import Program
-from rcsc.prove.options import Options
-from rcsc.prove.program import prove_program
-from rcsc.resolve import compile_text
-from rcsc.source import Source
+from rcsc.diagnostics.source import Source
+from rcsc.lang.model import Program
+from rcsc.lang.resolve import compile_text
+from rcsc.solvers.options import Options
+from rcsc.table.program import prove_program
 
 REPO = Path(__file__).parents[1]
 CASE = re.compile(r"^```rcs\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL)

@@ -10,22 +10,22 @@ from random import Random
 
 import pytest
 
-from rcsc.cli import run
+from rcsc.commands import run
 from rcsc.driver.trials import proofs
-from rcsc.interpret import matching_lines
-from rcsc.model import Program, Table, key_bounds, value_of_key
-from rcsc.project import load
-from rcsc.prove.options import Options
-from rcsc.resolve import resolve
+from rcsc.lang.interpret import matching_lines
+from rcsc.lang.model import Program, Table, key_bounds, value_of_key
+from rcsc.lang.project import load
+from rcsc.lang.resolve import resolve
+from rcsc.solvers.options import Options
 from rcsc.testing import suite
 from rcsc.testing.code_mutants import Decider, Noticed, code_mutants, decider, source_of
 from rcsc.testing.esbmc import EsbmcVerdict, Said
+from rcsc.testing.executors.symbols import symbols_of
 from rcsc.testing.figures import SuiteResult
-from rcsc.testing.matcher import Checked, Compared, check_matcher
+from rcsc.testing.inputs.snapshot import Missing, search_in
+from rcsc.testing.matchers.matcher import Checked, Compared, check_matcher
 from rcsc.testing.mutants import Caught, Opinion, difference, judge_table, narrower, table_mutants, wider
-from rcsc.testing.search import Missing, search_in
 from rcsc.testing.suite import SuiteOptions, run_suite
-from rcsc.testing.symbols import symbols_of
 from tests.emitted import emitted, program_of
 
 BOXES = proofs(Options(solver="boxes"))
@@ -291,6 +291,6 @@ table t assuming some {
         "2",
         str(tmp_path / "quotient.rcs"),
     ]
-    start = "import sys; from rcsc.cli import run; sys.exit(run(sys.argv[1:]))"
+    start = "import sys; from rcsc.commands import run; sys.exit(run(sys.argv[1:]))"
     ran = subprocess.run([sys.executable, "-c", start, "test", *asked], capture_output=True, check=False)
     assert ran.returncode == 0, ran.stderr

@@ -1,6 +1,6 @@
 """What a condition tells of the values in it: every condition over small ranges, against trying all inputs.
 
-A condition is built twice: as a node of `prove.values`, which folds and learns, and as the set of inputs at which it holds,
+A condition is built twice: as a node of `symbolic.values`, which folds and learns, and as the set of inputs at which it holds,
 by Python's own operators. Bounds learnt must hold at every one of these inputs.
 """
 
@@ -13,10 +13,10 @@ from random import Random
 
 import pytest
 
-from rcsc.model import Bool, Int, Op, Real, Scalar
-from rcsc.prove import values
-from rcsc.prove.evaluation import Evaluation
-from rcsc.prove.values import Fact, Node
+from rcsc.lang.model import Bool, Int, Op, Real, Scalar
+from rcsc.symbolic import values
+from rcsc.symbolic.evaluation import Evaluation
+from rcsc.symbolic.values import Fact, Node
 
 NAN, INF = math.nan, math.inf
 COMPARE: dict[Op, Callable[[float, float], bool]] = {

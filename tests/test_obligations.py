@@ -5,17 +5,17 @@ from pathlib import Path
 
 import pytest
 
-from rcsc.cli import run
+from rcsc.commands import run
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic
-from rcsc.model import Int, Program
-from rcsc.prove import smt
-from rcsc.prove.encode import within
-from rcsc.prove.options import Options
-from rcsc.prove.program import ProgramVerdict, prove_program
-from rcsc.prove.smt import Answer, Limits, Solver, Term
-from rcsc.resolve import compile_text
-from rcsc.source import Source
+from rcsc.diagnostics.source import Source
+from rcsc.lang.model import Int, Program
+from rcsc.lang.resolve import compile_text
+from rcsc.solvers import smt
+from rcsc.solvers.options import Options
+from rcsc.solvers.smt import Answer, Limits, Solver, Term
+from rcsc.symbolic.encode import within
+from rcsc.table.program import ProgramVerdict, prove_program
 
 VARIABLES = """
 enum colour { red, green, blue }
@@ -386,7 +386,7 @@ LEVEL = (
 def test_runs_that_are_too_long_to_follow_are_undecided(
     monkeypatch: pytest.MonkeyPatch, text: str, place: str, what: str
 ) -> None:
-    monkeypatch.setattr("rcsc.prove.evaluation.MOST_STEPS", 50)
+    monkeypatch.setattr("rcsc.symbolic.evaluation.MOST_STEPS", 50)
     found = proved(VARIABLES + text)
     assert found.proved is None
     [one] = found.findings
@@ -470,7 +470,7 @@ def test_no_question_is_asked_past_what_all_of_them_may_cost(
 ) -> None:
     text = PAIR + OWED[place]
     assert proved(text).proved is not None
-    monkeypatch.setattr("rcsc.prove.options.TOGETHER", 0)
+    monkeypatch.setattr("rcsc.solvers.options.TOGETHER", 0)
     found = proved(text)
     assert found.proved is None
     assert set(codes(found.findings)) == {"RCS409"}
@@ -483,7 +483,7 @@ def test_questions_that_are_decided_one_by_one_may_be_too_many_together(
     text = PAIR + OWED["a table"]
     assert proved(text, options).proved is not None
     spent: list[int] = []
-    monkeypatch.setattr("rcsc.prove.options.TOGETHER", 1)
+    monkeypatch.setattr("rcsc.solvers.options.TOGETHER", 1)
     for steps in (20_000, 400):
         found = [proved(text, replace(options, steps=steps)) for _ in range(2)]
         assert found[0].findings == found[1].findings

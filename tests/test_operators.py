@@ -15,21 +15,20 @@ from typing import Any
 import pytest
 import z3
 
-from rcsc.certify.run import Run, Start
+from rcsc.certify.execution import Run, Start
 from rcsc.certify.settle import script, values_in
 from rcsc.certify.values import Term, Terms, sort_of
-from rcsc.compose.bits import Bits, key_of_bits
-from rcsc.compose.keyed import Keyed
-from rcsc.compose.measured import Measured
-from rcsc.compose.sat import Sat
 from rcsc.diagnostics.codes import Code
-from rcsc.diff.words import said
+from rcsc.diff.changes.spell import said
 from rcsc.emit.c99 import helper
 from rcsc.emit.ctext import CText, wide_type
-from rcsc.emit.names import names_of
+from rcsc.emit.identifiers import names_of
 from rcsc.emit.pytext import PyText
-from rcsc.interpret import evaluate, matching_lines
-from rcsc.model import (
+from rcsc.host.tools import c_compiler, run_command
+from rcsc.lang.expressions import intervals
+from rcsc.lang.expressions.folding import fold
+from rcsc.lang.interpret import evaluate, matching_lines
+from rcsc.lang.model import (
     COMPARISONS,
     I64_MAX,
     I64_MIN,
@@ -48,22 +47,25 @@ from rcsc.model import (
     Value,
     real_key,
 )
-from rcsc.prove import smt, values
-from rcsc.prove.encode import Frame, encode
-from rcsc.prove.evaluation import Evaluation
-from rcsc.prove.options import Options
-from rcsc.prove.program import prove_program
-from rcsc.prove.table import prove_table
-from rcsc.prove.values import Node
-from rcsc.prove.verdict import Gap, Overlap
-from rcsc.resolve import compile_text, intervals
-from rcsc.resolve.folding import fold
-from rcsc.smtlib import cvc5_refutes
-from rcsc.testing.reference import Writer, c_type
-from rcsc.testing.reference_file import EXTREMES
-from rcsc.testing.reference_file import PRELUDE as C_PRELUDE
-from rcsc.testing.symbols import symbols_of
-from rcsc.testing.tools import c_compiler, run_command
+from rcsc.lang.resolve import compile_text
+from rcsc.solvers import smt
+from rcsc.solvers.options import Options
+from rcsc.solvers.sat import Sat
+from rcsc.solvers.smtlib import cvc5_refutes
+from rcsc.symbolic import values
+from rcsc.symbolic.bits import Bits, key_of_bits
+from rcsc.symbolic.encode import Frame, encode
+from rcsc.symbolic.evaluation import Evaluation
+from rcsc.symbolic.keyed import Keyed
+from rcsc.symbolic.measured import Measured
+from rcsc.symbolic.values import Node
+from rcsc.table.decide import prove_table
+from rcsc.table.program import prove_program
+from rcsc.table.verdict import Gap, Overlap
+from rcsc.testing.executors.reference import Writer, c_type
+from rcsc.testing.executors.reference_file import EXTREMES
+from rcsc.testing.executors.reference_file import PRELUDE as C_PRELUDE
+from rcsc.testing.executors.symbols import symbols_of
 from tests.emitted import emitted, program_of
 
 NAN, INF, GREATEST = math.nan, math.inf, 1.7976931348623157e308

@@ -21,22 +21,22 @@ import pytest
 import zstandard
 from mcap.writer import Writer
 
-from rcsc.cli import run
-from rcsc.compose.frozen import BadCaseError, read_case
-from rcsc.diff import forms
+from rcsc.commands import run
+from rcsc.compose.counterexample.frozen import BadCaseError, read_case
+from rcsc.diff import text as forms
 from rcsc.emit.write import write
-from rcsc.files import csv_text
-from rcsc.files.names import BadName, identifier, inside, within
-from rcsc.files.read import Malformed, Said, content, json_of, toml_of, xml_of
 from rcsc.graph.drawing import svg
-from rcsc.graph.model import Edge, StateGraph
-from rcsc.log.read import UnreadableLog, read
-from rcsc.log.records import MOST_CHUNK, Checked, Seal, records
-from rcsc.log.write import Recorder
-from rcsc.system.cell import System, assemble
-from rcsc.system.description import BadDescription, description
-from rcsc.system.signature import signature
-from sim.pictures.page import quoted
+from rcsc.graph.formats.state_graph import Edge, StateGraph
+from rcsc.host.files import csv_text
+from rcsc.host.files.names import BadName, identifier, inside, within
+from rcsc.host.files.read import Malformed, Said, content, json_of, toml_of, xml_of
+from rcsc.run.description import BadDescription, description
+from rcsc.run.log.read import UnreadableLog, read
+from rcsc.run.log.records import MOST_CHUNK, Checked, Seal, records
+from rcsc.run.log.write import Recorder
+from rcsc.run.signature import signature
+from rcsc.run.system import System, assemble
+from rcsc_cell.pictures.page import quoted
 from tests.emitted import emitted, shipped
 
 REPO = Path(__file__).parents[1]
@@ -51,11 +51,12 @@ PARSERS = {
 }  # fmt: skip
 """What makes values of text or bytes."""
 FORMATS_OF_OURS = {
-    "rcsc/model.py", "rcsc/prove/smt.py", "rcsc/smtlib.py", "rcsc/testing/native.py", "rcsc/testing/externs.py",  # doubles as bits
-    "rcsc/system/signature.py", "rcsc/system/executors.py", "rcsc/log/read.py", "rcsc/log/write.py",  # `FORMATS` by checked types
-    "rcsc/log/records.py", "rcsc/log/replay.py", "rcsc/system/shared.py", "rcsc/system/block.py", "rcsc/system/serve.py",
-    "rcsc/system/answers.py", "rcsc/system/levels.py", "rcsc/system/cell.py", "rcsc/workstation/stopped.py",
-    "rcsc/certify", "sim/loop.py", "sim/campaign/work.py",
+    "rcsc/lang/model.py", "rcsc/solvers/smt.py", "rcsc/solvers/smtlib.py", "rcsc/testing/executors/native.py",
+    "rcsc/testing/executors/externs.py",  # doubles as bits
+    "rcsc/run/signature.py", "rcsc/run/executors.py", "rcsc/run/log/read.py", "rcsc/run/log/write.py",  # `FORMATS` by checked types
+    "rcsc/run/log/records.py", "rcsc/run/log/replay.py", "rcsc/run/processes/memory.py", "rcsc/run/processes/block.py",
+    "rcsc/run/processes/serve.py", "rcsc/run/answers.py", "rcsc/run/levels.py", "rcsc/run/system.py",
+    "sim/rcsc_cell/workstation/stopped.py", "rcsc/certify", "sim/rcsc_cell/episodes/loop.py", "sim/rcsc_cell/campaign/work.py",
 }  # fmt: skip
 """Who may name `struct`: their formats are written in them, or taken from `FORMATS` for a type that was checked."""
 
@@ -82,7 +83,11 @@ def _word(node: ast.expr) -> str:
     return node.id if isinstance(node, ast.Name) else node.attr if isinstance(node, ast.Attribute) else ""
 
 
-READERS = ("rcsc/files/read.py:", "rcsc/testing/python_executor.py:", "rcsc/testing/externs.py:")
+READERS = (
+    "rcsc/host/files/read.py:",
+    "rcsc/testing/executors/python.py:",
+    "rcsc/testing/executors/externs.py:",
+)
 """Who parses; a tested executor, and what stands in for its externs, are texts that were generated just now."""
 
 
@@ -94,7 +99,7 @@ def test_only_the_bounded_readers_parse_text_from_outside() -> None:
     imported = [
         f"{name}:{node.lineno}: {one}"
         for name, tree in sources()
-        if not name.startswith("rcsc/files/")
+        if not name.startswith("rcsc/host/files/")
         for node in ast.walk(tree)
         if isinstance(node, ast.Import | ast.ImportFrom)
         for one in _imported(node)
@@ -708,17 +713,18 @@ def test_a_field_is_matched_to_its_end() -> None:
 # --- written whole or not at all -----------------------------------------------------------------
 
 SCRATCH = (
-    "rcsc/compose/rerun.py", "rcsc/compose/promela/spin.py", "rcsc/shell/sources.py", "rcsc/system/executors.py", "rcsc/diff/revision.py",
-    "rcsc/testing/native.py", "rcsc/testing/cortex.py", "rcsc/testing/esbmc.py", "rcsc/testing/matcher.py", "rcsc/testing/tools.py",
-    "rcsc/testing/code_mutants.py", "sim/processes.py", "sim/setting.py",
+    "rcsc/compose/counterexample/replay.py", "rcsc/compose/promela/spin.py", "rcsc/shell/reload/sources.py", "rcsc/run/executors.py",
+    "rcsc/diff/revision.py", "rcsc/testing/executors/native.py", "rcsc/testing/cortex.py", "rcsc/testing/esbmc.py",
+    "rcsc/testing/matchers/matcher.py", "rcsc/host/tools.py", "rcsc/testing/code_mutants.py", "sim/rcsc_cell/episodes/processes.py",
+    "sim/rcsc_cell/episodes/setting.py",
 )  # fmt: skip
 """Who writes into temporary folders that end with the process."""
 STREAMS = (
-    "rcsc/files/write.py",
-    "rcsc/log/write.py",
-    "sim/campaign/journal.py",
+    "rcsc/host/files/write.py",
+    "rcsc/run/log/write.py",
+    "sim/rcsc_cell/campaign/journal.py",
     "rcsc/shell/terminal.py",
-    "rcsc/system/block.py",
+    "rcsc/run/processes/block.py",
 )
 """The writer itself, what is added to at its end and read as far as it goes, and what is no file of the disk's."""
 
@@ -755,7 +761,7 @@ def test_files_are_written_by_the_one_writer() -> None:
 
 FULL = """
 import resource, sys
-from rcsc.cli import main
+from rcsc.commands import main
 resource.setrlimit(resource.RLIMIT_FSIZE, ({most}, {most}))
 sys.argv = ["rcsc", *sys.argv[1:]]
 main()

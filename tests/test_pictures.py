@@ -16,14 +16,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rcsc.database.pose import nine
-from sim.arm import LIMITS_DEG, plate, skeleton
-from sim.pictures.plot import plot, ticks
-from sim.pictures.solid import OVERVIEW, View, solid
-from sim.pictures.stick import Scene, pads, stick
-from sim.pictures.things import Outline
-from sim.pictures.views import FRONT, HIGH_MM, LOW_MM, SIDE, TOP
-from sim.report import Figure, Frame, Matched, Placement, Row, Story, page, report
+from rcsc_cell.cell.arm import LIMITS_DEG, plate, skeleton
+from rcsc_cell.database.pose import nine
+from rcsc_cell.pictures.plot import plot, ticks
+from rcsc_cell.pictures.report import Figure, Frame, Matched, Placement, Row, Story, page, report
+from rcsc_cell.pictures.solid import OVERVIEW, View, solid
+from rcsc_cell.pictures.stick import Scene, pads, stick
+from rcsc_cell.pictures.things import Outline
+from rcsc_cell.pictures.views import FRONT, HIGH_MM, LOW_MM, SIDE, TOP
 from tests.browser import Browser
 
 ABOVE = View((0.35, -0.001, 2.9), (0.35, 0.0, 0.3))

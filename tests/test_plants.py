@@ -15,22 +15,22 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rcsc.database.ask import Database
-from rcsc.database.build import build
-from rcsc.database.pose import Pose, Rotation, about_y, about_z, nine, pose_of, product
-from rcsc.system.cell import System
-from rcsc.system.signature import Values
-from rcsc.workstation.cell import prepare
-from rcsc.workstation.orders import DONE, EXECUTING, FAILED
-from sim.arm import LIMITS, margins_deg, plate, skeleton, solutions, solve
-from sim.cell import Backend, lying, plant
-from sim.faults import Faults
-from sim.model import mjcf
-from sim.physical import Physical
-from sim.plant import FLOOD, LINE, NO_PICTURE, PICTURE_TICKS, Grip, Plant
-from sim.reach import home, unreachable
-from sim.robot import FOLLOW, HOLD, JUMP_RAD, LAG_RAD, Robot
-from sim.vision.flood import Features
+from rcsc.run.signature import Values
+from rcsc.run.system import System
+from rcsc_cell.cell.arm import LIMITS, margins_deg, plate, skeleton, solutions, solve
+from rcsc_cell.cell.faults import Faults
+from rcsc_cell.cell.mujoco_model import mjcf
+from rcsc_cell.cell.physical import Physical
+from rcsc_cell.cell.plant import FLOOD, LINE, NO_PICTURE, PICTURE_TICKS, Grip, Plant
+from rcsc_cell.cell.reach import home, unreachable
+from rcsc_cell.cell.ready import Backend, lying, plant
+from rcsc_cell.cell.robot import FOLLOW, HOLD, JUMP_RAD, LAG_RAD, Robot
+from rcsc_cell.database.ask import Database
+from rcsc_cell.database.build import build
+from rcsc_cell.database.pose import Pose, Rotation, about_y, about_z, nine, pose_of, product
+from rcsc_cell.vision.flood import Features
+from rcsc_cell.workstation.orders import DONE, EXECUTING, FAILED
+from rcsc_cell.workstation.prepared import prepare
 from tests.cells import REPO, SYSTEM, database
 
 joint = st.tuples(
@@ -197,10 +197,10 @@ def test_the_arm_reaches_every_point_of_the_data(held: Database) -> None:
 
 
 def test_a_station_out_of_reach_is_named(tmp_path: Path) -> None:
-    from rcsc.database.ask import open_database
-    from rcsc.system.cell import signatures
-    from rcsc.system.description import description
-    from rcsc.workstation.cell import parts_of
+    from rcsc.run.description import description
+    from rcsc.run.system import signatures
+    from rcsc_cell.database.ask import open_database
+    from rcsc_cell.workstation.prepared import parts_of
 
     text = (SYSTEM.parent / "cell.toml").read_text(encoding="utf-8")
     moved_station = text.replace("x = 198.4, y = -545.0", "x = 291.0, y = -799.0")
@@ -268,7 +268,7 @@ REPEAT = """
 import sys
 from tests.test_plants import digests
 from tests.cells import database
-from sim.cell import plant
+from rcsc_cell.cell.ready import plant
 print(list(digests(plant(database(), sys.argv[1], seed=3)))[-1])
 """
 

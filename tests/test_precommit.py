@@ -12,7 +12,7 @@ from pathlib import Path
 import click
 import pytest
 
-from rcsc.cli.commands import commands
+from rcsc.commands.group import commands
 
 REPO = Path(__file__).parents[1]
 

@@ -17,17 +17,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rcsc.system import processes, serve
-from rcsc.system.adopt import adopt
-from rcsc.system.block import FOLDER, PREFIX, Block
-from rcsc.system.buffers import Buffers, CommonMemory
-from rcsc.system.cell import Outside, StateTableError, assemble, executors
-from rcsc.system.description import BadDescription, Description, LevelSpec, Wire, description
-from rcsc.system.processes import Supervisor, run_processes
-from rcsc.system.serve import Factory, begin, cycle
-from rcsc.system.shared import TRIES, Absent, Layout, SharedMemoryBuffers, layout
-from rcsc.system.signature import Leaf, Signature, Value, Values, signature
-from rcsc.workstation.orders import DONE, EXECUTING
+from rcsc.run.adopt import adopt
+from rcsc.run.buffers import Buffers, CommonMemory
+from rcsc.run.description import BadDescription, Description, LevelSpec, Wire, description
+from rcsc.run.processes import serve, supervisor
+from rcsc.run.processes.block import FOLDER, PREFIX, Block
+from rcsc.run.processes.memory import TRIES, Absent, Layout, SharedMemoryBuffers, layout
+from rcsc.run.processes.serve import Factory, begin, cycle
+from rcsc.run.processes.supervisor import Supervisor, run_processes
+from rcsc.run.signature import Leaf, Signature, Value, Values, signature
+from rcsc.run.system import Outside, StateTableError, assemble, executors
+from rcsc_cell.workstation.orders import DONE, EXECUTING
 from tests.processes_outside import (
     ACQUIRE,
     HERE,
@@ -146,7 +146,7 @@ def test_a_buffer_that_does_not_fit_is_refused(repo: Path) -> None:
 
 def test_a_stranger_that_ends_takes_nothing_with_it(buffers: SharedMemoryBuffers) -> None:
     """A process with a resource tracker of its own, which would remove the block and complain."""
-    look = f"from rcsc.system.block import Block; Block.attach({buffers.block.name!r}).close()"
+    look = f"from rcsc.run.processes.block import Block; Block.attach({buffers.block.name!r}).close()"
     ran = subprocess.run([sys.executable, "-c", look], capture_output=True, text=True, check=False)
     assert (ran.returncode, ran.stderr) == (0, "")
     Block.attach(buffers.block.name).close()
@@ -337,14 +337,22 @@ def answered_once(path: Path, count: int, first: int) -> None:
     assert [number for at, number in enumerate(begun) if at == 0 or begun[at - 1] != number] == numbers
 
 
-COMPILER = {"rcsc.model", "rcsc.plan", "rcsc.prove", "rcsc.resolve", "rcsc.syntax.tree"}
+COMPILER = {
+    "rcsc.lang.model",
+    "rcsc.emit.plan",
+    "rcsc.solvers",
+    "rcsc.symbolic",
+    "rcsc.table",
+    "rcsc.lang.resolve",
+    "rcsc.lang.syntax.tree",
+}
 
 
 @pytest.mark.parametrize(
     ("loads", "never"),
     [
-        ("rcsc.system.serve, sim.processes", COMPILER | {"numpy", "mujoco"}),  # a level
-        ("sim.campaign.work", COMPILER | {"mujoco"}),  # episodes by kinematics
+        ("rcsc.run.processes.serve, rcsc_cell.episodes.processes", COMPILER | {"numpy", "mujoco"}),  # a level
+        ("rcsc_cell.campaign.work", COMPILER | {"mujoco"}),  # episodes by kinematics
     ],
 )
 def test_a_process_loads_only_what_it_needs(loads: str, never: set[str]) -> None:
@@ -501,7 +509,7 @@ import sys
 from pathlib import Path
 
 sys.path.insert(0, {repo!r})
-from rcsc.system.processes import run_processes
+from rcsc.run.processes.supervisor import run_processes
 from tests.processes_outside import QUERIES, alone, outside
 
 if __name__ == "__main__":
@@ -700,8 +708,8 @@ def test_still_is_told_from_late(
 ) -> None:
     """A level whose period is 40 ms, by a clock and a process table of the test's own."""
     now = [0.0, 0.0]
-    monkeypatch.setattr("rcsc.system.processes.time", SimpleNamespace(monotonic=lambda: now[0]))
-    monkeypatch.setattr("rcsc.system.processes._state", lambda _: (state if now[0] else "R", now[1]))
+    monkeypatch.setattr("rcsc.run.processes.supervisor.time", SimpleNamespace(monotonic=lambda: now[0]))
+    monkeypatch.setattr("rcsc.run.processes.supervisor._state", lambda _: (state if now[0] else "R", now[1]))
     system = Supervisor(alone(repo), "python", {}, queries=QUERIES)
     try:
         system.buffers.commit("task", started(repo, 1))
@@ -757,4 +765,4 @@ def test_processes_that_do_not_end_share_one_grace(repo: Path, monkeypatch: pyte
     system._running = dict(enumerate(deaf))  # type: ignore[arg-type]
     system.close()
     assert all(one.killed for one in deaf)
-    assert clock[0] == processes.GRACE_S
+    assert clock[0] == supervisor.GRACE_S

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from rcsc.model import Program
-from rcsc.project import MOST_BYTES, listed, load, project_root
-from rcsc.resolve import resolve
+from rcsc.lang.model import Program
+from rcsc.lang.project import MOST_BYTES, listed, load, project_root
+from rcsc.lang.resolve import resolve
 
 
 def write(folder: Path, **texts: str) -> Path:

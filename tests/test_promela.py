@@ -8,23 +8,23 @@ from pathlib import Path
 
 import pytest
 
-from rcsc.cli import run
-from rcsc.compose.goals import Sort, goals
-from rcsc.compose.promela.aims import CONTRACT_BELOW
-from rcsc.compose.promela.flat import Check, Forget, Fork, Put, read, same
-from rcsc.compose.promela.model import BROKEN, RESTARTED, TAKEN, TOLD, Model, emit
-from rcsc.compose.promela.needs import needed
-from rcsc.compose.promela.plan import wanted
-from rcsc.compose.promela.sink import Sunk, sunk
-from rcsc.compose.promela.small import Breadth
+from rcsc.commands import run
+from rcsc.compose.contract.obligations import Sort, goals
+from rcsc.compose.contract.transition import Stepper
+from rcsc.compose.contract.variants import first_match, undeferred
+from rcsc.compose.counterexample.trace import shortest
+from rcsc.compose.promela.assemble import BROKEN, RESTARTED, TAKEN, TOLD, Model, emit
+from rcsc.compose.promela.cycle.aims import CONTRACT_BELOW
+from rcsc.compose.promela.cycle.statements import Check, Forget, Fork, Put, read, same
+from rcsc.compose.promela.instance import Breadth
+from rcsc.compose.promela.lazy_copy import Sunk, sunk
+from rcsc.compose.promela.liveness import needed
+from rcsc.compose.promela.selection import wanted
 from rcsc.compose.promela.spell import RESERVED, identifiers
 from rcsc.compose.promela.spin import Checked, Search, SpinError, check, tools
-from rcsc.compose.promela.words import rerun, run_of, told
-from rcsc.compose.system import steppers
-from rcsc.compose.trace import shortest
-from rcsc.compose.transition import Stepper
-from rcsc.compose.variants import first_match, undeferred
-from rcsc.model import Bool, Enum
+from rcsc.compose.promela.trail import rerun, run_of, told
+from rcsc.compose.proof.system import steppers
+from rcsc.lang.model import Bool, Enum
 
 REPO = Path(__file__).parents[1]
 SMALL = REPO / "tests" / "data" / "composed"

@@ -8,14 +8,14 @@ from random import Random
 
 import pytest
 
-from rcsc.cli import run
-from rcsc.compose.goals import Sort
-from rcsc.compose.level import Verdict, prove_level
-from rcsc.compose.promela.model import Model, emit
-from rcsc.compose.promela.small import Breadth
-from rcsc.compose.promela.words import Run, run_of
-from rcsc.compose.search import Effort
-from rcsc.compose.transition import Stepper
+from rcsc.commands import run
+from rcsc.compose.contract.obligations import Sort
+from rcsc.compose.contract.transition import Stepper
+from rcsc.compose.invariant.search import Effort
+from rcsc.compose.promela.assemble import Model, emit
+from rcsc.compose.promela.instance import Breadth
+from rcsc.compose.promela.trail import Run, run_of
+from rcsc.compose.proof.level import Verdict, prove_level
 from tests.test_promela import (
     REPO,
     SHIPPED,

@@ -4,14 +4,14 @@ from pathlib import Path
 
 import pytest
 
-from rcsc.cache import Cache
 from rcsc.driver.proofs import prove
-from rcsc.driver.work import Proof
-from rcsc.model import Program
-from rcsc.project import load
-from rcsc.prove import program as proving
-from rcsc.prove.options import Options
-from rcsc.resolve import compile_text, resolve
+from rcsc.driver.settings import Proof
+from rcsc.host.cache import Cache
+from rcsc.lang.model import Program
+from rcsc.lang.project import load
+from rcsc.lang.resolve import compile_text, resolve
+from rcsc.solvers.options import Options
+from rcsc.table import program as proving
 
 HEAD = """\
 input n : int 0 .. 9

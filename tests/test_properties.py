@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import pytest
 
-from sim.episode import (
+from rcsc_cell.episodes.episode import (
     FAULTS,
     SYSTEM,
     Episode,
@@ -16,15 +16,14 @@ from sim.episode import (
     Push,
     Restart,
     TransportSpec,
-    fault_classes,
-    run,
 )
-from sim.loop import Loop
-from sim.properties import PROPERTIES
-from sim.properties.cycle import Made
-from sim.properties.failing import REASONS
-from sim.properties.truth import CountsTrue, DoneTrue
-from sim.sampling import MAKE_BOXT
+from rcsc_cell.episodes.loop import Loop, run
+from rcsc_cell.episodes.part_faults import fault_classes
+from rcsc_cell.episodes.sampling import MAKE_BOXT
+from rcsc_cell.properties import PROPERTIES
+from rcsc_cell.properties.cycle import Made
+from rcsc_cell.properties.failing import REASONS
+from rcsc_cell.properties.truth import CountsTrue, DoneTrue
 from tests.loops import ACQUIRE, TBOX, trace
 from tests.matrix import BUGS, Bug, findings, project, seed
 
@@ -155,7 +154,7 @@ OPEN: dict[str, tuple[Made, Episode, str]] = {
         "nothing is between the pads",
     ),
 }
-"""What the tables do not do, and the paper's do not either; each is excused in `sim.properties`, and seen without the excuse."""
+"""What the tables do not do, and the paper's do not either; each is excused in `rcsc_cell.properties`, and seen without the excuse."""
 
 
 @pytest.mark.parametrize("name", list(OPEN))

@@ -11,30 +11,30 @@ from random import Random
 
 import pytest
 
-from rcsc.cache import open_cache
-from rcsc.cli import run
-from rcsc.compose.contract import Links
-from rcsc.compose.features import CLOSELY, Feature
-from rcsc.compose.finding import of_trace, time_line
-from rcsc.compose.goals import Goal, Sort, goals
-from rcsc.compose.kept import keep, recall
-from rcsc.compose.level import LevelProof, Verdict, certificate, prove_level
-from rcsc.compose.properties import every_feature, property_kept
-from rcsc.compose.search import Effort, read
-from rcsc.compose.system import steppers
-from rcsc.compose.trace import Search, Trace, broken, ran, shortest, traces
-from rcsc.compose.transition import Stepper
-from rcsc.compose.walk import Walk
+from rcsc.commands import run
+from rcsc.compose.contract.environment import Links
+from rcsc.compose.contract.obligations import Goal, Sort, goals
+from rcsc.compose.contract.predicates import CLOSELY, Feature
+from rcsc.compose.contract.properties import every_feature, property_kept
+from rcsc.compose.contract.transition import Stepper
+from rcsc.compose.contract.walk import Walk
+from rcsc.compose.counterexample.finding import of_trace, time_line
+from rcsc.compose.counterexample.trace import Search, Trace, broken, ran, shortest, traces
+from rcsc.compose.invariant.search import Effort, read
+from rcsc.compose.proof.kept import keep, recall
+from rcsc.compose.proof.level import LevelProof, Verdict, certificate, prove_level
+from rcsc.compose.proof.system import steppers
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Severity
-from rcsc.interpret import Fault, cycle, initial
-from rcsc.model import Enum, Kind, Program, Value, key_bounds, value_of_key
-from rcsc.prove.options import Options
-from rcsc.prove.program import prove_program
-from rcsc.resolve import compile_text
-from rcsc.smtlib import cvc5_refutes
-from rcsc.source import Source
-from rcsc.syntax.format import format_text
+from rcsc.diagnostics.source import Source
+from rcsc.host.cache import open_cache
+from rcsc.lang.interpret import Fault, cycle, initial
+from rcsc.lang.model import Enum, Kind, Program, Value, key_bounds, value_of_key
+from rcsc.lang.resolve import compile_text
+from rcsc.lang.syntax.format import format_text
+from rcsc.solvers.options import Options
+from rcsc.solvers.smtlib import cvc5_refutes
+from rcsc.table.program import prove_program
 from tests.emitted import emitted
 
 REPO = Path(__file__).parents[1]
@@ -196,7 +196,7 @@ def test_a_cached_proof_says_so_too(
     before = json.loads(capsys.readouterr().out)
     path.write_text(GRIP + FALSE + "# a comment\n", encoding="utf-8")
     monkeypatch.setattr(
-        "rcsc.prove.program.prove_program", lambda *_args, **_more: pytest.fail("proved again")
+        "rcsc.table.program.prove_program", lambda *_args, **_more: pytest.fail("proved again")
     )
     assert run(["check", str(path), "--json"]) == 0
     again = json.loads(capsys.readouterr().out)
@@ -509,7 +509,7 @@ def chosen(stepper: Stepper, closely: int = 0) -> tuple[Feature, ...]:
 
 
 def test_an_invariant_that_check_proves_may_be_false_after_a_restart(tmp_path: Path) -> None:
-    """Nothing that the lower level does fails; but it begins anew with a failure, as `system.adopt` says."""
+    """Nothing that the lower level does fails; but it begins anew with a failure, as `run.adopt` says."""
     stepper = with_properties(
         tmp_path,
         "lower",

@@ -9,8 +9,8 @@ from random import Random
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rcsc.system.buffers import CommonMemory
-from rcsc.system.signature import Values
+from rcsc.run.buffers import CommonMemory
+from rcsc.run.signature import Values
 from tests.cells import SCRIPT, Cell
 
 LATE_ENDS = 3000

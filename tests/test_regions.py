@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rcsc.model import (
+from rcsc.lang.model import (
     Among,
     Apply,
     Assumption,
@@ -41,12 +41,12 @@ from rcsc.model import (
     key_bounds,
     value_of_key,
 )
-from rcsc.prove.atoms import Universe, assumptions_of, lines_of
-from rcsc.prove.least import find, least, negated, whole, widest
-from rcsc.prove.linear import Simplex
-from rcsc.prove.regions import Answer, Open, Search
-from rcsc.prove.search import Tree
-from rcsc.questions import parts
+from rcsc.lang.questions import parts
+from rcsc.table.regions.atoms import Universe, assumptions_of, lines_of
+from rcsc.table.regions.least import find, least, negated, whole, widest
+from rcsc.table.regions.linear import Simplex
+from rcsc.table.regions.region import Answer, Open, Search
+from rcsc.table.regions.splitting import Tree
 
 BOOL = Bool()
 SMALL = Int(0, 4)

@@ -16,11 +16,11 @@ from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label, MatchedLine, Severity, WitnessColumn
 from rcsc.diagnostics.github import annotation
 from rcsc.diagnostics.jsonform import diagnostic_from_json, diagnostic_to_json, report_to_json
+from rcsc.diagnostics.printable import clip, escape, width
 from rcsc.diagnostics.render import full, one_line, paint, plain
 from rcsc.diagnostics.report import InSystem, Report, SystemReport, TableReport, Verdict
 from rcsc.diagnostics.sarif import fingerprint, sarif, uri
-from rcsc.diagnostics.spelling import clip, escape, width
-from rcsc.source import Source, Span
+from rcsc.diagnostics.source import Source, Span
 
 HERE = Path(__file__).parent
 TEXT = """\

@@ -5,9 +5,9 @@ import sys
 import pytest
 
 from rcsc.diagnostics.diagnostic import Diagnostic
-from rcsc.model import Assign, Call, Int, Program, Real, Select, Test, ToElement, ToLeaf, VariableName
-from rcsc.resolve import compile_text
-from rcsc.source import Source
+from rcsc.diagnostics.source import Source
+from rcsc.lang.model import Assign, Call, Int, Program, Real, Select, Test, ToElement, ToLeaf, VariableName
+from rcsc.lang.resolve import compile_text
 
 # Each case: the text, and for every error in it its line, its code and the text of its span.
 CASES: dict[str, tuple[str, list[tuple[int, str, str]]]] = {

@@ -15,22 +15,29 @@ from typing import Any
 
 import pytest
 
-from rcsc.cli import run
-from rcsc.database.ask import Database
+from rcsc.commands import run
 from rcsc.diagnostics.codes import Code
-from rcsc.system.cell import Outside, StateTableError, signatures
-from rcsc.system.description import description
-from rcsc.system.signature import Value, Values
-from rcsc.workstation.cell import Run, prepare
-from rcsc.workstation.interlocks import Cell
-from rcsc.workstation.orders import DONE, EXECUTING, MACHINE_ORDER, MACHINE_REPORT, VISE_ORDER, VISE_REPORT
-from rcsc.workstation.script import Row
-from rcsc.workstation.station import ANSWER_TICKS, PAUSE_TICKS, Workstation, workstation
-from rcsc.workstation.stopped import NotResumed, go_on, keep, stopped_path
-from sim.cell import lying, plant
-from sim.plant import Plant
-from sim.processes import outside as outside_of_processes
-from sim.witness import Timed
+from rcsc.run.description import description
+from rcsc.run.signature import Value, Values
+from rcsc.run.system import Outside, StateTableError, signatures
+from rcsc_cell.cell.plant import Plant
+from rcsc_cell.cell.ready import lying, plant
+from rcsc_cell.database.ask import Database
+from rcsc_cell.episodes.processes import outside as outside_of_processes
+from rcsc_cell.episodes.witness import Timed
+from rcsc_cell.workstation.interlocks import Cell
+from rcsc_cell.workstation.orders import (
+    DONE,
+    EXECUTING,
+    MACHINE_ORDER,
+    MACHINE_REPORT,
+    VISE_ORDER,
+    VISE_REPORT,
+)
+from rcsc_cell.workstation.prepared import Run, prepare
+from rcsc_cell.workstation.script import Row
+from rcsc_cell.workstation.station import ANSWER_TICKS, PAUSE_TICKS, Workstation, workstation
+from rcsc_cell.workstation.stopped import NotResumed, go_on, keep, stopped_path
 from tests.cells import REPO, SYSTEM
 
 HEAD = "command,part,source,dest,end_at\n"
@@ -86,7 +93,7 @@ def stopped_by_robot() -> Run:
 
 def rcsc(*args: str) -> "subprocess.CompletedProcess[str]":
     """A process of its own."""
-    command = [sys.executable, "-c", "from rcsc.cli import main; main()", *args]
+    command = [sys.executable, "-c", "from rcsc.commands import main; main()", *args]
     return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
@@ -631,7 +638,7 @@ def test_a_stop_that_cannot_be_kept_says_how_to_begin_anew(
 
     Path("bad.csv").write_text(HEAD + "MOVE,,,FIX-SAFE,\nENGRAVE PART,,,,\n", encoding="utf-8")
     kept = keep(stopped_at_vise(), "go.csv")
-    monkeypatch.setattr("rcsc.workstation.stopped.write_atomically", full)
+    monkeypatch.setattr("rcsc_cell.workstation.stopped.write_atomically", full)
     assert run(["run", "bad.csv", *QUICK]) == 1
     said = capfd.readouterr().err
     assert "No space left on device" in said

@@ -13,24 +13,24 @@ from pathlib import Path
 import pytest
 
 from rcsc.diagnostics.codes import Code
+from rcsc.diff.changes.difference import ProgramDifference
 from rcsc.diff.compare import compare
-from rcsc.diff.difference import ProgramDifference
 from rcsc.driver import TARGETS, compile_
-from rcsc.driver.work import Settings
-from rcsc.prove.options import Options
+from rcsc.driver.settings import Settings
+from rcsc.run.description import description
+from rcsc.run.system import Kind, assemble, signatures
 from rcsc.shell.commands import HELP, Commands
-from rcsc.shell.refusal import Refused
-from rcsc.shell.reload import Plant
+from rcsc.shell.reload.refusal import Refused
+from rcsc.shell.reload.reload import Plant
+from rcsc.shell.reload.sources import kept, laid_out
 from rcsc.shell.session import Session, silent_queries
-from rcsc.shell.sources import kept, laid_out
-from rcsc.system.cell import Kind, assemble, signatures
-from rcsc.system.description import description
-from rcsc.workstation.cell import database_of
-from sim.cell import plant
+from rcsc.solvers.options import Options
+from rcsc_cell.cell.ready import plant
+from rcsc_cell.workstation.prepared import database_of
 
 REPO = Path(__file__).parents[1]
 SYSTEM = REPO / "tables" / "system.toml"
-RCSC = [sys.executable, "-c", "from rcsc.cli import main; main()", "shell"]
+RCSC = [sys.executable, "-c", "from rcsc.commands import main; main()", "shell"]
 MOVE = ["command.inc_command = 1", "command.input_command = move", "command.dest_locpt = 3"]
 DONE = "run until task.report.inc_command_echo = 1 and task.report.status_report = done"
 
@@ -769,12 +769,12 @@ def test_what_cannot_be_compared_is_taken_only_if_that_is_said(
     assert "nothing changed" not in do(commands, "reload anyway")[-1]
     write(walker)
     monkeypatch.setattr(
-        "rcsc.shell.gate.compare",
+        "rcsc.shell.reload.gate.compare",
         lambda *args, **more: replace(compare(*args, **more), undecided=("table `walk`",)),
     )
     error = refused(commands, "reload")
     assert (error.code, "the solver gave up on table `walk`" in str(error)) == (Code.SHELL_OTHERWISE, True)
-    monkeypatch.setattr("rcsc.shell.gate.compare", lambda name, *_, **__: ProgramDifference(name))
+    monkeypatch.setattr("rcsc.shell.reload.gate.compare", lambda name, *_, **__: ProgramDifference(name))
     do(commands, "at = middle", "at.next = middle", "go = true")
     with pytest.raises(RuntimeError, match="nothing is said to differ"):
         do(commands, "reload")

@@ -5,13 +5,13 @@ from pathlib import Path
 
 import pytest
 
-from rcsc.cli import run
+from rcsc.commands import run
 from rcsc.diagnostics.codes import Code
 from rcsc.driver import TARGETS, compile_
-from rcsc.driver.work import Settings
-from rcsc.prove.options import Options
-from rcsc.shell import composed
+from rcsc.driver.settings import Settings
 from rcsc.shell.commands import HELP
+from rcsc.shell.reload import composed
+from rcsc.solvers.options import Options
 from tests.test_shell import alone, do, refused, state
 
 SMALL = Path(__file__).parent / "data" / "composed"

@@ -11,10 +11,10 @@ from typing import Any
 import jsonschema
 import pytest
 
-from rcsc.cache import FOLDER, Cache
-from rcsc.cli import run
-from rcsc.compose.standing import Known, Outline, Standing, outline_of, standing
+from rcsc.commands import run
+from rcsc.compose.proof.standing import Known, Outline, Standing, outline_of, standing
 from rcsc.driver import outline
+from rcsc.host.cache import FOLDER, Cache
 
 SMALL = Path(__file__).parent / "data" / "composed"
 KEPT = "assuming in_step (proved), kept by the levels together, system.toml"

@@ -11,28 +11,28 @@ from random import Random
 
 import pytest
 
-from rcsc.cli.show import backing
-from rcsc.compose.contract import Links
-from rcsc.compose.transition import Stepper
+from rcsc.commands.shared.show import backing
+from rcsc.compose.contract.environment import Links
+from rcsc.compose.contract.transition import Stepper
 from rcsc.diagnostics.jsonform import table_from_json, table_to_json
 from rcsc.driver import TARGETS, compile_
-from rcsc.driver.work import Settings
+from rcsc.driver.settings import Settings
 from rcsc.emit import emit_c, emit_python
+from rcsc.emit.lower import lower
 from rcsc.emit.write import write
-from rcsc.interpret import Fault, cycle, evaluate, initial, run_table, unfit
-from rcsc.lower import lower
-from rcsc.meaning import with_stops
-from rcsc.model import Bool, Int, Kind, Program, Snapshot, Value
-from rcsc.prove.options import Options
-from rcsc.prove.program import ProgramVerdict, prove_program
-from rcsc.prove.values import TRUE, constant
-from rcsc.resolve import compile_text
-from rcsc.system.adopt import restart
-from rcsc.system.buffers import CommonMemory
-from rcsc.system.executors import CExecutor, PythonExecutor, build
-from rcsc.system.levels import BadState, RunningLevel
-from rcsc.system.signature import signature
-from rcsc.testing.bits import same_value
+from rcsc.lang.interpret import Fault, cycle, evaluate, initial, run_table, unfit
+from rcsc.lang.meaning import with_stops
+from rcsc.lang.model import Bool, Int, Kind, Program, Snapshot, Value
+from rcsc.lang.resolve import compile_text
+from rcsc.run.adopt import restart
+from rcsc.run.buffers import CommonMemory
+from rcsc.run.executors import CExecutor, PythonExecutor, build
+from rcsc.run.levels import BadState, RunningLevel
+from rcsc.run.signature import signature
+from rcsc.solvers.options import Options
+from rcsc.symbolic.values import TRUE, constant
+from rcsc.table.program import ProgramVerdict, prove_program
+from rcsc.testing.executors.equality import same_value
 from tests.emitted import STOPS, proved_of
 
 SAFETY = {"RCS410", "RCS411", "RCS412", "RCS413", "RCS414", "RCS415", "RCS417"}

@@ -10,12 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rcsc.diagnostics.codes import Code
-from rcsc.source import Source, Span
-from rcsc.syntax import tree
-from rcsc.syntax.format import format_file, format_text
-from rcsc.syntax.lalr import Node, Tables
-from rcsc.syntax.parse import MOST_ERRORS, parse
-from rcsc.syntax.spell import spell_expr
+from rcsc.diagnostics.source import Source, Span
+from rcsc.lang.syntax import tree
+from rcsc.lang.syntax.format import format_file, format_text
+from rcsc.lang.syntax.lalr import Node, Tables
+from rcsc.lang.syntax.parse import MOST_ERRORS, parse
+from rcsc.lang.syntax.spell import spell_expr
 from tests.strategies_syntax import expressions, files
 
 REPO = Path(__file__).parents[1]

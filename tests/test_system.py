@@ -5,15 +5,15 @@ from pathlib import Path
 
 import pytest
 
-from rcsc.database.ask import Database
-from rcsc.database.pose import about_z
-from rcsc.system.cell import System
-from rcsc.system.levels import RunningLevel
-from rcsc.workstation.cell import prepare
-from sim.cell import Lying, plant
-from sim.model import Body
-from sim.plant import Plant
-from sim.witness import placements
+from rcsc.run.levels import RunningLevel
+from rcsc.run.system import System
+from rcsc_cell.cell.mujoco_model import Body
+from rcsc_cell.cell.plant import Plant
+from rcsc_cell.cell.ready import Lying, plant
+from rcsc_cell.database.ask import Database
+from rcsc_cell.database.pose import about_z
+from rcsc_cell.episodes.witness import placements
+from rcsc_cell.workstation.prepared import prepare
 from tests.cells import PAUSE_ENDS, SCRIPT, SYSTEM, Cell, through_script
 
 

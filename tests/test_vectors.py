@@ -7,13 +7,13 @@ from pathlib import Path
 
 import pytest
 
-from rcsc.interpret import holds, matching_lines
-from rcsc.model import Program
-from rcsc.project import load
-from rcsc.resolve import compile_text, resolve
-from rcsc.testing.export import vectors_csv, vectors_json
-from rcsc.testing.search import Missing, box_of, complement, intersection, search_in
-from rcsc.testing.vectors import Vectors, atoms, vectors_of
+from rcsc.lang.interpret import holds, matching_lines
+from rcsc.lang.model import Program
+from rcsc.lang.project import load
+from rcsc.lang.resolve import compile_text, resolve
+from rcsc.testing.inputs.export import vectors_csv, vectors_json
+from rcsc.testing.inputs.snapshot import Missing, box_of, complement, intersection, search_in
+from rcsc.testing.inputs.vectors import Vectors, atoms, vectors_of
 
 COUPLED = """
 enum mode { idle, run, stop }

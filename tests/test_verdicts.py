@@ -15,13 +15,13 @@ from rcsc.diagnostics.jsonform import report_to_json
 from rcsc.diagnostics.report import NOT_PROVED, Report, TableReport, Verdict, merged, resting
 from rcsc.diagnostics.sarif import sarif
 from rcsc.driver import check
-from rcsc.driver.work import Settings
-from rcsc.interpret import holds, matching_lines
-from rcsc.model import Program, Value
-from rcsc.prove.options import Options
-from rcsc.prove.program import prove_program
-from rcsc.prove.verdict import ContradictoryAssumptions, DeadLine, Gap, Overlap, Undecided
-from rcsc.resolve import compile_text
+from rcsc.driver.settings import Settings
+from rcsc.lang.interpret import holds, matching_lines
+from rcsc.lang.model import Program, Value
+from rcsc.lang.resolve import compile_text
+from rcsc.solvers.options import Options
+from rcsc.table.program import prove_program
+from rcsc.table.verdict import ContradictoryAssumptions, DeadLine, Gap, Overlap, Undecided
 
 HERE = {
     "lib": "state a : int 0 .. 9\ninput g : bool\ntable t {\n  | line | a ||\n  | l | <= 4 ||\n  | h | 5 .. 8 ||\n}\n",

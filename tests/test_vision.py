@@ -13,17 +13,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 
-from sim.vision import blobs as blobs_module
-from sim.vision import flood as flood_module
-from sim.vision import line as line_module
-from sim.vision import model as model_module
-from sim.vision import optics as optics_module
-from sim.vision.blobs import blobs, half_turn, label
-from sim.vision.camera import Camera
-from sim.vision.flood import Features, Found, find
-from sim.vision.line import LEAN, Surface, measure
-from sim.vision.model import Top, perceive, perceive_surface
-from sim.vision.optics import STANDARD, Floats, FloodImage, LineImage
+from rcsc_cell.vision import blobs as blobs_module
+from rcsc_cell.vision import flood as flood_module
+from rcsc_cell.vision import formulas as model_module
+from rcsc_cell.vision import line as line_module
+from rcsc_cell.vision import optics as optics_module
+from rcsc_cell.vision.blobs import blobs, half_turn, label
+from rcsc_cell.vision.camera import Camera
+from rcsc_cell.vision.flood import Features, Found, find
+from rcsc_cell.vision.formulas import Top, perceive, perceive_surface
+from rcsc_cell.vision.line import LEAN, Surface, measure
+from rcsc_cell.vision.optics import STANDARD, Floats, FloodImage, LineImage
 from tests.bench import vision as bench
 from tests.scenes import (
     BBOX,
@@ -299,7 +299,7 @@ def test_image_processing_cannot_know_the_world(module: ModuleType) -> None:
         elif isinstance(node, ast.ImportFrom):
             names.add(node.module or "")
     allowed = {"collections.abc", "dataclasses", "math", "numpy", "numpy.typing"}
-    assert names - allowed <= {f"sim.vision.{name}" for name in KNOWS}
+    assert names - allowed <= {f"rcsc_cell.vision.{name}" for name in KNOWS}
 
 
 def test_what_image_processing_is_given() -> None:

@@ -7,17 +7,17 @@ from pathlib import Path
 
 import pytest
 
-from rcsc.cli import run
-from rcsc.database.ask import Database, open_database
-from rcsc.database.build import BadData, build
-from rcsc.system.cell import System
-from rcsc.workstation.cell import prepare
-from rcsc.workstation.interlocks import Cell, after, refusal
-from rcsc.workstation.script import BadScript, Row, read_script
-from sim import reach
-from sim.cell import Lying, lying, plant
-from sim.model import Body
-from sim.plant import Plant
+from rcsc.commands import run
+from rcsc.run.system import System
+from rcsc_cell.cell import reach
+from rcsc_cell.cell.mujoco_model import Body
+from rcsc_cell.cell.plant import Plant
+from rcsc_cell.cell.ready import Lying, lying, plant
+from rcsc_cell.database.ask import Database, open_database
+from rcsc_cell.database.build import BadData, build
+from rcsc_cell.workstation.interlocks import Cell, after, refusal
+from rcsc_cell.workstation.prepared import prepare
+from rcsc_cell.workstation.script import BadScript, Row, read_script
 from tests.cells import REPO, SYSTEM
 
 PARTS = ("null_obj", "tbox", "bbox", "flag", "hous", "close_grip", "unknown_object")

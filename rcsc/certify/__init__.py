@@ -5,7 +5,7 @@ was not, and what it rests on. None of the prover's code is used, nor `Test.box`
 statements. Trusted besides this folder: Python, numpy, the parser and `resolve` (with the bounds that it gives the types of
 expressions), and a solver for what the report says that it answered.
 
-1. `rcsc.meaning.digest` binds the certificate to the whole program, and to which assumptions stop a cycle. The prover's options are
+1. `rcsc.lang.meaning.digest` binds the certificate to the whole program, and to which assumptions stop a cycle. The prover's options are
    not bound: nothing that is checked depends on them.
 2. What is owed is derived from the program (`owed`, by symbolic runs, `run`), never read from the certificate. The certificate only helps:
    a tree of regions for each table (`table`), and an input at which its assumptions hold together.
@@ -23,15 +23,15 @@ from typing import Any
 
 import numpy as np
 
+from rcsc.certify.execution import Owed, Start
 from rcsc.certify.known import Known
 from rcsc.certify.owed import Debt, Debts
-from rcsc.certify.run import Owed, Start
 from rcsc.certify.settle import Answer, Ask, Fails, Left, Outcome, Settler, Shown, values_in, variables
 from rcsc.certify.table import RejectedError, TableChecker
 from rcsc.certify.values import BOOL, INT, REAL, Term
-from rcsc.meaning import digest, relying
-from rcsc.model import AssumptionName, Bool, Program, Real, Scalar, Standing, Table, Value, key_bounds
-from rcsc.source import Span
+from rcsc.diagnostics.source import Span
+from rcsc.lang.meaning import digest, relying
+from rcsc.lang.model import AssumptionName, Bool, Program, Real, Scalar, Standing, Table, Value, key_bounds
 
 __all__ = ["Answer", "Ask", "Certified", "Unchecked", "certify", "check_certificate"]
 

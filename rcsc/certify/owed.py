@@ -14,15 +14,17 @@ line's actions and then postprocess; it may also end wherever an extern procedur
   what levels run before and after their tables, and in procedures that nothing calls (for all parameters);
 - no two actions of a line write different values to one output.
 
-The steps are those of `rcsc/interpret.py`; the argument is induction over them.
+The steps are those of `rcsc/lang/interpret.py`; the argument is induction over them.
 """
 
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-from rcsc.certify.run import Owed, Run, Start, TooLongError
+from rcsc.certify.execution import Owed, Run, Start, TooLongError
 from rcsc.certify.values import Term, ends_of, sort_of
-from rcsc.model import (
+from rcsc.diagnostics.source import Span as Written
+from rcsc.lang.leaves import everything, read_by
+from rcsc.lang.model import (
     Action,
     Assumption,
     Call,
@@ -40,8 +42,6 @@ from rcsc.model import (
     Variable,
     pending,
 )
-from rcsc.resolve.leaves import everything, read_by
-from rcsc.source import Span as Written
 
 
 @dataclass(frozen=True, slots=True)

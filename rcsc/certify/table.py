@@ -15,12 +15,13 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from rcsc.certify.execution import Owed, Run, Start
 from rcsc.certify.owed import Debt
-from rcsc.certify.run import Owed, Run, Start
 from rcsc.certify.settle import values_in
 from rcsc.certify.values import BOOL, INT, REAL, Term
-from rcsc.meaning import spelled
-from rcsc.model import (
+from rcsc.lang.leaves import read_by
+from rcsc.lang.meaning import spelled
+from rcsc.lang.model import (
     COMPARISONS,
     Among,
     Apply,
@@ -38,7 +39,6 @@ from rcsc.model import (
     key_of,
     real_of_key,
 )
-from rcsc.resolve.leaves import read_by
 
 Form: TypeAlias = tuple[tuple[str, int], ...]
 """Terms by name and their coefficients; sorted by name, the first positive, no common divisor."""

@@ -13,7 +13,7 @@ from collections.abc import Container, Iterable, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from rcsc.model import Bool, Real, Scalar, Value, key_bounds
+from rcsc.lang.model import Bool, Real, Scalar, Value, key_bounds
 
 Number: TypeAlias = int | float
 Span: TypeAlias = tuple[Number, Number] | None

@@ -25,8 +25,8 @@ What it assumes of its environment, the contract (`transition`), in words:
 - of the database: the same question has the same answer. Of everything else: its declared range.
 
 Why the contract may be assumed. Let a superior U publish orders, a subordinate D take them and publish reports,
-through buffers that hold the latest value, whole (`system.buffers`; processes copy under a sequence lock,
-`system.shared`). What D takes was published by U, never older than what it took before; likewise back. Suppose that
+through buffers that hold the latest value, whole (`run.buffers`; processes copy under a sequence lock,
+`run.processes.memory`). What D takes was published by U, never older than what it took before; likewise back. Suppose that
 up to some cycle every level has kept its guarantees. U's orders are then numbered one after the other, so that two
 orders under one number are the same, or 65536 numbers apart. D's report echoes the order that it took: so what is
 reported under number *n* is about order *n* (1); no number is echoed that was not sent (2); as D takes no older
@@ -41,7 +41,7 @@ What it rests on besides:
 - *Numbers.* They are 16 bits and wrap; here they are exact. "65536 numbers apart" is excluded by *freshness*: nobody
   is so late that all numbers go round meanwhile, which takes at least 65536 cycles, 43 minutes at 40 ms. A level that
   waits for echoes before it orders again cannot come near it (`WAITS`).
-- *Restarts.* A level may begin anew at any moment as `system.adopt` says: its order is PAUSE under the number after the
+- *Restarts.* A level may begin anew at any moment as `run.adopt` says: its order is PAUSE under the number after the
   order that stands in its buffer, or after the echo where none stands, and what it takes counts as seen. Such a
   beginning is proved like the first. For its neighbours it is an order that is superseded, or a report that failed;
   freshness then asks more where none stands: no order that the level gave before and that is not echoed yet may still

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from rcsc.diagnostics.codes import Code
-from rcsc.source import Span
+from rcsc.diagnostics.source import Span
 
 
 class Severity(StrEnum):

@@ -5,10 +5,10 @@ runner's `ActionCommand` (`%`, CR and LF in data, and `:` and `,` too in propert
 """
 
 from rcsc.diagnostics.diagnostic import Diagnostic, Severity
+from rcsc.diagnostics.printable import escape
 from rcsc.diagnostics.render import region
 from rcsc.diagnostics.report import Report
-from rcsc.diagnostics.spelling import escape
-from rcsc.source import Source, Sources
+from rcsc.diagnostics.source import Source, Sources
 
 _WORD = {Severity.ERROR: "error", Severity.WARNING: "warning", Severity.NOTE: "notice"}
 

@@ -11,7 +11,7 @@ from rcsc import __version__
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label, MatchedLine, Severity, WitnessColumn
 from rcsc.diagnostics.report import InSystem, Report, SystemReport, TableReport, Verdict
-from rcsc.source import Source, Sources, Span
+from rcsc.diagnostics.source import Source, Sources, Span
 
 FORM = 1
 """Version of this form; it rises when a member changes its meaning or goes away."""

@@ -10,8 +10,8 @@ from enum import StrEnum
 from itertools import groupby
 
 from rcsc.diagnostics.diagnostic import Diagnostic, Label, Severity, WitnessColumn
-from rcsc.diagnostics.spelling import clip, escape, pad, width
-from rcsc.source import Source, Sources
+from rcsc.diagnostics.printable import clip, escape, pad, width
+from rcsc.diagnostics.source import Source, Sources
 
 WIDEST_LINE = 200
 """Cells shown of a source line where the terminal's width is not known."""

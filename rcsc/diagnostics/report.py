@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 from rcsc.diagnostics.diagnostic import Diagnostic, Severity
-from rcsc.source import Source
+from rcsc.diagnostics.source import Source
 
 
 class Verdict(StrEnum):

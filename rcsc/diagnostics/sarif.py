@@ -15,7 +15,7 @@ from rcsc.diagnostics.explanations import explain
 from rcsc.diagnostics.jsonform import table_to_json
 from rcsc.diagnostics.render import region
 from rcsc.diagnostics.report import Report
-from rcsc.source import Source, Sources, Span
+from rcsc.diagnostics.source import Source, Sources, Span
 
 SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
 

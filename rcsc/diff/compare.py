@@ -6,21 +6,21 @@ In: resolved programs. Out: a `ProgramDifference`. What a solver gives up on is 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
-from rcsc.diff import parts
-from rcsc.diff.align import aligned
-from rcsc.diff.difference import Difference, Part, ProgramDifference, Traces
-from rcsc.diff.follows import follows
+from rcsc.diff.changes import parts
+from rcsc.diff.changes.align import aligned
+from rcsc.diff.changes.difference import Difference, Part, ProgramDifference, Traces
+from rcsc.diff.changes.follows import follows
+from rcsc.diff.changes.tables import table_part
+from rcsc.diff.changes.traces import traces
+from rcsc.diff.changes.versions import Versions
 from rcsc.diff.revision import NotComparedError
 from rcsc.diff.sides import Side, pairs
-from rcsc.diff.tables import table_part
-from rcsc.diff.traces import traces
-from rcsc.diff.versions import Versions
-from rcsc.model import Program
-from rcsc.prove import smt
-from rcsc.prove.cover import UndecidedError
-from rcsc.prove.evaluation import TooLongError
-from rcsc.prove.obligations import Obligations
-from rcsc.prove.options import Options
+from rcsc.lang.model import Program
+from rcsc.procedures.obligations import Obligations
+from rcsc.solvers import smt
+from rcsc.solvers.options import Options
+from rcsc.symbolic.evaluation import TooLongError
+from rcsc.table.cover import UndecidedError
 
 
 def compare(

@@ -6,7 +6,7 @@ In: a `Difference`. Out: a JSON value with all of it; the same difference gives 
 from typing import Any
 
 from rcsc import __version__
-from rcsc.diff.difference import Change, Difference, Follows, Part, ProgramDifference, Transition
+from rcsc.diff.changes.difference import Change, Difference, Follows, Part, ProgramDifference, Transition
 
 FORM = 1
 """Version of the JSON form; it rises when a member changes its meaning or goes away."""

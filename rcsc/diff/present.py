@@ -8,9 +8,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import count
 
-from rcsc.diff.difference import Change, Part, ProgramDifference
-from rcsc.diff.tables import assumed
-from rcsc.model import (
+from rcsc.diff.changes.difference import Change, Part, ProgramDifference
+from rcsc.diff.changes.tables import assumed
+from rcsc.lang.model import (
     Box,
     Call,
     Enum,
@@ -25,14 +25,15 @@ from rcsc.model import (
     pending,
     value_of_key,
 )
-from rcsc.prove import smt, values
-from rcsc.prove.cover import Space, UndecidedError
-from rcsc.prove.effect import Meaning, Shared
-from rcsc.prove.evaluation import TooLongError
-from rcsc.prove.follow import loosened
-from rcsc.prove.options import Options
-from rcsc.prove.symbolic import Run
-from rcsc.prove.values import Node
+from rcsc.relation.follow import loosened
+from rcsc.solvers import smt
+from rcsc.solvers.options import Options
+from rcsc.symbolic import values
+from rcsc.symbolic.effect import Meaning, Shared
+from rcsc.symbolic.evaluation import TooLongError
+from rcsc.symbolic.execution import Run
+from rcsc.symbolic.values import Node
+from rcsc.table.cover import Space, UndecidedError
 
 _ELSEWHERE = frozenset({"procedure", "assumption", "invariant", "property", "standing of assumption"})
 """Parts that do nothing by themselves: what a changed procedure does is seen in the tables that call it."""
@@ -131,7 +132,7 @@ class _Cycle:
         return {name: run.leaf(name) for name in self.kinds}
 
     def _settle(self, run: Run) -> None:
-        """Source: `rcsc.interpret.settle`."""
+        """Source: `rcsc.lang.interpret.settle`."""
         deferred = [v for v in self.program.variables if v.deferred_until is not None]
         due = [run.evaluate(v.deferred_until) for v in deferred if v.deferred_until is not None]
         later = [run.leaf(pending(v.name)) for v in deferred]

@@ -10,8 +10,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
-from rcsc import children
-from rcsc.project import PROJECT_FILE
+from rcsc.host import children
+from rcsc.lang.project import PROJECT_FILE
 
 _REGULAR, _LINK = ("100644", "100755"), "120000"
 

@@ -8,13 +8,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from rcsc.children import scratch
 from rcsc.diagnostics.diagnostic import Diagnostic, Label, Severity
+from rcsc.diagnostics.source import Source
 from rcsc.diff.revision import NotComparedError, lay_out
-from rcsc.model import Program
-from rcsc.project import load
-from rcsc.resolve import resolve
-from rcsc.source import Source
+from rcsc.host.children import scratch
+from rcsc.lang.model import Program
+from rcsc.lang.project import load
+from rcsc.lang.resolve import resolve
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,18 +10,18 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rcsc.cache import Cache, open_cache
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label, sort_key
 from rcsc.diagnostics.report import Report, merged
-from rcsc.driver.work import Effort, Made, Proof, Settings
-from rcsc.source import Span
+from rcsc.diagnostics.source import Span
+from rcsc.driver.settings import Effort, Made, Proof, Settings
+from rcsc.host.cache import Cache, open_cache
 
 if TYPE_CHECKING:
     from rcsc.driver.certified import Checking
-    from rcsc.model import Program, ProvedProgram
-    from rcsc.plan import Plan
-    from rcsc.project import Loaded
+    from rcsc.emit.plan import Plan
+    from rcsc.lang.model import Program, ProvedProgram
+    from rcsc.lang.project import Loaded
 
 TARGETS = ("python", "c")
 
@@ -118,7 +118,7 @@ def certify(settings: Settings, how: "Checking", write: Path | None, against: Pa
 
 
 def _cache(settings: Settings) -> Cache | None:
-    from rcsc.project import project_root
+    from rcsc.lang.project import project_root
 
     if not settings.use_cache:
         return None
@@ -128,7 +128,7 @@ def _cache(settings: Settings) -> Cache | None:
 
 
 def _load(settings: Settings) -> "Loaded":
-    from rcsc.project import load
+    from rcsc.lang.project import load
 
     settings.progress("reading")
     return load(settings.paths, settings.stdin)
@@ -137,8 +137,8 @@ def _load(settings: Settings) -> "Loaded":
 def _proofs(loaded: "Loaded", settings: Settings, cache: Cache | None) -> Iterator[Proof]:
     """Resolve and prove each root; findings of its files where it cannot be resolved."""
     from rcsc.driver.proofs import prove
-    from rcsc.model import Program
-    from rcsc.resolve import resolve
+    from rcsc.lang.model import Program
+    from rcsc.lang.resolve import resolve
 
     for root in loaded.roots:
         settings.progress(f"proving {root}")
@@ -201,8 +201,8 @@ def _emitted(plan: "Plan", targets: tuple[str, ...]) -> dict[str, str]:
 
 
 def _plan(proved: "ProvedProgram", *, defensive: bool = False) -> "Plan":
-    from rcsc.lower import lower
-    from rcsc.project import project_root
+    from rcsc.emit.lower import lower
+    from rcsc.lang.project import project_root
 
     return lower(proved, project_root(proved.program.file), defensive=defensive)
 

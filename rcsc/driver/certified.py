@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label, Severity
 from rcsc.diagnostics.report import Report
-from rcsc.driver.work import Made
-from rcsc.files import write_atomically
-from rcsc.files.read import Malformed, content, json_of
-from rcsc.project import Loaded
-from rcsc.source import Span
+from rcsc.diagnostics.source import Span
+from rcsc.driver.settings import Made
+from rcsc.host.files import write_atomically
+from rcsc.host.files.read import Malformed, content, json_of
+from rcsc.lang.project import Loaded
 
 if TYPE_CHECKING:
     from rcsc.certify import Answer, Certified
-    from rcsc.model import Program, ProvedProgram
+    from rcsc.lang.model import Program, ProvedProgram
 
 MOST_PROBLEMS = 10
 
@@ -71,8 +71,8 @@ def reviewed(
     The certificate must name the stopping assumptions of what was `proved`, from which executors are made.
     """
     from rcsc.certify import certify
-    from rcsc.model import Program
-    from rcsc.resolve import resolve
+    from rcsc.lang.model import Program
+    from rcsc.lang.resolve import resolve
 
     if isinstance(certificate, Diagnostic):
         return Made(Report((certificate,)), "not certified")
@@ -123,7 +123,7 @@ def _kept_questions(outcome: "Certified", folder: Path) -> list[Diagnostic]:
 def _cvc5(question: str) -> "Answer":
     """cvc5's answer, which has no part in the proof."""
     from rcsc.certify import Answer
-    from rcsc.smtlib import cvc5_says
+    from rcsc.solvers.smtlib import cvc5_says
 
     return {"unsat": Answer.NONE, "sat": Answer.SOME}.get(cvc5_says(question), Answer.UNKNOWN)
 

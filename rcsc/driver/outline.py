@@ -9,8 +9,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rcsc.cache import Cache
-from rcsc.compose.standing import (
+from rcsc.compose.proof.standing import (
     Assumed,
     LevelOutline,
     Outline,
@@ -21,13 +20,14 @@ from rcsc.compose.standing import (
     standing,
 )
 from rcsc.driver.unchanged import as_before, digest_at, digests
-from rcsc.system.description import BadDescription, description, places
+from rcsc.host.cache import Cache
+from rcsc.run.description import BadDescription, description, places
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from rcsc.compose.transition import Stepper
-    from rcsc.model import Program, Table
+    from rcsc.compose.contract.transition import Stepper
+    from rcsc.lang.model import Program, Table
 
 
 def known(system: Path, cache: Cache) -> Standing | None:
@@ -52,7 +52,7 @@ def outlined(system: Path, cache: Cache) -> Outline | None:
 
 def _read(system: Path) -> "tuple[dict[str, Stepper], dict[str, str]] | None":
     """Steppers of all levels, and what they were read from; None where they cannot be, or a file has changed meanwhile."""
-    from rcsc.compose.system import NoProgramError, loaded_program, steppers_of
+    from rcsc.compose.proof.system import NoProgramError, loaded_program, steppers_of
 
     looked_at = {str(system): digest_at(str(system))}
     programs: dict[str, Program] = {}
@@ -72,8 +72,8 @@ def _read(system: Path) -> "tuple[dict[str, Stepper], dict[str, str]] | None":
 
 def outline(made: "Mapping[str, Stepper]") -> Outline:
     """What levels are made of."""
-    from rcsc.compose.agreed import promises
-    from rcsc.compose.kept import content
+    from rcsc.compose.proof.assume_guarantee import promises
+    from rcsc.compose.proof.kept import content
 
     levels = tuple(
         LevelOutline(
@@ -95,7 +95,7 @@ def outline(made: "Mapping[str, Stepper]") -> Outline:
 
 def _run_by(stepper: "Stepper") -> "list[Table]":
     """The tables that the level runs."""
-    from rcsc.model import OneTable
+    from rcsc.lang.model import OneTable
 
     chosen = stepper.level.tables
     names = {chosen.table} if isinstance(chosen, OneTable) else {table for _, table in chosen.tables}

@@ -10,19 +10,19 @@ from collections.abc import Collection, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
-from rcsc.cache import Cache
 from rcsc.diagnostics.diagnostic import Diagnostic, Label, Severity, sort_key
 from rcsc.diagnostics.jsonform import diagnostic_from_json, diagnostic_to_json, table_from_json, table_to_json
 from rcsc.diagnostics.report import TableReport, Verdict, resting
-from rcsc.driver.work import Proof
-from rcsc.meaning import digest
-from rcsc.model import Program, Standing, Table
-from rcsc.project import Loaded
-from rcsc.prove.certificate import must_cover
-from rcsc.prove.obligations import called_by_lines
-from rcsc.prove.options import Options
-from rcsc.prove.verdict import DeadLine, Gap, SolversDisagree, TableVerdict, Undecided
-from rcsc.source import Span
+from rcsc.diagnostics.source import Span
+from rcsc.driver.settings import Proof
+from rcsc.host.cache import Cache
+from rcsc.lang.meaning import digest
+from rcsc.lang.model import Program, Standing, Table
+from rcsc.lang.project import Loaded
+from rcsc.procedures.obligations import called_by_lines
+from rcsc.solvers.options import Options
+from rcsc.table.certificate import must_cover
+from rcsc.table.verdict import DeadLine, Gap, SolversDisagree, TableVerdict, Undecided
 
 WORTH_A_PROCESS = 20_000
 """Cells of a program's tables from which several processes are quicker than one."""
@@ -30,8 +30,8 @@ WORTH_A_PROCESS = 20_000
 
 def prove(root: str, program: Program, loaded: Loaded, options: Options, cache: Cache | None) -> Proof:
     """Prove a program's tables, procedures and invariants; with a cache only what is not known."""
-    from rcsc.prove.invariants import properties_elsewhere
-    from rcsc.prove.program import prove_program
+    from rcsc.procedures.invariants import properties_elsewhere
+    from rcsc.table.program import prove_program
 
     cells = sum(len(table.lines) * len(table.columns) for table in program.tables)
     options = options if cells >= WORTH_A_PROCESS else replace(options, jobs=1)

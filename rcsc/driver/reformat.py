@@ -8,12 +8,12 @@ from pathlib import Path
 
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label, sort_key
+from rcsc.diagnostics.printable import escape
 from rcsc.diagnostics.report import Report
-from rcsc.diagnostics.spelling import escape
-from rcsc.files import write_atomically
-from rcsc.project import load
-from rcsc.source import Source, Span
-from rcsc.syntax import tree
+from rcsc.diagnostics.source import Source, Span
+from rcsc.host.files import write_atomically
+from rcsc.lang.project import load
+from rcsc.lang.syntax import tree
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,8 +62,8 @@ def _text(name: str, before: tree.File) -> str:
     Raises:
         RuntimeError: It does not; that is a bug.
     """
-    from rcsc.syntax.format import format_file
-    from rcsc.syntax.parse import parse
+    from rcsc.lang.syntax.format import format_file
+    from rcsc.lang.syntax.parse import parse
 
     text = format_file(before)
     if parse(Source(name, text)) != before:

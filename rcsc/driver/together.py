@@ -10,16 +10,16 @@ from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from rcsc.cache import Cache, cache_of
-from rcsc.compose.claims import UNREACHED
-from rcsc.compose.standing import ASSUMPTION, PROPERTY, Assumed, Known, LevelOutline, Standing
+from rcsc.compose.contract.claims import UNREACHED
+from rcsc.compose.proof.standing import ASSUMPTION, PROPERTY, Assumed, Known, LevelOutline, Standing
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label, Severity, sort_key
 from rcsc.diagnostics.report import NOT_PROVED, InSystem, Report, SystemReport, TableReport, named, trusting
+from rcsc.diagnostics.source import Source, Span
 from rcsc.driver.outline import known
-from rcsc.project import PROJECT_FILE
-from rcsc.source import Source, Span
-from rcsc.system.description import BadDescription, description, places
+from rcsc.host.cache import Cache, cache_of
+from rcsc.lang.project import PROJECT_FILE
+from rcsc.run.description import BadDescription, description, places
 
 SYSTEM_FILE = "system.toml"
 DECLARED_PROVED = "proved"

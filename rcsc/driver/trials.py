@@ -8,16 +8,16 @@ from pathlib import Path
 
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label
-from rcsc.driver.work import Effort
-from rcsc.files import write_atomically
-from rcsc.model import Expr, Program, Snapshot, Table
-from rcsc.prove.options import Options
-from rcsc.source import Span
-from rcsc.testing.export import vectors_csv, vectors_json
+from rcsc.diagnostics.source import Span
+from rcsc.driver.settings import Effort
+from rcsc.host.files import write_atomically
+from rcsc.lang.model import Expr, Program, Snapshot, Table
+from rcsc.solvers.options import Options
+from rcsc.testing.inputs.export import vectors_csv, vectors_json
+from rcsc.testing.inputs.snapshot import Missing, search_in
+from rcsc.testing.inputs.vectors import vectors_of
 from rcsc.testing.mutants import Opinion
-from rcsc.testing.search import Missing, search_in
 from rcsc.testing.suite import Proofs, SuiteOptions, run_suite
-from rcsc.testing.vectors import vectors_of
 
 
 def try_out(
@@ -63,11 +63,11 @@ def _unwritten(file: Path, why: str) -> Diagnostic:
 
 def proofs(options: Options) -> Proofs:
     """The prover and its solver, as far as the suite needs them."""
-    from rcsc.prove.certificate import must_cover
-    from rcsc.prove.encode import declared, encode
-    from rcsc.prove.smt import Answer, Solver
-    from rcsc.prove.table import prove_table
-    from rcsc.prove.verdict import Gap
+    from rcsc.solvers.smt import Answer, Solver
+    from rcsc.symbolic.encode import declared, encode
+    from rcsc.table.certificate import must_cover
+    from rcsc.table.decide import prove_table
+    from rcsc.table.verdict import Gap
 
     def prover(program: Program, table: Table) -> Opinion:
         verdict = prove_table(program, table, options)

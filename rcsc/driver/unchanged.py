@@ -11,15 +11,15 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rcsc.cache import Cache
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.report import Report
-from rcsc.files.read import Malformed, content
-from rcsc.project import MOST_BYTES, PROJECT_FILE, Loaded, listed, project_root
-from rcsc.source import Source
+from rcsc.diagnostics.source import Source
+from rcsc.host.cache import Cache
+from rcsc.host.files.read import Malformed, content
+from rcsc.lang.project import MOST_BYTES, PROJECT_FILE, Loaded, listed, project_root
 
 if TYPE_CHECKING:
-    from rcsc.prove.options import Options
+    from rcsc.solvers.options import Options
 
 _PASSING = {Code.UNDECIDED, Code.FILE_NOT_FOUND, Code.FILE_CYCLE}
 """Findings that may go away though no file that was read changes; as do all of 1xx and 9xx."""
@@ -108,7 +108,7 @@ def _looked_at(loaded: Loaded) -> list[str]:
 
 
 def _uses(loaded: Loaded) -> list[tuple[str, str]]:
-    from rcsc.syntax import tree
+    from rcsc.lang.syntax import tree
 
     return [
         (os.path.dirname(name), f"{one.path}.rcs")

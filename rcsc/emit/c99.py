@@ -5,11 +5,13 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from rcsc.emit.ctext import CText, c_type, constant, integer, locals_of, type_bounds, wide_type
-from rcsc.emit.environment import render
-from rcsc.emit.names import FAILED_BITS, Scope, comment, guard, names_of, parameter_word
+from rcsc.emit.identifiers import FAILED_BITS, Scope, comment, guard, names_of, parameter_word
+from rcsc.emit.plan import WORD, Coded, Cuts, Direct, Group, Index, Matcher, Plan, PlanTable, Truth, joined
+from rcsc.emit.rendering import render
 from rcsc.emit.symbols import symbols, unit_text
-from rcsc.interpret import Fault
-from rcsc.model import (
+from rcsc.lang.interpret import Fault
+from rcsc.lang.leaves import everything
+from rcsc.lang.model import (
     Admit,
     Array,
     Bool,
@@ -33,8 +35,6 @@ from rcsc.model import (
     pending,
     spell,
 )
-from rcsc.plan import WORD, Coded, Cuts, Direct, Group, Index, Matcher, Plan, PlanTable, Truth, joined
-from rcsc.resolve.leaves import everything
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,7 +1,7 @@
 """Types, constants, expressions and statements in C99.
 
 Integers are computed in `int64_t`, or in `uint64_t` where the bounds of operands and result need it and none is negative; that all of
-them fit there was proved (`prove.symbolic.word`). Doubles are IEEE binary64 (`FLT_EVAL_METHOD` 0); what is stored has no -0.0.
+them fit there was proved (`symbolic.execution.word`). Doubles are IEEE binary64 (`FLT_EVAL_METHOD` 0); what is stored has no -0.0.
 """
 
 import math
@@ -9,8 +9,8 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from rcsc.emit.names import Names
-from rcsc.model import (
+from rcsc.emit.identifiers import Names
+from rcsc.lang.model import (
     I64_MAX,
     I64_MIN,
     U64_MAX,
@@ -399,7 +399,7 @@ class CText:
 
 def locals_of(procedure: Procedure) -> Iterator[tuple[str, Scalar]]:
     """Locals and loop variables, declared at the top of the function."""
-    from rcsc.resolve.leaves import everything
+    from rcsc.lang.leaves import everything
 
     for statement in everything(procedure.body):
         if isinstance(statement, Local):

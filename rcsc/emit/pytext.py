@@ -3,8 +3,8 @@
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from rcsc.emit.names import Names
-from rcsc.model import (
+from rcsc.emit.identifiers import Names
+from rcsc.lang.model import (
     Among,
     Apply,
     Assign,

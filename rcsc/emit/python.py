@@ -5,11 +5,12 @@ from dataclasses import dataclass
 from itertools import groupby
 from math import prod
 
-from rcsc.emit.environment import render
-from rcsc.emit.names import FAILED_BITS, comment, names_of
+from rcsc.emit.identifiers import FAILED_BITS, comment, names_of
+from rcsc.emit.plan import WORD, Coded, Cuts, Direct, Group, Index, Plan, PlanTable, Truth, grouped
 from rcsc.emit.pytext import PyText, constant
-from rcsc.interpret import Fault
-from rcsc.model import (
+from rcsc.emit.rendering import render
+from rcsc.lang.interpret import Fault
+from rcsc.lang.model import (
     Admit,
     Bool,
     Int,
@@ -23,7 +24,6 @@ from rcsc.model import (
     key_bounds,
     pending,
 )
-from rcsc.plan import WORD, Coded, Cuts, Direct, Group, Index, Plan, PlanTable, Truth, grouped
 
 MOST_KEYS = 8192
 """Up to so many combinations of classes the line of each is looked up at once."""

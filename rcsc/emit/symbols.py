@@ -3,9 +3,9 @@
 import json
 
 from rcsc.emit.ctext import c_type
-from rcsc.emit.names import Names
-from rcsc.model import Bool, Enum, Int, Level, OneTable, Read, Real, Unit, Variable
-from rcsc.plan import Plan
+from rcsc.emit.identifiers import Names
+from rcsc.emit.plan import Plan
+from rcsc.lang.model import Bool, Enum, Int, Level, OneTable, Read, Real, Unit, Variable
 
 
 def symbols(plan: Plan, names: Names) -> str:

@@ -1,16 +1,16 @@
 """A table's graph, derived from what its lines mean.
 
 In: a program and one of its tables, as written too. Out: a `StateGraph`, and notes on what the graph does not hold; or why there is
-none. Which line leads from which state to which is answered by Z3 (`prove.steps`); the words on the edges are the table's own.
+none. Which line leads from which state to which is answered by Z3 (`relation.steps`); the words on the edges are the table's own.
 """
 
 from dataclasses import dataclass, field, replace
 
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label
-from rcsc.graph import words
-from rcsc.graph.model import ANY, Edge, StateGraph
-from rcsc.model import (
+from rcsc.graph import labels
+from rcsc.graph.formats.state_graph import ANY, Edge, StateGraph
+from rcsc.lang.model import (
     Action,
     Assign,
     Bool,
@@ -26,11 +26,11 @@ from rcsc.model import (
     key_bounds,
     spell,
 )
-from rcsc.prove.options import Options
-from rcsc.prove.smt import troubles
-from rcsc.prove.steps import MOST_STATES, Step, Steps, UnansweredError
-from rcsc.syntax import tree
-from rcsc.syntax.spell import spell_condition, spell_expr
+from rcsc.lang.syntax import tree
+from rcsc.lang.syntax.spell import spell_condition, spell_expr
+from rcsc.relation.steps import MOST_STATES, Step, Steps, UnansweredError
+from rcsc.solvers.options import Options
+from rcsc.solvers.smt import troubles
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,7 +141,7 @@ class _Derivation:
             tuple(line.name for line in self._lines()),
             used,
         )
-        return Derived(graph, words.guard(common), tuple(self.lost))
+        return Derived(graph, labels.guard(common), tuple(self.lost))
 
     # --- words ---
 
@@ -167,7 +167,7 @@ class _Derivation:
         """What the line's cells say, the state's left out; of these columns only where they are given."""
         cells = zip(self.written.conditions, self._row(at).conditions, strict=True)
         return [
-            words.term(heading, cell)
+            labels.term(heading, cell)
             for column, (heading, cell) in enumerate(cells)
             if cell is not None and not self._is_state(heading) and (columns is None or column in columns)
         ]
@@ -184,7 +184,7 @@ class _Derivation:
         by = self._deciders(line.actions, goal)
         stays = goal is None and not by
         effect = self._effect(self._row(at), line.actions, goal)
-        base = Edge(line.name, ANY, ANY, words.guard(self._terms(at)), effect, default=default)
+        base = Edge(line.name, ANY, ANY, labels.guard(self._terms(at)), effect, default=default)
         if not steps:
             return self._unreached(base, goal, at)
         anywhere = sources == states and (stays or all(one.target == goal for one in steps))
@@ -245,13 +245,13 @@ class _Derivation:
             written = (cell,) if isinstance(cell, tree.Comparison) else cell
             taken = [_taken(left) for _ in written]
             cells.append("; ".join(one.text for one in taken if one is not told))
-        return words.effect(tuple(map(_heading, self.written.actions)), tuple(cells))
+        return labels.effect(tuple(map(_heading, self.written.actions)), tuple(cells))
 
     # --- what is shown ---
 
     def _common(self, edges: list[Edge]) -> list[tree.Expr]:
         """Terms of every edge that leaves a state by itself."""
-        own = [words.terms_of(edge.guard) for edge in edges if edge.source != ANY]
+        own = [labels.terms_of(edge.guard) for edge in edges if edge.source != ANY]
         return [one for one in own[0] if all(one in terms for terms in own)] if len(own) > 1 else []
 
     def _eased(self, edge: Edge, common: list[tree.Expr]) -> Edge:
@@ -262,7 +262,7 @@ class _Derivation:
         terms = self._terms(at, self.steps.needed(at, source))
         if source is not None:
             terms = [one for one in terms if one not in common]
-        return replace(edge, shown=words.guard(terms))
+        return replace(edge, shown=labels.guard(terms))
 
     def _value(self, name: str) -> Value:
         return next(value for value in self.steps.states() if self._spelled(value) == name)

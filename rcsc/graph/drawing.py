@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 from html import escape
 
+from rcsc.graph.formats.state_graph import ANY, LINES, Edge, StateGraph
 from rcsc.graph.layout import Arrow, Box, Placed, Point, place
-from rcsc.graph.model import ANY, LINES, Edge, StateGraph
 
 _FONT_PX, _ROW_PX, _LETTER_PX = 11, 14, 6.62  # a letter of a monospaced font is 0.602 of its size wide
 _BADGE_PX, _GAP_PX, _EDGE_PX = 9.5, 5.0, 24.0

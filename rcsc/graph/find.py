@@ -11,10 +11,10 @@ from difflib import get_close_matches
 
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label
-from rcsc.model import OneTable, Program, Table
-from rcsc.project import Loaded, load, project_root
-from rcsc.resolve import resolve
-from rcsc.source import Source, Span
+from rcsc.diagnostics.source import Source, Span
+from rcsc.lang.model import OneTable, Program, Table
+from rcsc.lang.project import Loaded, load, project_root
+from rcsc.lang.resolve import resolve
 
 
 @dataclass(frozen=True, slots=True)

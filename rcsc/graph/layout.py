@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from rcsc import children
-from rcsc.files.read import json_of
+from rcsc.host import children
+from rcsc.host.files.read import json_of
 
 PACKAGE = "graphviz-pure"
 MOST_SECONDS = 120

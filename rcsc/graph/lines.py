@@ -7,14 +7,14 @@ others is drawn once, from every line, with the lines that it cannot follow.
 
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label
-from rcsc.graph import words
+from rcsc.graph import labels
 from rcsc.graph.derive import Derived
-from rcsc.graph.model import ANY, LINES, Edge, StateGraph
-from rcsc.model import Program, Table
-from rcsc.prove.follow import Follow, following
-from rcsc.prove.options import Options
-from rcsc.prove.steps import UnansweredError
-from rcsc.syntax import tree
+from rcsc.graph.formats.state_graph import ANY, LINES, Edge, StateGraph
+from rcsc.lang.model import Program, Table
+from rcsc.lang.syntax import tree
+from rcsc.relation.follow import Follow, following
+from rcsc.relation.steps import UnansweredError
+from rcsc.solvers.options import Options
 
 _MOST = 2 / 3
 """A line that can follow more than this share of the lines is drawn from every line."""
@@ -49,12 +49,12 @@ def derive_lines(program: Program, table: Table, file: tree.File, options: Optio
     graph = StateGraph(
         table.name, LINES, tuple(edges), lines=tuple(names), states=tuple(names[at] for at in live)
     )
-    return Derived(graph, words.guard(common))
+    return Derived(graph, labels.guard(common))
 
 
 def _terms(written: tree.TableDecl, row: tree.Row) -> dict[int, tree.Expr]:
     cells = enumerate(zip(written.conditions, row.conditions, strict=True))
-    return {at: words.term(heading, cell) for at, (heading, cell) in cells if cell is not None}
+    return {at: labels.term(heading, cell) for at, (heading, cell) in cells if cell is not None}
 
 
 def _common(every: list[list[tree.Expr]]) -> list[tree.Expr]:
@@ -63,17 +63,17 @@ def _common(every: list[list[tree.Expr]]) -> list[tree.Expr]:
 
 def _edge(names: list[str], follow: Follow, terms: dict[int, tree.Expr], common: list[tree.Expr]) -> Edge:
     shown = [terms[at] for at in follow.needed if terms[at] not in common]
-    whole = words.guard(list(terms.values()))
-    return Edge("", names[follow.line], names[follow.then], whole, shown=words.guard(shown))
+    whole = labels.guard(list(terms.values()))
+    return Edge("", names[follow.line], names[follow.then], whole, shown=labels.guard(shown))
 
 
 def _from_any(
     names: list[str], at: int, before: list[Follow], terms: dict[int, tree.Expr], live: list[int]
 ) -> Edge:
     never = [names[one] for one in live if one not in {follow.line for follow in before}]
-    whole = words.guard(list(terms.values()))
+    whole = labels.guard(list(terms.values()))
     needed = {column for follow in before for column in follow.needed}
-    shown = words.guard([terms[column] for column in sorted(needed)])
+    shown = labels.guard([terms[column] for column in sorted(needed)])
     return Edge(
         "", ANY, names[at], whole, shown=shown, decided=f"never after {', '.join(never)}" if never else ""
     )

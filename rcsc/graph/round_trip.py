@@ -8,16 +8,16 @@ from dataclasses import dataclass, replace
 
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label, WitnessColumn
-from rcsc.graph.tables import Tabled
-from rcsc.model import Program, Table, spell
-from rcsc.project import Loaded
-from rcsc.prove.options import Options
-from rcsc.prove.same import Comparison, Differs, NotDecided, Same, compare
-from rcsc.resolve import resolve
-from rcsc.source import Source, Span
-from rcsc.syntax import tree
-from rcsc.syntax.format import format_file
-from rcsc.syntax.parse import parse
+from rcsc.diagnostics.source import Source, Span
+from rcsc.graph.to_table import Tabled
+from rcsc.lang.model import Program, Table, spell
+from rcsc.lang.project import Loaded
+from rcsc.lang.resolve import resolve
+from rcsc.lang.syntax import tree
+from rcsc.lang.syntax.format import format_file
+from rcsc.lang.syntax.parse import parse
+from rcsc.relation.same import Comparison, Differs, NotDecided, Same, compare
+from rcsc.solvers.options import Options
 
 MOST_NAMED = 3
 """Variables named of those that differ."""

@@ -8,17 +8,17 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from rcsc.diagnostics.codes import Code
-from rcsc.shell import names
-from rcsc.shell.expressions import Question, asked
-from rcsc.shell.names import NamedLine
+from rcsc.run.levels import RunningLevel
+from rcsc.shell import typed_names
 from rcsc.shell.parts import call_of, part_names
-from rcsc.shell.refusal import Refused
+from rcsc.shell.queries import Question, asked
+from rcsc.shell.reload.refusal import Refused
 from rcsc.shell.session import MOST_CYCLES, Session
-from rcsc.system.levels import RunningLevel
+from rcsc.shell.typed_names import NamedLine
 
 Said = list[str]
-_SHOW = re.compile(rf"(?P<name>{names.NAME})\s*\?$")
-_SET = re.compile(rf"(?P<name>{names.NAME})\s*=(?!=)\s*(?P<value>.*)$")
+_SHOW = re.compile(rf"(?P<name>{typed_names.NAME})\s*\?$")
+_SET = re.compile(rf"(?P<name>{typed_names.NAME})\s*=(?!=)\s*(?P<value>.*)$")
 _SUFFIX = "_level"
 HELP = """\
 NAME                    run the module, procedure, owner or table of that name on the level chosen
@@ -98,7 +98,7 @@ class Commands:
         for level in self.session.levels:
             yield from (level.name, f"{level.name}-level")
             yield from (f"{level.name}.{leaf.name}" for leaf in level.sign.leaves)
-            for table in names.tables_of(level):
+            for table in typed_names.tables_of(level):
                 yield from (f"{level.name}.{table}.{line}" for line in level.sign.tables[table])
         yield from (leaf.name for leaf in self.session.level.sign.leaves)
         yield from self._parts(self.session.level)
@@ -113,24 +113,26 @@ class Commands:
         cycled = self._cycled(name)
         if cycled is not None:
             return self._alone(cycled, _number(args[0]) if args else 1)
-        level, rest = names.split(name, self.session.levels, self.session.level)
-        if names.found(rest, part_names(self.session.program(level))) is None:
+        level, rest = typed_names.split(name, self.session.levels, self.session.level)
+        if typed_names.found(rest, part_names(self.session.program(level))) is None:
             raise self._unknown(name)
         return self.session.part(level, rest, args)
 
     def _cycled(self, name: str) -> RunningLevel | None:
         """The level that `task-level`, or `task`, cycles."""
-        wanted = names.normal(name)
-        every = {names.normal(level.name): level for level in self.session.levels}
+        wanted = typed_names.normal(name)
+        every = {typed_names.normal(level.name): level for level in self.session.levels}
         return every.get(wanted.removesuffix(_SUFFIX)) or every.get(wanted)
 
     def _unknown(self, name: str) -> Refused:
-        level, rest = names.split(name, self.session.levels, self.session.level)
-        if names.positions(level.sign, rest):
+        level, rest = typed_names.split(name, self.session.levels, self.session.level)
+        if typed_names.positions(level.sign, rest):
             return Refused(
                 Code.SHELL_COMMAND, f"`{name}` is a variable", f"`{name} ?` shows it, `{name} = ...` sets it"
             )
-        return names.unknown(name, "command, module, procedure, owner, table or level", self.completions())
+        return typed_names.unknown(
+            name, "command, module, procedure, owner, table or level", self.completions()
+        )
 
     def _parts(self, level: RunningLevel) -> tuple[str, ...]:
         try:
@@ -141,21 +143,23 @@ class Commands:
     # --- variables ---
 
     def _show_variable(self, name: str) -> Said:
-        level, places = names.variable(name, self.session.levels, self.session.level)
-        return [names.shown(level, at) for at in places]
+        level, places = typed_names.variable(name, self.session.levels, self.session.level)
+        return [typed_names.shown(level, at) for at in places]
 
     def _show(self, rest: str) -> Said:
         if not rest:
             return self.session.changed() or ["the last cycle changed nothing"]
-        level = names.level_of(rest, self.session.levels)
-        return [names.shown(level, at) for at in range(len(level.sign.leaves))]
+        level = typed_names.level_of(rest, self.session.levels)
+        return [typed_names.shown(level, at) for at in range(len(level.sign.leaves))]
 
     def _buffers(self, rest: str) -> Said:
         every = [
             wire for wire in self.session.system.description.wires if rest in wire.source + " " + wire.target
         ]
         if not every:
-            raise names.unknown(rest, "buffer", [w.source for w in self.session.system.description.wires])
+            raise typed_names.unknown(
+                rest, "buffer", [w.source for w in self.session.system.description.wires]
+            )
         return [f"{wire.source} = {wire.target}: {self._held(wire.source, wire.target)}" for wire in every]
 
     def _held(self, source: str, target: str) -> str:
@@ -165,7 +169,7 @@ class Commands:
             return "nothing yet"
         for end in (source, target):
             name, _, variable = end.partition(".")
-            level = names.by_name(self.session.levels).get(name)
+            level = typed_names.by_name(self.session.levels).get(name)
             if level is not None:
                 leaves = [level.sign.leaves[at] for at in level.sign.record(variable)]
                 return ", ".join(
@@ -178,14 +182,14 @@ class Commands:
 
     def _level(self, rest: str) -> Said:
         if rest:
-            self.session.chosen = names.level_of(rest, self.session.levels).name
+            self.session.chosen = typed_names.level_of(rest, self.session.levels).name
         return [f"level `{self.session.chosen}`"]
 
     def _levels(self, rest: str) -> Said:
         _nothing("levels", rest)
         return [
             f"{'*' if one.name == self.session.chosen else ' '} {one.name:14} every {one.level.period_ms} ms: "
-            f"{', '.join(names.tables_of(one))}"
+            f"{', '.join(typed_names.tables_of(one))}"
             for one in self.session.levels
         ]
 
@@ -198,7 +202,7 @@ class Commands:
     def _step(self, rest: str) -> Said:
         words = rest.split()
         if words and not _is_number(words[0]):
-            level = names.level_of(words[0], self.session.levels)
+            level = typed_names.level_of(words[0], self.session.levels)
             return self._alone(level, _number(" ".join(words[1:]) or "1"))
         for _ in range(_number(rest or "1")):
             self.session.cycle()
@@ -237,9 +241,9 @@ class Commands:
         return self.session.run(left)
 
     def _line(self, place: str) -> NamedLine:
-        line = names.line_of(place, self.session.levels, self.session.level)
+        line = typed_names.line_of(place, self.session.levels, self.session.level)
         if line is None:
-            raise names.unknown(place, "line", self.completions())
+            raise typed_names.unknown(place, "line", self.completions())
         return line
 
     def _undo(self, rest: str) -> Said:
@@ -257,12 +261,12 @@ class Commands:
         return self.session.difference(self._named(rest))
 
     def _named(self, rest: str) -> str:
-        return names.level_of(rest or self.session.chosen, self.session.levels).name
+        return typed_names.level_of(rest or self.session.chosen, self.session.levels).name
 
     # --- conditions ---
 
     def _break(self, rest: str) -> Said:
-        what: Question | NamedLine | None = names.line_of(rest, self.session.levels, self.session.level)
+        what: Question | NamedLine | None = typed_names.line_of(rest, self.session.levels, self.session.level)
         stop = self.session.stops.add(what or self.session.question(rest))
         return [f"breakpoint {stop.number}: {stop.text}"]
 
@@ -281,7 +285,7 @@ class Commands:
     def _expect(self, rest: str) -> Said:
         condition = self.session.question(rest)
         if not asked(condition, self.session.levels):
-            now = condition.now(names.by_name(self.session.levels))
+            now = condition.now(typed_names.by_name(self.session.levels))
             raise Refused(Code.SHELL_EXPECTED, f"`{condition.text}` does not hold{f': {now}' if now else ''}")
         return []
 

@@ -7,9 +7,9 @@ import copy
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, is_dataclass
 
-from rcsc.system.cell import Outside, System
-from rcsc.system.levels import RunningLevel
-from rcsc.system.signature import Values
+from rcsc.run.levels import RunningLevel
+from rcsc.run.signature import Values
+from rcsc.run.system import Outside, System
 
 MOST = 10_000
 

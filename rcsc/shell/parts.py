@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from rcsc.diagnostics.codes import Code
-from rcsc.interpret import (
+from rcsc.lang.interpret import (
     ExternError,
     admit,
     call,
@@ -20,8 +20,8 @@ from rcsc.interpret import (
     matching_lines,
     settle,
 )
-from rcsc.meaning import with_stops
-from rcsc.model import (
+from rcsc.lang.meaning import with_stops
+from rcsc.lang.model import (
     AssumptionName,
     Bool,
     Enum,
@@ -37,10 +37,10 @@ from rcsc.model import (
     key_of,
     spell,
 )
-from rcsc.shell.names import found, near
-from rcsc.shell.refusal import Refused
-from rcsc.system.levels import RunningLevel
-from rcsc.system.signature import Values
+from rcsc.run.levels import RunningLevel
+from rcsc.run.signature import Values
+from rcsc.shell.reload.refusal import Refused
+from rcsc.shell.typed_names import found, near
 
 STEPS = ("preprocess", "state_table", "postprocess")
 """Of a cycle; run one after the other they are one."""

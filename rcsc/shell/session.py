@@ -10,24 +10,24 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from rcsc.diagnostics.codes import Code
-from rcsc.log.layout import fingerprints
-from rcsc.model import Program
-from rcsc.shell import history, names
-from rcsc.shell.composed import held_by, together
-from rcsc.shell.expressions import Question, question
-from rcsc.shell.gate import Judged, Running, judge
-from rcsc.shell.names import NamedLine
+from rcsc.lang.model import Program
+from rcsc.run.description import BadDescription, Description, LevelSpec
+from rcsc.run.levels import Fill, Query, RunningLevel
+from rcsc.run.log.schema import fingerprints
+from rcsc.run.signature import Signature, Value, Values
+from rcsc.run.system import StateTableError, System
+from rcsc.shell import history, typed_names
 from rcsc.shell.parts import run_part
-from rcsc.shell.refusal import Refused
-from rcsc.shell.reload import Plant, Reloaded, program_of, reload
+from rcsc.shell.queries import Question, question
+from rcsc.shell.reload.composed import held_by, together
+from rcsc.shell.reload.gate import Judged, Running, judge
+from rcsc.shell.reload.refusal import Refused
+from rcsc.shell.reload.reload import Plant, Reloaded, program_of, reload
 from rcsc.shell.stops import Stops, reached, stands
-from rcsc.system.cell import StateTableError, System
-from rcsc.system.description import BadDescription, Description, LevelSpec
-from rcsc.system.levels import Fill, Query, RunningLevel
-from rcsc.system.signature import Signature, Value, Values
+from rcsc.shell.typed_names import NamedLine
 
 if TYPE_CHECKING:
-    from rcsc.shell.sources import Kept
+    from rcsc.shell.reload.sources import Kept
 
 MOST_CYCLES = 100_000
 """After which `run` gives up: more than an hour of control time."""
@@ -207,8 +207,8 @@ class Session:
         Raises:
             Refused: There is none, or the text is no value of it.
         """
-        level, at = names.one_leaf(name, self.levels, self.level)
-        value = names.value_of(level.sign.leaves[at], text)
+        level, at = typed_names.one_leaf(name, self.levels, self.level)
+        value = typed_names.value_of(level.sign.leaves[at], text)
         level.executor.put(at, (value,))
         level.values = _spoken(level, _with(level.values, at, value))
         for buffer, first, end in _carriers(level):
@@ -217,7 +217,7 @@ class Session:
                 record = level.values[first:end] if held is None else _with(held, at - first, value)
                 self.memory.publish(buffer, record)
         self._answer(level, at)
-        return names.shown(level, at)
+        return typed_names.shown(level, at)
 
     def _answer(self, level: RunningLevel, at: int) -> None:
         """What is set in a record that the database fills is from now on its answer to the same question."""

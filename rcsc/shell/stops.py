@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from rcsc.shell.expressions import Question, asked, question
-from rcsc.shell.names import NamedLine, level_of, line_of, unknown
-from rcsc.shell.refusal import Refused
-from rcsc.system.levels import RunningLevel
+from rcsc.run.levels import RunningLevel
+from rcsc.shell.queries import Question, asked, question
+from rcsc.shell.reload.refusal import Refused
+from rcsc.shell.typed_names import NamedLine, level_of, line_of, unknown
 
 Levels = Sequence[RunningLevel]
 

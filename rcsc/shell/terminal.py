@@ -13,7 +13,7 @@ from types import FrameType
 from typing import TYPE_CHECKING
 
 from rcsc.shell.commands import Commands
-from rcsc.shell.refusal import Refused
+from rcsc.shell.reload.refusal import Refused
 
 if TYPE_CHECKING:
     from prompt_toolkit import PromptSession

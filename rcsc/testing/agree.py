@@ -10,15 +10,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from rcsc.interpret import Fault, Outcome, cycle, holds, matching_lines, run_table
-from rcsc.model import LineName, Program, Snapshot, Table, Value
-from rcsc.testing.edges import may_be_matched
-from rcsc.testing.externs import begin
-from rcsc.testing.native import Native, Result
-from rcsc.testing.reference_file import all_lines, fault_named, monitored
-from rcsc.testing.sessions import Seen, Session, differences
-from rcsc.testing.targets import Target
-from rcsc.testing.tools import Absent, BuildFailed
+from rcsc.host.tools import Absent, BuildFailed
+from rcsc.lang.interpret import Fault, Outcome, cycle, holds, matching_lines, run_table
+from rcsc.lang.model import LineName, Program, Snapshot, Table, Value
+from rcsc.testing.executors.edges import may_be_matched
+from rcsc.testing.executors.externs import begin
+from rcsc.testing.executors.native import Native, Result
+from rcsc.testing.executors.reference_file import all_lines, fault_named, monitored
+from rcsc.testing.executors.sessions import Seen, Session, differences
+from rcsc.testing.executors.targets import Target
 
 NONE, SEVERAL = -1, -2
 WHOLE = 1

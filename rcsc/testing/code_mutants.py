@@ -18,17 +18,17 @@ from enum import StrEnum
 from pathlib import Path
 from random import Random
 
-from rcsc.children import scratch
-from rcsc.model import Program, Snapshot
+from rcsc.host.children import scratch
+from rcsc.host.tools import Absent, c_compiler, run_command, write_c
+from rcsc.lang.model import Program, Snapshot
 from rcsc.testing.esbmc import Said, prove_function, too_large
-from rcsc.testing.externs import STAND_INS
-from rcsc.testing.matcher import Checked, Compared, check_matcher
-from rcsc.testing.matcher_text import matcher_text, numbers
-from rcsc.testing.native import COMPILE_S, Native
-from rcsc.testing.shim import shim_c
-from rcsc.testing.symbols import Symbols
-from rcsc.testing.targets import Target, targets
-from rcsc.testing.tools import Absent, c_compiler, run_command, write_c
+from rcsc.testing.executors.externs import STAND_INS
+from rcsc.testing.executors.native import COMPILE_S, Native
+from rcsc.testing.executors.shim import shim_c
+from rcsc.testing.executors.symbols import Symbols
+from rcsc.testing.executors.targets import Target, targets
+from rcsc.testing.matchers.matcher import Checked, Compared, check_matcher
+from rcsc.testing.matchers.matcher_text import matcher_text, numbers
 
 RUN_S = 20.0
 MOST_MASKS = 5000

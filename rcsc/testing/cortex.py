@@ -12,14 +12,14 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from math import prod
 
-from rcsc.children import scratch
-from rcsc.model import Program, Real, Table, Variable, key_bounds, value_of_key
-from rcsc.testing.edges import leaf_edges
-from rcsc.testing.externs import SCRIPTS, externs
-from rcsc.testing.reference import constant
-from rcsc.testing.reference_file import reference_c
-from rcsc.testing.symbols import Symbols
-from rcsc.testing.tools import Absent, BuildFailed, cortex_tools, run_command, write_c
+from rcsc.host.children import scratch
+from rcsc.host.tools import Absent, BuildFailed, cortex_tools, run_command, write_c
+from rcsc.lang.model import Program, Real, Table, Variable, key_bounds, value_of_key
+from rcsc.testing.executors.edges import leaf_edges
+from rcsc.testing.executors.externs import SCRIPTS, externs
+from rcsc.testing.executors.reference import constant
+from rcsc.testing.executors.reference_file import reference_c
+from rcsc.testing.executors.symbols import Symbols
 
 MOST_INPUTS = 1 << 20
 MACHINE = (

@@ -16,14 +16,14 @@ from enum import StrEnum
 from pathlib import Path
 from time import perf_counter
 
-from rcsc.children import Ran, scratch
-from rcsc.model import Program, Real
-from rcsc.testing.externs import STAND_INS, externs
-from rcsc.testing.matcher_text import ShapeError, function_body
-from rcsc.testing.reference_file import monitored, reference_c
-from rcsc.testing.symbols import Symbols
-from rcsc.testing.targets import Target, call_of, is_matcher, reference_of
-from rcsc.testing.tools import Absent, esbmc, run_command, write_c
+from rcsc.host.children import Ran, scratch
+from rcsc.host.tools import Absent, esbmc, run_command, write_c
+from rcsc.lang.model import Program, Real
+from rcsc.testing.executors.externs import STAND_INS, externs
+from rcsc.testing.executors.reference_file import monitored, reference_c
+from rcsc.testing.executors.symbols import Symbols
+from rcsc.testing.executors.targets import Target, call_of, is_matcher, reference_of
+from rcsc.testing.matchers.matcher_text import ShapeError, function_body
 
 CHECKS = (
     "--overflow-check",

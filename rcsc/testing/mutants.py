@@ -12,8 +12,8 @@ from enum import StrEnum
 from itertools import combinations
 from random import Random
 
-from rcsc.interpret import matching_lines
-from rcsc.model import (
+from rcsc.lang.interpret import matching_lines
+from rcsc.lang.model import (
     Apply,
     Bool,
     Box,
@@ -32,8 +32,8 @@ from rcsc.model import (
     spell,
     value_of_key,
 )
-from rcsc.testing.search import Missing, Search, Wanted
-from rcsc.testing.vectors import given_in
+from rcsc.testing.inputs.snapshot import Missing, Search, Wanted
+from rcsc.testing.inputs.vectors import given_in
 
 
 class Caught(StrEnum):

@@ -10,8 +10,9 @@ from random import Random
 
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label, sort_key
-from rcsc.model import Line, Program, Snapshot, Table
-from rcsc.source import Span
+from rcsc.diagnostics.source import Span
+from rcsc.host.tools import Absent, BuildFailed
+from rcsc.lang.model import Line, Program, Snapshot, Table
 from rcsc.testing.agree import (
     Compared,
     Disagreement,
@@ -25,19 +26,18 @@ from rcsc.testing.agree import (
 from rcsc.testing.code_mutants import Noticed, Sample, decider, judge_code, judge_masks, portable_agrees
 from rcsc.testing.cortex import MOST_INPUTS, CortexRun, run_cortex
 from rcsc.testing.esbmc import EsbmcVerdict, Said, prove_function, too_large
-from rcsc.testing.externs import PythonStandIns, python_stand_ins, with_c_stand_ins
+from rcsc.testing.executors.externs import PythonStandIns, python_stand_ins, with_c_stand_ins
+from rcsc.testing.executors.native import Native, build
+from rcsc.testing.executors.python import python_executor
+from rcsc.testing.executors.reference_file import all_lines, inputs
+from rcsc.testing.executors.sessions import Session, described
+from rcsc.testing.executors.symbols import Symbols, symbols_of
+from rcsc.testing.executors.targets import Target, is_matcher, targets
 from rcsc.testing.figures import ProgramFigures, SuiteResult, TableFigures, counted, tally
-from rcsc.testing.matcher import Checked, check_matcher
+from rcsc.testing.inputs.snapshot import Solver, search_in
+from rcsc.testing.inputs.vectors import Vectors, vectors_of
+from rcsc.testing.matchers.matcher import Checked, check_matcher
 from rcsc.testing.mutants import Caught, Prover, judge_table
-from rcsc.testing.native import Native, build
-from rcsc.testing.python_executor import python_executor
-from rcsc.testing.reference_file import all_lines, inputs
-from rcsc.testing.search import Solver, search_in
-from rcsc.testing.sessions import Session, described
-from rcsc.testing.symbols import Symbols, symbols_of
-from rcsc.testing.targets import Target, is_matcher, targets
-from rcsc.testing.tools import Absent, BuildFailed
-from rcsc.testing.vectors import Vectors, vectors_of
 
 QUICK_CORTEX = 1 << 14  # inputs of a table that the emulated target is given in an ordinary run
 LARGE = 128  # lines; of a larger table so many, by seed, are given vectors in an ordinary run
@@ -131,14 +131,14 @@ class Suite:
 
     def lines(self, target: Target, snapshots: Sequence[Snapshot]) -> Disagreement | None:
         """A matcher on the vectors and on drawn snapshots."""
-        from rcsc.testing.hunt import hunt_lines
+        from rcsc.testing.differential_search import hunt_lines
 
         found = run_lines(self.executors, target, snapshots, self.compared)
         return found or hunt_lines(self.executors, target, self.compared, self.options.examples)
 
     def steps(self, target: Target, snapshots: Sequence[Snapshot]) -> Disagreement | None:
         """A step from the vectors, a step or cycle in drawn sessions."""
-        from rcsc.testing.hunt import hunt_sessions
+        from rcsc.testing.differential_search import hunt_sessions
 
         found = next(filter(None, (self.one_step(target, snapshot) for snapshot in snapshots)), None)
         options = self.options

@@ -16,13 +16,13 @@ from pathlib import Path
 
 from rcsc.emit import emit_c, emit_python
 from rcsc.emit.ctext import CText
-from rcsc.emit.names import names_of
-from rcsc.lower import lower
-from rcsc.model import Box, Program, ProvedProgram, Value, key_bounds, seal_of_proof, value_of_key
-from rcsc.project import load
-from rcsc.prove.options import Options
-from rcsc.prove.program import prove_program
-from rcsc.resolve import compile_text, resolve
+from rcsc.emit.identifiers import names_of
+from rcsc.emit.lower import lower
+from rcsc.lang.model import Box, Program, ProvedProgram, Value, key_bounds, seal_of_proof, value_of_key
+from rcsc.lang.project import load
+from rcsc.lang.resolve import compile_text, resolve
+from rcsc.solvers.options import Options
+from rcsc.table.program import prove_program
 from tests.bench import families
 
 INPUTS = 512

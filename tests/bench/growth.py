@@ -16,12 +16,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from unittest.mock import patch
 
-from rcsc.compose.agreed import agreements
-from rcsc.compose.level import essential, prove_level
-from rcsc.compose.sat import Sat
-from rcsc.compose.search import Effort
-from rcsc.compose.system import steppers
-from rcsc.prove.smt import Solver
+from rcsc.compose.invariant.search import Effort
+from rcsc.compose.proof.assume_guarantee import agreements
+from rcsc.compose.proof.level import essential, prove_level
+from rcsc.compose.proof.system import steppers
+from rcsc.solvers.sat import Sat
+from rcsc.solvers.smt import Solver
 from tests.hierarchies_made import BOTTOM, RIGHT, Hierarchy, Line, MadeLevel, MadeTable
 from tests.hierarchies_text import written
 

@@ -1,8 +1,9 @@
 """How fast the whole cell runs, and where the time goes: `python -m tests.bench.loop`.
 
-MAKE BOXT from the first row to the last on each plant, by each executor, with a log and with whoever watches a run (`sim.witness`), as
-`rcsc run` has them. Times real time is control time by the time that the cycles took, from the first to the last; what is made before,
-as the model of the cell, does not count. A log and a witness are timed where they are called; the executors and the buffers are the rest.
+MAKE BOXT from the first row to the last on each plant, by each executor, with a log and with whoever watches a run
+(`rcsc_cell.episodes.witness`), as `rcsc run` has them. Times real time is control time by the time that the cycles took, from the first
+to the last; what is made before, as the model of the cell, does not count. A log and a witness are timed where they are called; the
+executors and the buffers are the rest.
 """
 
 import tempfile
@@ -11,13 +12,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from rcsc.database.ask import Database
-from rcsc.log.write import Recorder
-from rcsc.system.cell import Kind, System
-from rcsc.system.levels import RunningLevel
-from rcsc.workstation.cell import prepare
-from sim.cell import Backend, plant
-from sim.witness import Timed, Witness
+from rcsc.run.levels import RunningLevel
+from rcsc.run.log.write import Recorder
+from rcsc.run.system import Kind, System
+from rcsc_cell.cell.ready import Backend, plant
+from rcsc_cell.database.ask import Database
+from rcsc_cell.episodes.witness import Timed, Witness
+from rcsc_cell.workstation.prepared import prepare
 
 SYSTEM = Path(__file__).parents[2] / "tables" / "system.toml"
 ROUNDS = 3

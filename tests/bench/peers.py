@@ -11,7 +11,7 @@ from itertools import combinations
 from math import prod
 from typing import Any
 
-from rcsc.model import Apply, Box, Expr, Line, Literal, Op, Program, Read, Table, key_bounds
+from rcsc.lang.model import Apply, Box, Expr, Line, Literal, Op, Program, Read, Table, key_bounds
 
 Decide = Callable[[Program, Table], bool]
 

@@ -11,13 +11,13 @@ import time
 from collections.abc import Callable
 
 from rcsc.certify import check_certificate
-from rcsc.model import Program
-from rcsc.prove.certificate import program_certificate
-from rcsc.prove.options import Options
-from rcsc.prove.table import prove_table
-from rcsc.resolve import compile_text
-from rcsc.source import Source
-from rcsc.syntax.parse import parse
+from rcsc.diagnostics.source import Source
+from rcsc.lang.model import Program
+from rcsc.lang.resolve import compile_text
+from rcsc.lang.syntax.parse import parse
+from rcsc.solvers.options import Options
+from rcsc.table.certificate import program_certificate
+from rcsc.table.decide import prove_table
 from tests.bench import families
 from tests.bench.families import Fault
 from tests.bench.peers import installed

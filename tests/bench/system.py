@@ -10,12 +10,12 @@ import tempfile
 import time
 from pathlib import Path
 
-from rcsc.database.ask import Database
-from rcsc.log.write import Recorder
-from rcsc.system.cell import Kind
-from rcsc.workstation.cell import Run, prepare
-from sim.cell import plant
-from sim.witness import Timed
+from rcsc.run.log.write import Recorder
+from rcsc.run.system import Kind
+from rcsc_cell.cell.ready import plant
+from rcsc_cell.database.ask import Database
+from rcsc_cell.episodes.witness import Timed
+from rcsc_cell.workstation.prepared import Run, prepare
 
 SYSTEM = Path(__file__).parents[2] / "tables" / "system.toml"
 ROUNDS = 5

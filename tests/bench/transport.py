@@ -8,8 +8,8 @@ import multiprocessing
 import time
 from collections.abc import Callable
 
-from rcsc.system.buffers import Buffers, CommonMemory
-from rcsc.system.shared import SharedMemoryBuffers
+from rcsc.run.buffers import Buffers, CommonMemory
+from rcsc.run.processes.memory import SharedMemoryBuffers
 from tests.processes_outside import echo, pattern, wide
 
 ROUNDS = 20_000

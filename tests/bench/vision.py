@@ -14,8 +14,8 @@ from typing import ParamSpec, TypeVar
 
 import numpy as np
 
-from sim.vision.flood import Found, find
-from sim.vision.line import Surface, measure
+from rcsc_cell.vision.flood import Found, find
+from rcsc_cell.vision.line import Surface, measure
 from tests.scenes import SIZES, Scene, Size, anywhere, between, expected_mm, features
 
 POSES = 100

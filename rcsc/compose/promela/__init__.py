@@ -1,6 +1,6 @@
 """The levels once more, in another language and for another engine: a Promela model for Spin, made of the same program.
 
-What `compose` proves rests on one translation (`transition`, `prove.symbolic`) and on its solvers. Here procedures, deferred states,
+What `compose` proves rests on one translation (`transition`, `symbolic.execution`) and on its solvers. Here procedures, deferred states,
 tables and modules are translated again, by other code, into what Spin's verifier runs state by state; assumptions, goals, the contract,
 and what the programs state are said again. It is a check of both by each other, **not a proof**: a *small instance* is looked through, in
 which numbers go round after few, counters are short, the outside says few things, and reals are a few values (`small`; every reduction

@@ -10,10 +10,10 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
-from rcsc.compose.promela.flat import Block, Check, Flat, Forget, Fork, Match, Put, Tell
-from rcsc.compose.promela.small import Domain
-from rcsc.model import COMPARISONS, Among, Apply, Bool, Expr, Literal, Op, Read
-from rcsc.resolve.leaves import read_by
+from rcsc.compose.promela.cycle.statements import Block, Check, Flat, Forget, Fork, Match, Put, Tell
+from rcsc.compose.promela.instance import Domain
+from rcsc.lang.leaves import read_by
+from rcsc.lang.model import COMPARISONS, Among, Apply, Bool, Expr, Literal, Op, Read
 
 RESERVED = frozenset(
     """active assert atomic bit bool break byte chan d_step do else empty enabled eval false fi full goto hidden if init int len

@@ -12,9 +12,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from rcsc.children import scratch
-from rcsc.compose.promela.model import BROKEN, RESTARTED, TAKEN, TOLD, Model
-from rcsc.testing.tools import Absent, c_compiler, run_command
+from rcsc.compose.promela.assemble import BROKEN, RESTARTED, TAKEN, TOLD, Model
+from rcsc.host.children import scratch
+from rcsc.host.tools import Absent, c_compiler, run_command
 
 MODEL = "model.pml"
 LARGE, LONG_S = 1000, 10.0

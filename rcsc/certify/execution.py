@@ -1,0 +1,399 @@
+"""Symbolic runs: what conditions and statements compute, and what they owe on the way.
+
+In: expressions and statements of the model. Out: terms, the state after the run, and obligations. Ways through `if` and `case`
+are followed once each and joined; loops are unrolled, calls run in place. What is owed: no result or operand outside the 64 bits that
+its operation works in, no division by zero, no index outside its array, no value outside the range of what keeps it, no local read
+before it is assigned.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+
+from rcsc.certify.values import INT, REAL, Number, Term, Terms, ends_of, sort_of
+from rcsc.diagnostics.source import Span as Written
+from rcsc.lang.model import (
+    COMPARISONS,
+    I64_MAX,
+    I64_MIN,
+    NOWHERE,
+    U64_MAX,
+    Among,
+    Apply,
+    Assign,
+    Call,
+    Case,
+    Expr,
+    For,
+    If,
+    Int,
+    Literal,
+    Local,
+    Op,
+    Place,
+    Procedure,
+    Program,
+    Read,
+    ReadLocal,
+    Real,
+    Scalar,
+    Select,
+    Statement,
+    ToElement,
+    ToLeaf,
+)
+
+MOST_STEPS = 100_000
+"""Statements and elements that one run follows."""
+
+_ARITHMETIC = {Op.ADD: "+", Op.SUB: "-", Op.MUL: "*", Op.DIV: "/", Op.MOD: "mod", Op.NEG: "neg"}
+
+
+class TooLongError(Exception):
+    """A run has more steps than are followed."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Owed:
+    """An obligation: wherever the path is taken, `good` holds."""
+
+    name: str
+    written: Written
+    path: Term
+    good: Term
+    number: int
+
+
+@dataclass(slots=True)
+class State:
+    """Values at a point of a run.
+
+    Attributes:
+        leaves: Of leaves written so far.
+        assigned: For a local that was declared without a value, when it has one.
+        wrote: When the present action has written each leaf.
+    """
+
+    leaves: dict[str, Term] = field(default_factory=dict)
+    local: dict[str, Term] = field(default_factory=dict)
+    assigned: dict[str, Term] = field(default_factory=dict)
+    wrote: dict[str, Term] = field(default_factory=dict)
+
+    def copy(self) -> "State":
+        """A state that goes its own way."""
+        return State(dict(self.leaves), dict(self.local), dict(self.assigned), dict(self.wrote))
+
+
+class Start:
+    """What all runs of a program begin with."""
+
+    def __init__(self, program: Program) -> None:
+        self.program = program
+        self.terms = Terms()
+        self.types = {str(v.name): v.type for v in program.variables}
+        self.leaves = {name: self.terms.variable(name, kind) for name, kind in self.types.items()}
+        self.procedures = {str(one.name): one for one in program.procedures}
+        self._conditions: dict[
+            int, tuple[Expr, Term]
+        ] = {}  # an expression is kept, so that its identity is not used again
+
+    def condition(self, expr: Expr) -> Term:
+        """A condition of the program before a run; what evaluating it owes is owed elsewhere."""
+        known = self._conditions.get(id(expr))
+        if known is None:
+            known = self._conditions[id(expr)] = expr, Run(self, "").evaluate(expr)
+        return known[1]
+
+
+class Run:
+    """One run.
+
+    Attributes:
+        where: What runs, for the names of obligations.
+        cell: Where that is written.
+    """
+
+    def __init__(self, start: Start, where: str, cell: Written = NOWHERE) -> None:
+        self.start, self.terms, self.where, self.cell = start, start.terms, where, cell
+        self.state, self.path, self.owed = State(), start.terms.true, list[Owed]()
+        self._steps = self._fresh = 0
+
+    def owe(self, what: str, good: Term, written: Written = NOWHERE) -> int:
+        """Adds an obligation; its number."""
+        number = len(self.owed)
+        place = written if written.file else self.cell
+        self.owed.append(Owed(f"{self.where}: {what}", place, self.path, good, number))
+        return number
+
+    def _inside(self, value: Term, low: Number, high: Number) -> Term:
+        least, greatest = self.terms.constant(value.sort, low), self.terms.constant(value.sort, high)
+        return self.terms.every((self.terms.make("<=", least, value), self.terms.make("<=", value, greatest)))
+
+    def _step(self, many: int = 1) -> None:
+        self._steps += many
+        if self._steps > MOST_STEPS:
+            raise TooLongError
+
+    # --- expressions ---
+
+    def leaf(self, name: str) -> Term:
+        """The present value of a leaf."""
+        return self.state.leaves.get(name) or self.start.leaves[name]
+
+    def any_value(self, name: str, kind: Scalar) -> Term:
+        """A value of which only the type is known."""
+        self._fresh += 1
+        return self.terms.variable(f"{name} ({self._fresh})", kind)
+
+    def evaluate(self, expr: Expr) -> Term:
+        """The value of an expression."""
+        terms = self.terms
+        match expr:
+            case Literal(value=value, type=kind):
+                return terms.constant(sort_of(kind), value)
+            case Read(name=name):
+                return self.leaf(name)
+            case ReadLocal(name=name, type=kind, span=written):
+                if name in self.state.assigned:
+                    self.owe(f"`{name}` is assigned before it is read", self.state.assigned[name], written)
+                if name not in self.state.local:
+                    self.state.local[name] = self.any_value(name, kind)
+                return self.state.local[name]
+            case Select(leaves=leaves, index=index):
+                return self._element(leaves, self.index(index, len(leaves)))
+            case Among(subject=subject, values=values):
+                return self._among(self.evaluate(subject), values)
+            case Apply(op=Op.AND | Op.OR | Op.IMPLIES):
+                return self._logic(expr)
+            case Apply(op=op, args=args):
+                return self._applied(expr, op, [self.evaluate(arg) for arg in args])
+
+    def _among(self, subject: Term, values: Iterable[object]) -> Term:
+        found = (
+            self.terms.constant(subject.sort, value) for value in values if isinstance(value, int | float)
+        )
+        return self.terms.some(self.terms.make("=", subject, one) for one in found)
+
+    def _logic(self, expr: Apply) -> Term:
+        """The right side is looked at only where the left does not decide."""
+        left, path = self.evaluate(expr.args[0]), self.path
+        undecided = self.terms.negation(left) if expr.op is Op.OR else left
+        self.path = self.terms.every((path, undecided))
+        right = self.evaluate(expr.args[1])
+        self.path = path
+        if expr.op is Op.IMPLIES:
+            return self.terms.follows(left, right)
+        return (self.terms.every if expr.op is Op.AND else self.terms.some)((left, right))
+
+    def index(self, expr: Expr, length: int) -> Term:
+        """An index of an array of this length."""
+        at = self.evaluate(expr)
+        self.owe(f"the index lies in 0 .. {length - 1}", self._inside(at, 0, length - 1), expr.span)
+        return at
+
+    def _element(self, leaves: Sequence[str], at: Term) -> Term:
+        if at.op == "constant":
+            return self.leaf(leaves[min(max(int(at.low), 0), len(leaves) - 1)])
+        self._step(len(leaves))
+        found = self.leaf(leaves[-1])
+        for number, name in reversed(list(enumerate(leaves[:-1]))):
+            here = self.terms.make("=", at, self.terms.constant(INT, number))
+            found = self.terms.choice(here, self.leaf(name), found)
+        return found
+
+    def _applied(self, expr: Apply, op: Op, args: list[Term]) -> Term:
+        kinds = [kind for kind in (*(arg.type for arg in expr.args), expr.type) if isinstance(kind, Int)]
+        whole = isinstance(expr.args[0].type, Int) and op is not Op.TO_REAL
+        if op in (Op.DIV, Op.MOD):
+            zero = self.terms.constant(args[1].sort, 0)
+            nonzero = self.terms.negation(self.terms.make("=", args[1], zero))
+            self.owe("the divisor is not zero", nonzero, expr.args[1].span)
+        if not whole:
+            if op is Op.TO_INT:
+                return self._truncated(args[0], kinds, expr.span)
+            return self._operation(op, args)
+        ends = _word(kinds)
+        for arg, written in zip(args, expr.args, strict=True):
+            self._owe_word(arg, ends, "an operand", written.span)
+        if op in COMPARISONS:
+            return self._operation(op, args)
+        if op is Op.MOD:  # the machine divides first
+            self._owe_word(self._operation(Op.DIV, args), ends, "the quotient", expr.span)
+        found = self._operation(op, args)
+        self._owe_word(found, ends, f"the result of `{op.value}`", expr.span)
+        return found
+
+    def _owe_word(self, value: Term, ends: tuple[int, int], what: str, written: Written) -> None:
+        if value.op == "constant" and ends[0] <= value.low <= ends[1]:
+            return
+        if value.op == "variable" and ends[0] <= value.low and value.high <= ends[1]:
+            return
+        self.owe(f"{what} stays in its 64 bits", self._inside(value, *ends), written)
+
+    def _truncated(self, value: Term, kinds: list[Int], written: Written) -> Term:
+        """The whole number of a double; owed that it fits its 64 bits, which a NaN never does."""
+        low, high = _word(kinds)
+        make, real = self.terms.make, self.terms.constant
+        above = make("<", real(REAL, -1.0), value) if low == 0 else make("<=", real(REAL, float(low)), value)
+        fits = self.terms.every((above, make("<", value, real(REAL, float(high)))))
+        self.owe("the whole number stays in its 64 bits", fits, written)
+        return make("int", value)
+
+    def _operation(self, op: Op, args: list[Term]) -> Term:
+        """One operator; `a min b` is b where b < a, else a, and `a max b` is b where b > a."""
+        make, terms = self.terms.make, self.terms
+        if op is Op.NOT:
+            return terms.negation(args[0])
+        if op in (Op.EQ, Op.NE):
+            same = make("=", *args)
+            return same if op is Op.EQ else terms.negation(same)
+        if op in (Op.LT, Op.LE):
+            return make("<" if op is Op.LT else "<=", *args)
+        if op in (Op.GT, Op.GE):
+            return make("<" if op is Op.GT else "<=", args[1], args[0])
+        if op in (Op.MIN, Op.MAX):
+            takes = make("<", args[1], args[0]) if op is Op.MIN else make("<", args[0], args[1])
+            return terms.choice(takes, args[1], args[0])
+        if op is Op.ABS and args[0].sort == INT:
+            return terms.choice(make("<", args[0], terms.constant(INT, 0)), make("neg", args[0]), args[0])
+        return make("abs" if op is Op.ABS else "real" if op is Op.TO_REAL else _ARITHMETIC[op], *args)
+
+    # --- statements ---
+
+    def execute(self, body: Iterable[Statement]) -> None:
+        """Runs statements."""
+        for statement in body:
+            self._step()
+            match statement:
+                case Assign(place=place, value=value):
+                    self._assign(place, value)
+                case Local(name=name, type=kind, value=value):
+                    self.state.local.pop(name, None)
+                    self.state.assigned[name] = self.terms.false
+                    if value is not None:
+                        self._set_local(name, self._stored(kind, self.evaluate(value), name, value.span))
+                case If(condition=condition, then=then, orelse=orelse):
+                    self._branch(self.evaluate(condition), then, orelse)
+                case Case(subject=subject, arms=arms, orelse=orelse):
+                    given = self.evaluate(subject)
+                    self._arms([(self._among(given, arm.values), arm.body) for arm in arms], orelse)
+                case For(name=name, low=low, high=high, body=inner):
+                    for count in range(low, high + 1):
+                        self.state.local[name] = self.terms.constant(INT, count)
+                        self.execute(inner)
+                case Call(procedure=name, args=args):
+                    given_ = [(self.evaluate(arg), arg.span) for arg in args]
+                    self.call(self.start.procedures[name], given_)
+
+    def _stored(self, kind: Scalar, value: Term, what: str, written: Written) -> Term:
+        """The value as a place of this type keeps it."""
+        low, high = ends_of(kind)
+        if not isinstance(kind, Int | Real) or (value.op == "constant" and low <= value.low <= high):
+            return value
+        number = self.owe(f"`{what}` stays in {low} .. {high}", self._inside(value, low, high), written)
+        return self.terms.kept(value, low, high, number)
+
+    def _set_local(self, name: str, value: Term) -> None:
+        self.state.local[name] = value
+        self.state.assigned.pop(name, None)
+
+    def _assign(self, place: Place, value: Expr) -> None:
+        found = self.evaluate(value)
+        if isinstance(place, ToLeaf):
+            self.write(place.name, self._stored(place.type, found, place.name, value.span), self.terms.true)
+        elif isinstance(place, ToElement):
+            stored = self._stored(place.type, found, place.leaves[0], value.span)
+            at = self.index(place.index, len(place.leaves))
+            self._step(len(place.leaves))
+            for number, name in enumerate(place.leaves):
+                here = self.terms.make("=", at, self.terms.constant(INT, number))
+                self.write(name, stored, here)
+        else:
+            self._set_local(place.name, self._stored(place.type, found, place.name, value.span))
+
+    def write(self, leaf: str, value: Term, when: Term) -> None:
+        """Writes a leaf where `when` holds."""
+        if when is self.terms.false:
+            return
+        self.state.leaves[leaf] = self.terms.choice(when, value, self.leaf(leaf))
+        self.state.wrote[leaf] = self.terms.some((self.state.wrote.get(leaf, self.terms.false), when))
+
+    def _branch(self, condition: Term, then: Sequence[Statement], orelse: Sequence[Statement]) -> None:
+        if condition.op == "constant":
+            self.execute(then if condition.low else orelse)
+        else:
+            self._arms([(condition, then)], orelse)
+
+    def _arms(self, arms: list[tuple[Term, Sequence[Statement]]], orelse: Sequence[Statement]) -> None:
+        """The first arm whose condition holds, else `orelse`."""
+        if not arms:
+            self.execute(orelse)
+            return
+        (condition, body), *others = arms
+        before, path = self.state, self.path
+        self.state, self.path = before.copy(), self.terms.every((path, condition))
+        self.execute(body)
+        one = self.state
+        self.state, self.path = before, self.terms.every((path, self.terms.negation(condition)))
+        self._arms(others, orelse)
+        self.path = path
+        self.state = self._merged(condition, one, self.state)
+
+    def _merged(self, condition: Term, one: State, two: State) -> State:
+        self._step(len(one.leaves) + len(two.leaves))
+        choice, start = self.terms.choice, self.start.leaves
+
+        def joined(a: dict[str, Term], b: dict[str, Term], otherwise: Term) -> dict[str, Term]:
+            return {
+                name: choice(condition, a.get(name, otherwise), b.get(name, otherwise)) for name in {**a, **b}
+            }
+
+        leaves = {
+            name: choice(condition, one.leaves.get(name) or start[name], two.leaves.get(name) or start[name])
+            for name in {**one.leaves, **two.leaves}
+        }
+        local = {
+            name: choice(
+                condition, one.local.get(name) or two.local[name], two.local.get(name) or one.local[name]
+            )
+            for name in {**one.local, **two.local}
+        }  # one that only one side has was never assigned on the other: reading it there is owed not to happen
+        assigned = joined(one.assigned, two.assigned, self.terms.true)
+        return State(leaves, local, assigned, joined(one.wrote, two.wrote, self.terms.false))
+
+    # --- calls ---
+
+    def call(self, procedure: Procedure, args: Iterable[tuple[Term, Written]]) -> None:
+        """Runs a procedure; an extern one gives any value in range, or ends the cycle at any of its results."""
+        given = {
+            param.name: self._stored(param.type, value, param.name, written)
+            for param, (value, written) in zip(procedure.params, args, strict=True)
+        }
+        if procedure.extern is not None:
+            for name in procedure.writes:
+                self.stops(procedure)
+                self.write(
+                    name,
+                    self.any_value(f"{name} from {procedure.name}", self.start.types[name]),
+                    self.terms.true,
+                )
+            return
+        outer = self.state.local, self.state.assigned
+        self.state.local, self.state.assigned = given, {}
+        self.execute(procedure.body)
+        self.state.local, self.state.assigned = outer
+
+    def stops(self, procedure: Procedure) -> None:
+        """What is owed where a cycle may end because a result of the procedure is refused."""
+
+    def keeps(self, invariants: Iterable[tuple[str, Expr, frozenset[str]]], when: str = "") -> None:
+        """Owes every invariant that speaks of a leaf which was written."""
+        for name, condition, reads in invariants:
+            if not reads.isdisjoint(self.state.leaves):
+                after = Run(self.start, "")
+                after.state = State(self.state.leaves)
+                self.owe(f"invariant `{name}` is kept{when}", after.evaluate(condition))
+
+
+def _word(kinds: Iterable[Int]) -> tuple[int, int]:
+    """The 64 bits that an operation on these works in: unsigned where none can be negative."""
+    return (0, U64_MAX) if min(kind.low for kind in kinds) >= 0 else (I64_MIN, I64_MAX)

@@ -1,0 +1,109 @@
+"""The command line: arguments in, text and an exit status out.
+
+Exit statuses: 0 proved, 1 findings, 2 usage, 3 a bug in rcsc, 130 interrupted. Only here does anything
+print or end the process. Nothing heavy is imported before a command needs it.
+"""
+
+import contextlib
+import errno
+import os
+import sys
+from collections.abc import Sequence
+
+PROVED, FINDINGS, USAGE, BUG, INTERRUPTED = 0, 1, 2, 3, 130
+
+
+def main() -> None:
+    """Run `rcsc` with the process's arguments and end the process."""
+    status = run(sys.argv[1:])
+    try:
+        sys.stdout.flush()
+    except OSError as error:
+        status = status or _unwritable("standard output", error.strerror)
+        _forget_stdout()
+    if status == INTERRUPTED:
+        from rcsc.host.children import leave
+
+        leave(status)
+    sys.exit(status)
+
+
+def run(args: Sequence[str]) -> int:
+    """Run `rcsc` with `args`; the exit status."""
+    import click
+
+    from rcsc.commands.group import commands
+    from rcsc.commands.shared.show import UnwritableError
+
+    try:
+        status = commands.main(list(args), prog_name="rcsc", standalone_mode=False)
+    except click.ClickException as error:
+        error.show()
+        return int(getattr(error, "status", USAGE))
+    except (click.Abort, KeyboardInterrupt):
+        click.echo("rcsc: interrupted; nothing was half written", err=True)
+        return INTERRUPTED
+    except UnwritableError as error:
+        return _unwritable(*error.args)
+    except BrokenPipeError:
+        _forget_stdout()
+        return FINDINGS
+    except OSError as error:
+        if error.errno not in _FULL:
+            return _bug(error)
+        return _unwritable(f"`{error.filename}`" if error.filename else "a file", error.strerror)
+    except Exception as error:  # noqa: BLE001  # whatever it is, it is a bug in rcsc and is reported as one
+        return _bug(error)
+    return status if isinstance(status, int) else PROVED
+
+
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS)
+
+
+def _unwritable(place: str, why: str | None) -> int:
+    """A full disk, or one that is read only."""
+    import click
+
+    with contextlib.suppress(OSError):  # it may be the disk that this goes to
+        click.echo(
+            f"error[RCS502]: {place} cannot be written: {why or 'no reason given'}\n"
+            "  = note: a file that was there is as it was before, whole; a log is kept as far as it goes",
+            err=True,
+        )
+    return FINDINGS
+
+
+def _forget_stdout() -> None:
+    """Whoever read the output has gone: let the interpreter's last flush go nowhere."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def _bug(error: Exception) -> int:
+    import traceback
+
+    import click
+
+    from rcsc import __version__
+    from rcsc.diagnostics.printable import escape
+    from rcsc.host.children import WorkerEndedError
+
+    if isinstance(error, WorkerEndedError):
+        click.echo(
+            f"error[RCS904]: {error}\n"
+            "  = note: nothing is known of what it was to decide\n"
+            "  = help: if memory was short, `--jobs 1` takes less of it",
+            err=True,
+        )
+        return BUG
+    frames = traceback.extract_tb(error.__traceback__)
+    place = f"{os.path.basename(frames[-1].filename)}:{frames[-1].lineno}" if frames else "?"
+    what = escape(f"{type(error).__name__}: {error}")[:300]
+    click.echo(
+        f"error[RCS902]: a bug in rcsc {__version__}: {what} ({place})\n"
+        "  = note: nothing was proved, and nothing was written\n"
+        "  = help: please report it with the tables, if you can, and what RCSC_DEBUG=1 prints",
+        err=True,
+    )
+    if os.environ.get("RCSC_DEBUG") == "1":
+        traceback.print_exception(error)
+    return BUG

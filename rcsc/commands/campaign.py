@@ -1,0 +1,283 @@
+"""`rcsc campaign`: many episodes of the cell, with whatever can go wrong in them."""
+
+import json
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from rcsc.commands.shared.options import cores
+from rcsc.commands.shared.show import Progress, UnwritableError
+from rcsc.commands.shared.systems import SYSTEM, Stopped, compiled, stop, system_path
+from rcsc.diagnostics.codes import Code
+
+if TYPE_CHECKING:
+    from rcsc_cell.campaign.journal import Journal, Record
+    from rcsc_cell.campaign.rig import Rig
+    from rcsc_cell.campaign.worker_pool import Crew
+
+_TO = click.Path(dir_okay=False, path_type=Path)
+_TERMINAL_S, _PLAIN_S = 1.0, 10.0
+"""How often a line of progress is said: on a terminal over the last one, elsewhere below it."""
+
+
+@click.command(
+    short_help="Run many episodes of the cell, with faults; shrink what breaks a property.",
+    epilog="""\b
+Examples:
+  rcsc campaign --episodes 1000 --seed 7         a thousand episodes without physics; again: goes on, or adds
+  rcsc campaign --backend mujoco --episodes 100  with physics
+  rcsc campaign --again campaign/7-12-held       a saved counterexample: does it still fail?
+  rcsc campaign --scheduler tcp://head:8786      on a dask.distributed cluster (extra `cluster`)
+
+\b
+Exit status: 0 every property held, 1 one did not, 2 usage, 3 a bug in rcsc.""",
+)
+@click.option("--episodes", type=click.IntRange(min=1), default=200, show_default=True, metavar="N",
+              help="How many, those of the journal included.")  # fmt: skip
+@click.option("--workers", type=click.IntRange(min=1), default=None, metavar="K",
+              help="Processes here; one a processor when nobody says. The outcomes are the same with any number.")  # fmt: skip
+@click.option("--seed", type=int, default=0, show_default=True, metavar="S", help="Which episodes.")
+@click.option("--backend", type=click.Choice(["kinematic", "mujoco"]), default="kinematic", show_default=True,
+              help="The plant: kinematics alone, or physics.")  # fmt: skip
+@click.option("--executor", type=click.Choice(["c", "python"]), default=None,
+              help="Which of the generated executors run; c when nobody says, and with --again the episode's own.")  # fmt: skip
+@SYSTEM
+@click.option("--journal", type=_TO, default=None, metavar="FILE",
+              help="Where each episode's outcome is kept; else in .rcsc-cache beside the system, by seed and tables.")  # fmt: skip
+@click.option("--save", type=click.Path(file_okay=False, path_type=Path), default=Path("campaign"), show_default=True,
+              metavar="DIR", help="Where counterexamples go.")  # fmt: skip
+@click.option(
+    "--json", "json_", type=_TO, default=None, metavar="FILE", help="Write the summary to FILE, too."
+)
+@click.option("--limit", "limit_s", type=click.FloatRange(min=0, min_open=True), default=120.0, show_default=True,
+              metavar="SECONDS", help="What takes longer hangs.")  # fmt: skip
+@click.option("--scheduler", default=None, metavar="ADDRESS",
+              help="Play on the workers of this dask.distributed scheduler; they have the same rcsc and tables.")  # fmt: skip
+@click.option("--again", type=click.Path(exists=True, path_type=Path), default=None, metavar="FILE",
+              help="Run a saved episode, and nothing else; 1 if a property does not hold.")  # fmt: skip
+@click.option("--compile/--no-compile", "compiles", default=True, show_default=True,
+              help="Prove and compile what changed before anything moves.")  # fmt: skip
+def campaign(  # noqa: PLR0913, PLR0917  # as many as there are options
+    episodes: int, workers: int | None, seed: int, backend: str, executor: str | None, system: Path | None,
+    journal: Path | None, save: Path, json_: Path | None, limit_s: float, scheduler: str | None, again: Path | None,
+    compiles: bool,
+) -> int:  # fmt: skip
+    """Run episodes of the cell: parts, scripts, faults, lost buffers and restarts by seed, with every property watching.
+
+    Each outcome goes into a journal at once, so that a campaign killed at any moment goes on where it was. Where a property does
+    not hold, the episode is made as small as it gets and saved with its script and its log. An episode that takes its
+    process with it, or does not end, is a finding like any other.
+    """
+    if scheduler is not None and workers is not None:
+        raise click.UsageError("--workers are processes here; with --scheduler the cluster's are taken")
+    with _coded():
+        rig = _rig(system_path(system), backend, executor, limit_s)
+        if compiles and not compiled(rig.system, quiet=True):
+            return 1
+        if again is not None:
+            return _again(again, rig, executor)
+        crew = _crew(scheduler, workers or cores())
+        return _campaign(rig, seed, episodes, crew, _journal(rig, seed, journal), save, json_)
+
+
+@contextmanager
+def _coded() -> Iterator[None]:
+    """What can go wrong with a campaign, as coded errors."""
+    from rcsc.run.description import BadDescription
+    from rcsc.run.executors import NotBuilt
+    from rcsc.run.log.export import MissingPackage
+    from rcsc_cell.campaign.counterexamples import BadEpisode
+    from rcsc_cell.campaign.journal import BadJournal
+    from rcsc_cell.campaign.work import OtherTables
+    from rcsc_cell.campaign.worker_pool import WorkersGone
+    from rcsc_cell.database.build import BadData
+
+    try:
+        yield
+    except BadJournal as error:
+        raise Stopped(Code.BAD_JOURNAL, str(error), "name another file with --journal") from error
+    except BadEpisode as error:
+        raise Stopped(Code.BAD_EPISODE, str(error)) from error
+    except (WorkersGone, OtherTables) as error:
+        said = "what is done is kept: the same command goes on from there"
+        raise Stopped(Code.WORKERS_GONE, str(error), said) from error
+    except MissingPackage as error:
+        said = f"pip install 'rcsc[{error.extra}]'"
+        raise Stopped(Code.EXTRA_MISSING, f"`{error.package}` is not installed", said) from error
+    except (BadDescription, BadData, NotBuilt) as error:
+        stop(error)
+
+
+def _rig(path: Path, backend: str, executor: str | None, limit_s: float) -> "Rig":
+    from rcsc_cell.campaign.rig import Rig
+
+    return Rig(
+        "mujoco" if backend == "mujoco" else "kinematic",
+        "python" if executor == "python" else "c",
+        path.resolve(),
+        limit_s,
+    )
+
+
+def _crew(scheduler: str | None, workers: int) -> AbstractContextManager["Crew"]:
+    from rcsc_cell.campaign.worker_pool import cluster, processes
+
+    return processes(workers) if scheduler is None else cluster(scheduler)
+
+
+def _journal(rig: "Rig", seed: int, path: Path | None) -> "Journal":
+    from rcsc_cell.campaign.journal import Journal, header, journal_path
+
+    place = path or journal_path(rig, seed, rig.system.parent / ".rcsc-cache")
+    try:
+        return Journal(place, header(rig, seed))
+    except OSError as error:
+        raise UnwritableError(str(place), error.strerror or "no reason given") from error
+
+
+def _campaign(  # as many as there are options
+    rig: "Rig", seed: int, episodes: int, hired: AbstractContextManager["Crew"], journal: "Journal", save: Path,
+    json_: Path | None,
+) -> int:  # fmt: skip
+    """Plays, sums up, and saves counterexamples."""
+    from rcsc_cell.campaign.runner import campaign as play
+
+    with journal, hired as crew:
+        said = _Told(episodes, [one for at, one in journal.records.items() if at < episodes])
+        try:
+            for new in play(rig, seed, episodes, crew, journal):
+                said(new)
+        except KeyboardInterrupt:
+            said.end()
+            click.echo(
+                f"{len(journal.records)} episodes are kept in {journal.path}: the same command goes on",
+                err=True,
+            )
+            raise
+        said.end()
+        records = [record for index, record in sorted(journal.records.items()) if index < episodes]
+        _sum_up(rig, records, said, json_)
+        click.echo(f"journal: {journal.path}")
+        _save(rig, seed, records, crew, save)
+    return 1 if any(one.findings for one in records) else 0
+
+
+class _Told:
+    """Progress, now and then on standard error."""
+
+    def __init__(self, wanted: int, known: list["Record"]) -> None:
+        self._wanted, self._known, self._done = wanted, len(known), len(known)
+        self._findings = sum(bool(one.findings) for one in known)
+        self._progress = Progress()
+        self._terminal = sys.stderr.isatty()
+        self._begun = self._last = time.monotonic()
+        self.cycles = 0
+
+    @property
+    def here(self) -> int:
+        """Episodes played by this command."""
+        return self._done - self._known
+
+    @property
+    def seconds(self) -> float:
+        """Since the campaign began or went on."""
+        return time.monotonic() - self._begun
+
+    def __call__(self, records: tuple["Record", ...]) -> None:
+        """Takes what came in."""
+        self._done += len(records)
+        self._findings += sum(bool(one.findings) for one in records)
+        self.cycles += sum(one.ticks for one in records)
+        now = time.monotonic()
+        if now - self._last >= (_TERMINAL_S if self._terminal else _PLAIN_S):
+            self._last = now
+            say: Callable[[str], Any] = (
+                self._progress if self._terminal else lambda line: click.echo(line, err=True)
+            )
+            say(self._line())
+
+    def _line(self) -> str:
+        rate = self.here / max(self.seconds, 1e-9)
+        left = f", {_clock((self._wanted - self._done) / rate)} left" if rate else ""
+        return f"{self._done} of {self._wanted} episodes, {rate:.1f} a second{left}, {self._findings} with findings"
+
+    def end(self) -> None:
+        """Clears the line of a terminal."""
+        self._progress("")
+
+
+def _clock(seconds: float) -> str:
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02}:{rest:02}" if hours else f"{minutes}:{rest:02}"
+
+
+def _sum_up(rig: "Rig", records: list["Record"], said: _Told, json_: Path | None) -> None:
+    from rcsc.host.files import write_atomically
+    from rcsc_cell.campaign.rig import known_lines
+    from rcsc_cell.campaign.summary import as_json, as_text, summary
+    from rcsc_cell.episodes.episode import FAULTS
+
+    found = summary(records, known_lines(rig.system), tuple(FAULTS))
+    seconds = max(said.seconds, 1e-9)
+    click.echo(as_text(found))
+    click.echo(
+        f"{found.episodes} episodes, {found.cycles} cycles, {found.with_findings} with findings; "
+        f"{said.here} played now in {_clock(seconds)}: {said.here / seconds:.1f} a second, {said.cycles / seconds:.0f} cycles"
+    )
+    if json_ is None:
+        return
+    clock = {"played_now": said.here, "seconds": round(seconds, 3), "episodes_a_second": said.here / seconds}
+    try:
+        write_atomically(json_, (json.dumps(as_json(found) | clock, indent=1) + "\n").encode())
+    except OSError as error:
+        raise UnwritableError(str(json_), error.strerror or "no reason given") from error
+    click.echo(f"wrote {json_}")
+
+
+def _save(rig: "Rig", seed: int, records: list["Record"], crew: "Crew", folder: Path) -> None:
+    """Shrinks and saves what is not saved already, and says what to type."""
+    from rcsc_cell.campaign.counterexamples import MOST, choices, counterexamples, is_saved, save
+
+    chosen = choices(records)
+    wanted = [one for one in chosen[:MOST] if not is_saved(folder, rig, seed, one)]
+    for one in chosen[:MOST]:
+        if one not in wanted:
+            click.echo(f"saved before: {folder / one.name(seed)}")
+    for one, made in counterexamples(rig, seed, wanted, crew):
+        try:
+            place = save(folder, rig, seed, one, made)
+        except OSError as error:
+            raise UnwritableError(
+                str(folder / one.name(seed)), error.strerror or "no reason given"
+            ) from error
+        _tell(f"episode {one.index}", made.found.property, made.found.tick, made.found.said)
+        click.echo(f"  = help: rcsc campaign --again {place}", err=True)
+        if made.log:
+            click.echo(f"  = help: rcsc replay {place / 'log.mcap'}", err=True)
+    if len(chosen) > MOST:
+        click.echo(f"and {len(chosen) - MOST} more kinds of findings, in the journal")
+
+
+def _tell(where: str, name: str, tick: int, said: str) -> None:
+    click.echo(
+        f"error[{Code.PROPERTY_BROKEN.value}]: {where}, cycle {tick}: `{name}` does not hold: {said}",
+        err=True,
+    )
+
+
+def _again(path: Path, rig: "Rig", executor: str | None) -> int:
+    from rcsc_cell.campaign.counterexamples import again
+
+    outcome = again(path, rig, None if executor is None else rig.executor)
+    for number, text, state, reason, ticks in outcome.rows:
+        click.echo(f"{number:3}  {text:44} {state:8} {ticks:4} cycles{f'  {reason}' if reason else ''}")
+    click.echo(f"{outcome.end} after {outcome.ticks} cycles")
+    for found in outcome.findings:
+        _tell(str(path), found.property, found.tick, found.said)
+    return 1 if outcome.findings else 0

@@ -1,0 +1,167 @@
+"""`rcsc diff`: what changed between two versions of the tables, and the proof that nothing else did."""
+
+import os
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from rcsc.commands.shared.options import steps_option
+from rcsc.commands.shared.show import Color, Output, Progress, UnwritableError, json_text, show
+from rcsc.diagnostics.codes import Code
+from rcsc.diagnostics.diagnostic import Diagnostic, Label
+from rcsc.diagnostics.report import Report
+from rcsc.diagnostics.source import Span
+
+if TYPE_CHECKING:
+    from rcsc.diff.changes.difference import Difference
+    from rcsc.diff.sides import Given, Side
+    from rcsc.solvers.options import Options
+
+SAME, CHANGED, ERROR = 0, 1, 2
+
+
+@click.command(
+    short_help="Show what changed in meaning, and prove that nothing else did.",
+    epilog="""\b
+Examples:
+  rcsc diff old.rcs new.rcs                  two files
+  rcsc diff HEAD~1:tables tables             a revision's folder and this one
+  rcsc diff --rev main..HEAD tables          two revisions
+  rcsc diff --rev HEAD                       what is not committed yet
+  rcsc diff --rev main..HEAD --format markdown -o comment.md
+
+\b
+As a review comment, in CI:
+  rcsc diff --rev "$BASE..$HEAD" --format markdown -o comment.md || test $? -eq 1
+As a hook that stops a commit which was to change no meaning:
+  - repo: local
+    hooks:
+      - {id: rcsc-diff, name: rcsc diff, entry: rcsc diff --rev HEAD, language: system,
+         files: '\\.rcs$', pass_filenames: false}
+
+\b
+Exit status: 0 same meaning, 1 changed, 2 usage, an error, or not decided.""",
+)
+@click.argument("paths", nargs=-1, metavar="A B | [PATH]...")
+@click.option("--rev", "revision", default=None, metavar="REV1[..REV2]",
+              help="Compare two revisions, or one with the files as they are; PATH says which (default: this folder).")  # fmt: skip
+@click.option("--format", "form", type=click.Choice(["text", "json", "markdown"]), default="text", show_default=True,
+              help="text, json, or markdown for a review comment.")  # fmt: skip
+@click.option("--json", "form", flag_value="json", help="The same as --format json.")
+@click.option("-o", "--output", "file", type=click.Path(dir_okay=False, path_type=Path), default=None, metavar="FILE",
+              help="Write it to FILE instead of standard output.")  # fmt: skip
+@click.option("--color", type=click.Choice([color.value for color in Color]), default="auto", show_default=True,
+              help="Colour the text; `auto` on a terminal, unless NO_COLOR is set.")  # fmt: skip
+@steps_option(20)
+@click.option("--memory", type=click.IntRange(min=64), default=4096, show_default=True, metavar="MB",
+              help="Memory limit of the solver.")  # fmt: skip
+@click.option("--follow", is_flag=True,
+              help="For a changed table also: which line can match in the cycle after which, what is new and what is gone.")  # fmt: skip
+@click.option("-q", "--quiet", is_flag=True, help="Only what changed, no summary and no progress.")
+def diff(  # noqa: PLR0913, PLR0917  # as many as there are options
+    paths: tuple[str, ...], revision: str | None, form: str, file: Path | None, color: str, steps: int,
+    memory: int, follow: bool, quiet: bool,
+) -> int:  # fmt: skip
+    """Show the inputs for which another line, effect or fault follows in B than in A, and prove that there are no others.
+
+    A and B are files, folders, or `REV:path` as git has it. Effects are compared by meaning: what procedures, command and
+    status leave behind, whatever their text. Lines that are only renamed, split or renumbered are shown apart and change nothing.
+    For a level the steps of its state graph are compared: which are new, which are gone.
+    """
+    from rcsc.diff.revision import NotComparedError
+    from rcsc.solvers.options import Options
+
+    asked = _asked(paths, revision)
+    options = Options(steps=steps, memory_mb=memory)
+    progress = Progress(wanted=not quiet)
+    try:
+        found = _found(asked, options, progress, follow)
+    except NotComparedError as error:
+        return _refuse(Code.NOT_COMPARED, str(error), *error.helps)
+    finally:
+        progress("")
+    if isinstance(found, int):
+        return found
+    _write(_text(found, form, quiet, _wants_color(color, file)), file)
+    if found.undecided:
+        left = ", ".join(what for program in found.programs for what in program.undecided)
+        return _refuse(
+            Code.UNDECIDED, f"the solver gave up on {left}", "give each query more steps with `--steps`"
+        )
+    return CHANGED if found.changed else SAME
+
+
+def _asked(paths: tuple[str, ...], revision: str | None) -> "tuple[Given, Given]":
+    from rcsc.diff.sides import given, revisions
+
+    if revision is not None:
+        return revisions(revision, paths)
+    if len(paths) != 2:
+        raise click.UsageError("give two files or folders, A and B, or revisions with --rev")
+    return given(paths[0]), given(paths[1])
+
+
+def _found(
+    asked: "tuple[Given, Given]", options: "Options", progress: Callable[[str], None], follow: bool
+) -> "Difference | int":
+    """The difference, or the status where a side has errors."""
+    from rcsc.diff.compare import difference
+    from rcsc.diff.sides import read
+
+    sides = []
+    for one in asked:
+        progress(f"reading {one.name}")
+        sides.append(read(one))
+    if any(side.found for side in sides):
+        return _wrong(sides)
+    return difference(sides[0], sides[1], options, progress, follow=follow)
+
+
+def _wrong(sides: "list[Side]") -> int:
+    """Shows what keeps the sides from being compared."""
+    every = dict.fromkeys(one for side in sides for one in side.found)
+    sources = {name: source for side in sides for name, source in side.sources.items()}
+    show(Report(tuple(every), (), sources), "diff", Output(quiet=True))
+    return ERROR
+
+
+def _refuse(code: Code, message: str, *helps: str) -> int:
+    show(Report((Diagnostic(code, message, Label(Span("", 0, 0)), help=helps),)), "diff", Output(quiet=True))
+    return ERROR
+
+
+def _text(found: "Difference", form: str, quiet: bool, color: bool) -> str:
+    from rcsc.diagnostics.render import paint, plain
+    from rcsc.diff.jsonform import to_json
+    from rcsc.diff.text import markdown, rows
+
+    if form == "json":
+        return json_text(to_json(found))
+    if form == "markdown":
+        return markdown(found)
+    return (paint if color else plain)(rows(found, quiet=quiet))
+
+
+def _wants_color(color: str, file: Path | None) -> bool:
+    """Source: no-color.org for `NO_COLOR`; `--color` wins over it."""
+    if color != "auto":
+        return color == "always"
+    plain_terminal = os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb"
+    return not plain_terminal and file is None and sys.stdout.isatty()
+
+
+def _write(text: str, file: Path | None) -> None:
+    from rcsc.host.files import write_atomically
+
+    try:
+        if file is None:
+            click.echo(text, nl=False, color=True)
+        else:
+            write_atomically(file, text.encode())
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        raise UnwritableError(str(file or "standard output"), error.strerror or "no reason given") from error

@@ -1,0 +1,535 @@
+"""`rcsc prove`: the levels of a system proved together."""
+
+import importlib.util
+import io
+import json
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from rcsc.commands.shared.options import steps_option
+from rcsc.commands.shared.show import Progress, UnwritableError
+from rcsc.commands.shared.systems import Stopped, stop, system_path
+
+_WIDTH = 118
+"""Columns of a time line."""
+_LONG = 33
+"""Characters of an assignment that a column has room for, whatever the others hold."""
+_HARD = "\ue000"
+"""A space at which a time line does not break, while it is laid out; of private use, since every other one may."""
+_WORTH_PROCESSES = 40
+"""Lines of the levels' tables from which several processes are quicker than one: each takes a second to begin."""
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Sequence
+
+    from rich.table import Table
+
+    from rcsc.compose.contract.transition import Stepper
+    from rcsc.compose.counterexample.explain import Told
+    from rcsc.compose.counterexample.finding import Finding
+    from rcsc.compose.proof.level import LevelProof
+    from rcsc.compose.proof.system import SystemProof
+
+
+@click.command(
+    short_help="Prove the levels of a system together, for any delay.",
+    epilog="""\b
+Examples:
+  rcsc prove                                   the system in system.toml, here or in tables/
+  rcsc prove tables/system.toml --level task   one level in its environment
+  rcsc prove --certificate proof               the invariants as SMT-LIB, for another solver
+  rcsc prove --level task --without-deferral   what section 9 warns of: the shortest trace
+  rcsc prove --log found                       each trace as a log, for `rcsc replay` and `rcsc log`
+  rcsc prove --case tests/found/a.json         a frozen finding, again""",
+)
+@click.argument(
+    "system", required=False, type=click.Path(exists=True, dir_okay=False, path_type=Path), metavar="[SYSTEM]"
+)
+@click.option("--level", "only", multiple=True, metavar="NAME", help="Only this level (repeatable).")
+@steps_option(80)
+@click.option("--jobs", "-j", type=click.IntRange(min=1), default=None, show_default="2, or 1 for small levels",
+              help="Levels proved at once.")  # fmt: skip
+@click.option("--trace", "cycles", type=click.IntRange(min=0, max=40), default=8, show_default=True, metavar="N",
+              help="For what is not proved, look for a trace of at most N cycles; 0 does not look.")  # fmt: skip
+@click.option("--log", "logs", type=click.Path(file_okay=False, path_type=Path), default=None, metavar="DIR",
+              help="Keep each trace in DIR as a log that `rcsc replay` steps and `rcsc log` draws, with its executors.")  # fmt: skip
+@click.option("--freeze", type=click.Path(file_okay=False, path_type=Path), default=None, metavar="DIR",
+              help="Keep each trace in DIR as a case for --case: a test that fails until the tables are mended.")  # fmt: skip
+@click.option("--case", "cases", multiple=True, type=click.Path(dir_okay=False, path_type=Path), metavar="FILE",
+              help="Run a frozen case on the tables as they are, and nothing else (repeatable).")  # fmt: skip
+@click.option("--without-deferral", is_flag=True,
+              help="As if every next state were taken at once, not when its command is echoed: a demonstration.")  # fmt: skip
+@click.option("--first-match", is_flag=True,
+              help="As if of several lines that match the first ran: a demonstration.")  # fmt: skip
+@click.option("--without-default", is_flag=True,
+              help="As if every DEFAULT line were declared unreachable: shows what falls to them.")  # fmt: skip
+@click.option("--certificate", type=click.Path(file_okay=False, path_type=Path), default=None, metavar="DIR",
+              help="Write each level's questions to DIR as SMT-LIB: each is to be answered `unsat`.")  # fmt: skip
+@click.option("--certify", "confirms", is_flag=True,
+              help="Put the same questions to cvc5, which has no part in the proof.")  # fmt: skip
+@click.option("--no-cache", is_flag=True, help="Prove everything anew.")
+@click.option("--progress", is_flag=True,
+              help="Say each level on standard error as it is done, which is so on a terminal anyway.")  # fmt: skip
+@click.option("--strict", is_flag=True,
+              help="Exit status 1 also where something was not looked at, or rests on what is not proved.")  # fmt: skip
+@click.option("--invariants", is_flag=True, help="Print the invariant of each level, too.")
+@click.option("--json", "as_json", is_flag=True, help="The result as JSON.")
+def prove(  # noqa: PLR0913, PLR0917  # as many as there are options
+    system: Path | None, only: tuple[str, ...], steps: int, jobs: int | None, cycles: int, logs: Path | None,
+    freeze: Path | None, cases: tuple[Path, ...], without_deferral: bool, first_match: bool, without_default: bool,
+    certificate: Path | None, confirms: bool, no_cache: bool, progress: bool, strict: bool, invariants: bool, as_json: bool,
+) -> int:  # fmt: skip
+    """Prove that the levels of SYSTEM work together, however late each sees and answers what another says.
+
+    Each level is proved in its environment: every command at any moment, every delay, repetition and loss in the buffers, every
+    answer of the database. What it assumes of a neighbour is proved of that neighbour. Printed: each
+    assumption with its new standing, what is guaranteed between levels, and for what fails the shortest run that shows it.
+    """
+    from rcsc.compose.contract.variants import VARIANTS
+    from rcsc.compose.invariant.search import Effort
+    from rcsc.compose.proof.system import NoProgramError, prove_steppers, steppers
+    from rcsc.diagnostics.codes import Code
+    from rcsc.host.cache import open_cache
+    from rcsc.run.description import BadDescription
+    from rcsc.solvers.smt import Limits
+
+    if confirms and importlib.util.find_spec("cvc5") is None:
+        raise click.UsageError("--certify needs the extra `certify`: pip install 'rcsc[certify]'")
+    if cases:
+        return _again(cases)
+    path = system_path(system)
+    try:
+        made = steppers(path)
+    except NoProgramError as error:
+        raise Stopped(Code.BAD_SYSTEM, str(error)) from error
+    except BadDescription as error:
+        stop(error)
+    unknown = [name for name in only if name not in made]
+    if unknown:
+        raise click.UsageError(f"there is no level `{unknown[0]}`; there are {', '.join(made)}")
+    asked = {
+        "without-deferral": without_deferral,
+        "first-match": first_match,
+        "without-default": without_default,
+    }
+    variants = tuple(name for name, wanted in asked.items() if wanted)
+    for name in variants:
+        made = {level: one.of(VARIANTS[name](one.program)) for level, one in made.items()}
+    effort = Effort(limits=Limits.of(steps))
+    cache = None if no_cache or variants else open_cache(path.parent)  # a variant is nobody's tables
+    names = only or tuple(made)
+    with _Said(names, wanted=progress) as said:
+        proof = prove_steppers(
+            made, effort, jobs or _jobs([made[name] for name in names]), names, said, cache
+        )
+    if certificate is not None:
+        _write(certificate, made, proof)
+    if not as_json:
+        for one in proof.levels:
+            _say_level(proof, one)
+        if invariants:
+            _say_invariants(proof)
+        _say_agreements(proof)
+        _say_whole(made, proof)
+    keep = _Keep(path, logs, freeze, variants)
+    told = _look(made, proof, cycles, keep, None if as_json else _say_told)
+    if as_json:
+        click.echo(json.dumps(_as_json(proof, made, told), indent=2))
+    _say_not_agreed(proof)
+    refused = _refused(made, proof, quiet=as_json) if confirms else []
+    if refused or any(one.bug for one in told):
+        return 3
+    return 0 if proof.whole or (proof.proved and not strict) else 1
+
+
+def _jobs(levels: "Iterable[Stepper]") -> int:
+    """How many levels to prove at once where nobody says."""
+    lines = sum(len(table.lines) for one in levels for table in one.program.tables)
+    return min(2, os.cpu_count() or 1) if lines >= _WORTH_PROCESSES else 1
+
+
+class _Said:
+    """Says each level on standard error as it is done, and on a terminal those that are still to come."""
+
+    def __init__(self, names: "Sequence[str]", *, wanted: bool) -> None:
+        self._left = list(names)
+        self._line = Progress()
+        self._wanted = wanted or self._line.shown
+
+    def __enter__(self) -> "Callable[[LevelProof], None]":
+        self._doing()
+        return self._done
+
+    def __exit__(self, *_: object) -> None:
+        self._line("")
+
+    def _doing(self) -> None:
+        self._line(f"proving {', '.join(self._left)}" if self._left else "")
+
+    def _done(self, proof: "LevelProof") -> None:
+        self._line("")
+        found = f"{len(proof.found) - len(proof.open)} of {len(proof.found)} found proved"
+        if self._wanted:
+            click.echo(f"level {proof.level}: {found}, {proof.seconds:.1f} s", err=True)
+        self._left.remove(proof.level)
+        self._doing()
+
+
+def _refused(made: "dict[str, Stepper]", proof: "SystemProof", *, quiet: bool) -> list[str]:
+    """Questions that cvc5 does not answer as Z3 did; says how many there were."""
+    from rcsc.commands.shared.proved import confirmed
+    from rcsc.diagnostics.codes import Code
+
+    refused = []
+    for one in proof.levels:
+        answers = confirmed(made[one.level], one)
+        wrong = [name for name, same in answers.items() if not same]
+        refused += wrong
+        good = len(answers) - len(wrong)
+        click.echo(f"level {one.level}: cvc5 says the same of {good} of {len(answers)} questions", err=quiet)
+        for name in wrong:
+            click.echo(
+                f"error[{Code.SOLVERS_DISAGREE.value}]: level `{one.level}`: cvc5 does not confirm `{name}`",
+                err=True,
+            )
+    return refused
+
+
+def _say_level(whole: "SystemProof", proof: "LevelProof") -> None:
+    """One level: its assumptions first, then what else is proved of it, each with what it rests on that is not."""
+    from rcsc.commands.shared.proved import in_context, not_looked_at, standing, trusting
+    from rcsc.compose.contract.obligations import Sort
+    from rcsc.compose.proof.level import besides
+
+    found_before = ", by an earlier run" if proof.cached else ""
+    click.echo(click.style(f"level {proof.level}", bold=True) + f"  {proof.seconds:.1f} s{found_before}")
+    for sort in Sort:
+        found = [goal for goal, _ in proof.found if goal.sort is sort]
+        if sort is Sort.ASSUMPTION:
+            for goal in found:
+                said = standing(whole, proof.level, goal.key)
+                monitored = "" if whole.of(proof.level, goal.key).proved else "monitored: "
+                together = " of the levels together" if said in {"not proved", "undecided"} else ""
+                click.echo(f"  {goal.table:28} {goal.name:24} {monitored}{said}{together}")
+        elif sort in {Sort.INVARIANT, Sort.PROPERTY}:
+            for goal in found:
+                click.echo(f"  {sort.value:28} {goal.name:24} {standing(whole, proof.level, goal.key)}")
+        elif found:
+            beside = [goal.name for goal in besides(proof) if goal.sort is sort]
+            good = [goal for goal in found if whole.of(proof.level, goal.key).proved]
+            trusts = trusting(whole, proof.level, [goal.key for goal in good])
+            click.echo(f"  {sort.value}: {len(good)} of {len(found) - len(beside)} proved{trusts}")
+            for goal in found:
+                if goal not in good and goal.name not in beside:
+                    click.echo(
+                        f"    {goal.table or goal.name or 'within a cycle'}: {standing(whole, proof.level, goal.key)}"
+                    )
+            if beside:
+                click.echo(f"    beside the number, so that nobody relies on it: {', '.join(beside)}")
+    for line in not_looked_at(proof):
+        click.echo(f"  {line}")
+    many = len(proof.clauses)
+    click.echo(
+        f"  invariant: {many} clauses over {len(proof.features)} features; {proof.walked} states walked, {proof.learnt} learnt"
+    )
+    for line in in_context(whole, proof):
+        click.echo(f"  {line}")
+
+
+def _say_invariants(proof: "SystemProof") -> None:
+    from rcsc.compose.invariant.cubes import shown
+
+    for one in proof.levels:
+        click.echo(f"invariant of level {one.level}: never")
+        for clause in one.clauses:
+            click.echo(f"  {shown(one.features, clause)}")
+
+
+def _say_whole(made: "dict[str, Stepper]", proof: "SystemProof") -> None:
+    from rcsc.commands.shared.proved import assumptions, left_out, reaction, trusted
+
+    for line in (*reaction(made, proof), assumptions(proof), *trusted(proof), *left_out(proof)):
+        click.echo(line)
+    click.echo(f"{proof.seconds:.1f} s in all")
+
+
+def _say_agreements(proof: "SystemProof") -> None:
+    from rcsc.commands.shared.proved import named
+    from rcsc.compose.contract.claims import CONTRACT
+
+    if proof.agreements:
+        click.echo("between the levels")
+    for one in proof.agreements:
+        lacks = named(proof, one.level, proof.of(one.level, (CONTRACT, "", one.record)).lacks)
+        standing = "kept by: " if one.outside else "NOT " if not one.holds else ""
+        standing += f"only if {lacks}: " if one.holds and lacks else ""
+        click.echo(f"  {one.level} assumes that {one.assumed}")
+        click.echo(f"    {standing}{one.reason}")
+
+
+@dataclass(frozen=True, slots=True)
+class _Keep:
+    """Where findings are kept: the system's description, folders of logs and of cases, and the rules that are off."""
+
+    system: Path
+    logs: Path | None
+    cases: Path | None
+    variants: tuple[str, ...]
+
+
+def _look(
+    made: "dict[str, Stepper]",
+    proof: "SystemProof",
+    cycles: int,
+    keep: _Keep,
+    say: "Callable[[dict[str, Stepper], Told, int], None] | None",
+) -> "list[Told]":
+    """What is not proved, each with its shortest trace where there is one."""
+    from rcsc.compose.counterexample.explain import Looking, look
+    from rcsc.run.description import description
+    from rcsc.run.executors import NotBuilt
+
+    looking = Looking(description(keep.system), cycles, altered=bool(keep.variants), log=keep.logs)
+    found = []
+    try:
+        for one in look(made, proof, looking):
+            found.append(one)
+            if keep.cases is not None and one.finding is not None and not one.beside:
+                _freeze(made, one.finding, keep.cases, keep)
+            if say is not None:
+                say(made, one, cycles)
+    except OSError as error:
+        raise UnwritableError(
+            str(error.filename or keep.logs), error.strerror or "no reason given"
+        ) from error
+    except NotBuilt as error:
+        stop(error)
+    return found
+
+
+def _freeze(made: "dict[str, Stepper]", finding: "Finding", folder: Path, keep: _Keep) -> None:
+    from rcsc.compose.counterexample.explain import file_name
+    from rcsc.compose.counterexample.frozen import frozen
+    from rcsc.host.files import write_atomically
+    from rcsc.run.description import description
+
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / f"{description(keep.system).name}_{file_name(finding)}.json"
+    write_atomically(path, frozen(finding, made, keep.system, path, keep.variants).encode())
+
+
+def _again(cases: tuple[Path, ...]) -> int:
+    """Runs frozen cases."""
+    from rcsc.compose.counterexample.frozen import BadCaseError, case_breaks, read_case
+    from rcsc.diagnostics.codes import Code
+
+    wrong = 0
+    for path in cases:
+        try:
+            case = read_case(path)
+            breaks = case_breaks(case)
+        except BadCaseError as error:
+            raise Stopped(Code.BAD_CASE, str(error)) from error
+        said = f"level `{case.level}`: {case.goal.shown}: {'broken' if breaks else 'kept'}"
+        if breaks is case.expects_broken:
+            click.echo(f"{path}: {said}")
+        else:
+            wrong += 1
+            click.echo(f"error[{Code.FOUND_AGAIN.value}]: {path}: {said}", err=True)
+    return 1 if wrong else 0
+
+
+def _say_told(made: "dict[str, Stepper]", told: "Told", cycles: int) -> None:
+    """One thing that is not proved; runs of as many cycles were looked for."""
+    from rcsc.compose.contract.claims import SAFE
+    from rcsc.diagnostics.codes import Code
+
+    where = f"level `{told.level}`" + (f", table `{told.goal.table}`" if told.goal.table else "")
+    if told.bug:
+        click.echo(
+            f"error[{Code.NOT_REPRODUCED.value}]: {where}: the trace found does not run: {told.goal.shown}",
+            err=True,
+        )
+    elif told.warns:
+        click.echo(f"warning[{Code.ENDLESS.value}]: {where}: not shown: {told.goal.shown}", err=True)
+    else:
+        click.echo(f"error[{Code.NOT_COMPOSED.value}]: {where}: not proved: {told.goal.shown}", err=True)
+    if stated := _stated(made, told):
+        click.echo(f"  = note: it says: {stated}", err=True)
+    for line in told.beside:
+        click.echo(f"  = note: {line}", err=True)
+    if told.finding is not None and not told.beside:
+        _say_finding(made, told.finding, in_c=told.in_c)
+    elif told.guessed and told.goal.key == SAFE:
+        click.echo("  = note: the run that shows it meets an operation that is not defined", err=True)
+    elif told.guessed:
+        click.echo("  = note: a trace that was found does not run: arithmetic was left open", err=True)
+    elif told.goal.sort.value == "assumption" and told.goal.name in made[told.level].trusted:
+        click.echo(
+            "  = note: no first cycle can be as the tables declare, or no later one, or none that runs this table: "
+            "what rests on it says nothing",
+            err=True,
+        )
+    elif cycles and not told.beside:
+        click.echo(f"  = note: no run of {cycles} cycles or fewer shows it", err=True)
+    for line in told.helps:
+        click.echo(f"  = help: {line}", err=True)
+    if told.others:
+        click.echo(f"  = note: no such run shows both of lines {', '.join(told.others)}", err=True)
+    if told.log is not None:
+        folder = told.log.parent / "generated"
+        click.echo(f"  = log: rcsc replay {told.log} --generated {folder}", err=True)
+        page = told.log.with_suffix(".html")
+        click.echo(f"  = picture: rcsc log {told.log} --report {page}", err=True)
+
+
+def _stated(made: "dict[str, Stepper]", told: "Told") -> str:
+    """What a property says, as it is written; empty for what is none."""
+    from rcsc.compose.contract.obligations import Sort
+
+    if told.goal.sort is not Sort.PROPERTY:
+        return ""
+    return next(one.text for one in made[told.level].program.properties if one.name == told.goal.name)
+
+
+def _say_finding(made: "dict[str, Stepper]", finding: "Finding", *, in_c: bool) -> None:
+    """The time line."""
+    from rich.console import Console
+
+    from rcsc.compose.contract.claims import SAFE
+
+    begins = ", after a restart" if finding.restarted else ""
+    legal = "" if finding.legal else "; numbers have gone round, or a neighbour was restarted"
+    run_by = "as the interpreter, the Python and the C executors run it"
+    if finding.goal.key == SAFE:
+        run_by = "as the interpreter runs it; executors are to run nothing that is not safe"
+    elif not in_c:
+        run_by = "as the interpreter and the Python executor run it (no C function can give what is refused)"
+    what = (
+        f"goes round from cycle {finding.lap} to cycle {finding.broken_at}"
+        if finding.lap
+        else f"broken in cycle {finding.broken_at}"
+    )
+    click.echo(f"  = note: {what}{begins}, {run_by}{legal}", err=True)
+    with io.StringIO() as text:
+        Console(file=text, width=_WIDTH, no_color=True, highlight=False).print(_time_line(made, finding))
+        click.echo(
+            "\n".join(f"  {line.rstrip()}" for line in text.getvalue().replace(_HARD, " ").splitlines()),
+            err=True,
+        )
+
+
+def _time_line(made: "dict[str, Stepper]", finding: "Finding") -> "Table":
+    """A row a cycle: the line that matched, the inputs that changed, what else changed, and what went wrong."""
+    from rich import box
+    from rich.table import Table
+
+    from rcsc.compose.counterexample.finding import rows
+
+    several = len(finding.levels) > 1
+    table = Table(box=box.ASCII2, show_lines=True, pad_edge=False)
+    for heading in ("cycle", *(("level",) if several else ()), "table: line", "takes", "leaves"):
+        table.add_column(heading, overflow="fold")
+    for row in rows(made, finding):
+        takes, leaves = (
+            ", ".join(_unbroken(f"{name} = {said}") for name, said in changed.items())
+            for changed in (row.takes, row.leaves)
+        )
+        ran = f"{row.table}: {row.line}" + (f"\n! {row.wrong}" if row.wrong else "")
+        table.add_row(str(row.tick), *((row.level,) if several else ()), ran, takes, leaves)
+    return table
+
+
+def _unbroken(text: str) -> str:
+    """On one line, unless it is too long for a column: then it may break at its spaces, and not in a name."""
+    return text.replace(" ", _HARD) if len(text) <= _LONG else text
+
+
+def _say_not_agreed(proof: "SystemProof") -> None:
+    from rcsc.diagnostics.codes import Code
+
+    for one in proof.agreements:
+        if not one.holds:
+            click.echo(
+                f"error[{Code.NOT_AGREED.value}]: level `{one.level}` assumes that {one.assumed}", err=True
+            )
+
+
+def _write(folder: Path, made: "dict[str, Stepper]", proof: "SystemProof") -> None:
+    from rcsc.compose.proof.level import certificate
+    from rcsc.host.files import write_atomically
+
+    folder.mkdir(parents=True, exist_ok=True)
+    for one in proof.levels:
+        for name, text in certificate(made[one.level], one).items():
+            write_atomically(folder / f"{one.level} {name}.smt2".replace(" ", "_"), text.encode())
+
+
+def _as_json(proof: "SystemProof", made: "dict[str, Stepper]", told: "list[Told]") -> dict[str, Any]:
+    from rcsc.commands.shared.proved import as_json, claim
+
+    return {
+        "proved": proof.proved,
+        "whole": proof.whole,
+        "findings": [_told_as_json(made, one) for one in told],
+        "levels": [
+            {
+                "level": one.level,
+                "goals": [
+                    {
+                        "what": goal.sort.value,
+                        "table": goal.table,
+                        "name": goal.name,
+                        **claim(proof, one.level, goal.key),
+                    }
+                    for goal, _ in one.found
+                ],
+                "not_looked_at": [
+                    {"what": each.sort.value, "table": each.table, "missing": each.missing}
+                    for each in one.unlooked
+                ],
+                "clauses": len(one.clauses),
+                **as_json(proof, one),
+            }
+            for one in proof.levels
+        ],
+        "agreements": [
+            {
+                "level": one.level,
+                "assumed": one.assumed,
+                "reason": one.reason,
+                "holds": one.holds,
+                "outside": one.outside,
+            }
+            for one in proof.agreements
+        ],
+    }
+
+
+def _told_as_json(made: "dict[str, Stepper]", told: "Told") -> dict[str, Any]:
+    from dataclasses import asdict
+
+    from rcsc.compose.counterexample.finding import rows
+
+    found = told.finding
+    return {
+        "level": told.level,
+        "severity": "warning" if told.warns else "error",
+        "what": told.goal.sort.value,
+        "table": told.goal.table,
+        "name": told.goal.name,
+        "says": _stated(made, told),
+        "lines": list(told.goal.lines),
+        "reproduces": found is not None and not told.beside,
+        "beside": list(told.beside),
+        "restarted": found is not None and found.restarted,
+        "lap": 0 if found is None else found.lap,
+        "time_line": [] if found is None else [asdict(row) for row in rows(made, found)],
+        "helps": list(told.helps),
+        "others": list(told.others),
+        "log": "" if told.log is None else str(told.log),
+    }

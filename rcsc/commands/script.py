@@ -1,0 +1,389 @@
+"""`rcsc run`: a workstation's script in the simulated cell, on the generated executors."""
+
+import contextlib
+import shlex
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import click
+
+from rcsc.commands.shared.systems import DATABASE, EXECUTOR, SYSTEM, Stopped, compiled, stop, system_path
+
+if TYPE_CHECKING:
+    from rcsc_cell.cell.ready import Backend
+    from rcsc_cell.episodes.witness import Witness
+    from rcsc_cell.live import Live
+    from rcsc_cell.workstation.prepared import Run
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """What the user asked for."""
+
+    script: str
+    path: Path
+    kind: Literal["c", "python"]
+    database: Path | None
+    backend: "Backend"
+    seed: int
+    log: Path | None
+    report: Path | None
+    live: bool
+    rate: float
+    quiet: bool
+    again: str
+
+
+@click.command(
+    short_help="Run a workstation's script in the simulated cell.",
+    epilog="""\b
+Examples:
+  rcsc run make_boxt                     Fig. 7, corrected, to the end
+  rcsc run make_boxt_printed             as printed: refused at row 22
+  rcsc run make_boxt --executor python   the same, by the Python executors
+  rcsc run make_boxt --plant kinematic   without physics
+  rcsc run make_boxt --log boxt.mcap     keep every cycle
+  rcsc run make_boxt --report boxt.html  a page about it
+  rcsc run make_boxt --live              a page that follows it
+  rcsc run make_boxt --processes         each level in a process of its own
+  rcsc run make_boxt --resume            go on from the row that stopped it""",
+)
+@click.argument("script", metavar="SCRIPT")
+@SYSTEM
+@EXECUTOR
+@DATABASE
+@click.option("--plant", "backend", type=click.Choice(["mujoco", "kinematic"]), default="mujoco", show_default=True,
+              help="The cell by contact physics, or by kinematics alone.")  # fmt: skip
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, metavar="N",
+              help="Of the sensor's noise; the same seed gives the same log.")  # fmt: skip
+@click.option("--log", type=click.Path(dir_okay=False, path_type=Path), default=None, metavar="FILE",
+              help="Where the complete state of every cycle is kept (MCAP); else in .rcsc-cache beside the data.")  # fmt: skip
+@click.option("--report", type=click.Path(dir_okay=False, path_type=Path), default=None, metavar="FILE",
+              help="Write a page about the run: pictures, plots, lines, timing; one file that needs nothing else.")  # fmt: skip
+@click.option("--live", is_flag=True,
+              help="Show the cell in a browser's page while it runs, at --rate; to this machine only.")  # fmt: skip
+@click.option("--compile/--no-compile", "compiles", default=True, show_default=True,
+              help="Prove and compile what changed before anything moves.")  # fmt: skip
+@click.option("--processes", is_flag=True,
+              help="Each level in a process of its own, over shared memory, nothing else changed.")  # fmt: skip
+@click.option("--rate", type=click.FloatRange(min=0.1, max=20), default=4.0, show_default=True, metavar="N",
+              help="With --processes or --live: how many times as fast as the clock.")  # fmt: skip
+@click.option("--from-row", type=click.IntRange(min=1), default=None, metavar="N",
+              help="Begin at row N, as if the rows before were done; with --resume, those from the row that stopped.")  # fmt: skip
+@click.option("--resume", "resumes", is_flag=True,
+              help="Go on from the row that stopped the last run, with everything as it stood then.")  # fmt: skip
+@click.option("-q", "--quiet", is_flag=True, help="Only what stops the script.")
+def run(  # noqa: PLR0913, PLR0917  # as many as there are options
+    script: str, system: Path | None, executor: str, database: Path | None, backend: "Backend", seed: int,
+    log: Path | None, report: Path | None, live: bool, compiles: bool, processes: bool, rate: float,
+    from_row: int | None, resumes: bool, quiet: bool,
+) -> int:  # fmt: skip
+    """Run SCRIPT, a name in the system's scripts or a CSV file, one row a command.
+
+    What changed is proved and compiled, then the script runs on the generated executors in a simulated cell whose parts
+    move by contact forces, and what each command did is printed. Interlocks refuse a row that would machine a loose part.
+    A row that fails stops the script with its reason; TASK pauses, and where everything stands is kept, so that the script
+    can be resumed.
+    """
+    if processes and (resumes or live or report):
+        raise click.UsageError(
+            "--resume, --live and --report are of one process; with --processes, use --from-row"
+        )
+    path = system_path(system)
+    if compiles and not compiled(path, quiet):
+        return 1
+    kind: Literal["c", "python"] = "c" if executor == "c" else "python"
+    again = _command(script, system, database, executor, backend)
+    asked = Asked(script, path, kind, database, backend, seed, log, report, live, rate, quiet, again)
+    from rcsc.diagnostics.codes import Code
+    from rcsc.run.description import BadDescription
+    from rcsc.run.executors import NotBuilt
+    from rcsc.run.system import StateTableError
+    from rcsc_cell.database.build import BadData
+    from rcsc_cell.workstation.script import BadScript
+    from rcsc_cell.workstation.stopped import NotResumed
+
+    try:
+        return _run(asked, processes, from_row, resumes)
+    except (BadDescription, BadData, BadScript, NotBuilt, NotResumed, StateTableError) as error:
+        stop(error)
+    except ChildProcessError as error:
+        raise Stopped(Code.PROCESS_LOST, str(error), "what levels say as they end stands above") from error
+
+
+def _run(asked: Asked, processes: bool, from_row: int | None, resumes: bool) -> int:
+    """The run itself.
+
+    Raises:
+        BadDescription, BadData, BadScript, NotBuilt, NotResumed: Something is not in order; nothing has moved.
+        StateTableError: A level met a fault that the proofs exclude.
+    """
+    from rcsc.host.cache import open_cache
+    from rcsc_cell.cell.reach import checked
+    from rcsc_cell.cell.ready import plant
+    from rcsc_cell.episodes.witness import Timed, Witness
+    from rcsc_cell.workstation.prepared import prepare
+
+    timed: list[Timed] = []
+
+    def outside(database: Any) -> list[Timed]:
+        checked(database, open_cache(asked.path.parent))
+        timed.append(Timed(plant(database, asked.backend, seed=asked.seed)))
+        return timed
+
+    made = prepare(asked.path, asked.script, asked.kind, outside, asked.database)
+    _place(made, from_row, resumes)
+    if processes:
+        return _apart(made, asked)
+    witness = Witness(made, timed[0], film=asked.report is not None)
+    with _recorded(made, asked) as log, _followed(witness, asked):
+        made.system.watch.append(witness)
+        seconds = _watch(made, asked)
+    if asked.report is not None:
+        _write_report(asked.report, witness, asked, seconds)
+    return _closing(witness, asked, seconds, log)
+
+
+def _place(made: "Run", from_row: int | None, resumes: bool) -> None:
+    """Puts the run where it is to begin.
+
+    Raises:
+        BadScript: There is no such row.
+        NotResumed: There is nothing to go on from.
+    """
+    from rcsc_cell.workstation.script import BadScript
+    from rcsc_cell.workstation.stopped import forget, go_on
+
+    rows = len(made.station.rows)
+    if from_row is not None and from_row > rows:
+        raise BadScript(f"the script has {rows} rows, and none is {from_row}")
+    if resumes:
+        go_on(made)
+    else:
+        forget(made.system.description)  # what stood somewhere else begins anew
+    if from_row is not None:
+        made.station.begin_at(from_row - 1)
+
+
+def _command(script: str, system: Path | None, database: Path | None, executor: str, backend: str) -> str:
+    """What to type for the same run; how it begins is to be added."""
+    said = ["rcsc", "run", script]
+    said += ["--system", str(system)] if system else []
+    said += ["--database", str(database)] if database else []
+    said += ["--executor", executor] if executor != "c" else []
+    said += ["--plant", backend] if backend != "mujoco" else []
+    return shlex.join(said)
+
+
+# --- while it runs ---
+
+
+@contextlib.contextmanager
+def _recorded(made: "Run", asked: Asked) -> Iterator[Path]:
+    """Writes the log; its path."""
+    from rcsc.run.description import BadDescription
+    from rcsc.run.log.write import Recorder
+
+    path = (
+        asked.log
+        or made.system.description.database.parent / ".rcsc-cache" / f"{made.system.description.name}.mcap"
+    )
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        recorder = Recorder(made.system, path)
+    except OSError as error:
+        raise BadDescription(f"the log {path} cannot be written: {error.strerror}") from error
+    made.system.watch.append(recorder)
+    try:
+        yield path
+    finally:
+        recorder.close()
+
+
+@contextlib.contextmanager
+def _followed(witness: "Witness", asked: Asked) -> Iterator[None]:
+    """Opens the page, where one was asked for, and keeps the clock's pace for whoever looks."""
+    if not asked.live:
+        yield
+        return
+    live = _page(witness, asked)
+    witness.live = live
+    click.echo(f"the cell is at {live.start()}")
+    sys.stdout.flush()
+    pace = _Pace(witness.run.system.description.tick_ms / 1000 / asked.rate)
+    witness.run.system.watch.append(pace)
+    try:
+        yield
+    finally:
+        witness.finish()
+        live.stop()
+
+
+def _page(witness: "Witness", asked: Asked) -> "Live":
+    try:
+        from rcsc_cell.live import Live
+    except ImportError as error:
+        raise click.UsageError("--live needs the extra `live`: pip install 'rcsc[live]'") from error
+    from rcsc.run.description import BadDescription
+    from rcsc_cell.episodes.witness import names
+
+    system = witness.run.system
+    try:
+        return Live(
+            names(system), system.description.displays, tick_ms=system.description.tick_ms, title=asked.script
+        )
+    except ValueError as error:
+        raise BadDescription(f"{asked.path}, displays: {error}") from error
+
+
+class _Pace:
+    """Waits after each cycle until the clock has come as far."""
+
+    def __init__(self, cycle_s: float) -> None:
+        self._cycle_s, self._next = cycle_s, time.monotonic()
+
+    def __call__(self, system: object, due: object) -> None:  # noqa: ARG002  # what all who watch are given
+        self._next = max(self._next + self._cycle_s, time.monotonic() - 1.0)
+        time.sleep(max(0.0, self._next - time.monotonic()))
+
+
+def _watch(made: "Run", asked: Asked) -> float:
+    """Runs to the end, and says what becomes of each row; the seconds that it took."""
+    begun = time.perf_counter()
+    for result in made.steps():
+        if not asked.quiet:
+            _say(result.row.number, result.row.text, result.state, result.ticks)
+    return time.perf_counter() - begun
+
+
+def _say(number: int, text: str, state: str, ticks: int) -> None:
+    shown = state if state != "done" else click.style("done", fg="green")
+    click.echo(f"{number:3}  {text:42} {shown}  {ticks:5} cycles")
+    sys.stdout.flush()
+
+
+def _apart(made: "Run", asked: Asked) -> int:
+    """The same with a process for each level."""
+    from rcsc.diagnostics.codes import Code
+    from rcsc.host.children import scratch
+
+    with scratch("run") as folder:
+        rows = _rows_apart(asked, made.station.at, folder / "results")
+    if not asked.quiet:
+        click.echo(f"each level in a process of its own, {asked.rate:g} times as fast as the clock")
+    if rows and rows[-1][2] != "done":
+        number, text, state, reason, _ = rows[-1]
+        raise Stopped(
+            Code.SCRIPT_STOPPED,
+            f"row {number}, {text}: {state}: {reason}",
+            f"mend the cause, then begin anew: {asked.again} --processes --from-row {number}",
+        )
+    return 0
+
+
+def _rows_apart(asked: Asked, first: int, results: Path) -> list[list[Any]]:
+    """Runs the processes to the end: of each row its number, text, state, reason and ticks; `results` is where they travel."""
+    from rcsc.host.files.read import content, json_of
+    from rcsc.run.description import description
+    from rcsc.run.processes.serve import Factory
+    from rcsc.run.processes.supervisor import Supervisor, run_processes
+
+    held = str(asked.database.resolve()) if asked.database else ""
+    place = str(asked.path.resolve())
+    outside = Factory(
+        "rcsc_cell.episodes.processes:outside",
+        (place, asked.script, held, str(results), first, asked.backend),
+    )
+    queries = Factory("rcsc_cell.episodes.processes:queries", (place, held))
+    rows: list[list[Any]] = []
+
+    def more() -> list[list[Any]]:
+        return [json_of(line) for line in content(results).decode().splitlines()[len(rows) :]]
+
+    def watch(_: Supervisor) -> None:
+        new = more()
+        for number, text, state, _reason, ticks in [] if asked.quiet else new:
+            _say(number, text, state, ticks)
+        rows.extend(new)
+
+    results.touch()
+    run_processes(
+        description(asked.path),
+        asked.kind,
+        {"outside": outside},
+        queries=queries,
+        rate=asked.rate,
+        watch=watch,
+    )
+    return rows + more()
+
+
+# --- when it is over ---
+
+
+def _write_report(path: Path, witness: "Witness", asked: Asked, seconds: float) -> None:
+    from rcsc.run.description import BadDescription
+    from rcsc_cell.pictures.report import report
+
+    try:
+        report(path, witness.story(asked.script, seconds))
+    except OSError as error:
+        raise BadDescription(f"the report {path} cannot be written: {error.strerror}") from error
+
+
+def _closing(witness: "Witness", asked: Asked, seconds: float, log: Path) -> int:
+    from rcsc.diagnostics.codes import Code
+
+    made = witness.run
+    again = _kept(made, asked)
+    if not asked.quiet:
+        for line in _figures(witness, seconds):
+            click.echo(line)
+        here = log.relative_to(Path.cwd()) if log.is_relative_to(Path.cwd()) else log
+        click.echo(f"log: {here}" + (f"; report: {asked.report}" if asked.report else ""))
+    station, stopped = made.station, made.station.stopped
+    if stopped is not None:
+        word = "refused" if stopped.state == "refused" else "failed"
+        raise Stopped(
+            Code.SCRIPT_STOPPED,
+            f"row {stopped.row.number}, {stopped.row.text}: {word}: {stopped.reason}",
+            again,
+        )
+    if not station.over:
+        raise Stopped(Code.SCRIPT_STOPPED, f"row {station.at + 1} did not end in {made.system.tick} cycles")
+    return 0
+
+
+def _figures(witness: "Witness", seconds: float) -> Iterator[str]:
+    """Where parts lie, how near the joints came to their limits, and how long it took."""
+    system = witness.run.system
+    for one in witness.placed():
+        yield f"{one.part} at {one.place}: {one.error_mm:.2f} mm from where it should lie"
+    margins = ", ".join(f"{margin:.0f}" for margin in witness.margins_deg)
+    yield f"joints kept {margins} degrees from their limits"
+    control_s = system.tick * system.description.tick_ms / 1000
+    failed = sum(1 for level in system.levels if level.values[-1])
+    yield (
+        f"{system.tick} cycles, {control_s:.1f} s of control time in {seconds:.2f} s: {control_s / seconds:.0f} times "
+        f"as fast as the clock; {failed} assumptions failed"
+    )
+
+
+def _kept(made: "Run", asked: Asked) -> str:
+    """Keeps a run that stopped, forgets one that came to its end; what to do about it."""
+    from rcsc_cell.workstation.stopped import forget, keep
+
+    if made.station.stopped is None:
+        if made.station.over:
+            forget(made.system.description)
+        return ""
+    try:
+        keep(made, asked.script)
+    except OSError as error:
+        row = f"{asked.again} --from-row {made.station.at + 1}"
+        return f"where it stopped could not be kept: {error.strerror}; mend the cause, then begin anew: {row}"
+    return f"the robot is paused; mend the cause, then: {asked.again} --resume"

@@ -1,0 +1,220 @@
+"""What `rcsc prove` says of lines in their context, of how commands end, and of the system as a whole."""
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+from rcsc.diagnostics import report
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from rcsc.compose.contract.claims import Key, Need
+    from rcsc.compose.contract.transition import Stepper
+    from rcsc.compose.proof.context import Context
+    from rcsc.compose.proof.level import LevelProof
+    from rcsc.compose.proof.ranking import Counted
+    from rcsc.compose.proof.system import SystemProof
+    from rcsc.compose.proof.termination import Ending
+
+
+def standing(whole: "SystemProof", level: str, key: "Key") -> str:
+    """The verdict of a claim: `proved`, what it rests on that is not proved, or why it is not found itself."""
+    found = whole.of(level, key)
+    if found.proved:
+        if found.verdict.value != "proved":
+            return f"{found.verdict.value}, as the tables declare it"
+        return f"proved{trusting(whole, level, [key])}"
+    return found.verdict.value if not found.found else f"rests on {named(whole, level, found.lacks)}"
+
+
+def trusting(whole: "SystemProof", level: str, keys: "Sequence[Key]") -> str:
+    """The assumptions that these verdicts trust, as the tables declare them; empty for none."""
+    from rcsc.compose.contract.claims import declared
+
+    return report.trusting(declared(one for key in keys for one in whole.of(level, key).trusts))
+
+
+def named(whole: "SystemProof", level: str, needs: "Sequence[Need]") -> str:
+    """Claims in words."""
+    from rcsc.compose.contract.claims import spelled
+
+    return report.named([spelled(need, level, whole.closed) for need in needs])
+
+
+def not_looked_at(proof: "LevelProof") -> Iterator[str]:
+    """Goals that could not be stated."""
+    for one in proof.unlooked:
+        yield f"not looked at: {one.shown}"
+
+
+def in_context(whole: "SystemProof", proof: "LevelProof") -> Iterator[str]:
+    """Of one level, line by line."""
+    from rcsc.compose.contract.claims import UNREACHED
+    from rcsc.compose.contract.obligations import Sort
+
+    seen = proof.context
+    if seen is None:
+        yield "not looked at, as something is not proved: lines never reached, what lines do when they match again, whether commands end"
+        return
+    never = [(" ".join(at), standing(whole, proof.level, (UNREACHED, *at))) for at in seen.unreached]
+    good = ", ".join(name for name, said in never if said == "proved")
+    yield f"lines never reached here: {good or ('none' if not never else '')}".rstrip()
+    yield from (f"  {name}: {said}" for name, said in never if said != "proved")
+    if seen.unsure:
+        yield f"not shown whether reached: {', '.join(' '.join(at) for at in seen.unsure)}"
+    if seen.orders:
+        yield from _again(whole, proof.level, seen)
+    if proof.endings:
+        yield "given that every order that is not replaced is answered some time, and stays so,"
+        for one in proof.endings:
+            found = whole.of(proof.level, (Sort.ENDS, one.table, ""))
+            only = (
+                f"; rests on {named(whole, proof.level, found.lacks)}" if one.proved and found.lacks else ""
+            )
+            yield f"  {one.table} {_ends(one)}{only}"
+
+
+def _again(whole: "SystemProof", level: str, seen: "Context") -> Iterator[str]:
+    """What lines do that match again; of a level that gives no orders there is nothing to say."""
+    from rcsc.compose.contract.claims import AGAIN
+
+    again = "; ".join(f"{one.table} {one.line}: {', '.join(one.leaves)}" for one in seen.repeated)
+    rests = "" if seen.repeated or seen.restless else standing(whole, level, (AGAIN, "", ""))
+    only = f" ({rests})" if rests not in {"", "proved"} else ""
+    yield f"what a line does when it matches again before its order is echoed: {again or 'nothing'}{only}"
+    if seen.restless:
+        yield "order after order may be given on inputs that stay the same"
+
+
+def trusted(whole: "SystemProof") -> Iterator[str]:
+    """What is taken for granted that no level is responsible for."""
+    every = sorted({one for found in whole.closed.values() for one in found.trusts})
+    if every:
+        yield "taken for granted"
+        yield from (f"  {one}" for one in every)
+
+
+def left_out(whole: "SystemProof") -> Iterator[str]:
+    """That it is not wholly proved, and why, where no finding says so."""
+    if whole.whole or not whole.proved:
+        return
+    unlooked = sum(len(one.unlooked) for one in whole.levels)
+    rests = sum(found.found and not found.proved for found in whole.closed.values())
+    ends = sum(not one.proved for level in whole.levels for one in level.endings)
+    said = [
+        f"{unlooked} not looked at" if unlooked else "",
+        f"{rests} rest on what is not known" if rests else "",
+        f"{ends} not shown to end" if ends else "",
+    ]
+    yield f"not wholly proved: {', '.join(one for one in said if one)}"
+
+
+def _ends(one: "Ending") -> str:
+    if one.changes is None:
+        return "is not shown to end: its states may go round"
+    changes = "one change" if one.changes == 1 else f"{one.changes} changes"
+    said = f"ends, once taken, after at most {changes} of state"
+    if one.endless:
+        lines = ", ".join(f"`{line}`" for line in one.endless)
+        return f"is not shown to end: {'line' if len(one.endless) == 1 else 'lines'} {lines} may run for ever"
+    if one.counted:
+        said += "; meanwhile " + ", ".join(map(_counted, one.counted))
+    if one.still:
+        said += "; if the values in {} stand still".format(", ".join(f"`{name}`" for name in one.still))
+    return said
+
+
+def _counted(one: "Counted") -> str:
+    by = "" if one.least is None else f" by at least {one.least:.2g}"
+    return f"line `{one.line}` runs as long as `{one.counter}` rises{by}"
+
+
+def assumptions(proof: "SystemProof") -> str:
+    """How many there are, and how they stand."""
+    from rcsc.compose.contract.obligations import Sort
+
+    found = [
+        proof.of(one.level, goal.key)
+        for one in proof.levels
+        for goal, _ in one.found
+        if goal.sort is Sort.ASSUMPTION
+    ]
+    if not found:
+        return "the tables assume nothing"
+    believed = sum(one.proved and one.verdict.value != "proved" for one in found)
+    good = sum(one.proved for one in found) - believed
+    rest = len(found) - good - believed
+    trusts = f", {believed} taken for granted" if believed else ""
+    return f"assumptions of tables: {good} proved{trusts}" + (
+        f", {rest} not proved" if rest else ", none left"
+    )
+
+
+def reaction(made: "Mapping[str, Stepper]", proof: "SystemProof") -> Iterator[str]:
+    """The way of a PAUSE from the top down, as far as it is proved that it is passed on at once."""
+    from rcsc.compose.contract.obligations import Sort
+
+    passes = {
+        (one.level, goal.name)
+        for one in proof.levels
+        for goal, _ in one.found
+        if goal.sort is Sort.PAUSES and proof.of(one.level, goal.key).proved
+    }
+    tops = [
+        name
+        for name, one in made.items()
+        if one.links.above is not None and one.links.above.outside and one.links.below
+    ]
+    for top in tops if {one.level for one in proof.levels} == set(made) else ():
+        reached: dict[str, int] = {top: 1}
+        for name in made:
+            for below in made[name].links.below if name in reached else ():
+                if (name, below.order) in passes:
+                    reached[below.name] = reached[name] + 1
+        lowest = {name: cycles - 1 for name, cycles in reached.items() if name != top}
+        if lowest:
+            said = ", ".join(f"of `{name}` in {cycles}" for name, cycles in lowest.items())
+            yield f"a PAUSE of `{top}` is ordered {said} cycles of levels, besides what buffers take"
+
+
+def confirmed(stepper: "Stepper", proof: "LevelProof") -> "dict[str, bool]":
+    """Each question of the certificate, and whether cvc5 refutes it within two minutes."""
+    from rcsc.compose.proof.level import certificate
+    from rcsc.solvers.smtlib import CVC5_STEPS, cvc5_refutes
+
+    return {
+        name: cvc5_refutes(text, steps=6 * CVC5_STEPS) for name, text in certificate(stepper, proof).items()
+    }
+
+
+def claim(whole: "SystemProof", level: str, key: "Key") -> dict[str, Any]:
+    """A verdict, what it rests on that is not found, and what it trusts."""
+    found = whole.of(level, key)
+    return {
+        "verdict": found.verdict.value if found.proved or not found.found else "rests on what is not proved",
+        "rests_on": [
+            {"level": owner, "what": sort, "table": table, "name": name}
+            for owner, (sort, table, name) in found.lacks
+        ],
+        "trusts": list(found.trusts),
+    }
+
+
+def as_json(whole: "SystemProof", proof: "LevelProof") -> dict[str, Any]:
+    """Context and endings of one level."""
+    from dataclasses import asdict
+
+    from rcsc.compose.contract.claims import AGAIN, RUNS
+    from rcsc.compose.contract.obligations import Sort
+
+    again = (
+        {} if proof.context is None else asdict(proof.context) | claim(whole, proof.level, (AGAIN, "", ""))
+    )
+    return {
+        "runs": claim(whole, proof.level, RUNS),
+        "context": again or None,
+        "endings": [
+            {**asdict(one), "proved": one.proved, **claim(whole, proof.level, (Sort.ENDS, one.table, ""))}
+            for one in proof.endings
+        ],
+    }

@@ -1,0 +1,125 @@
+"""`rcsc shell`: a system under somebody's hands."""
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from rcsc.commands.shared.systems import EXECUTOR, stop, system_path
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from rcsc.run.description import Description
+    from rcsc.run.signature import Signature
+    from rcsc.run.system import Kind
+    from rcsc.shell.commands import Commands
+    from rcsc.shell.reload.refusal import Refused
+
+
+@click.command(
+    short_help="Run, step and change a system by hand.",
+    epilog="""\b
+Examples:
+  rcsc shell                          tables/system.toml, with stand-ins for robot, hand and camera
+  rcsc shell --script morning.txt     commands from a file; 1 at the first that fails
+  echo 'step 5' | rcsc shell --alone  nothing outside the levels, and a database that knows nothing
+
+\b
+In the shell:
+  TASK-LEVEL                          one cycle of level task
+  cur_state ?                         show a variable
+  command.input_command = acquire     set it
+  run until task.cur_state = state_3
+  help""",
+)
+@click.option("--script", type=click.Path(exists=True, dir_okay=False, path_type=Path), default=None, metavar="FILE",
+              help="Do the commands of FILE, one a line; else they are read from standard input.")  # fmt: skip
+@EXECUTOR
+@click.option("--alone", is_flag=True,
+              help="No stand-ins and no database, as for a system that is no such cell: what comes in is set by hand.")  # fmt: skip
+@click.argument(
+    "system", required=False, type=click.Path(exists=True, dir_okay=False, path_type=Path), metavar="[SYSTEM]"
+)
+def shell(script: Path | None, executor: str, alone: bool, system: Path | None) -> int:
+    """Run any module, procedure, owner, table or level of SYSTEM by name; look at and set any variable; step, run, undo.
+
+    SYSTEM is a system's description; without it, system.toml here or in tables/. Generated executors run, as they are.
+    """
+    commands = _commands(system_path(system), "c" if executor == "c" else "python", alone)
+    from rcsc.shell.terminal import converse, follow
+
+    if script is None and sys.stdin.isatty() and sys.stdout.isatty() and _has_prompt():
+        return converse(commands, click.echo, _complain)
+    with _lines(script) as (lines, name):
+        return follow(commands, lines, name, click.echo, _complain)
+
+
+def _commands(path: Path, kind: "Kind", alone: bool) -> "Commands":
+    from rcsc.run.description import BadDescription, description
+    from rcsc.run.executors import NotBuilt
+    from rcsc.run.system import Outside, assemble, signatures
+    from rcsc.shell.commands import Commands
+    from rcsc.shell.reload.reload import Plant
+    from rcsc.shell.session import Session, silent_queries
+    from rcsc_cell.cell.ready import plant
+    from rcsc_cell.database.build import BadData
+    from rcsc_cell.workstation.prepared import database_of
+
+    try:
+        said = description(path)
+        signs = signatures(said)
+        outside: tuple[Outside, ...] = ()
+        if alone or not _is_cell(said, signs):
+            queries = silent_queries(said, signs)
+        else:
+            database = database_of(said, signs)
+            queries, outside = database.queries, (plant(database, "kinematic"),)
+        system = assemble(said, kind, queries, outside)
+        return Commands(Session(system, Plant(path, said, kind, queries)))
+    except (BadDescription, BadData, NotBuilt) as error:
+        stop(error)
+
+
+def _is_cell(system: "Description", signs: "Mapping[str, Signature]") -> bool:
+    """Whether robot, hand and camera can stand beside the system, and its database be asked."""
+    from rcsc.run.description import BadDescription
+    from rcsc_cell.workstation.prepared import needs_cell
+
+    try:
+        needs_cell(system, signs)
+    except BadDescription:
+        return False
+    return system.database.is_file()
+
+
+def _has_prompt() -> bool:
+    import importlib.util
+
+    return importlib.util.find_spec("prompt_toolkit") is not None
+
+
+@contextmanager
+def _lines(script: Path | None) -> Iterator[tuple[Iterator[str], str]]:
+    """The lines of a script, or of standard input, and what to call it."""
+    if script is None:
+        yield iter(sys.stdin), "-"
+        return
+    try:
+        text = script.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise click.BadParameter(f"{script} cannot be read: {error}", param_hint="--script") from error
+    yield iter(text.splitlines()), str(script)
+
+
+def _complain(where: str, refused: "Refused") -> None:
+    """A refusal, as every error is shown."""
+    first, *rest = str(refused).splitlines() or [""]
+    click.echo(f"{where}error[{refused.code.value}]: {first}", err=True)
+    for line in rest:
+        click.echo(f"  {line}", err=True)
+    for one in refused.helps:
+        click.echo(f"  = help: {one}", err=True)

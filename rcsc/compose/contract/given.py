@@ -1,0 +1,80 @@
+"""What extern procedures give while a level is proved: never the user's code, which is neither imported nor called.
+
+In: a program, and a script or a source of chance. Out: contexts in which the interpreter takes the results from there. A result is any
+value of its type; where it is refused, any value that is none. A cycle in which a result is refused ends at that call.
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from random import Random
+from typing import TypeAlias
+
+from rcsc.lang.interpret import answering
+from rcsc.lang.model import (
+    Admit,
+    Enum,
+    Procedure,
+    Program,
+    Real,
+    Scalar,
+    Value,
+    Variable,
+    key_bounds,
+    value_of_key,
+)
+
+Answer: TypeAlias = tuple[str, tuple[Value, ...]]
+"""An extern procedure, and the results of one call of it, in the order in which it writes them."""
+REFUSED_NOW_AND_THEN = 0.04
+
+
+def may_be_refused(variable: Variable) -> bool:
+    """Whether some value that a function can return is refused for the variable; a number that is no NaN may be clamped instead."""
+    return variable.admit is not Admit.CLAMP or isinstance(variable.type, Real)
+
+
+def refused(variable: Variable) -> Value:
+    """A value that is refused for the variable: the one after its greatest, or no number."""
+    if isinstance(variable.type, Real):
+        return math.nan
+    return key_bounds(variable.type)[1] + 1
+
+
+def least(kind: Scalar) -> Value:
+    """The least value of a type."""
+    return value_of_key(kind, key_bounds(kind)[0])
+
+
+@contextmanager
+def scripted(program: Program, answers: Sequence[Answer]) -> Iterator[None]:
+    """Inside, each call has the next of the answers that are its procedure's; the least values where none is left."""
+    left = list(answers)
+
+    def answer(procedure: Procedure, _args: list[Value]) -> tuple[Value, ...]:
+        at = next((at for at, (name, _) in enumerate(left) if name == procedure.name), None)
+        if at is None:
+            return tuple(least(program.variable(name).type) for name in procedure.writes)
+        return left.pop(at)[1]
+
+    with answering(answer):
+        yield
+
+
+@contextmanager
+def at_random(program: Program, random: Random) -> Iterator[None]:
+    """Inside, each result is some value of its type, and now and then a refused one."""
+
+    def one(variable: Variable) -> Value:
+        if may_be_refused(variable) and random.random() < REFUSED_NOW_AND_THEN:
+            return refused(variable)
+        low, high = key_bounds(variable.type)
+        if isinstance(variable.type, Enum) or high - low < 64:
+            return value_of_key(variable.type, random.randint(low, high))
+        return value_of_key(variable.type, random.choice((low, random.randint(low, high), high)))
+
+    def answer(procedure: Procedure, _args: list[Value]) -> tuple[Value, ...]:
+        return tuple(one(program.variable(name)) for name in procedure.writes)
+
+    with answering(answer):
+        yield

@@ -1,0 +1,338 @@
+"""What is proved of every level, as conditions on one cycle from any reachable state.
+
+In: a stepper and a cycle from anywhere. Out: `Goal`s, each of which is to hold in every cycle. They are of two kinds:
+what is claimed of the level itself, and what it guarantees its neighbours, which is what they assume of it
+(`compose.__doc__`).
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import StrEnum
+from itertools import combinations
+from typing import TypeAlias
+
+from rcsc.compose.contract.claims import SAFE
+from rcsc.compose.contract.environment import COMMAND, ECHO, ECHOED, NUMBER, Below, leaves_under
+from rcsc.compose.contract.properties import invariants, kept_within, properties
+from rcsc.compose.contract.transition import Cycle, Stepper, TableAt, successor
+from rcsc.lang.interval_sets import meet
+from rcsc.lang.leaves import read_by
+from rcsc.lang.model import Bool, Enum, Kind, Line, OneTable, Program, Table, pending
+from rcsc.symbolic import values
+from rcsc.symbolic.values import Node
+from rcsc.table import boxes
+
+FLAG = "new_command"
+"""True until the level's own answer to a new command is echoed (sections 8.3 and 9)."""
+
+
+class Sort(StrEnum):
+    """What a goal is about; the value is how it is shown."""
+
+    ASSUMPTION = "assumption"
+    SOME_LINE = "some line matches"
+    ONE_LINE = "no two lines match"
+    NO_DEFAULT = "DEFAULT is not reached"
+    ECHOES = "the report echoes the command that it answers"
+    NUMBERED = "the order changes only with its number"
+    NEXT_NUMBER = "numbers are used one after the other"
+    WAITS = "no other command replaces an order before its echo, but for a new command"
+    ONCE = "a command number is taken up once"
+    ANSWERED = "no new command is passed over"
+    SAME_ORDER = "no other order comes under the number that was taken last"
+    OF_ITS_ORDER = "what is reported under the number of the last order is about that order"
+    PAUSES = "a PAUSE is passed on in the cycle that takes it"
+    DEFERRED = "no state is written directly while another is pending"
+    INVARIANT = "invariant"
+    PROPERTY = "property"
+    ENDS = "the command ends"  # none of one cycle: `ends`, `lap`
+    PROTOCOL = "orders and reports"  # all of its sorts at once
+    SAFE = SAFE[0]
+
+
+Key: TypeAlias = tuple[Sort, str, str]
+"""What tells the goals of a level apart: a key of a claim (`claims`)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Unlooked:
+    """Goals of a sort that cannot be stated, as a part of the level was not recognised; `missing`, what was looked for."""
+
+    sort: Sort
+    table: str
+    missing: str
+
+    @property
+    def shown(self) -> str:
+        """In one line."""
+        table = f"table `{self.table}`: " if self.table else ""
+        return f"{table}{self.sort.value}: {self.missing}"
+
+
+@dataclass(frozen=True, slots=True)
+class Goal:
+    """One condition.
+
+    Attributes:
+        table: Whose it is; empty where it is the level's.
+        name: Of the assumption, the buffer, or the leaf; of a pair of lines, both.
+        holds: The condition.
+        lines: The two lines that it is about (`pairs`).
+    """
+
+    sort: Sort
+    table: str
+    name: str
+    holds: Node
+    lines: tuple[str, ...] = ()
+
+    @property
+    def key(self) -> Key:
+        """The same for the same goal in any cycle."""
+        return self.sort, self.table, self.name
+
+    @property
+    def shown(self) -> str:
+        """In one line, without the table."""
+        if self.sort in {Sort.ASSUMPTION, Sort.INVARIANT, Sort.PROPERTY}:
+            return f"{self.sort.value} `{self.name}`"
+        if self.lines:
+            return "lines {} do not both match".format(" and ".join(f"`{line}`" for line in self.lines))
+        return f"{self.sort.value}: `{self.name}`" if self.name else self.sort.value
+
+
+def goals(stepper: Stepper, cycle: Cycle) -> tuple[Goal, ...]:
+    """All goals of a level, its tables' first."""
+    return (
+        *_tables(cycle),
+        *_upward(stepper, cycle),
+        *_downward(stepper, cycle),
+        *_own(stepper, cycle),
+        *_stated(stepper, cycle),
+    )
+
+
+def _tables(cycle: Cycle) -> Iterator[Goal]:
+    for at in cycle.tables:
+        name = str(at.table.name)
+        for assumption, condition in at.assumptions.items():
+            yield Goal(Sort.ASSUMPTION, name, assumption, values.follows(at.chosen, condition))
+        some = values.follows(at.runs, values.negation(at.none))
+        if at.table.default is None:
+            yield Goal(Sort.SOME_LINE, name, "", some)
+        elif at.table.default.unreachable:
+            yield Goal(Sort.NO_DEFAULT, name, "", some)
+        yield Goal(Sort.ONE_LINE, name, "", values.follows(at.runs, values.negation(at.several())))
+
+
+def pairs(cycle: Cycle) -> tuple[Goal, ...]:
+    """That no two lines match, pair by pair: what there is to look for where `ONE_LINE` is not proved."""
+    found = []
+    for at in cycle.tables:
+        for one, two in may_meet(at.table):
+            first, second = (str(at.table.lines[place].name) for place in (one, two))
+            never = values.negation(values.both(at.matches[one], at.matches[two]))
+            goal = values.follows(at.runs, never)
+            found.append(
+                Goal(Sort.ONE_LINE, str(at.table.name), f"{first} and {second}", goal, (first, second))
+            )
+    return tuple(found)
+
+
+def may_meet(table: Table) -> list[tuple[int, int]]:
+    """The pairs of lines whose cells do not part them; all of them where a cell is about several leaves."""
+    every = combinations(range(len(table.lines)), 2)
+    if not boxes.applies(table):
+        return list(every)
+    lines = boxes.lines_of(table)
+    return [
+        (one, two)
+        for one, two in every
+        if all(meet(lines[one][name], lines[two][name]) for name in lines[one].keys() & lines[two].keys())
+    ]
+
+
+def _upward(stepper: Stepper, cycle: Cycle) -> Iterator[Goal]:
+    """What the superior assumes of this level."""
+    if (above := stepper.links.above) is None:
+        return
+    number = values.equal(cycle.after[f"{above.report}.{ECHO}"], cycle.taken[f"{above.order}.{NUMBER}"])
+    command = values.equal(cycle.after[f"{above.report}.{ECHOED}"], cycle.taken[f"{above.order}.{COMMAND}"])
+    as_before = (
+        values.all_of(  # where an extern procedure is refused it may be as late as if the level had not run
+            values.equal(cycle.before[leaf], cycle.after[leaf])
+            for leaf in leaves_under(stepper.program, above.report)
+        )
+    )
+    late = values.both(cycle.refused, as_before)
+    yield Goal(Sort.ECHOES, "", above.report, values.either(values.both(number, command), late))
+
+
+def _downward(stepper: Stepper, cycle: Cycle) -> Iterator[Goal]:
+    """What the subordinates assume of this level, and that it waits for them."""
+    for below in stepper.links.below:
+        number = f"{below.order}.{NUMBER}"
+        before, after = cycle.before[number], cycle.after[number]
+        same = values.equal(before, after)
+        for leaf in leaves_under(stepper.program, below.order):
+            if leaf != number:
+                kept = values.equal(cycle.before[leaf], cycle.after[leaf])
+                yield Goal(Sort.NUMBERED, "", leaf, values.follows(same, kept))
+        yield Goal(
+            Sort.NEXT_NUMBER, "", below.order, values.either(same, values.equal(after, successor(before)))
+        )
+        if stepper.links.above is not None:
+            command = f"{below.order}.{COMMAND}"
+            kept = values.equal(cycle.before[command], cycle.after[command])
+            yield Goal(Sort.WAITS, "", below.order, values.follows(_waiting(stepper, cycle, below), kept))
+            if not list(_no_pause(stepper, below)):
+                yield Goal(Sort.PAUSES, "", below.order, _passes_on_a_pause(stepper, cycle, below))
+
+
+def _waiting(stepper: Stepper, cycle: Cycle, below: Below) -> Node:
+    """The command is the last one, and the order is not echoed."""
+    above = stepper.links.above
+    assert above is not None
+    number = f"{above.order}.{NUMBER}"
+    sent = cycle.before[f"{below.order}.{NUMBER}"]
+    echo = f"{below.report}.{ECHO}"
+    return values.all_of(
+        (
+            values.equal(cycle.before[number], cycle.taken[number]),
+            values.negation(values.equal(cycle.taken[echo], sent)),
+        )
+    )
+
+
+def _passes_on_a_pause(stepper: Stepper, cycle: Cycle, below: Below) -> Node:
+    """Where a new order is the first command, PAUSE or its like, so is the order that stands below behind the cycle."""
+    above = stepper.links.above
+    assert above is not None
+    taken, passed = f"{above.order}.{COMMAND}", f"{below.order}.{COMMAND}"
+    new = values.negation(
+        values.equal(cycle.before[f"{above.order}.{NUMBER}"], cycle.taken[f"{above.order}.{NUMBER}"])
+    )
+    paused = values.equal(cycle.taken[taken], values.constant(stepper.kinds[taken], 0))
+    passes = values.equal(cycle.after[passed], values.constant(stepper.kinds[passed], 0))
+    return values.follows(values.both(new, paused), passes)
+
+
+def _own(stepper: Stepper, cycle: Cycle) -> Iterator[Goal]:
+    above = stepper.links.above
+    if above is not None and has_flag(stepper):
+        same = values.equal(cycle.before[f"{above.order}.{NUMBER}"], cycle.taken[f"{above.order}.{NUMBER}"])
+        rises = values.both(cycle.after[FLAG], values.negation(cycle.before[FLAG]))
+        yield Goal(Sort.ONCE, "", FLAG, values.follows(same, values.negation(rises)))
+        for at in cycle.tables:
+            overlooking = _overlooking(at)
+            ends = bool(at.table.stops) or _asks(stepper.program)
+            if overlooking or (overlooking is not None and ends):
+                yield _answered(stepper, cycle, at, overlooking)
+    for variable in stepper.program.variables:
+        if variable.deferred_until is not None:
+            untouched = values.equal(cycle.after[variable.name], cycle.middle[variable.name])
+            agreed = values.equal(cycle.after[variable.name], cycle.after[pending(variable.name)])
+            yield Goal(Sort.DEFERRED, "", str(variable.name), values.either(untouched, agreed))
+
+
+def has_flag(stepper: Stepper) -> bool:
+    """Whether the level keeps the flag of a new command."""
+    return any(
+        v.name == FLAG and v.kind is Kind.STATE and isinstance(v.type, Bool)
+        for v in stepper.program.variables
+    )
+
+
+def unlooked(stepper: Stepper) -> tuple[Unlooked, ...]:
+    """The goals that are not looked at, and what is missing for them."""
+    return tuple(_unlooked(stepper))
+
+
+def _unlooked(stepper: Stepper) -> Iterator[Unlooked]:
+    links = stepper.links
+    for missing in links.unread:
+        yield Unlooked(Sort.PROTOCOL, "", missing)
+    if links.above is None:
+        if links.below:
+            for sort in (Sort.WAITS, Sort.PAUSES, Sort.ENDS):
+                yield Unlooked(sort, "", "the level takes no orders")
+        return
+    for below in links.below:
+        for missing in _no_pause(stepper, below):
+            yield Unlooked(Sort.PAUSES, "", missing)
+    if not has_flag(stepper):
+        for sort in (Sort.ONCE, Sort.ANSWERED):
+            yield Unlooked(sort, "", f"there is no state `{FLAG} : bool`")
+        return
+    for table in run_by(stepper):
+        if not any(looks_for(FLAG, line) for line in table.lines) and not _rests(stepper, table):
+            yield Unlooked(Sort.ANSWERED, str(table.name), f"no line looks at `{FLAG}`")
+
+
+def _no_pause(stepper: Stepper, below: Below) -> Iterator[str]:
+    """Why it is not known what a PAUSE is: the first command, which has a table of its own."""
+    assert stepper.links.above is not None
+    if isinstance(stepper.level.tables, OneTable):
+        yield "the level has one table for all commands"
+    for leaf in (f"{stepper.links.above.order}.{COMMAND}", f"{below.order}.{COMMAND}"):
+        if not isinstance(stepper.kinds[leaf], Enum):
+            yield f"`{leaf}` is no enumeration"
+
+
+def run_by(stepper: Stepper) -> list[Table]:
+    """The tables that the level runs."""
+    chosen = stepper.level.tables
+    names = {chosen.table} if isinstance(chosen, OneTable) else {table for _, table in chosen.tables}
+    return [one for one in stepper.program.tables if one.name in names]
+
+
+def _rests(stepper: Stepper, table: Table) -> bool:
+    """Whether it is the table of the first command, PAUSE or its like, and of no other: it does the same whether that is new or not."""
+    chosen = stepper.level.tables
+    return not isinstance(chosen, OneTable) and [
+        value for value, name in chosen.tables if name == table.name
+    ] == [0]
+
+
+def _stated(stepper: Stepper, cycle: Cycle) -> Iterator[Goal]:
+    """What the program itself states."""
+    for name, holds in invariants(stepper.program, cycle):
+        yield Goal(Sort.INVARIANT, "", name, holds)
+    for name, holds in properties(stepper.program, cycle):
+        yield Goal(Sort.PROPERTY, "", name, holds)
+    if stepper.safety.within:
+        yield Goal(Sort.SAFE, "", "", kept_within(stepper.program, cycle, stepper.safety.invariants))
+
+
+def _asks(program: Program) -> bool:
+    """Whether a cycle can end early because an extern procedure is refused."""
+    return any(one.extern is not None for one in program.procedures)
+
+
+def _overlooking(at: TableAt) -> tuple[Node, ...] | None:
+    """When lines match that do not look for a new command; None of a table in which none does. DEFAULT never looks."""
+    looks = [looks_for(FLAG, line) for line in at.table.lines]
+    if not any(looks):
+        return None
+    blind = [match for match, one in zip(at.matches, looks, strict=True) if not one]
+    default = at.table.default
+    return (*blind, *([] if default is None or default.unreachable else [at.none]))
+
+
+def looks_for(leaf: str, line: Line) -> bool:
+    """Whether some cell of the line reads the leaf, alone or in an expression."""
+    return any(test is not None and leaf in map(str, read_by(test.condition)) for test in line.tests)
+
+
+def _answered(stepper: Stepper, cycle: Cycle, at: TableAt, overlooking: tuple[Node, ...]) -> Goal:
+    """Where such a line runs while the flag stands, or the cycle ends before a line is done, the flag outlasts it.
+
+    If it is down as soon as the level sees the same once more, no line will answer the command, and what this line
+    reports is taken for the answer.
+    """
+    again = stepper.cycle(cycle.after, " again", taken=cycle.taken).middle[FLAG]
+    missed = values.any_of(overlooking)
+    passed = values.all_of((at.chosen, values.negation(at.several()), missed))
+    passed = values.either(passed, values.both(at.selected, cycle.interrupted))
+    flagged = values.both(cycle.middle[FLAG], passed)
+    return Goal(Sort.ANSWERED, str(at.table.name), FLAG, values.follows(flagged, again))

@@ -1,0 +1,284 @@
+"""What the invariants may speak of: features of a state, truth values or members of an enumeration of any size.
+
+In: one cycle from anywhere, and the nodes that are to be proved. Out: the `Feature`s in their cone. Nothing here names a table or
+a state; all of it is read from the model:
+
+- truth values and enumerations that conditions of tables, assumptions or the contract read, and flags;
+- whether two leaves are equal that the level itself compares: an order and the last one, a number and the one seen;
+- which class of a number's values a cell of a table tells apart;
+- whether a test variable still is what its module would compute now: a module that reads inputs only says the same again
+  as long as its inputs stay, which is what makes a line that matches again do the same again.
+"""
+
+from collections.abc import Container, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+
+from rcsc.compose.contract.environment import COMMAND
+from rcsc.compose.contract.transition import GHOST, Cycle, Leaves, Stepper
+from rcsc.lang.interpret import call, holds
+from rcsc.lang.leaves import everything, expressions, read_by
+from rcsc.lang.meaning import spelled
+from rcsc.lang.model import (  # fmt: skip
+    COMPARISONS,
+    Apply,
+    Bool,
+    Call,
+    Enum,
+    Expr,
+    If,
+    Kind,
+    Literal,
+    OneTable,
+    Op,
+    Procedure,
+    Program,
+    Read,
+    Scalar,
+    Value,
+    key_of,
+    pending,
+    spell,
+)
+from rcsc.lang.questions import parts
+from rcsc.symbolic import values
+from rcsc.symbolic.execution import Run
+from rcsc.symbolic.values import Node
+
+CLOSELY = 1
+"""Up to here, what is not proved is looked at with more features."""
+
+
+@dataclass(frozen=True, slots=True)
+class Feature:
+    """A truth value or a member; or, as a truth value, whether it equals another leaf, or what a module computes of it.
+
+    Attributes:
+        parts: Whether it is one of those that part the states.
+        procedures: Those that the module may call.
+    """
+
+    leaf: str
+    kind: Scalar
+    other: str = ""
+    module: Procedure | None = field(default=None, repr=False)
+    condition: Expr | None = field(default=None, repr=False)
+    parts: bool = False
+    procedures: Mapping[str, Procedure] = field(default_factory=dict, repr=False, compare=False)
+
+    @property
+    def name(self) -> str:
+        """In the tables' words."""
+        if self.condition is not None:
+            return f"({self.leaf})"
+        if self.module is not None:
+            return f"({self.leaf} is as `{self.module.name}` computes it)"
+        return f"({self.leaf} = {self.other})" if self.other else self.leaf
+
+    @property
+    def size(self) -> int:
+        """How many values it has."""
+        return len(self.kind.members) if isinstance(self.kind, Enum) else 2
+
+    def node(self, leaves: Leaves) -> Node:
+        """Its value in a state."""
+        if self.condition is not None:
+            return Run({}, {}, dict(leaves)).evaluate(self.condition)
+        if self.module is not None:
+            kinds = {name: node.kind for name, node in leaves.items()}
+            run = Run(self.procedures, kinds, dict(leaves))
+            run.execute((Call(self.module.name),))
+            return values.equal(leaves[self.leaf], run.leaf(self.leaf))
+        return values.equal(leaves[self.leaf], leaves[self.other]) if self.other else leaves[self.leaf]
+
+    def shown(self, value: int) -> str:
+        """A value in the tables' words."""
+        return spell(self.kind, value)
+
+
+def cone(cycle: Cycle, goals: Iterable[Node]) -> frozenset[str]:
+    """The leaves whose values before a cycle can influence the goals, now or in a later cycle."""
+    found: set[str] = set()
+    waiting = [name for name in values.variables(goals) if name in cycle.before]
+    while waiting:
+        name = waiting.pop()
+        if name not in found:
+            found.add(name)
+            waiting += [one for one in values.variables([cycle.after[name]]) if one in cycle.before]
+    return frozenset(found)
+
+
+def features(stepper: Stepper, cycle: Cycle, goals: Iterable[Node], closely: int = 0) -> tuple[Feature, ...]:
+    """The features in the cone of the goals, in declared order.
+
+    Args:
+        stepper: The level.
+        cycle: From anywhere.
+        goals: What is to be proved.
+        closely: At 1 (`CLOSELY`) there are also those by which procedures decide, behind the others.
+    """
+    inside = cone(cycle, goals)
+    program, kinds = stepper.program, stepper.kinds
+    read = _read(stepper)
+    computed = {leaf: module for leaf, module in _computed(stepper) if leaf in read}
+    chosen = [
+        name
+        for name, kind in kinds.items()
+        if listed(kind) and (name in computed or (name in inside and (name in read or _flag(program, name))))
+    ]
+    parting = {
+        *_selector(stepper),
+        *(name for name in chosen if _flag(program, name) and name not in computed),
+    }
+    found = [Feature(name, kinds[name], parts=name in parting) for name in chosen]
+    pairs = sorted({*compared(program), *_questions(stepper)})
+    found += [Feature(one, Bool(), other) for one, other in pairs if {one, other} <= inside and one in kinds]
+    found += [
+        Feature(leaf, Bool(), module=module, procedures=stepper.procedures)
+        for leaf, module in computed.items()
+    ]
+    found += _cells(stepper, {*inside, *computed})
+    if closely:
+        found += _branches(stepper, inside, {one.leaf for one in found})
+    return tuple(found)
+
+
+def point(stepper: Stepper, chosen: tuple[Feature, ...], state: Mapping[str, Value]) -> tuple[int, ...]:
+    """The features of a state that was run; modules are run by the interpreter."""
+    again: dict[str, dict[str, Value]] = {}
+    found = []
+    for one in chosen:
+        if one.condition is not None:
+            found.append(int(holds(one.condition, state)))
+        elif one.module is not None:
+            if one.module.name not in again:
+                again[one.module.name] = dict(state)
+                call(stepper.program, one.module.name, [], again[one.module.name])
+            found.append(int(state[one.leaf] == again[one.module.name][one.leaf]))
+        elif one.other:
+            found.append(int(state[one.leaf] == state[one.other]))
+        else:
+            found.append(key_of(one.kind, state[one.leaf]))
+    return tuple(found)
+
+
+def listed(kind: Scalar) -> bool:
+    """Whether the values can be gone through one by one: truth values, members."""
+    return isinstance(kind, Bool | Enum)
+
+
+def _flag(program: Program, name: str) -> bool:
+    """A truth value that the level itself keeps."""
+    return any(
+        v.name == name and isinstance(v.type, Bool) and v.kind is Kind.STATE for v in program.variables
+    )
+
+
+def _read(stepper: Stepper) -> set[str]:
+    """Leaves that decide which line runs, or that the contract speaks of; with what they will be."""
+    program, level = stepper.program, stepper.level
+    conditions = [one.condition for one in program.assumptions]
+    conditions += [
+        test.condition
+        for table in program.tables
+        for line in table.lines
+        for test in line.tests
+        if test is not None
+    ]
+    if not isinstance(level.tables, OneTable):
+        conditions.append(level.tables.selector)
+    found = {str(name) for condition in conditions for name in read_by(condition)}
+    found |= {f"{below.order}.{COMMAND}" for below in stepper.links.below}
+    found |= {f"{GHOST}{asked.into}" for asked in stepper.links.asked}
+    return found | {
+        str(pending(v.name)) for v in program.variables if v.deferred_until is not None and v.name in found
+    }
+
+
+def _computed(stepper: Stepper) -> Iterator[tuple[str, Procedure]]:
+    """Leaves that a module of the preprocess computes of inputs, flags, and what it writes itself."""
+    variables = {str(v.name): v for v in stepper.program.variables}
+    for name in stepper.level.preprocess:
+        module = stepper.procedures[name]
+        own = set(map(str, module.writes))
+        run = Run(stepper.procedures, stepper.kinds, stepper.anywhere())
+        run.execute((Call(module.name),))
+        if run.fresh:
+            continue  # it asks what nobody can say again
+        for leaf in map(str, module.writes):
+            used = values.variables([run.leaf(leaf)])
+            if all(
+                one in own or variables[one].kind is Kind.INPUT or _flag(stepper.program, one) for one in used
+            ):
+                yield leaf, module
+
+
+def _cells(stepper: Stepper, inside: Container[str]) -> Iterator[Feature]:
+    """Conditions of cells on numbers."""
+    kinds, seen = stepper.kinds, set()
+    for table in stepper.program.tables:
+        for column, tests in zip(
+            table.columns, zip(*(line.tests for line in table.lines), strict=True), strict=True
+        ):
+            for test in tests:
+                if test is None or all(listed(kinds[leaf]) for leaf in test.variables):
+                    continue
+                name = spelled(test.condition)
+                if name not in seen and all(leaf in inside for leaf in test.variables):
+                    seen.add(name)
+                    yield Feature(f"{column.heading} {test.text}", Bool(), condition=test.condition)
+
+
+def _branches(stepper: Stepper, inside: Container[str], there: Container[str]) -> Iterator[Feature]:
+    """What procedures decide by: truth values and members, and comparisons of numbers with a constant."""
+    kinds, seen = stepper.kinds, set()
+    for condition in _decisions(stepper.program):
+        for name in dict.fromkeys(map(str, read_by(condition))):
+            if name in inside and listed(kinds[name]) and name not in there and name not in seen:
+                seen.add(name)
+                yield Feature(name, kinds[name])
+        for part in parts(condition):
+            match part:
+                case Apply(op=op, args=(Read(name=leaf), Literal())) if op in COMPARISONS:
+                    name = spelled(part)
+                    if name not in seen and leaf in inside and not listed(kinds[leaf]):
+                        seen.add(name)
+                        yield Feature(name, Bool(), condition=part)
+
+
+def _decisions(program: Program) -> Iterator[Expr]:
+    """Conditions of two-way choices."""
+    for procedure in program.procedures:
+        for one in everything(procedure.body):
+            if isinstance(one, If):
+                yield one.condition
+
+
+def compared(program: Program) -> Iterator[tuple[str, str]]:
+    """Pairs of leaves that some procedure, or a deferral, compares for equality."""
+    conditions: list[Expr] = [v.deferred_until for v in program.variables if v.deferred_until is not None]
+    conditions += [
+        expr
+        for procedure in program.procedures
+        for one in everything(procedure.body)
+        for expr in expressions(one)
+    ]
+    for condition in conditions:
+        for part in parts(condition):
+            match part:
+                case Apply(op=Op.EQ | Op.NE, args=(Read(name=one), Read(name=two))) if one != two:
+                    yield min(str(one), str(two)), max(str(one), str(two))
+                case _:
+                    pass
+
+
+def _questions(stepper: Stepper) -> Iterator[tuple[str, str]]:
+    """What was asked of the database, and what would be asked now."""
+    for asked in stepper.links.asked:
+        for key in asked.keys:
+            yield f"{GHOST}{asked.into} {key}", key
+
+
+def _selector(stepper: Stepper) -> Iterator[str]:
+    """The leaves that select the table."""
+    if not isinstance(stepper.level.tables, OneTable):
+        yield from map(str, read_by(stepper.level.tables.selector))

@@ -1,0 +1,193 @@
+"""The program's own invariants and properties: as conditions on one cycle, as features, and of a run.
+
+In: a program and a cycle. Out: nodes that are to hold in every cycle; what the search has to look at for them; and whether a cycle that
+was run keeps them, as the interpreter says.
+
+An *invariant* is about state and outputs: it holds of the values with which the level begins, at first and after a restart, and
+behind every cycle. A *property* is about a cycle and the one before (`model.Property`): it holds behind every cycle, the first and the
+first after a restart included, of inputs as the cycle took them; before those stands what the level begins with. It says nothing of a
+cycle before a restart and one behind it. What is not defined (a division by zero, an index outside) does not hold.
+"""
+
+from collections.abc import Collection, Iterable, Iterator, Mapping
+
+from rcsc.compose.contract.predicates import Feature, cone, features, listed
+from rcsc.compose.contract.transition import Cycle, Leaves, Stepper
+from rcsc.lang.interpret import holds
+from rcsc.lang.leaves import read_by
+from rcsc.lang.meaning import spelled
+from rcsc.lang.model import (
+    BEFORE,
+    COMPARISONS,
+    Among,
+    Apply,
+    Bool,
+    Expr,
+    Op,
+    Program,
+    Read,
+    Scalar,
+    Select,
+    Value,
+    VariableName,
+    earlier,
+)
+from rcsc.lang.questions import parts
+from rcsc.symbolic import values
+from rcsc.symbolic.execution import Run
+from rcsc.symbolic.values import Node
+
+_PARTIAL = frozenset({Op.DIV, Op.MOD, Op.TO_INT})
+"""Operations that are not defined of every value; no feature evaluates them."""
+
+
+# --- as conditions on a cycle ----------------------------------------------------------------
+
+
+def invariants(program: Program, cycle: Cycle) -> Iterator[tuple[str, Node]]:
+    """Each invariant by name, before the cycle and behind it."""
+    for one in program.invariants:
+        yield one.name, values.both(_true(one.condition, cycle.before), _true(one.condition, cycle.after))
+
+
+def kept_within(program: Program, cycle: Cycle, names: Collection[str]) -> Node:
+    """These invariants also hold within the cycle, wherever one of its procedures, conditions or lines is shown to be safe under them."""
+    return values.all_of(
+        _true(one.condition, leaves)
+        for one in program.invariants
+        if one.name in names
+        for leaves in (cycle.settled, cycle.middle, cycle.acted)
+    )
+
+
+def properties(program: Program, cycle: Cycle) -> Iterator[tuple[str, Node]]:
+    """Each property by name."""
+    leaves = {**cycle.after, **{str(earlier(name)): node for name, node in cycle.before.items()}}
+    for one in program.properties:
+        yield one.name, _true(one.condition, leaves)
+
+
+def _true(condition: Expr, leaves: Leaves) -> Node:
+    """That the condition is defined, and holds."""
+    run = Run({}, {}, dict(leaves))
+    found = run.evaluate(condition)
+    return values.all_of((*(values.follows(one.path, one.good) for one in run.obligations), found))
+
+
+# --- of a run --------------------------------------------------------------------------------
+
+
+def invariant_kept(
+    stepper: Stepper, name: str, before: Mapping[str, Value], after: Mapping[str, Value]
+) -> bool:
+    """Whether the invariant holds before and behind a cycle that was run.
+
+    Raises:
+        StopIteration: There is no such invariant.
+    """
+    condition = next(one.condition for one in stepper.program.invariants if one.name == name)
+    return all(_held(condition, state, stepper.kinds) for state in (before, after))
+
+
+def property_kept(
+    stepper: Stepper, name: str, before: Mapping[str, Value], after: Mapping[str, Value]
+) -> bool:
+    """Whether the property holds of a cycle that was run.
+
+    Raises:
+        StopIteration: There is no such property.
+    """
+    condition = next(one.condition for one in stepper.program.properties if one.name == name)
+    kinds = {**stepper.kinds, **{str(earlier(leaf)): kind for leaf, kind in stepper.kinds.items()}}
+    return _held(condition, {**after, **{str(earlier(leaf)): value for leaf, value in before.items()}}, kinds)
+
+
+def _held(condition: Expr, state: Mapping[str, Value], kinds: Mapping[str, Scalar]) -> bool:
+    """As the interpreter says; what leaves 64 bits, which it does not look at, is not defined."""
+    try:
+        if not holds(condition, state):
+            return False
+    except (ArithmeticError, IndexError, ValueError):
+        return False
+    leaves = {str(name): values.constant(kinds[name], state[name]) for name in read_by(condition)}
+    return bool(_true(condition, leaves).low)
+
+
+# --- as features -----------------------------------------------------------------------------
+
+
+def every_feature(
+    stepper: Stepper, cycle: Cycle, goals: Iterable[Node], closely: int = 0
+) -> tuple[Feature, ...]:
+    """What `features` chooses, and what invariants and properties speak of.
+
+    Those that there are at less closeness come first, in the same order, as clauses name features by their position.
+    """
+    wanted = list(goals)
+    first = features(stepper, cycle, wanted)
+    said = _said(stepper, cone(cycle, wanted), {one.name for one in first}) if _states(stepper) else ()
+    found = (*first, *said)
+    if closely:
+        there = {one.name for one in found}
+        closer = features(stepper, cycle, wanted, closely)
+        found = (*found, *(one for one in closer if one.name not in there))
+    return found
+
+
+def _states(stepper: Stepper) -> list[Expr]:
+    program = stepper.program
+    return [*(one.condition for one in program.invariants), *(one.condition for one in program.properties)]
+
+
+def _said(stepper: Stepper, inside: frozenset[str], there: set[str]) -> tuple[Feature, ...]:
+    """Truth values and members, and comparisons of numbers, as far as they matter for a later cycle."""
+    found: dict[str, Feature] = {}
+    for condition in _states(stepper):
+        for part in parts(condition):
+            if len({name.startswith(BEFORE) for name in read_by(part)}) > 1:
+                continue  # it says of two cycles what no state shows
+            for one in _features_of(_of_one_cycle(part), stepper.kinds):
+                read = {one.leaf, *([one.other] if one.other else [])}
+                if one.condition is not None:
+                    read = set(map(str, read_by(one.condition)))
+                if one.name not in there and read and read <= inside:
+                    found.setdefault(one.name, one)
+    return tuple(found.values())
+
+
+def _of_one_cycle(part: Expr) -> Expr:
+    """The part without `was`."""
+    match part:
+        case Read(name=name):
+            return Read(VariableName(name.removeprefix(BEFORE)), part.type)
+        case Apply(op=op, args=args):
+            return Apply(op, tuple(map(_of_one_cycle, args)), part.type)
+        case Among(subject=subject, values=members):
+            return Among(_of_one_cycle(subject), members, part.type)
+        case _:
+            return part
+
+
+def _features_of(part: Expr, kinds: Mapping[str, Scalar]) -> Iterator[Feature]:
+    """The features that one part makes; none where it is a whole made of others."""
+    match part:
+        case Read(name=name) if listed(kinds[name]):
+            yield Feature(str(name), kinds[name])
+        case Apply(op=Op.EQ | Op.NE, args=(Read(name=one), Read(name=two))) if one != two:
+            yield Feature(min(str(one), str(two)), Bool(), max(str(one), str(two)))
+        case Apply(op=op) if op in COMPARISONS:
+            yield from _condition(part, kinds)
+        case Among():
+            yield from _condition(part, kinds)
+        case _:
+            pass
+
+
+def _condition(part: Expr, kinds: Mapping[str, Scalar]) -> Iterator[Feature]:
+    """A comparison of numbers, where it is defined of every value."""
+    whole = all(
+        not isinstance(one, Select) and not (isinstance(one, Apply) and one.op in _PARTIAL)
+        for one in parts(part)
+    )
+    if whole and not all(listed(kinds[leaf]) for leaf in read_by(part)):
+        yield Feature(spelled(part), Bool(), condition=part)

@@ -1,0 +1,419 @@
+"""One cycle of a level in its environment, as nodes: derived from the model that the executors are emitted from.
+
+In: a program, its level, the links. Out: `Cycle`s. A cycle takes the inputs, settles deferred values, runs preprocess, the
+selected table and postprocess, exactly as `interpret.cycle` does; what the environment may do is a condition on what is taken.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+
+from rcsc.compose.contract.environment import COMMAND, ECHO, ECHOED, NUMBER, Below, Links
+from rcsc.lang.interpret import Fault, evaluate
+from rcsc.lang.model import (  # fmt: skip
+    Action,
+    Bool,
+    Call,
+    Default,
+    Enum,
+    Int,
+    Kind,
+    Level,
+    Line,
+    OneTable,
+    Op,
+    Procedure,
+    Program,
+    Scalar,
+    Snapshot,
+    Standing,
+    Table,
+    TableName,
+    pending,
+)
+from rcsc.run.adopt import ECHOES, FAILED, ORDER
+from rcsc.symbolic import values
+from rcsc.symbolic.evaluation import ExternResults, State
+from rcsc.symbolic.execution import Run
+from rcsc.symbolic.values import FALSE, TRUE, Node
+
+GHOST = "asked "
+"""Names of what the proof remembers and the level does not: that the database was asked, and for which keys."""
+
+SEEN = "inc_command_seen"
+"""The number of the command being worked on; a level that restarts counts the one in its buffer as seen."""
+TAKEN = f"command.{NUMBER}"
+"""Where that one stands, by the convention of the tables: of an order under another name nothing is adopted."""
+EARLY = frozenset({Fault.EXTERN, Fault.ASSUMPTION})
+"""Faults that no proof excludes: the cycle ends there, and the next one runs."""
+Leaves = dict[str, Node]
+NUMBERS = 65536
+"""Command numbers that there are (16 bits)."""
+
+
+@dataclass(frozen=True, slots=True)
+class TableAt:
+    """A table in one cycle.
+
+    Attributes:
+        chosen: When it is the one that runs; `selected`, that would, if the cycle did not end before.
+        matches: When each of its lines matches, in order.
+        assumptions: When each of its assumptions holds, by name.
+    """
+
+    table: Table
+    chosen: Node
+    matches: tuple[Node, ...]
+    assumptions: Mapping[str, Node]
+    selected: Node
+
+    @property
+    def lines(self) -> list[tuple[Line | Default, Node]]:
+        """Each line with its condition, DEFAULT last."""
+        found: list[tuple[Line | Default, Node]] = list(zip(self.table.lines, self.matches, strict=True))
+        return found if self.table.default is None else [*found, (self.table.default, self.none)]
+
+    @property
+    def none(self) -> Node:
+        """No line matches."""
+        return values.all_of(map(values.negation, self.matches))
+
+    @property
+    def one_line(self) -> Node:
+        """A line runs."""
+        some = values.TRUE if self.table.default is not None else values.negation(self.none)
+        return values.both(some, values.negation(self.several()))
+
+    @property
+    def runs(self) -> Node:
+        """It is the one that runs, and none of its stopping assumptions fails: else the cycle ends before it is matched."""
+        return values.all_of((self.chosen, *(self.assumptions[name] for name in self.table.stops)))
+
+    @property
+    def stopped(self) -> Node:
+        """It is the one that would run, and a stopping assumption fails."""
+        return values.both(self.chosen, values.negation(self.runs)) if self.table.stops else FALSE
+
+    def several(self) -> Node:
+        """At least two lines match."""
+        found, before = FALSE, FALSE
+        for match in self.matches:
+            found = values.either(found, values.both(before, match))
+            before = values.either(before, match)
+        return found
+
+
+@dataclass(frozen=True, slots=True)
+class Cycle:
+    """One cycle.
+
+    Attributes:
+        before: Every leaf as the last cycle left it, and the ghosts; inputs as last taken.
+        taken: The inputs of this cycle.
+        contract: What the environment keeps to; `undeclared`, the same without what tables are declared to rely on.
+        middle: Every leaf that the table sees.
+        tables: Each table that may run.
+        after: Every leaf and ghost behind the cycle.
+        refused: An extern procedure's result is refused, or a stopping assumption fails, so that the cycle ends there;
+            `unmatched`, before the table is looked at; `interrupted`, before its line is done.
+        calls: Of extern procedures, in the order in which they can be made.
+        settled: Every leaf before the preprocess, and `acted`, before the postprocess.
+    """
+
+    before: Leaves
+    taken: Leaves
+    contract: Node
+    middle: Leaves
+    tables: tuple[TableAt, ...]
+    after: Leaves
+    refused: Node = FALSE
+    unmatched: Node = FALSE
+    interrupted: Node = FALSE
+    calls: tuple[ExternResults, ...] = ()
+    settled: Leaves = field(default_factory=dict)
+    acted: Leaves = field(default_factory=dict)
+    undeclared: Node = TRUE
+
+    @property
+    def cases(self) -> tuple[Node, ...]:
+        """Conditions on the cycle, of which one holds: which table runs, or that none does."""
+        none = (self.unmatched,) if self.unmatched is not FALSE else ()
+        return (*(at.chosen for at in self.tables), *none)
+
+    @property
+    def goes_on(self) -> Node:
+        """One line matches, or DEFAULT runs, where a table is matched: the cycle does not end in a fault that the proofs exclude."""
+        return values.all_of(values.follows(at.runs, at.one_line) for at in self.tables)
+
+
+@dataclass(frozen=True, slots=True)
+class Safety:
+    """Why a cycle as nodes is what the executors do: every operation is defined, and every value in range.
+
+    Attributes:
+        invariants: Under which of the program's that was shown; empty where it is so whatever the state.
+        within: Whether they have to be shown to hold within a cycle, too, as some procedure of the program alone can break one.
+    """
+
+    invariants: tuple[str, ...] = ()
+    within: bool = False
+
+
+@dataclass(slots=True)
+class Stepper:
+    """Makes cycles of one level.
+
+    Attributes:
+        trusted: Assumptions that the tables are declared to rely on, of what the environment gives: part of the contract.
+    """
+
+    program: Program
+    level: Level
+    links: Links
+    safety: Safety = Safety()
+    procedures: dict[str, Procedure] = field(init=False)
+    kinds: dict[str, Scalar] = field(init=False)
+    trusted: frozenset[str] = field(init=False, default=frozenset())
+
+    def __post_init__(self) -> None:
+        """Reads what cycles are made of."""
+        self.procedures = {one.name: one for one in self.program.procedures}
+        self.kinds = {str(v.name): v.type for v in self.program.variables}
+        for asked in self.links.asked:
+            self.kinds[f"{GHOST}{asked.into}"] = Bool()
+            for key in asked.keys:
+                self.kinds[f"{GHOST}{asked.into} {key}"] = self.kinds[key]
+        self.trusted = self._of_the_environment()
+
+    def _of_the_environment(self) -> frozenset[str]:
+        """Assumptions with standing *assumed* that speak of what a cycle takes; what is about state alone is to be proved."""
+        wanted = {str(one.name) for one in self.program.assumptions if one.standing is Standing.ASSUMED}
+        if not wanted:
+            return frozenset()
+        cycle = self.cycle(self.anywhere())
+        return frozenset(
+            name
+            for at in cycle.tables
+            for name, condition in at.assumptions.items()
+            if name in wanted and not set(values.variables([condition])) <= cycle.before.keys()
+        )
+
+    def anywhere(self) -> Leaves:
+        """Any values at all: the start of a step of induction."""
+        return {name: values.variable(name, kind) for name, kind in self.kinds.items()}
+
+    def first(self) -> Leaves:
+        """The values before the first cycle."""
+        start = {str(v.name): values.constant(v.type, v.initial) for v in self.program.variables}
+        return {
+            **{name: values.constant(kind, 0) for name, kind in self.kinds.items() if name.startswith(GHOST)},
+            **start,
+        }
+
+    def restarted(self) -> Leaves:
+        """The values before the first cycle after a restart, as `run.adopt` makes them, whatever stood in the buffers.
+
+        A member that a state has no name for leaves it as it is initially, as there. An order has a number that no report can echo
+        yet: the one after the order that stands in the buffer, which may be late; after the echo where none stands.
+        """
+        start = self.first()
+        inputs = {str(v.name) for v in self.program.variables if v.kind is Kind.INPUT}
+        start |= {
+            name: values.variable(f"{name} before restart", self.kinds[name]) for name in sorted(inputs)
+        }
+        for name, member in FAILED.items():
+            kind = self.kinds.get(name)
+            if isinstance(kind, Enum) and member in kind.members:
+                start[name] = values.constant(kind, kind.members.index(member))
+        if SEEN in start and TAKEN in start:
+            start[SEEN] = start[TAKEN]
+        outputs = [
+            str(v.name) for v in self.program.variables if v.kind is Kind.OUTPUT and v.name.startswith(ORDER)
+        ]
+        for leaf in outputs:
+            record, _, part = leaf.partition(".")
+            echo = f"{record.removeprefix(ORDER)}.{ECHOES.get(part, '')}"
+            if part == COMMAND:
+                start[leaf] = values.constant(self.kinds[leaf], 0)
+            elif echo in start:
+                late = values.variable(f"{leaf} before restart", self.kinds[leaf])
+                start[leaf] = values.choice(values.equal(late, start[echo]), successor(start[echo]), late)
+        return start
+
+    def of(self, program: Program) -> "Stepper":
+        """The same level with another program of the same leaves."""
+        return Stepper(
+            program,
+            next(one for one in program.levels if one.name == self.level.name),
+            self.links,
+            self.safety,
+        )
+
+    def table_of(self, snapshot: Snapshot) -> str:
+        """The table that ran in a cycle, by what the cycle left: what selects it stays from the preprocess on (`UNSTEADY_SELECTOR`)."""
+        if isinstance(self.level.tables, OneTable):
+            return str(self.level.tables.table)
+        return str(dict(self.level.tables.tables)[evaluate(self.level.tables.selector, snapshot)])
+
+    def cycle(self, before: Leaves, suffix: str = " taken", taken: Leaves | None = None) -> Cycle:
+        """One cycle from `before`; the inputs it takes, if not given, are fresh variables, named with the suffix.
+
+        What extern procedures give is named with it, too: cycles that one question is about need different suffixes.
+        """
+        if taken is None:
+            inputs = [v for v in self.program.variables if v.kind is Kind.INPUT]
+            taken = {str(v.name): values.variable(f"{v.name}{suffix}", v.type) for v in inputs}
+        run = Run(self.procedures, self.kinds, dict(before), suffix=suffix, refusals=True)
+        run.state.leaves.update(taken)
+        ghosts, answers = self._database(before, taken)
+        contract = undeclared = values.both(self._protocol(before, taken), answers)
+        self._settle(run)
+        settled = {**before, **run.state.leaves}
+        run.execute(Call(self.procedures[name].name) for name in self.level.preprocess)
+        middle = {**before, **run.state.leaves}
+        unmatched = run.ended
+        tables = tuple(self._tables(run))
+        contract = values.both(contract, self._trusted(tables))
+        run.ended = values.either(run.ended, values.any_of(at.stopped for at in tables))
+        self._lines(run, tables)
+        acted, interrupted = {**before, **run.state.leaves}, run.ended
+        run.execute(Call(self.procedures[name].name) for name in self.level.postprocess)
+        after = {**before, **run.state.leaves, **ghosts}
+        for variable in self.program.variables:
+            if variable.safe is not None:
+                shown, name = values.constant(variable.type, variable.safe), str(variable.name)
+                after[name] = values.choice(run.ended, shown, after[name])
+        calls = tuple(run.answered)
+        return Cycle(
+            before, taken, contract, middle, tables, after,
+            run.ended, unmatched, interrupted, calls, settled, acted, undeclared,
+        )  # fmt: skip
+
+    def tables(self, middle: Leaves, *, matched: bool) -> tuple[TableAt, ...]:
+        """Each table that may run on these leaves; none does where the cycle ends before it is matched."""
+        run = Run(self.procedures, self.kinds, dict(middle), ended=values.truth(not matched))
+        return tuple(self._tables(run))
+
+    # --- the environment ---
+
+    def _trusted(self, tables: tuple[TableAt, ...]) -> Node:
+        """What is declared to be so whenever a table runs."""
+        return values.all_of(
+            values.follows(at.chosen, condition)
+            for at in tables
+            for name, condition in at.assumptions.items()
+            if name in self.trusted
+        )
+
+    def _protocol(self, before: Leaves, taken: Leaves) -> Node:
+        """What holds of orders and reports, whatever the delay (`compose.__doc__`)."""
+        kept = TRUE
+        if (above := self.links.above) is not None:
+            number = f"{above.order}.{NUMBER}"
+            same = values.all_of(values.equal(before[leaf], taken[leaf]) for leaf in above.numbered)
+            kept = values.both(kept, values.follows(values.equal(before[number], taken[number]), same))
+        for below in self.links.below:
+            kept = values.both(kept, self.echo(below, before, taken))
+        return kept
+
+    @staticmethod
+    def echo(below: Below, before: Leaves, taken: Leaves) -> Node:
+        """The last order's number with another command is not echoed, nor a number not yet sent; what is echoed stays so."""
+        sent, last = before[f"{below.order}.{NUMBER}"], before[f"{below.report}.{ECHO}"]
+        echo = taken[f"{below.report}.{ECHO}"]
+        it = values.equal(taken[f"{below.report}.{ECHOED}"], before[f"{below.order}.{COMMAND}"])
+        now = values.equal(echo, sent)
+        stays = values.follows(values.equal(last, sent), now)
+        return values.all_of(
+            (values.follows(now, it), stays, values.negation(values.equal(echo, successor(sent))))
+        )
+
+    def _database(self, before: Leaves, taken: Leaves) -> tuple[Leaves, Node]:
+        """What was asked, and that the same question has the same answer."""
+        ghosts: Leaves = {}
+        kept = TRUE
+        for asked in self.links.asked:
+            again = before[f"{GHOST}{asked.into}"]
+            for key in asked.keys:
+                name = f"{GHOST}{asked.into} {key}"
+                ghosts[name] = taken.get(key, before[key])
+                again = values.both(again, values.equal(before[name], ghosts[name]))
+            same = values.all_of(values.equal(before[leaf], taken[leaf]) for leaf in asked.leaves)
+            kept = values.both(kept, values.follows(again, same))
+            ghosts[f"{GHOST}{asked.into}"] = TRUE
+        return ghosts, kept
+
+    # --- the level ---
+
+    def _settle(self, run: Run) -> None:
+        deferred = [v for v in self.program.variables if v.deferred_until is not None]
+        ready = [run.evaluate(v.deferred_until) for v in deferred if v.deferred_until is not None]
+        later = [run.leaf(pending(v.name)) for v in deferred]
+        for variable, when, value in zip(deferred, ready, later, strict=True):
+            run.write(variable.name, value, when)
+
+    def _tables(self, run: Run) -> Iterable[TableAt]:
+        goes_on = values.negation(run.ended)
+        for table, selected in self._choices(run):
+            assumptions = {
+                str(one.name): run.evaluate(one.condition)
+                for one in self.program.assumptions
+                if one.name in table.assumptions
+            }
+            matches = tuple(
+                values.all_of(run.evaluate(test.condition) for test in line.tests if test is not None)
+                for line in table.lines
+            )
+            yield TableAt(table, values.both(selected, goes_on), matches, assumptions, selected)
+
+    def _choices(self, run: Run) -> Iterable[tuple[Table, Node]]:
+        """Each table that may run, once, and when it does."""
+        by_name = {table.name: table for table in self.program.tables}
+        if isinstance(self.level.tables, OneTable):
+            yield by_name[self.level.tables.table], TRUE
+            return
+        selector = run.evaluate(self.level.tables.selector)
+        chosen: dict[TableName, Node] = {}
+        for value, name in self.level.tables.tables:
+            here = values.equal(selector, values.constant(selector.kind, value))
+            chosen[name] = values.either(chosen.get(name, FALSE), here)
+        for name, when in chosen.items():
+            yield by_name[name], when
+
+    def _lines(self, run: Run, tables: tuple[TableAt, ...]) -> None:
+        """Runs the line that matches, the first where there are several, of the table that is chosen."""
+        middle = run.state
+        ways: list[tuple[Node, State]] = []
+        for at in tables:
+            left = at.runs
+            for match, line in zip(at.matches, at.table.lines, strict=True):
+                ways.append(_way(run, middle, values.both(left, match), line.actions))
+                left = values.both(left, values.negation(match))
+            if at.table.default is not None:
+                ways.append(_way(run, middle, left, at.table.default.actions))
+        names = {name for _, state in ways for name in state.leaves}
+        leaves = {}
+        for name in sorted(names):
+            found = run.start[name] if name not in middle.leaves else middle.leaves[name]
+            base = found
+            for when, state in reversed(ways):
+                found = values.choice(when, state.leaves.get(name, base), found)
+            leaves[name] = found
+        run.state = State({**middle.leaves, **leaves})
+
+
+def _way(run: Run, middle: State, when: Node, actions: tuple[Action, ...]) -> tuple[Node, State]:
+    """What the actions of one line leave."""
+    run.state = State(dict(middle.leaves))
+    with run.where(when):
+        for action in actions:
+            run.state = State(dict(run.state.leaves))
+            run.execute((action.statement,))
+    return when, run.state
+
+
+def successor(number: Node) -> Node:
+    """The number after this one, of 16 bits."""
+    one, many = values.constant(number.kind, 1), values.constant(Int(0, NUMBERS), NUMBERS)
+    return values.arithmetic(
+        Op.MOD, (values.arithmetic(Op.ADD, (number, one), Int(0, NUMBERS)), many), number.kind
+    )

@@ -1,0 +1,77 @@
+"""Programs as if the language had other rules: what a rule is good for is seen where it is off.
+
+In: a program. Out: one of the same leaves, whose meaning is the language's own again. Executors of a variant are not what the
+tables say, so that they are marked like those of tables that do not prove (`findings`).
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+from rcsc.compose.contract.obligations import may_meet
+from rcsc.lang.model import Apply, Bool, Column, Expr, Literal, Op, Program, Table, Test
+
+TRUE = Literal(value=True, type=Bool())
+
+
+def undeferred(program: Program) -> Program:
+    """With every deferred state taken at once, not when its command is echoed: what section 9 warns of."""
+    at_once = tuple(
+        replace(v, deferred_until=TRUE) if v.deferred_until is not None else v for v in program.variables
+    )
+    return replace(program, variables=at_once)
+
+
+def first_match(program: Program) -> Program:
+    """With the first of several matching lines run: each line also asks that none before it matches."""
+    return replace(program, tables=tuple(map(_first_match, program.tables)))
+
+
+def defaults_reported(program: Program) -> Program:
+    """With every DEFAULT line declared unreachable, so that what falls to one is found."""
+    return replace(
+        program,
+        tables=tuple(
+            table
+            if table.default is None
+            else replace(table, default=replace(table.default, unreachable=True))
+            for table in program.tables
+        ),
+    )
+
+
+def _first_match(table: Table) -> Table:
+    """A column more: each line that can match together with an earlier one asks that none such does."""
+    meeting = may_meet(table)
+    if not meeting:
+        return table
+    earlier = {at: [one for one, two in meeting if two == at] for at in range(len(table.lines))}
+    conditions = [
+        _all_of([test.condition for test in line.tests if test is not None]) for line in table.lines
+    ]
+    lines = []
+    for at, line in enumerate(table.lines):
+        test = _none_of(table, [conditions[other] for other in earlier[at]]) if earlier[at] else None
+        lines.append(replace(line, tests=(*line.tests, test)))
+    return replace(table, columns=(*table.columns, Column("first", None, None)), lines=tuple(lines))
+
+
+def _none_of(table: Table, conditions: list[Expr]) -> Test:
+    found = conditions[0]
+    for one in conditions[1:]:
+        found = Apply(Op.OR, (found, one), Bool())
+    return Test("no line before", Apply(Op.NOT, (found,), Bool()), table.variables, None)
+
+
+def _all_of(conditions: list[Expr]) -> Expr:
+    found: Expr = TRUE
+    for one in conditions:
+        found = one if found is TRUE else Apply(Op.AND, (found, one), Bool())
+    return found
+
+
+VARIANTS: Mapping[str, Callable[[Program], Program]] = {
+    "without-deferral": undeferred,
+    "first-match": first_match,
+    "without-default": defaults_reported,
+}
+"""Each by the name of its option."""

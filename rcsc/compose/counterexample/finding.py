@@ -1,0 +1,167 @@
+"""A finding: a run of one level or of several that breaks a goal, as the interpreter did it; its time line.
+
+In: traces. Out: `Finding`s; rows and lines of text, in the tables' words.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+
+from rcsc.compose.contract.obligations import Goal, Sort
+from rcsc.compose.contract.transition import Stepper
+from rcsc.compose.counterexample.trace import Step, Trace, one_cycle
+from rcsc.lang.interpret import Fault
+from rcsc.lang.model import Value, key_bounds, key_of, spell
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """A run.
+
+    Attributes:
+        level: Whose goal it is.
+        goal: Which.
+        ticks: For each tick the cycle of each level that ran in it, from the top down.
+        after: Ticks behind the one in which it is broken, which show what comes of it.
+        restarted: Whether it begins where a restart does, and not with the initial values.
+        legal: Whether the levels around keep to more than the contract (`trace.Search.legal`).
+        lap: The cycle, from 1, before which all is as it is at the end, so that it may go on for ever; 0 where it is not about that.
+    """
+
+    level: str
+    goal: Goal
+    ticks: tuple[Mapping[str, Step], ...]
+    after: int = 0
+    restarted: bool = False
+    legal: bool = True
+    lap: int = 0
+
+    @property
+    def broken_at(self) -> int:
+        """The tick in which the goal is broken, from 1."""
+        return len(self.ticks) - self.after
+
+    @property
+    def broken(self) -> Step:
+        """The cycle that breaks it."""
+        return self.ticks[self.broken_at - 1][self.level]
+
+    @property
+    def levels(self) -> tuple[str, ...]:
+        """The levels in it, in the order in which they come."""
+        return tuple(dict.fromkeys(name for tick in self.ticks for name in tick))
+
+    def start(self, level: str) -> Mapping[str, Value]:
+        """Every leaf of a level before its first cycle."""
+        return next(tick[level].before for tick in self.ticks if level in tick)
+
+
+def of_trace(stepper: Stepper, goal: Goal, trace: Trace) -> Finding:
+    """The run of one level; what is passed over shows in the next cycle, in which the level sees the same again."""
+    steps = list(trace.steps)
+    if goal.sort is Sort.ANSWERED:
+        steps.append(one_cycle(stepper, steps[-1].after, steps[-1].taken, steps[-1].answers))
+    ticks = tuple({stepper.level.name: step} for step in steps)
+    after = len(steps) - len(trace.steps)
+    return Finding(stepper.level.name, goal, ticks, after, trace.restarted, trace.legal)
+
+
+# --- for people ----------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One cycle of one level, in the tables' words.
+
+    Attributes:
+        tick: From 1.
+        line: That ran; where several matched, those, and `none` where none did.
+        takes: Inputs that are not what they were, and what they are.
+        leaves: What else the cycle changed.
+        wrong: What went wrong in it; empty for nothing.
+    """
+
+    tick: int
+    level: str
+    table: str
+    line: str
+    takes: Mapping[str, str]
+    leaves: Mapping[str, str]
+    wrong: str
+
+
+_FAULTS = {
+    Fault.NO_LINE: "no line matches",
+    Fault.SEVERAL_LINES: "several lines match",
+    Fault.ADMIT: "an input is refused",
+    Fault.EXTERN: "an extern procedure is refused",
+    Fault.ASSUMPTION: "the cycle ends there",
+}
+_WRONG = {
+    Sort.NO_DEFAULT: "DEFAULT is reached",
+    Sort.ECHOES: "the report does not echo the command that it answers",
+    Sort.NUMBERED: "`{}` changes, its number does not",
+    Sort.NEXT_NUMBER: "the number of `{}` is not the next one",
+    Sort.WAITS: "another command replaces an order of `{}` that is not echoed",
+    Sort.ONCE: "a command number is taken up again",
+    Sort.ANSWERED: "the new command is passed over: seen once more, `{}` is down",
+    Sort.DEFERRED: "`{}` is written directly while another value is pending",
+    Sort.INVARIANT: "invariant `{}` does not hold",
+    Sort.PROPERTY: "property `{}` is broken",
+    Sort.SAFE: "within it an invariant does not hold under which its operations are safe",
+    Sort.ENDS: "all is as it was before cycle {}: so it may go on for ever",
+    Sort.SAME_ORDER: "another order under the number that was taken last: it is not seen as new",
+    Sort.OF_ITS_ORDER: "what is reported under the number of the last order is not about it",
+}
+
+
+def rows(made: Mapping[str, Stepper], finding: Finding) -> tuple[Row, ...]:
+    """The time line, a row for each cycle of each level."""
+    where = finding.broken_at, finding.level
+    goal = replace(finding.goal, name=str(finding.lap)) if finding.lap else finding.goal
+    return tuple(
+        _row(made[name], tick, step, goal if (tick, name) == where else None)
+        for tick, steps in enumerate(finding.ticks, 1)
+        for name, step in steps.items()
+    )
+
+
+def _row(stepper: Stepper, tick: int, step: Step, broken: Goal | None) -> Row:
+    """One cycle; what does not change is left out."""
+    kinds = stepper.kinds
+    changed = {
+        name: spell(kinds[name], value) for name, value in step.after.items() if step.before[name] != value
+    }
+    takes = {name: said for name, said in changed.items() if name in step.taken}
+    takes |= dict(_answers(stepper, step))
+    leaves = {name: said for name, said in changed.items() if name not in step.taken}
+    wrong = [f"assumption `{name}` fails" for name in step.failed]
+    wrong += [_FAULTS[step.fault]] if step.fault in _FAULTS else []
+    wrong += [_WRONG[broken.sort].format(broken.name)] if broken is not None and broken.sort in _WRONG else []
+    line = " and ".join(step.matched) or "none"
+    return Row(tick, stepper.level.name, step.table, line, takes, leaves, "; ".join(wrong))
+
+
+def _answers(stepper: Stepper, step: Step) -> Iterator[tuple[str, str]]:
+    """What extern procedures give, call by call; a value that is refused is in no type's words."""
+    for procedure, given in step.answers:
+        writes = next(one.writes for one in stepper.program.procedures if one.name == procedure)
+        for leaf, value in zip(writes, given, strict=True):
+            low, high = key_bounds(stepper.kinds[leaf])
+            inside = value == value and low <= key_of(stepper.kinds[leaf], value) <= high  # noqa: PLR0124  # no NaN
+            yield (
+                f"{leaf} from {procedure}",
+                spell(stepper.kinds[leaf], value) if inside else f"{value}, refused",
+            )
+
+
+def time_line(made: Mapping[str, Stepper], finding: Finding) -> list[str]:
+    """The same as lines of text: of each cycle which line matched, what was taken, and what changed."""
+    lines = []
+    for row in rows(made, finding):
+        who = f"level `{row.level}`, " if len(finding.levels) > 1 else ""
+        wrong = f"; {row.wrong}" if row.wrong else ""
+        lines.append(f"cycle {row.tick}: {who}table `{row.table}`, line `{row.line}`{wrong}")
+        for word, changed in (("takes", row.takes), ("leaves", row.leaves)):
+            if changed:
+                lines.append(f"  {word} {', '.join(f'{name} = {said}' for name, said in changed.items())}")
+    return lines

@@ -1,0 +1,306 @@
+"""A finding, frozen: a case in JSON that is run again on the tables as they are then.
+
+In: a finding. Out: its text; and back: whether the same inputs break the same goal now. A case names values in the tables' words, and only
+those that change, so that it outlives changes that do not concern it.
+
+What a case expects is `kept` where it stands for a fault that is to be mended (it fails until it is), `broken` where it shows a
+hazard that is to stay visible: that of another rule than the language's, or of a published table.
+"""
+
+import json
+import math
+import os
+from collections.abc import Callable, Container, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rcsc.compose.contract.given import Answer
+from rcsc.compose.contract.obligations import Goal, Sort
+from rcsc.compose.contract.transition import Stepper
+from rcsc.compose.contract.variants import VARIANTS
+from rcsc.compose.counterexample.finding import Finding
+from rcsc.compose.counterexample.lasso import lap_of
+from rcsc.compose.counterexample.pair import broken_in, exchange
+from rcsc.compose.counterexample.trace import Step, broken, one_cycle
+from rcsc.compose.proof.system import NoProgramError, steppers
+from rcsc.host.files.names import shown
+from rcsc.host.files.read import content, json_of
+from rcsc.lang.interpret import initial
+from rcsc.lang.model import Bool, Enum, Kind, Program, Real, Scalar, Value, key_bounds, key_of, spell
+from rcsc.lang.project import project_root
+from rcsc.run.description import BadDescription
+from rcsc.symbolic import values
+
+FORMAT = 1
+
+
+class BadCaseError(Exception):
+    """A case cannot be read, or names what the tables do not have; says what."""
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """A case as it is written.
+
+    Attributes:
+        system: The description's path.
+        variants: Under which other rules (`variants.VARIANTS`).
+        level: Whose goal it is, with its sort, table, name and lines.
+        start: For each level the leaves that do not begin as they do initially.
+        ticks: For each tick, for each level that runs, the inputs that change; `answers`, what its extern procedures give.
+    """
+
+    system: Path
+    variants: tuple[str, ...]
+    level: str
+    goal: Goal
+    start: Mapping[str, Mapping[str, str]]
+    ticks: tuple[Mapping[str, Mapping[str, str]], ...]
+    expects_broken: bool
+    answers: tuple[Mapping[str, Sequence[Any]], ...] = ()
+
+
+def frozen(
+    finding: Finding, made: Mapping[str, Stepper], system: Path, case: Path, variants: tuple[str, ...] = ()
+) -> str:
+    """The text of the case that will stand at `case`."""
+    goal = finding.goal
+    exchanged = exchange(made, finding.levels)
+    document = {
+        "format": FORMAT,
+        "system": os.path.relpath(system, case.parent).replace("\\", "/"),
+        "variants": list(variants),
+        "expect": "broken" if variants else "kept",
+        "goal": {
+            "level": finding.level,
+            "what": goal.sort.name.lower(),
+            "table": goal.table,
+            "name": goal.name,
+            "lines": list(goal.lines),
+        },
+        "start": {
+            name: said for name in finding.levels if (said := _not_initial(made[name], finding.start(name)))
+        },
+        "ticks": [
+            {name: _changed(made[name], step, exchanged[name]) for name, step in steps.items()}
+            for steps in finding.ticks
+        ],
+    }
+    if any(step.answers for steps in finding.ticks for step in steps.values()):
+        document["answers"] = [
+            {
+                name: [[one, list(map(_number, given))] for one, given in step.answers]
+                for name, step in steps.items()
+            }
+            for steps in finding.ticks
+        ]
+    return json.dumps(document, indent=1) + "\n"
+
+
+def _number(value: Value) -> Value | str:
+    """A result of an extern procedure, in range or not, as JSON has it: what is no number in words."""
+    return value if isinstance(value, bool | int) or math.isfinite(value) else str(value)
+
+
+def _not_initial(stepper: Stepper, start: Mapping[str, Value]) -> dict[str, str]:
+    begun = initial(stepper.program)
+    return {name: spell(stepper.kinds[name], start[name]) for name in begun if begun[name] != start[name]}
+
+
+def _changed(stepper: Stepper, step: Step, exchanged: Container[str]) -> dict[str, str]:
+    """The inputs that change, but for those that another level of the run gives."""
+    return {
+        name: spell(stepper.kinds[name], value)
+        for name, value in step.taken.items()
+        if step.before[name] != value and name not in exchanged
+    }
+
+
+# --- back ----------------------------------------------------------------------------------
+
+
+def read_case(path: Path) -> Case:
+    """Reads a case.
+
+    Raises:
+        BadCaseError: It is none.
+    """
+    try:
+        said: dict[str, Any] = json_of(content(path))
+        if said["format"] != FORMAT:
+            raise BadCaseError(f"`{path}` has format {said['format']}, not {FORMAT}")
+        about = said["goal"]
+        level, table, name = _texts([about[key] for key in ("level", "table", "name")])
+        sort, lines = Sort[about["what"].upper()], _texts(about["lines"])
+        return Case(
+            _system(path, said["system"]),
+            _texts(said["variants"]),
+            level,
+            Goal(sort, table, name, values.TRUE, lines),
+            _leaves(said["start"]),
+            tuple(map(_leaves, said["ticks"])),
+            {"broken": True, "kept": False}[said["expect"]],
+            tuple(map(_answered, said.get("answers", ()))),
+        )
+    except OSError as error:
+        raise BadCaseError(f"`{path}` cannot be read: {error.strerror}") from error
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise BadCaseError(f"`{path}` is no frozen finding: {error}") from error
+
+
+def _texts(said: object) -> tuple[str, ...]:
+    """A list of texts; a ValueError for anything else."""
+    if not isinstance(said, list) or not all(isinstance(one, str) for one in said):
+        raise ValueError("a list holds something else than texts")
+    return tuple(said)
+
+
+def _leaves(said: object) -> dict[str, dict[str, str]]:
+    """For each level the texts of leaves; a ValueError for anything else."""
+    if not isinstance(said, dict) or not all(isinstance(one, dict) for one in said.values()):
+        raise ValueError("a tick is no table of levels")
+    return {
+        level: dict(zip(leaves, _texts(list(leaves.values())), strict=True)) for level, leaves in said.items()
+    }
+
+
+def _answered(said: object) -> dict[str, list[tuple[str, list[Any]]]]:
+    """For each level the extern procedures that are called in a tick, with what they give; a TypeError for anything else."""
+    if not isinstance(said, dict):
+        raise TypeError("the answers of a tick are no table of levels")
+    found: dict[str, list[tuple[str, list[Any]]]] = {}
+    for level, several in said.items():
+        for procedure, given in several:
+            if not isinstance(procedure, str) or not isinstance(given, list):
+                raise TypeError("an answer is no procedure and what it gives")
+            found.setdefault(level, []).append((procedure, given))
+    return found
+
+
+def _system(case: Path, named: object) -> Path:
+    """The description that a case is about: in the project of the case, or in the folder where rcsc runs.
+
+    Raises:
+        ValueError: It leads elsewhere.
+    """
+    if not isinstance(named, str) or os.path.isabs(named) or not named.isprintable():
+        raise ValueError(f"{shown(named)} is no relative path")
+    found = (case.parent / named).resolve()
+    trusted = (Path.cwd(), Path(project_root(str(case))).resolve())
+    if not any(found.is_relative_to(folder) for folder in trusted):
+        raise ValueError(f"the system {shown(named)} is outside this project")
+    return case.parent / named
+
+
+def case_breaks(case: Case) -> bool:
+    """Whether the goal is broken in some tick; a fault ends the run.
+
+    Raises:
+        BadCaseError: The case names what the tables do not have.
+    """
+    made = _made(case)
+    now = {name: _begun(stepper, case.start.get(name, {})) for name, stepper in made.items()}
+    exchanged = exchange(made, tuple(made))
+    given = {name: {leaf: now[name][leaf] for leaf in leaves} for name, leaves in exchanged.items()}
+    so_far: list[Step] = []
+    answers = (*case.answers, *({} for _ in case.ticks[len(case.answers) :]))
+    for tick, answered in zip(case.ticks, answers, strict=False):
+        steps = {}
+        for name, said in tick.items():
+            taken = _taken(made[name], now[name], said) | given[name]
+            results = tuple(_answer(made[name], one) for one in answered.get(name, ()))
+            steps[name] = one_cycle(made[name], now[name], taken, results)
+        now |= {name: dict(step.after) for name, step in steps.items()}
+        for name, leaves in exchanged.items():
+            given[name] |= {leaf: now[of][source] for leaf, (of, source) in leaves.items() if of in steps}
+        if case.level in steps:
+            so_far.append(steps[case.level])
+            if _is_broken(made, case, so_far):
+                return True
+        if any(step.ends_the_run for step in steps.values()):
+            return False
+    return False
+
+
+def _answer(stepper: Stepper, said: Any) -> Answer:
+    """One call's results, as the case has them."""
+    try:
+        name, results = said
+        procedure = next(one for one in stepper.program.procedures if one.name == name and one.extern)
+        given = tuple(float(one) if isinstance(one, str) else one for one in results)
+        if len(given) == len(procedure.writes) and all(isinstance(one, bool | int | float) for one in given):
+            return str(name), given
+    except (TypeError, ValueError, StopIteration):
+        pass
+    raise BadCaseError(f"level `{stepper.level.name}` has no extern procedure that gives `{said}`")
+
+
+def _made(case: Case) -> dict[str, Stepper]:
+    try:
+        made = steppers(case.system)
+        change: list[Callable[[Program], Program]] = [VARIANTS[name] for name in case.variants]
+    except (BadDescription, NoProgramError) as error:
+        raise BadCaseError(str(error)) from error
+    except KeyError as error:
+        raise BadCaseError(f"there is no rule {error}") from error
+    names = {case.level, *case.start, *(name for tick in case.ticks for name in tick)}
+    if unknown := sorted(names - made.keys()):
+        raise BadCaseError(f"there is no level `{unknown[0]}`")
+    made = {name: stepper for name, stepper in made.items() if name in names}
+    for one in change:
+        made = {name: stepper.of(one(stepper.program)) for name, stepper in made.items()}
+    return made
+
+
+def _begun(stepper: Stepper, said: Mapping[str, str]) -> dict[str, Value]:
+    return {**initial(stepper.program), **_values(stepper, said)}
+
+
+def _taken(stepper: Stepper, now: Mapping[str, Value], said: Mapping[str, str]) -> dict[str, Value]:
+    inputs = {str(v.name) for v in stepper.program.variables if v.kind is Kind.INPUT}
+    if wrong := sorted(said.keys() - inputs):
+        raise BadCaseError(f"level `{stepper.level.name}` has no input `{wrong[0]}`")
+    return {name: now[name] for name in inputs} | _values(stepper, said)
+
+
+def _values(stepper: Stepper, said: Mapping[str, str]) -> dict[str, Value]:
+    found = {}
+    for name, text in said.items():
+        if name not in stepper.kinds:
+            raise BadCaseError(f"level `{stepper.level.name}` has no variable `{name}`")
+        found[name] = _value(name, stepper.kinds[name], text)
+    return found
+
+
+def _value(name: str, kind: Scalar, text: str) -> Value:
+    """The value that `spell` would write so."""
+    try:
+        value: Value
+        if isinstance(kind, Bool):
+            value = {"false": False, "true": True}[text]
+        elif isinstance(kind, Enum):
+            value = kind.members.index(text)
+        else:
+            value = float(text) if isinstance(kind, Real) else int(text)
+        low, high = key_bounds(kind)
+        if low <= key_of(kind, value) <= high:
+            return value
+    except (KeyError, ValueError):
+        pass
+    raise BadCaseError(f"`{name}` cannot be `{text}`")
+
+
+def _is_broken(made: Mapping[str, Stepper], case: Case, steps: list[Step]) -> bool:
+    """Whether the last of the level's cycles breaks the goal."""
+    stepper, step = made[case.level], steps[-1]
+    if case.goal.sort is Sort.ENDS:
+        return lap_of(stepper, case.goal.table, steps) is not None
+    if case.goal.sort in {Sort.SAME_ORDER, Sort.OF_ITS_ORDER}:
+        return broken_in(stepper, case.goal, step)
+    if case.goal.sort is Sort.SAFE and not stepper.safety.within:
+        return False  # it is so whatever a cycle does
+    try:
+        return broken(stepper, case.goal, step)
+    except StopIteration as error:
+        raise BadCaseError(f"level `{case.level}` has no goal `{case.goal.shown}`") from error

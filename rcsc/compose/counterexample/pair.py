@@ -1,0 +1,252 @@
+"""A level and the one below it, each as it is, and the buffers between them: what becomes of an order.
+
+In: two steppers and the link between them. Out: the shortest run in which what one assumes of the other is broken. It is looked for where
+a level is not proved to number its orders, or not to answer them: a level in its environment shows that, and only both show what is lost.
+
+In each tick one of the levels runs, or both. Each sees what the other left in the buffer before this tick, so that whoever does not run
+for a while sees late, skips, and sees again. Of everything else what a level's contract says holds.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+from rcsc.compose.contract.environment import COMMAND, NUMBER, Below, leaves_under
+from rcsc.compose.contract.obligations import Goal, Sort
+from rcsc.compose.contract.transition import Cycle, Leaves, Stepper, successor
+from rcsc.compose.counterexample.finding import Finding
+from rcsc.compose.counterexample.simplest import Bounded, Simplest
+from rcsc.compose.counterexample.trace import NotReproducedError, Search, Step, one_cycle
+from rcsc.lang.interpret import initial
+from rcsc.lang.model import Bool, Kind, Value
+from rcsc.solvers.sat import GaveUpError
+from rcsc.symbolic import values
+from rcsc.symbolic.values import Node
+
+
+@dataclass(slots=True)
+class _Side:
+    """One of the two levels.
+
+    Attributes:
+        takes: Each leaf that comes from the other level, and how that one calls it.
+        now: Its leaves behind the last tick.
+        taken: For each tick the inputs that it takes if it runs.
+        runs: For each tick whether it does; `cycles`, what it does then.
+    """
+
+    name: str
+    stepper: Stepper
+    takes: Mapping[str, str]
+    now: Leaves = field(init=False)
+    taken: list[Leaves] = field(default_factory=list)
+    runs: list[Node] = field(default_factory=list)
+    cycles: list[Cycle] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.now = self.stepper.first()
+
+    @property
+    def inputs(self) -> list[str]:
+        """Inputs that do not come from the other level."""
+        program = self.stepper.program
+        return [str(v.name) for v in program.variables if v.kind is Kind.INPUT and v.name not in self.takes]
+
+
+def broken_together(
+    upper: Stepper, lower: Stepper, below: Below, search: Search
+) -> Finding | NotReproducedError | None:
+    """The shortest run of both in which one breaks what the other assumes; None where there is none, or the solver gave up.
+
+    Looked for is that the lower level takes another order under the number that it took last, and that the upper one is told of its last
+    order what is not so, in at most `search.most` ticks.
+    """
+    pair = _Pair(upper, lower, below)
+    try:
+        for tick in range(1, search.most + 1):
+            for goal in pair.further(tick):
+                if (found := pair.found(goal)) is not None:
+                    return found
+    except GaveUpError:
+        pass
+    return None
+
+
+@dataclass(slots=True)
+class _Pair:
+    """Both levels, tick by tick."""
+
+    upper: Stepper
+    lower: Stepper
+    below: Below
+    sides: tuple[_Side, _Side] = field(init=False)
+    buffers: Leaves = field(init=False)
+    _run: Bounded = field(default_factory=Bounded)
+
+    def __post_init__(self) -> None:
+        above = self.lower.links.above
+        assert above is not None
+        reports = _renamed(self.upper, self.below.report, above.report)
+        orders = _renamed(self.lower, above.order, self.below.order)
+        others = tuple(one for one in self.upper.links.below if one != self.below)
+        self.sides = (
+            _Side(self.upper.level.name, _with(self.upper, below=others), reports),
+            _Side(self.lower.level.name, _with(self.lower, above=None), orders),
+        )
+        self.buffers = {
+            leaf: side.now[leaf] for side in self.sides for leaf in side.takes
+        }  # nothing is published yet: each keeps what it begins with
+
+    def further(self, tick: int) -> tuple[Goal, Goal]:
+        """One tick more; what is to hold in it."""
+        before = [side.now for side in self.sides]
+        for side in self.sides:
+            side.runs.append(values.variable(f"{side.name} runs {tick}", Bool()))
+        self._run.add(values.any_of(side.runs[-1] for side in self.sides))
+        seen = dict(self.buffers)
+        for side in self.sides:
+            self._cycle(side, seen, tick)
+        return self._goals(before)
+
+    def _cycle(self, side: _Side, seen: Leaves, tick: int) -> None:
+        """One cycle of a level, if it runs."""
+        kinds = side.stepper.kinds
+        taken = {leaf: values.variable(f"{side.name} {leaf} {tick}", kinds[leaf]) for leaf in side.inputs}
+        taken |= {leaf: seen[leaf] for leaf in side.takes}
+        one = side.stepper.cycle(side.now, f" of {side.name} {tick}", taken=taken)
+        runs = side.runs[-1]
+        kept = values.all_of((one.goes_on, one.contract, *_in_order(side.stepper, side.now, taken)))
+        self._run.add(values.follows(runs, kept))
+        side.taken.append(taken)
+        side.cycles.append(one)
+        for other in self.sides:
+            for leaf, source in other.takes.items():
+                if other is not side:
+                    self.buffers[leaf] = values.choice(runs, one.after[source], self.buffers[leaf])
+        side.now = {name: values.choice(runs, one.after[name], node) for name, node in side.now.items()}
+
+    def _goals(self, before: list[Leaves]) -> tuple[Goal, Goal]:
+        upper, lower = self.sides
+        above = self.lower.links.above
+        assert above is not None
+        number, taken = f"{above.order}.{NUMBER}", lower.taken[-1]
+        fields = dict.fromkeys((f"{above.order}.{COMMAND}", *above.numbered))
+        same = values.all_of(values.equal(before[1][leaf], taken[leaf]) for leaf in fields)
+        one = values.follows(
+            values.both(lower.runs[-1], values.equal(before[1][number], taken[number])), same
+        )
+        two = values.follows(upper.runs[-1], Stepper.echo(self.below, before[0], upper.taken[-1]))
+        return (
+            Goal(Sort.SAME_ORDER, "", above.order, one),
+            Goal(Sort.OF_ITS_ORDER, "", self.below.report, two),
+        )
+
+    # --- the run ---
+
+    def found(self, goal: Goal) -> Finding | NotReproducedError | None:
+        """The simplest run that breaks it in the last tick, as the interpreter runs it; None where there is none.
+
+        Raises:
+            GaveUpError: The solver did not decide.
+        """
+        wrong = self._run.literal(values.negation(goal.holds))
+        if not self._run.holds([wrong]):
+            return None
+        ticks = tuple(self._ran(Simplest(self._run, [wrong])))
+        stepper = self.upper if goal.sort is Sort.OF_ITS_ORDER else self.lower
+        level = stepper.level.name
+        if level not in ticks[-1] or not broken_in(stepper, goal, ticks[-1][level]):
+            return NotReproducedError(goal.shown, guessed=self._run.guessed)
+        return Finding(level, replace(goal, holds=values.FALSE), ticks)
+
+    def _ran(self, settled: Simplest) -> Iterator[dict[str, Step]]:
+        now = {side.name: dict(initial(side.stepper.program)) for side in self.sides}
+        held = {leaf: now[side.name][leaf] for side in self.sides for leaf in side.takes}
+        runs = [
+            settled.settle([side.runs[at] for side in self.sides], [True, True])
+            for at in range(len(self.sides[0].runs))
+        ]
+        for at, which in enumerate(runs):
+            seen, steps = dict(held), dict[str, Step]()
+            for side, running in zip(self.sides, which, strict=True):
+                free = settled.settle(
+                    [side.taken[at][leaf] for leaf in side.inputs],
+                    [now[side.name][leaf] for leaf in side.inputs],
+                )
+                if running:
+                    taken = dict(zip(side.inputs, free, strict=True)) | {
+                        leaf: seen[leaf] for leaf in side.takes
+                    }
+                    answers = settled.answers(side.stepper.program, side.cycles[at])
+                    steps[side.name] = one_cycle(side.stepper, now[side.name], taken, answers)
+                    now[side.name] = dict(steps[side.name].after)
+                    self._publish(side, now[side.name], held)
+            yield steps
+            if any(step.ends_the_run for step in steps.values()):
+                return
+
+    def _publish(self, side: _Side, after: Mapping[str, Value], held: dict[str, Value]) -> None:
+        for other in self.sides:
+            if other is not side:
+                held |= {leaf: after[source] for leaf, source in other.takes.items()}
+
+
+def exchange(made: Mapping[str, Stepper], levels: Sequence[str]) -> dict[str, dict[str, tuple[str, str]]]:
+    """For each of these levels its inputs that another of them gives: which one, and how it calls them."""
+    found: dict[str, dict[str, tuple[str, str]]] = {name: {} for name in levels}
+    for name in levels:
+        for below in made[name].links.below:
+            if below.name in found and (above := made[below.name].links.above) is not None:
+                reports = _renamed(made[name], below.report, above.report)
+                orders = _renamed(made[below.name], above.order, below.order)
+                found[name] |= {leaf: (below.name, source) for leaf, source in reports.items()}
+                found[below.name] |= {leaf: (name, source) for leaf, source in orders.items()}
+    return found
+
+
+def broken_in(stepper: Stepper, goal: Goal, step: Step) -> bool:
+    """Whether the cycle, as it ran, breaks what a level assumes of its neighbour: `SAME_ORDER` or `OF_ITS_ORDER`.
+
+    Raises:
+        StopIteration: The level has no such neighbour.
+    """
+    if goal.sort is Sort.SAME_ORDER:
+        return _taken_again(stepper, step)
+    kinds = stepper.kinds
+    below = next(one for one in stepper.links.below if one.report == goal.name)
+    before, taken = (
+        {name: values.constant(kinds[name], value) for name, value in of.items()}
+        for of in (step.before, step.taken)
+    )
+    holds = Stepper.echo(below, before, taken)
+    return holds.known and not holds.low
+
+
+def _taken_again(lower: Stepper, step: Step) -> bool:
+    """Whether another order is taken under the number that was taken last."""
+    above = lower.links.above
+    assert above is not None
+    fields = (f"{above.order}.{COMMAND}", *above.numbered)
+    number = f"{above.order}.{NUMBER}"
+    return step.before[number] == step.taken[number] and any(
+        step.before[leaf] != step.taken[leaf] for leaf in fields
+    )
+
+
+def _renamed(stepper: Stepper, record: str, other: str) -> dict[str, str]:
+    """The leaves of a record, and how the other end of the buffer calls them."""
+    return {leaf: other + leaf.removeprefix(record) for leaf in leaves_under(stepper.program, record)}
+
+
+def _with(stepper: Stepper, **links: object) -> Stepper:
+    """The level with a part of its environment left out, which is not assumed but there."""
+    return Stepper(stepper.program, stepper.level, replace(stepper.links, **links))  # type: ignore[arg-type]  # fields of Links
+
+
+def _in_order(stepper: Stepper, before: Leaves, taken: Leaves) -> Iterator[Node]:
+    """Its superior's numbers come one after the other."""
+    if (above := stepper.links.above) is not None:
+        number = f"{above.order}.{NUMBER}"
+        yield values.either(
+            values.equal(taken[number], before[number]),
+            values.equal(taken[number], successor(before[number])),
+        )

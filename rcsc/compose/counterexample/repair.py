@@ -1,0 +1,95 @@
+"""What would mend a table where a run breaks it: a cell, a line, or the weakest condition under which exactly one line matches.
+
+In: a stepper and a finding. Out: sentences in table words, each proved of the table as it stands; none where nothing small is known.
+"""
+
+from collections.abc import Iterator, Mapping
+
+from rcsc.compose.contract.obligations import Sort
+from rcsc.compose.contract.transition import Stepper
+from rcsc.compose.counterexample.finding import Finding
+from rcsc.compose.counterexample.trace import Step, seen_by_table
+from rcsc.lang.interpret import matching_lines
+from rcsc.lang.model import Box, Program, Scalar, Snapshot, Table, key_of
+from rcsc.table import boxes, spell
+from rcsc.table.repair import closing_line, parting_cell
+from rcsc.table.verdict import Gap, Overlap, Region
+
+MOST_REGIONS = 3
+"""Regions that a condition may exclude and still be small."""
+
+
+def helps(stepper: Stepper, finding: Finding) -> tuple[str, ...]:
+    """What to change in the table that the last cycle ran."""
+    step = finding.broken
+    if finding.goal.sort not in {
+        Sort.ASSUMPTION, Sort.SOME_LINE, Sort.ONE_LINE, Sort.NO_DEFAULT,
+    }:  # fmt: skip
+        return ()
+    table = next(one for one in stepper.program.tables if one.name == step.table)
+    if not boxes.applies(table):
+        return ()
+    return tuple(dict.fromkeys(_said(stepper, table, step)))
+
+
+def _said(stepper: Stepper, table: Table, step: Step) -> Iterator[str]:
+    seen = seen_by_table(stepper, step)
+    if seen is None:
+        return
+    matching = [at for at, line in enumerate(table.lines) if line.name in matching_lines(table, seen)]
+    if len(matching) > 1:
+        cell = parting_cell(stepper.program, table, Overlap(matching[0], matching[1], {}))
+        yield cell or f"lines {_names(table, matching)} both match {_while(stepper.program, table, matching)}"
+    elif not matching:
+        region = around(stepper.program, table, seen)
+        yield f"no line matches while {_conditions(stepper.program, region)}"
+        if row := closing_line(stepper.program, table, Gap((seen,), (region,))):
+            yield row
+    else:
+        yield f"line `{table.lines[matching[0]].name}` matches all the same, and no other"
+    if (weakest := weakest_condition(stepper.program, table)) and step.failed:
+        yield f"exactly one line matches under no more than this: {weakest}: proved"
+
+
+def around(program: Program, table: Table, seen: Snapshot) -> Region:
+    """A maximal region around an input that no line matches in which none does."""
+    decided = boxes.Boxes.of(program, table)
+    kinds = {str(v.name): v.type for v in program.variables}
+    cell = {name: (key_of(kinds[name], seen[name]),) * 2 for name in decided.names}
+    found = boxes.Search.of(decided, disjoint=True).grown(cell, ())
+    return decided.narrowed(found)
+
+
+def weakest_condition(program: Program, table: Table) -> str:
+    """The condition that holds of exactly the inputs that exactly one line matches; empty where it is not small."""
+    decided = boxes.Boxes.of(program, table)
+    regions: list[Region] = []
+    for first, second in decided.overlaps():
+        regions.append(decided.both(first, second).region or {})
+        if len(regions) > MOST_REGIONS:
+            return ""
+    search = boxes.Search.of(decided, disjoint=not regions)
+    gaps: list[Mapping[str, Box]] = []
+    try:
+        while (cell := search.least(gaps)) is not None:
+            gaps.append(search.grown(cell, gaps))
+            if len(regions) + len(gaps) > MOST_REGIONS:
+                return ""
+    except boxes.BudgetError:
+        return ""
+    every = [*regions, *(decided.narrowed(gap) for gap in gaps)]
+    return " and ".join(f"not ({_conditions(program, region)})" for region in every)
+
+
+def _conditions(program: Program, region: Region) -> str:
+    kinds: dict[str, Scalar] = {str(v.name): v.type for v in program.variables}
+    return " and ".join(spell.region(kinds, region)) or "true"
+
+
+def _while(program: Program, table: Table, matching: list[int]) -> str:
+    region = boxes.Boxes.of(program, table).both(matching[0], matching[1]).region
+    return f"while {_conditions(program, region or {})}"
+
+
+def _names(table: Table, matching: list[int]) -> str:
+    return " and ".join(f"`{table.lines[at].name}`" for at in matching)

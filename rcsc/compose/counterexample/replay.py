@@ -1,0 +1,274 @@
+"""A finding is a log: its run, done again by the generated executors, and kept so that it can be stepped.
+
+In: steppers, a system's description, and a run as the interpreter did it. Out: executors of the levels in it, a log that
+`rcsc replay` steps, and the proof of the pudding: the Python and the C executors leave in every cycle what the interpreter left.
+
+Where a program does not prove, or is looked at under another rule than the language's (`variants`), its executors are made by force:
+the same emitters, and every file marked (`host.files.write.UNPROVED`), which no cell runs (`run.unproved`).
+"""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from rcsc.compose.contract.environment import leaves_under
+from rcsc.compose.contract.transition import Stepper
+from rcsc.compose.counterexample.finding import Finding, rows
+from rcsc.compose.counterexample.trace import Step
+from rcsc.emit import emit_c, emit_python
+from rcsc.emit.ctext import c_type, wide_type
+from rcsc.emit.lower import lower, lower_by_force
+from rcsc.lang.interpret import Fault
+from rcsc.lang.model import Kind as VariableKind
+from rcsc.lang.model import Program, spell
+from rcsc.lang.project import project_root
+from rcsc.run import answers
+from rcsc.run.buffers import CommonMemory
+from rcsc.run.description import Description, LevelSpec, Wire
+from rcsc.run.levels import RunningLevel, running_level
+from rcsc.run.log.finding import LoggedCycle, LoggedFinding
+from rcsc.run.log.write import Recorder
+from rcsc.run.signature import Values
+from rcsc.run.system import Kind, System, executors, signatures
+from rcsc.solvers.options import Options
+from rcsc.table.program import prove_program
+
+KINDS: tuple[Kind, ...] = ("python", "c")
+
+
+class ExecutorsDifferError(Exception):
+    """An executor does not do what the interpreter did: a bug in rcsc.
+
+    Attributes:
+        beside: What each left, where they differ, a line each.
+    """
+
+    def __init__(self, beside: tuple[str, ...]) -> None:
+        super().__init__(beside[0])
+        self.beside = beside
+
+
+# --- executors -----------------------------------------------------------------------------
+
+
+def make(programs: Iterable[Program], folder: Path, *, altered: bool) -> tuple[str, ...]:
+    """Writes the executors of these programs into a folder; the programs whose are made by force.
+
+    Args:
+        programs: To be made.
+        folder: Where to: `python/` and `c/` below it.
+        altered: The programs are not what their tables say, so that theirs are made by force too.
+
+    Raises:
+        OSError: The folder cannot be written.
+    """
+    forced = []
+    for program in map(told_what_externs_give, programs):
+        root = project_root(program.file)
+        proved = None if altered else prove_program(program, Options()).proved
+        plan = lower_by_force(program, root) if proved is None else lower(proved, root)
+        if proved is None:
+            forced.append(program.name)
+        for name, text in (emit_python(plan) | emit_c(plan)).items():
+            path = folder / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            said = text + "".join(_stand_ins(program)) if path.suffix == ".c" else text
+            path.write_bytes(said.encode())
+    return tuple(forced)
+
+
+def told_what_externs_give(program: Program) -> Program:
+    """The program, its extern procedures in Python those of `run.answers`: the user's functions are called by no finding."""
+    return replace(
+        program,
+        procedures=tuple(
+            one
+            if one.extern is None
+            else replace(one, extern=replace(one.extern, python=f"{answers.MODULE}:{answers.OF}{one.name}"))
+            for one in program.procedures
+        ),
+    )
+
+
+def _stand_ins(program: Program) -> Iterator[str]:
+    """The same in C, behind the program's own text."""
+    externs = [one for one in program.procedures if one.extern is not None]
+    if externs:
+        yield answers.HEAD
+    kinds = {str(v.name): c_type(v.type) for v in program.variables}
+    for one in externs:
+        assert one.extern is not None
+        given = [kinds[name] for name in one.reads] + [wide_type(each.type) for each in one.params]
+        yield answers.stand_in(
+            one.extern.c,
+            [(kind, f"a{at}") for at, kind in enumerate(given)],
+            [(kinds[name], f"r{at}") for at, name in enumerate(one.writes)],
+        )
+
+
+def only_in_python(finding: Finding, made: Mapping[str, Stepper]) -> bool:
+    """Whether an extern procedure gives what no C function can: a refused value of a type that C's own does not exceed."""
+    for steps in finding.ticks:
+        for name, step in steps.items():
+            program = made[name].program
+            for procedure, given in step.answers:
+                writes = next(one.writes for one in program.procedures if one.name == procedure)
+                kinds = [c_type(program.variable(leaf).type) for leaf in writes]
+                if not all(map(answers.fits, kinds, given)):
+                    return True
+    return False
+
+
+# --- the run, again ------------------------------------------------------------------------
+
+
+def record(
+    finding: Finding, made: Mapping[str, Stepper], system: Description, path: Path, *, altered: bool = False
+) -> None:
+    """Runs a finding on the executors in `system.generated`, both kinds, and writes what they do as a log.
+
+    Args:
+        finding: The run.
+        made: The levels in it.
+        system: Their system.
+        path: Where the log goes.
+        altered: The programs are not what their tables say; the log says so.
+
+    Raises:
+        ExecutorsDifferError: They do something else than the interpreter did.
+        NotBuilt: The C could not be built.
+        OSError: The log cannot be written.
+    """
+    programs = {name: made[name].program for name in finding.levels}
+    alone = part_of(system, programs)
+    for kind in () if only_in_python(finding, made) else KINDS[1:]:
+        for _ in _cycles(finding, made, _begun(finding, alone, kind), kind):
+            pass
+    running = _begun(finding, alone, KINDS[0])
+    with Recorder(running, path, _logged(finding, made, altered)) as recorder:
+        for ran in _cycles(finding, made, running, KINDS[0]):
+            recorder(running, ran)
+
+
+def _logged(finding: Finding, made: Mapping[str, Stepper], altered: bool) -> LoggedFinding:
+    """What the log says of it besides the states."""
+    cycles = {
+        (row.tick, row.level): LoggedCycle(
+            finding.ticks[row.tick - 1][row.level].matched,
+            row.wrong,
+            finding.ticks[row.tick - 1][row.level].answers,
+        )
+        for row in rows(made, finding)
+    }
+    return LoggedFinding(
+        finding.level,
+        finding.goal.table,
+        finding.goal.shown,
+        finding.broken_at,
+        finding.restarted,
+        finding.legal,
+        altered,
+        cycles,
+    )
+
+
+def part_of(system: Description, programs: Mapping[str, Program]) -> Description:
+    """The description of these levels alone: whatever is an input of theirs comes through a buffer.
+
+    What the database fills, and what nothing is known of, comes from `database` and `environment`.
+    """
+    wires = [wire for wire in system.wires if _owner(wire.target) in programs]
+    wires += [wire for wire in system.wires if _owner(wire.source) in programs and wire not in wires]
+    levels = tuple(LevelSpec(spec.name, spec.program, ()) for spec in system.levels if spec.name in programs)
+    for spec in system.levels:
+        if spec.name in programs:
+            fed = {feed.into for feed in spec.feeds}
+            wired = {wire.target for wire in wires}
+            for record in _inputs(programs[spec.name]):
+                target = f"{spec.name}.{record}"
+                if target not in wired:
+                    wires.append(Wire(f"{'database' if record in fed else 'environment'}.{target}", target))
+    return replace(system, levels=levels, wires=tuple(wires), displays={})
+
+
+def _owner(end: str) -> str:
+    return end.partition(".")[0]
+
+
+def _inputs(program: Program) -> tuple[str, ...]:
+    """The input variables, records and arrays whole, in declared order."""
+    names = (str(v.name) for v in program.variables if v.kind is VariableKind.INPUT)
+    return tuple(dict.fromkeys(name.partition(".")[0].partition("[")[0] for name in names))
+
+
+def _begun(finding: Finding, system: Description, kind: Kind) -> System:
+    """The levels where the run begins; not `assemble`, which a cell uses and which refuses what is made by force."""
+    signs = signatures(system)
+    made = executors(system, signs, kind)
+    levels = tuple(
+        running_level(spec, system, signs[spec.name], made[spec.name], {}) for spec in system.levels
+    )
+    for level in levels:
+        start = finding.start(level.name)
+        level.put_back(
+            (*(start[leaf.name] for leaf in level.sign.leaves), *level.values[len(level.sign.leaves) :])
+        )
+    return System(system, levels, (), CommonMemory())
+
+
+def _cycles(
+    finding: Finding, made: Mapping[str, Stepper], running: System, kind: Kind
+) -> Iterator[tuple[RunningLevel, ...]]:
+    """Runs tick by tick; the levels that ran in each.
+
+    Raises:
+        ExecutorsDifferError: A level leaves something else than the interpreter left.
+    """
+    for tick, steps in enumerate(finding.ticks, 1):
+        ran = tuple(level for level in running.levels if level.name in steps)
+        for level in ran:
+            _take(running, level, made[level.name], steps[level.name])
+            answers.told(level.executor, steps[level.name].answers)
+            level.run()
+            beside = tuple(_beside(level, steps[level.name], made[level.name], kind, tick))
+            if beside:
+                raise ExecutorsDifferError(beside)
+        running.tick = tick
+        yield ran
+
+
+def _take(running: System, level: RunningLevel, stepper: Stepper, step: Step) -> None:
+    """Publishes what the environment gave in this cycle, and takes it."""
+    for wire in running.description.wires:
+        owner, _, variable = wire.target.partition(".")
+        if owner == level.name:
+            leaves = leaves_under(stepper.program, variable)
+            running.buffers.publish(wire.source, tuple(step.taken[leaf] for leaf in leaves))
+    level.take(running.buffers)
+
+
+def _beside(level: RunningLevel, step: Step, stepper: Stepper, kind: Kind, tick: int) -> Iterator[str]:
+    """Where the executor left something else."""
+    who = "Python" if kind == "python" else "C"
+    there = f"tick {tick}, level `{level.name}`"
+    count = len(level.sign.leaves)
+    for leaf, value in zip(level.sign.leaves, level.values[:count], strict=True):
+        if step.after[leaf.name] != value:
+            then = spell(stepper.kinds[leaf.name], step.after[leaf.name])
+            yield f"{there}: `{leaf.name}` = {then} by the interpreter, {leaf.shown(value)} by the {who} executor"
+    said, did = _traced(step, level.sign.monitored), _did(level, level.values)
+    if said != did:
+        yield f"{there}: {said} by the interpreter, {did} by the {who} executor"
+
+
+def _traced(step: Step, monitored: Sequence[str]) -> str:
+    failed = [name for name in monitored if name in step.failed]
+    return _said(step.line, step.fault, failed)
+
+
+def _did(level: RunningLevel, values: Values) -> str:
+    return _said(level.line, Fault(level.fault), level.sign.failures(values))
+
+
+def _said(line: str, fault: Fault, failed: Sequence[str]) -> str:
+    return f"line `{line}`, fault {fault.name.lower()}, failed: {' '.join(failed) or 'none'}"

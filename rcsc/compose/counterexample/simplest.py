@@ -1,0 +1,163 @@
+"""Whether a bounded run can be so, and the simplest of the runs that can, always the same one.
+
+In: conditions as nodes. Out: whether they can hold together; values, which the nodes have from then on. A model is whatever the
+solver likes, and another one after an upgrade; what is settled here depends on the question alone.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from rcsc.compose.contract.given import Answer, least, refused
+from rcsc.compose.contract.transition import Cycle
+from rcsc.lang.model import Bool, Op, Program, Scalar, Value, key_bounds, key_of, value_of_key
+from rcsc.solvers.sat import Sat
+from rcsc.symbolic import values
+from rcsc.symbolic.bits import Bits, Literal, key_of_bits
+from rcsc.symbolic.evaluation import ExternResults
+from rcsc.symbolic.keyed import Keyed
+from rcsc.symbolic.values import Node
+
+
+class _Bits(Bits):
+    """Knows which nodes it has met."""
+
+    __slots__ = ()
+
+    def met(self, node: Node) -> bool:
+        """Whether there is a word of the node."""
+        return node in self._words
+
+
+@dataclass(slots=True)
+class Bounded:
+    """What holds of a run of so many cycles, as clauses; nothing of it is ever taken back."""
+
+    _bits: _Bits = field(default_factory=_Bits)
+    _sat: Sat = field(default_factory=lambda: Sat([]))
+    _asked: list[Node] = field(default_factory=list)
+
+    def add(self, node: Node) -> None:
+        """States that it holds."""
+        self._sat.add([self.literal(node)])
+
+    def literal(self, node: Node) -> Literal:
+        """Of a truth value."""
+        found = self._bits.literal(node)
+        self._asked.append(node)
+        self._hand_on()
+        return found
+
+    def has(self, node: Node, value: Value) -> Literal:
+        """The literal of: the node has this value."""
+        found = self._bits.equals(self._bits.word(node), node.kind, key_of(node.kind, value))
+        self._hand_on()
+        return found
+
+    def _hand_on(self) -> None:
+        for clause in self._bits.clauses:
+            self._sat.add(clause)
+        self._bits.clauses.clear()
+
+    def holds(self, assuming: Sequence[Literal]) -> bool:
+        """Whether all that is stated, and these literals, can hold together.
+
+        Raises:
+            GaveUpError: The solver did not decide.
+        """
+        return self._sat.holds(assuming)
+
+    def met(self, node: Node) -> bool:
+        """Whether anything stated or asked has the node in it."""
+        return self._bits.met(node)
+
+    def key(self, node: Node) -> int:
+        """The key of the node's value in the last run that could be."""
+        bits = [self._sat.value(literal) for literal in self._bits.word(node)]
+        return int(bits[0]) if isinstance(node.kind, Bool) else key_of_bits(bits)
+
+    @property
+    def guessed(self) -> bool:
+        """Whether an operation in what was stated or asked is left open: the same that `keyed` leaves open."""
+        keyed = Keyed()
+        for node in self._asked:
+            keyed.term(node)
+        return keyed.guessed > 0
+
+
+@dataclass(slots=True)
+class Simplest:
+    """Settles nodes one after the other, each so that a run with all that was settled before can still be.
+
+    Attributes:
+        given: What holds of the run beside what is stated; what is settled comes to it.
+    """
+
+    run: Bounded
+    given: list[Literal]
+
+    def settle(self, nodes: Sequence[Node], wanted: Sequence[Value]) -> list[Value]:
+        """The values of the nodes: as many as may be as wanted, and the least that is left for each of the others."""
+        every = zip(nodes, wanted, strict=True)
+        met = [(node, value) for node, value in every if self.run.met(node) and not node.known]
+        kept = self._keep(met)
+        free = {node for node, _ in met} - kept
+        return [
+            self._least(node) if node in free else value for node, value in zip(nodes, wanted, strict=True)
+        ]
+
+    def answers(self, program: Program, cycle: Cycle) -> tuple[Answer, ...]:
+        """What the extern procedures that the cycle calls give: least values, and refused ones only where it has to be."""
+        for call in cycle.calls:
+            self.run.literal(call.path)
+        return tuple(self._answer(program, call) for call in cycle.calls if self._made(call.path))
+
+    def _made(self, path: Node) -> bool:
+        return bool(path.low) if path.known else bool(self.settle([path], [False])[0])
+
+    def _answer(self, program: Program, call: ExternResults) -> Answer:
+        writes = next(one.writes for one in program.procedures if one.name == call.procedure)
+        given = self.settle(call.results, [least(node.kind) for node in call.results])
+        wrong = self.settle(call.refusals, [False] * len(call.refusals))
+        results = [
+            refused(program.variable(name)) if broken else value
+            for name, value, broken in zip(writes, given, wrong, strict=True)
+        ]
+        return call.procedure, tuple(results)
+
+    def _keep(self, wanted: Sequence[tuple[Node, Value]]) -> set[Node]:
+        """Halves what cannot be had together; the nodes that have their value now."""
+        if not wanted:
+            return set()
+        together = [self.run.has(node, value) for node, value in wanted]
+        if self.run.holds([*self.given, *together]):
+            self.given += together
+            return {node for node, _ in wanted}
+        middle = len(wanted) // 2
+        return self._keep(wanted[:middle]) | self._keep(wanted[middle:]) if middle else set()
+
+    def _least(self, node: Node) -> Value:
+        """The least value that the node can have."""
+        can = self.run.holds(self.given)
+        assert can
+        low, high = key_bounds(node.kind)[0], self.run.key(node)
+        while low < high:
+            middle = (low + high) // 2
+            if self.run.holds([*self.given, self._at_most(node, middle)]):
+                high = self.run.key(node)
+            else:
+                low = middle + 1
+        value = value_of_key(node.kind, high)
+        self.given.append(self.run.has(node, value))
+        return value
+
+    def _at_most(self, node: Node, key: int) -> Literal:
+        kind: Scalar = node.kind
+        if isinstance(kind, Bool):
+            return -self.run.literal(node)
+        limit = values.constant(kind, value_of_key(kind, key))
+        return self.run.literal(values.compare(Op.LE, node, limit))
+
+
+def constant_of(node: Node, otherwise: Value) -> Value:
+    """The value of a node that is a constant."""
+    return value_of_key(node.kind, key_of(node.kind, node.low)) if node.known else otherwise

@@ -1,0 +1,528 @@
+"""The shortest way from the first cycle to where a goal is broken, run before it is shown.
+
+In: a stepper and goals. Out: `Trace`s: what the environment gave in each cycle, and what the reference interpreter, which is the
+meaning of the language, made of it. The solver finds the inputs; the interpreter is run on them from the initial values, and only what it
+does is shown. Where it does not break the goal, the trace is not believed: `NotReproducedError`.
+
+Of the shortest runs one of the simplest is given, always the same: an input stays as it was in the cycle before where it can, and has the
+least value that fits where it cannot.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TypeAlias
+
+from rcsc.compose.contract.environment import COMMAND, ECHO, ECHOED, NUMBER, Below
+from rcsc.compose.contract.given import Answer, scripted
+from rcsc.compose.contract.obligations import Goal, Key, Sort, goals, pairs
+from rcsc.compose.contract.properties import invariant_kept, property_kept
+from rcsc.compose.contract.transition import EARLY, GHOST, Cycle, Leaves, Stepper, successor
+from rcsc.compose.counterexample.simplest import Bounded, Simplest, constant_of
+from rcsc.lang.interpret import (
+    ExternError,
+    Fault,
+    Outcome,
+    admit,
+    call,
+    cycle,
+    execute,
+    holds,
+    initial,
+    matching_lines,
+    settle,
+)
+from rcsc.lang.model import (
+    Action,
+    Default,
+    Int,
+    Kind,
+    Line,
+    Op,
+    Snapshot,
+    Standing,
+    Value,
+    spell,
+    value_of_key,
+)
+from rcsc.solvers.sat import GaveUpError
+from rcsc.symbolic import values
+from rcsc.symbolic.values import Node
+
+
+class NotReproducedError(Exception):
+    """The interpreter does not do what the solver said: a bug in rcsc, or an operation that was left open.
+
+    Attributes:
+        guessed: Whether an operation was left open (`keyed`), so that it need not be a bug.
+        beside: What the solver said and what the interpreter did, where they differ, a line each.
+    """
+
+    def __init__(self, goal: str, *, guessed: bool = False, beside: tuple[str, ...] = ()) -> None:
+        super().__init__(goal)
+        self.guessed, self.beside = guessed, beside
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One cycle.
+
+    Attributes:
+        taken: The inputs.
+        table: That ran; `line`, empty where none matched.
+        fault: What ended the cycle early.
+        failed: Assumptions of the table that did not hold, monitored or not.
+        before: Every leaf at its start, inputs as last taken.
+        after: Every leaf at its end.
+        matched: Every line that matched, DEFAULT left out.
+        answers: What each call of an extern procedure gave, in order.
+    """
+
+    taken: Mapping[str, Value]
+    table: str
+    line: str
+    fault: Fault
+    failed: tuple[str, ...]
+    before: Mapping[str, Value]
+    after: Mapping[str, Value]
+    matched: tuple[str, ...] = ()
+    answers: tuple[Answer, ...] = ()
+
+    @property
+    def ends_the_run(self) -> bool:
+        """Whether it ended in a fault that the proofs exclude; after the others (`EARLY`) the next cycle runs."""
+        return self.fault not in {Fault.OK, *EARLY}
+
+
+Given: TypeAlias = tuple[Mapping[str, Value], tuple[Answer, ...]]
+"""What the environment gives in a cycle: the inputs, and the results of extern procedures."""
+
+
+@dataclass(frozen=True, slots=True)
+class Trace:
+    """A run that breaks a goal in its last cycle; no shorter one does.
+
+    Attributes:
+        goal: What it breaks, in words.
+        restarted: Whether it begins where a restart does, and not with the initial values.
+        legal: Whether its environment did only what a neighbour that began with it can do (`Search.legal`).
+    """
+
+    goal: str
+    steps: tuple[Step, ...]
+    restarted: bool = False
+    legal: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Search:
+    """How to look for traces.
+
+    Attributes:
+        most: Cycles.
+        restarted: Begin as after a restart.
+        legal: The superior's numbers come one after the other, and each report is of an order of this run, none older than the one
+            before: narrower than the contract, which leaves room for numbers that have gone round and for what stood in the buffers
+            before a restart. A trace found so is one that two levels can do that begin together.
+    """
+
+    most: int = 10
+    restarted: bool = False
+    legal: bool = False
+
+
+Found: TypeAlias = Trace | NotReproducedError
+
+
+def shortest(stepper: Stepper, goal: Goal, most: int = 10, *, legal: bool = False) -> Trace | None:
+    """The shortest trace of at most `most` cycles; None where there is none, or the solver gave up.
+
+    Raises:
+        NotReproducedError: The interpreter does not break the goal there.
+    """
+    found = traces(stepper, (goal,), Search(most, legal=legal)).get(goal.key)
+    if isinstance(found, NotReproducedError):
+        raise found
+    return found
+
+
+def traces(stepper: Stepper, wanted: Sequence[Goal], search: Search) -> dict[Key, Found]:
+    """For each goal for which there is one the shortest trace, all found in one search."""
+    run = Unrolled(stepper, search)
+    waiting = {goal.key: goal for goal in wanted}
+    found: dict[Key, Found] = {}
+    for _ in range(search.most):
+        if not waiting:
+            break
+        one = run.further()
+        here = {goal.key: _wrong(goal, one) for goal in (*goals(stepper, one), *pairs(one))}
+        for key, goal in list(waiting.items()):
+            try:
+                if run.reaches(here[key]):
+                    found[key] = run.told(goal, here[key])
+                    del waiting[key]
+            except GaveUpError:
+                del waiting[key]
+    return found
+
+
+def _wrong(goal: Goal, one: Cycle) -> Node:
+    """That the cycle breaks the goal: what it leaves counts only where it does not end early."""
+    wrong = values.negation(goal.holds)
+    early = goal.sort in {Sort.ASSUMPTION, Sort.ONE_LINE, Sort.SOME_LINE, Sort.NO_DEFAULT}
+    return wrong if early else values.both(wrong, one.goes_on)
+
+
+@dataclass(slots=True)
+class Unrolled:
+    """Cycles one after the other, from the first of a run."""
+
+    stepper: Stepper
+    search: Search
+    cycles: list[Cycle] = field(default_factory=list)
+    _run: Bounded = field(default_factory=Bounded)
+    _now: Leaves = field(init=False)
+    _start: Leaves = field(init=False)
+    _orders: dict[str, list[tuple[Node, Node]]] = field(default_factory=dict)
+    _echoed: dict[str, Node] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self._start = self.stepper.restarted() if self.search.restarted else self.stepper.first()
+        self._now = self._start
+
+    def further(self) -> Cycle:
+        """One cycle more."""
+        at = len(self.cycles) + 1
+        if self.cycles:  # a fault would have ended the run
+            self._run.add(self.cycles[-1].goes_on)
+        one = self.stepper.cycle(self._now, f" {at}")
+        self.cycles.append(one)
+        self._now = one.after
+        self._run.add(one.contract)
+        if self.search.legal:
+            self._run.add(values.all_of(self._legal(one, at)))
+        return one
+
+    def _legal(self, one: Cycle, at: int) -> Iterator[Node]:
+        above = self.stepper.links.above
+        if above is not None:
+            number = f"{above.order}.{NUMBER}"
+            before, now = one.before[number], one.taken[number]
+            yield values.either(values.equal(now, before), values.equal(now, successor(before)))
+        for below in self.stepper.links.below:
+            yield from self._answers(below, one, at)
+
+    def _answers(self, below: Below, one: Cycle, at: int) -> Iterator[Node]:
+        """The report is of one of the orders published so far; of which, is a number that does not fall."""
+        orders = self._orders.setdefault(below.order, [])
+        orders.append((one.before[f"{below.order}.{NUMBER}"], one.before[f"{below.order}.{COMMAND}"]))
+        kind = Int(0, self.search.most)
+        which = values.variable(f"{below.report} echoes {at}", kind)
+        yield values.compare(Op.LE, self._echoed.get(below.report, values.constant(kind, 0)), which)
+        yield values.compare(Op.LT, which, values.constant(kind, len(orders)))
+        self._echoed[below.report] = which
+        echo, echoed = one.taken[f"{below.report}.{ECHO}"], one.taken[f"{below.report}.{ECHOED}"]
+        for place, (number, command) in enumerate(orders):
+            it = values.both(values.equal(echo, number), values.equal(echoed, command))
+            yield values.follows(values.equal(which, values.constant(kind, place)), it)
+
+    def reaches(self, wrong: Node) -> bool:
+        """Whether the last cycle can be so.
+
+        Raises:
+            GaveUpError: The solver did not decide.
+        """
+        return self._run.holds([self._run.literal(wrong)])
+
+    def told(self, goal: Goal, wrong: Node) -> Found:
+        """The simplest run that ends so, as the interpreter runs it; or that it does not break the goal.
+
+        Raises:
+            GaveUpError: The solver did not decide.
+        """
+        settled = Simplest(self._run, [self._run.literal(wrong)])
+        start, given = self._settled(settled)
+        try:
+            trace = _ran(self.stepper, goal, given, start, self.search)
+        except (ArithmeticError, IndexError, ValueError):  # an operation that is not defined: `SAFE` says so
+            return NotReproducedError(goal.shown, guessed=True)
+        if _breaks(self.stepper, goal, trace, len(given)):
+            return trace
+        beside = self._beside(trace) if self._run.holds(settled.given) else ()
+        return NotReproducedError(goal.shown, guessed=self.guessed or self._asks, beside=beside)
+
+    def inputs(self, wrong: Node) -> tuple[dict[str, Value], list[Given]]:
+        """Every leaf before the simplest run that ends so, and what its cycles are given.
+
+        Raises:
+            GaveUpError: The solver did not decide.
+        """
+        return self._settled(Simplest(self._run, [self._run.literal(wrong)]))
+
+    @property
+    def guessed(self) -> bool:
+        """Whether an operation was left open."""
+        return self._run.guessed
+
+    @property
+    def _asks(self) -> bool:
+        """Whether extern procedures are called: a goal may speak of what they give in the cycle after the last."""
+        return any(one.calls for one in self.cycles)
+
+    def _settled(self, settled: Simplest) -> tuple[dict[str, Value], list[Given]]:
+        start = self._begins(settled)
+        return start, self._simplest(settled, start)
+
+    def _simplest(self, settled: Simplest, start: Mapping[str, Value]) -> list[Given]:
+        """What each cycle is given; an input stays as it was where it can, and so does what no condition reads."""
+        found: list[Given] = []
+        program = self.stepper.program
+        inputs = [str(v.name) for v in program.variables if v.kind is Kind.INPUT]
+        before = [start[name] for name in inputs]
+        for one in self.cycles:
+            before = settled.settle([one.taken[name] for name in inputs], before)
+            found.append((dict(zip(inputs, before, strict=True)), settled.answers(program, one)))
+        return found
+
+    def _begins(self, settled: Simplest) -> dict[str, Value]:
+        """Every leaf before the first cycle."""
+        begun = dict(initial(self.stepper.program))
+        if self.search.restarted:
+            names = list(begun)
+            nodes = [self._start[name] for name in names]
+            known = [constant_of(node, begun[name]) for name, node in zip(names, nodes, strict=True)]
+            begun = dict(zip(names, settled.settle(nodes, known), strict=True))
+        return begun
+
+    def _beside(self, trace: Trace) -> tuple[str, ...]:
+        """Where the solver's run and the interpreter's part: the first cycle in which they do."""
+        for number, (one, step) in enumerate(zip(self.cycles, trace.steps, strict=False), 1):
+            said = {
+                name: value_of_key(kind, self._run.key(one.after[name]))
+                for name, kind in self.stepper.kinds.items()
+                if name in step.after and self._run.met(one.after[name])
+            }
+            other = [
+                f"cycle {number}: `{name}` = {spell(kind, said[name])} by the solver, {spell(kind, step.after[name])} as it ran"
+                for name, kind in self.stepper.kinds.items()
+                if name in said and said[name] != step.after[name]
+            ]
+            if other:
+                return tuple(other)
+        return ("every leaf that the solver spoke of is the same in both",)
+
+
+# --- the run -------------------------------------------------------------------------------
+
+
+def replayed(stepper: Stepper, goal: Goal, inputs: Sequence[Given]) -> Trace:
+    """The run on what the environment gives, from the initial values.
+
+    Raises:
+        NotReproducedError: It does not break the goal in its last cycle.
+    """
+    trace = _ran(stepper, goal, inputs, initial(stepper.program), Search())
+    if not _breaks(stepper, goal, trace, len(inputs)):
+        raise NotReproducedError(goal.shown)
+    return trace
+
+
+def _ran(
+    stepper: Stepper,
+    goal: Goal,
+    given: Sequence[Given],
+    start: Mapping[str, Value],
+    search: Search,
+) -> Trace:
+    return Trace(goal.shown, ran_on(stepper, start, given), search.restarted, search.legal)
+
+
+def ran(
+    stepper: Stepper, start: Mapping[str, Value], inputs: Sequence[Mapping[str, Value]]
+) -> tuple[Step, ...]:
+    """What the interpreter does, from `start` on these inputs, up to the first fault that ends a run."""
+    return ran_on(stepper, start, [(taken, ()) for taken in inputs])
+
+
+def ran_on(stepper: Stepper, start: Mapping[str, Value], given: Sequence[Given]) -> tuple[Step, ...]:
+    """The same with results of extern procedures."""
+    now = dict(start)
+    steps: list[Step] = []
+    for taken, answers in given:
+        steps.append(one_cycle(stepper, now, taken, answers))
+        now = dict(steps[-1].after)
+        if steps[-1].ends_the_run:
+            break
+    return tuple(steps)
+
+
+def one_cycle(
+    stepper: Stepper,
+    before: Mapping[str, Value],
+    taken: Mapping[str, Value],
+    answers: tuple[Answer, ...] = (),
+) -> Step:
+    """What the interpreter does in one cycle, in which extern procedures give these answers."""
+    with scripted(stepper.program, answers):
+        outcome = cycle(stepper.program, stepper.level, {**before, **taken})
+    return _step(stepper, before, taken, outcome, answers)
+
+
+@dataclass(slots=True)
+class Halfway:
+    """A cycle up to its postprocess.
+
+    Attributes:
+        middle: Every leaf as the table saw it: inputs taken, deferred values settled, preprocess run, as far as it came.
+        settled: Every leaf before the preprocess; `done`, before the postprocess, as far as it came.
+        matched: Whether it came to the table.
+        acted: Whether its line, if one ran, was done.
+    """
+
+    middle: dict[str, Value]
+    settled: dict[str, Value]
+    done: dict[str, Value]
+    matched: bool = False
+    acted: bool = False
+
+
+def halfway(stepper: Stepper, step: Step) -> Halfway:
+    """The first part of a cycle, as the interpreter runs it again."""
+    program = stepper.program
+    now = admit(program, {**step.before, **step.taken})
+    assert not isinstance(now, str)
+    settle(program, now)
+    found = Halfway(now, dict(now), now)
+    try:
+        with scripted(program, step.answers):
+            for name in stepper.level.preprocess:
+                call(program, name, [], now)
+            found.matched, found.middle = True, dict(now)
+            execute(program, [action.statement for action in _actions(stepper, step)], now, {})
+            found.acted = step.fault is not Fault.ASSUMPTION
+    except ExternError:
+        pass
+    return found
+
+
+def _actions(stepper: Stepper, step: Step) -> tuple[Action, ...]:
+    """What the line that ran does."""
+    table = next(one for one in stepper.program.tables if one.name == step.table)
+    lines: list[Line | Default] = [*table.lines, *([] if table.default is None else [table.default])]
+    return next((one.actions for one in lines if one.name == step.line), ())
+
+
+def seen_by_table(stepper: Stepper, step: Step) -> Snapshot | None:
+    """Every leaf as the table saw it; None where the cycle ended before."""
+    found = halfway(stepper, step)
+    return found.middle if found.matched else None
+
+
+def _breaks(stepper: Stepper, goal: Goal, trace: Trace, cycles: int) -> bool:
+    return len(trace.steps) == cycles and broken(stepper, goal, trace.steps[-1])
+
+
+def _step(
+    stepper: Stepper,
+    before: Mapping[str, Value],
+    taken: Mapping[str, Value],
+    outcome: Outcome,
+    answers: tuple[Answer, ...],
+) -> Step:
+    after = outcome.snapshot
+    chosen = stepper.table_of(after)
+    line = "" if outcome.line is None else str(outcome.line)
+    matched: tuple[str, ...] = () if outcome.line is None else (line,)
+    if outcome.fault is Fault.SEVERAL_LINES:
+        table = next(one for one in stepper.program.tables if one.name == chosen)
+        matched = tuple(map(str, matching_lines(table, after)))
+    found = Step(
+        dict(taken),
+        chosen,
+        line,
+        outcome.fault,
+        outcome.failed_assumptions,
+        dict(before),
+        after,
+        matched,
+        answers,
+    )
+    return replace(found, failed=(*found.failed, *_also_failed(stepper, found)))
+
+
+def _also_failed(stepper: Stepper, step: Step) -> tuple[str, ...]:
+    """Assumptions of the table that no executor looks at, and that did not hold."""
+    table = next(one for one in stepper.program.tables if one.name == step.table)
+    others = [
+        one
+        for one in stepper.program.assumptions
+        if one.name in table.assumptions
+        and one.standing is not Standing.MONITORED
+        and one.name not in step.failed
+    ]
+    seen = seen_by_table(stepper, step) if others else None
+    return () if seen is None else tuple(str(one.name) for one in others if not holds(one.condition, seen))
+
+
+def broken(stepper: Stepper, goal: Goal, step: Step) -> bool:
+    """Whether the cycle, as it ran, breaks the goal."""
+    if goal.table and goal.table != step.table:
+        return False
+    match goal.sort:
+        case Sort.ASSUMPTION:
+            return goal.name in step.failed
+        case Sort.ONE_LINE:
+            return step.fault is Fault.SEVERAL_LINES and set(goal.lines) <= set(step.matched)
+        case Sort.SOME_LINE:
+            return step.fault is Fault.NO_LINE
+        case Sort.NO_DEFAULT:
+            table = next(one for one in stepper.program.tables if one.name == goal.table)
+            return table.default is not None and step.line == table.default.name
+        case Sort.INVARIANT:
+            kept = invariant_kept(stepper, goal.name, step.before, step.after)
+            return not step.ends_the_run and not kept
+        case Sort.PROPERTY:
+            kept = property_kept(stepper, goal.name, step.before, step.after)
+            return not step.ends_the_run and not kept
+        case Sort.SAFE:
+            return not step.ends_the_run and _broken_between(stepper, goal, step)
+        case _:
+            return _broken_between(stepper, goal, step)
+
+
+def _broken_between(stepper: Stepper, goal: Goal, step: Step) -> bool:
+    """A goal about what stands before and behind a cycle."""
+    holds = _same(goals(stepper, as_cycle(stepper, step)), goal).holds
+    return holds.known and not holds.low
+
+
+def as_cycle(stepper: Stepper, step: Step) -> Cycle:
+    """A cycle as it ran, all its nodes constants; what stands within it, which no run is shown to break, as the table saw it."""
+    before, after = _constants(stepper, step.before), _constants(stepper, step.after)
+    taken = {name: after[name] for name in step.taken}
+    half = halfway(stepper, step)
+    middle = _constants(stepper, half.middle)
+    return Cycle(
+        before,
+        taken,
+        values.TRUE,
+        {**middle, **taken},
+        stepper.tables(middle, matched=half.matched),
+        after,
+        values.truth(step.fault in EARLY),
+        values.truth(not half.matched),
+        values.truth(not half.acted),
+        settled=middle,
+        acted=middle,
+    )
+
+
+def _same(every: tuple[Goal, ...], goal: Goal) -> Goal:
+    return next(one for one in every if one.key == goal.key)
+
+
+def _constants(stepper: Stepper, state: Mapping[str, Value]) -> Leaves:
+    return {
+        name: values.constant(kind, state[name])
+        for name, kind in stepper.kinds.items()
+        if not name.startswith(GHOST)
+    } | {name: values.constant(kind, 0) for name, kind in stepper.kinds.items() if name.startswith(GHOST)}

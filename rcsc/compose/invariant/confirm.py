@@ -1,0 +1,133 @@
+"""What a search found, asked anew of Z3: whether clauses are an invariant, and whether goals follow from them.
+
+In: features, the cycles with which a level begins, a cycle from anywhere, clauses. Out: questions, each of which has to be
+answered *unsatisfiable*; they are also the certificate. Nothing of the search is used: other terms (`keyed`), another solver.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from rcsc.compose.contract.predicates import Feature
+from rcsc.compose.contract.transition import Cycle
+from rcsc.compose.invariant.pdr import Clause
+from rcsc.lang.model import Bool
+from rcsc.solvers import smt
+from rcsc.solvers.smt import Limits, Solver, Term
+from rcsc.symbolic import values
+from rcsc.symbolic.keyed import Keyed
+from rcsc.symbolic.values import Node
+
+
+@dataclass(slots=True)
+class Confirmation:
+    """The questions of one level.
+
+    Attributes:
+        firsts: The first cycle, from the initial values; and that after a restart.
+        cycle: Any later one.
+        cases: Conditions on a cycle, of which at least one holds; each is asked apart, which is quicker.
+        rested_on: Solvers whose refutations something rests on besides the goals: part of the certificate.
+    """
+
+    features: tuple[Feature, ...]
+    firsts: Sequence[Cycle]
+    cycle: Cycle
+    cases: Sequence[Node]
+    keyed: Keyed
+    limits: Limits
+    rested_on: list[Solver] = field(default_factory=list)
+    _literals: dict[tuple[bool, int, int], Term] = field(default_factory=dict)
+    _nodes: dict[tuple[bool, int], Node] = field(default_factory=dict)
+    _kept: dict[tuple[bool, Clause], Term] = field(default_factory=dict)
+    _denied: dict[Clause, Term] = field(default_factory=dict)
+    _ended: dict[tuple[int, int], Term] = field(default_factory=dict)
+
+    def literal(self, at: int, value: int, *, after: bool) -> Term:
+        """That a feature has a value before, or behind, the cycle; of `~value`, that it has another."""
+        if value < 0:
+            return smt.negation(self.literal(at, ~value, after=after))
+        key = after, at, value
+        if key not in self._literals:
+            node = self.node(at, after=after)
+            if isinstance(node.kind, Bool):
+                wanted = node if value else values.negation(node)
+            else:
+                wanted = values.equal(node, values.constant(node.kind, value))
+            self._literals[key] = self.keyed.term(wanted)
+        return self._literals[key]
+
+    def node(self, at: int, *, after: bool) -> Node:
+        """A feature before, or behind, the cycle."""
+        if (after, at) not in self._nodes:
+            leaves = self.cycle.after if after else self.cycle.before
+            self._nodes[after, at] = self.features[at].node(leaves)
+        return self._nodes[after, at]
+
+    def broken(self, clause: Clause, *, after: bool) -> Term:
+        """That the combination stands."""
+        key = after, clause
+        if key not in self._kept:
+            self._kept[key] = smt.all_of([self.literal(at, value, after=after) for at, value in clause])
+        return self._kept[key]
+
+    def _held(self, clause: Clause) -> Term:
+        """That the combination does not stand before the cycle."""
+        if clause not in self._denied:
+            self._denied[clause] = smt.negation(self.broken(clause, after=False))
+        return self._denied[clause]
+
+    def known(self, clauses: Sequence[Clause]) -> Solver:
+        """A solver in which one cycle starts where the clauses hold."""
+        held = [self._held(clause) for clause in clauses]
+        for at in range(len(self.features)):
+            self.keyed.term(self.node(at, after=True))
+        contract = self.keyed.term(self.cycle.contract)
+        for case in self.cases:
+            self.keyed.term(case)
+        solver = Solver(self.limits, remembers=True)
+        solver.add(*self.keyed.ranges, contract, *held)
+        return solver
+
+    def in_other_terms(self, keyed: Keyed) -> "Confirmation":
+        """The same, asked in other terms."""
+        return Confirmation(
+            self.features, self.firsts, self.cycle, self.cases, keyed, self.limits, self.rested_on
+        )
+
+    def step_question(self, clauses: Sequence[Clause], case: Node) -> Solver:
+        """That a cycle in this case breaks a clause: unsatisfiable, when they are an invariant."""
+        broken = smt.any_of([self.broken(clause, after=True) for clause in clauses])
+        solver = self.known(clauses)
+        solver.add(self.keyed.term(case), broken)
+        return solver
+
+    def first_question(self, clauses: Sequence[Clause], first: Cycle) -> Solver:
+        """That a first cycle leads to where a clause is broken: unsatisfiable, when they are an invariant."""
+        nodes = [one.node(first.after) for one in self.features]
+        equal = [self.keyed.equal(self._end(at), node) for at, node in enumerate(nodes)]
+        solver = self.beginning(first)
+        solver.add(*self.keyed.ranges, *equal, smt.any_of([self._stands(clause) for clause in clauses]))
+        return solver
+
+    def beginning(self, first: Cycle) -> Solver:
+        """A solver in which a first cycle runs."""
+        contract = self.keyed.term(first.contract)
+        solver = Solver(self.limits)
+        solver.add(*self.keyed.ranges, contract)
+        return solver
+
+    def _end(self, at: int) -> Term:
+        """A constant for a feature behind the cycle: quicker to read from a model than what it is equal to."""
+        return self.keyed.fresh(f"end!{at}", self.features[at].kind)
+
+    def _stands(self, clause: Clause) -> Term:
+        """That the constants have the clause's values."""
+        return smt.all_of([self._at(at, value) for at, value in clause])
+
+    def _at(self, at: int, value: int) -> Term:
+        if value < 0:
+            return smt.negation(self._at(at, ~value))
+        key = at, value
+        if key not in self._ended:
+            self._ended[key] = self.keyed.has(self._end(at), self.features[at].kind, value)
+        return self._ended[key]

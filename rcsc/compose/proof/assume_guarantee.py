@@ -1,0 +1,260 @@
+"""What the levels of a system assume of each other, matched with what was proved of them.
+
+In: steppers of all levels. Out: `Promise`s, each with the goals of the neighbour that keep it, and, for proofs, whether they do.
+"""
+
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+
+from rcsc.compose.contract.claims import (
+    AGAIN,
+    CONTRACT,
+    DECLARED,
+    ENDING,
+    FOUND,
+    RUNS,
+    SAFE,
+    UNREACHED,
+    Claim,
+    Key,
+    Need,
+    Verdict,
+    worst,
+)
+from rcsc.compose.contract.environment import COMMAND, ECHO, ECHOED, NUMBER
+from rcsc.compose.contract.obligations import Sort
+from rcsc.compose.contract.transition import NUMBERS, Stepper
+from rcsc.compose.proof.level import LevelProof
+
+
+@dataclass(frozen=True, slots=True)
+class Promise:
+    """One thing that a level assumes of a neighbour.
+
+    Attributes:
+        level: Who assumes it.
+        assumed: In words.
+        reason: Whose guarantee it is, in words.
+        record: In which the level takes what it is about.
+        needs: What must be proved of the neighbour.
+        own: What the level has to keep itself: reports are about its orders only as far as it numbers them.
+        begins: Whether both begin in agreement.
+        outside: Whether the neighbour stands outside the levels: then it is its own to keep.
+    """
+
+    level: str
+    record: str
+    assumed: str
+    reason: str
+    needs: tuple[Need, ...] = ()
+    own: tuple[Need, ...] = ()
+    begins: bool = True
+    outside: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Agreement:
+    """One thing that a level assumes of a neighbour, and why it may.
+
+    Attributes:
+        level: Who assumes it.
+        assumed: In words.
+        reason: Whose guarantee it is, in words.
+        record: In which it takes what that is about.
+        holds: Whether it is found so of the neighbour, given what that rests on; where it stands outside the levels it is its own to keep.
+    """
+
+    level: str
+    record: str
+    assumed: str
+    reason: str
+    holds: bool
+    outside: bool = False
+
+
+def agreements(made: Mapping[str, Stepper], proofs: Mapping[str, LevelProof]) -> list[Agreement]:
+    """What each level assumes of each neighbour, matched with what was proved there."""
+    proved = {
+        (name, goal.key)
+        for name, proof in proofs.items()
+        for goal, verdict in proof.found
+        if verdict in FOUND
+    }
+    return [
+        Agreement(one.level, one.record, one.assumed, one.reason, _kept(one, proved), one.outside)
+        for one in promises(made)
+    ]
+
+
+def _kept(promise: Promise, proved: Collection[Need]) -> bool:
+    return promise.begins and all(need in proved for need in promise.needs)
+
+
+# --- claims --------------------------------------------------------------------------------
+
+
+def claims(made: Mapping[str, Stepper], proofs: Mapping[str, LevelProof]) -> dict[Need, Claim]:
+    """Everything that is claimed of these levels, and what it rests on."""
+    found: dict[Need, Claim] = {}
+    for one in promises(made):
+        verdict = Verdict.PROVED if one.begins else Verdict.NOT_PROVED
+        trusts = (
+            (one.reason.replace("stands outside the levels", "keeps to the protocol"),) if one.outside else ()
+        )
+        found[one.level, (CONTRACT, "", one.record)] = Claim(verdict, (*one.needs, *one.own), trusts)
+    for name, proof in proofs.items():
+        found |= {(name, key): claim for key, claim in of_level(made[name], proof)}
+    return found
+
+
+def of_level(stepper: Stepper, proof: LevelProof) -> Iterator[tuple[Key, Claim]]:
+    """What is claimed of one level, but for the contract."""
+    name = proof.level
+    runs = ((name, RUNS),)
+    yield from _of_runs(stepper, proof)
+    for goal, verdict in proof.found:
+        trusts = tuple(_of_a_restart(stepper, proof)) if goal.sort is Sort.ECHOES else ()
+        if goal.key != SAFE:
+            yield goal.key, Claim(verdict, runs, trusts)
+    if proof.context is not None:
+        for line in proof.context.unreached:
+            yield (UNREACHED, *line), Claim(Verdict.PROVED, runs)
+        if not proof.context.repeated and not proof.context.restless:
+            yield (AGAIN, "", ""), Claim(Verdict.PROVED, runs)
+    for ending in proof.endings:
+        verdict = Verdict.PROVED if ending.proved else Verdict.NOT_PROVED
+        yield (Sort.ENDS, ending.table, ""), _of_ending(stepper, ending.still, verdict)
+    if proof.endings:
+        every = tuple((name, (Sort.ENDS, ending.table, "")) for ending in proof.endings)
+        yield ENDING, Claim(Verdict.PROVED, every)
+
+
+def _of_a_restart(stepper: Stepper, proof: LevelProof) -> Iterator[str]:
+    """What else could end the first cycle after a restart early, so that the report that stood before is followed by an older one."""
+    if _asks(stepper):
+        yield "no extern procedure is refused in the first cycle after a restart"
+    stops = {str(name) for table in stepper.program.tables for name in table.stops}
+    failing = {goal.name for goal in proof.open if goal.sort is Sort.ASSUMPTION}
+    for name in sorted(stops & failing):
+        yield f"assumption `{name}` of level `{proof.level}` does not fail in the first cycle after a restart"
+
+
+def _of_runs(stepper: Stepper, proof: LevelProof) -> Iterator[tuple[Key, Claim]]:
+    """That the level runs as its tables say, in an environment that keeps to its contract, and that its operations are safe."""
+    name, links = proof.level, stepper.links
+    ends = [*([] if links.above is None else [links.above.order]), *(below.report for below in links.below)]
+    needs: list[Key] = [SAFE, *((CONTRACT, "", record) for record in ends)]
+    needs += [goal.key for goal, _ in proof.found if goal.sort in {Sort.SOME_LINE, Sort.ONE_LINE}]
+    needs += [
+        goal.key for goal, _ in proof.found if goal.sort is Sort.ASSUMPTION and goal.name in stepper.trusted
+    ]
+    trusts = [f"assumption `{one}` of level `{name}`{DECLARED}" for one in sorted(stepper.trusted)]
+    if stepper.trusted:
+        trusts.append(f"level `{name}` can be as its tables declare in every state that it comes to")
+    trusts += [
+        f"the same question has the same answer in `{asked.into}` of level `{name}`" for asked in links.asked
+    ]
+    yield RUNS, Claim(Verdict.PROVED, tuple((name, key) for key in needs), tuple(trusts))
+    within = [verdict for goal, verdict in proof.found if goal.key == SAFE]
+    invariants = tuple((name, (Sort.INVARIANT, "", one)) for one in stepper.safety.invariants)
+    rests = ((name, RUNS), *invariants) if within else invariants
+    yield SAFE, Claim(worst(within), rests)
+
+
+def _of_ending(stepper: Stepper, still: Iterable[str], verdict: Verdict) -> Claim:
+    """That a command ends, given that what is below answers, and that what has to stand still does."""
+    name, below = stepper.level.name, stepper.links.below
+    trusts = [
+        f"`{one.name}` answers every order that is not replaced, and stays so" for one in below if one.outside
+    ]
+    trusts += [f"the values in `{one}` of level `{name}` stand still meanwhile" for one in still]
+    if _asks(stepper):
+        trusts.append(f"extern procedures of level `{name}` are refused only finitely often")
+    needs = tuple((one.name, ENDING) for one in below if not one.outside)
+    return Claim(verdict, ((name, RUNS), *needs), tuple(trusts))
+
+
+def _asks(stepper: Stepper) -> bool:
+    return any(one.extern is not None for one in stepper.program.procedures)
+
+
+# --- what levels assume of each other ------------------------------------------------------
+
+
+def promises(made: Mapping[str, Stepper]) -> Iterator[Promise]:
+    """What each level assumes of each neighbour."""
+    for name, stepper in made.items():
+        yield from _of_above(name, stepper, made)
+        yield from _of_below(name, stepper, made)
+
+
+def _of_below(name: str, stepper: Stepper, made: Mapping[str, Stepper]) -> Iterator[Promise]:
+    for below in stepper.links.below:
+        words = f"what `{below.name}` reports under the number of the last order is about that order"
+        keys: tuple[Key, ...] = (
+            (Sort.NUMBERED, "", f"{below.order}.{COMMAND}"),
+            (Sort.NEXT_NUMBER, "", below.order),
+        )
+        own = tuple((name, key) for key in keys)
+        if below.outside:
+            reason = f"`{below.name}` stands outside the levels"
+            yield Promise(name, below.report, words, reason, own=own, outside=True)
+            continue
+        lower = made[below.name].links.above
+        if lower is None:
+            yield Promise(name, below.report, words, f"`{below.name}` takes no numbered orders", begins=False)
+            continue
+        yield Promise(
+            name,
+            below.report,
+            words,
+            f"proved of `{below.name}`: {Sort.ECHOES.value}; both begin with the same order",
+            ((below.name, (Sort.ECHOES, "", lower.report)),),
+            own,
+            _begin(stepper, below.order, made[below.name], lower.order),
+        )
+
+
+def _of_above(name: str, stepper: Stepper, made: Mapping[str, Stepper]) -> Iterator[Promise]:
+    above = stepper.links.above
+    if above is None:
+        return
+    fields = ", ".join(f"`{leaf}`" for leaf in above.numbered)
+    words = (
+        f"while the number of `{above.order}` stays, so do {fields}"
+        if fields
+        else f"the numbers of `{above.order}` come one after the other"
+    )
+    if above.outside:
+        yield Promise(name, above.order, words, f"`{above.name}` stands outside the levels", outside=True)
+        return
+    upper = next(one for one in made[above.name].links.below if one.name == name)
+    keys: list[Key] = [
+        (Sort.NUMBERED, "", other_end(leaf, above.order, upper.order)) for leaf in above.numbered
+    ]
+    keys.append((Sort.NEXT_NUMBER, "", upper.order))
+    needs = tuple((above.name, key) for key in keys)
+    yield Promise(name, above.order, words, f"proved of `{above.name}`: {Sort.NUMBERED.value}", needs)
+
+
+def other_end(leaf: str, record: str, other: str) -> str:
+    """The same field at the other end of the buffer."""
+    return other + leaf.removeprefix(record)
+
+
+def _begin(upper: Stepper, order: str, lower: Stepper, record: str) -> bool:
+    """Before the first cycle the lower level's order is the upper's, and the upper sees it echoed, or none that is still to come."""
+    first = {str(v.name): v.initial for v in upper.program.variables}
+    other = {str(v.name): v.initial for v in lower.program.variables}
+    above = lower.links.above
+    numbered = () if above is None else above.numbered
+    ends = {leaf: other_end(leaf, record, order) for leaf in (f"{record}.{COMMAND}", *numbered)}
+    ends[f"{record}.{NUMBER}"] = number = f"{order}.{NUMBER}"
+    report = next(one.report for one in upper.links.below if one.order == order)
+    if not first.keys() >= {*ends.values(), f"{report}.{ECHOED}"} or not other.keys() >= ends.keys():
+        return False  # a field is missing, or named otherwise
+    sent, echo = int(first[number]), int(first[f"{report}.{ECHO}"])
+    echoed = (sent - echo) % NUMBERS < NUMBERS // 2
+    if echo == sent:
+        echoed = first[f"{report}.{ECHOED}"] == first[f"{order}.{COMMAND}"]
+    return echoed and all(other[leaf] == first[end] for leaf, end in ends.items())

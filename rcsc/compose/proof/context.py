@@ -1,0 +1,233 @@
+"""What an invariant tells of the lines of a level's tables, besides the goals.
+
+In: a stepper, and what was confirmed of it. Out: a `Context`:
+
+- *unreached*: lines that no reachable cycle runs, a DEFAULT line too, but where that is a goal. Dead in this system, though not in
+  their table.
+- *repeated*: what else a line does that gives an order and then matches again, on the same inputs, before the order is echoed.
+  Section 9 asks that there be nothing: each line is to say the same until its command is echoed.
+- *restless*: levels that would give order after order on inputs that stay the same.
+
+Each question is answered by Z3 from the invariant; what is not refuted is named, so the lists are never too short.
+"""
+
+from collections.abc import Container, Iterator, Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from rcsc.compose.contract.environment import NUMBER
+from rcsc.compose.contract.transition import Cycle, Stepper
+from rcsc.compose.invariant.confirm import Confirmation
+from rcsc.compose.invariant.pdr import Clause
+from rcsc.lang.leaves import everything, written_by
+from rcsc.lang.model import Bool, Call, Default, Kind, Statement
+from rcsc.solvers import smt
+from rcsc.solvers.smt import Answer, Solver, Term
+from rcsc.symbolic import values
+from rcsc.symbolic.values import Node
+
+
+@dataclass(frozen=True, slots=True)
+class Again:
+    """A line that does more when it matches again, and to which leaves."""
+
+    table: str
+    line: str
+    leaves: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Context:
+    """What was found of one level.
+
+    Attributes:
+        unreached: Tables and lines that no reachable cycle runs; `unsure`, of which that is not shown and no run was seen either.
+        orders: Whether the level gives orders, so that there is something to repeat.
+    """
+
+    unreached: tuple[tuple[str, str], ...]
+    repeated: tuple[Again, ...]
+    restless: bool
+    unsure: tuple[tuple[str, str], ...] = ()
+    orders: bool = True
+
+
+Line_: TypeAlias = tuple[str, str]
+"""A table and a line."""
+
+
+@dataclass(frozen=True, slots=True)
+class _From:
+    """Where a cycle may begin: in the invariant, or as the level begins; its solver, and the same cycle again."""
+
+    cycle: Cycle
+    again: Cycle
+    solver: Solver
+
+
+def context(
+    stepper: Stepper, asked: Confirmation, clauses: Sequence[Clause], ran: Container[Line_] = frozenset()
+) -> Context:
+    """Asks all of it; lines that `ran` on walks are known to be reached."""
+    every = list(_starts(stepper, asked, clauses))
+    asked.rested_on += [one.solver for one in every]
+    reached = [set(_reached(asked, one)) for one in every]
+    lines = [line for line, _ in _lines(every[0].cycle)]
+    unreached = tuple(line for line in lines if not any(line in found for found in reached))
+    return Context(
+        unreached,
+        tuple(_every_repeated(stepper, asked, every)),
+        any(_restless(stepper, asked, one) for one in every),
+        tuple(line for line in lines if line not in unreached and line not in ran),
+        bool(stepper.links.below),
+    )
+
+
+def never_run(asked: Confirmation, clauses: Sequence[Clause], ran: Container[Line_]) -> list[Node]:
+    """That lines do not run, one by one, which no walk ran and which the clauses allow: what there is to be shown."""
+    solver = asked.known(clauses)
+    return [
+        values.negation(when)
+        for line, when in _lines(asked.cycle)
+        if line not in ran and may(solver, asked.keyed.term(when))
+    ]
+
+
+def _starts(stepper: Stepper, asked: Confirmation, clauses: Sequence[Clause]) -> Iterator[_From]:
+    """A later cycle, and each with which the level may begin."""
+    for at, cycle in enumerate((asked.cycle, *asked.firsts)):
+        again = stepper.cycle(cycle.after, f" again {at}", taken=cycle.taken)
+        yield _From(cycle, again, asked.beginning(cycle) if at else asked.known(clauses))
+
+
+def gives_an_order(stepper: Stepper, cycle: Cycle) -> Node:
+    """That the cycle gives an order."""
+    numbers = [f"{below.order}.{NUMBER}" for below in stepper.links.below]
+    return values.any_of(
+        values.negation(values.equal(cycle.before[name], cycle.after[name])) for name in numbers
+    )
+
+
+def _lines(cycle: Cycle) -> Iterator[tuple[Line_, Node]]:
+    """Each line, and when it runs; but for a DEFAULT that is said to be unreachable, which is a goal."""
+    for at in cycle.tables:
+        for line, match in at.lines:
+            if not (isinstance(line, Default) and line.unreachable):
+                yield (str(at.table.name), str(line.name)), values.both(at.runs, match)
+
+
+def _reached(asked: Confirmation, start: _From) -> Iterator[Line_]:
+    """The lines of which it is not refuted that they run."""
+    runs = [(line, asked.keyed.term(when)) for line, when in _lines(start.cycle)]
+    start.solver.add(*asked.keyed.ranges)
+    for line, term in runs:
+        if may(start.solver, term):
+            yield line
+
+
+def _restless(stepper: Stepper, asked: Confirmation, start: _From) -> bool:
+    """Whether an order may be given in both of two cycles on the same inputs."""
+    sent = [asked.keyed.term(gives_an_order(stepper, cycle)) for cycle in (start.cycle, start.again)]
+    start.solver.add(*asked.keyed.ranges)
+    return may(start.solver, *sent)
+
+
+def may(solver: Solver, *terms: Term) -> bool:
+    """Whether they are not refuted."""
+    solver.push()
+    solver.add(*terms)
+    answer = solver.check()
+    solver.pop()
+    return answer is not Answer.UNSATISFIABLE
+
+
+def _every_repeated(stepper: Stepper, asked: Confirmation, every: Sequence[_From]) -> Iterator[Again]:
+    """Line by line, the leaves that a second match may change, wherever the first begins."""
+    found: dict[Line_, dict[str, None]] = {}
+    for start in every:
+        for line, leaves in _repeated(stepper, asked, start):
+            found.setdefault(line, {}).update(dict.fromkeys(leaves))
+    for where, changed in found.items():
+        yield Again(*where, tuple(changed))
+
+
+def _repeated(stepper: Stepper, asked: Confirmation, start: _From) -> Iterator[tuple[Line_, tuple[str, ...]]]:
+    cycle, again, keyed = start.cycle, start.again, asked.keyed
+    changed = {
+        leaf: keyed.term(values.negation(values.equal(cycle.after[leaf], again.after[leaf])))
+        for leaf in _of_lines(stepper)
+    }
+    lines = [
+        (
+            (str(one.table.name), str(line.name)),
+            keyed.term(values.all_of((one.chosen, match, two.chosen, more))),
+        )
+        for one, two in zip(cycle.tables, again.tables, strict=True)
+        for (line, match), (_, more) in zip(one.lines, two.lines, strict=True)
+    ]
+    gives = keyed.term(gives_an_order(stepper, cycle))
+    solver = start.solver
+    solver.push()
+    solver.add(*keyed.ranges, gives)
+    for line, twice in lines:
+        solver.push()
+        solver.add(twice)
+        leaves = tuple(_shown(solver, changed))
+        solver.pop()
+        if leaves:
+            yield line, leaves
+    solver.pop()
+
+
+def _shown(solver: Solver, changed: dict[str, Term]) -> Iterator[str]:
+    """The leaves of which it is not refuted that they change, a model naming several at once."""
+    left = dict(changed)
+    while left:
+        solver.push()
+        solver.add(smt.any_of(list(left.values())))
+        answer = solver.check()
+        seen = (
+            [leaf for leaf, term in left.items() if solver.value(term, Bool())]
+            if answer is Answer.SATISFIABLE
+            else []
+        )
+        solver.pop()
+        if answer is Answer.UNKNOWN:
+            yield from left
+            return
+        if not seen:
+            return
+        yield from seen
+        left = {leaf: term for leaf, term in left.items() if leaf not in seen}
+
+
+def _of_lines(stepper: Stepper) -> list[str]:
+    """States and outputs that more than the preprocess writes: a test variable is no effect of a line."""
+    before = {str(leaf) for name in stepper.level.preprocess for leaf in stepper.procedures[name].writes}
+    later = {str(leaf) for name in stepper.level.postprocess for leaf in stepper.procedures[name].writes}
+    lines = of_lines(stepper) | later
+    return [
+        str(v.name)
+        for v in stepper.program.variables
+        if v.kind is not Kind.INPUT and (v.name in lines or v.name not in before)
+    ]
+
+
+def of_lines(stepper: Stepper) -> set[str]:
+    """What some line of some table writes."""
+    found = set()
+    for table in stepper.program.tables:
+        every = [*(line.actions for line in table.lines), *([table.default.actions] if table.default else [])]
+        for actions in every:
+            for action in actions:
+                found |= _written(stepper, action.statement)
+    return found
+
+
+def _written(stepper: Stepper, statement: Statement) -> set[str]:
+    found: set[str] = set()
+    for one in everything((statement,)):
+        found |= set(map(str, written_by(one)))
+        if isinstance(one, Call):
+            found |= set(map(str, stepper.procedures[one.procedure].writes))
+    return found

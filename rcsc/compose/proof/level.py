@@ -1,0 +1,296 @@
+"""One level proved in its environment.
+
+In: a stepper (program, level, links). Out: a `LevelProof`: for each goal whether it holds in every reachable cycle, and the invariant that
+shows it. Reachable states are never listed: the invariant holds before the first cycle, every cycle keeps it whatever the environment
+does within its contract, and every cycle that begins in it fulfils the goals.
+"""
+
+import time
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
+
+from rcsc.compose.contract.claims import FOUND
+from rcsc.compose.contract.claims import Verdict as Verdict  # noqa: PLC0414  # it is the verdict of a goal, too
+from rcsc.compose.contract.environment import COMMAND
+from rcsc.compose.contract.obligations import Goal, Sort, Unlooked, goals, unlooked
+from rcsc.compose.contract.predicates import Feature
+from rcsc.compose.contract.transition import Cycle, Stepper
+from rcsc.compose.invariant.confirm import Confirmation
+from rcsc.compose.invariant.pdr import Clause
+from rcsc.compose.invariant.search import LIMITS, Effort, Found, search, strengthened
+from rcsc.compose.proof.context import Context, context, never_run
+from rcsc.compose.proof.termination import Ending, Flow, no_answers
+from rcsc.solvers import smt
+from rcsc.solvers.sat import GaveUpError
+from rcsc.solvers.smt import Answer, Limits, Solver, Term
+from rcsc.symbolic import values
+from rcsc.symbolic.keyed import Keyed
+
+
+class NotConfirmedError(Exception):
+    """Another solver does not say the same, or gave up: nothing may rest on what was found."""
+
+
+@dataclass(frozen=True, slots=True)
+class LevelProof:
+    """What was found of a level.
+
+    Attributes:
+        found: Each goal with its verdict.
+        features: What the clauses speak of.
+        clauses: The invariant: combinations that never stand; empty where none was found.
+        walked: States seen on walks; `learnt`, those that the solver added.
+        seconds: Wall time of the search, for the report.
+        cached: Whether an earlier run made it.
+        context: What was found of its lines; None where something is not proved.
+        endings: Whether its commands end, table by table.
+        unlooked: Goals that could not be stated, as a part of the level was not recognised.
+    """
+
+    level: str
+    found: tuple[tuple[Goal, Verdict], ...]
+    features: tuple[Feature, ...]
+    clauses: tuple[Clause, ...]
+    walked: int
+    learnt: int
+    seconds: float = field(compare=False)
+    cached: bool = field(default=False, compare=False)
+    context: Context | None = None
+    endings: tuple[Ending, ...] = ()
+    unlooked: tuple[Unlooked, ...] = ()
+
+    def verdict(self, sort: Sort, table: str = "", name: str = "") -> Verdict:
+        """Of one goal.
+
+        Raises:
+            KeyError: There is none such.
+        """
+        for goal, verdict in self.found:
+            if (goal.sort, goal.table, goal.name) == (sort, table, name):
+                return verdict
+        raise KeyError(name)
+
+    @property
+    def open(self) -> tuple[Goal, ...]:
+        """The goals that are not proved."""
+        return tuple(goal for goal, verdict in self.found if verdict not in FOUND)
+
+
+def essential(proof: LevelProof) -> tuple[Goal, ...]:
+    """Goals that failed; a field that is not numbered is no failure, but nobody may assume that it is; a command is."""
+    beside = besides(proof)
+    return tuple(goal for goal in proof.open if goal not in beside)
+
+
+def besides(proof: LevelProof) -> tuple[Goal, ...]:
+    """Fields of orders that change under the same number, commands apart."""
+    return tuple(
+        goal for goal in proof.open if goal.sort is Sort.NUMBERED and not goal.name.endswith(f".{COMMAND}")
+    )
+
+
+def prove_level(stepper: Stepper, effort: Effort | None = None) -> LevelProof:
+    """Proves every goal of a level that can be proved with the invariants found, and looks at its lines in their context."""
+    effort = effort or Effort()
+    begun, cut_before = time.perf_counter(), smt.cut_short()
+    cycle, firsts = stepper.cycle(stepper.anywhere()), tuple(_firsts(stepper).values())
+    wanted = goals(stepper, cycle)
+    seen: Context | None = None
+    ends: tuple[Ending, ...] = ()
+    try:
+        found = search(stepper, firsts, cycle, wanted, effort)
+        asked = _asked_anew(found.features, firsts, cycle, effort.limits)
+        looks = effort.looks and not any(wanted[at].sort is not Sort.NUMBERED for at in found.open)
+        flow = Flow(stepper, asked, found.clauses)
+        if looks and (others := [*flow.ways_round(), *never_run(asked, found.clauses, found.ran)]):
+            found = strengthened(stepper, firsts, cycle, found, others)
+            flow = Flow(stepper, asked, found.clauses)
+        _confirm(asked, found.clauses)
+        verdicts = list(_verdicts(stepper, asked, found, wanted))
+        if looks:
+            seen, ends = context(stepper, asked, found.clauses, found.ran), tuple(flow.endings())
+        _uncut(cut_before)
+    except (GaveUpError, NotConfirmedError):
+        found, seen, ends = Found(), None, ()
+        verdicts = [(goal, Verdict.UNDECIDED) for goal in wanted]
+    return LevelProof(
+        stepper.level.name,
+        tuple(verdicts),
+        found.features,
+        found.clauses,
+        found.walked,
+        found.learnt,
+        time.perf_counter() - begun,
+        context=seen,
+        endings=ends,
+        unlooked=(*unlooked(stepper), *(Unlooked(Sort.ENDS, "", why) for why in no_answers(stepper))),
+    )
+
+
+def _uncut(before: int) -> None:
+    """Nothing is said where the processor time ended a question: another machine might have found something else.
+
+    Raises:
+        GaveUpError: It did.
+    """
+    if smt.cut_short() > before:
+        raise GaveUpError
+
+
+def _asked_anew(
+    features: tuple[Feature, ...], firsts: tuple[Cycle, ...], cycle: Cycle, limits: Limits
+) -> Confirmation:
+    return Confirmation(features, firsts, cycle, cycle.cases, Keyed(), limits)
+
+
+def _confirm(asked: Confirmation, clauses: Sequence[Clause]) -> None:
+    """Asks anew, of another solver, whether the clauses are an invariant: the search is not to be trusted.
+
+    Raises:
+        NotConfirmedError: They are not, or the solver gave up.
+    """
+    if any(question.check() is not Answer.UNSATISFIABLE for question in _questions(asked, clauses)):
+        raise NotConfirmedError
+
+
+def _questions(asked: Confirmation, clauses: Sequence[Clause]) -> Iterable[Solver]:
+    for first in asked.firsts:
+        yield asked.first_question(clauses, first)
+    for case in asked.cases:
+        yield asked.step_question(clauses, case)
+
+
+def _firsts(stepper: Stepper) -> dict[str, Cycle]:
+    """The cycles with which a level can begin."""
+    return {
+        "first": stepper.cycle(stepper.first(), " at first"),
+        "restart": stepper.cycle(stepper.restarted(), " at restart"),
+    }
+
+
+def _verdicts(
+    stepper: Stepper, inference: Confirmation, found: Found, wanted: tuple[Goal, ...]
+) -> Iterable[tuple[Goal, Verdict]]:
+    """Asks for each goal whether a first cycle, or a cycle from the invariant, can break it."""
+    keyed = inference.keyed
+    every = [wanted, *(goals(stepper, first) for first in inference.firsts)]
+    asked = [[keyed.term(values.negation(goal.holds)) for goal in each] for each in every]
+    solvers = [inference.known(found.clauses), *(inference.beginning(first) for first in inference.firsts)]
+    believed = _believed(stepper, inference, found.clauses, solvers)
+    for at, goal in enumerate(wanted):
+        if at in found.open:
+            yield goal, Verdict.NOT_PROVED
+            continue
+        answers = {_asked(solver, terms[at]) for solver, terms in zip(solvers, asked, strict=True)}
+        if answers == {Answer.UNSATISFIABLE}:
+            trusted = goal.sort is Sort.ASSUMPTION and goal.name in stepper.trusted
+            yield goal, believed[goal.table] if trusted else Verdict.PROVED
+        else:
+            yield goal, Verdict.NOT_PROVED if Answer.SATISFIABLE in answers else Verdict.UNDECIDED
+
+
+def _believed(
+    stepper: Stepper, inference: Confirmation, clauses: Sequence[Clause], solvers: Sequence[Solver]
+) -> dict[str, Verdict]:
+    """What becomes of what each table declares: where no cycle can keep to it, all that rests on it says nothing.
+
+    So it is where none of some sort of cycle can, a later one, the first, or that after a restart; and for a table where none that
+    runs it can, although one would run it otherwise.
+    """
+    names = [str(at.table.name) for at in inference.cycle.tables]
+    if not stepper.trusted:
+        return dict.fromkeys(names, Verdict.TRUSTED)
+    whole = _of_possible({solver.check() for solver in solvers})
+    if whole is not Verdict.TRUSTED:
+        return dict.fromkeys(names, whole)
+    return {name: _can_run(inference, clauses, solvers, at) for at, name in enumerate(names)}
+
+
+def _of_possible(answers: set[Answer]) -> Verdict:
+    """Whether all of it is possible, as a verdict on what was declared."""
+    if Answer.UNSATISFIABLE in answers:
+        return Verdict.NOT_PROVED
+    return Verdict.UNDECIDED if Answer.UNKNOWN in answers else Verdict.TRUSTED
+
+
+def _can_run(
+    inference: Confirmation, clauses: Sequence[Clause], solvers: Sequence[Solver], at: int
+) -> Verdict:
+    """Whether a table can run in some cycle that is as declared, if it can in one that need not be."""
+    chosen = [inference.keyed.term(one.tables[at].chosen) for one in (inference.cycle, *inference.firsts)]
+    answers = {_asked(solver, term) for solver, term in zip(solvers, chosen, strict=True)}
+    if Answer.SATISFIABLE in answers:
+        return Verdict.TRUSTED
+    if Answer.UNKNOWN in answers:
+        return Verdict.UNDECIDED
+    cycle, *firsts = (replace(one, contract=one.undeclared) for one in (inference.cycle, *inference.firsts))
+    free = replace(inference, cycle=cycle, firsts=firsts)
+    others = [free.known(clauses), *(free.beginning(first) for first in firsts)]
+    without = {_asked(solver, term) for solver, term in zip(others, chosen, strict=True)}
+    if Answer.SATISFIABLE in without:
+        return Verdict.NOT_PROVED
+    return _of_possible(without - {Answer.UNSATISFIABLE})
+
+
+def _asked(solver: Solver, term: Term) -> Answer:
+    solver.push()
+    solver.add(term)
+    answer = solver.check()
+    solver.pop()
+    return answer
+
+
+def certificate(stepper: Stepper, proof: LevelProof, limits: Limits = LIMITS) -> dict[str, str]:
+    """Questions in SMT-LIB, each to be answered `unsat` by any solver, that together show what was proved.
+
+    `first` and `restart`: such a cycle leads into the invariant; `step TABLE`: a later cycle in which this table runs keeps
+    it; `goals first`, `goals restart`: such cycles fulfil the goals that are proved; `goals SORT`: every cycle from the
+    invariant fulfils those of one sort; `lines N`: what is said of lines in their context; `ends TABLE N`: that steps which were
+    not found are not taken, that what counts rises, and that nothing else goes round. If lines or endings are not as the proof
+    has them when they are looked at again, one question is there that has a model.
+    """
+    cycle, firsts = stepper.cycle(stepper.anywhere()), _firsts(stepper)
+    asked = _asked_anew(proof.features, tuple(firsts.values()), cycle, limits)
+    clauses = proof.clauses
+    found = {name: asked.first_question(clauses, first).script() for name, first in firsts.items()}
+    names = [*(f"step {at.table.name}" for at in cycle.tables), "step of no table"]
+    for name, case in zip(names, cycle.cases, strict=False):
+        found[name] = asked.step_question(clauses, case).script()
+    proved = {goal.key for goal, verdict in proof.found if verdict in FOUND}
+    for name, first in firsts.items():
+        wanted = [goal for goal in goals(stepper, first) if goal.key in proved]
+        found[f"goals {name}"] = _none_broken(asked, asked.beginning(first), wanted)
+    every = [goal for goal in goals(stepper, cycle) if goal.key in proved]
+    for sort in dict.fromkeys(goal.sort for goal in every):
+        wanted = [goal for goal in every if goal.sort is sort]
+        found[f"goals {sort.name.lower()}"] = _none_broken(asked, asked.known(clauses), wanted)
+    if proof.context is not None:
+        found |= _looked_again(stepper, proof, asked)
+    return found
+
+
+def _looked_again(stepper: Stepper, proof: LevelProof, asked: Confirmation) -> dict[str, str]:
+    """What `context` and `Flow.endings` rest on."""
+    assert proof.context is not None
+    seen = replace(context(stepper, asked, proof.clauses), unsure=proof.context.unsure)
+    found = {f"lines {number}": text for number, text in enumerate(_refuted(asked), 1)}
+    ends = []
+    for ending in Flow(stepper, asked, proof.clauses).endings():
+        ends.append(ending)
+        found |= {f"ends {ending.table} {number}": text for number, text in enumerate(_refuted(asked), 1)}
+    if (seen, tuple(ends)) != (proof.context, proof.endings):
+        found["lines and endings as before"] = "(set-logic ALL)\n(check-sat)\n"
+    return found
+
+
+def _refuted(asked: Confirmation) -> list[str]:
+    """What was refuted since the last time, a script for each solver."""
+    found = [one.refutations() for one in asked.rested_on if one.refuted]
+    asked.rested_on.clear()
+    return found
+
+
+def _none_broken(asked: Confirmation, solver: Solver, wanted: Sequence[Goal]) -> str:
+    bad = smt.any_of([asked.keyed.term(values.negation(goal.holds)) for goal in wanted])
+    solver.add(*asked.keyed.ranges, bad)
+    return solver.script()

@@ -1,0 +1,321 @@
+"""What kept proofs say of the levels together, read without a solver, a search or a cycle.
+
+In: what a system is made of (`Outline`) and a cache. Out: `Standing`. A proof is filed under a digest of all that it is about (the
+program as resolved, the level, its links), so that it is never taken for one of other content. What a level assumes of a neighbour has
+to be proved of that neighbour, as it is now, before anything is called proved of the levels together.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Any
+
+from rcsc.compose.contract.claims import (
+    CONTRACT,
+    FOUND,
+    RUNS,
+    UNREACHED,
+    Claim,
+    Closed,
+    Key,
+    Need,
+    Verdict,
+    closed,
+    declared,
+    spelled,
+)
+from rcsc.compose.contract.claims import UNKNOWN as UNLOOKED_AT
+from rcsc.host.cache import Cache
+
+ASSUMPTION, PROPERTY = "assumption", "property"
+"""Sorts of goals: of an assumption of a table, of a property."""
+
+
+class Known(StrEnum):
+    """What is known of something that the levels together are to keep."""
+
+    PROVED = "proved"
+    TRUSTED = "assumed"  # the tables say so, of what comes from outside
+    PARTLY = "proved as far as it was looked at"
+    CONDITIONAL = "conditional"  # found so given what it rests on, of which something is not proved
+    NOT_PROVED = "not proved"
+    UNKNOWN = "unknown"  # nobody has looked at this content, or the solver gave up
+
+
+@dataclass(frozen=True, slots=True)
+class Verdicts:
+    """What was found of one level, shortened.
+
+    Attributes:
+        claims: What was found of each, given what it rests on.
+        open: What is not proved and should be, in words.
+        unlooked: What was not looked at, in words.
+    """
+
+    claims: Mapping[Key, Claim]
+    open: tuple[str, ...]
+    unlooked: tuple[str, ...] = ()
+
+    @property
+    def many(self) -> int:
+        """How many claims are found so."""
+        return sum(claim.verdict in FOUND for claim in self.claims.values())
+
+
+def keep_verdicts(cache: Cache, content: str, verdicts: Verdicts) -> None:
+    """Keeps what was found, unless more was proved of the same content before, with more effort."""
+    before = verdicts_of(cache, content)
+    if before is None or before.many <= verdicts.many:
+        value = {
+            "claims": [
+                [
+                    list(key),
+                    claim.verdict,
+                    [[level, list(need)] for level, need in claim.rests_on],
+                    list(claim.trusts),
+                ]
+                for key, claim in verdicts.claims.items()
+            ],
+            "open": list(verdicts.open),
+            "unlooked": list(verdicts.unlooked),
+        }
+        cache.store(value, "composed verdicts", content)
+    cache.store({}, "composed verdicts")
+
+
+def verdicts_of(cache: Cache, content: str) -> Verdicts | None:
+    """What was found of a level of this content."""
+    kept = cache.load("composed verdicts", content)
+    if kept is None:
+        return None
+    claims = {
+        _key(key): Claim(
+            Verdict(verdict), tuple((level, _key(need)) for level, need in rests_on), tuple(trusts)
+        )
+        for key, verdict, rests_on, trusts in kept["claims"]
+    }
+    return Verdicts(claims, tuple(kept["open"]), tuple(kept["unlooked"]))
+
+
+def _key(said: list[str]) -> Key:
+    sort, table, name = said
+    return sort, table, name
+
+
+def any_kept(cache: Cache) -> bool:
+    """Whether levels were ever proved into this cache."""
+    return cache.load("composed verdicts") is not None
+
+
+# --- what a system is made of ----------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class TableOutline:
+    """A table that a level runs.
+
+    Attributes:
+        file: Its real path.
+        default: The name of its DEFAULT line; empty where there is none.
+    """
+
+    file: str
+    name: str
+    default: str
+
+
+@dataclass(frozen=True, slots=True)
+class LevelOutline:
+    """A level.
+
+    Attributes:
+        content: Digest of all that a proof of it is about.
+        file: Real path of the file that declares it; `start` and `end`, where its name stands there.
+        properties: Each with the real path of the file that states it.
+    """
+
+    name: str
+    content: str
+    file: str
+    start: int
+    end: int
+    tables: tuple[TableOutline, ...]
+    properties: tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Assumed:
+    """What a level assumes of a neighbour; `agreed.Promise`, shortened.
+
+    Attributes:
+        record: In which the level takes what it is about.
+        needs: Goals of the neighbour, `own`, of the level itself; `begins`, whether the two begin in agreement.
+    """
+
+    level: str
+    record: str
+    words: str
+    needs: tuple[Need, ...]
+    own: tuple[Need, ...]
+    begins: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Outline:
+    """A system, as its files have it."""
+
+    levels: tuple[LevelOutline, ...]
+    assumed: tuple[Assumed, ...]
+
+
+def outline_of(form: Mapping[str, Any]) -> Outline:
+    """The inverse of `dataclasses.asdict`, by way of JSON."""
+    levels = tuple(
+        LevelOutline(
+            **one
+            | {
+                "tables": tuple(TableOutline(**table) for table in one["tables"]),
+                "properties": tuple((name, file) for name, file in one["properties"]),
+            }
+        )
+        for one in form["levels"]
+    )
+    assumed = tuple(
+        Assumed(
+            one["level"],
+            one["record"],
+            one["words"],
+            _needs(one["needs"]),
+            _needs(one["own"]),
+            one["begins"],
+        )
+        for one in form["assumed"]
+    )
+    return Outline(levels, assumed)
+
+
+def _needs(form: list[Any]) -> tuple[Need, ...]:
+    return tuple((level, _key(key)) for level, key in form)
+
+
+# --- what is known of it -----------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Standing:
+    """What is known of a system of this content.
+
+    Attributes:
+        outline: The system.
+        known: By level, what a kept proof says.
+        closed: What follows of each claim over the whole chain.
+    """
+
+    outline: Outline
+    known: Mapping[str, Verdicts]
+    closed: Mapping[Need, Closed] = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Closes the claims."""
+        claims: dict[Need, Claim] = {
+            (one.level, (CONTRACT, "", one.record)): Claim(
+                Verdict.PROVED if one.begins else Verdict.NOT_PROVED, (*one.needs, *one.own)
+            )
+            for one in self.outline.assumed
+        }
+        claims |= {
+            (level, key): claim for level, kept in self.known.items() for key, claim in kept.claims.items()
+        }
+        object.__setattr__(self, "closed", closed(claims))
+
+    @property
+    def broken(self) -> tuple[Assumed, ...]:
+        """What a level assumes although it is not proved of the neighbour, which was looked at."""
+        return tuple(one for one in self.outline.assumed if self._kept(one) is Known.NOT_PROVED)
+
+    def _kept(self, assumed: Assumed) -> Known:
+        found = [self._goal(level, key) for level, key in assumed.needs]
+        if not assumed.begins or Known.NOT_PROVED in found:
+            return Known.NOT_PROVED
+        return Known.UNKNOWN if Known.UNKNOWN in found else Known.PROVED
+
+    def _goal(self, level: str, key: Key) -> Known:
+        """What was found of a goal, in its level's environment."""
+        verdicts = self.known.get(level)
+        if verdicts is None:
+            return Known.UNKNOWN
+        claim = verdicts.claims.get(key)
+        return Known.PROVED if claim is not None and claim.verdict in FOUND else Known.NOT_PROVED
+
+    def of_goal(self, level: str, key: Key) -> Known:
+        """Whether a goal of a level is proved of the levels together."""
+        found = self._goal(level, key)
+        if found is not Known.PROVED:
+            return found
+        if not self._proved(level, key):
+            return self._given(level, key)
+        return Known.TRUSTED if self._closed(level, key).verdict is Verdict.TRUSTED else Known.PROVED
+
+    def _given(self, level: str, key: Key) -> Known:
+        """What is known of a claim that is found so, but not all that it rests on: not even that where nobody looked at it."""
+        whole = all(owner in self.known for owner, _ in self._closed(level, key).lacks)
+        return Known.CONDITIONAL if whole else Known.UNKNOWN
+
+    def _closed(self, level: str, key: Key) -> Closed:
+        return self.closed.get((level, key), UNLOOKED_AT)
+
+    def _proved(self, level: str, key: Key) -> bool:
+        return self._closed(level, key).proved
+
+    def lacking(self, level: str, key: Key = RUNS) -> tuple[str, ...]:
+        """What is not found of that on which a claim of a level rests, in words; by default, all of its claims."""
+        return tuple(spelled(need, level, self.closed) for need in self._closed(level, key).lacks)
+
+    def trusting(self, level: str, key: Key) -> tuple[str, ...]:
+        """What a claim takes for granted that is written in tables, in words."""
+        return declared(self._closed(level, key).trusts)
+
+    def of_level(self, level: str) -> Known:
+        """Whether all that should be is proved of a level."""
+        verdicts = self.known.get(level)
+        if verdicts is None:
+            return Known.UNKNOWN
+        if verdicts.open:
+            return Known.NOT_PROVED
+        if not self._proved(level, RUNS):
+            return self._given(level, RUNS)
+        return Known.PARTLY if verdicts.unlooked else Known.PROVED
+
+    @property
+    def whole(self) -> Known:
+        """Whether all of it is proved."""
+        found = {self.of_level(one.name) for one in self.outline.levels}
+        if Known.NOT_PROVED in found or self.broken:
+            return Known.NOT_PROVED
+        worst = (Known.UNKNOWN, Known.CONDITIONAL, Known.PARTLY)
+        return next((one for one in worst if one in found), Known.PROVED)
+
+    def missing(self, level: str) -> tuple[str, ...]:
+        """Why a level of which nothing is found wrong is not wholly proved: what it rests on, and what was not looked at."""
+        verdicts = self.known.get(level)
+        if verdicts is None:
+            return ()
+        rests = (f"rests on {one}" for one in self.lacking(level))
+        return (*rests, *(f"not looked at: {one}" for one in verdicts.unlooked))
+
+    def unreached(self, level: str, table: str) -> tuple[str, ...]:
+        """Lines of a table that no reachable cycle of this system runs."""
+        verdicts = self.known.get(level)
+        if verdicts is None:
+            return ()
+        return tuple(
+            line
+            for sort, at, line in verdicts.claims
+            if (sort, at) == (UNREACHED, table) and self._proved(level, (sort, at, line))
+        )
+
+
+def standing(cache: Cache, outline: Outline) -> Standing:
+    """What the cache knows of a system."""
+    found = {one.name: verdicts_of(cache, one.content) for one in outline.levels}
+    return Standing(outline, {name: one for name, one in found.items() if one is not None})

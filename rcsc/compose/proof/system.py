@@ -1,0 +1,286 @@
+"""The whole system proved, level by level.
+
+In: a system's description. Out: `SystemProof`. The proofs of the levels are put together by `compose.__doc__`'s
+argument; here it is checked that what a level assumes of a neighbour is what was proved of that neighbour, and that
+they begin in agreement.
+"""
+
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from pathlib import Path
+
+from rcsc.compose.contract.claims import UNKNOWN, Closed, Key, Need, closed
+from rcsc.compose.contract.environment import Links, check_ends, links
+from rcsc.compose.contract.obligations import Goal, goals
+from rcsc.compose.contract.transition import Safety, Stepper
+from rcsc.compose.invariant.search import Effort
+from rcsc.compose.proof.assume_guarantee import Agreement, agreements, claims, other_end
+from rcsc.compose.proof.kept import keep, recall
+from rcsc.compose.proof.level import LevelProof, Verdict, besides, essential, prove_level
+from rcsc.diagnostics.codes import Code
+from rcsc.diagnostics.diagnostic import Diagnostic
+from rcsc.host import children
+from rcsc.host.cache import Cache
+from rcsc.lang.meaning import with_stops
+from rcsc.lang.model import AssumptionName, Program
+from rcsc.lang.project import Loaded, load
+from rcsc.run.description import BadDescription, Description, description, places
+from rcsc.symbolic.values import TRUE
+
+SHOWN_HERE = frozenset({Code.ASSUMPTION_NOT_PROVED, Code.INVARIANT_BROKEN, Code.TWO_WRITERS})
+"""What is proved of the levels, or is no fault of a cycle as it runs."""
+
+
+class NoProgramError(Exception):
+    """A level's tables cannot be read, or are not in order; says which."""
+
+
+@dataclass(frozen=True, slots=True)
+class SystemProof:
+    """What was found of a system.
+
+    Attributes:
+        closed: What follows of each claim over the whole chain; of levels that were not proved nothing is known.
+    """
+
+    levels: tuple[LevelProof, ...]
+    agreements: tuple[Agreement, ...]
+    seconds: float = field(compare=False)
+    closed: Mapping[Need, Closed] = field(default_factory=dict)
+
+    @property
+    def proved(self) -> bool:
+        """Whether every goal that could be stated, and every agreement between levels, is found so."""
+        return all(not essential(proof) for proof in self.levels) and all(
+            one.holds for one in self.agreements
+        )
+
+    @property
+    def whole(self) -> bool:
+        """Whether it is proved, nothing was left out, and nothing rests on what is not known."""
+        besides_ = {(proof.level, goal.key) for proof in self.levels for goal in besides(proof)}
+        return (
+            self.proved
+            and not any(proof.unlooked for proof in self.levels)
+            and all(one.proved for need, one in self.closed.items() if need not in besides_)
+        )
+
+    def of(self, level: str, key: Key) -> Closed:
+        """What follows of a claim."""
+        return self.closed.get((level, key), UNKNOWN)
+
+
+def steppers(path: Path) -> dict[str, Stepper]:
+    """A stepper for each level of the system described by the file, from the top down.
+
+    Each subordinate may assume that the fields stand still which its superior is built to number: the
+    fields that the superior compares with the last order. That the superior keeps them is proved with it.
+
+    Raises:
+        BadDescription: The description says something that cannot be.
+        NoProgramError: The tables of a level cannot be read.
+    """
+    system = description(path)
+    read = {spec.name: checked(path, spec.program) for spec in system.levels}
+    made = steppers_of(system, {name: program for name, (program, _) in read.items()})
+    return {name: replace_safety(one, read[name][1]) for name, one in made.items()}
+
+
+def steppers_of(system: Description, programs: Mapping[str, Program]) -> dict[str, Stepper]:
+    """The same of programs that were read, one for each level.
+
+    Raises:
+        BadDescription: The description says something that cannot be.
+        NoProgramError: A program has no such level.
+    """
+    check_ends(system, programs)
+    every = {name: links(system, name, program) for name, program in programs.items()}
+    _check_ranks(every)
+    found = {}
+    for name, program in programs.items():
+        level = next((one for one in program.levels if one.name == name), None)
+        if level is None:
+            raise NoProgramError(f"program `{program.name}` has no level `{name}`")
+        found[name] = Stepper(program, level, _narrowed(every[name], every, programs))
+    return found
+
+
+def _check_ranks(every: Mapping[str, Links]) -> None:
+    """No level is its own superior, at whatever distance: each would end its commands given that the other does, and neither might.
+
+    Raises:
+        BadDescription: One is.
+    """
+    for name in every:
+        way = [name]
+        while (above := every[way[-1]].above) is not None and above.name in every and above.name not in way:
+            way.append(above.name)
+        if above is not None and above.name == name:
+            said = ", ".join(f"`{one}` takes orders of `{two}`" for one, two in pairwise((*way, name)))
+            raise BadDescription(f"there is no highest level: {said}")
+
+
+def _narrowed(mine: Links, every: Mapping[str, Links], programs: Mapping[str, Program]) -> Links:
+    """The links, with only those fields numbered that the superior compares."""
+    above = mine.above
+    if above is None or above.outside:
+        return mine
+    from rcsc.compose.contract.predicates import compared
+
+    upper = next((one for one in every[above.name].below if one.name == mine.level), None)
+    if upper is None:
+        raise BadDescription(
+            f"`{mine.level}.{above.order}` is an order of `{above.name}`, which takes no report of it"
+        )
+    pairs = {leaf for pair in compared(programs[above.name]) for leaf in pair}
+    kept = tuple(leaf for leaf in above.numbered if other_end(leaf, above.order, upper.order) in pairs)
+    return replace(mine, above=replace(above, numbered=kept))
+
+
+def program_of(path: Path, name: str) -> Program:
+    """The program of a level, beside the description.
+
+    Raises:
+        NoProgramError: It is not there, does not resolve, or something in it may leave its range or not be defined.
+    """
+    return checked(path, name)[0]
+
+
+def checked(path: Path, name: str) -> tuple[Program, Safety]:
+    """The program of a level, and why a cycle as nodes is the executors'.
+
+    It is so only where nothing leaves its range and every operation is defined: that is shown of the program by itself, where
+    it has to be given its invariants, which are goals here. An assumption that is needed for it stops the cycle where it fails.
+
+    Raises:
+        NoProgramError: It is not there, does not resolve, or something in it may leave its range or not be defined.
+    """
+    from rcsc.procedures.obligations import Obligations
+    from rcsc.solvers.options import Options
+
+    program = loaded_program(path, name)[0]
+    owed = Obligations(program, Options())
+    found = owed.prove(program.tables)
+    for one in found:
+        if one.code not in SHOWN_HERE:
+            raise NoProgramError(f"{one.message}: see `rcsc check {one.primary.span.file}`")
+    return with_stops(program, owed.stops), _safety(program, owed.stops, found)
+
+
+def _safety(
+    program: Program, stops: Mapping[str, tuple[AssumptionName, ...]], found: Sequence[Diagnostic]
+) -> Safety:
+    """Whether the invariants are needed: they are not where all is shown without them, under no other stopping assumptions."""
+    from rcsc.procedures.obligations import Obligations
+    from rcsc.solvers.options import Options
+
+    if not program.invariants:
+        return Safety()
+    without = Obligations(replace(program, invariants=()), Options())
+    wrong = any(one.code not in SHOWN_HERE for one in without.prove(program.tables))
+    if not wrong and all(set(names) <= set(stops.get(table, ())) for table, names in without.stops.items()):
+        return Safety()
+    broken = any(one.code is Code.INVARIANT_BROKEN for one in found)
+    return Safety(tuple(one.name for one in program.invariants), broken)
+
+
+def replace_safety(stepper: Stepper, safety: Safety) -> Stepper:
+    """The stepper with what is known of its program."""
+    return Stepper(stepper.program, stepper.level, stepper.links, safety)
+
+
+def loaded_program(path: Path, name: str) -> tuple[Program, Loaded]:
+    """The same, with the files that it was read from.
+
+    Raises:
+        NoProgramError: It is not there, or does not resolve.
+    """
+    from rcsc.lang.resolve import resolve
+
+    for file in places(path, name):
+        if file.is_file():
+            loaded = load([str(file)])
+            program = resolve(loaded.roots[0], loaded)
+            if isinstance(program, Program) and not loaded.found:
+                return program, loaded
+            raise NoProgramError(f"`{file}` is not in order: see `rcsc check {file}`")
+    raise NoProgramError(f"there is no program `{name}` beside {path}")
+
+
+def prove_system(path: Path, effort: Effort | None = None, jobs: int = 1) -> SystemProof:
+    """Proves every level of the system described by the file.
+
+    Raises:
+        BadDescription: The description says something that cannot be.
+        NoProgramError: The tables of a level cannot be read.
+    """
+    made = steppers(path)
+    return prove_steppers(made, effort, jobs, tuple(made))
+
+
+def prove_steppers(
+    made: Mapping[str, Stepper],
+    effort: Effort | None,
+    jobs: int,
+    only: tuple[str, ...],
+    said: Callable[[LevelProof], None] | None = None,
+    cache: Cache | None = None,
+) -> SystemProof:
+    """Proves these levels, but for those that the cache has; `said` is called with each as it is done.
+
+    Agreements are looked at only for all levels.
+    """
+    begun = time.perf_counter()
+    proofs: dict[str, LevelProof] = {}
+    for name, proof in _each_unless_kept(made, effort or Effort(), jobs, only, cache):
+        proofs[name] = proof
+        if said is not None:
+            said(proof)
+    agreed = tuple(agreements(made, proofs)) if set(proofs) == set(made) else ()
+    follows = closed(claims(made, proofs))
+    return SystemProof(tuple(proofs.values()), agreed, time.perf_counter() - begun, follows)
+
+
+def _each_unless_kept(
+    made: Mapping[str, Stepper], effort: Effort, jobs: int, only: tuple[str, ...], cache: Cache | None
+) -> Iterator[tuple[str, LevelProof]]:
+    """Each level's proof, in order."""
+    known = {name: recall(cache, made[name], effort) for name in only} if cache is not None else {}
+    new = _each(made, effort, jobs, tuple(name for name in only if known.get(name) is None))
+    for name in only:
+        kept = known.get(name)
+        if kept is not None:
+            yield name, kept
+            continue
+        _, proof = next(new)
+        if cache is not None:
+            keep(cache, made[name], effort, proof)
+        yield name, proof
+
+
+def _each(
+    made: Mapping[str, Stepper], effort: Effort, jobs: int, only: tuple[str, ...]
+) -> Iterator[tuple[str, LevelProof]]:
+    """Each level's proof; in processes where there are several jobs."""
+    if jobs == 1 or len(only) <= 1:
+        for name in only:
+            yield name, prove_level(made[name], effort)
+        return
+    with children.pool(min(jobs, len(only))) as pool:
+        waiting = {name: pool.submit(_proved, made[name], effort) for name in only}
+        for name, one in waiting.items():
+            proof = children.answer(one)
+            yield name, replace(proof, found=_again(made[name], proof))
+
+
+def _proved(stepper: Stepper, effort: Effort) -> LevelProof:
+    """In a process of its own: goals come back without their nodes, which are many, and are made anew."""
+    found = prove_level(stepper, effort)
+    return replace(found, found=tuple((replace(goal, holds=TRUE), verdict) for goal, verdict in found.found))
+
+
+def _again(stepper: Stepper, proof: LevelProof) -> tuple[tuple[Goal, Verdict], ...]:
+    wanted = goals(stepper, stepper.cycle(stepper.anywhere()))
+    return tuple((goal, verdict) for goal, (_, verdict) in zip(wanted, proof.found, strict=True))

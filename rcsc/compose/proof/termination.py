@@ -1,0 +1,398 @@
+"""That every command is answered some time and stays so, given that what is below does: no deadlock, nothing that goes on for ever.
+
+In: a stepper, and what was confirmed of it. Out: an `Ending` for each table. A level is *answered* in a cycle when each
+subordinate echoes the last order and says of it *done* or *failed*; of the first command, PAUSE or its like, *done*. It is
+assumed that each order, if no other replaces it, is answered some time and stays so; and that is what is shown of the level: it
+is *unanswered* while it reports neither; a fourth status answers nothing. The argument, for a level that keeps one command:
+
+- Its *table* stays, or what selects it is no part of the command: then from table to table there is no way round.
+- Its *phase* is its pending next states, and the flags that its lines write. From phase to phase there is no way round (all
+  steps are listed by the solver, from the invariant), so after the cycle that takes the command, which may be the first of all, the phase
+  changes at most `changes` times; but for ways round on which
+  the command is answered in every cycle: whoever stays on one has answered for good.
+- While the phase stays, lines follow one another. A line that comes again and again stands on a way round among them. It
+  comes finitely often if there is a *counter*, a number of the level that rises whenever the line runs and never falls on that
+  way round: it ends at the end of its range. A real has to rise by a share of its range (`SMALLEST`), found in fractions
+  (`measured`). Lines that have one are taken out, and what is left is looked at again.
+- A line that gives orders must have one, at least for the cycles in which it does so. So orders end.
+- Then answers come, and stay. Among the lines that are left none may go round in answered cycles that give no order, but those that
+  leave the command unanswered only finitely often.
+
+Lines for which this is not shown are named in `endless`: they wait for what they read.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from rcsc.compose.contract.environment import COMMAND, ECHO, ECHOED, NUMBER, STATUS, Below
+from rcsc.compose.contract.obligations import FLAG
+from rcsc.compose.contract.transition import Cycle, Stepper, TableAt
+from rcsc.compose.invariant.confirm import Confirmation
+from rcsc.compose.invariant.pdr import Clause
+from rcsc.compose.proof.context import gives_an_order, may, of_lines
+from rcsc.compose.proof.ranking import Counted, Turn, lines_that_stop, parts
+from rcsc.lang.model import Bool, Enum, Kind, OneTable, Read, pending
+from rcsc.solvers import smt
+from rcsc.solvers.smt import Answer
+from rcsc.symbolic import values
+from rcsc.symbolic.keyed import sort
+from rcsc.symbolic.values import Node
+
+MOST_STEPS = 400
+DONE, FAILED = "done", "failed"
+"""What a report says of a command that is answered; whatever else it says, the command goes on."""
+
+Phase = tuple[int, ...]
+Way = tuple[Phase, Phase]
+
+
+@dataclass(frozen=True, slots=True)
+class Ending:
+    """What was found of one table.
+
+    Attributes:
+        changes: How often the phase can change while the command lasts, after the cycle that takes it; None where it could go round,
+            or the table could.
+        counted: Lines that may run for as long as a counter rises.
+        still: Inputs whose values, echoes and statuses apart, are taken to stand still meanwhile.
+        endless: Lines of which it is not shown that they end.
+    """
+
+    table: str
+    changes: int | None
+    counted: tuple[Counted, ...] = ()
+    still: tuple[str, ...] = ()
+    endless: tuple[str, ...] = ()
+
+    @property
+    def proved(self) -> bool:
+        """Whether the command ends, given answers."""
+        return self.changes is not None and not self.endless
+
+
+def reports(stepper: Stepper) -> bool:
+    """Whether the level has a superior, and all reports can say that a command is done."""
+    above = stepper.links.above
+    if above is None:
+        return False
+    return not no_answers(stepper)
+
+
+def no_answers(stepper: Stepper) -> tuple[str, ...]:
+    """Why it is not known which reports answer a command."""
+    above = stepper.links.above
+    if above is None:
+        return ()
+    found = []
+    ends = ((above.order, above.report), *((below.order, below.report) for below in stepper.links.below))
+    for order, report in ends:
+        kind = stepper.kinds.get(f"{report}.{STATUS}")
+        if not isinstance(kind, Enum) or DONE not in kind.members:
+            found.append(f"`{report}` has no `{STATUS}` with a member `{DONE}`")
+        if not isinstance(stepper.kinds[f"{order}.{COMMAND}"], Enum):
+            found.append(f"`{order}.{COMMAND}` is no enumeration")
+    return tuple(found)
+
+
+def command_stays(stepper: Stepper, cycle: Cycle) -> Node:
+    """The level's command is still the same."""
+    above = stepper.links.above
+    assert above is not None
+    number = f"{above.order}.{NUMBER}"
+    return values.equal(cycle.before[number], cycle.taken[number])
+
+
+def unanswered(stepper: Stepper, cycle: Cycle) -> Node:
+    """The level's report is none that its superior waits for: *done* or *failed*; of the first command *done* alone."""
+    above = stepper.links.above
+    assert above is not None
+    command, status = f"{above.order}.{COMMAND}", f"{above.report}.{STATUS}"
+    rests = values.equal(cycle.taken[command], values.constant(stepper.kinds[command], 0))
+    done = _says(stepper, status, cycle.after, DONE)
+    ended = values.either(
+        done, values.both(values.negation(rests), _says(stepper, status, cycle.after, FAILED))
+    )
+    return values.negation(ended)
+
+
+def answered(stepper: Stepper, cycle: Cycle, below: Below) -> Node:
+    """The last order is echoed, and ended: the first command by *done* alone."""
+    command, status = f"{below.order}.{COMMAND}", f"{below.report}.{STATUS}"
+    echoed = values.equal(cycle.taken[f"{below.report}.{ECHO}"], cycle.before[f"{below.order}.{NUMBER}"])
+    rests = values.equal(cycle.before[command], values.constant(stepper.kinds[command], 0))
+    done = _says(stepper, status, cycle.taken, DONE)
+    ended = values.either(
+        done, values.both(values.negation(rests), _says(stepper, status, cycle.taken, FAILED))
+    )
+    return values.both(echoed, ended)
+
+
+def _says(stepper: Stepper, leaf: str, leaves: Mapping[str, Node], member: str) -> Node:
+    kind = stepper.kinds[leaf]
+    assert isinstance(kind, Enum)
+    if member not in kind.members:
+        return values.FALSE
+    return values.equal(leaves[leaf], values.constant(kind, kind.members.index(member)))
+
+
+@dataclass(frozen=True, slots=True)
+class _Phases:
+    """The phases that a command of a table goes through.
+
+    Attributes:
+        leaves: What tells them apart.
+        steps: Every change from one to another; None where they are too many, or the solver gave up.
+        rounds: Phases that lead to one another, and whether the command may be unanswered in a cycle from one of them to one.
+    """
+
+    leaves: tuple[str, ...]
+    steps: set[Way] | None
+    rounds: tuple[tuple[set[Phase], bool], ...] = ()
+
+    @property
+    def waiting(self) -> list[Way]:
+        """Steps on a way round on which the command may be unanswered."""
+        parts_ = [part for part, waits in self.rounds if waits]
+        return sorted(way for way in self.steps or () if any(part.issuperset(way) for part in parts_))
+
+    @property
+    def changes(self) -> int | None:
+        """Steps on the longest way, those left out that lead round while the command is answered; None where others do."""
+        if self.steps is None or any(waits for _, waits in self.rounds):
+            return None
+        same = {phase: min(part) for part, _ in self.rounds for phase in part}
+        left = {(same.get(one, one), same.get(two, two)) for one, two in self.steps}
+        return longest({(one, two) for one, two in left if one != two})
+
+
+class Flow:
+    """The questions of one level, from an invariant; none where it has no superior that it reports to."""
+
+    def __init__(self, stepper: Stepper, asked: Confirmation, clauses: Sequence[Clause]) -> None:
+        self.stepper, self.asked, self.clauses = stepper, asked, clauses
+        self.keyed = asked.keyed
+        self.rows: dict[tuple[str, ...], list[Cycle]] = {}
+        self.found: dict[int, _Phases] = {}
+
+    @property
+    def tables(self) -> tuple[TableAt, ...]:
+        """Those that are asked about."""
+        return self.asked.cycle.tables if reports(self.stepper) else ()
+
+    def endings(self) -> Iterator[Ending]:
+        """One for each table."""
+        round_ = self._tables_round() if self.tables else set()
+        for number in range(len(self.tables)):
+            yield self._ending(number, goes_round=number in round_)
+
+    def _ending(self, number: int, *, goes_round: bool) -> Ending:
+        changes = self._phases(number).changes
+        found = lines_that_stop(
+            self.stepper.program, self.asked, self.clauses, lambda still: self._turns(number, still)
+        )
+        table = str(self.tables[number].table.name)
+        return Ending(table, None if goes_round else changes, found.counted, found.still, found.endless)
+
+    def ways_round(self) -> list[Node]:
+        """That steps between phases are not taken, one by one, of which some lead round: what there is to be shown if none does."""
+        found = []
+        for number, at in enumerate(self.tables):
+            phases = self._phases(number)
+            taken = values.both(at.chosen, command_stays(self.stepper, self.asked.cycle))
+            before, after = self._ends(phases.leaves)
+            found += [
+                values.negation(values.all_of((taken, *_are(before, one), *_are(after, two))))
+                for one, two in phases.waiting
+            ]
+        return found
+
+    # --- from phase to phase ---
+
+    def _phases(self, number: int) -> _Phases:
+        """Of a table; flags that lines set and reset while the command is unanswered tell none apart."""
+        if number not in self.found:
+            at = self.asked.cycle.tables[number]
+            phases = self._phases_by(at, self._pending_and_flags())
+            turning = {
+                leaf
+                for place, leaf in enumerate(phases.leaves)
+                for one, two in phases.waiting
+                if one[place] != two[place] and isinstance(self.stepper.kinds[leaf], Bool) and leaf != FLAG
+            }
+            if turning:
+                phases = self._phases_by(at, tuple(leaf for leaf in phases.leaves if leaf not in turning))
+            self.found[number] = phases
+        return self.found[number]
+
+    def _pending_and_flags(self) -> tuple[str, ...]:
+        """Pending states, the flag of a new command, and flags that lines write."""
+        variables = self.stepper.program.variables
+        found = [
+            str(pending(v.name))
+            for v in variables
+            if v.deferred_until is not None and isinstance(v.type, Bool | Enum)
+        ]
+        written = of_lines(self.stepper)
+        flags = [
+            str(v.name)
+            for v in variables
+            if v.kind is Kind.STATE and isinstance(v.type, Bool) and (v.name == FLAG or v.name in written)
+        ]
+        return (*found, *flags)
+
+    def _ends(self, leaves: Sequence[str]) -> tuple[list[Node], list[Node]]:
+        """What tells phases apart, before the cycle and behind it."""
+        cycle = self.asked.cycle
+        return [cycle.before[leaf] for leaf in leaves], [cycle.after[leaf] for leaf in leaves]
+
+    def _phases_by(self, at: TableAt, leaves: tuple[str, ...]) -> _Phases:
+        steps = self._steps(at, leaves)
+        return _Phases(leaves, steps, () if steps is None else tuple(self._rounds(at, leaves, steps)))
+
+    def _rounds(
+        self, at: TableAt, leaves: tuple[str, ...], steps: set[Way]
+    ) -> Iterator[tuple[set[Phase], bool]]:
+        phases = sorted({phase for step in steps for phase in step})
+        places = {phase: place for place, phase in enumerate(phases)}
+        for part in parts({(places[one], places[two]) for one, two in steps}):
+            inside = {phases[place] for place in part}
+            cycle, solver = self.asked.cycle, self.asked.known(self.clauses)
+            ends = [
+                values.any_of(values.all_of(_are(nodes, phase)) for phase in sorted(inside))
+                for nodes in self._ends(leaves)
+            ]
+            waits = (command_stays(self.stepper, cycle), unanswered(self.stepper, cycle))
+            term = self.keyed.term(values.all_of((at.chosen, *waits, *ends)))
+            solver.add(*self.keyed.ranges)
+            self.asked.rested_on.append(solver)
+            yield inside, may(solver, term)
+
+    def _steps(self, at: TableAt, leaves: tuple[str, ...]) -> set[Way] | None:
+        """Every change of phase in a cycle that runs the table; None where they are too many, or the solver gave up."""
+        keyed, cycle = self.keyed, self.asked.cycle
+        before, after = self._ends(leaves)
+        stays = values.all_of(map(values.equal, before, after))
+        moves = keyed.term(
+            values.all_of((at.chosen, command_stays(self.stepper, cycle), values.negation(stays)))
+        )
+        nodes = (*before, *after)
+        terms = [keyed.term(node) for node in nodes]
+        solver = self.asked.known(self.clauses)
+        solver.add(*keyed.ranges, moves)
+        found: set[Way] = set()
+        while len(found) < MOST_STEPS:
+            answer = solver.check()
+            if answer is Answer.UNSATISFIABLE:
+                self.asked.rested_on.append(solver)
+                return found
+            if answer is Answer.UNKNOWN:
+                return None
+            point = [
+                int(solver.value(term, sort(node.kind))) for node, term in zip(nodes, terms, strict=True)
+            ]
+            found.add((tuple(point[: len(leaves)]), tuple(point[len(leaves) :])))
+            same = [
+                keyed.has(term, node.kind, value)
+                for node, term, value in zip(nodes, terms, point, strict=True)
+            ]
+            solver.add(smt.negation(smt.all_of(same)))
+        return None
+
+    # --- three cycles in a row ---
+
+    def _turns(self, number: int, still: tuple[str, ...]) -> tuple[Turn, Turn, Turn]:
+        """Of a table: three cycles in a row."""
+        one, two, three = (self._turn(cycle, number) for cycle in self._cycles(still))
+        return one, two, three
+
+    def _cycles(self, still: tuple[str, ...]) -> list[Cycle]:
+        """Three in a row, from anywhere in the invariant, in which these inputs keep their values."""
+        if still not in self.rows:
+            row = [self.asked.cycle]
+            kept = {leaf: taken for leaf, taken in row[0].taken.items() if _stands_still(leaf, still)}
+            for suffix in (" second", " third"):
+                free = {
+                    leaf: values.variable(f"{leaf}{suffix}", node.kind) for leaf, node in row[0].taken.items()
+                }
+                row.append(self.stepper.cycle(row[-1].after, suffix, taken={**free, **kept}))
+            self.rows[still] = row
+        return self.rows[still]
+
+    def _turn(self, cycle: Cycle, number: int) -> Turn:
+        """The cycle of a table, in which the command and the phase stay."""
+        leaves = self._phases(number).leaves
+        same = values.all_of(values.equal(cycle.before[leaf], cycle.after[leaf]) for leaf in leaves)
+        at = cycle.tables[number]
+        stays = values.all_of((at.chosen, cycle.contract, command_stays(self.stepper, cycle), same))
+        orders = gives_an_order(self.stepper, cycle)
+        return Turn(
+            at,
+            cycle.before,
+            cycle.after,
+            stays,
+            orders,
+            unanswered(self.stepper, cycle),
+            values.all_of(answered(self.stepper, cycle, below) for below in self.stepper.links.below),
+        )
+
+    # --- from table to table ---
+
+    def _tables_round(self) -> set[int]:
+        """The tables that may follow one another round while the command stays."""
+        above, chosen = self.stepper.links.above, self.stepper.level.tables
+        assert above is not None
+        if isinstance(chosen, OneTable):
+            return set()
+        if isinstance(chosen.selector, Read) and chosen.selector.name in above.numbered:
+            return set()  # the same under the same number: the contract
+        one, two, _ = self._cycles(())
+        term = self.keyed.term
+        goes_on = [
+            term(values.both(cycle.contract, command_stays(self.stepper, cycle))) for cycle in (one, two)
+        ]
+        runs = [[term(at.chosen) for at in cycle.tables] for cycle in (one, two)]
+        solver = self.asked.known(self.clauses)
+        self.asked.rested_on.append(solver)
+        solver.add(*self.keyed.ranges, *goes_on)
+        steps = {
+            (here, there)
+            for here, now in enumerate(runs[0])
+            for there, then in enumerate(runs[1])
+            if here != there and may(solver, now, then)
+        }
+        return {table for part in parts(steps) for table in part}
+
+
+def _are(nodes: Sequence[Node], phase: Phase) -> list[Node]:
+    return [
+        values.equal(node, values.constant(node.kind, value))
+        for node, value in zip(nodes, phase, strict=True)
+    ]
+
+
+def _stands_still(leaf: str, still: tuple[str, ...]) -> bool:
+    """Whether it is a value, no echo or status, in one of these inputs."""
+    record, _, part = leaf.partition(".")
+    return record in still and part not in (NUMBER, ECHO, ECHOED, STATUS)
+
+
+def longest(steps: set[Way]) -> int | None:
+    """Steps on the longest way; None where a way goes round."""
+    onward: dict[Phase, list[Phase]] = {}
+    for one, two in sorted(steps):
+        onward.setdefault(one, []).append(two)
+    length: dict[Phase, int] = {}
+
+    def measure(phase: Phase, way: tuple[Phase, ...]) -> bool:
+        if phase in length:
+            return True
+        if phase in way:
+            return False
+        if not all(measure(one, (*way, phase)) for one in onward.get(phase, ())):
+            return False
+        length[phase] = max((1 + length[one] for one in onward.get(phase, ())), default=0)
+        return True
+
+    if not all(measure(phase, ()) for phase in onward):
+        return None
+    return max(length.values(), default=0)

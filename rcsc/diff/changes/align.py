@@ -1,0 +1,248 @@
+"""Two versions of a program over one set of variables.
+
+In: two programs. Out: `Aligned`: the leaves that both have, each with the values that both versions can hold, and what
+changed of the declarations. Members of an enumeration are the same where their names are: where the two versions number them
+differently, both are numbered anew.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, fields, is_dataclass, replace
+from typing import Any
+
+from rcsc.lang.expressions.scope import spell_unit
+from rcsc.lang.model import (
+    Among,
+    Arm,
+    Case,
+    Enum,
+    Int,
+    Kind,
+    Literal,
+    Program,
+    Real,
+    Scalar,
+    TableByCommand,
+    Test,
+    Value,
+    Variable,
+    spell,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Declaration:
+    """What changed of a declaration.
+
+    Attributes:
+        what: `variable x`, `enumeration status`.
+        before: Empty where it is new; likewise `after` where it is gone.
+    """
+
+    what: str
+    before: str
+    after: str
+
+
+@dataclass(frozen=True, slots=True)
+class Aligned:
+    """Two versions that can be compared.
+
+    Attributes:
+        before, after: The programs, members of enumerations numbered alike.
+        leaves: The leaves that both have, with the values that both can hold, in declared order.
+        apart: Leaves of one name but of kinds that cannot be compared.
+        changes: Of declarations.
+    """
+
+    before: Program
+    after: Program
+    leaves: Mapping[str, Scalar]
+    apart: frozenset[str]
+    changes: tuple[Declaration, ...]
+
+
+def aligned(before: Program, after: Program) -> Aligned:
+    """The two versions over what they have in common."""
+    changes = tuple(_declarations(before, after))
+    numbering = _numbering(before, after)
+    one, two = (
+        _Rewriter(numbering).program(program) if numbering else program for program in (before, after)
+    )
+    later = {str(variable.name): variable.type for variable in two.variables}
+    leaves: dict[str, Scalar] = {}
+    apart = set()
+    for variable in one.variables:
+        if variable.name in later:
+            kind = _both(variable.type, later[variable.name], numbering)
+            if kind is None:
+                apart.add(str(variable.name))
+            else:
+                leaves[str(variable.name)] = kind
+    return Aligned(one, two, leaves, frozenset(apart), changes)
+
+
+def _both(one: Scalar, two: Scalar, shared: "Mapping[Enum, _Members]") -> Scalar | None:
+    """The values of both types; None where they are of different kinds, or have none in common."""
+    match one, two:
+        case Int(unit=unit), Int(unit=other) if unit == other:
+            low, high = max(one.low, two.low), min(one.high, two.high)
+            return Int(low, high, unit) if low <= high else None
+        case Real(unit=unit), Real(unit=other) if unit == other:
+            least, greatest = max(one.low, two.low), min(one.high, two.high)
+            return Real(least, greatest, unit) if least <= greatest else None
+        case Enum(), Enum():
+            known = {members.whole: members.common for members in shared.values()}
+            if one == two:
+                return Enum(one.name, known[one]) if one in known else one
+            return one if one.members == two.members else None
+        case _:
+            return one if type(one) is type(two) and not isinstance(one, Int | Real | Enum) else None
+
+
+# --- enumerations ------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class _Members:
+    """A version's enumeration numbered anew.
+
+    Attributes:
+        whole: The members of both versions: those in common first.
+        common: Those in common.
+        to: The new number of each member.
+    """
+
+    whole: Enum
+    common: tuple[str, ...]
+    to: tuple[int, ...]
+
+
+def _numbering(before: Program, after: Program) -> dict[Enum, _Members]:
+    """For each enumeration that both declare with other members, how it is numbered anew; by its old form."""
+    later = {enum.name: enum for enum in after.enums}
+    found = {}
+    for one in before.enums:
+        two = later.get(one.name)
+        if two is None or two.members == one.members:
+            continue
+        common = tuple(name for name in one.members if name in two.members)
+        if not common:
+            continue
+        rest = [name for name in (*one.members, *two.members) if name not in common]
+        whole = Enum(one.name, (*common, *dict.fromkeys(rest)))
+        for version in (one, two):
+            found[version] = _Members(whole, common, tuple(map(whole.members.index, version.members)))
+    return found
+
+
+class _Rewriter:
+    """One program being rewritten; tests that lines share stay shared."""
+
+    def __init__(self, members: Mapping[Enum, _Members]) -> None:
+        self.members = members
+        self.tests: dict[int, Test] = {}
+
+    def program(self, program: Program) -> Program:
+        """Rewritten, apart from its declarations as written."""
+        return replace(
+            program,
+            variables=self.any(program.variables),
+            procedures=self.any(program.procedures),
+            assumptions=self.any(program.assumptions),
+            invariants=self.any(program.invariants),
+            properties=self.any(program.properties),
+            tables=self.any(program.tables),
+            levels=self.any(program.levels),
+        )
+
+    def any(self, value: Any) -> Any:
+        """Any part of the model."""
+        if isinstance(value, Enum):
+            return self.members[value].whole if value in self.members else value
+        if isinstance(value, tuple):
+            return tuple(self.any(part) for part in value)
+        if not is_dataclass(value) or isinstance(value, type):
+            return value
+        return self._test(value) if isinstance(value, Test) else self._changed(value)
+
+    def _test(self, test: Test) -> Test:
+        known = self.tests.get(id(test))
+        if known is None:  # its box counts members as they were; the condition says the same
+            known = self.tests[id(test)] = replace(test, condition=self.any(test.condition), box=None)
+        return known
+
+    def _changed(self, value: Any) -> Any:
+        parts = {one.name: self.any(getattr(value, one.name)) for one in fields(value) if one.init}
+        match value:
+            case Literal(type=kind) if isinstance(kind, Enum):
+                parts["value"] = self._number(kind, value.value)
+            case Among(subject=subject):
+                parts["values"] = self._numbers(subject.type, value.values)
+            case Variable(type=kind):
+                parts["initial"] = self._number(kind, value.initial)
+                if value.safe is not None:
+                    parts["safe"] = self._number(kind, value.safe)
+            case Case(subject=subject):
+                parts["arms"] = tuple(
+                    Arm(self._numbers(subject.type, arm.values), self.any(arm.body), arm.span)
+                    for arm in value.arms
+                )
+            case TableByCommand(selector=selector):
+                parts["tables"] = tuple((self._number(selector.type, at), name) for at, name in value.tables)
+        return type(value)(**parts)
+
+    def _number(self, kind: Scalar, value: Value) -> Value:
+        if isinstance(kind, Enum) and kind in self.members:
+            return self.members[kind].to[int(value)]
+        return value
+
+    def _numbers(self, kind: Scalar, numbers: Iterable[Value]) -> tuple[Value, ...]:
+        return tuple(self._number(kind, value) for value in numbers)
+
+
+# --- declarations --------------------------------------------------------------------------
+
+
+def _declarations(before: Program, after: Program) -> Iterable[Declaration]:
+    """Enumerations and variables that are new, gone, or declared otherwise."""
+    enums = [{one.name: ", ".join(one.members) for one in program.enums} for program in (before, after)]
+    yield from _changed(
+        "enumeration", *({n: said for n, said in one.items() if all(n in e for e in enums)} for one in enums)
+    )
+    yield from _changed(
+        "variable",
+        *({str(v.name): _said(v) for v in p.variables if not _is_pending(v)} for p in (before, after)),
+    )
+
+
+def _changed(what: str, before: Mapping[str, str], after: Mapping[str, str]) -> Iterator[Declaration]:
+    for name in dict.fromkeys((*before, *after)):
+        if before.get(name, "") != after.get(name, ""):
+            yield Declaration(f"{what} `{name}`", before.get(name, ""), after.get(name, ""))
+
+
+def _is_pending(variable: Variable) -> bool:
+    """Whether it is the leaf of a deferred value: declared with its variable."""
+    return variable.name.endswith(".next")
+
+
+def _said(variable: Variable) -> str:
+    """The declaration in the language's words, without what it says of its deferred value."""
+    unit = variable.type.unit if isinstance(variable.type, Int | Real) else ()
+    stated = f" [{spell_unit(unit)}]" if unit else ""
+    first = spell(variable.type, variable.initial)
+    admit = f" {variable.admit.value}" if variable.kind is Kind.INPUT else ""
+    deferred = " deferred" if variable.deferred_until is not None else ""
+    admit += "" if variable.safe is None else f" safe {spell(variable.type, variable.safe)}"
+    return f"{variable.kind.value} : {kind_said(variable.type)}{stated} = {first}{admit}{deferred}"
+
+
+def kind_said(kind: Scalar) -> str:
+    """The type in the language's words."""
+    match kind:
+        case Enum(name=name):
+            return name
+        case Int() | Real():
+            return f"{type(kind).__name__.lower()} {spell(kind, kind.low)} .. {spell(kind, kind.high)}"
+        case _:
+            return "bool"

@@ -1,0 +1,93 @@
+"""Which line can match in the cycle after which, in one version and not in the other.
+
+In: two versions of a program. Out: `Follows`, one for each table that a level runs and for which it can have changed. Each version's
+pairs are those of `relation.follow`: inputs are free under the table's assumptions, and arithmetic on doubles may say "can" too often,
+in either version.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping
+
+from rcsc.diff.changes.difference import Follows
+from rcsc.diff.changes.versions import Versions
+from rcsc.lang.digest import Digests
+from rcsc.lang.model import Call, Level, Line, OneTable, ProcedureName, Program, Statement, Table
+from rcsc.relation.follow import following
+from rcsc.relation.steps import UnansweredError
+from rcsc.solvers.options import Options
+
+Pairs = frozenset[tuple[str, str]]
+
+
+def follows(versions: Versions) -> Iterator[Follows]:
+    """Every table that both versions have and a level runs, where its pairs may differ."""
+    later = {level.name: level for level in versions.after.levels}
+    for level in versions.before.levels:
+        if level.name not in later:
+            continue
+        pair = level, later[level.name]
+        around = _around(versions.digests[0], level) != _around(versions.digests[1], pair[1])
+        tables = [_tables(side.program, one) for side, one in zip(versions.digests, pair, strict=True)]
+        for name, one in tables[0].items():
+            two = tables[1].get(name)
+            if two is not None and (
+                around or versions.digests[0].table(one) != versions.digests[1].table(two)
+            ):
+                yield _compared(versions, level.name, one, two)
+
+
+def _around(digests: Digests, level: Level) -> object:
+    """What a cycle does besides the table: a change of it may change the pairs of every table."""
+    bodies: list[list[Statement]] = [
+        [Call(ProcedureName(name)) for name in part] for part in (level.preprocess, level.postprocess)
+    ]
+    deferred = [
+        (v.name, repr(v.deferred_until)) for v in digests.program.variables if v.deferred_until is not None
+    ]
+    return [digests.body(body) for body in bodies], deferred
+
+
+def _tables(program: Program, level: Level) -> Mapping[str, Table]:
+    named = {str(table.name): table for table in program.tables}
+    if isinstance(level.tables, OneTable):
+        return {str(level.tables.table): named[level.tables.table]}
+    return {str(name): named[name] for _, name in level.tables.tables}
+
+
+def _compared(versions: Versions, level: str, one: Table, two: Table) -> Follows:
+    name = str(two.name)
+    try:
+        before = _pairs(versions.before, one, versions.options)
+        after = _pairs(versions.after, two, versions.options)
+    except UnansweredError:
+        return Follows(level, name, decided=False)
+    called = _renamed(one, two)
+    before = frozenset((called.get(a, a), called.get(b, b)) for a, b in before)
+    order = {line: at for at, line in enumerate(_names(two))}
+
+    def sorted_(pairs: Iterable[tuple[str, str]]) -> tuple[tuple[str, str], ...]:
+        return tuple(sorted(pairs, key=lambda pair: [(order.get(line, len(order)), line) for line in pair]))
+
+    return Follows(level, name, sorted_(after - before), sorted_(before - after))
+
+
+def _pairs(program: Program, table: Table, options: Options) -> Pairs:
+    names = _names(table)
+    return frozenset((names[one.line], names[one.then]) for one in following(program, table, options))
+
+
+def _names(table: Table) -> list[str]:
+    default = [] if table.default is None else [str(table.default.name)]
+    return [*(str(line.name) for line in table.lines), *default]
+
+
+def _renamed(one: Table, two: Table) -> dict[str, str]:
+    """New names of lines that are otherwise word for word as they were."""
+    names = set(_names(one)), set(_names(two))
+    fresh = {_body(line): str(line.name) for line in two.lines if str(line.name) not in names[0]}
+    gone = [line for line in one.lines if str(line.name) not in names[1]]
+    return {str(line.name): fresh[_body(line)] for line in gone if _body(line) in fresh}
+
+
+def _body(line: Line) -> str:
+    tests = [repr(test.condition) for test in line.tests if test is not None]
+    return repr((tests, [repr(action.statement) for action in line.actions]))

@@ -1,0 +1,323 @@
+"""Two versions of what is no table: procedures, what a level runs around its table, conditions with a name, periods.
+
+In: versions. Out: `Part`s.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import fields, is_dataclass, replace
+from enum import StrEnum
+from functools import partial
+from itertools import product
+from typing import Any
+
+from rcsc.diff.changes.contrast import changes, contrast
+from rcsc.diff.changes.difference import Basis, Change, Part, Sort
+from rcsc.diff.changes.spell import number
+from rcsc.diff.changes.versions import Doing, Runner, Versions
+from rcsc.lang.interpret import call, execute
+from rcsc.lang.leaves import read_by
+from rcsc.lang.meaning import digest
+from rcsc.lang.model import (
+    BEFORE,
+    Assumption,
+    Call,
+    Enum,
+    Expr,
+    Int,
+    Invariant,
+    Level,
+    OneTable,
+    Procedure,
+    ProcedureName,
+    Program,
+    Property,
+    Real,
+    Scalar,
+    Statement,
+    Value,
+)
+from rcsc.symbolic import values
+from rcsc.symbolic.effect import Effect, Meaning
+from rcsc.symbolic.values import FALSE, TRUE, Node
+
+
+def procedures(versions: Versions) -> Iterator[Part]:
+    """Every procedure that both versions have, called with the same arguments.
+
+    Raises:
+        UndecidedError, TooLongError, RecursionError: As `tables.table_part`.
+    """
+    later = versions.digests[1].procedures
+    for name, one in versions.digests[0].procedures.items():
+        if name in later:
+            yield _procedure(versions, one, later[name])
+
+
+def _procedure(versions: Versions, one: Procedure, two: Procedure) -> Part:
+    name, (first, second) = str(one.name), versions.digests
+    if first.procedure(name) == second.procedure(name):
+        return Part("procedure", name, basis=Basis.DIGEST)
+    calls: list[Statement] = [Call(ProcedureName(name))]
+    apart = sorted(versions.aligned.apart & (first.touched(calls, ()) | second.touched(calls, ())))
+    if apart:
+        return Part("procedure", name, (f"cannot be compared: `{apart[0]}` changed its kind",))
+    if [(p.name, _kind(p.type)) for p in one.params] != [(p.name, _kind(p.type)) for p in two.params]:
+        return Part("procedure", name, ("its parameters changed",))
+    args = [
+        values.variable(
+            p.name if p.name not in versions.kinds else f"argument {p.name}", _narrower(p.type, q.type)
+        )
+        for p, q in zip(one.params, two.params, strict=True)
+    ]
+    runner = partial(_call, name, [node.name for node in args])
+    effects = [meaning.procedure(name, args) for meaning in versions.meanings()]
+    return _effects(versions, "procedure", name, (effects[0], effects[1]), (runner, runner))
+
+
+def _kind(kind: Scalar) -> object:
+    """The type without its bounds."""
+    return (type(kind), kind.unit) if isinstance(kind, Int | Real) else kind
+
+
+def _narrower(one: Scalar, two: Scalar) -> Scalar:
+    """The values of both types, one kind."""
+    match one, two:
+        case Int(), Int():
+            return Int(max(one.low, two.low), min(one.high, two.high), one.unit)
+        case Real(), Real():
+            return Real(max(one.low, two.low), min(one.high, two.high), one.unit)
+        case _:
+            return one
+
+
+def _call(name: str, args: list[str], program: Program, now: dict[str, Value]) -> None:
+    call(program, name, [now.pop(arg) if arg.startswith("argument ") else now[arg] for arg in args], now)
+
+
+def _run(body: list[Statement], program: Program, now: dict[str, Value]) -> None:
+    execute(program, body, now, {})
+
+
+def _effects(
+    versions: Versions, what: str, name: str, pair: tuple[Effect, Effect], runners: tuple[Runner, Runner]
+) -> Part:
+    """Where two effects differ, all inputs free."""
+    before = versions.queries
+    one, two = (Doing(name, effect, run, {}) for effect, run in zip(pair, runners, strict=True))
+    made = contrast(versions, TRUE, (one, two))
+    found = changes(versions, Sort.EFFECT, (name, name), TRUE, TRUE, made) if made.differ else []
+    return Part(what, name, (), tuple(found), (), Basis.SOLVER, versions.queries - before)
+
+
+# --- levels ----------------------------------------------------------------------------------
+
+
+def levels(versions: Versions) -> Iterator[Part]:
+    """Every level that both versions have: period, which table runs when, and what runs before and behind it.
+
+    Raises:
+        UndecidedError, TooLongError, RecursionError: As `tables.table_part`.
+    """
+    later = {level.name: level for level in versions.after.levels}
+    for one in versions.before.levels:
+        two = later.get(one.name)
+        if two is None:
+            yield Part("level", one.name, ("gone",))
+            continue
+        yield Part("level", one.name, tuple(_level(one, two)), basis=Basis.DIGEST)
+        yield _sequence(versions, "preprocess", one.name, (one.preprocess, two.preprocess))
+        yield _sequence(versions, "postprocess", one.name, (one.postprocess, two.postprocess))
+    known = {level.name for level in versions.before.levels}
+    yield from (Part("level", name, ("new",)) for name in later if name not in known)
+
+
+def _level(one: Level, two: Level) -> Iterator[str]:
+    """What changed of the level itself."""
+    if one.period_ms != two.period_ms:
+        yield f"period: {one.period_ms} ms, now {two.period_ms} ms"
+    first, second = _chosen(one), _chosen(two)
+    for at in dict.fromkeys((*first, *second)):
+        if first.get(at) != second.get(at):
+            yield f"table for {at or 'every cycle'}: {first.get(at, 'none')}, now {second.get(at, 'none')}"
+    if _selector(one) != _selector(two):
+        yield "which command chooses the table"
+
+
+def _chosen(level: Level) -> Mapping[str, str]:
+    if isinstance(level.tables, OneTable):
+        return {"": f"`{level.tables.table}`"}
+    kind = level.tables.selector.type
+    return {number(kind, value): f"`{table}`" for value, table in level.tables.tables}
+
+
+def _selector(level: Level) -> Expr | None:
+    return None if isinstance(level.tables, OneTable) else level.tables.selector
+
+
+def _sequence(
+    versions: Versions, what: str, level: str, names: tuple[tuple[str, ...], tuple[str, ...]]
+) -> Part:
+    """What runs before a level's table, or behind it, as one run."""
+    bodies: list[list[Statement]] = [[Call(ProcedureName(name)) for name in part] for part in names]
+    first, second = versions.digests
+    if first.body(bodies[0]) == second.body(bodies[1]):
+        return Part(what, level, basis=Basis.DIGEST)
+    apart = sorted(versions.aligned.apart & (first.touched(bodies[0], ()) | second.touched(bodies[1], ())))
+    if apart:
+        return Part(what, level, (f"cannot be compared: `{apart[0]}` changed its kind",))
+    one, two = (m.effect(body) for m, body in zip(versions.meanings(), bodies, strict=True))
+    return _effects(versions, what, level, (one, two), (partial(_run, bodies[0]), partial(_run, bodies[1])))
+
+
+# --- what no comparison has looked at -----------------------------------------------------------
+
+_COMPARED: Mapping[str, tuple[str, Mapping[str, object]]] = {
+    "enums": ("enumeration", {}),
+    "records": ("record", {}),
+    "declared": ("variable", {}),
+    "variables": ("variable", {"deferred_until": None}),
+    "procedures": ("procedure", {"body": (), "reads": (), "writes": ()}),
+    "assumptions": ("assumption", {"condition": None, "standing": None}),
+    "invariants": ("invariant", {"condition": None}),
+    "properties": ("property", {"condition": None}),
+    "tables": ("table", {"columns": (), "lines": (), "default": None, "variables": (), "assumptions": ()}),
+    "owners": ("owner", {}),
+    "levels": ("level", {"preprocess": (), "postprocess": ()}),
+}
+"""What the members of a program's field are called, and which of their fields a comparison of their own looks at."""
+_UNSEEN = {"name", "file", "own_tables"}
+"""Fields of a program that mean nothing to it: where it stands, and which file declares what."""
+_WORDS = {"doc": "", "text": "", "box": None}
+"""Fields that say again, for people or for the prover, what others say."""
+
+
+def unsaid(versions: Versions, said: Iterable[str]) -> Iterator[Part]:
+    """Whatever of the two programs differs, by a walk over all fields, and is neither said yet nor compared.
+
+    Procedures that only one version has are left out: what they do shows where they are called.
+
+    Args:
+        versions: The two programs.
+        said: What declarations and parts have told: `table t`.
+    """
+    known = set(said)
+    before, after = versions.before, versions.after
+    for field in fields(Program):
+        if field.name in _UNSEEN:
+            continue
+        what, compared = _COMPARED.get(field.name, (field.name, {}))
+        one, two = ({str(m.name): m for m in getattr(p, field.name)} for p in (before, after))
+        for name in dict.fromkeys((*one, *two)):
+            key = f"{what} `{name.removesuffix('.next')}"
+            if any(told.startswith((f"{key}`", f"{key}.", f"{key}[")) for told in known):
+                continue  # itself, or a part of it
+            if name not in one or name not in two:
+                if what != "procedure":
+                    yield Part(what, name, ("new" if name not in one else "gone",))
+            elif _rest_of(one[name], compared) != _rest_of(two[name], compared):
+                yield Part(what, name, ("declared otherwise",))
+        if [name for name in one if name in two] != [name for name in two if name in one]:
+            yield Part("order", field.name, ("declared in another order",))
+
+
+def _rest_of(member: Any, compared: Mapping[str, object]) -> str:
+    """A digest of a member without what is compared; an enumeration stands for itself."""
+    left_out = {*compared, *_WORDS}
+    kept = (getattr(member, f.name) for f in fields(member) if f.compare and f.name not in left_out)
+    return digest(tuple(_bare(one, whole=isinstance(member, Enum)) for one in kept))
+
+
+def _bare(value: Any, *, whole: bool = False) -> Any:
+    """The value without words; a type by its name, since its members are compared by themselves."""
+    if isinstance(value, tuple):
+        return tuple(_bare(part) for part in value)
+    if isinstance(value, Enum) and not whole:
+        return ("enum", value.name)
+    if isinstance(value, StrEnum) or not is_dataclass(value):
+        return value
+    parts = ((f.name, _WORDS.get(f.name, getattr(value, f.name))) for f in fields(value) if f.compare)
+    return (type(value).__name__, *((name, _bare(part)) for name, part in parts))
+
+
+# --- conditions --------------------------------------------------------------------------------
+
+
+def conditions(versions: Versions) -> Iterator[Part]:
+    """Assumptions, invariants, properties, and when deferred values are taken.
+
+    Raises:
+        UndecidedError: As `tables.table_part`.
+    """
+    before, after = versions.before, versions.after
+    for what, one, two in (
+        ("assumption", _named(before.assumptions), _named(after.assumptions)),
+        ("invariant", _named(before.invariants), _named(after.invariants)),
+        ("deferred value", _deferred(before), _deferred(after)),
+    ):
+        for name in dict.fromkeys((*one, *two)):
+            if name not in two or name not in one:
+                if what != "deferred value":  # the declaration says so
+                    yield Part(what, name, ("gone" if name not in two else "new",))
+            else:
+                yield _condition(versions, what, name, (one[name], two[name]))
+    yield from _properties(versions)
+    standing = {str(known.name): known.standing for known in before.assumptions}
+    for assumption in after.assumptions:
+        was = standing.get(str(assumption.name), assumption.standing)
+        if was is not assumption.standing:
+            said = f"{was.value}, now {assumption.standing.value}"
+            yield Part("standing of assumption", str(assumption.name), (said,))
+
+
+def _properties(versions: Versions) -> Iterator[Part]:
+    """Each property, with its words where it is new, gone, or says something else."""
+    one, two = ({p.name: p for p in made.properties} for made in (versions.before, versions.after))
+    for name in dict.fromkeys((*one, *two)):
+        if name not in two or name not in one:
+            only = one[name] if name in one else two[name]
+            yield Part("property", name, (f"{'gone' if name in one else 'new'}: {_words(only)}",))
+            continue
+        part = _condition(versions, "property", name, (one[name].condition, two[name].condition))
+        said = (f"{_words(one[name])} -> {_words(two[name])}",) if part.changes else part.said
+        yield replace(part, said=said)
+
+
+def _words(stated: Property) -> str:
+    """What a property says, in one line."""
+    return " ".join(stated.text.split())
+
+
+def _named(conditions: Iterable[Assumption | Invariant]) -> dict[str, Expr]:
+    return {str(one.name): one.condition for one in conditions}
+
+
+def _deferred(program: Program) -> dict[str, Expr]:
+    return {str(v.name): v.deferred_until for v in program.variables if v.deferred_until is not None}
+
+
+def _condition(versions: Versions, what: str, name: str, pair: tuple[Expr, Expr]) -> Part:
+    """Where a condition was true and is not now, and the other way."""
+    if repr(pair[0]) == repr(pair[1]):
+        return Part(what, name, basis=Basis.DIGEST)
+    read = {leaf.removeprefix(BEFORE) for condition in pair for leaf in read_by(condition)}
+    if apart := sorted(versions.aligned.apart & read):
+        return Part(what, name, (f"cannot be compared: `{apart[0]}` changed its kind",))
+    before = versions.queries
+    one, two = (
+        _worth(meaning, condition, undefined="false" if what == "property" else "undefined")
+        for meaning, condition in zip(versions.meanings(), pair, strict=True)
+    )
+    found: list[Change] = []
+    for first, second in product(one, two):
+        if first != second:
+            region = versions.shared.one(values.both(one[first], two[second]))
+            found += changes(versions, Sort.CONDITION, (first, second), region)
+    return Part(what, name, (), tuple(found), (), Basis.SOLVER, versions.queries - before)
+
+
+def _worth(meaning: Meaning, condition: Expr, undefined: str) -> dict[str, Node]:
+    """Where the condition is true, false and, called as given, undefined."""
+    holds = meaning.condition(condition)
+    good = values.all_of(values.negation(bad) for bad in meaning.bad)
+    found = {"true": values.both(good, holds), "false": values.both(good, values.negation(holds))}
+    return found | {undefined: values.either(found.get(undefined, FALSE), values.negation(good))}

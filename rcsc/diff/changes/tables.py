@@ -1,0 +1,275 @@
+"""Two versions of one table: where another line, another effect, or none or several lines.
+
+In: two tables over shared leaves. Out: a `Part`. Inputs at which the versions differ are found one pair of lines after the
+other; when the solver finds no more, that is the proof that nothing else changed.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import partial
+
+from rcsc.diff.changes.contrast import Contrast, changes, contrast
+from rcsc.diff.changes.difference import Basis, Change, Part, Sort
+from rcsc.diff.changes.versions import Doing, Versions, is_hard
+from rcsc.lang.interpret import execute, matching_lines
+from rcsc.lang.leaves import everything, written_by
+from rcsc.lang.model import Action, Bool, Call, Program, Statement, Table, Value
+from rcsc.symbolic import values
+from rcsc.symbolic.effect import Meaning, several
+from rcsc.symbolic.values import TRUE, Node
+
+NONE, SEVERAL, UNDEFINED = "no line", "several lines", "a condition that is undefined"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Outcome:
+    """What can become of an input.
+
+    Attributes:
+        name: Of the line; of a fault what it is.
+        label: `line 3`, or the fault.
+        when: At which inputs.
+        holds: The conditions of the line, without what makes it the only one.
+        actions: None for a fault.
+    """
+
+    name: str
+    label: str
+    when: Node
+    holds: Node = TRUE
+    actions: tuple[Action, ...] | None = None
+
+    @property
+    def key(self) -> tuple[bool, str]:
+        """The same for the same outcome in two versions."""
+        return self.actions is None, self.name
+
+
+def table_part(versions: Versions, one: Table, two: Table) -> Part:
+    """What changed between two versions of a table.
+
+    Raises:
+        UndecidedError: The solver gave up.
+        TooLongError, RecursionError: A procedure has more steps than are followed.
+    """
+    name = str(two.name)
+    if versions.digests[0].table(one) == versions.digests[1].table(two):
+        return Part("table", name, basis=Basis.DIGEST)
+    apart = sorted(versions.aligned.apart & (_touched(versions, 0, one) | _touched(versions, 1, two)))
+    if apart:
+        said = (f"cannot be compared: {', '.join(f'`{leaf}`' for leaf in apart)} changed its kind",)
+        return Part("table", name, (*said, *_claims(one, two)))
+    return _Comparison(versions, one, two).part()
+
+
+def _claims(one: Table, two: Table) -> Iterator[str]:
+    """What changed of a table that no region shows: the assumptions that it may rely on, and what is said of its DEFAULT."""
+    gone = [name for name in one.assumptions if name not in two.assumptions]
+    new = [name for name in two.assumptions if name not in one.assumptions]
+    yield from (f"no longer assumes `{name}`" for name in gone)
+    yield from (f"assumes `{name}`, too" for name in new)
+    orders = [
+        [name for name in names if name not in (*gone, *new)] for names in (one.assumptions, two.assumptions)
+    ]
+    if orders[0] != orders[1]:
+        yield "its assumptions stand in another order"
+    first, second = (_default(table) for table in (one, two))
+    if first != second:
+        yield f"its DEFAULT line: {first}, now {second}"
+
+
+def _default(table: Table) -> str:
+    if table.default is None:
+        return "none"
+    return "unreachable" if table.default.unreachable else "reachable"
+
+
+def _touched(versions: Versions, side: int, table: Table) -> set[str]:
+    body = [
+        action.statement
+        for line in (*table.lines, table.default)
+        if line is not None
+        for action in line.actions
+    ]
+    tests = [test.condition for line in table.lines for test in line.tests if test is not None]
+    return versions.digests[side].touched(body, tests)
+
+
+class _Comparison:
+    """One table being compared.
+
+    Attributes:
+        outcomes: Of each version, by key, in order of the table.
+        relied: Where the assumptions of one version at least hold.
+    """
+
+    def __init__(self, versions: Versions, one: Table, two: Table) -> None:
+        self.versions, self.tables = versions, (one, two)
+        self.meanings = versions.meanings()
+        self.outcomes = tuple(
+            {out.key: out for out in _outcomes(table, meaning)}
+            for table, meaning in zip(self.tables, self.meanings, strict=True)
+        )
+        self.relied = versions.shared.one(
+            values.any_of(
+                assumed(program, table, meaning)
+                for program, table, meaning in zip(
+                    (versions.before, versions.after), self.tables, versions.meanings(), strict=True
+                )
+            )
+        )
+
+    def part(self) -> Part:
+        """Everything that changed."""
+        versions, before = self.versions, self.versions.queries
+        changed: list[Change] = []
+        moved: list[Change] = []
+        first, second = (list(outs) for outs in self.outcomes)
+        kept = [(self.outcomes[0][key], self.outcomes[1][key]) for key in first if key in second]
+        pairs = [*((one, two) for one, two in kept if self._bodies_differ(one, two)), *self._pairs(kept)]
+        for one, two in sorted(pairs, key=lambda both: (first.index(both[0].key), second.index(both[1].key))):
+            for change in self._compared(one, two):
+                (moved if change.sort is Sort.LINE else changed).append(change)
+        space = versions.space(*(out.when for outs in self.outcomes for out in outs.values()))
+        return Part(
+            "table", str(self.tables[1].name), tuple(_claims(*self.tables)), tuple(changed), tuple(moved), Basis.SOLVER,
+            versions.queries - before, space.volume(space.nodes),
+        )  # fmt: skip
+
+    def _bodies_differ(self, one: Outcome, two: Outcome) -> bool:
+        """Whether a line's actions, and all that they call, are not word for word the same."""
+        if one.actions is None or two.actions is None:
+            return False
+        bodies = [_body(out.actions) for out in (one, two)]
+        first, second = (
+            digests.body(body) for digests, body in zip(self.versions.digests, bodies, strict=True)
+        )
+        return first != second
+
+    def _pairs(self, kept: list[tuple[Outcome, Outcome]]) -> list[tuple[Outcome, Outcome]]:
+        """Every pair of outcomes with different names that some input has."""
+        versions = self.versions
+        space = versions.space(*(out.when for outs in self.outcomes for out in outs.values()))
+        solver = space.solver(
+            values.negation(values.any_of(values.both(one.when, two.when) for one, two in kept))
+        )
+        found = []
+        while space.answered(solver):
+            one, two = (
+                next(out for out in outs.values() if solver.value(values.term_of(out.when), Bool()))
+                for outs in self.outcomes
+            )
+            found.append((one, two))
+            solver.add(values.term_of(values.negation(values.both(one.when, two.when))))
+        versions.queries += space.queries
+        return found
+
+    def _compared(self, one: Outcome, two: Outcome) -> list[Change]:
+        """What changed where one version has the first outcome and the other the second."""
+        versions = self.versions
+        both = versions.shared.one(values.both(one.when, two.when))
+        if both not in versions.stated:
+            versions.stated[both] = versions.shared.one(values.both(one.holds, two.holds))
+        labels = one.label, two.label
+        if one.actions is None or two.actions is None:
+            return self._confirmed(changes(versions, Sort.FAULT, labels, both, self.relied), one, two)
+        doing = [
+            Doing(out.label, meaning.effect(_body(out.actions), (one.holds, two.holds)), partial(_run, _body(out.actions)),
+                  _headings(program, out.actions))
+            for out, meaning, program in zip(
+                (one, two), self.meanings, (versions.before, versions.after), strict=True
+            )
+        ]  # fmt: skip
+        made = contrast(versions, both, (doing[0], doing[1]))
+        found = changes(versions, Sort.EFFECT, labels, both, self.relied, made) if made.differ else []
+        if one.key != two.key:
+            found += self._moved(labels, both, made)
+        return self._confirmed(found, one, two)
+
+    def _moved(self, labels: tuple[str, str], both: Node, made: Contrast) -> list[Change]:
+        """Where another line has the same effect; not looked for where doubles are computed with."""
+        versions = self.versions
+        if not made.differ:
+            return changes(versions, Sort.LINE, labels, both)
+        alike = versions.shared.one(values.both(both, values.negation(made.node)))
+        if is_hard(alike) or not versions.possible(alike):
+            return []
+        return changes(versions, Sort.LINE, labels, alike)
+
+    def _confirmed(self, found: list[Change], one: Outcome, two: Outcome) -> list[Change]:
+        """Each witness put to the reference meaning: it must match as is said.
+
+        Raises:
+            RuntimeError: It does not, which is a bug in rcsc.
+        """
+        for change in found:
+            for program, table, out in zip(
+                (self.versions.before, self.versions.after), self.tables, (one, two), strict=True
+            ):
+                if out.name != UNDEFINED or out.actions is not None:
+                    self._match(program, table, out, change)
+        return found
+
+    def _match(self, program: Program, table: Table, out: Outcome, change: Change) -> None:
+        now = self.versions.snapshot(program, dict(change.point))
+        seen = matching_lines(table, now)
+        default = table.default
+        if len(seen) > 1:
+            name = SEVERAL
+        elif seen:
+            name = str(seen[0])
+        else:
+            name = NONE if default is None else str(default.name)
+        if name != out.name:
+            raise RuntimeError(f"table {table.name}: {change.witness} meets {name}, not {out.name}")
+
+
+def assumed(program: Program, table: Table, meaning: Meaning) -> Node:
+    """That the table's assumptions and the program's invariants hold."""
+    conditions = [a.condition for a in program.assumptions if a.name in table.assumptions]
+    conditions += [invariant.condition for invariant in program.invariants]
+    return values.all_of(meaning.condition(condition) for condition in conditions)
+
+
+def _outcomes(table: Table, meaning: Meaning) -> Iterable[Outcome]:
+    """Everything that can become of an input: exactly one of them does."""
+    tests = {id(test): test for line in table.lines for test in line.tests if test is not None}
+    known = {at: meaning.condition(test.condition) for at, test in tests.items()}
+    lines = [
+        values.all_of(known[id(test)] for test in line.tests if test is not None) for line in table.lines
+    ]
+    fine = values.all_of(values.negation(bad) for bad in meaning.bad)
+    many, one = several(lines), meaning.shared.one
+    alone = values.both(fine, values.negation(many))
+    for line, holds in zip(table.lines, lines, strict=True):
+        yield Outcome(
+            str(line.name), f"line `{line.name}`", one(values.both(alone, holds)), one(holds), line.actions
+        )
+    nothing = one(values.both(fine, values.negation(values.any_of(lines))))
+    default = table.default
+    if default is None:
+        yield Outcome(NONE, NONE, nothing)
+    else:
+        yield Outcome(str(default.name), f"DEFAULT `{default.name}`", nothing, TRUE, default.actions)
+    yield Outcome(SEVERAL, SEVERAL, one(values.both(fine, many)))
+    yield Outcome(UNDEFINED, UNDEFINED, one(values.negation(fine)))
+
+
+def _body(actions: tuple[Action, ...] | None) -> list[Statement]:
+    return [action.statement for action in actions or ()]
+
+
+def _run(body: list[Statement], program: Program, now: dict[str, Value]) -> None:
+    execute(program, body, now, {})
+
+
+def _headings(program: Program, actions: tuple[Action, ...] | None) -> Mapping[str, tuple[str, ...]]:
+    """For each leaf the headings of the actions that may write it."""
+    writes = {str(one.name): one.writes for one in program.procedures}
+    found: dict[str, dict[str, None]] = {}
+    for action in actions or ():
+        for statement in everything([action.statement]):
+            named = writes[str(statement.procedure)] if isinstance(statement, Call) else written_by(statement)
+            for leaf in named:
+                found.setdefault(str(leaf), {})[action.heading] = None
+    return {leaf: tuple(names) for leaf, names in found.items()}

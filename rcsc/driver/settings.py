@@ -1,0 +1,83 @@
+"""What the commands are given, and what they hand back."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rcsc.diagnostics.diagnostic import Diagnostic
+from rcsc.diagnostics.report import Report, TableReport
+
+if TYPE_CHECKING:
+    from rcsc.lang.model import Program, ProvedProgram
+    from rcsc.solvers.options import Options
+
+
+def silent(_doing: str) -> None:
+    """No progress is shown."""
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """What to work on and how.
+
+    Attributes:
+        paths: Files, folders, or `-`.
+        stdin: What `-` stands for.
+        use_cache: Whether earlier proofs may be used and new ones kept.
+        progress: Told what is being done; an empty text when it is over.
+    """
+
+    paths: tuple[str, ...]
+    options: "Options"
+    stdin: bytes | None = None
+    use_cache: bool = True
+    progress: Callable[[str], None] = silent
+
+
+@dataclass(frozen=True, slots=True)
+class Made:
+    """A report, and a closing line for people."""
+
+    report: Report
+    closing: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Proof:
+    """What became of one root file.
+
+    Attributes:
+        program: None where it does not resolve.
+        proved: None where something is not proved, or was proved by an earlier run only.
+    """
+
+    root: str
+    found: tuple[Diagnostic, ...]
+    program: "Program | None" = None
+    tables: tuple[TableReport, ...] = ()
+    proved: "ProvedProgram | None" = None
+    certificate: Mapping[str, object] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Effort:
+    """How much `rcsc test` tries.
+
+    Attributes:
+        examples: Inputs for each matcher, and sequences for each step and cycle.
+        cycles: Longest sequence.
+        deep: Whether the C is mutated and the emulated target is asked about as many inputs as it can.
+        esbmc_s: Time limit of the model checker for one function, in seconds; 0 leaves it out.
+        cortex: Whether an emulated Cortex-M3 is asked.
+        mutants: How many mutants of each table (and of the C, where `deep`); 0 for none, -1 for all.
+        vectors: Where to write MC/DC vectors.
+    """
+
+    examples: int = 200
+    cycles: int = 8
+    deep: bool = False
+    esbmc_s: float = 0.0
+    cortex: bool = True
+    mutants: int = 24
+    vectors: Path | None = None

@@ -1,0 +1,151 @@
+"""A proved program to a `Plan`: classes, masks and their grouping."""
+
+import os
+from dataclasses import replace
+
+from rcsc.emit.plan import (
+    WORD,
+    Coded,
+    Cuts,
+    Direct,
+    Index,
+    Matcher,
+    Plan,
+    PlanLine,
+    PlanTable,
+    Probe,
+    Truth,
+    grouped,
+)
+from rcsc.lang.meaning import checked
+from rcsc.lang.model import (
+    Bool,
+    Box,
+    Enum,
+    Program,
+    ProvedProgram,
+    Real,
+    Standing,
+    Table,
+    Test,
+    Variable,
+    key_bounds,
+    value_of_key,
+)
+
+MOST_DIRECT = 256
+"""Keys of a leaf up to which each has a mask of its own."""
+MOST_CODED = 4096
+"""Keys of a leaf up to which its class is looked up; past them it is searched for."""
+FEW_CUTS = 2
+"""Cuts up to which comparing is cheaper than looking up."""
+MOST_GROUPED = 512
+"""Combinations of classes up to which leaves share a table of masks."""
+
+
+def lower(proved: ProvedProgram, root: str = "", *, defensive: bool = False) -> Plan:
+    """The plan of a proved program; there is no other way to one that is not marked.
+
+    Args:
+        proved: What `prove` made.
+        root: The project's folder: files are named as seen from there, so that the same project gives the
+            same bytes wherever it stands and from wherever it is compiled; "" leaves their names alone.
+        defensive: Whether the executors check their state at the beginning of every cycle.
+    """
+    return replace(_plan(proved.program, root, proved=True), defensive=defensive)
+
+
+def lower_by_force(program: Program, root: str = "") -> Plan:
+    """The plan of a program that is not proved, to run a finding: what is emitted of it is marked, and no cell runs it."""
+    return _plan(program, root, proved=False)
+
+
+def _plan(program: Program, root: str, *, proved: bool) -> Plan:
+    monitored = checked(program)
+    tables = tuple(_table(program, table, monitored, _seen(table.file, root)) for table in program.tables)
+    return Plan(program, _seen(program.file, root), tables, monitored, proved)
+
+
+def _seen(file: str, root: str) -> str:
+    """The file's name as seen from the folder `root`, with `/`."""
+    return (os.path.relpath(file, root) if root else file).replace("\\", "/")
+
+
+def _table(program: Program, table: Table, monitored: tuple[int, ...], file: str) -> PlanTable:
+    lines = [PlanLine(line.name, line.actions, f"{file} line {line.name}") for line in table.lines]
+    if table.default is not None:
+        name = table.default.name
+        lines.append(PlanLine(name, table.default.actions, f"{file} line {name}"))
+    named = [(place, program.assumptions[at]) for place, at in enumerate(monitored)]
+    stops = tuple(place for place, one in named if one.name in table.stops)
+    relied = tuple(
+        place
+        for place, one in named
+        if place in stops or (one.standing is Standing.MONITORED and one.name in table.assumptions)
+    )
+    return PlanTable(table, _matcher(program, table), tuple(lines), relied, stops)
+
+
+def _matcher(program: Program, table: Table) -> Matcher:
+    variables: dict[str, Variable] = {v.name: v for v in program.variables}
+    by_leaf: dict[str, list[tuple[int, Box]]] = {}
+    relational: dict[int, tuple[Test, list[int]]] = {}
+    for at, line in enumerate(table.lines):
+        for test in line.tests:
+            if test is None:
+                continue
+            if test.box is None:
+                relational.setdefault(id(test), (test, []))[1].append(at)
+            else:
+                by_leaf.setdefault(test.variables[0], []).append((at, test.box))
+    everyone = (1 << len(table.lines)) - 1
+    probes = [_leaf_probe(variables[name], stated, everyone) for name, stated in _declared(table, by_leaf)]
+    probes += [_test_probe(test, lines, everyone) for test, lines in relational.values()]
+    groups = grouped(probes, MOST_GROUPED) if len(table.lines) > WORD else tuple((one,) for one in probes)
+    return Matcher(len(table.lines), table.default is not None, groups)
+
+
+def _declared(
+    table: Table, by_leaf: dict[str, list[tuple[int, Box]]]
+) -> list[tuple[str, list[tuple[int, Box]]]]:
+    return [(name, by_leaf[name]) for name in table.variables if name in by_leaf]
+
+
+def _leaf_probe(variable: Variable, stated: list[tuple[int, Box]], everyone: int) -> Probe:
+    """The masks of one leaf: for each class the lines whose boxes contain it."""
+    low, high = key_bounds(variable.type)
+    index: Index
+    if not isinstance(variable.type, Real) and (
+        isinstance(variable.type, Bool | Enum) or (high - low < MOST_DIRECT and everyone.bit_length() <= WORD)
+    ):
+        starts = list(range(low, high + 1))
+        index = Direct(variable.name, variable.type, low, len(starts))
+    else:
+        edges = {edge for _, box in stated for first, last in box for edge in (first, last + 1)}
+        cuts = sorted(edge for edge in edges if low < edge <= high)
+        starts = [low, *cuts]
+        if len(cuts) > FEW_CUTS and high - low < MOST_CODED and not isinstance(variable.type, Real):
+            ends = [*cuts, high + 1]
+            classes = [
+                at
+                for at, (start, end) in enumerate(zip(starts, ends, strict=True))
+                for _ in range(start, end)
+            ]
+            index = Coded(variable.name, variable.type, low, tuple(classes))
+        else:
+            index = Cuts(
+                variable.name, variable.type, tuple(value_of_key(variable.type, cut) for cut in cuts)
+            )
+    excluded = [0] * len(starts)
+    for at, box in stated:
+        bit = 1 << at
+        for place, start in enumerate(starts):
+            if not any(first <= start <= last for first, last in box):
+                excluded[place] |= bit
+    return Probe(index, tuple(everyone & ~mask for mask in excluded))
+
+
+def _test_probe(test: Test, lines: list[int], everyone: int) -> Probe:
+    """The masks of one test: without it, the lines that do not state it."""
+    stating = sum(1 << at for at in set(lines))
+    return Probe(Truth(test.condition, test.text), (everyone & ~stating, everyone))

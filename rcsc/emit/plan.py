@@ -1,0 +1,189 @@
+"""The shape of the executors, in no language: what `lower` makes and `emit` spells.
+
+A matcher is a conjunction of look-ups: each *probe* finds the class of one leaf (or the truth of one test, or both of
+several leaves together), and the class's mask has a bit for each line that it does not exclude.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from math import prod
+from typing import TypeAlias
+
+from rcsc.host.files.write import UNPROVED
+from rcsc.lang.model import Action, Expr, LineName, Program, Scalar, Table, VariableName
+
+WORD = 64
+
+
+@dataclass(frozen=True, slots=True)
+class Direct:
+    """The class of a leaf is its key less `low`; one class a key."""
+
+    leaf: VariableName
+    type: Scalar
+    low: int
+    count: int
+
+
+@dataclass(frozen=True, slots=True)
+class Cuts:
+    """The class of a leaf is how many of `cuts` (values, ascending) are at most its value."""
+
+    leaf: VariableName
+    type: Scalar
+    cuts: tuple[int | float, ...]
+
+    @property
+    def count(self) -> int:
+        """How many classes there are."""
+        return len(self.cuts) + 1
+
+
+@dataclass(frozen=True, slots=True)
+class Coded:
+    """The class of a leaf is looked up by its key less `low`."""
+
+    leaf: VariableName
+    type: Scalar
+    low: int
+    classes: tuple[int, ...]
+
+    @property
+    def count(self) -> int:
+        """How many classes there are."""
+        return max(self.classes) + 1
+
+
+@dataclass(frozen=True, slots=True)
+class Truth:
+    """The class is 1 where the condition holds, else 0."""
+
+    condition: Expr
+    text: str
+    count: int = 2
+
+
+Index: TypeAlias = Direct | Coded | Cuts | Truth
+
+
+@dataclass(frozen=True, slots=True)
+class Probe:
+    """A class and what it leaves.
+
+    Attributes:
+        masks: For each class a mask: bit k is set where line k does not exclude it.
+    """
+
+    index: Index
+    masks: tuple[int, ...]
+
+
+Group: TypeAlias = tuple[Probe, ...]
+"""Probes that share a table: their classes are taken together, in mixed radix, the last one fastest."""
+
+
+@dataclass(frozen=True, slots=True)
+class Matcher:
+    """The matcher of one table.
+
+    Attributes:
+        lines: How many lines, DEFAULT left out.
+        default: Whether there is a DEFAULT line: it is taken where no other matches.
+    """
+
+    lines: int
+    default: bool
+    groups: tuple[Group, ...]
+
+    @property
+    def words(self) -> int:
+        """Machine words of 64 lines in a mask."""
+        return (self.lines + WORD - 1) // WORD
+
+
+def joined(group: Group) -> tuple[int, ...]:
+    """The masks of a group: one for each combination of classes."""
+    masks = group[0].masks
+    for probe in group[1:]:
+        masks = tuple(one & two for one in masks for two in probe.masks)
+    return masks
+
+
+def grouped(probes: Iterable[Probe], most: int) -> tuple[Group, ...]:
+    """Probes joined while their classes together are at most `most`: fewer masks to load, larger tables."""
+    bins: list[list[Probe]] = []
+    for probe in sorted(probes, key=lambda one: -len(one.masks)):
+        for group in bins:
+            if prod(len(one.masks) for one in group) * len(probe.masks) <= most:
+                group.append(probe)
+                break
+        else:
+            bins.append([probe])
+    return tuple(tuple(group) for group in bins)
+
+
+@dataclass(frozen=True, slots=True)
+class PlanLine:
+    """A line and what it does, for DEFAULT too."""
+
+    name: LineName
+    actions: tuple[Action, ...]
+    source: str  # file:line
+
+
+@dataclass(frozen=True, slots=True)
+class PlanTable:
+    """A table to be emitted.
+
+    Attributes:
+        monitored: Positions in `Plan.monitored` of the assumptions that it checks.
+        stops: Those of them that end the cycle where they fail.
+    """
+
+    table: Table
+    matcher: Matcher
+    lines: tuple[PlanLine, ...]
+    monitored: tuple[int, ...]
+    stops: tuple[int, ...] = ()
+
+    @property
+    def where(self) -> str:
+        """What must hold where the table is matched by itself, in words; empty for nothing."""
+        names = " and ".join(self.table.stops)
+        return f" where {names} {'holds' if len(self.stops) == 1 else 'hold'}" if names else ""
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """A program, ready to be spelled.
+
+    Attributes:
+        source: The root file, relative, with `/`.
+        monitored: Positions in `program.assumptions` of those that the executors check: monitored ones, and those that stop some table.
+        proved: Whether it is proved; of one that is not, every file is marked (`UNPROVED`).
+        defensive: Whether every cycle begins with a check of the state.
+    """
+
+    program: Program
+    source: str
+    tables: tuple[PlanTable, ...]
+    monitored: tuple[int, ...]
+    proved: bool = True
+    defensive: bool = False
+
+    @property
+    def checked(self) -> tuple[str, ...]:
+        """What each assumption that is checked does where it fails, in words: `seen: ends the cycle in tally; told in count`."""
+        return tuple(self._checked(place, at) for place, at in enumerate(self.monitored))
+
+    def _checked(self, place: int, at: int) -> str:
+        stops = [one.table.name for one in self.tables if place in one.stops]
+        told = [one.table.name for one in self.tables if place in one.monitored and place not in one.stops]
+        parts = [(f"ends the cycle in {', '.join(stops)}", stops), (f"only told in {', '.join(told)}", told)]
+        does = "; ".join(words for words, tables in parts if tables) or "no table relies on it"
+        return f"{self.program.assumptions[at].name}: {does}"
+
+    @property
+    def mark(self) -> str:
+        """The mark of what is not proved; empty for what is."""
+        return "" if self.proved else UNPROVED

@@ -1,0 +1,431 @@
+"""Text from outside, read within bounds: JSON, TOML, XML and CSV, and their values as what they must be.
+
+In: files, or texts that travelled in one. Out: values, or `Malformed`, which says what is wrong. Sizes are bounded before anything is read,
+nesting before anything is parsed, so that no text makes a parser recurse or reserve what it does not hold.
+"""
+
+import csv
+import io
+import json
+import os
+import re
+import stat
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO, TYPE_CHECKING, Any, BinaryIO
+
+from rcsc.host.files.names import BadName, file_name, identifier, line_name, member, shown
+
+if TYPE_CHECKING:
+    from xml.etree.ElementTree import Element
+
+MIB = 1024 * 1024
+MOST_BYTES = 64 * MIB
+"""Of a file that is read whole, where nobody says otherwise."""
+MOST_TOML_BYTES = 4 * MIB
+DEEPEST = 200
+"""Levels of nesting of JSON; Python's own parser gives up at about 900."""
+DEEPEST_TOML = 32
+DEEPEST_XML = 64
+
+_JSON = re.compile(r'"[^"\\]*+(?:\\.[^"\\]*+)*+"|[\[{\]}"]', re.DOTALL)
+_TOML = re.compile(
+    r"""(?P<text>'''.*?'''|\"\"\"(?:[^"\\]++|\\.|"(?!""))*+\"{3,5}|"[^"\\\n]*+(?:\\.[^"\\\n]*+)*+"|'[^'\n]*+'|\#[^\n]*+)"""
+    r"""|(?P<mark>[\[{\]}"'])""",
+    re.DOTALL,
+)
+_DOTTED = re.compile(rf"(?<![\w-])(?:[\w-]++[ \t]*+\.[ \t]*+){{{DEEPEST_TOML},}}")
+UNPRINTED = re.compile(
+    "[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069\ud800-\udfff]"
+)
+"""Control characters but tab and ends of lines, overrides of writing direction, and halves of characters."""
+
+
+class Malformed(ValueError):  # noqa: N818  # what happened, not an error of ours
+    """A text from outside is not what it must be; says why."""
+
+
+# --- files ---------------------------------------------------------------------------------
+
+
+def content(path: Path, most: int = MOST_BYTES) -> bytes:
+    """Return the content of a regular file of bounded size; a pipe or a device might never end.
+
+    Raises:
+        OSError: It cannot be read.
+        Malformed: It is no regular file, or is too large.
+    """
+    with opened(path) as file:
+        if os.fstat(file.fileno()).st_size > most:
+            raise Malformed(f"has more than {_size(most)}")
+        found = file.read(most + 1)
+    if len(found) > most:
+        raise Malformed(f"has more than {_size(most)}")
+    return found
+
+
+def opened(path: Path) -> BinaryIO:
+    """Return a regular file, open for reading; a pipe is not waited for.
+
+    Raises:
+        OSError: It cannot be read.
+        Malformed: It is no regular file.
+    """
+    file = open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK))  # noqa: SIM115  # the caller's
+    if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+        file.close()
+        raise Malformed("is not a regular file")
+    return file
+
+
+def _size(count: int) -> str:
+    return f"{count // MIB} MiB" if count >= MIB else f"{count} bytes"
+
+
+def text(path: Path, most: int = MOST_BYTES) -> str:
+    """Return the text of a regular file of bounded size.
+
+    Raises:
+        OSError: It cannot be read.
+        Malformed: It is no regular file, too large, or not UTF-8.
+    """
+    return decoded(content(path, most))
+
+
+def piped(file: IO[bytes], most: int = MOST_BYTES) -> bytes:
+    """Return what comes through a pipe, up to a size.
+
+    Raises:
+        Malformed: There is more.
+    """
+    found = file.read(most + 1)
+    if len(found) > most:
+        raise Malformed(f"has more than {_size(most)}")
+    return found
+
+
+def plain(found: str) -> str:
+    """Return a text without characters that a terminal would obey.
+
+    Raises:
+        Malformed: It has one.
+    """
+    _check_texts(found)
+    return found
+
+
+def decoded(found: bytes) -> str:
+    """Return bytes as text.
+
+    Raises:
+        Malformed: They are not UTF-8.
+    """
+    try:
+        return found.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise Malformed(f"is not UTF-8 at byte {error.start}") from error
+
+
+# --- forms ---------------------------------------------------------------------------------
+
+
+def json_of(found: str | bytes, deepest: int = DEEPEST, *, plain: bool = True) -> Any:
+    """Return the value of a JSON text.
+
+    Args:
+        found: The text.
+        deepest: Levels of nesting that it may have.
+        plain: Whether its texts may hold no control characters: what is shown on a terminal later.
+
+    Raises:
+        Malformed: It is no JSON, or nested too deep.
+    """
+    said = found if isinstance(found, str) else decoded(found)
+    _check_depth(_JSON.finditer(said), deepest)
+    try:
+        value = json.loads(said)
+    except ValueError as error:
+        raise Malformed(f"is not JSON: {error}") from error
+    if plain:
+        _check_texts(value)
+    return value
+
+
+def toml_of(found: str | bytes) -> dict[str, Any]:
+    """Return the table of a TOML text.
+
+    Raises:
+        Malformed: It is no TOML, nested too deep or too large.
+    """
+    import tomllib
+
+    said = found if isinstance(found, str) else decoded(found)
+    if len(said) > MOST_TOML_BYTES:
+        raise Malformed(f"has more than {_size(MOST_TOML_BYTES)}")
+    bare = _TOML.sub(_bare, said)
+    _check_depth(re.finditer(r"[\[{\]}]", bare), DEEPEST_TOML)
+    if _DOTTED.search(bare):
+        raise Malformed(f"is nested more than {DEEPEST_TOML} deep")
+    try:
+        value = tomllib.loads(said)
+    except (tomllib.TOMLDecodeError, ValueError, RecursionError) as error:
+        raise Malformed(f"is not TOML: {error}") from error
+    _check_texts(value)
+    return value
+
+
+def _bare(found: re.Match[str]) -> str:
+    """Brackets as they are, a text or a comment as a letter."""
+    if found[0] in {'"', "'"}:
+        raise Malformed("has a text without an end")
+    return found["mark"] or "q"
+
+
+def xml_of(found: str) -> "Element":
+    """Return the outermost element of an XML text without a document type, so that there is no entity to expand.
+
+    Raises:
+        Malformed: It is no such text; the arguments are what is wrong, and the row and column where.
+    """
+    from xml.etree import ElementTree as ET
+
+    if "<!DOCTYPE" in found or "<!ENTITY" in found:
+        raise Malformed("a document type is not read", found[: found.find("<!")].count("\n") + 1, 0)
+    parser = ET.XMLParser(target=_shallow())  # noqa: S314  # without a document type there is no entity to expand
+    try:
+        parser.feed(found)
+        root: Element = parser.close()
+    except ET.ParseError as error:
+        raise Malformed(f"not XML: {error.msg.split(':')[0]}", *error.position) from error
+    return root
+
+
+def _shallow() -> Any:
+    """What builds the elements of an XML text, up to a depth."""
+    from xml.etree import ElementTree as ET
+
+    class Shallow(ET.TreeBuilder):
+        depth = 0
+
+        def start(self, tag: str, attrs: dict[str, str], /) -> Any:
+            self.depth += 1
+            if self.depth > DEEPEST_XML:
+                raise Malformed(f"nested more than {DEEPEST_XML} deep", 1, 0)
+            return super().start(tag, attrs)
+
+        def end(self, tag: str, /) -> Any:
+            self.depth -= 1
+            return super().end(tag)
+
+    return Shallow()
+
+
+def rows_of(found: str, columns: Sequence[str]) -> list[dict[str, str]]:
+    """Return the rows of a CSV text with a heading.
+
+    Raises:
+        Malformed: It is no CSV, or has other columns.
+    """
+    table = csv.DictReader(io.StringIO(found, newline=""))
+    try:
+        if tuple(table.fieldnames or ()) != tuple(columns):
+            raise Malformed(f"the columns are {', '.join(columns)}")
+        return [{key: value or "" for key, value in row.items() if key} for row in table]
+    except csv.Error as error:
+        raise Malformed(f"is no CSV file: {error}") from error
+
+
+def _check_depth(marks: Iterator[re.Match[str]], deepest: int) -> None:
+    depth = 0
+    for found in marks:
+        mark = found[0]
+        if mark == '"':
+            raise Malformed("has a text without an end")
+        if mark in "[{":
+            depth += 1
+            if depth > deepest:
+                raise Malformed(f"is nested more than {deepest} deep")
+        elif mark in "]}":
+            depth -= 1
+
+
+def _check_texts(value: object) -> None:
+    """Refuse what a terminal would obey."""
+    waiting = [value]
+    while waiting:
+        one = waiting.pop()
+        if isinstance(one, str):
+            bad = UNPRINTED.search(one)
+            if bad is not None:
+                raise Malformed(
+                    f"has a character that does not print, in {shown(one[max(0, bad.start() - 20) :])}"
+                )
+        elif isinstance(one, dict):
+            waiting += one.keys()
+            waiting += one.values()
+        elif isinstance(one, list):
+            waiting += one
+
+
+# --- values --------------------------------------------------------------------------------
+
+_REQUIRED: Any = object()
+
+
+@dataclass(frozen=True, slots=True)
+class Said:
+    """A table of outside data, of which each field is taken as what it must be.
+
+    Attributes:
+        value: The table.
+        where: How messages call it.
+    """
+
+    value: Any
+    where: str = ""
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.value, dict):
+            raise Malformed(f"{self.where or 'it'} is no table of names and values")
+
+    def text(self, key: str, default: str = _REQUIRED) -> str:
+        """Return a text.
+
+        Raises:
+            Malformed: It is none, or missing.
+        """
+        found = self._get(key, default)
+        if not isinstance(found, str):
+            raise Malformed(f"{self._at(key)} is no text")
+        return found
+
+    def name(self, key: str, default: str = _REQUIRED) -> str:
+        """Return an identifier; the default may be another text.
+
+        Raises:
+            Malformed: It is none, or missing.
+        """
+        return self._checked(key, identifier, default)
+
+    def file_name(self, key: str) -> str:
+        """Return what a file may be called.
+
+        Raises:
+            Malformed: None may, or it is missing.
+        """
+        return self._checked(key, file_name, _REQUIRED)
+
+    def member(self, key: str) -> str:
+        """Return a place in a struct.
+
+        Raises:
+            Malformed: It is none, or missing.
+        """
+        return self._checked(key, member, _REQUIRED)
+
+    def one_of(self, key: str, allowed: Sequence[str]) -> str:
+        """Return one of the texts that are allowed.
+
+        Raises:
+            Malformed: It is another, or missing.
+        """
+        found = self.text(key)
+        if found not in allowed:
+            raise Malformed(f"{self._at(key)}: {shown(found)} is none of {', '.join(allowed)}")
+        return found
+
+    def whole(self, key: str, low: int, high: int) -> int:
+        """Return a whole number in a range.
+
+        Raises:
+            Malformed: It is none, or missing.
+        """
+        found = self._get(key, _REQUIRED)
+        if not isinstance(found, int) or isinstance(found, bool) or not low <= found <= high:
+            raise Malformed(f"{self._at(key)} is no whole number from {low} to {high}")
+        return found
+
+    def number(self, key: str, default: float | None = _REQUIRED) -> float | None:
+        """Return a number or a bool.
+
+        Raises:
+            Malformed: It is none, or missing.
+        """
+        found = self._get(key, default)
+        if found is None or isinstance(found, int | float):
+            return found
+        raise Malformed(f"{self._at(key)} is no number")
+
+    def names(self, key: str, default: Sequence[str] = _REQUIRED) -> tuple[str, ...]:
+        """Return a list of identifiers.
+
+        Raises:
+            Malformed: It is none, or missing.
+        """
+        return self._each(key, identifier, default)
+
+    def lines(self, key: str) -> tuple[str, ...]:
+        """Return a list of names of lines.
+
+        Raises:
+            Malformed: It is none, or missing.
+        """
+        return self._each(key, line_name, _REQUIRED)
+
+    def members(self, key: str) -> tuple[str, ...]:
+        """Return a list of places in structs.
+
+        Raises:
+            Malformed: It is none, or missing.
+        """
+        return self._each(key, member, _REQUIRED)
+
+    def each(self, key: str, most: int, default: Sequence[object] = _REQUIRED) -> "Iterator[Said]":
+        """Give each table of a list.
+
+        Raises:
+            Malformed: It is no list of tables, has more than `most`, or is missing.
+        """
+        for at, one in enumerate(self._list(key, most, default)):
+            yield Said(one, f"{self._at(key)}[{at}]")
+
+    def table(self, key: str) -> "Said":
+        """Return a table in it.
+
+        Raises:
+            Malformed: It is none, or missing.
+        """
+        return Said(self._get(key, _REQUIRED), self._at(key))
+
+    def _each(self, key: str, check: Any, default: Sequence[str]) -> tuple[str, ...]:
+        found = self._list(key, 1_000_000, default)
+        return tuple(self._named(key, check, one) for one in found)
+
+    def _list(self, key: str, most: int, default: Sequence[object]) -> Sequence[Any]:
+        found = self._get(key, default)
+        if not isinstance(found, list | tuple):
+            raise Malformed(f"{self._at(key)} is no list")
+        if len(found) > most:
+            raise Malformed(f"{self._at(key)} has {len(found)} entries, more than {most}")
+        return found
+
+    def _checked(self, key: str, check: Any, default: str) -> str:
+        found = self._get(key, default)
+        return self._named(key, check, found) if key in self.value else default
+
+    def _named(self, key: str, check: Any, found: object) -> str:
+        try:
+            named: str = check(found)
+        except BadName as error:
+            raise Malformed(f"{self._at(key)}: {error}") from error
+        return named
+
+    def _get(self, key: str, default: Any) -> Any:
+        found = self.value.get(key, default)
+        if found is _REQUIRED:
+            raise Malformed(f"{self.where or 'it'} lacks `{key}`")
+        return found
+
+    def _at(self, key: str) -> str:
+        return f"{self.where}.{key}" if self.where else f"`{key}`"

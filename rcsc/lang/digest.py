@@ -1,0 +1,125 @@
+"""A digest of all that a part of a program means, so that what did not change is known without a solver.
+
+In: a program and one of its parts. Out: text; equal texts mean the same. Positions, doc lines, comments and the words of a
+cell are left out; names of lines are not, since logs and executors show them.
+"""
+
+import hashlib
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field, replace
+
+from rcsc.lang.leaves import everything, expressions, read_by, written_by
+from rcsc.lang.model import (
+    Action,
+    Assumption,
+    Call,
+    Expr,
+    Procedure,
+    Program,
+    Statement,
+    Table,
+    Test,
+    Variable,
+)
+
+
+@dataclass(slots=True)
+class Digests:
+    """Digests of one program's parts."""
+
+    program: Program
+    procedures: dict[str, Procedure] = field(init=False)
+    variables: dict[str, Variable] = field(init=False)
+    assumptions: dict[str, Assumption] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.procedures = {str(one.name): one for one in self.program.procedures}
+        self.variables = {str(one.name): one for one in self.program.variables}
+        self.assumptions = {str(one.name): one for one in self.program.assumptions}
+
+    def table(self, table: Table) -> str:
+        """Of a table: its lines, what they run, its assumptions and invariants, and the types of what it touches."""
+        hashed = hashlib.sha256(b"table\n")
+        known: dict[int, str] = {}
+        lines: list[tuple[object, ...]] = [
+            (
+                line.name,
+                [_stated(test, known) for test in line.tests if test is not None],
+                _statements(line.actions),
+            )
+            for line in table.lines
+        ]
+        if table.default is not None:
+            lines.append((table.default.name, table.default.unreachable, _statements(table.default.actions)))
+        for line in lines:
+            hashed.update(repr(line).encode())
+        conditions = [self.assumptions[name].condition for name in table.assumptions]
+        stated = [
+            (name, self.assumptions[name].standing, repr(self.assumptions[name].condition))
+            for name in table.assumptions
+        ]
+        kept = [(one.name, repr(one.condition)) for one in self.program.invariants]
+        hashed.update(repr((stated, kept)).encode())
+        body = [
+            action.statement
+            for line in (*table.lines, table.default)
+            if line is not None
+            for action in line.actions
+        ]
+        tests = {id(test): test.condition for line in table.lines for test in line.tests if test is not None}
+        conditions += [*tests.values(), *(one.condition for one in self.program.invariants)]
+        hashed.update(self._rest(body, conditions).encode())
+        return hashed.hexdigest()
+
+    def body(self, body: Iterable[Statement]) -> str:
+        """Of statements and all that they call."""
+        statements = list(body)
+        return repr([repr(one) for one in statements]) + self._rest(statements, ())
+
+    def procedure(self, name: str) -> str:
+        """Of a procedure and all that it calls."""
+        one = self.procedures[name]
+        return repr(one.params) + self.body([Call(one.name)])
+
+    def touched(self, body: Iterable[Statement], conditions: Iterable[Expr]) -> set[str]:
+        """Leaves that statements, all that they call, and conditions read or write."""
+        called = [self.procedures[name] for name in self.closure(body)]
+        found = {str(leaf) for condition in conditions for leaf in read_by(condition)}
+        for part in (body, *(one.body for one in called)):
+            for statement in everything(part):
+                found.update(written_by(statement))
+                found.update(leaf for expr in expressions(statement) for leaf in read_by(expr))
+        for one in called:
+            found.update((*one.reads, *one.writes))
+        return found
+
+    def closure(self, body: Iterable[Statement]) -> list[str]:
+        """The procedures that run when the statements do, sorted."""
+        waiting, seen = list(_called(body)), set[str]()
+        while waiting:
+            name = waiting.pop()
+            if name not in seen:
+                seen.add(name)
+                waiting.extend(_called(self.procedures[name].body))
+        return sorted(seen)
+
+    def _rest(self, body: list[Statement], conditions: Iterable[Expr]) -> str:
+        """Procedures as they are defined, and variables as they are declared."""
+        defined = [repr(replace(self.procedures[name], doc="")) for name in self.closure(body)]
+        leaves = sorted(self.touched(body, conditions))
+        declared = [(name, repr(self.variables[name].type), self.variables[name].kind) for name in leaves]
+        return repr((defined, declared))
+
+
+def _called(body: Iterable[Statement]) -> Iterator[str]:
+    return (str(one.procedure) for one in everything(body) if isinstance(one, Call))
+
+
+def _stated(test: Test, known: dict[int, str]) -> str:
+    if id(test) not in known:
+        known[id(test)] = repr(test.condition)
+    return known[id(test)]
+
+
+def _statements(actions: Iterable[Action]) -> list[str]:
+    return [repr(action.statement) for action in actions]

@@ -1,0 +1,239 @@
+"""Condition cells to tests; where a test looks at one leaf only, to its set of keys."""
+
+from dataclasses import dataclass, field
+
+from rcsc.diagnostics.codes import Code
+from rcsc.diagnostics.source import Span
+from rcsc.lang.expressions.folding import fold
+from rcsc.lang.expressions.operators import Typed, compared
+from rcsc.lang.expressions.placing import placed
+from rcsc.lang.expressions.scope import Body, Scope
+from rcsc.lang.expressions.typed import among, between, boolean, typed
+from rcsc.lang.leaves import read_by
+from rcsc.lang.model import (
+    COMPARISONS,
+    Among,
+    Apply,
+    Bool,
+    Box,
+    Expr,
+    Int,
+    Literal,
+    Op,
+    Read,
+    Real,
+    Scalar,
+    Test,
+    Value,
+    Variable,
+    VariableName,
+    key_bounds,
+    key_of,
+    value_of_key,
+)
+from rcsc.lang.syntax import tree
+
+_SMALL = 512
+_FLIPPED = {Op.LT: Op.GT, Op.LE: Op.GE, Op.GT: Op.LT, Op.GE: Op.LE, Op.EQ: Op.EQ, Op.NE: Op.NE}
+
+
+@dataclass(slots=True)
+class Tests:
+    """The tests of one table: one a column and meaning, shared by the lines that state it.
+
+    Attributes:
+        subjects: What each column's heading means; None under `when`, and after an error.
+        order: The place of each leaf in declared order.
+    """
+
+    scope: Scope
+    headings: tuple[tree.Heading, ...]
+    subjects: tuple[Typed | None, ...]
+    order: dict[str, int]
+    known: dict[tuple[int, int], Test | None] = field(default_factory=dict)
+    meant: dict[tuple[int, tree.Condition], Test | None] = field(default_factory=dict)
+    __test__ = False
+
+    def test(self, column: int, written: tree.Condition, text: str, span: Span) -> Test | None:
+        """The test of a cell; None where it is always true, or after an error."""
+        meaning = (column, written)
+        if meaning not in self.meant:
+            self.scope.cell = span
+            self.meant[meaning] = self._test(column, written, text, span)
+            self.scope.cell = None
+        self.known[column, id(written)] = self.meant[meaning]
+        return self.meant[meaning]
+
+    def _test(self, column: int, written: tree.Condition, text: str, span: Span) -> Test | None:
+        condition = self._condition(column, written)
+        if condition is None:
+            return None
+        value = fold(condition)
+        names = tuple(sorted(set(read_by(condition)), key=self.order.__getitem__))
+        box = box_of(condition, self.scope.leaves[names[0]]) if len(names) == 1 else None
+        text = " ".join(text.split())
+        if value is False or box == ():
+            helps = "the line could never match: mend the condition, or take the line out"
+            self.scope.report(Code.EMPTY_CONDITION, f"no value satisfies `{text}`", span, helps)
+            return None
+        return None if value is True else Test(text, placed(condition, span), names, box)
+
+    def _condition(self, column: int, written: tree.Condition) -> Expr | None:
+        scope, body = self.scope, Body()
+        if self.headings[column].subject is None:
+            assert isinstance(written, tree.Comparison)
+            return boolean(scope, body, written.value)
+        subject = self.subjects[column]
+        if subject is None:
+            return None
+        found: Typed | None
+        match written:
+            case tree.Comparison(op, value, span):
+                other = typed(scope, body, value, subject.expr.type)
+                found = None if other is None else compared(scope, Op(op), (subject, other), span)
+            case tree.OneOf(members, span):
+                found = among(scope, body, subject, members, span)
+            case tree.Between(low, high, span):
+                found = between(scope, body, subject, low, high, span)
+        return None if found is None else found.expr
+
+
+# --- boxes ---------------------------------------------------------------------------
+
+
+def box_of(condition: Expr, leaf: Variable) -> Box | None:
+    """The keys of the one leaf it reads for which the condition holds; None where not a box."""
+    low, high = key_bounds(leaf.type)
+    box = _box(condition, leaf.type, low, high)
+    if box is None and high - low < _SMALL and not isinstance(leaf.type, Real):
+        return _tried(condition, leaf.name, leaf.type, range(low, high + 1))
+    return box
+
+
+def _tried(condition: Expr, name: VariableName, kind: Scalar, keys: range) -> Box | None:
+    """By trying every key; None where the condition is undefined for some."""
+    holding = []
+    for key in keys:
+        value = fold(condition, {name: value_of_key(kind, key)})
+        if value is None:
+            return None
+        if value:
+            holding.append((key, key))
+    return joined(holding)
+
+
+def joined(parts: list[tuple[int, int]]) -> Box:
+    """Sorted and merged where they touch."""
+    merged: list[tuple[int, int]] = []
+    for low, high in sorted(part for part in parts if part[0] <= part[1]):
+        if merged and low <= merged[-1][1] + 1:
+            merged[-1] = (merged[-1][0], max(merged[-1][1], high))
+        else:
+            merged.append((low, high))
+    return tuple(merged)
+
+
+def _without(box: Box, low: int, high: int) -> Box:
+    edges, at = [], low
+    for first, last in box:
+        edges.append((at, first - 1))
+        at = last + 1
+    return joined([*edges, (at, high)])
+
+
+def _box(condition: Expr, kind: Scalar, low: int, high: int) -> Box | None:
+    always = fold(condition)
+    if always is not None:
+        return ((low, high),) if always else ()
+    match condition:
+        case Read():
+            return ((1, 1),)
+        case Among(subject=Read(), values=values):
+            keys = [key_of(kind, value) for value in values]
+            return joined([(key, key) for key in keys if low <= key <= high])
+        case Apply(op=Op.NOT, args=(inner,)):
+            box = _box(inner, kind, low, high)
+            return None if box is None else _without(box, low, high)
+        case Apply(op=Op.AND | Op.OR | Op.IMPLIES as op, args=(left, right)):
+            one, two = _box(left, kind, low, high), _box(right, kind, low, high)
+            return None if one is None or two is None else _joined_by(op, one, two, low, high)
+        case Apply(op=op, args=(left, right)) if op in COMPARISONS:
+            return _compared(op, left, right, kind, low, high)
+        case _:
+            return None
+
+
+def _joined_by(op: Op, one: Box, two: Box, low: int, high: int) -> Box:
+    if op is Op.IMPLIES:
+        one = _without(one, low, high)
+    if op is Op.AND:
+        return joined([(max(a, c), min(b, d)) for a, b in one for c, d in two])
+    return joined([*one, *two])
+
+
+def _compared(op: Op, left: Expr, right: Expr, kind: Scalar, low: int, high: int) -> Box | None:
+    if fold(left) is not None:
+        left, right, op = right, left, _FLIPPED[op]
+    value = fold(right)
+    if value is None or isinstance(right.type, Bool) is not isinstance(kind, Bool):
+        return None
+    if isinstance(left, Read):
+        return _against(op, key_of(kind, value), low, high)
+    line = _affine(left) if isinstance(kind, Int) else None
+    return None if line is None else _affine_box(op, line, int(value), low, high)
+
+
+def _against(op: Op, key: int, low: int, high: int) -> Box:
+    below, above = (low, min(key - 1, high)), (max(key + 1, low), high)
+    at = (key, key) if low <= key <= high else (1, 0)
+    parts = {
+        Op.EQ: [at],
+        Op.NE: [below, above],
+        Op.LT: [below],
+        Op.LE: [below, at],
+        Op.GT: [above],
+        Op.GE: [at, above],
+    }
+    return joined(parts[op])
+
+
+def _affine(expr: Expr) -> tuple[int, int] | None:
+    """`(a, b)` where the expression is a * leaf + b; None where it is not."""
+    value: Value | None = fold(expr)
+    if value is not None:
+        return 0, int(value)
+    match expr:
+        case Read():
+            return 1, 0
+        case Apply(op=Op.NEG, args=(inner,)):
+            line = _affine(inner)
+            return None if line is None else (-line[0], -line[1])
+        case Apply(op=Op.ADD | Op.SUB | Op.MUL as op, args=(left, right)):
+            one, two = _affine(left), _affine(right)
+            return None if one is None or two is None else _combined(op, one, two)
+        case _:
+            return None
+
+
+def _combined(op: Op, one: tuple[int, int], two: tuple[int, int]) -> tuple[int, int] | None:
+    (a, b), (c, d) = one, two
+    if op is Op.MUL:
+        return None if a and c else (a * d + c * b, b * d)
+    sign = 1 if op is Op.ADD else -1
+    return a + sign * c, b + sign * d
+
+
+def _affine_box(op: Op, line: tuple[int, int], value: int, low: int, high: int) -> Box | None:
+    """Keys x with a * x + b `op` value."""
+    a, rest = line[0], value - line[1]
+    if a < 0:
+        a, rest, op = -a, -rest, _FLIPPED[op]
+    if a == 0:
+        always = fold(Apply(op, (Literal(0, Int(0, 0)), Literal(rest, Int(rest, rest))), Bool()))
+        return ((low, high),) if always else ()
+    floor, exact = rest // a, rest % a == 0
+    if op in (Op.EQ, Op.NE):
+        return _against(op, floor, low, high) if exact else (() if op is Op.EQ else ((low, high),))
+    if op in (Op.LE, Op.GT) or exact:
+        return _against(op, floor, low, high)
+    return _against(Op.LE if op is Op.LT else Op.GT, floor, low, high)

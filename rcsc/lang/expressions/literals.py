@@ -1,0 +1,57 @@
+"""Numbers of the text: within 64 bits, finite, and no two different ones for one double."""
+
+import math
+from fractions import Fraction
+
+from rcsc.diagnostics.codes import Code
+from rcsc.diagnostics.diagnostic import Label
+from rcsc.diagnostics.source import Span
+from rcsc.lang.expressions.operators import Typed
+from rcsc.lang.expressions.scope import Scope
+from rcsc.lang.model import U64_MAX, Int, Literal, Real
+from rcsc.lang.syntax import tree
+
+LONGEST = 1_000
+
+
+def integer(scope: Scope, written: tree.IntLiteral) -> Typed | None:
+    """A whole number that fits in 64 bits."""
+    text = written.text.replace("_", "")
+    digits = text[2:] if text[:2] in ("0x", "0X") else text
+    value = int(digits.lstrip("0")[:40] or "0", 10 if digits is text else 16)
+    if value > U64_MAX:
+        message = "no 64-bit integer holds this number"
+        scope.report(Code.TOO_WIDE, message, written.span, f"the greatest is {U64_MAX}")
+        return None
+    kind = Int(value, value, scope.unit(written.unit))
+    return Typed(Literal(value, kind, written.span), written.unit is None)
+
+
+def real(scope: Scope, written: tree.RealLiteral) -> Typed | None:
+    """The double nearest to the number written.
+
+    Source: IEEE 754-2019, 5.12 (correctly rounded conversion from decimal).
+    """
+    text = written.text.replace("_", "")
+    value = float(text)
+    if not math.isfinite(value):
+        scope.report(Code.NOT_FINITE, f"`{written.text}` is larger than every double", written.span)
+        return None
+    if len(text) > LONGEST or len(text.lower().partition("e")[2]) > 5:
+        message = f"a number is written with at most {LONGEST} characters, its exponent with at most 5"
+        scope.report(Code.NOT_FINITE, message, written.span)
+        return None
+    _one_spelling(scope, value, text, written.span)
+    return Typed(
+        Literal(value, Real(value, value, scope.unit(written.unit)), written.span), written.unit is None
+    )
+
+
+def _one_spelling(scope: Scope, value: float, text: str, span: Span) -> None:
+    """Reports two different numbers of the text that are the same double."""
+    first = scope.doubles.setdefault(value, (text, scope.at(span)))
+    if first[0] != text and Fraction(first[0]) != Fraction(text):
+        shown = [one if len(one) <= 40 else one[:37] + "..." for one in (text, first[0])]
+        message = f"`{shown[0]}` and `{shown[1]}` are different numbers but the same double, {value!r}"
+        label = Label(first[1], "the other")
+        scope.report(Code.SAME_DOUBLE, message, span, f"write {value!r} for both", related=(label,))

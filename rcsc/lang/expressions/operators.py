@@ -1,0 +1,174 @@
+"""What operators make of typed operands: kinds and units checked, bounds computed, constants folded."""
+
+import math
+from dataclasses import dataclass
+
+from rcsc.diagnostics.codes import Code
+from rcsc.diagnostics.source import Span
+from rcsc.lang.expressions import intervals
+from rcsc.lang.expressions.folding import fold
+from rcsc.lang.expressions.scope import Scope, normal, spell_unit
+from rcsc.lang.model import (
+    I64_MAX,
+    I64_MIN,
+    U64_MAX,
+    Apply,
+    Bool,
+    Enum,
+    Expr,
+    Int,
+    Literal,
+    Op,
+    Real,
+    Scalar,
+    Unit,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Typed:
+    """An expression, and whether it is made of numbers written without a unit."""
+
+    expr: Expr
+    bare: bool = False
+
+    def unit(self) -> Unit:
+        """Its unit; () for a bare number, a bool or an enumeration."""
+        kind = self.expr.type
+        return kind.unit if isinstance(kind, Int | Real) else ()
+
+    def literal(self) -> Literal:
+        """Itself, of a folded constant."""
+        assert isinstance(self.expr, Literal)
+        return self.expr
+
+
+def kind_word(kind: Scalar) -> str:
+    """The kind, for messages."""
+    match kind:
+        case Bool():
+            return "bool"
+        case Enum(name=name):
+            return f"`{name}`"
+        case Int():
+            return "int"
+        case Real():
+            return "real"
+
+
+def same_kind(one: Scalar, two: Scalar) -> bool:
+    """Whether values of the two can be compared or assigned, units aside."""
+    if isinstance(one, Enum) or isinstance(two, Enum):
+        return one == two
+    return type(one) is type(two)
+
+
+def applied(scope: Scope, op: Op, operands: tuple[Typed, ...], unit: Unit, span: Span) -> Typed | None:
+    """The operation with its bounds; folded where all operands are constants."""
+    kinds = tuple(o.expr.type for o in operands if isinstance(o.expr.type, Int | Real))
+    args = tuple(o.expr for o in operands)
+    bare = all(o.bare for o in operands)
+    made = Apply(op, args, intervals.apply(op, kinds, unit), span)
+    value = fold(made) if all(isinstance(arg, Literal) for arg in args) else None
+    if value is None:
+        return Typed(made, bare)
+    if isinstance(made.type, Real) and not math.isfinite(value):
+        scope.report(Code.NOT_FINITE, "this constant is larger than every double", span)
+        return None
+    if isinstance(made.type, Int) and not I64_MIN <= value <= U64_MAX:
+        scope.report(Code.TOO_WIDE, "no 64-bit integer holds this constant", span)
+        return None
+    point = (
+        Int(int(value), int(value), unit)
+        if isinstance(made.type, Int)
+        else Real(value + 0.0, value + 0.0, unit)
+    )
+    return Typed(Literal(value + 0.0 if isinstance(value, float) else value, point, span), bare)
+
+
+def scaled(scope: Scope, op: Op, left: Typed, right: Typed, span: Span) -> Typed | None:
+    """A product or quotient: units multiply."""
+    if not one_kind(scope, left, right, span):
+        return None
+    powers = dict(left.unit())
+    for name, power in right.unit():
+        powers[name] = powers.get(name, 0) + (power if op is Op.MUL else -power)
+    return applied(scope, op, (left, right), normal(powers), span)
+
+
+def alike(scope: Scope, op: Op, operands: tuple[Typed, ...], span: Span) -> Typed | None:
+    """A sum, difference, remainder, least or greatest: units agree."""
+    unit = common_unit(scope, operands, span)
+    if unit is None or not one_kind(scope, operands[0], operands[-1], span):
+        return None
+    return applied(scope, op, operands, unit, span)
+
+
+def one_kind(scope: Scope, left: Typed, right: Typed, span: Span) -> bool:
+    """Whether both sides are of one kind, and one 64-bit integer type holds both."""
+    if not same_kind(left.expr.type, right.expr.type):
+        one, two = kind_word(left.expr.type), kind_word(right.expr.type)
+        helps = ("convert with `real(n)` or `int(x)`",) if {one, two} == {"int", "real"} else ()
+        scope.report(Code.KIND, f"the two sides are {one} and {two}", span, *helps)
+        return False
+    kinds = [k for k in (left.expr.type, right.expr.type) if isinstance(k, Int)]
+    unsigned = any(k.low >= 0 and k.high > I64_MAX for k in kinds)
+    if unsigned and min(k.low for k in kinds) < 0:
+        scope.report(
+            Code.MIXED_SIGN, "no 64-bit integer type holds both sides", span, "narrow one of the ranges"
+        )
+        return False
+    return True
+
+
+def common_unit(scope: Scope, operands: tuple[Typed, ...], span: Span) -> Unit | None:
+    """The unit of all that have one; None (reported) where they differ."""
+    units = [operand.unit() for operand in operands if not operand.bare]
+    if not units:
+        return ()
+    for unit in units:
+        if unit != units[0]:
+            scope.report(Code.UNIT, f"the units differ: {spell_unit(units[0])} and {spell_unit(unit)}", span)
+            return None
+    return units[0]
+
+
+def compared(scope: Scope, op: Op, pair: tuple[Typed, Typed], span: Span) -> Typed | None:
+    """A comparison of the two."""
+    left, right = pair
+    if not one_kind(scope, left, right, span) or common_unit(scope, pair, span) is None:
+        return None
+    if op not in (Op.EQ, Op.NE) and not isinstance(left.expr.type, Int | Real):
+        scope.report(Code.KIND, f"{kind_word(left.expr.type)} has no order", span, "use `=`, `/=` or a set")
+        return None
+    return Typed(Apply(op, (left.expr, right.expr), Bool(), span))
+
+
+def _nearest(bound: int) -> float:
+    """The double nearest to a bound; infinite beyond all doubles, where a bound of a bound may lie."""
+    try:
+        return float(bound)
+    except OverflowError:
+        return math.inf if bound > 0 else -math.inf
+
+
+def converted(scope: Scope, op: Op, operand: Typed, span: Span) -> Typed | None:
+    """`int(x)` toward zero, or `real(n)` to the nearest double; the unit stays."""
+    kind = operand.expr.type
+    if op is Op.TO_REAL:
+        if not isinstance(kind, Int):
+            scope.report(Code.KIND, "`real` converts a whole number", span)
+            return None
+        converted: Scalar = Real(_nearest(kind.low), _nearest(kind.high), kind.unit)
+    else:
+        if not isinstance(kind, Real):
+            scope.report(Code.KIND, "`int` converts a real number", span)
+            return None
+        wide = not (math.isfinite(kind.low) and math.isfinite(kind.high))
+        converted = Int(*((-(2**1024), 2**1024) if wide else (int(kind.low), int(kind.high))), kind.unit)
+    made = Apply(op, (operand.expr,), converted, span)
+    value = fold(made) if isinstance(operand.expr, Literal) else None
+    if value is not None and op is Op.TO_INT and not I64_MIN <= value <= U64_MAX:
+        scope.report(Code.TOO_WIDE, "no 64-bit integer holds this constant", span)
+        return None
+    return Typed(made if value is None else Literal(value, converted, span), operand.bare)

@@ -1,0 +1,172 @@
+"""The names of one program and what is wrong with their use; shared by the parts of `resolve`."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+
+from rcsc.diagnostics.codes import Code
+from rcsc.diagnostics.diagnostic import Diagnostic, Label
+from rcsc.diagnostics.source import Span
+from rcsc.lang.model import (
+    Declared,
+    Enum,
+    Literal,
+    Local,
+    Parameter,
+    Record,
+    Scalar,
+    Type,
+    Unit,
+    Value,
+    Variable,
+)
+from rcsc.lang.syntax import tree
+
+BASE_UNITS = frozenset("m mm s ms N kg deg rad Hz A V lb".split())
+
+
+@dataclass(frozen=True, slots=True)
+class Constant:
+    """A named constant, and whether it takes any unit (it was written without one)."""
+
+    literal: Literal
+    bare: bool
+
+
+@dataclass(slots=True)
+class Scope:
+    """Everything declared so far, by name, and the diagnostics so far.
+
+    Attributes:
+        places: Where each name was declared, by `SPACE NAME`.
+        signatures: The types of each procedure's parameters.
+        places_of: The place of each leaf in declared order; made when it is asked for.
+        doubles: The first spelling of each double of the text, and where it stands.
+        demand: Resolves a constant (`value`) or `type` asked for before its turn; False after an error.
+        variables: Names of variables, declared or not yet.
+        cell: The table cell that is being resolved.
+        depth: How deep the expression that is being resolved nests.
+        made: Statements made so far; a copy of a record or an array is one a scalar.
+        no_before: Why `was` cannot stand in the expression that is being resolved; empty where it can.
+    """
+
+    found: list[Diagnostic] = field(default_factory=list)
+    places: dict[str, Span] = field(default_factory=dict)
+    units: set[str] = field(default_factory=lambda: set(BASE_UNITS))
+    constants: dict[str, Constant] = field(default_factory=dict)
+    types: dict[str, Type] = field(default_factory=dict)
+    members: dict[str, list[Enum]] = field(default_factory=dict)
+    declared: dict[str, Declared] = field(default_factory=dict)
+    leaves: dict[str, Variable] = field(default_factory=dict)
+    places_of: dict[str, int] = field(default_factory=dict)
+    deferred: set[str] = field(default_factory=set)
+    procedures: dict[str, tree.ProcedureDecl] = field(default_factory=dict)
+    signatures: dict[str, tuple[Scalar, ...]] = field(default_factory=dict)
+    doubles: dict[float, tuple[str, Span]] = field(default_factory=dict)
+    records: list[Record] = field(default_factory=list)
+    elements: dict[tuple[str, int], tuple[str, ...]] = field(default_factory=dict)
+    demand: Callable[[str, tree.Name], bool] = lambda _space, _name: True
+    variables: set[str] = field(default_factory=set)
+    cell: Span | None = None
+    depth: int = 0
+    made: int = 0
+    no_before: str = "`was` stands in a property only"
+
+    def report(
+        self, code: Code, message: str, span: Span, *helps: str, related: tuple[Label, ...] = ()
+    ) -> None:
+        """Adds an error; one found in a cell is told where it stands in the file."""
+        self.found.append(Diagnostic(code, message, Label(self.at(span)), related=related, help=helps))
+
+    def at(self, span: Span) -> Span:
+        """The span in the file: nodes inside a table cell count from the start of the cell."""
+        if span.file or self.cell is None:
+            return span
+        return tree.absolute(span, self.cell.file, self.cell.start)
+
+    def order(self, leaf: str) -> int:
+        """The place of a leaf in declared order."""
+        if len(self.places_of) != len(self.leaves):
+            self.places_of = {name: at for at, name in enumerate(self.leaves)}
+        return self.places_of[leaf]
+
+    def names(self, base: str, length: int) -> tuple[str, ...]:
+        """The names of the elements of an array; made once, as every use by index has them all."""
+        made = self.elements.get((base, length))
+        if made is None:
+            made = tuple(f"{base}[{at}]" for at in range(length))
+            self.elements[base, length] = made
+        return made
+
+    def claim(self, name: tree.Name, space: str) -> bool:
+        """Takes `name` in a name space; reports and refuses one that is taken."""
+        key = f"{space} {name.text}"
+        if key in self.places:
+            first = Label(self.places[key], "first declared here")
+            self.report(Code.DUPLICATE_NAME, f"`{name.text}` is declared twice", name.span, related=(first,))
+            return False
+        self.places[key] = name.span
+        return True
+
+    def unknown(self, kind: str, name: tree.Name, known: list[str], span: Span | None = None) -> None:
+        """Reports a name that nothing declares, with the nearest one that exists."""
+        near = get_close_matches(name.text, known, n=1)
+        helps = (f"did you mean `{near[0]}`?",) if near else ()
+        self.report(Code.UNKNOWN_NAME, f"no {kind} is called `{name.text}`", span or name.span, *helps)
+
+    def unit(self, written: tree.Unit | None) -> Unit:
+        """The unit in normal form; () for none."""
+        if written is None:
+            return ()
+        powers: dict[str, int] = {}
+        for factor in written.factors:
+            if factor.name.text not in self.units:
+                self.report(
+                    Code.UNIT,
+                    f"`{factor.name.text}` is not a unit",
+                    factor.name.span,
+                    f"declare it: `unit {factor.name.text}`",
+                )
+            powers[factor.name.text] = powers.get(factor.name.text, 0) + factor.power
+        return normal(powers)
+
+
+def root_of(leaf: str) -> str:
+    """The variable that a leaf is a part of."""
+    return leaf.partition(".")[0].partition("[")[0]
+
+
+def spell_number(value: Value) -> str:
+    """The number for a message; a very long one by its size."""
+    if isinstance(value, int) and abs(value) >= 10**40:
+        return f"{'-' * (value < 0)}(a number of {value.bit_length()} bits)"
+    return repr(value)
+
+
+def normal(powers: dict[str, int]) -> Unit:
+    """Sorted, without zero powers."""
+    return tuple(sorted((name, power) for name, power in powers.items() if power))
+
+
+def spell_unit(unit: Unit) -> str:
+    """`mm/s`; `1` for none."""
+    above = [name if power == 1 else f"{name}^{power}" for name, power in unit if power > 0]
+    below = [name if power == -1 else f"{name}^{-power}" for name, power in unit if power < 0]
+    return "*".join(above) + "".join(f"/{name}" for name in below) if above else "/".join(["1", *below])
+
+
+@dataclass(slots=True)
+class Body:
+    """The parameters and locals of one procedure; names made unique within it."""
+
+    visible: dict[str, Parameter | Local] = field(default_factory=dict)
+    taken: set[str] = field(default_factory=set)
+
+    def fresh(self, name: str) -> str:
+        """`name`, or the first of `name_2`, `name_3` that no other local has."""
+        unique, number = name, 1
+        while unique in self.taken:
+            number += 1
+            unique = f"{name}_{number}"
+        self.taken.add(unique)
+        return unique

@@ -1,0 +1,390 @@
+"""Expressions: names found, sub-expressions typed, paths followed to their leaves."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+from rcsc.diagnostics.codes import Code
+from rcsc.diagnostics.source import Span
+from rcsc.lang.expressions.folding import fold
+from rcsc.lang.expressions.literals import integer, real
+from rcsc.lang.expressions.operators import (
+    Typed,
+    alike,
+    applied,
+    common_unit,
+    compared,
+    converted,
+    kind_word,
+    one_kind,
+    scaled,
+)
+from rcsc.lang.expressions.scope import Body, Scope
+from rcsc.lang.leaves import one_earlier
+from rcsc.lang.model import (
+    COMPARISONS,
+    Among,
+    Apply,
+    Array,
+    Bool,
+    Enum,
+    Expr,
+    Int,
+    Literal,
+    Op,
+    Read,
+    ReadLocal,
+    Real,
+    Record,
+    Scalar,
+    Select,
+    Type,
+    Value,
+    VariableName,
+)
+from rcsc.lang.syntax import tree
+
+DEEPEST = 200
+
+
+def typed(scope: Scope, body: Body, written: tree.Expr, want: Scalar | None = None) -> Typed | None:
+    """The typed expression; None after an error, which has then been reported."""
+    if scope.depth == DEEPEST:
+        scope.report(Code.TOO_DEEP, f"expressions nest more than {DEEPEST} deep", written.span)
+        return None
+    scope.depth += 1
+    try:
+        return _typed(scope, body, written, want)
+    finally:
+        scope.depth -= 1
+
+
+def _typed(scope: Scope, body: Body, written: tree.Expr, want: Scalar | None) -> Typed | None:
+    match written:
+        case tree.BoolLiteral(value, span):
+            return Typed(Literal(value, Bool(), span))
+        case tree.IntLiteral():
+            return integer(scope, written)
+        case tree.RealLiteral():
+            return real(scope, written)
+        case tree.Reference(name, span):
+            return _reference(scope, body, name, span, want)
+        case tree.FieldOf() | tree.IndexOf():
+            return _path(scope, body, written)
+        case tree.Unary():
+            return _unary(scope, body, written)
+        case tree.Was(operand, span):
+            return _was(scope, body, operand, span, want)
+        case tree.Binary():
+            return _binary(scope, body, written)
+        case tree.InSet():
+            return _in_set(scope, body, written)
+        case tree.InRange():
+            return _in_range(scope, body, written)
+        case tree.Apply():
+            return _function(scope, body, written)
+
+
+def boolean(scope: Scope, body: Body, written: tree.Expr) -> Expr | None:
+    """A condition."""
+    found = typed(scope, body, written, Bool())
+    if found is None:
+        return None
+    if not isinstance(found.expr.type, Bool):
+        scope.report(Code.KIND, f"a condition is a bool, this is {kind_word(found.expr.type)}", written.span)
+        return None
+    return found.expr
+
+
+def _reference(scope: Scope, body: Body, name: tree.Name, span: Span, want: Scalar | None) -> Typed | None:
+    local = body.visible.get(name.text)
+    if local is not None:
+        return Typed(ReadLocal(local.name, local.type, span))
+    if isinstance(want, Enum) and name.text in want.members:
+        if _is_also(scope, name.text, want):
+            message = f"`{name.text}` may mean the variable or `{want.name}.{name.text}`"
+            helps = f"write `{want.name}.{name.text}`, or rename the variable"
+            scope.report(Code.UNKNOWN_NAME, message, name.span, helps)
+            return None
+        return Typed(Literal(want.members.index(name.text), want, span))
+    if name.text in scope.declared:
+        return _path(scope, body, tree.Reference(name, span))
+    if not scope.demand("value", name):
+        return None
+    if name.text in scope.constants:
+        constant = scope.constants[name.text]
+        return Typed(Literal(constant.literal.value, constant.literal.type, span), constant.bare)
+    enums = scope.members.get(name.text, [])
+    if len(enums) == 1:
+        return Typed(Literal(enums[0].members.index(name.text), enums[0], span))
+    if enums:
+        names = ", ".join(f"`{enum.name}.{name.text}`" for enum in enums)
+        scope.report(
+            Code.UNKNOWN_NAME,
+            f"`{name.text}` may mean {names}",
+            name.span,
+            "write which enumeration is meant",
+        )
+        return None
+    if name.text in scope.variables:
+        scope.report(Code.NOT_CONSTANT, f"this must be a constant, `{name.text}` is a variable", name.span)
+        return None
+    if f"value {name.text}" in scope.places:
+        return None  # what is wrong with it has been reported where it is declared
+    known = [*body.visible, *scope.declared, *scope.constants, *scope.members]
+    scope.unknown("variable, constant or member", name, known)
+    return None
+
+
+def _is_also(scope: Scope, name: str, want: Enum) -> bool:
+    """Whether a variable or constant of that name has the type wanted, too."""
+    declared, constant = scope.declared.get(name), scope.constants.get(name)
+    kind = declared.type if declared else constant.literal.type if constant else None
+    return kind == want
+
+
+@dataclass(frozen=True, slots=True)
+class Path:
+    """Where a path leads: one leaf or record, or by a computed index one of several.
+
+    Attributes:
+        names: Path names; one, or one an element of the array that `index` selects from.
+        type: The type there.
+        index: The computed index.
+    """
+
+    names: tuple[str, ...]
+    type: Type
+    index: Expr | None = None
+
+
+def path_of(scope: Scope, body: Body, written: tree.Expr) -> Path | None:
+    """Where a variable path leads; None after an error."""
+    match written:
+        case tree.Reference(name):
+            declared = scope.declared.get(name.text)
+            if declared is None:
+                scope.unknown("variable", name, list(scope.declared))
+                return None
+            return Path((declared.name,), declared.type)
+        case tree.FieldOf(base, name):
+            return _field(scope, path_of(scope, body, base), name)
+        case tree.IndexOf(base, index):
+            return _element(scope, body, path_of(scope, body, base), index)
+        case _:
+            scope.report(Code.KIND, "this is not a variable", written.span)
+            return None
+
+
+def _field(scope: Scope, base: Path | None, name: tree.Name) -> Path | None:
+    if base is None:
+        return None
+    if not isinstance(base.type, Record):
+        scope.report(Code.KIND, f"`{base.names[0]}` has no fields", name.span)
+        return None
+    for part in base.type.fields:
+        if part.name == name.text:
+            return Path(tuple(f"{one}.{name.text}" for one in base.names), part.type, base.index)
+    scope.unknown("field", name, [part.name for part in base.type.fields])
+    return None
+
+
+def _element(scope: Scope, body: Body, base: Path | None, written: tree.Expr) -> Path | None:
+    index = typed(scope, body, written)
+    if base is None or index is None:
+        return None
+    if not isinstance(base.type, Array) or not isinstance(index.expr.type, Int):
+        what = (
+            "an index is a whole number"
+            if isinstance(base.type, Array)
+            else f"`{base.names[0]}` is not an array"
+        )
+        scope.report(Code.KIND, what, written.span)
+        return None
+    at, length = fold(index.expr), base.type.length
+    if at is not None:
+        if not 0 <= at < length:
+            scope.report(
+                Code.OUT_OF_RANGE_CONSTANT, f"the index {at} is not in 0 .. {length - 1}", written.span
+            )
+            return None
+        return Path(tuple(f"{one}[{at}]" for one in base.names), base.type.element, base.index)
+    if base.index is not None:
+        scope.report(Code.KIND, "a path has at most one computed index", written.span)
+        return None
+    return Path(scope.names(base.names[0], length), base.type.element, index.expr)
+
+
+def _path(scope: Scope, body: Body, written: tree.Expr) -> Typed | None:
+    if isinstance(written, tree.FieldOf) and isinstance(written.base, tree.Reference):
+        owner = scope.types.get(written.base.name.text)
+        if isinstance(owner, Enum) and written.base.name.text not in scope.declared:
+            return _member(scope, owner, written)
+    path = path_of(scope, body, written)
+    if path is None:
+        return None
+    if not isinstance(path.type, Bool | Enum | Int | Real):
+        scope.report(Code.KIND, f"`{path.names[0]}` is a whole record or array", written.span)
+        return None
+    leaves = tuple(VariableName(name) for name in path.names)
+    if path.index is None:
+        return Typed(Read(leaves[0], path.type, written.span))
+    return Typed(Select(leaves, path.index, path.type, written.span))
+
+
+def _member(scope: Scope, owner: Enum, written: tree.FieldOf) -> Typed | None:
+    if written.name.text not in owner.members:
+        scope.unknown(f"member of `{owner.name}`", written.name, list(owner.members))
+        return None
+    return Typed(Literal(owner.members.index(written.name.text), owner, written.span))
+
+
+def _unary(scope: Scope, body: Body, written: tree.Unary) -> Typed | None:
+    if written.op == "not":
+        inner = boolean(scope, body, written.operand)
+        return None if inner is None else Typed(Apply(Op.NOT, (inner,), Bool(), written.span))
+    operand = typed(scope, body, written.operand)
+    if operand is None or not _number(scope, operand, written.operand):
+        return None
+    return applied(scope, Op.NEG, (operand,), operand.unit(), written.span)
+
+
+def _was(scope: Scope, body: Body, written: tree.Expr, span: Span, want: Scalar | None) -> Typed | None:
+    """The same expression of the values behind the cycle before."""
+    if scope.no_before:
+        scope.report(Code.NO_CYCLE_BEFORE, scope.no_before, span)
+        return None
+    with without_before(scope, "`was` goes back one cycle, not two"):
+        found = typed(scope, body, written, want)
+    return None if found is None else Typed(one_earlier(found.expr), found.bare)
+
+
+@contextmanager
+def without_before(scope: Scope, why: str) -> Iterator[None]:
+    """Inside, `was` is refused for the reason given; an empty one allows it."""
+    outer, scope.no_before = scope.no_before, why
+    yield
+    scope.no_before = outer
+
+
+def _number(scope: Scope, operand: Typed, written: tree.Expr) -> bool:
+    if isinstance(operand.expr.type, Int | Real):
+        return True
+    scope.report(Code.KIND, f"arithmetic takes numbers, this is {kind_word(operand.expr.type)}", written.span)
+    return False
+
+
+def _pair(scope: Scope, body: Body, left: tree.Expr, right: tree.Expr) -> tuple[Typed, Typed] | None:
+    """Both sides; a bare enum member takes the enumeration of the other side."""
+    if _may_be_member(scope, body, left):
+        two = typed(scope, body, right)
+        one = typed(scope, body, left, two.expr.type if two else None)
+    else:
+        one = typed(scope, body, left)
+        two = typed(scope, body, right, one.expr.type if one else None)
+    return None if one is None or two is None else (one, two)
+
+
+def _may_be_member(scope: Scope, body: Body, written: tree.Expr) -> bool:
+    if not isinstance(written, tree.Reference):
+        return False
+    name = written.name.text
+    return name in scope.members and name not in body.visible and name not in scope.declared
+
+
+def _binary(scope: Scope, body: Body, written: tree.Binary) -> Typed | None:
+    op = Op(written.op)
+    if op in (Op.AND, Op.OR, Op.IMPLIES):
+        one, two = boolean(scope, body, written.left), boolean(scope, body, written.right)
+        return None if one is None or two is None else Typed(Apply(op, (one, two), Bool(), written.span))
+    pair = _pair(scope, body, written.left, written.right)
+    if pair is None:
+        return None
+    if op in COMPARISONS:
+        return compared(scope, op, pair, written.span)
+    left, right = pair
+    if not (_number(scope, left, written.left) and _number(scope, right, written.right)):
+        return None
+    if op is Op.MOD and isinstance(left.expr.type, Real):
+        scope.report(Code.KIND, "`mod` takes whole numbers", written.span)
+        return None
+    if op in (Op.MUL, Op.DIV):
+        return scaled(scope, op, left, right, written.span)
+    return alike(scope, op, (left, right), written.span)
+
+
+def _in_set(scope: Scope, body: Body, written: tree.InSet) -> Typed | None:
+    subject = typed(scope, body, written.subject)
+    return None if subject is None else among(scope, body, subject, written.members, written.span)
+
+
+def among(
+    scope: Scope, body: Body, subject: Typed, members: tuple[tree.Expr, ...], span: Span
+) -> Typed | None:
+    """`subject in {members}`; members are constants."""
+    values: list[Value] = []
+    for member in members:
+        one = typed(scope, body, member, subject.expr.type)
+        if one is None:
+            return None
+        value = fold(one.expr)
+        if value is None:
+            scope.report(Code.NOT_CONSTANT, "the members of a set are constants", member.span)
+            return None
+        if (
+            not one_kind(scope, subject, one, member.span)
+            or common_unit(scope, (subject, one), member.span) is None
+        ):
+            return None
+        values.append(value)
+    return Typed(Among(subject.expr, tuple(sorted(set(values))), Bool(), span))
+
+
+def _in_range(scope: Scope, body: Body, written: tree.InRange) -> Typed | None:
+    subject = typed(scope, body, written.subject)
+    return None if subject is None else between(scope, body, subject, written.low, written.high, written.span)
+
+
+def between(
+    scope: Scope, body: Body, subject: Typed, low: tree.Expr, high: tree.Expr, span: Span
+) -> Typed | None:
+    """`low <= subject and subject <= high`."""
+    least = typed(scope, body, low, subject.expr.type)
+    most = typed(scope, body, high, subject.expr.type)
+    if least is None or most is None:
+        return None
+    ends = fold(least.expr), fold(most.expr)
+    if ends[0] is not None and ends[1] is not None and ends[0] > ends[1]:
+        scope.report(
+            Code.EMPTY_RANGE,
+            f"the range {ends[0]} .. {ends[1]} is empty",
+            span,
+            "write the smaller bound first",
+        )
+        return None
+    above, below = (
+        compared(scope, Op.GE, (subject, least), span),
+        compared(scope, Op.LE, (subject, most), span),
+    )
+    if above is None or below is None:
+        return None
+    return Typed(Apply(Op.AND, (above.expr, below.expr), Bool(), span))
+
+
+def _function(scope: Scope, body: Body, written: tree.Apply) -> Typed | None:
+    op = Op(written.function.text)
+    want = 2 if op in (Op.MIN, Op.MAX) else 1
+    if len(written.args) != want:
+        scope.report(
+            Code.WRONG_ARGUMENTS, f"`{op.value}` takes {want} argument{'s' * (want - 1)}", written.span
+        )
+        return None
+    args = [typed(scope, body, arg) for arg in written.args]
+    operands = tuple(arg for arg in args if arg is not None)
+    if len(operands) != want or not all(
+        _number(scope, o, w) for o, w in zip(operands, written.args, strict=True)
+    ):
+        return None
+    if op in (Op.TO_INT, Op.TO_REAL):
+        return converted(scope, op, operands[0], written.span)
+    return alike(scope, op, operands, written.span)

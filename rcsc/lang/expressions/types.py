@@ -1,0 +1,167 @@
+"""Type expressions to types, and constants to values."""
+
+import math
+
+from rcsc.diagnostics.codes import Code
+from rcsc.diagnostics.source import Span
+from rcsc.lang.expressions.folding import fold
+from rcsc.lang.expressions.operators import Typed
+from rcsc.lang.expressions.scope import Body, Scope
+from rcsc.lang.expressions.typed import typed
+from rcsc.lang.model import (
+    I64_MAX,
+    I64_MIN,
+    U64_MAX,
+    Array,
+    Bool,
+    Enum,
+    Int,
+    Literal,
+    Real,
+    Record,
+    Scalar,
+    Type,
+    Unit,
+    Value,
+)
+from rcsc.lang.syntax import tree
+
+MOST_ELEMENTS = 4096
+MOST_LEAVES = 10_000
+
+
+def type_of(scope: Scope, written: tree.TypeExpr) -> Type:
+    """The type written; after an error some type, so that resolving goes on."""
+    match written:
+        case tree.BoolType():
+            return Bool()
+        case tree.NamedType(name):
+            if not scope.demand("type", name):
+                return Bool()
+            if name.text not in scope.types:
+                scope.unknown("type", name, [*scope.types, "bool"])
+                return Bool()
+            return scope.types[name.text]
+        case tree.ArrayType(length, element, span):
+            return _small(scope, Array(_length(scope, length), type_of(scope, element)), span)
+        case tree.IntType():
+            return _int(scope, written)
+        case tree.RealType():
+            return _real(scope, written)
+
+
+def size(kind: Type) -> int:
+    """Scalars in a value of the type."""
+    match kind:
+        case Array(length, element):
+            return length * size(element)
+        case Record(fields=fields):
+            return sum(size(part.type) for part in fields)
+        case _:
+            return 1
+
+
+def _small(scope: Scope, kind: Array, span: Span) -> Type:
+    if size(kind) <= MOST_LEAVES:
+        return kind
+    scope.report(Code.TOO_MANY_LEAVES, f"a type has at most {MOST_LEAVES} scalar parts", span)
+    return Bool()
+
+
+def scalar_of(scope: Scope, written: tree.TypeExpr) -> Scalar:
+    """The type of a local or parameter, which is a scalar."""
+    found = type_of(scope, written)
+    if isinstance(found, Bool | Enum | Int | Real):
+        return found
+    scope.report(Code.KIND, "a local or parameter is a bool, an enumeration or a number", written.span)
+    return Bool()
+
+
+def constant(scope: Scope, written: tree.Expr, want: Scalar | None = None) -> Typed | None:
+    """The folded value of a constant expression; None (reported) where it is not one."""
+    value = typed(scope, Body(), written, want)
+    if value is None:
+        return None
+    folded = fold(value.expr)
+    if folded is None:
+        scope.report(Code.NOT_CONSTANT, "this must be a constant", written.span)
+        return None
+    return Typed(Literal(folded, _point(value.expr.type, folded), written.span), value.bare)
+
+
+def _point(kind: Scalar, value: Value) -> Scalar:
+    if isinstance(kind, Int):
+        return Int(int(value), int(value), kind.unit)
+    return Real(float(value), float(value), kind.unit) if isinstance(kind, Real) else kind
+
+
+def _length(scope: Scope, written: tree.Expr) -> int:
+    value = constant(scope, written)
+    if value is None:
+        return 1
+    length = value.literal().value
+    if not isinstance(value.expr.type, Int) or not 1 <= length <= MOST_ELEMENTS:
+        scope.report(Code.BAD_LENGTH, f"an array has 1 to {MOST_ELEMENTS} elements", written.span)
+        return 1
+    return int(length)
+
+
+def _bounds(scope: Scope, written: tree.IntType | tree.RealType) -> tuple[Typed, Typed, Unit] | None:
+    low, high = constant(scope, written.low), constant(scope, written.high)
+    if low is None or high is None:
+        return None
+    unit = scope.unit(written.unit)
+    for bound, place in ((low, written.low), (high, written.high)):
+        other = bound.unit()
+        if other and unit and other != unit:
+            scope.report(Code.UNIT, "the bounds of a range have one unit", place.span)
+        unit = unit or other
+    return low, high, unit
+
+
+def _int(scope: Scope, written: tree.IntType) -> Int:
+    bounds = _bounds(scope, written)
+    if bounds is None:
+        return Int(0, 0)
+    low, high, unit = bounds
+    if not (isinstance(low.expr.type, Int) and isinstance(high.expr.type, Int)):
+        scope.report(Code.KIND, "the bounds of an `int` are whole numbers", written.span)
+        return Int(0, 0)
+    least, most = int(low.literal().value), int(high.literal().value)
+    if least > most:
+        scope.report(
+            Code.EMPTY_RANGE,
+            f"the range {least} .. {most} is empty",
+            written.span,
+            "write the smaller bound first",
+        )
+        return Int(most, most, unit)
+    if least < I64_MIN or most > U64_MAX or (least < 0 and most > I64_MAX):
+        scope.report(Code.TOO_WIDE, f"no 64-bit integer holds {least} .. {most}", written.span)
+        return Int(0, 0, unit)
+    return Int(least, most, unit)
+
+
+def _real(scope: Scope, written: tree.RealType) -> Real:
+    bounds = _bounds(scope, written)
+    if bounds is None:
+        return Real(0.0, 0.0)
+    low, high, unit = bounds
+    least, most = _double(scope, low, written.low.span), _double(scope, high, written.high.span)
+    if least > most:
+        scope.report(
+            Code.EMPTY_RANGE,
+            f"the range {least!r} .. {most!r} is empty",
+            written.span,
+            "write the smaller bound first",
+        )
+        return Real(most, most, unit)
+    return Real(least, most, unit)
+
+
+def _double(scope: Scope, bound: Typed, span: Span) -> float:
+    value = bound.literal().value
+    if not isinstance(bound.expr.type, Real):
+        scope.report(Code.KIND, "the bounds of a `real` have a decimal point", span, f"write `{value}.0`")
+        return 0.0
+    return float(value) + 0.0 if math.isfinite(value) else 0.0

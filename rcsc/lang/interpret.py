@@ -1,0 +1,444 @@
+"""The reference meaning of the language; the prover and both executors are held against it.
+
+In: a model and a snapshot. Out: values, matching lines, and the outcome of a step or a cycle. Short
+enough to believe: it follows the manual's "What a cycle does" word for word and optimises nothing.
+"""
+
+import importlib
+import operator
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass, replace
+from enum import IntEnum
+from typing import Any, TypeAlias
+
+from rcsc.lang.model import (
+    Action,
+    Admit,
+    Among,
+    Apply,
+    Assign,
+    Call,
+    Case,
+    Expr,
+    For,
+    If,
+    Kind,
+    Level,
+    LineName,
+    Literal,
+    Local,
+    OneTable,
+    Op,
+    Procedure,
+    Program,
+    Read,
+    ReadLocal,
+    Real,
+    Scalar,
+    Select,
+    Snapshot,
+    Standing,
+    Statement,
+    Table,
+    Test,
+    ToElement,
+    ToLeaf,
+    ToLocal,
+    Value,
+    Variable,
+    key_bounds,
+    pending,
+)
+
+
+class Fault(IntEnum):
+    """Why a cycle ended early; the executors return the same numbers."""
+
+    OK = 0
+    ADMIT = 1
+    NO_LINE = 2
+    SEVERAL_LINES = 3
+    EXTERN = 4
+    ASSUMPTION = 5
+    STATE = 6  # of the executors that are compiled to check their state in every cycle
+    ARITHMETIC = 7  # of the executors in C alone: this machine, or its compiler, computes reals otherwise
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What a step or cycle did.
+
+    Attributes:
+        snapshot: The complete state afterwards.
+        line: The matched line; None where there was none.
+        line_index: Its position; DEFAULT is behind the last; -1 where there was none.
+        fault: OK, or why it ended early.
+        failed_assumptions: Assumptions that the executors check and that did not hold.
+        fault_at: The leaf that was refused, or the first assumption that ended the cycle.
+    """
+
+    snapshot: dict[str, Value]
+    line: LineName | None
+    line_index: int
+    fault: Fault
+    failed_assumptions: tuple[str, ...] = ()
+    fault_at: str = ""
+
+
+class ExternError(Exception):
+    """An extern procedure gave a value outside its declared range, for the leaf named."""
+
+
+Answers: TypeAlias = Callable[[Procedure, list[Value]], tuple[Value, ...]]
+"""What stands in for extern procedures: takes one with its reads and arguments, and gives its writes in order."""
+_ANSWERS: ContextVar[Answers | None] = ContextVar("answers", default=None)
+
+
+# --- expressions ---------------------------------------------------------------------
+
+
+def divide(a: int, b: int) -> int:
+    """Quotient rounded toward zero, as in C."""
+    quotient = abs(a) // abs(b)
+    return quotient if (a < 0) == (b < 0) else -quotient
+
+
+# What each operator means, for every stage: folding and interval bounds compute with these functions, and executors, solvers
+# and reference are held against them. Reals are IEEE 754 binary64, rounded to nearest even. Comparisons with a NaN are false,
+# but `/=`, which is true. `min` and `max` keep their first operand where it is a NaN, and drop a second one. `abs` and
+# `-` act on the sign, of zeros too. `int` is undefined of a NaN or an infinity, and `/` and `mod` of a divisor that is zero.
+OPERATORS: Mapping[Op, Callable[..., Any]] = {
+    Op.NOT: operator.not_,
+    Op.NEG: operator.neg,
+    Op.EQ: operator.eq,
+    Op.NE: operator.ne,
+    Op.LT: operator.lt,
+    Op.LE: operator.le,
+    Op.GT: operator.gt,
+    Op.GE: operator.ge,
+    Op.ADD: operator.add,
+    Op.SUB: operator.sub,
+    Op.MUL: operator.mul,
+    Op.DIV: lambda a, b: a / b if isinstance(a, float) else divide(a, b),
+    Op.MOD: lambda a, b: a - b * divide(a, b),
+    Op.ABS: abs,
+    Op.MIN: lambda a, b: b if b < a else a,  # noqa: FURB136 - says which it is where a NaN is among them
+    Op.MAX: lambda a, b: b if b > a else a,  # noqa: FURB136 - as above
+    Op.TO_INT: int,
+    Op.TO_REAL: float,
+}
+
+
+def operated(op: Op, kind: Scalar, *operands: Value) -> Value:
+    """The value of an operator other than `and`, `or` and `implies`; the first operand is of type `kind`.
+
+    Raises:
+        ArithmeticError, ValueError: It has none: a divisor that is zero, or a real without a whole number.
+    """
+    reals = isinstance(kind, Real)
+    result: Value = OPERATORS[op](*map(float, operands)) if reals else OPERATORS[op](*operands)
+    return result
+
+
+def evaluate(expr: Expr, snapshot: Snapshot, local: Mapping[str, Value] | None = None) -> Value:
+    """The value of `expr`; undefined operations (proved absent) raise."""
+    match expr:
+        case Literal(value=value):
+            return value
+        case Read(name=name):
+            return snapshot[name]
+        case ReadLocal(name=name):
+            return (local or {})[name]
+        case Select(leaves=leaves, index=index):
+            return snapshot[leaves[_index(index, len(leaves), snapshot, local)]]
+        case Among(subject=subject, values=values):
+            return evaluate(subject, snapshot, local) in values
+        case Apply(op=op, args=args):
+            return _applied(op, args, snapshot, local)
+
+
+def _index(expr: Expr, length: int, snapshot: Snapshot, local: Mapping[str, Value] | None) -> int:
+    at = int(evaluate(expr, snapshot, local))
+    if not 0 <= at < length:
+        raise IndexError(at)
+    return at
+
+
+def _applied(op: Op, args: tuple[Expr, ...], snapshot: Snapshot, local: Mapping[str, Value] | None) -> Value:
+    first = evaluate(args[0], snapshot, local)
+    if op is Op.AND:
+        return bool(first) and bool(evaluate(args[1], snapshot, local))
+    if op is Op.OR:
+        return bool(first) or bool(evaluate(args[1], snapshot, local))
+    if op is Op.IMPLIES:
+        return not first or bool(evaluate(args[1], snapshot, local))
+    return operated(op, args[0].type, first, *(evaluate(arg, snapshot, local) for arg in args[1:]))
+
+
+def holds(condition: Expr | Test, snapshot: Snapshot) -> bool:
+    """Whether a condition is true of `snapshot`."""
+    return bool(evaluate(condition.condition if isinstance(condition, Test) else condition, snapshot))
+
+
+def matching_lines(table: Table, snapshot: Snapshot) -> list[LineName]:
+    """The lines that match, DEFAULT left out, in order."""
+    return [
+        line.name for line in table.lines if all(test is None or holds(test, snapshot) for test in line.tests)
+    ]
+
+
+# --- statements ----------------------------------------------------------------------
+
+
+def execute(
+    program: Program, body: Iterable[Statement], snapshot: dict[str, Value], local: dict[str, Value]
+) -> None:
+    """Runs statements; `snapshot` and `local` are changed in place."""
+    for statement in body:
+        match statement:
+            case Assign(place=place, value=value):
+                _assign(place, _stored(evaluate(value, snapshot, local)), snapshot, local)
+            case Local(name=name, value=value):
+                local.pop(name, None)
+                if value is not None:
+                    local[name] = _stored(evaluate(value, snapshot, local))
+            case If(condition=condition, then=then, orelse=orelse):
+                execute(program, then if evaluate(condition, snapshot, local) else orelse, snapshot, local)
+            case Case(subject=subject, arms=arms, orelse=orelse):
+                given = evaluate(subject, snapshot, local)
+                chosen = next((arm.body for arm in arms if given in arm.values), orelse)
+                execute(program, chosen, snapshot, local)
+            case For(name=name, low=low, high=high, body=inner):
+                for count in range(low, high + 1):
+                    local[name] = count
+                    execute(program, inner, snapshot, local)
+            case Call(procedure=name, args=args):
+                call(program, name, [_stored(evaluate(arg, snapshot, local)) for arg in args], snapshot)
+
+
+def _stored(value: Value) -> Value:
+    """-0.0 is 0.0 wherever it is kept."""
+    return value + 0.0 if isinstance(value, float) else value
+
+
+def _assign(
+    place: ToLeaf | ToElement | ToLocal, value: Value, snapshot: dict[str, Value], local: dict[str, Value]
+) -> None:
+    match place:
+        case ToLeaf(name=name):
+            snapshot[name] = value
+        case ToLocal(name=name):
+            local[name] = value
+        case ToElement(leaves=leaves, index=index):
+            snapshot[leaves[_index(index, len(leaves), snapshot, local)]] = value
+
+
+def call(program: Program, name: str, args: list[Value], snapshot: dict[str, Value]) -> None:
+    """Runs one procedure; `snapshot` is changed in place."""
+    procedure = next(one for one in program.procedures if one.name == name)
+    if procedure.extern is not None:
+        _call_extern(program, procedure, args, snapshot)
+        return
+    local = {param.name: arg for param, arg in zip(procedure.params, args, strict=True)}
+    execute(program, procedure.body, snapshot, local)
+
+
+def _call_extern(
+    program: Program, procedure: Procedure, args: list[Value], snapshot: dict[str, Value]
+) -> None:
+    """The user's function takes the reads and the arguments, and gives the writes in order: one as it is or in a tuple.
+
+    What it gives where nothing is written does not matter; another number of values than are written is refused.
+    """
+    given = (_ANSWERS.get() or _of_user)(procedure, [*(snapshot[name] for name in procedure.reads), *args])
+    if procedure.writes and len(given) != len(procedure.writes):
+        raise ExternError(procedure.writes[0])
+    for name, value in zip(procedure.writes, given, strict=bool(procedure.writes)):
+        admitted = _admitted(program.variable(name), value)
+        if admitted is None:
+            raise ExternError(name)
+        snapshot[name] = admitted
+
+
+def _of_user(procedure: Procedure, args: list[Value]) -> tuple[Value, ...]:
+    assert procedure.extern is not None
+    module, _, function = procedure.extern.python.partition(":")
+    results = getattr(importlib.import_module(module), function)(*args)
+    if not procedure.writes:
+        return ()
+    return results if isinstance(results, tuple) else (results,)
+
+
+@contextmanager
+def answering(answers: Answers) -> Iterator[None]:
+    """Inside, no extern procedure is called: `answers` gives the results, in range or not."""
+    before = _ANSWERS.set(answers)
+    try:
+        yield
+    finally:
+        _ANSWERS.reset(before)
+
+
+# --- cycles --------------------------------------------------------------------------
+
+
+def initial(program: Program) -> dict[str, Value]:
+    """Every leaf's value before the first cycle."""
+    return {variable.name: variable.initial for variable in program.variables}
+
+
+def _admitted(variable: Variable, value: Value) -> Value | None:
+    """The value a table may see; None where it is refused."""
+    given = _exactly(float if isinstance(variable.type, Real) else int, value)
+    if given is None:
+        return None
+    value = given
+    if isinstance(variable.type, Real):
+        low, high = variable.type.low, variable.type.high
+        value = value + 0.0
+    else:
+        low, high = key_bounds(variable.type)
+    if low <= value <= high:
+        return value
+    if variable.admit is Admit.CLAMP:
+        return low if value < low else high
+    return None
+
+
+def _exactly(kind: type[int | float], value: Any) -> Value | None:
+    """What came from outside as a value of its kind: None for a NaN, a fraction among integers, and what is no number."""
+    if kind is int and isinstance(value, int):
+        return value
+    try:
+        made = kind(value)
+        return made if made == value else None
+    except (TypeError, ValueError, OverflowError):
+        return None
+
+
+def admit(program: Program, snapshot: Snapshot) -> dict[str, Value] | str:
+    """The snapshot with every input admitted, or the first leaf that is refused."""
+    admitted = dict(snapshot)
+    for variable in program.variables:
+        if variable.kind is Kind.INPUT:
+            value = _admitted(variable, snapshot[variable.name])
+            if value is None:
+                return variable.name
+            admitted[variable.name] = value
+    return admitted
+
+
+def unfit(program: Program, snapshot: Snapshot) -> str:
+    """The first state or output that is no value of its type, or else the first invariant that does not hold; empty for none.
+
+    Inputs are admitted by every cycle.
+    """
+    for variable in program.variables:
+        value, kind = snapshot[variable.name], variable.type
+        low, high = (kind.low, kind.high) if isinstance(kind, Real) else key_bounds(kind)
+        of_kind = isinstance(value, int | float if isinstance(kind, Real) else int)
+        if variable.kind is not Kind.INPUT and not (of_kind and low <= value <= high):
+            return variable.name
+    broken = (one.name for one in program.invariants if not evaluate(one.condition, snapshot))
+    return next(broken, "")
+
+
+def settle(program: Program, snapshot: dict[str, Value]) -> None:
+    """Deferred variables whose condition holds take their next value, all at once."""
+    ready = [
+        v.name
+        for v in program.variables
+        if v.deferred_until is not None and holds(v.deferred_until, snapshot)
+    ]
+    for name in ready:
+        snapshot[name] = snapshot[pending(name)]
+
+
+def run_table(program: Program, table: Table, snapshot: Snapshot) -> Outcome:
+    """One step of a table outside any level."""
+    return _cycle(program, lambda _: table, (), (), snapshot)
+
+
+def cycle(program: Program, level: Level, snapshot: Snapshot) -> Outcome:
+    """One cycle of a level."""
+    by_name = {table.name: table for table in program.tables}
+
+    def chosen(now: Snapshot) -> Table:
+        if isinstance(level.tables, OneTable):
+            return by_name[level.tables.table]
+        return by_name[dict(level.tables.tables)[evaluate(level.tables.selector, now)]]
+
+    return _cycle(program, chosen, level.preprocess, level.postprocess, snapshot)
+
+
+def _cycle(
+    program: Program,
+    chosen: Callable[[Snapshot], Table],
+    preprocess: tuple[str, ...],
+    postprocess: tuple[str, ...],
+    snapshot: Snapshot,
+) -> Outcome:
+    """One cycle; after a fault the outputs that have a safe value show it."""
+    outcome = _attempt(program, chosen, preprocess, postprocess, snapshot)
+    if outcome.fault is Fault.OK:
+        return outcome
+    shown = {str(v.name): v.safe for v in program.variables if v.safe is not None}
+    return replace(outcome, snapshot={**outcome.snapshot, **shown})
+
+
+def _attempt(
+    program: Program,
+    chosen: Callable[[Snapshot], Table],
+    preprocess: tuple[str, ...],
+    postprocess: tuple[str, ...],
+    snapshot: Snapshot,
+) -> Outcome:
+    now = admit(program, snapshot)
+    if isinstance(now, str):
+        return Outcome(dict(snapshot), None, -1, Fault.ADMIT, (), now)
+    settle(program, now)
+    line: LineName | None = None
+    index, failed = -1, tuple[str, ...]()
+    try:
+        for name in preprocess:
+            call(program, name, [], now)
+        table = chosen(now)
+        failed = failed_assumptions(program, table, now)
+        stopped = next((name for name in failed if name in table.stops), None)
+        if stopped is not None:
+            return Outcome(now, None, -1, Fault.ASSUMPTION, failed, stopped)
+        found = _match(table, now)
+        if isinstance(found, Fault):
+            return Outcome(now, None, -1, found, failed)
+        line, index, actions = found
+        execute(program, [action.statement for action in actions], now, {})
+        for name in postprocess:
+            call(program, name, [], now)
+    except ExternError as error:
+        return Outcome(now, line, index, Fault.EXTERN, failed, str(error))
+    return Outcome(now, line, index, Fault.OK, failed)
+
+
+def failed_assumptions(program: Program, table: Table, now: Snapshot) -> tuple[str, ...]:
+    """The table's assumptions that are checked, because they are monitored or stop the cycle, and do not hold."""
+    return tuple(
+        assumption.name
+        for assumption in program.assumptions
+        if assumption.name in table.assumptions
+        and (assumption.standing is Standing.MONITORED or assumption.name in table.stops)
+        and not holds(assumption.condition, now)
+    )
+
+
+def _match(table: Table, now: Snapshot) -> tuple[LineName, int, tuple[Action, ...]] | Fault:
+    matching = matching_lines(table, now)
+    if len(matching) > 1:
+        return Fault.SEVERAL_LINES
+    if matching:
+        index = next(at for at, line in enumerate(table.lines) if line.name == matching[0])
+        return matching[0], index, table.lines[index].actions
+    if table.default is None:
+        return Fault.NO_LINE
+    return table.default.name, len(table.lines), table.default.actions

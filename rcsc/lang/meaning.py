@@ -1,0 +1,113 @@
+"""Names for terms, what tables may rely on, and a digest of all that a proof depends on.
+
+In: the model. Out: text. Shared by the prover, its certificates and the checker, so that all three
+speak of the same thing; no proof rests on it.
+"""
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass, replace
+from enum import StrEnum
+
+from rcsc.lang.leaves import read_by
+from rcsc.lang.model import (
+    Among,
+    Apply,
+    Assumption,
+    AssumptionName,
+    Expr,
+    Literal,
+    Program,
+    Read,
+    Standing,
+    Table,
+)
+
+
+def spelled(term: Expr) -> str:
+    """A name for `term` that says all of what it is: two terms of one name are one term."""
+    match term:
+        case Literal(value=value, type=kind):
+            return f"{type(kind).__name__.lower()}:{value!r}"
+        case Read(name=name):
+            return name
+        case Apply(op=op, args=args):
+            return f"({op.value} {' '.join(map(spelled, args))})"
+        case Among(subject=subject, values=values):
+            return f"(in {spelled(subject)} {' '.join(map(repr, values))})"
+        case _:
+            return f"({type(term).__name__} {term!r})"
+
+
+def relying(program: Program) -> Program:
+    """The program with its invariants as assumptions of the tables that read what they speak of."""
+    if not program.invariants:
+        return program
+    made = [
+        Assumption(AssumptionName(one.name), Standing.PROVED, one.condition, one.doc, one.span)
+        for one in program.invariants
+    ]
+    reads = {one.name: set(read_by(one.condition)) for one in made}
+
+    def of(table: Table) -> Table:
+        names = tuple(one.name for one in made if not reads[one.name].isdisjoint(table.variables))
+        return replace(table, assumptions=(*table.assumptions, *names)) if names else table
+
+    tables = tuple(of(table) for table in program.tables)
+    return replace(program, assumptions=(*program.assumptions, *made), tables=tables)
+
+
+def with_stops(program: Program, stops: Mapping[str, tuple[AssumptionName, ...]]) -> Program:
+    """The program, each table with its stopping assumptions (`Table.stops`); none where it is not named."""
+    tables = tuple(replace(table, stops=stops.get(table.name, ())) for table in program.tables)
+    return replace(program, tables=tables)
+
+
+def checked(program: Program) -> tuple[int, ...]:
+    """Positions of the assumptions that the executors check: monitored ones, and those that stop some table."""
+    stopping = {name for table in program.tables for name in table.stops}
+    return tuple(
+        at
+        for at, one in enumerate(program.assumptions)
+        if one.standing is Standing.MONITORED or one.name in stopping
+    )
+
+
+def digest(*meant: object) -> str:
+    """SHA-256 (hex) of values of the model: every field that equality looks at, so spans are left out.
+
+    Fields are found by walking the classes, so that one that is added cannot be forgotten.
+
+    Raises:
+        TypeError: A part is no value of the model.
+    """
+    return _Digest().of(meant)
+
+
+class _Digest:
+    """Digests parts first, each object once: tests and lists of leaves are shared by many lines."""
+
+    def __init__(self) -> None:
+        self._known: dict[
+            int, tuple[object, str]
+        ] = {}  # the object is kept, so that its identity is not used again
+
+    def of(self, value: object) -> str:
+        found = self._known.get(id(value))
+        if found is None:
+            text = self._text(value)
+            found = self._known[id(value)] = value, hashlib.sha256(text.encode()).hexdigest()
+        return found[1]
+
+    def _text(self, value: object) -> str:
+        kind = type(value).__name__
+        if value is None or isinstance(value, bool | int | float | str):
+            return f"{kind} {value.value if isinstance(value, StrEnum) else value!r}"
+        if isinstance(value, tuple):
+            return f"{kind} {' '.join(map(self.of, value))}"
+        if is_dataclass(value):
+            parts = (
+                f"{one.name} {self.of(getattr(value, one.name))}" for one in fields(value) if one.compare
+            )
+            return f"{kind} {' '.join(parts)}"
+        raise TypeError(f"{kind} is no value of the model")

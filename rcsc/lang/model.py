@@ -1,0 +1,743 @@
+"""What a program means: typed, flattened, with every name found.
+
+In: nothing. Out: the frozen values that `resolve` makes and every later stage reads.
+Records and arrays are flattened: each scalar leaf is a `Variable` of its own, named by its
+path (`emove_status.echo`, `counts[2]`), in declared order. Values of a leaf at run time
+are Python `bool` (bool), `int` (int, and enum members by their index) and `float` (real).
+
+A *key* is a leaf's value as an integer in an order-preserving numbering (`key_of`): bool 0/1, enum
+index, the integer itself, and for a double its rank among doubles (`real_key`). Over
+keys every leaf is a bounded integer, so that conditions on one leaf are sets of intervals.
+"""
+
+import struct
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import NewType, TypeAlias
+
+from rcsc.diagnostics.source import Span
+
+VariableName = NewType("VariableName", str)
+ProcedureName = NewType("ProcedureName", str)
+TableName = NewType("TableName", str)
+LineName = NewType("LineName", str)
+AssumptionName = NewType("AssumptionName", str)
+
+Value: TypeAlias = bool | int | float
+Snapshot: TypeAlias = Mapping[str, Value]
+"""The frozen inputs and state of one cycle: a value for every leaf."""
+
+Unit: TypeAlias = tuple[tuple[str, int], ...]
+"""Base unit symbols with their powers, sorted, none zero; () is a bare number."""
+
+I64_MIN, I64_MAX, U64_MAX = -(2**63), 2**63 - 1, 2**64 - 1
+
+NOWHERE = Span("", 0, 0)
+
+
+def at() -> Span:
+    """A span field: where it was written; not part of what it means."""
+    return field(default=NOWHERE, compare=False, repr=False)
+
+
+# --- types ---------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Bool:
+    """False before true."""
+
+
+@dataclass(frozen=True, slots=True)
+class Enum:
+    """A declared enumeration; values are indices into `members`, in declared order."""
+
+    name: str
+    members: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Int:
+    """An integer in `low .. high`, both included; bounds within 64 bits, signed or not.
+
+    As the type of an expression the bounds are what interval arithmetic gives, and they
+    may exceed 64 bits: then it is a proof obligation that the value does not.
+    """
+
+    low: int
+    high: int
+    unit: Unit = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Real:
+    """An IEEE binary64 in `low .. high`, both finite and included; -0.0 is 0.0."""
+
+    low: float
+    high: float
+    unit: Unit = ()
+
+
+Scalar: TypeAlias = Bool | Enum | Int | Real
+
+
+@dataclass(frozen=True, slots=True)
+class Array:
+    """`length` elements of one type."""
+
+    length: int
+    element: "Type"
+
+
+@dataclass(frozen=True, slots=True)
+class RecordField:
+    """A named part of a record."""
+
+    name: str
+    type: "Type"
+    doc: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """Named parts in order."""
+
+    name: str
+    fields: tuple[RecordField, ...]
+
+
+Type: TypeAlias = Scalar | Array | Record
+
+
+def real_key(value: float) -> int:
+    """The rank of a finite double: monotone, consecutive doubles differ by one, 0.0 is 0."""
+    bits: int = struct.unpack("<q", struct.pack("<d", value))[0]
+    return bits if bits >= 0 else -(bits & 0x7FFF_FFFF_FFFF_FFFF)
+
+
+def real_of_key(key: int) -> float:
+    """The double of rank `key`; the inverse of `real_key` (with 0.0 for -0.0)."""
+    magnitude: float = struct.unpack("<d", struct.pack("<q", abs(key)))[0]
+    return magnitude if key >= 0 else -magnitude
+
+
+def key_of(kind: Scalar, value: Value) -> int:
+    """The key of `value`, a value of type `kind`."""
+    return real_key(float(value)) if isinstance(kind, Real) else int(value)
+
+
+def value_of_key(kind: Scalar, key: int) -> Value:
+    """The value of type `kind` with this key."""
+    if isinstance(kind, Bool):
+        return bool(key)
+    return real_of_key(key) if isinstance(kind, Real) else key
+
+
+def key_bounds(kind: Scalar) -> tuple[int, int]:
+    """Least and greatest key of the type."""
+    match kind:
+        case Bool():
+            return 0, 1
+        case Enum(members=members):
+            return 0, len(members) - 1
+        case Int(low, high):
+            return low, high
+        case Real(low, high):
+            return real_key(low), real_key(high)
+
+
+def spell(kind: Scalar, value: Value) -> str:
+    """`value` in the table's words: `true`, a member's name, a number."""
+    match kind:
+        case Bool():
+            return "true" if value else "false"
+        case Enum(members=members):
+            return members[int(value)]
+        case Int():
+            return str(int(value))
+        case Real():
+            return repr(float(value))
+
+
+# --- variables -----------------------------------------------------------------------
+
+
+class Kind(StrEnum):
+    """Who writes a variable: the world, or the level's own procedures."""
+
+    INPUT = "input"
+    STATE = "state"
+    OUTPUT = "output"
+
+
+class Admit(StrEnum):
+    """What happens to a reading outside its declared range; a NaN is always rejected."""
+
+    REJECT = "reject"
+    CLAMP = "clamp"
+
+
+@dataclass(frozen=True, slots=True)
+class Variable:
+    """A scalar leaf.
+
+    Attributes:
+        name: Its path. The pending value of a deferred variable `x` is a state leaf of its
+            own, named `x.next`, directly after `x`.
+        initial: Its value before the first cycle (inputs too).
+        deferred_until: For a deferred variable: at the start of a cycle, when this holds of
+            the snapshot, `x` takes the value of `x.next`. `next x := e` writes `x.next`.
+        safe: Of an output, what it shows after a cycle that ended in a fault; None where it then stays as it is.
+    """
+
+    name: VariableName
+    kind: Kind
+    type: Scalar
+    initial: Value
+    admit: Admit = Admit.REJECT
+    deferred_until: "Expr | None" = None
+    doc: str = ""
+    span: Span = at()
+    safe: Value | None = None
+
+
+def pending(name: str) -> VariableName:
+    """The leaf that holds the deferred next value of `name`."""
+    return VariableName(f"{name}.next")
+
+
+BEFORE = "was "
+"""What the name of a leaf begins with, in a property, where its value behind the cycle before is meant."""
+
+
+def earlier(name: str) -> VariableName:
+    """The name, in a property, of the value of a leaf behind the cycle before."""
+    return VariableName(f"{BEFORE}{name}")
+
+
+@dataclass(frozen=True, slots=True)
+class Declared:
+    """A variable as declared, before flattening; `leaves` are its `Variable` names."""
+
+    name: str
+    kind: Kind
+    type: Type
+    leaves: tuple[VariableName, ...]
+    doc: str = ""
+    span: Span = at()
+
+
+# --- expressions ---------------------------------------------------------------------
+# Every expression has a `type`; for Int and Real its bounds enclose every value it can
+# take over the declared ranges (interval arithmetic). Arithmetic is exact on integers
+# (`/` truncates toward zero, `mod` has the sign of the dividend, as in C) and IEEE
+# binary64, round to nearest even, on reals. No implicit conversion between the two.
+
+
+class Op(StrEnum):
+    """Operators, spelled as in the source."""
+
+    NOT = "not"
+    NEG = "-x"
+    AND = "and"
+    OR = "or"
+    IMPLIES = "implies"
+    EQ = "="
+    NE = "/="
+    LT = "<"
+    LE = "<="
+    GT = ">"
+    GE = ">="
+    ADD = "+"
+    SUB = "-"
+    MUL = "*"
+    DIV = "/"
+    MOD = "mod"
+    ABS = "abs"
+    MIN = "min"
+    MAX = "max"
+    TO_INT = "int"
+    TO_REAL = "real"
+
+
+COMPARISONS = frozenset({Op.EQ, Op.NE, Op.LT, Op.LE, Op.GT, Op.GE})
+
+
+@dataclass(frozen=True, slots=True)
+class Literal:
+    """A constant (enum members by index)."""
+
+    value: Value
+    type: Scalar
+    span: Span = at()
+
+
+@dataclass(frozen=True, slots=True)
+class Read:
+    """The value of a leaf variable."""
+
+    name: VariableName
+    type: Scalar
+    span: Span = at()
+
+
+@dataclass(frozen=True, slots=True)
+class ReadLocal:
+    """The value of a parameter, local or loop variable of the procedure."""
+
+    name: str
+    type: Scalar
+    span: Span = at()
+
+
+@dataclass(frozen=True, slots=True)
+class Select:
+    """`leaves[index]`: an array element by a computed index; that it is in 0 .. len-1 is proved."""
+
+    leaves: tuple[VariableName, ...]
+    index: "Expr"
+    type: Scalar
+    span: Span = at()
+
+
+@dataclass(frozen=True, slots=True)
+class Apply:
+    """An operator and its operands (one or two).
+
+    `and`, `or` and `implies` look at the right operand only where the left one does not
+    decide, also for proof obligations: `n /= 0 and x / n > 2` is safe.
+    """
+
+    op: Op
+    args: "tuple[Expr, ...]"
+    type: Scalar
+    span: Span = at()
+
+
+@dataclass(frozen=True, slots=True)
+class Among:
+    """`subject in {a, b}`; members are constants. Type Bool."""
+
+    subject: "Expr"
+    values: tuple[Value, ...]
+    type: Scalar = Bool()
+    span: Span = at()
+
+
+Expr: TypeAlias = Literal | Read | ReadLocal | Select | Apply | Among
+
+
+# --- statements and procedures -------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class ToLeaf:
+    """Assigns a leaf (for `next x := e`, the pending leaf)."""
+
+    name: VariableName
+    type: Scalar
+
+
+@dataclass(frozen=True, slots=True)
+class ToElement:
+    """Assigns `leaves[index]`."""
+
+    leaves: tuple[VariableName, ...]
+    index: Expr
+    type: Scalar
+
+
+@dataclass(frozen=True, slots=True)
+class ToLocal:
+    """Assigns a local."""
+
+    name: str
+    type: Scalar
+
+
+Place: TypeAlias = ToLeaf | ToElement | ToLocal
+
+
+@dataclass(frozen=True, slots=True)
+class Assign:
+    """`place := value`; the value is proved to lie in the place's declared range."""
+
+    place: Place
+    value: Expr
+    span: Span = at()
+
+
+@dataclass(frozen=True, slots=True)
+class Local:
+    """Declares a local; without a value it must be assigned before use (proved)."""
+
+    name: str  # unique within its procedure
+    type: Scalar
+    value: Expr | None
+    span: Span = at()
+
+
+@dataclass(frozen=True, slots=True)
+class If:
+    """Two-way choice."""
+
+    condition: Expr
+    then: "tuple[Statement, ...]"
+    orelse: "tuple[Statement, ...]"
+    span: Span = at()
+
+
+@dataclass(frozen=True, slots=True)
+class Arm:
+    """The values (constants) of one arm of a case and what it runs."""
+
+    values: tuple[Value, ...]
+    body: "tuple[Statement, ...]"
+    span: Span = at()
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """The arm whose values contain the subject; values are disjoint; else `orelse`."""
+
+    subject: Expr
+    arms: tuple[Arm, ...]
+    orelse: "tuple[Statement, ...]"
+    span: Span = at()
+
+
+@dataclass(frozen=True, slots=True)
+class For:
+    """Runs the body with `name` = low, low+1 .. high; not at all when high < low."""
+
+    name: str  # unique within its procedure
+    low: int
+    high: int
+    body: "tuple[Statement, ...]"
+    span: Span = at()
+
+
+@dataclass(frozen=True, slots=True)
+class Call:
+    """Runs a procedure; arguments by value, each proved to lie in its parameter's range."""
+
+    procedure: ProcedureName
+    args: tuple[Expr, ...] = ()
+    span: Span = at()
+
+
+Statement: TypeAlias = Assign | Local | If | Case | For | Call
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """A by-value parameter."""
+
+    name: str
+    type: Scalar
+    span: Span = at()
+
+
+@dataclass(frozen=True, slots=True)
+class Extern:
+    """An implementation of the user's: called with the values of `reads`, gives `writes`.
+
+    Both executors admit what comes back: a value outside its declared range is a fault.
+    """
+
+    python: str  # "package.module:function"
+    c: str  # C function name
+
+
+@dataclass(frozen=True, slots=True)
+class Procedure:
+    """A functionally bounded module: named inputs, a process, outputs.
+
+    Attributes:
+        reads: Leaves it may read, calls included; sorted.
+        writes: Leaves it may write, calls included; sorted.
+        extern: Set for an extern procedure, whose body is empty.
+    """
+
+    name: ProcedureName
+    params: tuple[Parameter, ...]
+    body: tuple[Statement, ...]
+    reads: tuple[VariableName, ...]
+    writes: tuple[VariableName, ...]
+    extern: Extern | None = None
+    doc: str = ""
+    span: Span = at()
+
+
+# --- assumptions, invariants, properties ---------------------------------------------
+
+
+class Standing(StrEnum):
+    """How an assumption is known."""
+
+    ASSUMED = "assumed"
+    MONITORED = "monitored"  # checked by the executors each cycle
+    PROVED = "proved"  # from declared ranges and invariants; what the levels together show is not declared
+
+
+@dataclass(frozen=True, slots=True)
+class Assumption:
+    """A named condition on inputs and state that tables may rely on."""
+
+    name: AssumptionName
+    standing: Standing
+    condition: Expr
+    doc: str = ""
+    span: Span = at()
+
+
+@dataclass(frozen=True, slots=True)
+class Invariant:
+    """A condition on state and outputs: true at first, kept by every cycle (proved).
+
+    Once proved, every table of the program may rely on it.
+    """
+
+    name: str
+    condition: Expr
+    doc: str = ""
+    span: Span = at()
+
+
+@dataclass(frozen=True, slots=True)
+class Property:
+    """What holds behind every cycle of a level, in its environment; proved of the levels together (`compose`).
+
+    Nothing is emitted for it, and no table relies on it.
+
+    Attributes:
+        condition: About a cycle: leaves as it leaves them, inputs as it took them; and, under the names that `earlier`
+            gives, leaves as the cycle before left them (before the first: as the level begins).
+        text: As it was written, behind the colon.
+    """
+
+    name: str
+    condition: Expr
+    text: str
+    doc: str = ""
+    span: Span = at()
+
+
+# --- tables --------------------------------------------------------------------------
+
+Box: TypeAlias = tuple[tuple[int, int], ...]
+"""Sorted, disjoint, non-adjacent, inclusive intervals of keys; () is nothing."""
+
+
+@dataclass(frozen=True, slots=True)
+class Test:
+    """One distinct condition of a column; shared (same object) by all lines that state it.
+
+    Attributes:
+        text: The cell in the table's words, normalised.
+        condition: What it means, a boolean expression.
+        variables: Leaves that it reads, in declared order.
+        box: Where `condition` depends on exactly one leaf (`variables[0]`), compared with
+            constants: the keys for which it holds, within the declared range. Else None.
+    """
+
+    text: str
+    condition: Expr
+    variables: tuple[VariableName, ...]
+    box: Box | None
+    __test__ = False  # not a pytest class
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """A condition column; `variable` is its leaf where the heading is just a leaf."""
+
+    heading: str
+    subject: Expr | None  # None for `when`
+    variable: VariableName | None
+    span: Span = at()
+
+
+@dataclass(frozen=True, slots=True)
+class Action:
+    """One action of a line: a call or an assignment, and the heading it stands under."""
+
+    heading: str
+    text: str
+    statement: Statement
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """A row: matches when all its tests hold (None, a blank cell, always holds).
+
+    Attributes:
+        tests: One a condition column.
+        bounds: Start and end offsets of each cell, flattened; see `cell_span`.
+    """
+
+    name: LineName
+    tests: tuple[Test | None, ...]
+    actions: tuple[Action, ...]
+    span: Span = at()
+    bounds: tuple[int, ...] = field(default=(), compare=False, repr=False)
+
+    def cell_span(self, column: int) -> Span:
+        """The span of the condition cell in `column` (the row's if unknown)."""
+        at_ = 2 * (column + 1)
+        if at_ + 1 >= len(self.bounds):
+            return self.span
+        return Span(self.span.file, self.bounds[at_], self.bounds[at_ + 1])
+
+
+@dataclass(frozen=True, slots=True)
+class Default:
+    """The DEFAULT line: runs where no other line matches."""
+
+    name: LineName
+    actions: tuple[Action, ...]
+    unreachable: bool
+    span: Span = at()
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """What a level tries for one command: exactly one line must match in every cycle.
+
+    Attributes:
+        variables: Test variables: every leaf some test reads, in declared order.
+        assumptions: Names of those that the table's proof may use.
+        stops: Those of them on which the safety of the table's conditions and lines rests, in declared order; `prove` sets it.
+            Where one fails the cycle ends before the table is matched; the others only tell.
+    """
+
+    name: TableName
+    columns: tuple[Column, ...]
+    lines: tuple[Line, ...]
+    default: Default | None
+    variables: tuple[VariableName, ...]
+    assumptions: tuple[AssumptionName, ...]
+    doc: str = ""
+    span: Span = at()  # the name in `table NAME`
+    file: str = field(default="", compare=False)
+    stops: tuple[AssumptionName, ...] = ()
+
+
+# --- owners, levels, programs --------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Owner:
+    """An executing owner: procedures and owners, run in the order listed."""
+
+    name: str
+    members: tuple[str, ...]
+    doc: str = ""
+    span: Span = at()
+
+
+@dataclass(frozen=True, slots=True)
+class OneTable:
+    """A level that always runs one table."""
+
+    table: TableName
+
+
+@dataclass(frozen=True, slots=True)
+class TableByCommand:
+    """A level with one table a command; every value of the selector has a table."""
+
+    selector: Expr
+    tables: tuple[tuple[Value, TableName], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Level:
+    """One control level: every cycle deferred values, preprocess, table, postprocess."""
+
+    name: str
+    period_ms: int
+    preprocess: tuple[str, ...]  # procedures and owners, flattened to procedure names
+    tables: OneTable | TableByCommand
+    postprocess: tuple[str, ...]
+    doc: str = ""
+    span: Span = at()
+
+
+@dataclass(frozen=True, slots=True)
+class Program:
+    """One root file and all that it uses: what is checked and compiled together.
+
+    Attributes:
+        name: The root file's stem: names the generated files.
+        file: The root file.
+        enums: In order of declaration, used files first (likewise all below).
+        variables: Every leaf.
+        tables: Tables of the root file and of the files it uses.
+        own_tables: Names of the tables that the root file itself declares.
+    """
+
+    name: str
+    file: str = field(compare=False)
+    enums: tuple[Enum, ...]
+    records: tuple[Record, ...]
+    declared: tuple[Declared, ...]
+    variables: tuple[Variable, ...]
+    procedures: tuple[Procedure, ...]
+    assumptions: tuple[Assumption, ...]
+    invariants: tuple[Invariant, ...]
+    tables: tuple[Table, ...]
+    own_tables: tuple[TableName, ...]
+    owners: tuple[Owner, ...]
+    levels: tuple[Level, ...]
+    properties: tuple[Property, ...] = ()
+
+    def variable(self, name: str) -> Variable:
+        """The leaf called `name`; KeyError if there is none."""
+        for variable in self.variables:
+            if variable.name == name:
+                return variable
+        raise KeyError(name)
+
+
+# --- verdicts ------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Backing:
+    """What a verdict rests on, shown in the report.
+
+    Attributes:
+        method: `boxes` (masks and counting), `tree` (region tree) or `z3`.
+        confirmed_by_z3: Whether Z3 was asked the same and agreed.
+        assumptions: Each assumption used, with its standing.
+    """
+
+    method: str
+    confirmed_by_z3: bool
+    assumptions: tuple[tuple[AssumptionName, Standing], ...] = ()
+
+
+_PROOF_SEAL = object()
+
+
+@dataclass(frozen=True, slots=True)
+class ProvedProgram:
+    """A program all of whose tables and procedures were proved; only `prove` makes one.
+
+    `lower` accepts nothing else.
+    """
+
+    program: Program
+    backings: tuple[tuple[TableName, Backing], ...]
+    seal: object = field(repr=False, compare=False, default=None)
+
+    def __post_init__(self) -> None:
+        if self.seal is not _PROOF_SEAL:
+            raise TypeError("a ProvedProgram is constructed only by rcsc.table")
+
+
+def seal_of_proof() -> object:
+    """For `rcsc.table` alone (and tests of later stages that name it)."""
+    return _PROOF_SEAL

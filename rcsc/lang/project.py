@@ -1,0 +1,307 @@
+"""Which files belong together: paths to parsed files, with what they use.
+
+In: paths as the user gave them. Out: `Loaded`; what cannot be read or found is a diagnostic in it.
+"""
+
+import os
+import re
+import stat
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from fnmatch import fnmatch
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rcsc.diagnostics.codes import Code
+from rcsc.diagnostics.diagnostic import Diagnostic, Label, sort_key
+from rcsc.diagnostics.source import Source, Span
+from rcsc.host.files.read import Malformed, toml_of
+
+if TYPE_CHECKING:  # who only looks for the folder of a project, as a running level does, needs no syntax
+    from rcsc.lang.syntax import tree
+
+PROJECT_FILE = "rcsc.toml"
+MOST_BYTES = 16 * 1024 * 1024
+
+
+@dataclass(frozen=True, slots=True)
+class Loaded:
+    """Parsed files.
+
+    Attributes:
+        given: Files that the paths mean, in order.
+        roots: Those to check: of a folder those that no other of its files uses.
+        files: Every file, used ones too, by name as reached from the paths given.
+        uses: For each file the files that it uses.
+        sources: Every text.
+        found: What could not be read, found or parsed.
+    """
+
+    given: tuple[str, ...]
+    roots: tuple[str, ...]
+    files: "Mapping[str, tree.File]"
+    uses: Mapping[str, tuple[str, ...]]
+    sources: Mapping[str, Source]
+    found: tuple[Diagnostic, ...]
+
+
+def load(paths: Sequence[str], stdin: str | bytes | None = None, stdin_name: str = "-") -> Loaded:
+    """Reads and parses files, folders and (`-`) the text `stdin`, and all that they use."""
+    loader = _Loader(stdin, stdin_name)
+    roots = tuple(dict.fromkeys(file for path in paths for file in loader.roots(path)))
+    for file in roots:
+        loader.reach(file)
+    found = tuple(sorted(set(loader.found), key=sort_key))
+    uses = {file: tuple(used) for file, used in loader.uses.items()}
+    heads = _heads(roots, {path for path in paths if not os.path.isdir(path)}, uses)
+    return Loaded(roots, heads, loader.files, uses, loader.sources, found)
+
+
+def _heads(roots: tuple[str, ...], named: set[str], uses: Mapping[str, tuple[str, ...]]) -> tuple[str, ...]:
+    """Without the files of a folder that another of its files uses: they are checked as parts of that one."""
+    explicit = {os.path.realpath(path) for path in named}
+    used = {part for file in roots for part in uses.get(file, ()) if part != file}
+    waiting = list(used)
+    while waiting:
+        for part in uses.get(waiting.pop(), ()):
+            if part not in used:
+                used.add(part)
+                waiting.append(part)
+    heads = tuple(one for one in roots if one not in used or os.path.realpath(one) in explicit)
+    return heads or roots
+
+
+def listed(paths: Sequence[str]) -> tuple[str, ...]:
+    """The files that the paths mean, unread, as `load` takes them for roots."""
+    loader = _Loader(None, "-")
+    return tuple(dict.fromkeys(file for path in paths for file in loader.roots(path)))
+
+
+def project_root(file: str) -> str:
+    """The nearest folder upward with an `rcsc.toml`; else the file's own folder."""
+    folder = os.path.dirname(file) or "."
+    here = Path(folder).resolve()
+    for up, above in enumerate((here, *here.parents)):
+        if (above / PROJECT_FILE).is_file():
+            root = os.path.normpath(os.path.join(folder, *[".."] * up))
+            same = os.path.realpath(root) == str(above)
+            return root if same else str(above)  # a linked folder's parents are not its name's
+    return folder
+
+
+@dataclass(frozen=True, slots=True)
+class _Unread:
+    """Why a file was not read; told again at every `use` of it."""
+
+    code: Code
+    message: str
+    helps: tuple[str, ...] = ()
+
+
+@dataclass(slots=True)
+class _Loader:
+    """Reads each file once.
+
+    Attributes:
+        named: The name of each file by its real path: the one it was first reached by.
+        unread: Files that could not be read.
+        excluded: The patterns of each project, by its root.
+        root_of: The project root of each folder.
+    """
+
+    stdin: str | bytes | None
+    stdin_name: str
+    files: "dict[str, tree.File]" = field(default_factory=dict)
+    uses: dict[str, list[str]] = field(default_factory=dict)
+    sources: dict[str, Source] = field(default_factory=dict)
+    found: list[Diagnostic] = field(default_factory=list)
+    named: dict[str, str] = field(default_factory=dict)
+    unread: dict[str, _Unread] = field(default_factory=dict)
+    excluded: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    root_of: dict[str, str] = field(default_factory=dict)
+
+    def report(self, code: Code, message: str, span: Span, *helps: str) -> None:
+        """Adds an error."""
+        self.found.append(Diagnostic(code, message, Label(span), help=helps))
+
+    # --- which files ---
+
+    def roots(self, path: str) -> Iterator[str]:
+        """The files that a path of the user's means."""
+        if path == "-":
+            yield self.stdin_name
+        elif os.path.isdir(path):
+            inside = list(self._inside(path))
+            if not inside:
+                helps = f"give a folder with `*.rcs` files; `{PROJECT_FILE}` may exclude some"
+                self.report(Code.NO_TABLES, "there is no `.rcs` file here to check", Span(path, 0, 0), helps)
+            yield from inside
+        elif os.path.lexists(path):
+            self._exclude(self._root(os.path.dirname(path)))
+            yield self._name(path)
+        else:
+            self.report(Code.UNREADABLE, "there is no such file or folder", Span(path, 0, 0))
+
+    def _inside(self, folder: str) -> Iterator[str]:
+        """Files of a folder and the folders in it, each folder once whatever links lead to it."""
+        seen: set[str] = set()
+        for here, folders, names in os.walk(folder, followlinks=True):
+            real = os.path.realpath(here)
+            if real in seen:
+                folders.clear()
+                continue
+            seen.add(real)
+            folders[:] = sorted(name for name in folders if not name.startswith("."))
+            root = self._root(here)
+            exclude = self._exclude(root)
+            for name in sorted(names):
+                path = os.path.normpath(os.path.join(here, name))
+                relative = os.path.relpath(path, root).replace(os.sep, "/")
+                if name.endswith(".rcs") and not any(fnmatch(relative, pattern) for pattern in exclude):
+                    yield self._name(path)
+
+    def _name(self, path: str) -> str:
+        """The name of the file in messages: the path by which it was first reached."""
+        return self.named.setdefault(os.path.realpath(path), os.path.normpath(path))
+
+    def _root(self, folder: str) -> str:
+        if folder not in self.root_of:
+            self.root_of[folder] = project_root(os.path.join(folder, "_"))
+        return self.root_of[folder]
+
+    def _exclude(self, root: str) -> tuple[str, ...]:
+        """The globs of a project; what is wrong with its file is reported once."""
+        path = os.path.join(root, PROJECT_FILE)
+        if root not in self.excluded:
+            self.excluded[root] = self._settings(path) if os.path.isfile(path) else ()
+        return self.excluded[root]
+
+    def _settings(self, path: str) -> tuple[str, ...]:
+        text = self._text(path)
+        if isinstance(text, _Unread):
+            self.report(Code.PROJECT_FILE, text.message, Span(path, 0, 0), *text.helps)
+            return ()
+        self.sources[path] = Source(path, text)
+        try:
+            settings = toml_of(text)
+        except Malformed as error:
+            where = _toml_place(str(error), text)
+            message = f"the project file {str(error).partition(' (at ')[0]}"
+            self.report(Code.PROJECT_FILE, message, Span(path, where, where))
+            return ()
+        patterns = settings.get("exclude", [])
+        unknown = sorted(settings.keys() - {"name", "exclude"})
+        wrong = f"`{unknown[0]}` is not a setting" if unknown else ""
+        if not isinstance(settings.get("name", ""), str):
+            wrong = "`name` is a text"
+        if not isinstance(patterns, list) or not all(isinstance(one, str) for one in patterns):
+            wrong = "`exclude` is a list of patterns"
+        if wrong:
+            self.report(Code.PROJECT_FILE, wrong, Span(path, 0, 0), "the settings are `name` and `exclude`")
+            return ()
+        return tuple(patterns)
+
+    # --- reading ---
+
+    def reach(self, root: str) -> None:
+        """Reads a file and all that it uses; a circle is reported where it closes."""
+        path = {root: self._used_by(root)} if self._read(root, Span(root, 0, 0)) else {}
+        while path:
+            file = next(reversed(path))
+            use = next(path[file], None)
+            if use is None:
+                del path[file]
+                continue
+            target = self._target(file, use)
+            if target is None:
+                continue
+            self.uses[file].append(target)
+            if target in path:
+                names = list(path)
+                cycle = " -> ".join((*names[names.index(target) :], target))
+                self.report(Code.FILE_CYCLE, f"files use each other in a circle: {cycle}", use.span)
+            elif self._read(target, use.span):
+                path[target] = self._used_by(target)
+
+    def _used_by(self, file: str) -> "Iterator[tree.Use]":
+        from rcsc.lang.syntax.tree import Use
+
+        return iter([one for one in self.files[file].declarations if isinstance(one, Use)])
+
+    def _read(self, file: str, asked: Span) -> bool:
+        """Whether the file is now read and parsed, for the first time."""
+        from rcsc.lang.syntax.parse import parse
+        from rcsc.lang.syntax.tree import File
+
+        if file in self.sources:
+            return False
+        text = self.unread.get(file) or self._text(file)
+        if isinstance(text, _Unread):
+            self.unread[file] = text
+            self.report(text.code, text.message, asked, *text.helps)
+            return False
+        self.sources[file] = Source(file, text)
+        parsed = parse(self.sources[file])
+        if not isinstance(parsed, File):
+            self.found.extend(parsed)
+            return False
+        self.files[file] = parsed
+        self.uses[file] = []
+        return True
+
+    def _target(self, file: str, use: "tree.Use") -> str | None:
+        folder = os.path.dirname(file)
+        bases = (folder, self._root(folder))
+        tried = dict.fromkeys(os.path.normpath(os.path.join(base, use.path + ".rcs")) for base in bases)
+        for place in tried:
+            if os.path.lexists(place):
+                return self._name(place)
+        places = " and ".join(f"`{place}`" for place in tried)
+        message = f"no file `{use.path}.rcs` is found"
+        self.report(Code.FILE_NOT_FOUND, message, use.span, f"looked for {places}")
+        return None
+
+    def _text(self, file: str) -> str | _Unread:
+        raw: str | bytes | _Unread
+        piped = file == self.stdin_name and self.stdin is not None
+        raw = (self.stdin or "") if piped else _bytes(file)
+        if isinstance(raw, str | _Unread):
+            return raw
+        if len(raw) > MOST_BYTES:
+            return _too_large(file)
+        try:
+            return raw.decode("utf-8-sig")
+        except UnicodeDecodeError as error:
+            return _Unread(
+                Code.BAD_ENCODING,
+                f"`{file}` is not UTF-8 at byte {error.start}",
+                ("save it as UTF-8",),
+            )
+
+
+def _bytes(file: str) -> bytes | _Unread:
+    """The content of a regular file of bounded size; a pipe or a device might never end."""
+    try:
+        about = os.stat(file)
+        if not stat.S_ISREG(about.st_mode):
+            return _Unread(Code.UNREADABLE, f"`{file}` is not a regular file", ("pipe the text to `-`",))
+        if about.st_size > MOST_BYTES:
+            return _too_large(file)
+        with open(file, "rb") as opened:
+            return opened.read(MOST_BYTES + 1)
+    except OSError as error:
+        return _Unread(Code.UNREADABLE, f"`{file}` cannot be read: {error.strerror}")
+
+
+def _too_large(file: str) -> _Unread:
+    helps = ("split it, and let one file `use` the other",)
+    return _Unread(Code.TOO_LARGE, f"`{file}` has more than {MOST_BYTES // 1024**2} MiB", helps)
+
+
+def _toml_place(message: str, text: str) -> int:
+    """The offset of an error of `tomllib`'s, which names line and column only in words."""
+    place = re.search(r"\(at line (\d+), column (\d+)\)", message)
+    if place is None:
+        return len(text) if "end of document" in message else 0
+    before = text.splitlines(keepends=True)[: int(place[1]) - 1]
+    return min(len(text), sum(map(len, before)) + int(place[2]) - 1)

@@ -1,0 +1,152 @@
+"""A region's question as conditions of the model: is there an input at which not one line holds?
+
+In: bounds on forms (by the names of their terms), and lines. Out: expressions whose conjunction
+is to be refuted. The checker of certificates states the same question by itself (`certify.table`).
+
+A bound that no condition can say (a distance between two doubles, in ranks) is left out: the
+question then covers more than the region, so that a refutation still stands.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import reduce
+from itertools import combinations
+
+from rcsc.lang.meaning import spelled
+from rcsc.lang.model import (
+    Among,
+    Apply,
+    Bool,
+    Enum,
+    Expr,
+    Int,
+    Literal,
+    Op,
+    Program,
+    Read,
+    Real,
+    Select,
+    Table,
+    key_bounds,
+    real_of_key,
+)
+
+_TRUE = Literal(True, Bool())
+
+
+def question(
+    program: Program,
+    table: Table,
+    assumptions: Sequence[str],
+    bounds: Mapping[tuple[tuple[str, int], ...], tuple[int, int]],
+    candidates: Sequence[int],
+) -> list[Expr]:
+    """Conditions that together say: in the region, under the assumptions, it goes wrong.
+
+    Args:
+        program: Where the assumptions are declared.
+        table: Whose lines.
+        assumptions: Names of those that may be used.
+        bounds: The region.
+        candidates: Positions of the lines that may hold there.
+    """
+    terms = {spelled(term): term for condition in _conditions(program, table) for term in parts(condition)}
+    terms |= {str(v.name): Read(v.name, v.type) for v in program.variables}
+    asked = [a.condition for a in program.assumptions if a.name in assumptions]
+    for form, (low, high) in bounds.items():
+        asked += _within([(terms[name], k) for name, k in form], low, high)
+    return [*asked, fault(table, candidates)]
+
+
+def fault(table: Table, candidates: Sequence[int]) -> Expr:
+    """Two of the candidates hold, or none does (where no DEFAULT may be reached)."""
+    lines = [
+        conjunction(test.condition for test in table.lines[i].tests if test is not None) for i in candidates
+    ]
+    wrong = [conjunction(pair) for pair in combinations(lines, 2)]
+    if table.default is None or table.default.unreachable:
+        wrong.append(conjunction(negation(line) for line in lines))
+    return disjunction(wrong)
+
+
+def conjunction(conditions: Iterable[Expr]) -> Expr:
+    """All of them; true when there are none."""
+    kept = [condition for condition in conditions if condition != _TRUE]
+    return reduce(lambda a, b: Apply(Op.AND, (a, b), Bool()), kept) if kept else _TRUE
+
+
+def disjunction(conditions: Iterable[Expr]) -> Expr:
+    """One of them; false when there are none."""
+    kept = list(conditions)
+    return reduce(lambda a, b: Apply(Op.OR, (a, b), Bool()), kept) if kept else Literal(False, Bool())
+
+
+def negation(condition: Expr) -> Expr:
+    """Its opposite."""
+    return Apply(Op.NOT, (condition,), Bool())
+
+
+def parts(expr: Expr) -> Iterator[Expr]:
+    """The expression and all below it."""
+    yield expr
+    match expr:
+        case Apply(args=args):
+            for part in args:
+                yield from parts(part)
+        case Among(subject=inner) | Select(index=inner):
+            yield from parts(inner)
+
+
+def _conditions(program: Program, table: Table) -> Iterator[Expr]:
+    distinct = {id(test): test for line in table.lines for test in line.tests if test is not None}
+    yield from (test.condition for test in distinct.values() if test.box is None)
+    yield from (a.condition for a in program.assumptions if a.name in table.assumptions)
+
+
+def _within(terms: list[tuple[Expr, int]], low: int, high: int) -> list[Expr]:
+    """`low <= sum <= high` in keys, as far as it can be said."""
+    first = terms[0][0]
+    if len(terms) == 1:
+        return _one(first, low, high)
+    if all(isinstance(term.type, Int) for term, _ in terms):
+        total = reduce(lambda a, b: _arithmetic(Op.ADD, a, b), (_times(term, k) for term, k in terms))
+        return [_compare(Op.GE, total, _integer(low)), _compare(Op.LE, total, _integer(high))]
+    if [k for _, k in terms] != [1, -1]:
+        return []
+    second = terms[1][0]
+    if isinstance(first.type, Real):
+        said = {Op.LT: high == -1, Op.LE: high == 0, Op.GE: low == 0, Op.GT: low == 1}
+    else:
+        said = {Op.EQ: low == high == 0, Op.NE: high < 0 or low > 0}
+    return [_compare(op, first, second) for op, whether in said.items() if whether]
+
+
+def _one(term: Expr, low: int, high: int) -> list[Expr]:
+    match term.type:
+        case Bool():
+            return [negation(term)] if high == 0 else [term] if low == 1 else []
+        case Enum():
+            return [Among(term, tuple(range(low, high + 1)))]
+        case Int():
+            return [_compare(Op.GE, term, _integer(low)), _compare(Op.LE, term, _integer(high))]
+        case Real():
+            ends = (Op.GE, max(low, key_bounds(term.type)[0])), (Op.LE, min(high, key_bounds(term.type)[1]))
+            return [_compare(op, term, Literal(real_of_key(end), term.type)) for op, end in ends]
+
+
+def _compare(op: Op, left: Expr, right: Expr) -> Expr:
+    return Apply(op, (left, right), Bool())
+
+
+def _integer(value: int) -> Expr:
+    return Literal(value, Int(value, value))
+
+
+def _times(term: Expr, factor: int) -> Expr:
+    return term if factor == 1 else _arithmetic(Op.MUL, _integer(factor), term)
+
+
+def _arithmetic(op: Op, left: Expr, right: Expr) -> Expr:
+    """A sum or product; its bounds are those of interval arithmetic."""
+    (a, b), (c, d) = key_bounds(left.type), key_bounds(right.type)
+    ends = (a * c, a * d, b * c, b * d) if op is Op.MUL else (a + c, b + d)
+    return Apply(op, (left, right), Int(min(ends), max(ends)))

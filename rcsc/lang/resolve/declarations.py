@@ -1,0 +1,86 @@
+"""Everything that has a name before procedures and tables: units, enumerations, constants, types, variables.
+
+Constants and types may be declared in any order: one that is asked for before its turn is resolved then.
+"""
+
+from rcsc.diagnostics.codes import Code
+from rcsc.lang.expressions.scope import Scope
+from rcsc.lang.model import Enum
+from rcsc.lang.resolve import variables
+from rcsc.lang.syntax import tree
+
+MOST_LINKS = 100
+
+
+class Names:
+    """The declarations of one program that others refer to.
+
+    Attributes:
+        waiting: Constants and types not yet resolved, by `SPACE NAME`.
+        path: Those being resolved now, each asked for by the one before.
+    """
+
+    def __init__(self, scope: Scope, all_: list[tree.Declaration]) -> None:
+        self.scope = scope
+        self.all = all_
+        self.waiting: dict[str, tree.ConstDecl | tree.TypeDecl | tree.RecordDecl] = {}
+        self.path: list[str] = []
+
+    def declare(self) -> tuple[Enum, ...]:
+        """Declares all, and gives the enumerations in text order."""
+        scope = self.scope
+        for unit in (d for d in self.all if isinstance(d, tree.UnitDecl)):
+            if scope.claim(unit.name, "unit"):
+                scope.units.add(unit.name.text)
+        enums = tuple(variables.declare_enum(scope, d) for d in self.all if isinstance(d, tree.EnumDecl))
+        for one in self.all:
+            match one:
+                case tree.ConstDecl(name=name) if scope.claim(name, "value"):
+                    self.waiting[f"value {name.text}"] = one
+                case tree.TypeDecl(name=name) | tree.RecordDecl(name=name) if scope.claim(name, "type"):
+                    self.waiting[f"type {name.text}"] = one
+                case _:
+                    pass
+        declared = [d for d in self.all if isinstance(d, tree.VariableDecl)]
+        mine = [one for one in declared if scope.claim(one.name, "value")]
+        scope.variables.update(one.name.text for one in mine)
+        scope.demand = self._demand
+        for key in list(self.waiting):
+            if key in self.waiting:
+                self._resolve(key)
+        for variable in mine:
+            variables.declare_variable(scope, variable)
+        for variable in mine:
+            variables.settle_deferred(scope, variable)
+        return enums
+
+    def _demand(self, space: str, name: tree.Name) -> bool:
+        """Resolves a name asked for before its turn; False where it asks for itself, which is reported."""
+        key = f"{space} {name.text}"
+        if key in self.path:
+            names = [one.partition(" ")[2] for one in (*self.path[self.path.index(key) :], key)]
+            message = f"`{name.text}` is declared by means of itself: {' -> '.join(names)}"
+            code = Code.KIND if space == "type" else Code.NOT_CONSTANT
+            self.scope.report(code, message, name.span)
+            return False
+        if key in self.waiting:
+            if len(self.path) == MOST_LINKS:
+                message = f"declarations refer to each other more than {MOST_LINKS} deep"
+                self.scope.report(Code.TOO_DEEP, message, name.span, "declare what is used before its use")
+                return False
+            self._resolve(key)
+        return True
+
+    def _resolve(self, key: str) -> None:
+        scope, one = self.scope, self.waiting.pop(key)
+        self.path.append(key)
+        depth, scope.depth = scope.depth, 0
+        match one:
+            case tree.ConstDecl():
+                variables.declare_constant(scope, one)
+            case tree.TypeDecl():
+                variables.declare_type(scope, one)
+            case tree.RecordDecl():
+                variables.declare_record(scope, one)
+        scope.depth = depth
+        self.path.pop()

@@ -1,0 +1,206 @@
+"""Procedures, modules and extern procedures; owners; what calls what."""
+
+from collections.abc import Iterable, Iterator, Mapping
+from typing import TypeAlias
+
+from rcsc.diagnostics.codes import Code
+from rcsc.diagnostics.source import Span
+from rcsc.lang.expressions.scope import Body, Scope, root_of
+from rcsc.lang.expressions.typed import path_of
+from rcsc.lang.expressions.types import scalar_of
+from rcsc.lang.leaves import everything, expressions, read_by, written_by
+from rcsc.lang.model import (
+    Among,
+    Apply,
+    Call,
+    Expr,
+    Kind,
+    Parameter,
+    Procedure,
+    ProcedureName,
+    Read,
+    Select,
+    Statement,
+    VariableName,
+    pending,
+)
+from rcsc.lang.resolve.externs import extern
+from rcsc.lang.resolve.statements import MOST_STATEMENTS, Statements, below, cost
+from rcsc.lang.syntax import tree
+
+MOST_CALLS = 100
+
+_Body: TypeAlias = tuple[tuple[Parameter, ...], tuple[Statement, ...]]
+
+
+def procedures(scope: Scope, written: list[tree.ProcedureDecl]) -> tuple[Procedure, ...]:
+    """All procedures, with what they read and write, calls included."""
+    for one in written:
+        scope.signatures[one.name.text] = tuple(scalar_of(scope, param.type) for param in one.params)
+    bodies = {one.name.text: _body(scope, one) for one in written}
+    order = _call_order(scope, bodies)
+    known: dict[str, Procedure] = {}
+    costs: dict[str, int] = {}
+    by_name = {one.name.text: one for one in written}
+    for name in order:
+        known[name] = _procedure(scope, by_name[name], bodies[name], known)
+        costs[name] = cost(bodies[name][1], costs)
+        if costs[name] > MOST_STATEMENTS:
+            scope.report(
+                Code.LOOP_TOO_LONG,
+                f"`{name}` runs more than {MOST_STATEMENTS} statements",
+                by_name[name].name.span,
+            )
+    return tuple(known[one.name.text] for one in written if one.name.text in known)
+
+
+def _body(scope: Scope, written: tree.ProcedureDecl) -> _Body:
+    body = Body()
+    params = []
+    for param, kind in zip(written.params, scope.signatures[written.name.text], strict=True):
+        made = Parameter(body.fresh(param.name.text), kind, param.span)
+        if param.name.text in body.visible:
+            scope.report(Code.DUPLICATE_NAME, f"`{param.name.text}` is a parameter twice", param.name.span)
+        body.visible[param.name.text] = made
+        params.append(made)
+    return tuple(params), Statements(scope, body).block(written.body)
+
+
+def _call_order(scope: Scope, bodies: dict[str, _Body]) -> list[str]:
+    """Callees before callers; a cycle is reported with its path, and so are calls that nest too deep."""
+    calls = {name: [s for s in everything(body[1]) if isinstance(s, Call)] for name, body in bodies.items()}
+    deep: dict[str, int] = {}
+    for name in bodies:
+        if name not in deep:
+            _visit(scope, name, calls, deep)
+    return list(deep)
+
+
+def _visit(scope: Scope, start: str, calls: dict[str, list[Call]], deep: dict[str, int]) -> None:
+    """Goes through all that `start` calls; in `deep`, callees first, how deep the calls of each nest."""
+    path: dict[str, Iterator[Call]] = {start: iter(calls[start])}
+    while path:
+        name = next(reversed(path))
+        call = next(path[name], None)
+        if call is None:
+            del path[name]
+            deep[name] = 1 + max((deep.get(one.procedure, 0) for one in calls[name]), default=0)
+            continue
+        callee = call.procedure
+        if callee in path:
+            names = list(path)
+            cycle = " -> ".join((*names[names.index(callee) :], callee))
+            message = f"procedures call each other in a circle: {cycle}"
+            scope.report(
+                Code.CALL_CYCLE, message, call.span, "a procedure cannot be called again before it ends"
+            )
+        elif callee not in deep:
+            path[callee] = iter(calls[callee])
+        elif deep[callee] == MOST_CALLS:
+            scope.report(Code.TOO_DEEP, f"calls nest more than {MOST_CALLS} deep here", call.span)
+
+
+def _procedure(
+    scope: Scope,
+    written: tree.ProcedureDecl,
+    body: _Body,
+    known: dict[str, Procedure],
+) -> Procedure:
+    reads, writes = touched(body[1], known)
+    if written.kind != "procedure":
+        declared_reads = _places(scope, written.reads, writing=False)
+        declared_writes = _places(scope, written.writes, writing=True)
+        if written.kind == "module":
+            _check_declared(scope, body[1], known, declared_reads, declared_writes)
+        reads, writes = declared_reads, declared_writes
+    named = extern(scope, written) if written.kind == "extern" else None
+    return Procedure(
+        ProcedureName(written.name.text),
+        body[0],
+        body[1],
+        tuple(sorted(reads, key=scope.order)),
+        tuple(sorted(writes, key=scope.order)),
+        named,
+        " ".join(written.doc),
+        written.name.span,
+    )
+
+
+def touched(
+    body: Iterable[Statement], known: Mapping[str, Procedure]
+) -> tuple[set[VariableName], set[VariableName]]:
+    """The leaves that statements may read, and those that they may write, calls included."""
+    reads: set[VariableName] = set()
+    writes: set[VariableName] = set()
+    for statement in everything(body):
+        for expr in expressions(statement):
+            reads.update(read_by(expr))
+        writes.update(written_by(statement))
+        if isinstance(statement, Call) and statement.procedure in known:
+            reads.update(known[statement.procedure].reads)
+            writes.update(known[statement.procedure].writes)
+    return reads, writes
+
+
+def _places(scope: Scope, written: tuple[tree.Expr, ...], writing: bool) -> set[VariableName]:
+    """Leaves under the declared paths."""
+    leaves: set[VariableName] = set()
+    for one in written:
+        path = path_of(scope, Body(), one)
+        if path is None:
+            continue
+        root = root_of(path.names[0])
+        if writing and scope.declared[root].kind is Kind.INPUT:
+            scope.report(Code.NOT_WRITABLE, f"`{root}` is an input; only the world writes it", one.span)
+        if path.index is not None:
+            scope.report(Code.NOT_CONSTANT, "the index of a declared path is a constant", one.span)
+        own = scope.declared[root].leaves
+        every = (*own, *(pending(name) for name in own if name in scope.deferred))
+        leaves.update(name for name in every if below(name, path.names[0]))
+    return leaves
+
+
+def _check_declared(
+    scope: Scope,
+    body: tuple[Statement, ...],
+    known: dict[str, Procedure],
+    reads: set[VariableName],
+    writes: set[VariableName],
+) -> None:
+    """Reports each place where a module touches what it does not name."""
+    for statement in everything(body):
+        for expr in expressions(statement):
+            for names, span in _reading(expr):
+                _undeclared(scope, "reads", set(names) - reads, span)
+        _undeclared(scope, "writes", set(written_by(statement)) - writes, statement.span)
+        if isinstance(statement, Call) and statement.procedure in known:
+            callee = known[statement.procedure]
+            _undeclared(scope, "reads", set(callee.reads) - reads, statement.span)
+            _undeclared(scope, "writes", set(callee.writes) - writes, statement.span)
+
+
+def _reading(expr: Expr) -> Iterator[tuple[tuple[VariableName, ...], Span]]:
+    match expr:
+        case Read(name=name, span=span):
+            yield (name,), span
+        case Select(leaves=leaves, index=index, span=span):
+            yield leaves, span
+            yield from _reading(index)
+        case Apply(args=args):
+            for arg in args:
+                yield from _reading(arg)
+        case Among(subject=subject):
+            yield from _reading(subject)
+        case _:
+            return
+
+
+def _undeclared(scope: Scope, verb: str, extra: set[VariableName], span: Span) -> None:
+    """One report a variable: by its leaf where only one is touched."""
+    leaves: dict[str, list[VariableName]] = {}
+    for name in sorted(extra, key=scope.order):
+        leaves.setdefault(root_of(name), []).append(name)
+    for root, names in leaves.items():
+        shown = root if len(names) > 1 else names[0].removesuffix(".next")
+        message = f"the module {verb} `{shown}`, which it does not name"
+        scope.report(Code.UNDECLARED_ACCESS, message, span, f"add `{shown}` to its `{verb}`")

@@ -1,0 +1,180 @@
+"""One root file and all that it uses, to a `Program`."""
+
+import gc
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from rcsc.diagnostics.codes import Code
+from rcsc.diagnostics.diagnostic import Diagnostic, sort_key
+from rcsc.diagnostics.source import Sources
+from rcsc.lang.expressions.scope import Body, Scope
+from rcsc.lang.expressions.typed import boolean
+from rcsc.lang.leaves import read_by
+from rcsc.lang.model import (
+    Assumption,
+    AssumptionName,
+    Invariant,
+    Kind,
+    Level,
+    Procedure,
+    Program,
+    Property,
+    Standing,
+    Table,
+    TableName,
+)
+from rcsc.lang.project import Loaded, load
+from rcsc.lang.resolve import procedures as calls
+from rcsc.lang.resolve.declarations import Names
+from rcsc.lang.resolve.levels import level
+from rcsc.lang.resolve.owners import Owners
+from rcsc.lang.resolve.properties import made_property
+from rcsc.lang.resolve.tables import table
+from rcsc.lang.syntax import tree
+
+
+def resolve(root: str, loaded: Loaded) -> Program | tuple[Diagnostic, ...]:
+    """The program of the file `root`, or every diagnostic of it and of the files it uses, by position."""
+    files = closure(root, loaded)
+    wrong = tuple(d for d in loaded.found if d.primary.span.file in files)
+    if wrong:
+        return wrong
+    declarations = [d for file in files for d in loaded.files[file].declarations]
+    with _uncollected():
+        return _Resolver(root, loaded.sources).program(declarations, loaded.files[root])
+
+
+@contextmanager
+def _uncollected() -> Iterator[None]:
+    """Without garbage collection: the model has no cycles, and to look for them doubles the time."""
+    was_on = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_on:
+            gc.enable()
+
+
+def compile_text(text: str, file: str = "case.rcs") -> Program | tuple[Diagnostic, ...]:
+    """The program of a text that uses no other file."""
+    loaded = load(["-"], stdin=text, stdin_name=file)
+    return loaded.found or resolve(loaded.roots[0], loaded)
+
+
+def closure(root: str, loaded: Loaded) -> list[str]:
+    """The file and all that it uses, used ones first."""
+    order: dict[str, None] = {}
+    path = {root: iter(loaded.uses.get(root, ()))}
+    while path:
+        file = next(reversed(path))
+        used = next(path[file], None)
+        if used is None:
+            del path[file]
+            order[file] = None
+        elif used not in path and used not in order:
+            path[used] = iter(loaded.uses.get(used, ()))
+    return list(order)
+
+
+class _Resolver:
+    """Works through the declarations, kind by kind, so that their order in the text is free."""
+
+    def __init__(self, root: str, sources: Sources) -> None:
+        self.root = root
+        self.sources = sources
+        self.scope = Scope()
+
+    def program(self, all_: list[tree.Declaration], root: tree.File) -> Program | tuple[Diagnostic, ...]:
+        """The program, or what is wrong."""
+        scope = self.scope
+        enums = Names(scope, all_).declare()
+        written = [d for d in all_ if isinstance(d, tree.ProcedureDecl) and scope.claim(d.name, "call")]
+        scope.procedures.update({d.name.text: d for d in written})
+        procedures = calls.procedures(scope, written)
+        owners = Owners(
+            scope, [d for d in all_ if isinstance(d, tree.OwnerDecl) and scope.claim(d.name, "call")]
+        )
+        assumptions = self._assumptions(all_)
+        invariants = self._invariants(all_)
+        properties = self._properties(all_)
+        tables = self._tables(all_, {a.name for a in assumptions})
+        levels = self._levels(all_, tables, owners, procedures)
+        if scope.found:
+            return tuple(sorted(set(scope.found), key=sort_key))
+        own = tuple(TableName(d.name.text) for d in root.declarations if isinstance(d, tree.TableDecl))
+        stem = self.root.rpartition("/")[2].removesuffix(".rcs")
+        return Program(
+            stem,
+            self.root,
+            enums,
+            tuple(scope.records),
+            tuple(scope.declared.values()),
+            tuple(scope.leaves.values()),
+            procedures,
+            assumptions,
+            invariants,
+            tables,
+            own,
+            owners.all(),
+            levels,
+            properties,
+        )
+
+    def _assumptions(self, all_: list[tree.Declaration]) -> tuple[Assumption, ...]:
+        made = []
+        for one in all_:
+            if isinstance(one, tree.AssumeDecl) and self.scope.claim(one.name, "assumption"):
+                condition = boolean(self.scope, Body(), one.condition)
+                if condition is not None:
+                    standing = Standing(one.state or "assumed")
+                    name = AssumptionName(one.name.text)
+                    made.append(Assumption(name, standing, condition, " ".join(one.doc), one.name.span))
+        return tuple(made)
+
+    def _invariants(self, all_: list[tree.Declaration]) -> tuple[Invariant, ...]:
+        made = []
+        for one in all_:
+            if not (isinstance(one, tree.InvariantDecl) and self.scope.claim(one.name, "assumption")):
+                continue
+            condition = boolean(self.scope, Body(), one.condition)
+            if condition is None:
+                continue
+            inputs = [n for n in read_by(condition) if self.scope.leaves[n].kind is Kind.INPUT]
+            if inputs:
+                self.scope.report(
+                    Code.KIND,
+                    f"an invariant is about state and outputs; `{inputs[0]}` is an input",
+                    one.condition.span,
+                    "an assumption can be about inputs",
+                )
+            made.append(Invariant(one.name.text, condition, " ".join(one.doc), one.name.span))
+        return tuple(made)
+
+    def _properties(self, all_: list[tree.Declaration]) -> tuple[Property, ...]:
+        written = (d for d in all_ if isinstance(d, tree.PropertyDecl))
+        made = (made_property(self.scope, d) for d in written if self.scope.claim(d.name, "assumption"))
+        return tuple(one for one in made if one is not None)
+
+    def _levels(
+        self,
+        all_: list[tree.Declaration],
+        tables: tuple[Table, ...],
+        owners: Owners,
+        procedures: tuple[Procedure, ...],
+    ) -> tuple[Level, ...]:
+        by_name = {one.name: one for one in tables}
+        bodies = {str(one.name): one for one in procedures}
+        written = [d for d in all_ if isinstance(d, tree.LevelDecl) and self.scope.claim(d.name, "table")]
+        made = (level(self.scope, one, by_name, owners, bodies) for one in written)
+        return tuple(one for one in made if one is not None)
+
+    def _tables(self, all_: list[tree.Declaration], assumptions: set[AssumptionName]) -> tuple[Table, ...]:
+        made = []
+        for one in all_:
+            if isinstance(one, tree.TableDecl) and self.scope.claim(one.name, "table"):
+                for name in one.assuming:
+                    if name.text not in assumptions:
+                        self.scope.unknown("assumption", name, list(assumptions))
+                made.append(table(self.scope, one, self.sources))
+        return tuple(made)

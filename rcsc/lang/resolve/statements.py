@@ -1,0 +1,333 @@
+"""Statements: places found, values and arguments checked, locals renamed apart."""
+
+from dataclasses import dataclass, field
+
+from rcsc.diagnostics.codes import Code
+from rcsc.diagnostics.source import Span
+from rcsc.lang.expressions.operators import Typed, common_unit, kind_word, same_kind
+from rcsc.lang.expressions.scope import Body, Scope, root_of, spell_number
+from rcsc.lang.expressions.typed import Path, boolean, path_of, typed
+from rcsc.lang.expressions.types import constant, scalar_of
+from rcsc.lang.leaves import read_by
+from rcsc.lang.model import (
+    Arm,
+    Array,
+    Assign,
+    Bool,
+    Call,
+    Case,
+    Enum,
+    For,
+    If,
+    Int,
+    Kind,
+    Literal,
+    Local,
+    Parameter,
+    ProcedureName,
+    Read,
+    Real,
+    Record,
+    Scalar,
+    Select,
+    Statement,
+    ToElement,
+    ToLeaf,
+    ToLocal,
+    Type,
+    Value,
+    VariableName,
+    pending,
+)
+from rcsc.lang.resolve.variables import fits
+from rcsc.lang.syntax import tree
+
+MOST_ROUNDS = 4096
+MOST_STATEMENTS = 1_000_000
+
+
+@dataclass(slots=True)
+class Statements:
+    """Resolves the statements of one procedure, or of one action cell."""
+
+    scope: Scope
+    body: Body = field(default_factory=Body)
+    loops: set[str] = field(default_factory=set)
+
+    def block(self, written: tuple[tree.Statement, ...]) -> tuple[Statement, ...]:
+        """The statements; locals declared inside are forgotten behind it."""
+        before = dict(self.body.visible)
+        resolved = tuple(made for one in written for made in self._statement(one))
+        self.body.visible = before
+        return resolved
+
+    def _statement(self, written: tree.Statement) -> tuple[Statement, ...]:
+        match written:
+            case tree.Assign():
+                return self.assign(written.place, written.value, written.deferred, written.span)
+            case tree.Local():
+                return self._local(written)
+            case tree.If(condition, then, orelse, span):
+                test = boolean(self.scope, self.body, condition)
+                first, second = self.block(then), self.block(orelse)
+                return () if test is None else (If(test, first, second, span),)
+            case tree.Case():
+                return self._case(written)
+            case tree.For():
+                return self._for(written)
+            case tree.Call():
+                return self._call(written)
+
+    # --- assignment ---
+
+    def assign(self, place: tree.Expr, value: tree.Expr, deferred: bool, span: Span) -> tuple[Statement, ...]:
+        """One assignment a leaf."""
+        if isinstance(place, tree.Reference) and place.name.text in self.body.visible:
+            return self._assign_local(place, value, deferred, span)
+        target = self.place(place, deferred)
+        return () if target is None else self.store(target, value, deferred, span)
+
+    def place(self, place: tree.Expr, deferred: bool) -> Path | None:
+        """Where an assignment outside the locals goes; None after an error."""
+        constants = self.scope.constants
+        name = place.name.text if isinstance(place, tree.Reference) else ""
+        if name not in self.scope.declared and (name in constants or name in self.scope.members):
+            self.scope.report(Code.NOT_WRITABLE, f"`{name}` is a constant", place.span)
+            return None
+        target = path_of(self.scope, self.body, place)
+        return target if target is not None and self._writable(target, deferred, place.span) else None
+
+    def store(self, target: Path, value: tree.Expr, deferred: bool, span: Span) -> tuple[Statement, ...]:
+        """One assignment a leaf of the place."""
+        if not isinstance(target.type, Bool | Enum | Int | Real):
+            return self._copy(target, value, span)
+        found = typed(self.scope, self.body, value, target.type)
+        if found is None or not self._assignable(target.type, found, value.span):
+            return ()
+        names = tuple(pending(name) if deferred else VariableName(name) for name in target.names)
+        if target.index is None:
+            return (Assign(ToLeaf(names[0], target.type), found.expr, span),)
+        return (Assign(ToElement(names, target.index, target.type), found.expr, span),)
+
+    def _assign_local(
+        self, place: tree.Reference, value: tree.Expr, deferred: bool, span: Span
+    ) -> tuple[Statement, ...]:
+        local = self.body.visible[place.name.text]
+        if deferred:
+            self.scope.report(
+                Code.NOT_DEFERRED, f"`{place.name.text}` is a local, not a deferred variable", place.span
+            )
+            return ()
+        if isinstance(local, Parameter):
+            message = f"`{place.name.text}` is a parameter and is not assigned"
+            self.scope.report(
+                Code.NOT_WRITABLE, message, place.span, "keep its value in a local, and assign that"
+            )
+            return ()
+        if local.name in self.loops:
+            self.scope.report(
+                Code.NOT_WRITABLE, f"`{place.name.text}` counts a loop and is not assigned", place.span
+            )
+            return ()
+        found = typed(self.scope, self.body, value, local.type)
+        if found is None or not self._assignable(local.type, found, value.span):
+            return ()
+        return (Assign(ToLocal(local.name, local.type), found.expr, span),)
+
+    def _writable(self, target: Path, deferred: bool, span: Span) -> bool:
+        root = root_of(target.names[0])
+        declared = self.scope.declared[root]
+        if declared.kind is Kind.INPUT:
+            self.scope.report(Code.NOT_WRITABLE, f"`{root}` is an input; only the world writes it", span)
+            return False
+        if deferred and target.names[0] not in self.scope.deferred:
+            self.scope.report(
+                Code.NOT_DEFERRED,
+                f"`{target.names[0]}` has no deferred next value",
+                span,
+                "declare it `deferred until ...`, or assign it without `next`",
+            )
+            return False
+        return True
+
+    def _assignable(self, kind: Scalar, value: Typed, span: Span) -> bool:
+        if isinstance(value.expr, Literal):
+            return fits(self.scope, kind, value, span)
+        if not same_kind(kind, value.expr.type):
+            self.scope.report(
+                Code.KIND, f"expected {kind_word(kind)}, this is {kind_word(value.expr.type)}", span
+            )
+            return False
+        if isinstance(kind, Int | Real):
+            least = Literal(kind.low, kind)
+            return common_unit(self.scope, (Typed(least), value), span) is not None
+        return True
+
+    def _copy(self, target: Path, value: tree.Expr, span: Span) -> tuple[Statement, ...]:
+        """A whole record or array, leaf by leaf."""
+        origin = path_of(self.scope, self.body, value)
+        if origin is None:
+            return ()
+        if origin.type != target.type:
+            self.scope.report(Code.KIND, "a record or array is assigned from one of the same type", span)
+            return ()
+        suffixes = _suffixes(target.type)
+        if self._refused(target, origin, len(suffixes), span):
+            return ()
+        copies: list[Statement] = []
+        for suffix, kind in suffixes:
+            to, came = self._leaf(target, suffix), self._leaf(origin, suffix)
+            read = (
+                Read(came[0], kind, value.span)
+                if origin.index is None
+                else Select(came, origin.index, kind, value.span)
+            )
+            place = ToLeaf(to[0], kind) if target.index is None else ToElement(to, target.index, kind)
+            copies.append(Assign(place, read, span))
+        return tuple(copies)
+
+    def _refused(self, target: Path, origin: Path, count: int, span: Span) -> bool:
+        """Whether a copy is too much, or would change an index that its later parts use."""
+        self.scope.made += count * len(target.names) * len(origin.names)
+        if self.scope.made > MOST_STATEMENTS:
+            message = f"copies of records and arrays come to more than {MOST_STATEMENTS} statements"
+            self.scope.report(Code.LOOP_TOO_LONG, message, span)
+            return True
+        used = {name for path in (target, origin) if path.index for name in read_by(path.index)}
+        own = [name for name in used if any(below(name, one) for one in target.names)]
+        if own:
+            message = f"the index reads `{min(own)}`, which this assignment changes"
+            self.scope.report(Code.KIND, message, span, "keep the index in a local first")
+        return bool(own)
+
+    @staticmethod
+    def _leaf(path: Path, suffix: str) -> tuple[VariableName, ...]:
+        return tuple(VariableName(name + suffix) for name in path.names)
+
+    # --- other statements ---
+
+    def _local(self, written: tree.Local) -> tuple[Statement, ...]:
+        kind = scalar_of(self.scope, written.type)
+        value = None
+        if written.value is not None:
+            found = typed(self.scope, self.body, written.value, kind)
+            if found is not None and self._assignable(kind, found, written.value.span):
+                value = found.expr
+        if written.name.text in self.body.visible:
+            self.scope.report(
+                Code.DUPLICATE_NAME, f"`{written.name.text}` is declared twice", written.name.span
+            )
+        local = Local(self.body.fresh(written.name.text), kind, value, written.span)
+        self.body.visible[written.name.text] = local
+        return (local,)
+
+    def _case(self, written: tree.Case) -> tuple[Statement, ...]:
+        subject = typed(self.scope, self.body, written.subject)
+        seen: dict[Value, Span] = {}
+        arms = tuple(self._arm(arm, subject, seen) for arm in written.arms)
+        orelse = self.block(written.orelse or ())
+        return () if subject is None else (Case(subject.expr, arms, orelse, written.span),)
+
+    def _arm(self, written: tree.Arm, subject: Typed | None, seen: dict[Value, Span]) -> Arm:
+        values = []
+        for one in written.values if subject is not None else ():
+            assert subject is not None
+            value = constant(self.scope, one, subject.expr.type)
+            if value is None or not self._arm_fits(subject, value, one.span):
+                continue
+            found = value.literal().value
+            if found in seen:
+                self.scope.report(Code.DUPLICATE_ARM, "an arm above already takes this value", one.span)
+            seen.setdefault(found, one.span)
+            values.append(found)
+        return Arm(tuple(values), self.block(written.body), written.span)
+
+    def _arm_fits(self, subject: Typed, value: Typed, span: Span) -> bool:
+        if not same_kind(subject.expr.type, value.expr.type):
+            words = kind_word(subject.expr.type), kind_word(value.expr.type)
+            self.scope.report(Code.KIND, f"expected {words[0]}, this is {words[1]}", span)
+            return False
+        kind, found = subject.expr.type, value.literal().value
+        if isinstance(kind, Int | Real) and not kind.low <= found <= kind.high:
+            low, high = spell_number(kind.low), spell_number(kind.high)
+            message = f"{spell_number(found)} is never taken: the subject lies in {low} .. {high}"
+            self.scope.report(Code.OUT_OF_RANGE_CONSTANT, message, span)
+            return False
+        return common_unit(self.scope, (subject, value), span) is not None
+
+    def _for(self, written: tree.For) -> tuple[Statement, ...]:
+        low, high = constant(self.scope, written.low), constant(self.scope, written.high)
+        if low is None or high is None:
+            return ()
+        ends = low.literal().value, high.literal().value
+        if not (isinstance(low.expr.type, Int) and isinstance(high.expr.type, Int)):
+            self.scope.report(Code.KIND, "a loop counts whole numbers", written.span)
+            return ()
+        first, last = int(ends[0]), int(ends[1])
+        if last - first >= MOST_ROUNDS:
+            self.scope.report(Code.LOOP_TOO_LONG, f"a loop has at most {MOST_ROUNDS} rounds", written.span)
+            return ()
+        name = self.body.fresh(written.name.text)
+        before = dict(self.body.visible)
+        self.body.visible[written.name.text] = Local(
+            name, Int(first, max(first, last)), None, written.name.span
+        )
+        self.loops.add(name)
+        body = self.block(written.body)
+        self.body.visible = before
+        return (For(name, first, last, body, written.span),)
+
+    def _call(self, written: tree.Call) -> tuple[Statement, ...]:
+        procedure = self.scope.procedures.get(written.name.text)
+        if procedure is None:
+            self.scope.unknown("procedure", written.name, list(self.scope.procedures))
+            return ()
+        if len(procedure.params) != len(written.args):
+            want, got = len(procedure.params), len(written.args)
+            self.scope.report(
+                Code.WRONG_ARGUMENTS,
+                f"`{written.name.text}` takes {want} argument{'s' * (want != 1)}, not {got}",
+                written.span,
+            )
+            return ()
+        args = []
+        for kind, arg in zip(self.scope.signatures[written.name.text], written.args, strict=True):
+            found = typed(self.scope, self.body, arg, kind)
+            if found is None or not self._assignable(kind, found, arg.span):
+                return ()
+            args.append(found.expr)
+        return (Call(ProcedureName(written.name.text), tuple(args), written.span),)
+
+
+def _suffixes(kind: Type, prefix: str = "") -> list[tuple[str, Scalar]]:
+    match kind:
+        case Array(length, element):
+            return [pair for at in range(length) for pair in _suffixes(element, f"{prefix}[{at}]")]
+        case Record(fields=fields):
+            return [pair for part in fields for pair in _suffixes(part.type, f"{prefix}.{part.name}")]
+        case _:
+            return [(prefix, kind)]
+
+
+def below(leaf: str, path: str) -> bool:
+    """Whether the leaf is the path or a part of it."""
+    return leaf == path or leaf.startswith((f"{path}.", f"{path}["))
+
+
+def cost(body: tuple[Statement, ...], known: dict[str, int]) -> int:
+    """Statements that one run executes at most, calls included."""
+    total = 0
+    for one in body:
+        total += 1
+        match one:
+            case If(then=then, orelse=orelse):
+                total += max(cost(then, known), cost(orelse, known))
+            case Case(arms=arms, orelse=orelse):
+                total += max([cost(arm.body, known) for arm in arms] + [cost(orelse, known)])
+            case For(low=low, high=high, body=inner):
+                total += max(0, high - low + 1) * cost(inner, known)
+            case Call(procedure=name):
+                total += known.get(name, 0)
+            case _:
+                pass
+    return total

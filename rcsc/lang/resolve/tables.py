@@ -1,0 +1,164 @@
+"""Tables: columns, lines, tests and actions."""
+
+from rcsc.diagnostics.codes import Code
+from rcsc.diagnostics.diagnostic import Label
+from rcsc.diagnostics.source import Sources, Span
+from rcsc.lang.expressions.conditions import Tests
+from rcsc.lang.expressions.operators import Typed
+from rcsc.lang.expressions.placing import placed, placed_statement
+from rcsc.lang.expressions.scope import Body, Scope
+from rcsc.lang.expressions.typed import Path, typed
+from rcsc.lang.model import (
+    Action,
+    AssumptionName,
+    Column,
+    Default,
+    Line,
+    LineName,
+    Read,
+    Statement,
+    Table,
+    TableName,
+    Test,
+    VariableName,
+)
+from rcsc.lang.resolve.statements import Statements
+from rcsc.lang.syntax import tree
+
+
+def table(scope: Scope, written: tree.TableDecl, sources: Sources) -> Table:
+    """The table; what is wrong with it has been reported."""
+    order = {name: at for at, name in enumerate(scope.leaves)}
+    text = sources[written.span.file].text
+    subjects = tuple(_subject(scope, heading) for heading in written.conditions)
+    columns = tuple(
+        _column(heading, subject, text) for heading, subject in zip(written.conditions, subjects, strict=True)
+    )
+    cells = _Cells(scope, written, text, Tests(scope, written.conditions, subjects, order))
+    lines: list[Line] = []
+    default: Default | None = None
+    names: dict[str, Span] = {}
+    for row in written.rows:
+        name_span = cells.span(row, 0)
+        if row.name in names:
+            scope.report(
+                Code.DUPLICATE_LINE,
+                f"two lines are called `{row.name}`",
+                name_span,
+                related=(Label(names[row.name], "the first"),),
+            )
+        names.setdefault(row.name, name_span)
+        if not row.default:
+            lines.append(Line(LineName(row.name), cells.tests(row), cells.actions(row), row.span, row.bounds))
+        elif default is not None:
+            scope.report(Code.SEVERAL_DEFAULTS, "a table has at most one DEFAULT line", name_span)
+        else:
+            default = Default(LineName(row.name), cells.actions(row), row.unreachable, cells.span(row, 1))
+    read = {name for line in lines for test in line.tests if test is not None for name in test.variables}
+    return Table(
+        TableName(written.name.text),
+        columns,
+        tuple(lines),
+        default,
+        tuple(VariableName(name) for name in scope.leaves if name in read),
+        tuple(AssumptionName(name.text) for name in written.assuming),
+        " ".join(written.doc),
+        written.name.span,
+        written.span.file,
+    )
+
+
+def _subject(scope: Scope, heading: tree.Heading) -> Typed | None:
+    """What the lines of a column are about; None under `when`, and after an error."""
+    if heading.subject is None:
+        return None
+    scope.cell = heading.span
+    subject = typed(scope, Body(), heading.subject)
+    scope.cell = None
+    return None if subject is None else Typed(placed(subject.expr, heading.span), subject.bare)
+
+
+def _column(heading: tree.Heading, subject: Typed | None, text: str) -> Column:
+    expr = None if subject is None else subject.expr
+    leaf = expr.name if isinstance(expr, Read) else None
+    return Column(" ".join(text[heading.span.start : heading.span.end].split()), expr, leaf, heading.span)
+
+
+class _Cells:
+    """Reads the cells of one table's rows; each distinct cell once."""
+
+    def __init__(self, scope: Scope, written: tree.TableDecl, text: str, tests: Tests) -> None:
+        self.scope = scope
+        self.text = text
+        self.known = tests
+        self.headings = [text[h.span.start : h.span.end] for h in written.actions]
+        self.places = [self._place(heading) for heading in written.actions]
+        self.made: dict[tuple[int, int], list[tuple[str, Statement]]] = {}
+
+    def _place(self, heading: tree.Heading) -> tuple[Path, Span] | None:
+        """Where a column of values assigns; None for a column of actions, and after an error."""
+        if heading.subject is None:
+            return None
+        self.scope.cell = heading.span
+        path = Statements(self.scope).place(heading.subject, False)
+        self.scope.cell = None
+        return None if path is None else (path, heading.span)
+
+    def span(self, row: tree.Row, cell: int) -> Span:
+        """The span of a cell, counted from the line's name."""
+        return Span(row.span.file, row.bounds[2 * cell], row.bounds[2 * cell + 1])
+
+    def tests(self, row: tree.Row) -> tuple[Test | None, ...]:
+        """One test a condition column."""
+        known = self.known.known
+        result: list[Test | None] = []
+        for column, written in enumerate(row.conditions):
+            if written is None:
+                result.append(None)
+                continue
+            key = (column, id(written))
+            if key in known:
+                result.append(known[key])
+                continue
+            span = self.span(row, column + 1)
+            result.append(self.known.test(column, written, self.text[span.start : span.end], span))
+        return tuple(result)
+
+    def actions(self, row: tree.Row) -> tuple[Action, ...]:
+        """The actions of all columns, left to right."""
+        result: list[Action] = []
+        for column, written in enumerate(row.actions):
+            if not written:
+                continue
+            span = self.span(row, 1 + len(row.conditions) + column)
+            key = (column, id(written))
+            if key not in self.made:
+                self.scope.cell = span
+                self.made[key] = self._actions(column, written, self.text[span.start : span.end])
+                self.scope.cell = None
+            heading = self.headings[column]
+            for text, statement in self.made[key]:
+                result.append(Action(heading, text, placed_statement(statement, span)))
+        return tuple(result)
+
+    def _actions(
+        self, column: int, written: tuple[tree.Statement, ...] | tree.Comparison, text: str
+    ) -> list[tuple[str, Statement]]:
+        statements = Statements(self.scope)
+        if isinstance(written, tree.Comparison):
+            target = self.places[column]
+            if target is None:
+                return []
+            path = replaced(target[0], target[1])
+            return [(text, one) for one in statements.store(path, written.value, False, written.span)]
+        pieces = [piece.strip() for piece in text.split(";")]
+        made: list[tuple[str, Statement]] = []
+        for at, one in enumerate(written):
+            piece = pieces[at] if len(pieces) == len(written) else text
+            made.extend((piece, statement) for statement in statements.block((one,)))
+        return made
+
+
+def replaced(path: Path, heading: Span) -> Path:
+    """The path with the spans of its index in the file."""
+    return path if path.index is None else Path(path.names, path.type, placed(path.index, heading))

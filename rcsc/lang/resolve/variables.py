@@ -1,0 +1,206 @@
+"""Types, constants and variables declared; records and arrays flattened into leaves."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from rcsc.diagnostics.codes import Code
+from rcsc.diagnostics.source import Span
+from rcsc.lang.expressions.operators import Typed, common_unit, kind_word, same_kind
+from rcsc.lang.expressions.scope import Body, Constant, Scope
+from rcsc.lang.expressions.typed import boolean
+from rcsc.lang.expressions.types import MOST_LEAVES, constant, size, type_of
+from rcsc.lang.model import (
+    Admit,
+    Array,
+    Bool,
+    Declared,
+    Enum,
+    Int,
+    Kind,
+    Literal,
+    Real,
+    Record,
+    RecordField,
+    Scalar,
+    Type,
+    Value,
+    Variable,
+    VariableName,
+    key_bounds,
+    pending,
+    value_of_key,
+)
+from rcsc.lang.syntax import tree
+from rcsc.lang.syntax.screen import MOST_NAME
+
+
+def declare_enum(scope: Scope, written: tree.EnumDecl) -> Enum:
+    """Adds an enumeration and its members."""
+    first: dict[str, tree.Name] = {}
+    for member in written.members:
+        if member.text in first:
+            scope.report(Code.DUPLICATE_NAME, f"`{member.text}` is a member twice", member.span)
+        first.setdefault(member.text, member)
+    enum = Enum(written.name.text, tuple(first))
+    if scope.claim(written.name, "type"):
+        scope.types[enum.name] = enum
+        for member_name in first:
+            scope.members.setdefault(member_name, []).append(enum)
+    return enum
+
+
+def declare_type(scope: Scope, written: tree.TypeDecl) -> None:
+    """Adds a named type."""
+    scope.types[written.name.text] = type_of(scope, written.type)
+
+
+def declare_record(scope: Scope, written: tree.RecordDecl) -> None:
+    """Adds a record."""
+    parts: dict[str, RecordField] = {}
+    for part in written.fields:
+        kind = type_of(scope, part.type)
+        if part.name.text in parts:
+            scope.report(Code.DUPLICATE_NAME, f"`{part.name.text}` is a field twice", part.name.span)
+        parts.setdefault(part.name.text, RecordField(part.name.text, kind, " ".join(part.doc)))
+    record = Record(written.name.text, tuple(parts.values()))
+    if size(record) > MOST_LEAVES:
+        message = f"a type has at most {MOST_LEAVES} scalar parts"
+        scope.report(Code.TOO_MANY_LEAVES, message, written.name.span)
+        scope.types[written.name.text] = Bool()
+        return
+    scope.types[record.name] = record
+    scope.records.append(record)
+
+
+def declare_constant(scope: Scope, written: tree.ConstDecl) -> None:
+    """Adds a constant."""
+    value = constant(scope, written.value)
+    if value is not None:
+        scope.constants[written.name.text] = Constant(value.literal(), value.bare)
+
+
+def declare_variable(scope: Scope, written: tree.VariableDecl) -> None:
+    """Adds a variable and its leaves; the pending leaf of a deferred one directly behind it."""
+    kind = type_of(scope, written.type)
+    if size(kind) + len(scope.leaves) > MOST_LEAVES:
+        scope.report(
+            Code.TOO_MANY_LEAVES, f"a program has at most {MOST_LEAVES} scalar variables", written.name.span
+        )
+        return
+    flat = list(_leaves(written.name.text, kind))
+    if max((len(name) for name, _ in flat), default=0) > MOST_NAME:
+        message = f"a part of `{written.name.text}`, written out, has more than {MOST_NAME} characters"
+        scope.report(Code.LONG_NAME, message, written.name.span)
+        return
+    initial, safe = _constant(scope, written.initial, kind, "initial"), _safe(scope, written, kind)
+    deferred = written.deferred_until is not None and _may_be_deferred(scope, written, kind)
+    for name, leaf in flat:
+        least = value_of_key(leaf, key_bounds(leaf)[0])
+        variable = Variable(
+            VariableName(name),
+            Kind(written.kind),
+            leaf,
+            least if initial is None else initial,
+            _admit(scope, written, leaf),
+            None,
+            " ".join(written.doc),
+            written.name.span,
+            safe,
+        )
+        scope.leaves[name] = variable
+        if deferred:
+            scope.deferred.add(name)
+            scope.leaves[pending(name)] = replace(variable, name=pending(name), kind=Kind.STATE)
+    scope.declared[written.name.text] = Declared(
+        written.name.text,
+        Kind(written.kind),
+        kind,
+        tuple(VariableName(name) for name, _ in flat),
+        " ".join(written.doc),
+        written.name.span,
+    )
+
+
+def settle_deferred(scope: Scope, written: tree.VariableDecl) -> None:
+    """Resolves `until`, once every variable is known."""
+    name = written.name.text
+    if written.deferred_until is None or name not in scope.deferred:
+        return
+    until = boolean(scope, Body(), written.deferred_until)
+    if until is not None:
+        scope.leaves[name] = replace(scope.leaves[name], deferred_until=until)
+
+
+def _leaves(name: str, kind: Type) -> Iterator[tuple[str, Scalar]]:
+    match kind:
+        case Array(length, element):
+            for at in range(length):
+                yield from _leaves(f"{name}[{at}]", element)
+        case Record(fields=fields):
+            for part in fields:
+                yield from _leaves(f"{name}.{part.name}", part.type)
+        case _:
+            yield name, kind
+
+
+def _constant(scope: Scope, written: tree.Expr | None, kind: Type, what: str) -> Value | None:
+    """The initial or the safe value; None where none is written, or what is written is none."""
+    if written is None:
+        return None
+    if not isinstance(kind, Bool | Enum | Int | Real):
+        scope.report(Code.KIND, f"a record or array has no {what} value of its own", written.span)
+        return None
+    value = constant(scope, written, kind)
+    if value is None or not fits(scope, kind, value, written.span):
+        return None
+    found = value.literal().value
+    return float(found) + 0.0 if isinstance(kind, Real) else found
+
+
+def _safe(scope: Scope, written: tree.VariableDecl, kind: Type) -> Value | None:
+    if written.safe is not None and written.kind != "output":
+        message = f"only an output has a safe value, `{written.name.text}` is not one"
+        scope.report(Code.KIND, message, written.name.span)
+        return None
+    return _constant(scope, written.safe, kind, "safe")
+
+
+def fits(scope: Scope, kind: Scalar, value: Typed, span: Span) -> bool:
+    """Whether a constant may be a value of the type; reports it where not."""
+    if not same_kind(kind, value.expr.type):
+        scope.report(Code.KIND, f"expected {kind_word(kind)}, this is {kind_word(value.expr.type)}", span)
+        return False
+    if isinstance(kind, Int | Real):
+        target = Typed(Literal(kind.low, kind), False)
+        if common_unit(scope, (target, value), span) is None:
+            return False
+        found = value.literal().value
+        if not kind.low <= found <= kind.high:
+            scope.report(Code.OUT_OF_RANGE_CONSTANT, f"{found} is not in {kind.low} .. {kind.high}", span)
+            return False
+    return True
+
+
+def _admit(scope: Scope, written: tree.VariableDecl, leaf: Scalar) -> Admit:
+    if not written.admit:
+        return Admit.REJECT
+    if written.kind != "input":
+        scope.report(
+            Code.KIND, f"only an input is admitted, `{written.name.text}` is not one", written.name.span
+        )
+        return Admit.REJECT
+    if written.admit == "clamp" and not isinstance(leaf, Int | Real):
+        scope.report(Code.KIND, "only a number can be clamped", written.name.span, "leave `clamp` out")
+        return Admit.REJECT
+    return Admit(written.admit)
+
+
+def _may_be_deferred(scope: Scope, written: tree.VariableDecl, kind: Type) -> bool:
+    if written.kind != "state" or not isinstance(kind, Bool | Enum | Int | Real):
+        scope.report(
+            Code.NOT_DEFERRED,
+            "only a state variable that is a single value can be deferred",
+            written.name.span,
+        )
+        return False
+    return True

@@ -1,0 +1,358 @@
+"""Parse trees to syntax trees: one method a grammar rule, in grammar order."""
+
+from dataclasses import replace
+from typing import Any, ClassVar, Protocol
+
+from rcsc.diagnostics.source import Span
+from rcsc.lang.syntax import tree
+from rcsc.lang.syntax.comments import Comments, split, words
+from rcsc.lang.syntax.lalr import Node
+
+
+class Rows(Protocol):
+    """Parses the rows of a table."""
+
+    def table(
+        self, rows: list[Any]
+    ) -> tuple[tuple[tree.Heading, ...], tuple[tree.Heading, ...], tuple[tree.Row, ...]]: ...
+
+
+class Build:
+    """Builds the nodes of one file, or of one table cell (then `file` is "" and `rows` None)."""
+
+    def __init__(self, file: str, comments: Comments, rows: Rows | None) -> None:
+        self.file = file
+        self.comments = comments
+        self.rows = rows
+
+    # --- pieces ---
+
+    def _span(self, node: Node) -> Span:
+        if node.start_pos < 0:
+            return Span(self.file, 0, 0)
+        return Span(self.file, node.start_pos, node.end_pos)
+
+    def _name(self, token: Any) -> tree.Name:
+        return tree.Name(str(token), Span(self.file, token.start_pos, token.end_pos))
+
+    def _names(self, node: Node | None) -> tuple[tree.Name, ...]:
+        return tuple(self._name(token) for token in node.children) if node is not None else ()
+
+    def _head(self, node: Node) -> dict[str, Any]:
+        """Span, comments and doc lines of a declaration."""
+        plain, doc = split(self.comments.take(node.start_pos))
+        return {"span": self._span(node), "comments": plain, "doc": doc}
+
+    def _above(self, node: Node) -> dict[str, Any]:
+        """Span and comments of a statement or an arm."""
+        comments = self.comments.take(node.start_pos)
+        return {"span": self._span(node), "comments": tuple(words(text) for text in comments)}
+
+    @staticmethod
+    def _rule(item: Any) -> str:
+        return item.data if isinstance(item, Node) else ""
+
+    def _find(self, items: list[Any], rule: str) -> Any:
+        return next((item for item in items if self._rule(item) == rule), None)
+
+    def _kind(self, items: list[Any], terminal: str) -> Any:
+        return next((item for item in items if getattr(item, "type", None) == terminal), None)
+
+    # --- declarations ---
+
+    def declaration(self, node: Node) -> tree.Declaration:
+        """Any declaration."""
+        built: tree.Declaration = getattr(self, f"_{node.data}")(node)
+        return built
+
+    def _use(self, node: Node) -> tree.Use:
+        head = self._head(node)
+        head.pop("doc")
+        return tree.Use("/".join(str(token) for token in node.children[0].children if token != "/"), **head)
+
+    def _const_decl(self, node: Node) -> tree.ConstDecl:
+        head = self._head(node)
+        return tree.ConstDecl(self._name(node.children[0]), self.expr(node.children[2]), **head)
+
+    def _enum_decl(self, node: Node) -> tree.EnumDecl:
+        head = self._head(node)
+        name, *members = node.children
+        return tree.EnumDecl(self._name(name), tuple(self._name(member) for member in members), **head)
+
+    def _type_decl(self, node: Node) -> tree.TypeDecl:
+        head = self._head(node)
+        return tree.TypeDecl(self._name(node.children[0]), self.type(node.children[2]), **head)
+
+    def _record_decl(self, node: Node) -> tree.RecordDecl:
+        head = self._head(node)
+        name, *fields = node.children
+        return tree.RecordDecl(self._name(name), tuple(self._field(field) for field in fields), **head)
+
+    def _field(self, node: Node) -> tree.FieldDecl:
+        head = self._head(node)
+        return tree.FieldDecl(self._name(node.children[0]), self.type(node.children[1]), **head)
+
+    def _unit_decl(self, node: Node) -> tree.UnitDecl:
+        return tree.UnitDecl(self._name(node.children[0]), **self._head(node))
+
+    def _variable_decl(self, node: Node) -> tree.VariableDecl:
+        head = self._head(node)
+        kind, name, declared, *rest = node.children
+        admit, equal, safe = (self._kind(rest, word) for word in ("ADMIT", "EQUAL", "SAFE"))
+        words = {id(word) for word in (admit, equal, safe)}
+        exprs = [item for item in rest if id(item) not in words]
+        initial = self.expr(exprs.pop(0)) if equal is not None else None
+        shown = self.expr(exprs.pop(0)) if safe is not None else None
+        until = self.expr(exprs[0]) if exprs else None
+        return tree.VariableDecl(
+            str(kind), self._name(name), self.type(declared), initial, str(admit or ""), until, shown, **head
+        )
+
+    def _assume_decl(self, node: Node) -> tree.AssumeDecl:
+        head = self._head(node)
+        standing = self._kind(node.children, "STANDING")
+        return tree.AssumeDecl(
+            self._name(node.children[0]), self.expr(node.children[-1]), str(standing or ""), **head
+        )
+
+    def _invariant_decl(self, node: Node) -> tree.InvariantDecl:
+        head = self._head(node)
+        return tree.InvariantDecl(self._name(node.children[0]), self.expr(node.children[1]), **head)
+
+    def _property_decl(self, node: Node) -> tree.PropertyDecl:
+        head = self._head(node)
+        name, condition, *last = node.children
+        word = self._rule(last[0]) if last else ""  # the rule is called as the word is
+        other = self.expr(last[0].children[0]) if last else None
+        return tree.PropertyDecl(self._name(name), self.expr(condition), word, other, **head)
+
+    def _procedure_decl(self, node: Node) -> tree.ProcedureDecl:
+        return self._procedure(node, "procedure")
+
+    def _module_decl(self, node: Node) -> tree.ProcedureDecl:
+        return self._procedure(node, "module")
+
+    def _extern_decl(self, node: Node) -> tree.ProcedureDecl:
+        return self._procedure(node, "extern")
+
+    def _procedure(self, node: Node, kind: str) -> tree.ProcedureDecl:
+        head = self._head(node)
+        parts = node.children[1:]
+        params, body = self._find(parts, "parameters"), self._find(parts, "block")
+        reads, writes = self._find(parts, "reads"), self._find(parts, "writes")
+        python, c = self._find(parts, "python"), self._find(parts, "c_function")
+        return tree.ProcedureDecl(
+            kind,
+            self._name(node.children[0]),
+            tuple(
+                tree.Parameter(self._name(p.children[0]), self.type(p.children[1]), self._span(p))
+                for p in (params.children if params else ())
+            ),
+            tuple(self.expr(place) for place in (reads.children if reads else ())),
+            tuple(self.expr(place) for place in (writes.children if writes else ())),
+            str(python.children[0])[1:-1] if python else "",
+            str(c.children[0])[1:-1] if c else "",
+            self.block(body) if body else (),
+            **head,
+        )
+
+    def _owner_decl(self, node: Node) -> tree.OwnerDecl:
+        head = self._head(node)
+        return tree.OwnerDecl(
+            self._name(node.children[0]), self._names(self._find(node.children, "names")), **head
+        )
+
+    def _table_decl(self, node: Node) -> tree.TableDecl:
+        head = self._head(node)
+        assuming = self._names(self._find(node.children, "names"))
+        assert self.rows is not None
+        rows = [item for item in node.children if getattr(item, "type", None) == "ROW"]
+        conditions, actions, lines = self.rows.table(rows)
+        return tree.TableDecl(self._name(node.children[0]), assuming, conditions, actions, lines, **head)
+
+    def _level_decl(self, node: Node) -> tree.LevelDecl:
+        head = self._head(node)
+        parts = node.children[1:]
+        period, before = self._find(parts, "period"), self._find(parts, "preprocess")
+        one, many = self._find(parts, "one_table"), self._find(parts, "by_command")
+        after = self._find(parts, "postprocess")
+        return tree.LevelDecl(
+            self._name(node.children[0]),
+            self.expr(period.children[0]) if period else None,
+            self._names(before.children[0]) if before else (),
+            self._name(one.children[0]) if one else None,
+            self.expr(many.children[0]) if many else None,
+            tuple(
+                tree.Dispatch(self.expr(d.children[0]), self._name(d.children[1]), self._span(d))
+                for d in (many.children[1:] if many else ())
+            ),
+            self._names(after.children[0]) if after else (),
+            **head,
+        )
+
+    # --- types and units ---
+
+    def type(self, node: Node) -> tree.TypeExpr:
+        """Any type."""
+        span = self._span(node)
+        match node.data:
+            case "bool_type":
+                return tree.BoolType(span)
+            case "named_type":
+                return tree.NamedType(self._name(node.children[0]), span)
+            case "array_type":
+                return tree.ArrayType(self.expr(node.children[0]), self.type(node.children[1]), span)
+            case rule:
+                low, high, *unit = node.children
+                built = tree.IntType if rule == "int_type" else tree.RealType
+                most, own = self.expr(high), self._unit(unit)
+                if (
+                    own is None
+                    and isinstance(most, tree.IntLiteral | tree.RealLiteral)
+                    and most.unit is not None
+                ):
+                    # the parser reads `0 .. 9 [mm]` with the unit at the 9; it is the type's
+                    most, own = replace(most, unit=None), most.unit
+                return built(self.expr(low), most, own, span)
+
+    def _unit(self, items: list[Any]) -> tree.Unit | None:
+        node = self._find(items, "unit")
+        if node is None:
+            return None
+        product, *divisors = [item for item in node.children if isinstance(item, Node)]
+        factors = [self._factor(f, 1) for f in product.children if isinstance(f, Node)]
+        factors += [self._factor(f, -1) for f in divisors]
+        return tree.Unit(tuple(factor for factor in factors if factor is not None), self._span(node))
+
+    def _factor(self, node: Node, sign: int) -> tree.UnitFactor | None:
+        if node.data == "unit_one":
+            return None
+        names = [item for item in node.children if item.type in ("NAME", "INT")]
+        power = int(names[1]) if len(names) > 1 else 1
+        return tree.UnitFactor(self._name(names[0]), sign * power)
+
+    # --- expressions ---
+
+    _BINARY: ClassVar[dict[str, str]] = {"implies": "implies", "disjoin": "or", "conjoin": "and"}
+
+    def expr(self, node: Node) -> tree.Expr:
+        """Any expression."""
+        rule, span, parts = node.data, self._span(node), node.children
+        if rule in self._BINARY:
+            return tree.Binary(self._BINARY[rule], self.expr(parts[0]), self.expr(parts[1]), span)
+        if rule in ("compare", "arithmetic"):
+            return tree.Binary(str(parts[1]), self.expr(parts[0]), self.expr(parts[2]), span)
+        if rule in ("negate", "minus"):
+            return tree.Unary("not" if rule == "negate" else "-", self.expr(parts[-1]), span)
+        built: tree.Expr = getattr(self, f"_{rule}")(parts, span)
+        return built
+
+    def _was(self, parts: list[Any], span: Span) -> tree.Expr:
+        return tree.Was(self.expr(parts[0]), span)
+
+    def _in_set(self, parts: list[Any], span: Span) -> tree.Expr:
+        return tree.InSet(self.expr(parts[0]), tuple(self.expr(part) for part in parts[1:]), span)
+
+    def _in_range(self, parts: list[Any], span: Span) -> tree.Expr:
+        return tree.InRange(self.expr(parts[0]), self.expr(parts[1]), self.expr(parts[2]), span)
+
+    def _field_of(self, parts: list[Any], span: Span) -> tree.Expr:
+        return tree.FieldOf(self.expr(parts[0]), self._name(parts[-1]), span)
+
+    def _index_of(self, parts: list[Any], span: Span) -> tree.Expr:
+        return tree.IndexOf(self.expr(parts[0]), self.expr(parts[1]), span)
+
+    def _true(self, _: list[Any], span: Span) -> tree.Expr:
+        return tree.BoolLiteral(True, span)
+
+    def _false(self, _: list[Any], span: Span) -> tree.Expr:
+        return tree.BoolLiteral(False, span)
+
+    def _integer(self, parts: list[Any], span: Span) -> tree.Expr:
+        return tree.IntLiteral(str(parts[0]), self._unit(parts[1:]), span)
+
+    def _real_number(self, parts: list[Any], span: Span) -> tree.Expr:
+        return tree.RealLiteral(str(parts[0]), self._unit(parts[1:]), span)
+
+    def _reference(self, parts: list[Any], span: Span) -> tree.Expr:
+        return tree.Reference(self._name(parts[0]), span)
+
+    def _apply(self, parts: list[Any], span: Span) -> tree.Expr:
+        return tree.Apply(self._name(parts[0]), tuple(self.expr(part) for part in parts[1:]), span)
+
+    def _to_int(self, parts: list[Any], span: Span) -> tree.Expr:
+        return tree.Apply(tree.Name("int", span), (self.expr(parts[0]),), span)
+
+    def _to_real(self, parts: list[Any], span: Span) -> tree.Expr:
+        return tree.Apply(tree.Name("real", span), (self.expr(parts[0]),), span)
+
+    # --- cells ---
+
+    def cell(self, node: Node) -> Any:
+        """A condition, an expression or a list of actions, by the start rule that parsed it."""
+        part = node.children[0]
+        match node.data:
+            case "cell":
+                return self._condition(part)
+            case "actions":
+                return tuple(self.statement(item) for item in node.children if isinstance(item, Node))
+            case _:
+                return self.expr(part)
+
+    def _condition(self, node: Node) -> tree.Condition:
+        span, parts = self._span(node), node.children
+        match node.data:
+            case "equals":
+                return tree.Comparison("=", self.expr(parts[0]), span)
+            case "comparison":
+                return tree.Comparison(str(parts[0]), self.expr(parts[1]), span)
+            case "one_of":
+                return tree.OneOf(tuple(self.expr(part) for part in parts), span)
+            case _:
+                return tree.Between(self.expr(parts[0]), self.expr(parts[1]), span)
+
+    # --- statements ---
+
+    def block(self, node: Node) -> tuple[tree.Statement, ...]:
+        """The statements between braces."""
+        return tuple(self.statement(item) for item in node.children if isinstance(item, Node))
+
+    def statement(self, node: Node) -> tree.Statement:
+        """Any statement."""
+        built: tree.Statement = getattr(self, f"_{node.data}_statement")(node.children, self._above(node))
+        return built
+
+    def _assign_statement(self, parts: list[Any], above: dict[str, Any]) -> tree.Statement:
+        return tree.Assign(self.expr(parts[0]), self.expr(parts[1]), False, **above)
+
+    def _defer_statement(self, parts: list[Any], above: dict[str, Any]) -> tree.Statement:
+        return tree.Assign(self.expr(parts[0]), self.expr(parts[1]), True, **above)
+
+    def _local_statement(self, parts: list[Any], above: dict[str, Any]) -> tree.Statement:
+        value = self.expr(parts[2]) if len(parts) > 2 else None
+        return tree.Local(self._name(parts[0]), self.type(parts[1]), value, **above)
+
+    def _if_statement(self, parts: list[Any], above: dict[str, Any]) -> tree.Statement:
+        condition, then = self.expr(parts[0]), self.block(parts[1])
+        orelse: tuple[tree.Statement, ...] = ()
+        if len(parts) > 2:
+            other = parts[2]
+            orelse = self.block(other) if other.data == "block" else (self.statement(other),)
+        return tree.If(condition, then, orelse, **above)
+
+    def _case_statement(self, parts: list[Any], above: dict[str, Any]) -> tree.Statement:
+        arms = tuple(self._arm(part) for part in parts[1:] if part.data == "arm")
+        last = self._find(parts[1:], "block")
+        return tree.Case(self.expr(parts[0]), arms, None if last is None else self.block(last), **above)
+
+    def _arm(self, node: Node) -> tree.Arm:
+        above = self._above(node)
+        values = tuple(self.expr(part) for part in node.children[:-1])
+        return tree.Arm(values, self.block(node.children[-1]), **above)
+
+    def _for_statement(self, parts: list[Any], above: dict[str, Any]) -> tree.Statement:
+        name, low, high, body = parts
+        return tree.For(self._name(name), self.expr(low), self.expr(high), self.block(body), **above)
+
+    def _call_statement(self, parts: list[Any], above: dict[str, Any]) -> tree.Statement:
+        return tree.Call(self._name(parts[0]), tuple(self.expr(part) for part in parts[1:]), **above)

@@ -1,0 +1,55 @@
+"""Comments of one text, handed to the nodes they stand with.
+
+A comment goes with the node that begins next, or, behind a node on its line, with that node.
+Each is handed out once; what nobody takes is the file's.
+"""
+
+import re
+from bisect import bisect_right
+
+from rcsc.diagnostics.source import Source
+
+_TOKEN = re.compile(r'"[^"\\\n]*"|#[^\r\n]*')
+
+
+class Comments:
+    """The comments of `source`, in order, each until taken."""
+
+    def __init__(self, source: Source) -> None:
+        self._waiting: list[tuple[int, str]] = []
+        self._starts = [0] + [at + 1 for at, char in enumerate(source.text) if char == "\n"]
+        for match in _TOKEN.finditer(source.text):
+            if match.group().startswith("#"):
+                self._waiting.append((match.start(), match.group().rstrip()))
+
+    def _line(self, offset: int) -> int:
+        return bisect_right(self._starts, offset)
+
+    def take(self, start: int) -> tuple[str, ...]:
+        """What stands before offset `start`, or behind it on the same line."""
+        line = self._line(start)
+        count = 0
+        while count < len(self._waiting):
+            offset = self._waiting[count][0]
+            if offset > start and self._line(offset) != line:
+                break
+            count += 1
+        taken = self._waiting[:count]
+        del self._waiting[:count]
+        return tuple(text for _, text in taken)
+
+    def rest(self) -> tuple[str, ...]:
+        """What nobody took."""
+        return self.take(1 << 62)
+
+
+def words(comment: str) -> str:
+    """The text of a comment, without its marks and the space behind them."""
+    return comment.lstrip("#").removeprefix(" ").rstrip()
+
+
+def split(comments: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Plain comments and the texts of doc lines (`##`), of comments that stand before a declaration."""
+    plain = tuple(words(text) for text in comments if not text.startswith("##"))
+    doc = tuple(words(text) for text in comments if text.startswith("##"))
+    return plain, doc

@@ -1,0 +1,262 @@
+"""Tree to text in one layout; `parse(format_file(t)) == t`.
+
+Comments stand above what they belong to, doc lines directly above the declaration; tables are aligned.
+"""
+
+from collections.abc import Collection, Iterator
+
+from rcsc.diagnostics.diagnostic import Diagnostic
+from rcsc.diagnostics.source import Source
+from rcsc.lang.syntax import tree
+from rcsc.lang.syntax.rows import ACTION_WORDS
+from rcsc.lang.syntax.spell import spell_condition, spell_expr, spell_type
+
+_LONE = (tree.Use, tree.UnitDecl, tree.ConstDecl, tree.TypeDecl, tree.VariableDecl, tree.AssumeDecl, tree.InvariantDecl,
+         tree.PropertyDecl, tree.EnumDecl, tree.OwnerDecl)  # fmt: skip
+
+
+def format_text(source: Source) -> str | tuple[Diagnostic, ...]:
+    """The text in the one layout, or what is wrong with it."""
+    from rcsc.lang.syntax.parse import parse
+
+    parsed = parse(source)
+    return format_file(parsed) if isinstance(parsed, tree.File) else parsed
+
+
+def format_file(file: tree.File) -> str:
+    """The file's text."""
+    lines: list[str] = []
+    before: tree.Declaration | None = None
+    for one in file.declarations:
+        if before is not None and not _together(before, one):
+            lines.append("")
+        lines.extend(_declaration(one))
+        before = one
+    if file.trailing:
+        lines.extend([""] if lines else [])
+        lines.extend(_above(file.trailing, ()))
+    return "\n".join(lines) + "\n" if lines else ""
+
+
+def _together(one: tree.Declaration, two: tree.Declaration) -> bool:
+    """Whether two declarations stand without a line between them."""
+    if not isinstance(one, _LONE) or type(one) is not type(two) or two.comments:
+        return False
+    return (
+        not isinstance(one, tree.VariableDecl)
+        or not isinstance(two, tree.VariableDecl)
+        or one.kind == two.kind
+    )
+
+
+def _above(comments: tuple[str, ...], doc: tuple[str, ...], pad: str = "") -> Iterator[str]:
+    yield from ((f"{pad}# {text}").rstrip() for text in comments)
+    yield from ((f"{pad}## {text}").rstrip() for text in doc)
+
+
+def _declaration(one: tree.Declaration) -> Iterator[str]:
+    yield from _above(one.comments, () if isinstance(one, tree.Use) else one.doc)
+    match one:
+        case tree.Use(path):
+            yield f"use {path}"
+        case tree.UnitDecl(name):
+            yield f"unit {name.text}"
+        case tree.ConstDecl(name, value):
+            yield f"const {name.text} = {spell_expr(value)}"
+        case tree.EnumDecl(name, members):
+            yield f"enum {name.text} {{ {', '.join(member.text for member in members)} }}"
+        case tree.TypeDecl(name, kind):
+            yield f"type {name.text} = {spell_type(kind)}"
+        case tree.RecordDecl():
+            yield from _record(one)
+        case tree.VariableDecl():
+            yield _variable(one)
+        case tree.AssumeDecl() | tree.InvariantDecl() | tree.PropertyDecl():
+            yield _claim(one)
+        case tree.ProcedureDecl():
+            yield from _procedure(one)
+        case tree.OwnerDecl(name, members):
+            inside = f" {', '.join(m.text for m in members)} " if members else " "
+            yield f"owner {name.text} {{{inside}}}"
+        case tree.TableDecl():
+            yield from _table(one)
+        case tree.LevelDecl():
+            yield from _level(one)
+
+
+def _claim(one: tree.AssumeDecl | tree.InvariantDecl | tree.PropertyDecl) -> str:
+    said = spell_expr(one.condition)
+    match one:
+        case tree.AssumeDecl(name, _, state):
+            return f"assume {name.text}{f' {state}' if state else ''} : {said}"
+        case tree.InvariantDecl(name):
+            return f"invariant {name.text} : {said}"
+        case tree.PropertyDecl(name, _, word, other):
+            return f"property {name.text} : {said}" + (
+                f" {word} {spell_expr(other)}" if other is not None else ""
+            )
+
+
+def _record(one: tree.RecordDecl) -> Iterator[str]:
+    yield f"record {one.name.text} {{"
+    for part in one.fields:
+        yield from _above(part.comments, part.doc, "  ")
+        yield f"  {part.name.text} : {spell_type(part.type)}"
+    yield "}"
+
+
+def _variable(one: tree.VariableDecl) -> str:
+    text = f"{one.kind} {one.name.text} : {spell_type(one.type)}"
+    text += f" = {spell_expr(one.initial)}" if one.initial is not None else ""
+    text += f" safe {spell_expr(one.safe)}" if one.safe is not None else ""
+    text += f" {one.admit}" if one.admit else ""
+    return text + (
+        f" deferred until {spell_expr(one.deferred_until)}" if one.deferred_until is not None else ""
+    )
+
+
+def _procedure(one: tree.ProcedureDecl) -> Iterator[str]:
+    word = {"procedure": "procedure", "module": "module", "extern": "extern procedure"}[one.kind]
+    params = ", ".join(f"{p.name.text} : {spell_type(p.type)}" for p in one.params)
+    head = f"{word} {one.name.text}" + (f"({params})" if params else "")
+    head += f" reads {', '.join(spell_expr(r) for r in one.reads)}" if one.reads else ""
+    head += f" writes {', '.join(spell_expr(w) for w in one.writes)}" if one.writes else ""
+    if one.kind == "extern":
+        head += f' python "{one.python}"' if one.python else ""
+        yield head + (f' c "{one.c}"' if one.c else "")
+        return
+    yield f"{head} {{"
+    yield from _block(one.body, 1)
+    yield "}"
+
+
+def _block(body: tuple[tree.Statement, ...], depth: int) -> Iterator[str]:
+    for statement in body:
+        yield from _above(statement.comments, (), "  " * depth)
+        yield from _statement(statement, depth)
+
+
+def _statement(one: tree.Statement, depth: int) -> Iterator[str]:
+    pad = "  " * depth
+    match one:
+        case tree.Assign() | tree.Call():
+            yield pad + _simple(one)
+        case tree.Local(name, kind, value):
+            yield f"{pad}local {name.text} : {spell_type(kind)}" + (
+                f" := {spell_expr(value)}" if value else ""
+            )
+        case tree.If():
+            yield from _if(one, depth, pad)
+        case tree.Case(subject, arms, orelse):
+            yield f"{pad}case {spell_expr(subject)} {{"
+            for arm in arms:
+                yield from _above(arm.comments, (), f"{pad}  ")
+                yield f"{pad}  {', '.join(spell_expr(v) for v in arm.values)} {{"
+                yield from _block(arm.body, depth + 2)
+                yield f"{pad}  }}"
+            if orelse is not None:
+                yield f"{pad}  else {{"
+                yield from _block(orelse, depth + 2)
+                yield f"{pad}  }}"
+            yield f"{pad}}}"
+        case tree.For(name, low, high, body):
+            yield f"{pad}for {name.text} in {spell_expr(low, 6)} .. {spell_expr(high, 6)} {{"
+            yield from _block(body, depth + 1)
+            yield f"{pad}}}"
+
+
+def _if(one: tree.If, depth: int, lead: str) -> Iterator[str]:
+    """An `if`; one alone in an `else`, without comments, goes on as `else if`."""
+    pad = "  " * depth
+    yield f"{lead}if {spell_expr(one.condition)} {{"
+    yield from _block(one.then, depth + 1)
+    if not one.orelse:
+        yield f"{pad}}}"
+    elif len(one.orelse) == 1 and isinstance(one.orelse[0], tree.If) and not one.orelse[0].comments:
+        yield from _if(one.orelse[0], depth, f"{pad}}} else ")
+    else:
+        yield f"{pad}}} else {{"
+        yield from _block(one.orelse, depth + 1)
+        yield f"{pad}}}"
+
+
+def _simple(one: tree.Assign | tree.Call) -> str:
+    if isinstance(one, tree.Assign):
+        return f"{'next ' if one.deferred else ''}{spell_expr(one.place)} := {spell_expr(one.value)}"
+    return one.name.text + (f"({', '.join(spell_expr(arg) for arg in one.args)})" if one.args else "")
+
+
+# --- tables and levels ---------------------------------------------------------------
+
+
+def _table(one: tree.TableDecl) -> Iterator[str]:
+    assuming = f" assuming {', '.join(name.text for name in one.assuming)}" if one.assuming else ""
+    yield f"table {one.name.text}{assuming} {{"
+    left = [["line", *(_heading(h, {"when"}) for h in one.conditions)]]
+    right = [[_heading(h, ACTION_WORDS) for h in one.actions]]
+    for row in one.rows:
+        left.append([row.name, *_conditions(row, one)])
+        right.append([_action(cell) for cell in row.actions])
+    widths = _widths(left), _widths(right)
+    for number, (conditions, actions) in enumerate(zip(left, right, strict=True)):
+        if number:
+            yield from _above(one.rows[number - 1].comments, (), "  ")
+        yield "  " + _row(conditions, actions, widths)
+        if not number:
+            dashes = [["-" * width for width in side] for side in widths]
+            yield "  " + _row(dashes[0], dashes[1], widths).replace(" ", "-")
+    yield "}"
+
+
+def _heading(heading: tree.Heading, words: Collection[str]) -> str:
+    """A heading; a variable that is called like one of the words stands in parentheses."""
+    if heading.subject is None:
+        return heading.word
+    text = spell_expr(heading.subject)
+    return f"({text})" if text in words else text
+
+
+def _conditions(row: tree.Row, table: tree.TableDecl) -> list[str]:
+    if row.default:
+        return [
+            "DEFAULT unreachable" if row.unreachable else "DEFAULT",
+            *([""] * (len(table.conditions) - 1)),
+        ]
+    return [
+        "" if cell is None else spell_condition(cell, heading.subject is None)
+        for cell, heading in zip(row.conditions, table.conditions, strict=True)
+    ]
+
+
+def _action(cell: tuple[tree.Statement, ...] | tree.Comparison) -> str:
+    if isinstance(cell, tree.Comparison):
+        return spell_expr(cell.value)
+    return "; ".join(_simple(one) for one in cell if isinstance(one, tree.Assign | tree.Call))
+
+
+def _widths(rows: list[list[str]]) -> list[int]:
+    return [max(len(row[at]) for row in rows) for at in range(len(rows[0]))]
+
+
+def _row(conditions: list[str], actions: list[str], widths: tuple[list[int], list[int]]) -> str:
+    left = " | ".join(text.ljust(width) for text, width in zip(conditions, widths[0], strict=True))
+    right = " | ".join(text.ljust(width) for text, width in zip(actions, widths[1], strict=True))
+    return f"| {left} ||" + (f" {right} |" if actions else "")
+
+
+def _level(one: tree.LevelDecl) -> Iterator[str]:
+    yield f"level {one.name.text} {{"
+    if one.period is not None:
+        yield f"  period {spell_expr(one.period)}"
+    if one.preprocess:
+        yield f"  preprocess {', '.join(name.text for name in one.preprocess)}"
+    if one.table is not None:
+        yield f"  table {one.table.text}"
+    elif one.selector is not None:
+        yield f"  table by {spell_expr(one.selector)} {{"
+        for dispatch in one.dispatch:
+            yield f"    {spell_expr(dispatch.value)} : {dispatch.table.text}"
+        yield "  }"
+    if one.postprocess:
+        yield f"  postprocess {', '.join(name.text for name in one.postprocess)}"
+    yield "}"

@@ -1,0 +1,271 @@
+"""Text to tree; the only importer of Lark.
+
+In: a `Source`. Out: a `tree.File`, or every syntax error that was found. No text makes it raise.
+"""
+
+from dataclasses import dataclass, field
+from functools import cache, lru_cache
+from importlib.resources import files as package_files
+from pathlib import Path
+from typing import Any, cast
+
+import lark
+
+from rcsc.diagnostics.codes import Code
+from rcsc.diagnostics.diagnostic import Diagnostic, Label
+from rcsc.diagnostics.source import Source, Span
+from rcsc.lang.syntax import screen, tree
+from rcsc.lang.syntax.build import Build
+from rcsc.lang.syntax.comments import Comments, words
+from rcsc.lang.syntax.expected import expected
+from rcsc.lang.syntax.lalr import Leaf, Node, Tables
+from rcsc.lang.syntax.rows import ACTION_WORDS, NAME, Cell, Cells, cut, is_separator
+
+MOST_ERRORS = 20
+
+
+@cache
+def _parser() -> lark.Lark:
+    """The LALR parser of the grammar, which stands beside the package or inside its wheel."""
+    packaged = package_files("rcsc") / "_data" / "grammar" / "rcs.lark"
+    beside = Path(__file__).parents[3] / "grammar" / "rcs.lark"
+    text = (packaged if packaged.is_file() else beside).read_text(encoding="utf-8")
+    starts = ["file", "cell", "when", "heading", "actions"]
+    return lark.Lark(text, parser="lalr", start=starts)
+
+
+@cache
+def _tables() -> Tables:
+    return Tables(_parser())
+
+
+def _parsed(text: str, start: str) -> Node:
+    """The parse tree of a text by one of the start rules.
+
+    Raises:
+        lark.UnexpectedInput: It has none.
+    """
+    found = _tables().parse(text, start)
+    if found is None:
+        _parser().parse(text, start=start)  # says what is wrong
+        raise AssertionError("Lark takes a text that its tables refuse")
+    return found
+
+
+@lru_cache(maxsize=128)  # one run reads a file for each root that uses it, and a shell at each reload
+def parse(source: Source) -> tree.File | tuple[Diagnostic, ...]:
+    """The tree of `source`, or what is wrong with its text.
+
+    After an error parsing goes on with the next declaration, so that one run reports several.
+    """
+    refused = screen.refuse(source)
+    if refused:
+        return refused
+    pieces = _Pieces(source)
+    found = pieces.parse()
+    found += [screen.too_deep(source, *place) for node in pieces.nodes if (place := _deep_in(node))]
+    if found:
+        return tuple(found[:MOST_ERRORS])
+    comments = Comments(source)
+    build = Build(source.name, comments, _Rows(source, comments, found))
+    declarations = tuple(build.declaration(node) for node in pieces.nodes)
+    if found:
+        return tuple(found[:MOST_ERRORS])
+    return tree.File(declarations, tuple(words(text) for text in comments.rest()), source.name)
+
+
+def _deep_in(root: Node) -> tuple[int, int] | None:
+    """Start and end of the first node that lies too deep; what follows may then call itself at each depth."""
+    waiting = [(root, 0)]
+    while waiting:
+        node, depth = waiting.pop()
+        if depth > screen.DEEPEST:
+            return node.start_pos, node.start_pos + 1
+        deeper = depth + (node.data not in ("block", "arm"))
+        waiting.extend((child, deeper) for child in reversed(node.children) if isinstance(child, Node))
+    return None
+
+
+@dataclass(slots=True)
+class _Pieces:
+    """The declarations of one text, parsed together or, after an error, from keyword to keyword."""
+
+    source: Source
+    nodes: list[Node] = field(default_factory=list)
+
+    def parse(self) -> list[Diagnostic]:
+        """Fills `nodes`; what was wrong."""
+        text, offset = self.source.text, 0
+        found: list[Diagnostic] = []
+        while len(found) < MOST_ERRORS:
+            blank = screen.blank_before(text, offset)
+            try:
+                self.nodes.extend(_parsed(blank, "file").children)
+                return found
+            except lark.UnexpectedInput as error:
+                found.append(_syntax_error(error, self.source.name, 0, len(text), text))
+                offset = screen.next_declaration(text, found[-1].primary.span.start, offset)
+            if offset >= len(text):
+                break
+        return found
+
+
+def _syntax_error(error: lark.UnexpectedInput, file: str, start: int, end: int, text: str) -> Diagnostic:
+    """What stands there and what was expected; `start` is where the parsed text begins in the file."""
+    at = cast("int | None", error.pos_in_stream) or 0
+    position, word = start + at, ""
+    wanted: set[str] = set()
+    if isinstance(error, lark.UnexpectedToken):
+        wanted = set(cast("set[str] | None", error.accepts) or error.expected)
+        if error.token.type == "$END":
+            position = end
+        else:
+            position, word = start + (error.token.start_pos or 0), str(error.token)
+    elif isinstance(error, lark.UnexpectedCharacters):
+        wanted = set(error.allowed or ())
+        word = text[at] if at < len(text) else ""
+    if word and not word.isascii():
+        message = f"`{word}` is not allowed here: names are made of ASCII letters, digits and `_`"
+        return _error(Code.NON_ASCII_NAME, message, Span(file, position, position + len(word)))
+    seen = f"`{screen.shortened(word)}`" if word else "the end of the text"
+    return _error(
+        Code.SYNTAX, f"expected {expected(wanted)}, found {seen}", Span(file, position, position + len(word))
+    )
+
+
+def _error(code: Code, message: str, span: Span, *helps: str) -> Diagnostic:
+    return Diagnostic(code, message, Label(span), help=helps)
+
+
+def _says_default(cell: Cell) -> bool:
+    return cell.text.split() in (["DEFAULT"], ["DEFAULT", "unreachable"])
+
+
+@dataclass(slots=True)
+class _Rows:
+    """Parses the rows of a table; each distinct cell text once."""
+
+    source: Source
+    comments: Comments
+    found: list[Diagnostic]
+    memory: dict[tuple[str, str], Any] = field(default_factory=dict)
+
+    def table(
+        self, rows: list[Leaf]
+    ) -> tuple[tuple[tree.Heading, ...], tuple[tree.Heading, ...], tuple[tree.Row, ...]]:
+        """Condition headings, action headings and lines of a table."""
+        head = self._cut(rows[0])
+        if head is None:
+            return (), (), ()
+        if head.conditions[0].text != "line":
+            self._report(Code.SYNTAX, "the first heading of a table is `line`", head.conditions[0])
+        conditions = tuple(self._heading(cell, "when") for cell in head.conditions[1:])
+        actions = tuple(self._heading(cell, "") for cell in head.actions)
+        lines = [self._row(row, head, conditions, actions) for row in rows[1:] if not is_separator(str(row))]
+        return conditions, actions, tuple(line for line in lines if line is not None)
+
+    def _cut(self, row: Leaf) -> Cells | None:
+        start = row.start_pos
+        cells = cut(str(row), start)
+        if isinstance(cells, str):
+            self.found.append(
+                _error(Code.RAGGED_ROW, cells, Span(self.source.name, start, start + len(row.rstrip())))
+            )
+            return None
+        return cells
+
+    def _heading(self, cell: Cell, whole: str) -> tree.Heading:
+        span = Span(self.source.name, cell.start, cell.end)
+        if cell.text == whole or (not whole and cell.text in ACTION_WORDS):
+            return tree.Heading(None, cell.text, span)
+        parsed = self._parse("heading", cell)
+        subject = tree.Reference(tree.Name(cell.text)) if parsed is None else parsed
+        return tree.Heading(subject, "", span)
+
+    def _row(
+        self, row: Leaf, head: Cells, conditions: tuple[tree.Heading, ...], actions: tuple[tree.Heading, ...]
+    ) -> tree.Row | None:
+        cells = self._cut(row)
+        if cells is None or not self._even(row, cells, head):
+            return None
+        name = cells.conditions[0]
+        if not NAME.match(name.text):
+            self._report(Code.SYNTAX, "a line needs a name of letters, digits and `_`", name)
+        tests = cells.conditions[1:]
+        default = bool(tests) and _says_default(tests[0])
+        for cell in tests[1:]:
+            if default and cell.text:
+                self._report(Code.DEFAULT_WITH_CONDITIONS, "a DEFAULT line has no conditions", cell)
+            elif _says_default(cell):
+                what = "DEFAULT stands in the first column of conditions, or nowhere"
+                helps = "write `= DEFAULT` for a value of that name, `(DEFAULT)` under `when`"
+                self._report(Code.DEFAULT_ELSEWHERE, what, cell, helps)
+        parsed = tuple(
+            None if default else self._condition(cell, heading)
+            for cell, heading in zip(tests, conditions, strict=True)
+        )
+        everything = (*cells.conditions, *cells.actions)
+        start = row.start_pos
+        return tree.Row(
+            name.text,
+            parsed,
+            tuple(self._action(cell, heading) for cell, heading in zip(cells.actions, actions, strict=True)),
+            default,
+            default and tests[0].text.endswith("unreachable"),
+            Span(self.source.name, start, everything[-1].end),
+            tuple(bound for cell in everything for bound in (cell.start, cell.end)),
+            tuple(words(text) for text in self.comments.take(start)),
+        )
+
+    def _even(self, row: Leaf, cells: Cells, head: Cells) -> bool:
+        for side, got, want in (
+            ("conditions", cells.conditions, head.conditions),
+            ("actions", cells.actions, head.actions),
+        ):
+            if len(got) != len(want):
+                start = row.start_pos
+                self.found.append(
+                    _error(
+                        Code.RAGGED_ROW,
+                        f"this row has {len(got)} cells of {side}, the heading {len(want)}",
+                        Span(self.source.name, start, start + len(row.rstrip())),
+                        "a blank cell between `|` is don't care",
+                    )
+                )
+                return False
+        return True
+
+    def _condition(self, cell: Cell, heading: tree.Heading) -> tree.Condition | None:
+        if not cell.text or _says_default(cell):  # which is reported
+            return None
+        if heading.subject is None:
+            whole = self._parse("when", cell)
+            return None if whole is None else tree.Comparison("=", whole, Span("", 0, len(cell.text)))
+        return cast("tree.Condition | None", self._parse("cell", cell))
+
+    def _action(self, cell: Cell, heading: tree.Heading) -> tuple[tree.Statement, ...] | tree.Comparison:
+        if not cell.text:
+            return ()
+        if heading.subject is None:
+            return cast("tuple[tree.Statement, ...]", self._parse("actions", cell) or ())
+        value = self._parse("when", cell)
+        return () if value is None else tree.Comparison("=", value, Span("", 0, len(cell.text)))
+
+    def _parse(self, start: str, cell: Cell) -> Any:
+        """The parsed cell, from memory where the same text stood before; None after an error."""
+        if (start, cell.text) in self.memory:
+            return self.memory[start, cell.text]
+        try:
+            node = _parsed(cell.text, start)
+            if _deep_in(node):
+                self.found.append(screen.too_deep(self.source, cell.start, cell.end))
+                return None
+            parsed = Build("", Comments(Source("", "")), None).cell(node)
+        except lark.UnexpectedInput as error:
+            self.found.append(_syntax_error(error, self.source.name, cell.start, cell.end, cell.text))
+            return None
+        self.memory[start, cell.text] = parsed
+        return parsed
+
+    def _report(self, code: Code, message: str, cell: Cell, *helps: str) -> None:
+        self.found.append(_error(code, message, Span(self.source.name, cell.start, cell.end), *helps))

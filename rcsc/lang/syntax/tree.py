@@ -1,0 +1,626 @@
+"""What was written: the syntax tree, unresolved, with spans.
+
+Equality means "says the same": spans and layout do not count, comments do.
+"""
+
+from dataclasses import dataclass, field
+from typing import TypeAlias
+
+from rcsc.diagnostics.source import Span
+
+NOWHERE = Span("", 0, 0)
+
+
+def at() -> Span:
+    """A span field: where the node was written; not part of what it says."""
+    return field(default=NOWHERE, compare=False, repr=False)
+
+
+# --- names, units, expressions -------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Name:
+    """An identifier as written."""
+
+    text: str
+    span: Span = at()
+
+
+@dataclass(frozen=True, slots=True)
+class UnitFactor:
+    """One factor of a unit: `mm`, or `s` with power -1 in `[mm/s]`."""
+
+    name: Name
+    power: int = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Unit:
+    """`[mm/s]`; `[1/s]` has only factors with negative power."""
+
+    factors: tuple[UnitFactor, ...]
+    span: Span = at()
+
+
+@dataclass(frozen=True, slots=True)
+class BoolLiteral:
+    """`true` or `false`."""
+
+    value: bool
+    span: Span = at()
+
+
+@dataclass(frozen=True, slots=True)
+class IntLiteral:
+    """`40`, `0x28`, `1_000`, each with an optional unit. `text` is as written."""
+
+    text: str
+    unit: Unit | None = None
+    span: Span = at()
+
+
+@dataclass(frozen=True, slots=True)
+class RealLiteral:
+    """`1.5`, `2e-3`, each with an optional unit. `text` is as written."""
+
+    text: str
+    unit: Unit | None = None
+    span: Span = at()
+
+
+@dataclass(frozen=True, slots=True)
+class Reference:
+    """A name in an expression: variable, constant, enum member, local."""
+
+    name: Name
+    span: Span = at()
+
+
+@dataclass(frozen=True, slots=True)
+class FieldOf:
+    """`base.field`: a field of a record, or `enum_name.member`."""
+
+    base: "Expr"
+    name: Name
+    span: Span = at()
+
+
+@dataclass(frozen=True, slots=True)
+class IndexOf:
+    """`base[index]`."""
+
+    base: "Expr"
+    index: "Expr"
+    span: Span = at()
+
+
+@dataclass(frozen=True, slots=True)
+class Unary:
+    """`not a` or `-a`; `op` is `not` or `-`."""
+
+    op: str
+    operand: "Expr"
+    span: Span = at()
+
+
+@dataclass(frozen=True, slots=True)
+class Was:
+    """`was a`: the value behind the cycle before; in properties only."""
+
+    operand: "Expr"
+    span: Span = at()
+
+
+@dataclass(frozen=True, slots=True)
+class Binary:
+    """`op` is one of `implies or and = /= < <= > >= + - * / mod`."""
+
+    op: str
+    left: "Expr"
+    right: "Expr"
+    span: Span = at()
+
+
+@dataclass(frozen=True, slots=True)
+class InSet:
+    """`subject in {a, b}`."""
+
+    subject: "Expr"
+    members: "tuple[Expr, ...]"
+    span: Span = at()
+
+
+@dataclass(frozen=True, slots=True)
+class InRange:
+    """`subject in low .. high`, both ends included."""
+
+    subject: "Expr"
+    low: "Expr"
+    high: "Expr"
+    span: Span = at()
+
+
+@dataclass(frozen=True, slots=True)
+class Apply:
+    """`abs(x)`, `min(a, b)`, `max(a, b)`, `int(x)`, `real(x)`."""
+
+    function: Name
+    args: "tuple[Expr, ...]"
+    span: Span = at()
+
+
+Expr: TypeAlias = (
+    BoolLiteral
+    | IntLiteral
+    | RealLiteral
+    | Reference
+    | FieldOf
+    | IndexOf
+    | Unary
+    | Was
+    | Binary
+    | InSet
+    | InRange
+    | Apply
+)
+
+
+# --- types ---------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class BoolType:
+    """`bool`."""
+
+    span: Span = at()
+
+
+@dataclass(frozen=True, slots=True)
+class NamedType:
+    """An enum, record or type name."""
+
+    name: Name
+    span: Span = at()
+
+
+@dataclass(frozen=True, slots=True)
+class IntType:
+    """`int LOW .. HIGH [unit]`; bounds are constant expressions."""
+
+    low: Expr
+    high: Expr
+    unit: Unit | None = None
+    span: Span = at()
+
+
+@dataclass(frozen=True, slots=True)
+class RealType:
+    """`real LOW .. HIGH [unit]`: an IEEE double in a finite range."""
+
+    low: Expr
+    high: Expr
+    unit: Unit | None = None
+    span: Span = at()
+
+
+@dataclass(frozen=True, slots=True)
+class ArrayType:
+    """`array[LENGTH] of ELEMENT`."""
+
+    length: Expr
+    element: "TypeExpr"
+    span: Span = at()
+
+
+TypeExpr: TypeAlias = BoolType | NamedType | IntType | RealType | ArrayType
+
+
+# --- statements ----------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Assign:
+    """`place := value`, or `next place := value` for a deferred variable."""
+
+    place: Expr  # Reference, FieldOf or IndexOf
+    value: Expr
+    deferred: bool = False
+    span: Span = at()
+    comments: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Local:
+    """`local name : type` or `local name : type := value`."""
+
+    name: Name
+    type: TypeExpr
+    value: Expr | None = None
+    span: Span = at()
+    comments: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class If:
+    """`if c { ... } else if d { ... } else { ... }`; `else if` nests in `orelse`."""
+
+    condition: Expr
+    then: "tuple[Statement, ...]"
+    orelse: "tuple[Statement, ...]" = ()
+    span: Span = at()
+    comments: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Arm:
+    """`a, b { ... }` in a case."""
+
+    values: tuple[Expr, ...]
+    body: "tuple[Statement, ...]"
+    span: Span = at()
+    comments: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """`case subject { a, b { ... } else { ... } }`."""
+
+    subject: Expr
+    arms: tuple[Arm, ...]
+    orelse: "tuple[Statement, ...] | None" = None
+    span: Span = at()
+    comments: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class For:
+    """`for i in LOW .. HIGH { ... }`; the bounds are constants."""
+
+    name: Name
+    low: Expr
+    high: Expr
+    body: "tuple[Statement, ...]"
+    span: Span = at()
+    comments: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Call:
+    """`name` or `name(a, b)` as a statement or in an action cell."""
+
+    name: Name
+    args: tuple[Expr, ...] = ()
+    span: Span = at()
+    comments: tuple[str, ...] = ()
+
+
+Statement: TypeAlias = Assign | Local | If | Case | For | Call
+
+
+# --- table rows ----------------------------------------------------------------------
+# Rows are split into cells by `|`; each distinct cell text is parsed once, so nodes inside
+# a cell carry spans relative to the start of the cell, with file "". `absolute` mends that.
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """A condition cell `op expr`; a bare `expr` is `= expr`."""
+
+    op: str  # = /= < <= > >=
+    value: Expr
+    span: Span = at()
+
+
+@dataclass(frozen=True, slots=True)
+class OneOf:
+    """A condition cell `in {a, b}`."""
+
+    members: tuple[Expr, ...]
+    span: Span = at()
+
+
+@dataclass(frozen=True, slots=True)
+class Between:
+    """A condition cell `low .. high`, both ends included."""
+
+    low: Expr
+    high: Expr
+    span: Span = at()
+
+
+Condition: TypeAlias = Comparison | OneOf | Between
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """A line of a table.
+
+    Attributes:
+        name: The line's name, the first cell.
+        conditions: One entry a condition column; None is a blank cell. Under the heading
+            `when` the cell is a `Comparison` with op `=` whose value is the whole expression.
+        actions: One entry an action column: its statements (`Call`, `Assign`), in order;
+            under the heading of a variable, one `Comparison` with op `=` (the value) or
+            nothing.
+        bounds: Offsets in the file: start and end of the trimmed text of every cell in
+            order (name, conditions, actions), flattened: 2 * (1 + conditions + actions).
+        default: Whether this is the DEFAULT line; then all conditions are None.
+        unreachable: `DEFAULT unreachable`.
+    """
+
+    name: str
+    conditions: tuple[Condition | None, ...]
+    actions: tuple[tuple[Statement, ...] | Comparison, ...]
+    default: bool = False
+    unreachable: bool = False
+    span: Span = at()
+    bounds: tuple[int, ...] = field(default=(), compare=False, repr=False)
+    comments: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Heading:
+    """A column's heading: `when`, an expression over variables, or an action heading.
+
+    For conditions `subject` is None exactly for `when`. For actions `subject` is None for
+    `procedures`, `command_out`, `status_out` (then `word` says which), else the place
+    assigned.
+    """
+
+    subject: Expr | None
+    word: str = ""
+    span: Span = at()
+
+
+# --- declarations --------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Use:
+    """`use types` or `use task/vars`: makes the names of that file visible."""
+
+    path: str
+    span: Span = at()
+    comments: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class UnitDecl:
+    """`unit lb`."""
+
+    name: Name
+    span: Span = at()
+    comments: tuple[str, ...] = ()
+    doc: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class ConstDecl:
+    """`const max_width = 110 [mm]`."""
+
+    name: Name
+    value: Expr
+    span: Span = at()
+    comments: tuple[str, ...] = ()
+    doc: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class EnumDecl:
+    """`enum status { executing, done, failed }`."""
+
+    name: Name
+    members: tuple[Name, ...]
+    span: Span = at()
+    comments: tuple[str, ...] = ()
+    doc: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class TypeDecl:
+    """`type width = int 0 .. 110 [mm]`."""
+
+    name: Name
+    type: TypeExpr
+    span: Span = at()
+    comments: tuple[str, ...] = ()
+    doc: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class FieldDecl:
+    """`name : type` in a record."""
+
+    name: Name
+    type: TypeExpr
+    span: Span = at()
+    comments: tuple[str, ...] = ()
+    doc: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class RecordDecl:
+    """`record emove_status { echo : number ... }`."""
+
+    name: Name
+    fields: tuple[FieldDecl, ...]
+    span: Span = at()
+    comments: tuple[str, ...] = ()
+    doc: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class VariableDecl:
+    """`input|state|output name : type = initial [safe value] [clamp|reject] [deferred until expr]`.
+
+    `admit` is "", "clamp" or "reject" and only for inputs, `safe` only for outputs. A missing initial value means
+    the least value of the type (first member, low bound, false).
+    """
+
+    kind: str  # input, state, output
+    name: Name
+    type: TypeExpr
+    initial: Expr | None = None
+    admit: str = ""
+    deferred_until: Expr | None = None
+    safe: Expr | None = None
+    span: Span = at()
+    comments: tuple[str, ...] = ()
+    doc: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class AssumeDecl:
+    """`assume name [assumed|monitored|proved] : expr`; "" is `assumed`."""
+
+    name: Name
+    condition: Expr
+    state: str = ""
+    span: Span = at()
+    comments: tuple[str, ...] = ()
+    doc: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class InvariantDecl:
+    """`invariant name : expr`."""
+
+    name: Name
+    condition: Expr
+    span: Span = at()
+    comments: tuple[str, ...] = ()
+    doc: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class PropertyDecl:
+    """`property name : expr [then|until expr]`.
+
+    `word` is "", "then" or "until"; `other` stands behind it.
+    """
+
+    name: Name
+    condition: Expr
+    word: str = ""
+    other: Expr | None = None
+    span: Span = at()
+    comments: tuple[str, ...] = ()
+    doc: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """`name : type` of a procedure."""
+
+    name: Name
+    type: TypeExpr
+    span: Span = at()
+
+
+@dataclass(frozen=True, slots=True)
+class ProcedureDecl:
+    """`procedure name(params) { ... }`, or `module name reads a writes b { ... }`.
+
+    A module declares what it reads and writes, and the declaration is checked. An
+    `extern procedure` has no body but names its Python (`"pkg.module:function"`) and C
+    (`"function"`) implementations.
+    """
+
+    kind: str  # procedure, module, extern
+    name: Name
+    params: tuple[Parameter, ...] = ()
+    reads: tuple[Expr, ...] = ()
+    writes: tuple[Expr, ...] = ()
+    python: str = ""
+    c: str = ""
+    body: tuple[Statement, ...] = ()
+    span: Span = at()
+    comments: tuple[str, ...] = ()
+    doc: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class OwnerDecl:
+    """`owner name { module_a, module_b, other_owner }`: run in the order listed."""
+
+    name: Name
+    members: tuple[Name, ...]
+    span: Span = at()
+    comments: tuple[str, ...] = ()
+    doc: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class TableDecl:
+    """`table name assuming a, b { rows }`."""
+
+    name: Name
+    assuming: tuple[Name, ...]
+    conditions: tuple[Heading, ...]
+    actions: tuple[Heading, ...]
+    rows: tuple[Row, ...]
+    span: Span = at()
+    comments: tuple[str, ...] = ()
+    doc: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Dispatch:
+    """`member : table` in a level's `table by variable { ... }`."""
+
+    value: Expr
+    table: Name
+    span: Span = at()
+
+
+@dataclass(frozen=True, slots=True)
+class LevelDecl:
+    """A control level: preprocess, state table, postprocess; one cycle a period.
+
+    `level name { period 40 [ms] preprocess a, b table t postprocess c }`, or with one
+    table a command: `table by input_command { acquire : acquire_table ... }`.
+    """
+
+    name: Name
+    period: Expr | None
+    preprocess: tuple[Name, ...]
+    table: Name | None
+    selector: Expr | None
+    dispatch: tuple[Dispatch, ...]
+    postprocess: tuple[Name, ...]
+    span: Span = at()
+    comments: tuple[str, ...] = ()
+    doc: tuple[str, ...] = ()
+
+
+Declaration: TypeAlias = (
+    Use
+    | UnitDecl
+    | ConstDecl
+    | EnumDecl
+    | TypeDecl
+    | RecordDecl
+    | VariableDecl
+    | AssumeDecl
+    | InvariantDecl
+    | PropertyDecl
+    | ProcedureDecl
+    | OwnerDecl
+    | TableDecl
+    | LevelDecl
+)
+
+
+@dataclass(frozen=True, slots=True)
+class File:
+    """One source file: its declarations in order."""
+
+    declarations: tuple[Declaration, ...]
+    trailing: tuple[str, ...] = ()  # comments after the last declaration
+    name: str = field(default="", compare=False)
+
+
+def absolute(relative: Span, file: str, cell_start: int) -> Span:
+    """The span in the file of a node inside a table cell that starts at `cell_start`."""
+    return Span(file, cell_start + relative.start, cell_start + relative.end)

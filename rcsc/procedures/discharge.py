@@ -1,0 +1,227 @@
+"""Obligations put to Z3: one question where all hold, else halves until those that fail are found.
+
+In: obligations and what may be assumed. Out: those that can fail, each with its least witness, and those left
+open. Domains of the variables are asserted here. Z3 is loaded only when something is asked.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from enum import Enum, auto
+from itertools import combinations
+from typing import TypeVar
+
+from rcsc.lang.model import Kind, Real, Value, Variable, VariableName, value_of_key
+from rcsc.solvers import smt
+from rcsc.solvers.options import Options
+from rcsc.solvers.smt import Answer, Solver, Term
+from rcsc.symbolic import trial, values
+from rcsc.symbolic.encode import Frame, least_witness
+from rcsc.symbolic.evaluation import Obligation
+from rcsc.symbolic.values import Node
+
+MOST_CHOICES = 64
+"""Choices of assumptions that are tried for the fewest; past them, one that has none to spare is taken."""
+Candidate = TypeVar("Candidate")
+
+MOST_UNKNOWN = 2
+"""After so many questions without an answer, the rest of a run is not asked."""
+
+
+@dataclass(slots=True)
+class Tally:
+    """How obligations were settled, for the report and the tests."""
+
+    by_intervals: int = 0
+    by_solver: int = 0
+    queries: int = 0
+
+
+class Outcome(Enum):
+    """What became of an obligation that is not shown."""
+
+    FAILS = auto()
+    OPEN = auto()
+
+
+@dataclass(frozen=True, slots=True)
+class Failure:
+    """An obligation that is not shown.
+
+    Attributes:
+        witness: By variable, in order; empty where it is open.
+    """
+
+    obligation: Obligation
+    outcome: Outcome
+    witness: tuple[tuple[Variable, Value], ...] = ()
+
+
+@dataclass(slots=True)
+class Asker:
+    """Asks for one program.
+
+    Attributes:
+        order: Position of each leaf; other variables come behind.
+    """
+
+    options: Options
+    order: dict[str, int]
+    tally: Tally = field(default_factory=Tally)
+
+    def unshown(
+        self,
+        obligations: Sequence[Obligation],
+        base: Callable[[], Sequence[Node]],
+        wanted: Callable[[Obligation], bool],
+    ) -> list[Failure]:
+        """The obligations that do not hold wherever `base` does; those that are `wanted` with a witness."""
+        if not obligations:
+            return []
+        self.tally.by_solver += len(obligations)
+        try:
+            return _Question(self, obligations, base(), wanted).answer()
+        except smt.troubles():
+            return [Failure(one, Outcome.OPEN) for one in obligations]
+
+    def all_hold(self, obligations: Sequence[Obligation], base: Callable[[], Sequence[Node]]) -> bool:
+        """Whether all of them are shown wherever `base` holds, by one question; left open is not shown."""
+        if not obligations:
+            return True
+        try:
+            return _Question(self, obligations, base(), lambda _: False).all_hold()
+        except smt.troubles():
+            return False
+
+
+def fewest(
+    candidates: Sequence[Candidate], suffice: Callable[[Sequence[Candidate]], bool]
+) -> tuple[Candidate, ...]:
+    """The fewest candidates that suffice, the first such choice in their order; more never suffice less.
+
+    Where there are many candidates: a choice of which none can be spared, later ones spared first.
+    """
+    tried = 0
+    for count in range(len(candidates)):
+        for chosen in combinations(candidates, count):
+            if tried == MOST_CHOICES:
+                return _irredundant(candidates, suffice)
+            tried += 1
+            if suffice(chosen):
+                return chosen
+    return tuple(candidates)
+
+
+def _irredundant(
+    candidates: Sequence[Candidate], suffice: Callable[[Sequence[Candidate]], bool]
+) -> tuple[Candidate, ...]:
+    kept = tuple(candidates)
+    for at in reversed(range(len(candidates))):
+        fewer = (*kept[:at], *kept[at + 1 :])
+        if suffice(fewer):
+            kept = fewer
+    return kept
+
+
+class _Question:
+    """One run's obligations."""
+
+    def __init__(
+        self,
+        asker: Asker,
+        owed: Sequence[Obligation],
+        base: Sequence[Node],
+        wanted: Callable[[Obligation], bool],
+    ) -> None:
+        self.asker, self.owed, self.wanted = asker, owed, wanted
+        self.bad = [values.both(one.path, values.negation(one.good)) for one in owed]
+        found = values.variables([*base, *self.bad])
+        self.variables = sorted(found.values(), key=lambda node: self._place(node.name))
+        self.reals = any(isinstance(node.kind, Real) for node in self.variables)
+        self.known = list(base)
+        self.base = [*values.domain(self.variables), *map(values.term_of, base)]
+        self.failures: list[Failure] = []
+        self.unknown = 0
+        self.solver: Solver | None = None
+
+    def _place(self, name: str) -> tuple[int, str]:
+        return self.asker.order.get(name, len(self.asker.order)), name
+
+    def answer(self) -> list[Failure]:
+        """What is not shown, in the order owed."""
+        self._search(0, len(self.owed))
+        return self.failures
+
+    def all_hold(self) -> bool:
+        """Whether none of the obligations can fail."""
+        bad = values.any_of(self.bad)
+        if self.reals and trial.found([*self.known, bad], self.variables) is not None:
+            return False
+        return self._ask(values.term_of(bad)) is Answer.UNSATISFIABLE
+
+    def _search(self, first: int, last: int) -> None:
+        """Looks among the obligations `first .. last - 1`; those before hold, or were found."""
+        if self.unknown > MOST_UNKNOWN:
+            self.failures += [Failure(one, Outcome.OPEN) for one in self.owed[first:last]]
+            return
+        bad = values.any_of(self.bad[first:last])
+        tried = trial.found([*self.known, bad], self.variables) if self.reals else None
+        answer = self._ask(values.term_of(bad)) if tried is None else Answer.SATISFIABLE
+        if answer is Answer.UNSATISFIABLE:
+            return
+        if last - first > 1:
+            middle = (first + last) // 2
+            self._search(first, middle)
+            self._search(middle, last)
+            return
+        self._found(first, answer, tried)
+        self.known.append(values.negation(self.bad[first]))
+        self.base.append(values.term_of(self.known[-1]))
+        if self.solver is not None:
+            self.solver.add(self.base[-1])
+
+    def _ask(self, bad: Term) -> Answer:
+        """Whether it can be; doubles are quicker in a solver of their own."""
+        if self.reals or self.solver is None:
+            solver = self._fresh()
+            self.solver = None if self.reals else solver
+            if self.reals:
+                solver.add(bad)
+                answer = solver.check()
+                self.asker.tally.queries += 1
+                return answer
+        assert self.solver is not None
+        self.solver.push()
+        self.solver.add(bad)
+        answer = self.solver.check()
+        self.solver.pop()
+        self.asker.tally.queries += 1
+        return answer
+
+    def _fresh(self) -> Solver:
+        solver = Solver(self.asker.options.limits)
+        solver.add(*self.base)
+        return solver
+
+    def _found(self, at: int, answer: Answer, tried: trial.Point | None) -> None:
+        if answer is Answer.UNKNOWN:
+            self.unknown += 1
+            self.failures.append(Failure(self.owed[at], Outcome.OPEN))
+            return
+        witness = self._witness(self.bad[at], tried) if self.wanted(self.owed[at]) else ()
+        self.failures.append(Failure(self.owed[at], Outcome.FAILS, witness))
+
+    def _witness(self, bad: Node, tried: trial.Point | None) -> tuple[tuple[Variable, Value], ...]:
+        shown = [
+            Variable(VariableName(node.name), Kind.STATE, node.kind, value_of_key(node.kind, 0))
+            for node in self.variables
+        ]
+        found = self._least(bad, shown) if tried is None else tried
+        return () if found is None else tuple((one, found[one.name]) for one in shown)
+
+    def _least(self, bad: Node, shown: list[Variable]) -> dict[str, Value] | None:
+        solver = self._fresh()
+        solver.add(values.term_of(bad))
+        frame = Frame({node.name: values.term_of(node) for node in self.variables})
+        found = least_witness(solver, shown, frame)
+        self.asker.tally.queries += solver.queries
+        return found

@@ -1,0 +1,98 @@
+"""Invariants and assumptions as a whole: true at first, and satisfiable together; and that properties are proved elsewhere.
+
+In: a program. Out: diagnostics. That every run keeps each invariant is shown with the run (`obligations`).
+"""
+
+from collections.abc import Iterator
+
+from rcsc.diagnostics.codes import Code
+from rcsc.diagnostics.diagnostic import Diagnostic, Label, Severity
+from rcsc.lang.interpret import holds, initial
+from rcsc.lang.leaves import read_by
+from rcsc.lang.model import (
+    Assumption,
+    Expr,
+    Invariant,
+    Kind,
+    Program,
+    Property,
+    Snapshot,
+    Table,
+    Value,
+    key_bounds,
+    value_of_key,
+)
+from rcsc.solvers.options import Options
+from rcsc.solvers.smt import Answer
+
+
+def at_first(program: Program) -> Iterator[Diagnostic]:
+    """Invariants, and assumptions about states and outputs alone, that the initial values break."""
+    start = initial(program)
+    for invariant in program.invariants:
+        if _holds(invariant.condition, start) is False:
+            message = f"the initial values do not satisfy invariant `{invariant.name}`"
+            yield Diagnostic(Code.INVARIANT_INITIAL, message, Label(invariant.span))
+    inputs = {variable.name for variable in program.variables if variable.kind is Kind.INPUT}
+    for assumption in program.assumptions:
+        if inputs.isdisjoint(read_by(assumption.condition)) and _holds(assumption.condition, start) is False:
+            message = f"assumption `{assumption.name}` does not hold of the initial values"
+            helps = ("give a variable another initial value, or weaken the assumption",)
+            label = Label(assumption.span)
+            yield Diagnostic(Code.ASSUMPTION_INITIAL, message, label, help=helps, severity=Severity.WARNING)
+
+
+def properties_elsewhere(program: Program) -> Iterator[Diagnostic]:
+    """That properties are not proved of a program alone; one note for each file that declares some."""
+    files: dict[str, list[Property]] = {}
+    for one in program.properties:
+        files.setdefault(one.span.file, []).append(one)
+    for declared in files.values():
+        names = ", ".join(f"`{one.name}`" for one in declared)
+        what, is_ = ("property", "is") if len(declared) == 1 else ("properties", "are")
+        message = f"{what} {names} {is_} not proved here"
+        helps = ("`rcsc prove` proves what a level does in its environment, cycle after cycle",)
+        label = Label(declared[0].span)
+        yield Diagnostic(Code.PROPERTY_ELSEWHERE, message, label, help=helps, severity=Severity.NOTE)
+
+
+def _holds(condition: Expr, snapshot: Snapshot) -> bool | None:
+    """None where it is not defined, which is a finding of its own."""
+    try:
+        return holds(condition, snapshot)
+    except (ArithmeticError, IndexError, ValueError):
+        return None
+
+
+def assumptions_satisfiable(program: Program, table: Table, options: Options) -> Snapshot | Answer:
+    """Values that satisfy all assumptions of the table and all invariants, or that there are none, or that Z3 does not know.
+
+    A few are tried by hand before Z3 is asked.
+    """
+    conditions = [one.condition for one in assumed_of(program, table)]
+    for trial in _trials(program):
+        if all(_holds(one, trial) for one in conditions):
+            return trial
+    from rcsc.solvers.smt import Solver
+    from rcsc.symbolic.encode import declared, encode
+
+    frame, domain = declared(program.variables)
+    solver = Solver(options.limits)
+    solver.add(*domain, *(encode(condition, frame) for condition in conditions))
+    answer = solver.check()
+    if answer is not Answer.SATISFIABLE:
+        return answer
+    return {one.name: solver.value(frame.leaves[one.name], one.type) for one in program.variables}
+
+
+def assumed_of(program: Program, table: Table) -> tuple[Assumption | Invariant, ...]:
+    """The assumptions of the table, and every invariant of the program."""
+    named = (one for one in program.assumptions if one.name in table.assumptions)
+    return (*named, *program.invariants)
+
+
+def _trials(program: Program) -> Iterator[dict[str, Value]]:
+    """A few inputs that are quickly tried."""
+    yield initial(program)
+    for end in (0, 1):
+        yield {one.name: value_of_key(one.type, key_bounds(one.type)[end]) for one in program.variables}

@@ -1,1 +1,0 @@
-"""The proofs: tables by masks, counting and region trees; procedures and all the rest by Z3."""

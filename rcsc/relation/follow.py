@@ -1,0 +1,204 @@
+"""Which line of a table can match in the cycle after which.
+
+In: a table of a program. Out: pairs of lines, each answered by Z3 under the table's assumptions and the program's
+invariants; a question without an answer raises `UnansweredError`.
+
+The whole cycle is followed: the first line's actions, postprocess, any new inputs, deferred values, preprocess. At first
+nothing is under way: deferred values are the present ones (see `steps`). Arithmetic on doubles is taken to give any value
+within its bounds: there it may say "can" too often, never too seldom. Of the levels around nothing is known.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import count
+
+from rcsc.lang.meaning import relying
+from rcsc.lang.model import (
+    Action,
+    Call,
+    Int,
+    Kind,
+    Level,
+    Op,
+    Program,
+    Real,
+    Table,
+    TableByCommand,
+    Value,
+    pending,
+)
+from rcsc.relation.steps import UnansweredError, answered, assumed
+from rcsc.solvers import smt
+from rcsc.solvers.options import Options
+from rcsc.solvers.smt import Solver, Term
+from rcsc.symbolic import values
+from rcsc.symbolic.encode import within
+from rcsc.symbolic.evaluation import TooLongError
+from rcsc.symbolic.execution import Run
+from rcsc.symbolic.values import Node
+
+_ARITHMETIC = frozenset(
+    {Op.ADD, Op.SUB, Op.MUL, Op.DIV, Op.NEG, Op.ABS, Op.MIN, Op.MAX, Op.TO_INT, Op.TO_REAL}
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Follow:
+    """A line that can match in the cycle after another.
+
+    Attributes:
+        line: Position of the first; DEFAULT is behind the last.
+        then: Position of the second.
+        needed: Columns of the second whose tests the first and the others do not imply.
+    """
+
+    line: int
+    then: int
+    needed: tuple[int, ...]
+
+
+def following(program: Program, table: Table, options: Options) -> list[Follow]:
+    """Every pair of lines of which the second can match in the cycle after the first.
+
+    Raises:
+        UnansweredError: Z3 gave no answer, or a cycle is too long to follow.
+    """
+    whole = relying(program)
+    own = next(one for one in whole.tables if one.name == table.name)
+    try:
+        return list(_Cycles(whole, own, _level_of(whole, own), options).pairs())
+    except (TooLongError, RecursionError) as error:
+        raise UnansweredError from error
+    except smt.troubles() as error:
+        raise UnansweredError from error
+
+
+def _level_of(program: Program, table: Table) -> tuple[Level, Value | None] | None:
+    """The level that runs the table, and the value of its selector; None where none does."""
+    for level in program.levels:
+        if not isinstance(level.tables, TableByCommand):
+            if level.tables.table == table.name:
+                return level, None
+            continue
+        for value, name in level.tables.tables:
+            if name == table.name:
+                return level, value
+    return None
+
+
+def loosened(nodes: Sequence[Node], numbers: Iterator[int]) -> Iterator[Term]:
+    """Makes every result of arithmetic on doubles any value within its bounds, and yields the bounds.
+
+    Args:
+        nodes: None of which is a term yet.
+        numbers: Others for each result: two results are not the same.
+    """
+    for one in values.parts_first(*nodes):
+        if one.op in _ARITHMETIC and any(isinstance(part.kind, Real) for part in (one, *one.args)):
+            if one.term is None:
+                one.term = smt.variable(f"double!{next(numbers)}", one.kind)
+            if one.ordered:
+                ends = (
+                    Int(int(one.low), int(one.high)) if isinstance(one.kind, Int) else Real(one.low, one.high)
+                )
+                yield within(one.term, ends)
+
+
+class _Cycles:
+    """Two cycles of the level one after the other, from any state."""
+
+    def __init__(
+        self, program: Program, table: Table, level: tuple[Level, Value | None] | None, options: Options
+    ) -> None:
+        self.program, self.table, self.level = program, table, level
+        self.kinds = {str(v.name): v.type for v in program.variables}
+        self.procedures = {str(p.name): p for p in program.procedures}
+        self.start: dict[str, Node] = {}
+        self.options = options
+        self.cycle = 0
+        self.loose = count(1)
+
+    def pairs(self) -> Iterator[Follow]:
+        """Every pair that is possible."""
+        first = self._run()
+        self._before_table(first)
+        for one in self.program.variables:
+            if one.deferred_until is not None:
+                first.state.leaves[pending(one.name)] = first.leaf(one.name)
+        facts = self._facts(first)
+        lines = self._lines(first)
+        for at, actions in enumerate(self._actions()):
+            run = self._run()
+            run.state = first.state.copy()
+            run.execute(action.statement for action in actions)
+            self._procedures(run, () if self.level is None else self.level[0].postprocess)
+            self._before_table(run)
+            known = [*facts, lines[at], *self._facts(run)]
+            nexts = self._lines(run)
+            solver = Solver(self.options.limits)
+            solver.add(
+                *values.domain(values.variables([*known, *nexts]).values()),
+                *loosened(known + nexts, self.loose),
+            )
+            solver.add(*map(values.term_of, known))
+            for to, node in enumerate(nexts):
+                if answered(solver, values.term_of(node)):
+                    yield Follow(at, to, self._needed(run, solver, to))
+
+    def _needed(self, run: Run, solver: Solver, line: int) -> tuple[int, ...]:
+        if line == len(self.table.lines):
+            return ()
+        tests = {
+            at: run.evaluate(t.condition)
+            for at, t in enumerate(self.table.lines[line].tests)
+            if t is not None
+        }
+        terms = {at: values.term_of(node) for at, node in tests.items()}
+        for at in list(terms):
+            others = [term for column, term in terms.items() if column != at]
+            if not answered(solver, *others, smt.negation(terms[at])):
+                del terms[at]
+        return tuple(terms)
+
+    def _run(self) -> Run:
+        return Run(self.procedures, self.kinds, self.start)
+
+    def _actions(self) -> list[tuple[Action, ...]]:
+        default = [] if self.table.default is None else [self.table.default.actions]
+        return [*(line.actions for line in self.table.lines), *default]
+
+    def _before_table(self, run: Run) -> None:
+        """Any inputs, the deferred values that are due, and the preprocess."""
+        self.cycle += 1
+        for one in self.program.variables:
+            if one.kind is Kind.INPUT:
+                run.state.leaves[one.name] = values.variable(f"{one.name}'{self.cycle}", one.type)
+        deferred = [v for v in self.program.variables if v.deferred_until is not None]
+        due = [run.evaluate(v.deferred_until) for v in deferred if v.deferred_until is not None]
+        later = [run.leaf(pending(v.name)) for v in deferred]
+        for variable, when, value in zip(deferred, due, later, strict=True):
+            run.write(variable.name, value, when)
+        self._procedures(run, () if self.level is None else self.level[0].preprocess)
+
+    def _procedures(self, run: Run, names: Sequence[str]) -> None:
+        run.execute(Call(self.procedures[name].name) for name in names)
+
+    def _facts(self, run: Run) -> list[Node]:
+        """What is known when the table looks."""
+        facts = [run.evaluate(one) for one in assumed(self.program, self.table)]
+        if (
+            self.level is not None
+            and isinstance(self.level[0].tables, TableByCommand)
+            and self.level[1] is not None
+        ):
+            selector = self.level[0].tables.selector
+            facts.append(values.equal(run.evaluate(selector), values.constant(selector.type, self.level[1])))
+        return facts
+
+    def _lines(self, run: Run) -> list[Node]:
+        """That each line matches then; DEFAULT behind the others."""
+        lines = [
+            values.all_of(run.evaluate(t.condition) for t in line.tests if t) for line in self.table.lines
+        ]
+        none = values.negation(values.any_of(lines))
+        return [*lines, none] if self.table.default is not None else lines

@@ -1,0 +1,199 @@
+"""Whether two tables over the same declarations do the same, whatever the input.
+
+In: two programs that differ in one table. Out: `Same`, `Differs` with the least input, or `NotDecided`. The same line's worth: a
+condition that is not defined, no line, several lines, or one line whose actions come to their end alike, call the same extern procedures
+in the same states with the same values, and leave every variable the same. Asked of Z3 pair of lines by pair
+of lines, under the assumptions of the first table and the program's invariants; lines are compared by what they do, not by name.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from rcsc.lang.meaning import relying
+from rcsc.lang.model import Action, Kind, Program, Scalar, Table, Value, Variable, VariableName, value_of_key
+from rcsc.relation.steps import assumed
+from rcsc.solvers import smt
+from rcsc.solvers.options import Options
+from rcsc.solvers.smt import Answer, Solver
+from rcsc.symbolic import values
+from rcsc.symbolic.effect import Effect, Meaning, Shared, goes_wrong_otherwise, same_calls, value_behind
+from rcsc.symbolic.encode import Frame, least_witness
+from rcsc.symbolic.evaluation import TooLongError
+from rcsc.symbolic.execution import Run
+from rcsc.symbolic.values import Node
+
+NO_LINE, SEVERAL_LINES, UNDEFINED = "no line", "several lines", "an undefined condition"
+RUN, CALLS = "whether the actions come to their end", "which extern procedures are called, or with what"
+
+
+@dataclass(frozen=True, slots=True)
+class Same:
+    """Proved: no admitted input tells the two tables apart.
+
+    Attributes:
+        questions: How many were put to Z3; the others were settled by looking.
+    """
+
+    questions: int
+
+
+@dataclass(frozen=True, slots=True)
+class Differs:
+    """An input for which they do not do the same.
+
+    Attributes:
+        witness: By variable, in declared order.
+        first: What the first table does: a line's name, `no line`, `several lines` or `an undefined condition`.
+        second: What the second does.
+        changed: What differs afterwards: variables by name, `RUN` and `CALLS`; empty where the lines differ in kind.
+    """
+
+    witness: tuple[tuple[Variable, Value], ...]
+    first: str
+    second: str
+    changed: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class NotDecided:
+    """Z3 gave no answer to one of the questions."""
+
+    first: str
+    second: str
+
+
+Comparison: TypeAlias = Same | Differs | NotDecided
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Outcome:
+    """What one table does for some inputs: the condition, and what its actions do; None where nothing runs."""
+
+    name: str
+    when: Node
+    effect: Effect | None
+
+
+def compare(first: tuple[Program, Table], second: tuple[Program, Table], options: Options) -> Comparison:
+    """Whether the tables do the same for every input that the first one's assumptions admit."""
+    try:
+        return _Question(first, second, options).answer()
+    except (TooLongError, RecursionError):
+        return NotDecided("", "")
+    except smt.troubles():
+        return NotDecided("", "")
+
+
+class _Question:
+    def __init__(self, first: tuple[Program, Table], second: tuple[Program, Table], options: Options) -> None:
+        self.options = options
+        self.shared = Shared()
+        self.start = self.shared.start
+        program = relying(first[0])
+        self.variables = program.variables
+        self.kinds = {str(v.name): v.type for v in program.variables}
+        for name, kind in self.kinds.items():
+            self.start[name] = self.shared.one(values.variable(name, kind))
+        self.one, self.two = list(self._outcomes(*first)), list(self._outcomes(*second))
+        table = next(one for one in program.tables if one.name == first[1].name)
+        run = Run({}, self.kinds, self.start)
+        self.known = [run.evaluate(condition) for condition in assumed(program, table)]
+        self.questions = 0
+
+    def answer(self) -> Comparison:
+        """Each outcome of the first table against those of the second that it can meet, its namesake first."""
+        for one in self.one:
+            left = one.when  # what of it no outcome of the second table has met yet
+            for two in sorted(self.two, key=lambda two: two.name != one.name):
+                found = self._asked(one, two)
+                if found is not None:
+                    return found
+                left = values.both(left, values.negation(two.when))
+                if self._check(left)[0] is Answer.UNSATISFIABLE:
+                    break
+        return Same(self.questions)
+
+    def _outcomes(self, program: Program, table: Table) -> Iterator[_Outcome]:
+        """What the table can come to; the conditions exclude each other and leave nothing out."""
+        meaning = Meaning(program, self.kinds, self.shared)
+        lines = [
+            values.all_of(meaning.condition(t.condition) for t in line.tests if t) for line in table.lines
+        ]
+        undefined = values.any_of(meaning.bad)
+        defined, none = values.negation(undefined), values.negation(values.any_of(lines))
+        before, twice = values.FALSE, values.FALSE
+        for when in lines:
+            twice = values.either(twice, values.both(before, when))
+            before = values.either(before, when)
+        for line, when in zip(table.lines, lines, strict=True):
+            alone = values.all_of((when, values.negation(twice), defined))
+            yield _Outcome(line.name, alone, _done(meaning, line.actions))
+        none = values.both(none, defined)
+        if table.default is None:
+            yield _Outcome(NO_LINE, none, None)
+        else:
+            yield _Outcome(table.default.name, none, _done(meaning, table.default.actions))
+        yield _Outcome(SEVERAL_LINES, values.both(twice, defined), None)
+        yield _Outcome(UNDEFINED, undefined, None)
+
+    def _unlike(self, one: _Outcome, two: _Outcome) -> Node:
+        if one.effect is None or two.effect is None:
+            return values.truth(one.name != two.name)
+        return values.any_of(node for _, node in self._changes(one.effect, two.effect))
+
+    def _changes(self, one: Effect, two: Effect) -> Iterator[tuple[str, Node]]:
+        """What can differ afterwards, and where it does."""
+        leaves = [name for name in self.kinds if name in one.leaves or name in two.leaves]
+        good = values.both(one.good, two.good)
+        yield RUN, goes_wrong_otherwise(one, two, self.shared)
+        yield CALLS, values.both(good, values.negation(same_calls(one, two, leaves, self.shared)))
+        for name in leaves:
+            pair = [value_behind(effect, name, self.shared) for effect in (one, two)]
+            same = self.shared.equal(*pair)
+            if same is not values.TRUE:
+                yield name, values.both(good, values.negation(same))
+
+    def _check(self, wrong: Node) -> tuple[Answer, Solver | None, dict[str, Node]]:
+        """Whether it can be, the solver that says so, and the variables that it is about."""
+        if wrong is values.FALSE:
+            return Answer.UNSATISFIABLE, None, {}
+        self.questions += 1
+        found = values.variables([*self.known, wrong])
+        solver = Solver(self.options.limits)
+        solver.add(*values.domain(found.values()), *map(values.term_of, [*self.known, wrong]))
+        return solver.check(), solver, found
+
+    def _asked(self, one: _Outcome, two: _Outcome) -> Comparison | None:
+        """None where the two outcomes cannot meet, or are the same where they do."""
+        answer, solver, found = self._check(values.all_of((one.when, two.when, self._unlike(one, two))))
+        if solver is None or answer is Answer.UNSATISFIABLE:
+            return None
+        if answer is Answer.UNKNOWN:
+            return NotDecided(one.name, two.name)
+        return self._witness(solver, found, one, two)
+
+    def _witness(self, solver: Solver, found: dict[str, Node], one: _Outcome, two: _Outcome) -> Comparison:
+        order = {v.name: at for at, v in enumerate(self.variables)}
+        names = sorted(found, key=lambda name: (order.get(VariableName(name), len(order)), name))
+        shown = [_shown(name, found[name].kind) for name in names]
+        frame = Frame({name: values.term_of(node) for name, node in found.items()})
+        least = least_witness(solver, shown, frame)
+        if least is None:
+            return NotDecided(one.name, two.name)
+        changed: tuple[str, ...] = ()
+        if one.effect is not None and two.effect is not None:
+            changed = tuple(
+                name
+                for name, node in self._changes(one.effect, two.effect)
+                if solver.check(values.term_of(node)) is Answer.SATISFIABLE
+            )
+        return Differs(tuple((v, least[v.name]) for v in shown), one.name, two.name, changed)
+
+
+def _done(meaning: Meaning, actions: tuple[Action, ...]) -> Effect:
+    return meaning.effect(action.statement for action in actions)
+
+
+def _shown(name: str, kind: Scalar) -> Variable:
+    return Variable(VariableName(name), Kind.STATE, kind, value_of_key(kind, 0))

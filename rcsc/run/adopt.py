@@ -1,0 +1,111 @@
+"""How a level starts again: from its checkpoint, or anew: then what stands in its buffers is old, and PAUSE goes down.
+
+In: a level, its buffers, its checkpoint; for a start anew a signature and values: an initial state with the inputs as the buffers hold
+them now; its own orders that stand. Out: values to start from.
+The convention of the tables: input `command` with `inc_command`, state `inc_command_seen`, orders named `to_NAME`, and the input
+`NAME` that echoes them.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+
+from rcsc.run.buffers import Buffers
+from rcsc.run.levels import RunningLevel
+from rcsc.run.signature import Signature, Value, Values
+
+NUMBERS = 65536
+ORDER = "to_"
+# How an order is numbered, and where the level below repeats the number; the camera's pictures are numbered, too.
+ECHOES = {"inc_command": "inc_command_echo", "number": "number"}
+# A member, by its name, for a state; the failure stands until the next command.
+FAILED = {
+    "status_report": "failed",
+    "failure": "restart",
+    "cur_state": "f_state",
+    "cur_state.next": "f_state",
+}
+
+
+class Begun(StrEnum):
+    """From what state a level goes on that was started again."""
+
+    CHECKPOINT = "checkpoint"  # that of its last cycle
+    ANEW = "anew"  # that is lost, or ended in a fault: the state that `adopt` says
+
+
+@dataclass(frozen=True, slots=True)
+class Restarted:
+    """A level that was started again, between two cycles.
+
+    Attributes:
+        values: All leaves, from which its next cycle begins once it has taken its inputs.
+    """
+
+    level: str
+    begun: Begun
+    values: Values
+
+
+def restart(level: RunningLevel, buffers: Buffers, checkpoint: Values | None = None) -> Restarted:
+    """Puts a level where its process would begin again.
+
+    Args:
+        level: Whatever state it is in.
+        buffers: What it takes from and gives to.
+        checkpoint: All leaves and the trace after its last cycle; None where they are lost: then it starts anew.
+
+    Raises:
+        BadState: The checkpoint, or what the level would adopt, lies outside what its tables are proved for.
+    """
+    if checkpoint is None:
+        level.put_back(level.initial)
+        level.take(buffers)
+        level.restore(adopt(level.sign, level.executor.values(), standing(level, buffers)))
+    else:
+        level.restore(checkpoint)
+    begun = Begun.ANEW if checkpoint is None else Begun.CHECKPOINT
+    return Restarted(level.name, begun, level.values[: len(level.sign.leaves)])
+
+
+def standing(level: RunningLevel, buffers: Buffers) -> dict[int, Value]:
+    """What a level's own orders and reports say that still stand in the buffers, by the positions of the leaves."""
+    return {
+        give.first + at: value
+        for give in level.gives
+        for at, value in enumerate(buffers.latest(give.buffer) or ())
+    }
+
+
+def adopt(sign: Signature, values: Values, stands: Mapping[int, Value] | None = None) -> Values:
+    """The values with which a level starts safely, whatever is in its buffers.
+
+    The order in the command buffer counts as seen, and has failed; each level below gets PAUSE with a number that no order had
+    before: the next after the order that stands, which it may not have echoed yet; after what it echoed where none stands. What a
+    program has no variable for is left as it is.
+
+    Args:
+        sign: The level's program.
+        values: All leaves and the trace; states and outputs initial.
+        stands: What its own buffers hold, of `standing`.
+    """
+    now = list(values)
+    for name, member in FAILED.items():
+        at = sign.index.get(name)
+        if at is not None and member in sign.leaves[at].members:
+            now[at] = sign.leaves[at].members.index(member)
+    if "inc_command_seen" in sign.index and "command.inc_command" in sign.index:
+        now[sign.index["inc_command_seen"]] = now[sign.index["command.inc_command"]]
+    for at, leaf in enumerate(sign.leaves):
+        if leaf.kind == "output" and leaf.name.startswith(ORDER):
+            now[at] = _order(sign, leaf.name, now, at, stands or {})
+    return tuple(now)
+
+
+def _order(sign: Signature, name: str, now: list[Value], at: int, stands: Mapping[int, Value]) -> Value:
+    """What a leaf of an order starts with: a number not yet echoed, the first command, which rests; the others stay."""
+    record, _, part = name.partition(".")
+    if part == "input_command":
+        return 0
+    echo = sign.index.get(f"{record.removeprefix(ORDER)}.{ECHOES.get(part, '')}")
+    return now[at] if echo is None else (int(stands.get(at, now[echo])) + 1) % NUMBERS

@@ -1,0 +1,90 @@
+"""What extern procedures give in the run of a finding: told to the executors, so that they do without the user's functions.
+
+In: the answers of one cycle, as (procedure, results). Executors that were made for a finding call `of_NAME` here in Python, and in C
+functions that read the same results from `rcsc_answers` (`stand_ins`).
+"""
+
+import ctypes
+import struct
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, TypeAlias
+
+from rcsc.run.executors import CExecutor, Executor
+from rcsc.run.signature import Value
+
+Answers: TypeAlias = Sequence[tuple[str, tuple[Value, ...]]]
+
+MOST = 4096
+"""Results of one cycle that a C executor can be told."""
+MODULE, OF = __name__, "of_"
+C_TYPES = {
+    "bool": (0, 1),
+    **{f"uint{bits}_t": (0, 2**bits - 1) for bits in (8, 16, 32, 64)},
+    **{f"int{bits}_t": (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) for bits in (8, 16, 32, 64)},
+}
+HEAD = f"""
+#include <string.h>
+__attribute__((weak)) uint64_t rcsc_answers[{MOST}];
+__attribute__((weak)) uint32_t rcsc_answer;
+"""
+_left: list[tuple[str, tuple[Value, ...]]] = []
+
+
+def __getattr__(name: str) -> Callable[..., Any]:
+    """The function of an extern procedure: gives the next of its answers.
+
+    Raises:
+        AttributeError: The name is none of an extern procedure.
+    """
+    if not name.startswith(OF):
+        raise AttributeError(name)
+
+    def answer(*_args: Value) -> Any:
+        at = next((at for at, (one, _) in enumerate(_left) if one == name.removeprefix(OF)), None)
+        if at is None:
+            raise LookupError(f"nothing is said of what `{name.removeprefix(OF)}` gives here")
+        results = _left.pop(at)[1]
+        return results[0] if len(results) == 1 else results
+
+    return answer
+
+
+def told(executor: Executor, answers: Answers) -> None:
+    """Has the executor's next cycle take these answers."""
+    _left[:] = answers
+    if isinstance(executor, CExecutor):
+        words = [_word(value) for _, results in answers for value in results][:MOST]
+        executor.write("rcsc_answers", (ctypes.c_uint64 * MOST)(*words))
+        executor.write("rcsc_answer", ctypes.c_uint32(0))
+
+
+def _word(value: Value) -> int:
+    """The 64 bits of a value."""
+    if isinstance(value, float):
+        (bits,) = struct.unpack("<Q", struct.pack("<d", value))
+        return int(bits)
+    return int(value) % 2**64
+
+
+def fits(c_type: str, value: Value) -> bool:
+    """Whether a C function can give the value."""
+    if c_type not in C_TYPES:
+        return True
+    low, high = C_TYPES[c_type]
+    return bool(low <= value <= high)
+
+
+def stand_in(function: str, given: Iterable[tuple[str, str]], results: Iterable[tuple[str, str]]) -> str:
+    """A C function that gives what it is told; arguments and results as (type, name)."""
+    ins, outs = list(given), list(results)
+    parameters = [*(f"{kind} {name}" for kind, name in ins), *(f"{kind} *{name}_out" for kind, name in outs)]
+    body = [f"    (void){name};" for _, name in ins]
+    for kind, name in outs:
+        if kind == "double":
+            body.append(f"    (void)memcpy({name}_out, &rcsc_answers[rcsc_answer], sizeof(double));")
+        else:
+            body.append(f"    *{name}_out = ({kind})rcsc_answers[rcsc_answer];")
+        body.append(f"    rcsc_answer = (rcsc_answer + 1U) % {MOST}U;")
+    return "\n".join(
+        [f"__attribute__((weak)) void {function}({', '.join(parameters) or 'void'})", "{", *body, "}\n"]
+    )

@@ -1,0 +1,35 @@
+"""Common memory: the latest value of every buffer (Haynes et al. 1984, section 9).
+
+A reader may see the same value twice, or miss one; it never sees half of one.
+"""
+
+from typing import Protocol
+
+from rcsc.run.signature import Values
+
+
+class Buffers(Protocol):
+    """What carries buffers between levels; the one interface of every transport."""
+
+    def publish(self, name: str, values: Values) -> None:
+        """Make this the latest value."""
+        ...
+
+    def latest(self, name: str) -> Values | None:
+        """The latest value; None before the first."""
+        ...
+
+
+class CommonMemory:
+    """Common memory of one process."""
+
+    def __init__(self) -> None:
+        self._held: dict[str, Values] = {}
+
+    def publish(self, name: str, values: Values) -> None:
+        """Make this the latest value."""
+        self._held[name] = values
+
+    def latest(self, name: str) -> Values | None:
+        """The latest value; None before the first."""
+        return self._held.get(name)

@@ -1,0 +1,237 @@
+"""The description of a system: its levels, the buffers between them, and what the database fills; one TOML file.
+
+In: `system.toml`. Out: a frozen `Description`. The names of buffers and of their destinations stand here, and the
+rest is automatic (Haynes et al. 1984, section 9).
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+from rcsc.diagnostics.codes import Code
+from rcsc.diagnostics.source import Source
+from rcsc.host.described import (
+    BadFile,
+    Document,
+    Entries,
+    KeyPath,
+    Listing,
+    Member,
+    Name,
+    Number,
+    Record,
+    Text,
+    Word,
+    nearest,
+    read_document,
+)
+from rcsc.host.files.names import BadName, is_member, member, within
+from rcsc.host.files.read import Said
+from rcsc.lang.project import project_root
+
+
+class BadDescription(BadFile):
+    """The description says something that cannot be; tells where and what."""
+
+
+LONGEST_MS, MOST_LEVELS = 3_600_000, 10_000
+FEED = Record({"into": Member(), "query": Word(), "keys": Listing(Member())})
+LEVEL = Record({"name": Word()}, {"program": Word(), "feed": Listing(FEED)})
+SYSTEM = Record(
+    {
+        "name": Name(),
+        "generated": Text(),
+        "tick_ms": Number(1, LONGEST_MS, whole=True),
+        "level": Listing(LEVEL, least=1),
+        "buffers": Entries(Member()),
+    },
+    {"data": Text(), "displays": Entries(Listing(Member())), "outside": Listing(Word())},
+)
+PARTIES = Record({key: SYSTEM.needed[key] for key in ("level", "buffers")}, {"outside": Listing(Word())})
+"""What a description may say; `outside` are the parties of its buffers that are no levels."""
+
+
+@dataclass(frozen=True, slots=True)
+class Feed:
+    """Inputs that the database fills before each cycle.
+
+    Attributes:
+        into: The record that is filled.
+        query: What the database is asked.
+        keys: Leaves whose values are asked for.
+    """
+
+    into: str
+    query: str
+    keys: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class LevelSpec:
+    """One control level."""
+
+    name: str
+    program: str
+    feeds: tuple[Feed, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Wire:
+    """A buffer: whose output it is, and whose input; `level.variable` at both ends."""
+
+    source: str
+    target: str
+
+
+@dataclass(frozen=True, slots=True)
+class Description:
+    """A whole system; levels from the top down.
+
+    Attributes:
+        database: The data of the cell; there is no such file where the system asks no database.
+        displays: Sets of variables to look at, by the name that a level's `display` gives them.
+        document: The file, for the places of what is wrong with it.
+    """
+
+    name: str
+    generated: Path
+    database: Path
+    tick_ms: int
+    levels: tuple[LevelSpec, ...]
+    wires: tuple[Wire, ...]
+    displays: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    document: Document | None = field(default=None, compare=False, repr=False)
+
+    def review(self) -> Document:
+        """A fresh page for faults, with the places of this description."""
+        if self.document is None:
+            return Document(self.name, Source(self.name, ""), {}, Code.BAD_SYSTEM)
+        return replace(self.document, faults=[])
+
+
+def description(path: Path) -> Description:
+    """Read a description; its paths are seen from where it stands.
+
+    Raises:
+        BadDescription: It cannot be read, or something in it cannot be; all that is wrong is told at once.
+    """
+    document = read_document(path, Code.BAD_SYSTEM, BadDescription)
+    document.check(SYSTEM)
+    if document.holds(PARTIES):
+        _check_parties(document)
+    generated, data = (_place(path, document, key) for key in ("generated", "data"))
+    if document.faults:
+        raise document.bad(BadDescription)
+    return _described(path, document, generated, data)
+
+
+def _place(path: Path, document: Document, key: str) -> Path:
+    """Where a path of the description leads: into its project, or to the folder `generated` beside that."""
+    try:
+        return within(
+            Path(project_root(str(path))), path.parent, document.value.get(key, NO_DATA), f"path `{key}`"
+        )
+    except BadName as error:
+        document.wrong((key,), str(error))
+        return path
+
+
+def _described(path: Path, document: Document, generated: Path, data: Path) -> Description:
+    said: dict[str, Any] = document.value
+    return Description(
+        said["name"],
+        generated,
+        data if data != path.resolve() else data.with_name(NO_DATA),  # older descriptions name themselves
+        said["tick_ms"],
+        tuple(level_of(Said(one)) for one in said["level"]),
+        tuple(Wire(a, b) for a, b in said["buffers"].items()),
+        {name: tuple(shown) for name, shown in said.get("displays", {}).items()},
+        document,
+    )
+
+
+def level_of(said: Said) -> LevelSpec:
+    """Return a level of a description, or of a log's copy of one.
+
+    Raises:
+        Malformed: It is none, or a name in it is none.
+    """
+    feeds = "feed" if "feed" in said.value else "feeds"
+    return LevelSpec(
+        said.name("name"),
+        said.name("program", said.name("name")),
+        tuple(
+            Feed(one.member("into"), one.name("query"), one.members("keys"))
+            for one in said.each(feeds, MOST_LEVELS, ())
+        ),
+    )
+
+
+def wire_of(source: object, target: object) -> Wire:
+    """Return a buffer between two variables, `level.variable` each.
+
+    Raises:
+        BadName: One of them is none.
+    """
+    return Wire(member(source, "buffer"), member(target, "buffer's destination"))
+
+
+NO_DATA = ".no-data"
+"""Stands for the data of a system that has none: no such file is ever made."""
+
+
+def _check_parties(document: Document) -> None:
+    """Every level has a name of its own; each buffer has a level at an end, and parties that are known."""
+    said = document.value
+    levels = [str(one["name"]) for one in said["level"]]
+    for at, name in enumerate(levels):
+        if name in levels[:at]:
+            document.wrong(("level", at, "name"), f"there are two levels `{name}`")
+    ends = list(_ends(said["buffers"]))
+    for path, end, _ in ends:
+        party, dot, variable = end.partition(".")
+        if not (party and dot and variable) or not is_member(end):
+            document.wrong(path, f"`{end}` is no buffer's end", "write `party.variable`")
+    parties = [end.partition(".")[0] for _, end, _ in ends]
+    outside = said.get("outside")
+    for path, end, other in ends:
+        party, theirs = end.partition(".")[0], other.partition(".")[0]
+        if party in levels:
+            continue
+        if outside is not None:
+            known = [*levels, *outside]
+            if party not in outside:
+                document.wrong(path, f"`{party}` is neither a level nor in `outside`", *nearest(party, known))
+        elif alike := _alike(party, levels, parties):
+            document.wrong(
+                path, f"`{party}` is no level, and is spelled almost as `{alike}`",
+                f'did you mean `{alike}`? Else name those that are no levels: `outside = ["{party}"]`',
+            )  # fmt: skip
+        elif theirs not in levels:
+            document.wrong(path, f"neither end of `{end}` and `{other}` is a level", *nearest(party, levels))
+    targets = [target for _, target, _ in ends[1::2]]
+    for (path, target, _), at in zip(ends[1::2], range(len(targets)), strict=True):
+        if target in targets[:at]:
+            document.wrong(path, f"`{target}` is filled twice")
+
+
+def _ends(buffers: Mapping[str, str]) -> Iterator[tuple[KeyPath, str, str]]:
+    """Both ends of each buffer: where it stands, the end, the other end."""
+    for source, target in buffers.items():
+        yield ("buffers", source), source, target
+        yield ("buffers", source), target, source
+
+
+def _alike(party: str, levels: list[str], parties: list[str]) -> str:
+    """The level, or the party that is named oftener, whose spelling is nearest; empty where none is near."""
+    oftener = [one for one in parties if parties.count(one) > parties.count(party)]
+    swapped = [one for one in levels if sorted(one) == sorted(party)]
+    near = [*swapped, *get_close_matches(party, [*levels, *oftener], n=1, cutoff=0.8)]
+    return near[0] if near else ""
+
+
+def places(path: Path, program: str) -> tuple[Path, Path]:
+    """Where the program of a level is looked for, beside the description, in order."""
+    return path.parent / program / f"{program}.rcs", path.parent / f"{program}.rcs"

@@ -1,0 +1,231 @@
+"""Generated executors behind one interface: Python modules, and C built into one shared library.
+
+In: the generated folder and signatures. Out: executors that hold one state each. Values go in and out as tuples in declared
+order; both kinds give the same values, bit for bit.
+"""
+
+import ctypes
+import hashlib
+import importlib.util
+import shutil
+import struct
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from operator import attrgetter
+from pathlib import Path
+from typing import Protocol
+
+from rcsc.host import children
+from rcsc.host.files.names import BadName
+from rcsc.host.files.read import Malformed, content
+from rcsc.run.signature import FORMATS, LevelSign, Signature, Value, Values, sources_of
+
+FLAGS = ("-std=c99", "-O1", "-ffp-contract=off", "-fPIC", "-shared")
+"""A cycle takes microseconds; more optimization would only be waited for at each start."""
+
+
+class NotBuilt(Exception):  # noqa: N818  # what happened, not an error of ours
+    """The C executors could not be built here; says why."""
+
+
+class Executor(Protocol):
+    """One level's executor with its state."""
+
+    def cycle(self) -> int:
+        """Run one cycle; the fault, 0 for none."""
+        ...
+
+    def values(self) -> Values:
+        """All leaves, then the trace."""
+        ...
+
+    def put(self, first: int, values: Sequence[Value]) -> None:
+        """Set the leaves from position `first` on."""
+        ...
+
+    def check(self) -> int:
+        """-1 where the state may be gone on from, else what is wrong with it (`Signature.unfit`)."""
+        ...
+
+
+class PythonExecutor:
+    """A generated Python module with a state."""
+
+    def __init__(self, generated: Path, sign: Signature, level: LevelSign) -> None:
+        name = f"rcsc_generated_{sign.program}"
+        *_, path = _files(generated, sign)
+        spec = importlib.util.spec_from_file_location(name, path)
+        if spec is None or spec.loader is None:
+            raise NotBuilt(f"no Python module for `{sign.program}`")
+        module = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(module)
+        self._state = module.State()
+        self._cycle = getattr(module, level.cycle.removeprefix(f"{sign.program}_"))
+        self._check = module.check
+        self._names = [leaf.attribute for leaf in sign.leaves]
+        self._get = attrgetter(*self._names, *sign.trace)
+
+    def cycle(self) -> int:
+        """Run one cycle; the fault, 0 for none."""
+        fault: int = self._cycle(self._state)
+        return fault
+
+    def check(self) -> int:
+        """-1 where the state may be gone on from, else what is wrong with it."""
+        at: int = self._check(self._state)
+        return at
+
+    def values(self) -> Values:
+        """All leaves, then the trace."""
+        found: Values = self._get(self._state)
+        return found
+
+    def put(self, first: int, values: Sequence[Value]) -> None:
+        """Set the leaves from position `first` on."""
+        for at, value in enumerate(values, first):
+            setattr(self._state, self._names[at], value)
+
+
+@dataclass(frozen=True, slots=True)
+class Library:
+    """The C executors of several programs in one shared library."""
+
+    handle: ctypes.CDLL
+
+
+_BUILT: dict[bytes, Library] = {}
+"""What this process has built already, by the text that it was built of."""
+
+
+def build(generated: Path, signs: Sequence[Signature]) -> Library:
+    """Compiles the generated C, once for the same text.
+
+    Raises:
+        NotBuilt: There is no compiler, or it refused.
+    """
+    compiler = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
+    if compiler is None:
+        raise NotBuilt("there is no C compiler here")
+    layout = "\n".join(_layout(sign) for sign in signs)
+    try:
+        texts = [content(path) for sign in signs for path in _files(generated, sign)[:2]]
+    except OSError as error:
+        raise NotBuilt(f"{error.filename} cannot be read: {error.strerror}") from error
+    except Malformed as error:
+        raise NotBuilt(f"a generated file {error}") from error
+    key = hashlib.sha256(b"\0".join([layout.encode(), *texts])).digest()
+    if key not in _BUILT:
+        _BUILT[key] = _built(compiler, generated, signs, layout)
+    return _BUILT[key]
+
+
+def _files(generated: Path, sign: Signature) -> tuple[Path, Path, Path]:
+    """The program's files, all in the generated folder: nothing else is compiled or loaded.
+
+    Raises:
+        NotBuilt: A name or a link leads elsewhere.
+    """
+    try:
+        return sources_of(generated, sign.program)
+    except BadName as error:
+        raise NotBuilt(str(error)) from error
+
+
+def _built(compiler: str, generated: Path, signs: Sequence[Signature], layout: str) -> Library:
+    with children.scratch("executors") as folder:
+        shim = folder / "layout.c"
+        shim.write_text(layout, encoding="utf-8")
+        library = folder / "executors.so"
+        sources = [str(_files(generated, sign)[0]) for sign in signs]
+        command = [compiler, *FLAGS, f"-I{generated / 'c'}", "-o", str(library), str(shim), *sources]
+        ran = children.run(command)
+        if ran.status != 0:
+            raise NotBuilt(ran.err.strip().splitlines()[0] if ran.err.strip() else "the compiler failed")
+        return Library(ctypes.CDLL(str(library)))  # it stays mapped when the folder is gone
+
+
+def _layout(sign: Signature) -> str:
+    """Where each leaf lies in the program's struct, said by the compiler itself."""
+    p, kind = sign.program, sign.struct_name
+    places = [
+        f"(unsigned)offsetof({kind}, {one})" for one in (*(leaf.place for leaf in sign.leaves), *sign.trace)
+    ]
+    return (
+        f'#include <stddef.h>\n#include "{p}.h"\n'
+        f"const unsigned rcsc_{p}_places[] = {{{', '.join(places)}, (unsigned)sizeof({kind})}};\n"
+    )
+
+
+class CExecutor:
+    """A generated C executor with a state of its own."""
+
+    def __init__(self, library: Library, sign: Signature, level: LevelSign) -> None:
+        self._library = library  # keeps the file that is mapped
+        count = len(sign.leaves) + len(sign.trace)
+        places = list((ctypes.c_uint * (count + 1)).in_dll(library.handle, f"rcsc_{sign.program}_places"))
+        self._memory = ctypes.create_string_buffer(places[-1])
+        self._address = ctypes.byref(self._memory)
+        self._cycle = getattr(library.handle, level.cycle)
+        self._cycle.restype = ctypes.c_int32
+        self._check = getattr(library.handle, sign.check)
+        self._check.restype = ctypes.c_int32
+        getattr(library.handle, sign.init)(self._address)
+        formats = [*(FORMATS[leaf.c_type] for leaf in sign.leaves), *sign.trace_format]
+        self._places, self._formats = places, formats
+        order = sorted(range(count), key=places.__getitem__)
+        self._whole = _padded([(places[at], formats[at]) for at in order], places[-1])
+        back = sorted(range(count), key=order.__getitem__)
+        self._order = None if order == list(range(count)) else back
+        self._parts: dict[tuple[int, int], struct.Struct] = {}
+
+    def cycle(self) -> int:
+        """Run one cycle; the fault, 0 for none."""
+        fault: int = self._cycle(self._address)
+        return fault
+
+    def check(self) -> int:
+        """-1 where the state may be gone on from, else what is wrong with it."""
+        at: int = self._check(self._address)
+        return at
+
+    def write(self, name: str, value: ctypes.Array[ctypes.c_uint64] | ctypes.c_uint32) -> None:
+        """Sets a variable of the library, where it has one of that name."""
+        try:
+            there = type(value).in_dll(self._library.handle, name)
+        except ValueError:
+            return
+        ctypes.memmove(ctypes.byref(there), ctypes.byref(value), ctypes.sizeof(value))
+
+    def values(self) -> Values:
+        """All leaves, then the trace."""
+        found = self._whole.unpack(self._memory)
+        return found if self._order is None else tuple(found[at] for at in self._order)
+
+    def put(self, first: int, values: Sequence[Value]) -> None:
+        """Set the leaves from position `first` on."""
+        base = self._places[first]
+        key = first, len(values)
+        part = self._parts.get(key)
+        if part is None:
+            run = range(first, first + len(values))
+            places = [self._places[at] - base for at in run]
+            if any(b < a for a, b in pairwise(places)):
+                for at, value in enumerate(values, first):
+                    self.put(at, (value,))
+                return
+            end = places[-1] + struct.calcsize(self._formats[run[-1]])
+            part = self._parts[key] = _padded(
+                [(place, self._formats[at]) for place, at in zip(places, run, strict=True)], end
+            )
+        part.pack_into(self._memory, base, *values)
+
+
+def _padded(fields: Sequence[tuple[int, str]], size: int) -> struct.Struct:
+    """A format with the padding that the compiler left between ascending places."""
+    text, at = "<" if sys.byteorder == "little" else ">", 0
+    for place, one in fields:
+        text += "x" * (place - at) + one
+        at = place + struct.calcsize(one)
+    return struct.Struct(text + "x" * (size - at))

@@ -1,0 +1,239 @@
+"""A control level that runs: its executor, the buffers it takes and gives, and what the database fills.
+
+In: a description, signatures, executors, a database. Out: `RunningLevel`, which takes, runs and gives, each when told.
+"""
+
+import struct
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from rcsc.run.buffers import Buffers
+from rcsc.run.description import BadDescription, Description, Feed, LevelSpec
+from rcsc.run.executors import Executor
+from rcsc.run.signature import LevelSign, Signature, Value, Values
+
+Query = Callable[..., Values]
+
+
+@dataclass(frozen=True, slots=True)
+class Take:
+    """A buffer, and where its values go."""
+
+    buffer: str
+    first: int
+    count: int
+    form: str
+
+
+@dataclass(frozen=True, slots=True)
+class Give:
+    """A buffer, and which leaves it carries."""
+
+    buffer: str
+    first: int
+    end: int
+
+
+@dataclass(frozen=True, slots=True)
+class Fill:
+    """A question to the database, where its answer goes, and the leaves that it is about."""
+
+    query: Query
+    first: int
+    keys: tuple[int, ...]
+    form: str
+
+
+class StateTableError(Exception):
+    """A level met a fault that the proofs exclude, or was refused an input or a state; says which, where and when."""
+
+
+class BadState(StateTableError):  # noqa: N818  # what was refused, not an error of ours
+    """A state from outside lies outside what the executors are proved for; says which level and what."""
+
+
+def put_checked(name: str, sign: Signature, executor: Executor, values: Values) -> None:
+    """Gives an executor a state from outside, and checks it before any cycle sees it.
+
+    Raises:
+        BadState: Something lies outside its range, or an invariant does not hold; the executor has the state that it had.
+    """
+    count = len(sign.leaves)
+    kept = executor.values()[:count]
+    try:
+        struct.pack(sign.form(range(count)), *values[:count])
+        executor.put(0, values[:count])
+        at = executor.check()
+        wrong = "" if at < 0 else sign.unfit(at, values)
+    except struct.error as error:
+        wrong = str(error)
+    if wrong:
+        executor.put(0, kept)
+        raise BadState(f"level `{name}` cannot go on from this state: {wrong}")
+
+
+@dataclass(slots=True)
+class RunningLevel:
+    """One level with its state.
+
+    Attributes:
+        values: All leaves and the trace, as the last cycle left them, with inputs taken since.
+        initial: The same before the first cycle.
+    """
+
+    name: str
+    sign: Signature
+    level: LevelSign
+    executor: Executor
+    takes: tuple[Take, ...]
+    gives: tuple[Give, ...]
+    fills: tuple[Fill, ...]
+    values: Values = ()
+    initial: Values = field(init=False)
+    _taken: dict[str, Values] = field(default_factory=dict)
+    _asked: dict[int, list[Value]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Reads the initial state."""
+        self.values = self.initial = self.executor.values()
+
+    def take(self, buffers: Buffers) -> None:
+        """Copies the latest value of every input buffer, then has the database fill what depends on them.
+
+        Raises:
+            StateTableError: What somebody outside published, or the database answered, are no values of these leaves.
+        """
+        now: list[Value] | None = None
+        for take in self.takes:
+            latest = buffers.latest(take.buffer)
+            if latest is not None and latest is not self._taken.get(take.buffer):
+                self._taken[take.buffer] = latest
+                self._put(f"buffer `{take.buffer}`", take.form, take.first, latest)
+                now = list(self.values) if now is None else now
+                now[take.first : take.first + take.count] = latest
+        seen: Sequence[Value] = self.values if now is None else now
+        for fill in self.fills:
+            keys = [seen[at] for at in fill.keys]
+            if self._asked.get(fill.first) != keys:
+                self._asked[fill.first] = keys
+                self._put("the answer of the database", fill.form, fill.first, fill.query(*keys))
+
+    def _put(self, what: str, form: str, first: int, values: Values) -> None:
+        try:
+            struct.pack(form, *values)
+        except struct.error as error:
+            raise StateTableError(f"level `{self.name}` cannot take {what}: {error}") from error
+        self.executor.put(first, values)
+
+    def run(self) -> int:
+        """One cycle; the fault, 0 for none."""
+        fault = self.executor.cycle()
+        self.values = self.executor.values()
+        return fault
+
+    def give(self, buffers: Buffers) -> None:
+        """Publishes every output buffer."""
+        for give in self.gives:
+            buffers.publish(give.buffer, self.values[give.first : give.end])
+
+    def restore(self, values: Values) -> None:
+        """Goes on from a state that `values` said, as if nothing had happened in between.
+
+        Raises:
+            BadState: The state is none that a cycle may begin with; the level has kept its own.
+        """
+        put_checked(self.name, self.sign, self.executor, values)
+        self._restored()
+
+    def put_back(self, values: Values) -> None:
+        """The same with a state that this level had, or that was looked at already: it is not checked."""
+        self.executor.put(0, values[: len(self.sign.leaves)])
+        self._restored()
+
+    def _restored(self) -> None:
+        self.values = self.executor.values()
+        self._taken.clear()
+        self._asked.clear()
+
+    def value(self, name: str) -> Value:
+        """A leaf of the last cycle.
+
+        Raises:
+            KeyError: There is none of that name.
+        """
+        return self.values[self.sign.index[name]]
+
+    def shown(self, name: str) -> str:
+        """The same, in the table's words."""
+        return self.sign.leaves[self.sign.index[name]].shown(self.value(name))
+
+    @property
+    def table(self) -> str:
+        """The table that the last cycle ran."""
+        return self.sign.table_of(self.level, self.values)
+
+    @property
+    def line(self) -> str:
+        """The line that the last cycle ran; empty for none."""
+        at = int(self.values[len(self.sign.leaves)])
+        lines = self.sign.tables.get(self.table, ())
+        return lines[at] if 0 <= at < len(lines) else ""
+
+    @property
+    def fault(self) -> int:
+        """What stopped the last cycle; 0 for nothing."""
+        return int(self.values[len(self.sign.leaves) + 1])
+
+
+def running_level(
+    spec: LevelSpec,
+    system: Description,
+    sign: Signature,
+    executor: Executor,
+    queries: Mapping[str, Query],
+) -> RunningLevel:
+    """A level wired as the description says.
+
+    Raises:
+        BadDescription: A buffer or a feed names what the program does not have, or what does not fit.
+    """
+    level = next((one for one in sign.levels if one.name == spec.name), None)
+    if level is None:
+        raise BadDescription(f"program `{sign.program}` has no level `{spec.name}`")
+    takes: list[tuple[str, int, int]] = []
+    gives: list[tuple[str, int, int]] = []
+    for wire in system.wires:
+        for end, made in ((wire.target, takes), (wire.source, gives)):
+            owner, _, variable = end.partition(".")
+            if owner == spec.name:
+                run = _positions(sign, variable, end)
+                made.append((wire.source, run.start, len(run)))
+    return RunningLevel(
+        spec.name,
+        sign,
+        level,
+        executor,
+        tuple(Take(*one, sign.form(range(one[1], one[1] + one[2]))) for one in takes),
+        tuple(Give(name, first, first + count) for name, first, count in gives),
+        tuple(_fill(spec, sign, feed, queries) for feed in spec.feeds),
+    )
+
+
+def _positions(sign: Signature, variable: str, where: str) -> range:
+    try:
+        return sign.record(variable)
+    except KeyError as error:
+        raise BadDescription(f"program `{sign.program}` has no variable `{variable}` ({where})") from error
+
+
+def _fill(spec: LevelSpec, sign: Signature, feed: Feed, queries: Mapping[str, Query]) -> Fill:
+    where = f"level `{spec.name}`, feed into `{feed.into}`"
+    if feed.query not in queries:
+        raise BadDescription(f"{where}: the database answers no question `{feed.query}`")
+    run = _positions(sign, feed.into, where)
+    keys = tuple(_positions(sign, key, where).start for key in feed.keys)
+    query = queries[feed.query]
+    answer = query(*(0 for _ in keys))
+    if len(answer) != len(run):
+        raise BadDescription(f"{where}: {len(answer)} values for {len(run)} leaves")
+    return Fill(query, run.start, keys, sign.form(run))

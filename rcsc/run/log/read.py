@@ -1,0 +1,280 @@
+"""A log, read: the whole one, or what a kill left of it.
+
+In: an MCAP file that `rcsc.run.log.write` wrote. Out: a `Log`: for each level its signature and what every cycle left. A log may come from
+anybody: whatever it names is checked against what it may be.
+"""
+
+import struct
+from bisect import bisect_right
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from mcap.records import Channel, McapRecord, Message, Metadata
+
+from rcsc.host.files.names import identifier, shown
+from rcsc.run.adopt import Begun
+from rcsc.run.description import Description, wire_of
+from rcsc.run.log.finding import FINDING, LoggedFinding, finding_of
+from rcsc.run.log.records import Checked, Seal, records
+from rcsc.run.log.schema import (
+    BUFFERS,
+    LEVELS,
+    PROGRAMS,
+    RESTARTS,
+    SIGNATURE,
+    SYSTEM,
+    buffer_leaves,
+    message_format,
+    restart_of,
+    signature_from,
+    system_of,
+)
+from rcsc.run.signature import LevelSign, Signature, Values
+
+_NOWHERE = Path()
+_TICKS_A_MESSAGE, _ALWAYS_TICKS = 64, 1_000_000
+"""How far apart the records of a log may lie; ticks without one cost time and hold nothing."""
+
+
+class UnreadableLog(Exception):  # noqa: N818  # what happened, not an error of ours
+    """A file is no log of rcsc's, or nothing of it is left; says why."""
+
+
+@dataclass(slots=True)
+class Track:
+    """What one level left, or what one buffer carried, in ticks that ascend.
+
+    Attributes:
+        packed: Canonical bytes; the same object where a state comes again, so that waiting costs no memory.
+    """
+
+    layout: struct.Struct
+    ticks: list[int] = field(default_factory=list)
+    packed: list[bytes] = field(default_factory=list)
+    known: dict[bytes, bytes] = field(default_factory=dict, repr=False)
+
+    def add(self, tick: int, content: bytes) -> None:
+        """Append one record.
+
+        Raises:
+            ValueError: It has not the length that the signature says, or is of an earlier tick.
+        """
+        if len(content) != self.layout.size:
+            raise ValueError(f"{len(content)} bytes, not {self.layout.size}")
+        if self.ticks and tick <= self.ticks[-1]:
+            raise ValueError(f"tick {tick} after tick {self.ticks[-1]}")
+        self.ticks.append(tick)
+        self.packed.append(self.known.setdefault(content, content))
+
+    def place(self, tick: int) -> int:
+        """Where the latest record of then lies; -1 for none."""
+        return bisect_right(self.ticks, tick) - 1
+
+    def latest(self, tick: int) -> Values | None:
+        """The value as of a tick."""
+        at = self.place(tick)
+        return None if at < 0 else self.layout.unpack(self.packed[at])
+
+    def __iter__(self) -> Iterator[tuple[int, Values]]:
+        held, values = b"", ()
+        for tick, content in zip(self.ticks, self.packed, strict=True):
+            if content is not held:
+                held, values = content, self.layout.unpack(content)
+            yield tick, values
+
+
+@dataclass(frozen=True, slots=True)
+class LoggedRestart:
+    """A level that was started again.
+
+    Attributes:
+        tick: That of the cycle that it came before.
+        values: All leaves, from which the level went on.
+    """
+
+    tick: int
+    begun: Begun
+    values: Values
+
+
+@dataclass(frozen=True, slots=True)
+class LoggedLevel:
+    """A level of a log; the first record is what it started from, every other one a cycle.
+
+    Attributes:
+        restarts: In order; logs that were written before there were such records have none.
+    """
+
+    name: str
+    sign: Signature
+    level: LevelSign
+    track: Track
+    restarts: tuple[LoggedRestart, ...] = ()
+
+    def restarted(self, at: int) -> LoggedRestart | None:
+        """The restart that the cycle whose record has this place began from; None where it went on from the record before."""
+        after, until = self.track.ticks[at - 1], self.track.ticks[at]
+        return next((one for one in reversed(self.restarts) if after < one.tick <= until), None)
+
+
+@dataclass(frozen=True, slots=True)
+class Log:
+    """A log.
+
+    Attributes:
+        facts: The description of the system as it was written.
+        programs: The digest of each program that ran.
+        levels: From the top down.
+        buffers: Those that no level fills, by name.
+        checked: What its chain says of it.
+        finding: What the run breaks; None where it is not kept for that.
+    """
+
+    facts: Mapping[str, str]
+    programs: Mapping[str, str]
+    levels: tuple[LoggedLevel, ...]
+    buffers: Mapping[str, Track]
+    checked: Checked
+    finding: LoggedFinding | None = None
+
+    @property
+    def complete(self) -> bool:
+        """Whether the log is whole, and every byte as it was recorded."""
+        return self.checked.seal is Seal.WHOLE
+
+    def system(self, generated: Path = _NOWHERE, database: Path = _NOWHERE) -> Description:
+        """The description, with paths of here."""
+        return system_of(self.facts, generated, database)
+
+    @property
+    def tick_ms(self) -> int:
+        """Length of a tick in ms."""
+        return int(self.facts["tick_ms"])
+
+    @property
+    def first(self) -> int:
+        """The tick that recording started from, before the first cycle."""
+        return min(level.track.ticks[0] for level in self.levels)
+
+    @property
+    def last(self) -> int:
+        """The last tick."""
+        return max(level.track.ticks[-1] for level in self.levels)
+
+    @property
+    def ticks(self) -> range:
+        """Every tick in which cycles were recorded."""
+        return range(self.first + 1, self.last + 1)
+
+    def level(self, name: str) -> LoggedLevel:
+        """A level by its name.
+
+        Raises:
+            KeyError: There is none.
+        """
+        for level in self.levels:
+            if level.name == name:
+                return level
+        raise KeyError(name)
+
+
+def read(path: Path) -> Log:
+    """Reads a log; one that was cut off or changed is read as far as it is what was recorded.
+
+    Raises:
+        UnreadableLog: It cannot be read, or is none.
+    """
+    checked = Checked()
+    made = _Reading(checked)
+    try:
+        for record in records(path, checked):
+            made.take(record)
+        return made.log()
+    except OSError as error:
+        raise UnreadableLog(f"`{path}` cannot be read: {error.strerror}") from error
+    except (KeyError, TypeError, ValueError, AttributeError, StopIteration, struct.error) as error:
+        why = checked.why or (str(error) if isinstance(error, ValueError) else "")
+        raise UnreadableLog(f"`{path}` holds no run that rcsc recorded{why and f': {why}'}") from error
+
+
+@dataclass(slots=True)
+class _Reading:
+    """What was read so far."""
+
+    checked: Checked
+    metadata: dict[str, dict[str, str]] = field(default_factory=dict)
+    signs: dict[str, Signature] = field(default_factory=dict)
+    tracks: dict[int, Track] = field(default_factory=dict)
+    topics: dict[str, int] = field(default_factory=dict)
+    begun: dict[int, tuple[Begun, str, struct.Struct]] = field(default_factory=dict)
+    restarts: dict[str, list[LoggedRestart]] = field(default_factory=dict)
+
+    def take(self, record: McapRecord) -> None:
+        """Notes one record."""
+        match record:
+            case Metadata(name=name, metadata=said):
+                self.metadata[name] = said
+            case Channel():
+                self._channel(record)
+            case Message(channel_id=channel, sequence=tick, data=content) if channel in self.tracks:
+                self.tracks[channel].add(tick, content)
+            case Message(channel_id=channel, sequence=tick, data=content) if channel in self.begun:
+                self._restart(*self.begun[channel], tick, content)
+            case _:
+                pass
+
+    def _restart(self, begun: Begun, level: str, layout: struct.Struct, tick: int, content: bytes) -> None:
+        if len(content) != layout.size:
+            raise ValueError(f"{len(content)} bytes, not {layout.size}")
+        self.restarts.setdefault(level, []).append(LoggedRestart(tick, begun, layout.unpack(content)))
+
+    def _channel(self, channel: Channel) -> None:
+        if channel.id in self.tracks or channel.id in self.begun:  # said again at the end
+            return
+        if channel.topic in self.topics:
+            raise ValueError(f"two channels are called {shown(channel.topic)}")
+        if channel.topic.startswith(LEVELS):
+            sign = signature_from(channel.metadata[SIGNATURE])
+            self.signs[identifier(channel.topic.removeprefix(LEVELS), "level")] = sign
+            self.tracks[channel.id] = Track(sign.packed)
+        elif channel.topic.startswith(BUFFERS):
+            source, target = channel.topic.removeprefix(BUFFERS), channel.metadata["target"]
+            wire = wire_of(source, target)
+            leaves = buffer_leaves(self.signs[target.partition(".")[0]], wire)
+            self.tracks[channel.id] = Track(struct.Struct(message_format(leaves)))
+        elif channel.topic.startswith(RESTARTS):
+            begun, level = restart_of(channel.topic)
+            self.begun[channel.id] = begun, level, struct.Struct(message_format(self.signs[level].leaves))
+            return
+        else:
+            return
+        self.topics[channel.topic] = channel.id
+
+    def log(self) -> Log:
+        """The log.
+
+        Raises:
+            KeyError, TypeError, ValueError, AttributeError, StopIteration: It is none.
+        """
+        facts = self.metadata[SYSTEM]
+        levels = tuple(self._level(spec.name) for spec in system_of(facts, _NOWHERE, _NOWHERE).levels)
+        if not levels or not all(level.track.ticks for level in levels):
+            raise ValueError("no state")
+        buffers = {
+            topic.removeprefix(BUFFERS): self.tracks[channel]
+            for topic, channel in self.topics.items()
+            if topic.startswith(BUFFERS)
+        }
+        found = finding_of(self.metadata[FINDING]) if FINDING in self.metadata else None
+        log = Log(facts, self.metadata.get(PROGRAMS, {}), levels, buffers, self.checked, found)
+        held = sum(len(track.ticks) for track in self.tracks.values())
+        if log.last - log.first > _ALWAYS_TICKS + _TICKS_A_MESSAGE * held:
+            raise ValueError(f"{log.last - log.first} ticks and {held} records")
+        return log
+
+    def _level(self, name: str) -> LoggedLevel:
+        sign = self.signs[name]
+        level = next(one for one in sign.levels if one.name == name)
+        restarts = tuple(self.restarts.get(name, ()))
+        return LoggedLevel(name, sign, level, self.tracks[self.topics[LEVELS + name]], restarts)

@@ -1,0 +1,265 @@
+"""Replay: every level runs again from the recorded state with the recorded inputs, and must leave what it left then.
+
+A level that was started again runs from the state that is recorded of that.
+
+In: a log and a folder of generated executors. Out: moments, and differences in the words of the tables. With another
+folder than the log was written with it is a what-if: the first difference is where the other tables leave something
+else; a line of another name that leaves the same is none.
+"""
+
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from rcsc.run.adopt import Begun
+from rcsc.run.answers import Answers, told
+from rcsc.run.description import BadDescription
+from rcsc.run.executors import Executor
+from rcsc.run.levels import put_checked
+from rcsc.run.log.queries import Predicate
+from rcsc.run.log.read import Log, LoggedLevel
+from rcsc.run.log.schema import fingerprints
+from rcsc.run.log.states import line_of, words
+from rcsc.run.signature import Leaf, LevelSign, Signature, Value, Values
+from rcsc.run.system import Kind, executors, signatures
+
+_ASIDE = frozenset({"table", "line", "assumptions_failed"})
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """A leaf, or what else a cycle leaves, that is not what it was; in the tables' words."""
+
+    name: str
+    then: str
+    now: str
+
+
+@dataclass(frozen=True, slots=True)
+class Cycle:
+    """One level's cycle, then and now.
+
+    Attributes:
+        line_then: `table line`, as recorded; `line_now` as it matched now.
+        restarted: From what state the level had been started again before it; None where it had not.
+    """
+
+    level: str
+    line_then: str
+    line_now: str
+    differences: tuple[Difference, ...]
+    recorded: Values
+    now: Values
+    restarted: Begun | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """All levels that ran in a tick."""
+
+    tick: int
+    cycles: tuple[Cycle, ...]
+
+    @property
+    def differs(self) -> bool:
+        """Whether anything is not what it was."""
+        return any(cycle.differences for cycle in self.cycles)
+
+
+@dataclass(slots=True)
+class _Again:
+    """A level that runs again.
+
+    Attributes:
+        same: Whether the signature is the recorded one, so that bytes can be compared.
+        aside: What is shown but makes no difference alone: in a what-if, which line it was.
+        lacking: What the log has and these tables have not: leaves, and values that were put as the initial one.
+    """
+
+    logged: LoggedLevel
+    sign: Signature
+    level: LevelSign
+    executor: Executor
+    same: bool
+    packed: struct.Struct
+    aside: frozenset[str]
+    inputs: frozenset[int] = frozenset()
+    carried: tuple[tuple[int, int], ...] = ()
+    lacking: dict[str, None] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        then = self.logged.sign
+        self.inputs = frozenset(at for at, leaf in enumerate(then.leaves) if leaf.kind == "input")
+        self.carried = tuple(
+            (then.index[leaf.name], at) for at, leaf in enumerate(self.sign.leaves) if leaf.name in then.index
+        )
+        gone = (leaf.name for leaf in then.leaves if leaf.name not in self.sign.index)
+        self.lacking = dict.fromkeys(f"{self.logged.name}.{name}" for name in gone)
+
+    def cycle(self, at: int, answers: Answers) -> Cycle | None:
+        """Run the cycle whose record has this place; None for the state that recording started from."""
+        if at < 1:
+            return None
+        track = self.logged.track
+        recorded = track.layout.unpack(track.packed[at])
+        restart = self.logged.restarted(at)
+        self._put(track.layout.unpack(track.packed[at - 1]) if restart is None else restart.values, recorded)
+        told(self.executor, answers)
+        self.executor.cycle()
+        now = self.executor.values()
+        equal = self.same and self.packed.pack(*now) == track.packed[at]
+        return Cycle(
+            self.logged.name,
+            _line(self.logged.sign, self.logged.level, recorded),
+            _line(self.sign, self.level, now),
+            () if equal else self._differences(recorded, now),
+            recorded,
+            now,
+            None if restart is None else restart.begun,
+        )
+
+    def _put(self, before: Values, recorded: Values) -> None:
+        """The state before, and the inputs of the cycle; what the log does not know stays as it is.
+
+        Raises:
+            BadState: The tables are not proved for it.
+        """
+        start = [
+            recorded[at] if at in self.inputs else before[at] for at in range(len(self.logged.sign.leaves))
+        ]
+        if self.same:
+            put_checked(self.logged.name, self.sign, self.executor, tuple(start))
+            return
+        values = list(self.executor.values()[: len(self.sign.leaves)])
+        for source, target in self.carried:
+            then, now = self.logged.sign.leaves[source], self.sign.leaves[target]
+            values[target] = _translated(then, now, start[source])
+            if then.members != now.members and then.shown(start[source]) not in now.members:
+                self.lacking[f"{self.logged.name}.{then.name} = {then.shown(start[source])}"] = None
+        put_checked(self.logged.name, self.sign, self.executor, tuple(values))
+
+    def _differences(self, recorded: Values, now: Values) -> tuple[Difference, ...]:
+        then_words = words(self.logged.sign, self.logged.level, recorded)
+        now_words = words(self.sign, self.level, now)
+        found = tuple(
+            Difference(name, said, now_words[name])
+            for name, said in then_words.items()
+            if name in now_words and now_words[name] != said
+        )
+        return found if any(one.name not in self.aside for one in found) else ()
+
+
+def _translated(then: Leaf, now: Leaf, value: Value) -> Value:
+    """A recorded value in the other program's numbers; a member that it lacks is put as its initial value."""
+    if then.members == now.members:
+        return value
+    said = then.shown(value)
+    return now.members.index(said) if said in now.members else now.initial
+
+
+def _line(sign: Signature, level: LevelSign, values: Values) -> str:
+    return f"{sign.table_of(level, values)} line {line_of(sign, level, values) or 'none'}"
+
+
+@dataclass(slots=True)
+class Replay:
+    """A log that runs again, at any tick, forwards and backwards.
+
+    Attributes:
+        tick: Where it is now.
+        unchanged: Whether the executors are generated from the tables that the log was recorded with.
+    """
+
+    log: Log
+    generated: Path
+    kind: Kind = "c"
+    tick: int = 0
+    unchanged: bool = True
+    _levels: tuple[_Again, ...] = field(default=())
+
+    def __post_init__(self) -> None:
+        """Builds the executors.
+
+        Raises:
+            BadDescription: The generated programs do not fit the log.
+            NotBuilt: The C could not be built.
+        """
+        system = self.log.system(self.generated)
+        signs = signatures(system, fitting=False)  # each level runs alone
+        for name, sign in signs.items():
+            if not any(level.name == name for level in sign.levels):
+                raise BadDescription(f"program `{sign.program}` has no level `{name}`")
+        made = executors(system, signs, self.kind)
+        self.unchanged = fingerprints(system) == dict(self.log.programs)
+        self._levels = tuple(
+            _again(level, signs[level.name], made[level.name], self.unchanged) for level in self.log.levels
+        )
+        self.tick = self.log.first
+
+    def go(self, tick: int) -> Moment:
+        """Run the cycles of a tick again.
+
+        Raises:
+            IndexError: The log does not hold it.
+        """
+        if tick not in self.log.ticks:
+            raise IndexError(tick)
+        self.tick = tick
+        found = (
+            level.cycle(at, self._answers(tick, level.logged.name))
+            for level in self._levels
+            if (at := level.logged.track.place(tick)) >= 0 and level.logged.track.ticks[at] == tick
+        )
+        return Moment(tick, tuple(cycle for cycle in found if cycle is not None))
+
+    def _answers(self, tick: int, level: str) -> Answers:
+        """What extern procedures gave in a cycle of a finding; where the log keeps none, they are called."""
+        told = None if self.log.finding is None else self.log.finding.cycles.get((tick, level))
+        return () if told is None else told.answers
+
+    def forward(self) -> Moment:
+        """The next tick.
+
+        Raises:
+            IndexError: This was the last.
+        """
+        return self.go(self.tick + 1)
+
+    def back(self) -> Moment:
+        """The tick before.
+
+        Raises:
+            IndexError: This was the first.
+        """
+        return self.go(self.tick - 1)
+
+    def moments(self) -> Iterator[Moment]:
+        """Every tick from the first."""
+        return (self.go(tick) for tick in self.log.ticks)
+
+    @property
+    def lacking(self) -> tuple[str, ...]:
+        """What the log has and these tables have not, as far as it was run: it was not compared, or stood at its initial value."""
+        return tuple(one for level in self._levels for one in level.lacking)
+
+    def first_difference(self) -> Moment | None:
+        """The first tick in which a level leaves something else than was recorded; None for none."""
+        return next((moment for moment in self.moments() if moment.differs), None)
+
+
+def _again(logged: LoggedLevel, sign: Signature, executor: Executor, unchanged: bool) -> _Again:
+    level = next(one for one in sign.levels if one.name == logged.name)
+    aside = frozenset() if unchanged else _ASIDE - logged.sign.index.keys()
+    return _Again(logged, sign, level, executor, sign == logged.sign, sign.packed, aside)
+
+
+def find(log: Log, wanted: Predicate, start: int | None = None) -> int | None:
+    """The first tick from `start` on in which the recorded values are as wanted; None for none."""
+    for tick in log.ticks if start is None else range(max(start, log.first + 1), log.last + 1):
+        moment = {
+            level.name: values for level in log.levels if (values := level.track.latest(tick)) is not None
+        }
+        if wanted(moment):
+            return tick
+    return None

@@ -1,0 +1,147 @@
+"""What a log says of itself: the layout of each message for other tools, and each level's signature for rcsc.
+
+In: signatures and descriptions. Out: their texts, and back. The canonical bytes of a state (little-endian, unpadded, in
+order) are at the same time a ROS 1 message of plain fields, so that any viewer of MCAP files decodes them.
+
+Source: MCAP specification, registry of well-known encodings (`ros1`, `ros1msg`); ROS 1 `msg` format.
+"""
+
+import hashlib
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+
+from rcsc.host.files.names import file_name
+from rcsc.host.files.read import Said, content, json_of
+from rcsc.run.adopt import Begun
+from rcsc.run.description import LONGEST_MS, MOST_LEVELS, Description, Wire, level_of, wire_of
+from rcsc.run.signature import FORMATS, Leaf, Signature, generated_files, signature_of
+
+FORMAT = "1"
+SYSTEM, PROGRAMS = "rcsc.system", "rcsc.programs"
+"""Names of the metadata records."""
+SIGNATURE = "rcsc.signature"
+"""Key of a level's channel that holds its program's signature."""
+LEVELS, BUFFERS, RESTARTS = "/levels/", "/buffers/", "/restarts/"
+"""How the topics of channels begin."""
+
+_ROS = {
+    "bool": "bool", "uint8_t": "uint8", "int8_t": "int8", "uint16_t": "uint16", "int16_t": "int16",
+    "uint32_t": "uint32", "int32_t": "int32", "uint64_t": "uint64", "int64_t": "int64", "double": "float64",
+}  # fmt: skip
+_TRACE_FIELDS = (
+    "int32 line # place of the line in its table, from 0; -1 for none",
+    "int32 fault # 0 for none",
+    "int32 fault_at # place of the leaf that was refused; -1 for none",
+)
+_FAILED_FIELD = "uint64 {} # one bit an assumption that is checked"
+
+
+def message_definition(leaves: Sequence[Leaf], failed: Sequence[str] | None = None) -> str:
+    """The fields of a message, one a line, an enumeration's members as constants before it.
+
+    Args:
+        leaves: What the message holds.
+        failed: Words of failed assumptions; with them the trace comes after the leaves.
+    """
+    rows = [row for leaf in leaves for row in _field(leaf)]
+    if failed is not None:
+        rows += [*_TRACE_FIELDS, *map(_FAILED_FIELD.format, failed)]
+    return "\n".join(rows) + "\n"
+
+
+def _field(leaf: Leaf) -> Iterable[str]:
+    kind, name = _ROS[leaf.c_type], leaf.attribute
+    for value, member in enumerate(leaf.members):
+        yield f"{kind} {name.upper()}_{member.upper()}={value}"
+    said = " ".join(f"{leaf.name} ({leaf.kind}{', ' + leaf.unit if leaf.unit else ''}) {leaf.doc}".split())
+    yield f"{kind} {name} # {said}"
+
+
+def restart_topic(begun: Begun, level: str) -> str:
+    """The channel of a level's restarts of one kind: `/restarts/anew/task`."""
+    return f"{RESTARTS}{begun.value}/{level}"
+
+
+def restart_of(topic: str) -> tuple[Begun, str]:
+    """What `restart_topic` was made of.
+
+    Raises:
+        ValueError: A kind that this version does not know.
+    """
+    begun, _, level = topic.removeprefix(RESTARTS).partition("/")
+    return Begun(begun), level
+
+
+def message_format(leaves: Iterable[Leaf]) -> str:
+    """The same for `struct`, without the trace."""
+    return "<" + "".join(FORMATS[leaf.c_type] for leaf in leaves)
+
+
+def compact(value: object) -> str:
+    """A value as JSON, always the same text for the same value."""
+    return json.dumps(value, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
+
+
+def signature_text(sign: Signature) -> str:
+    """A signature as text."""
+    return compact(asdict(sign))
+
+
+def signature_from(text: str) -> Signature:
+    """A signature from its text.
+
+    Raises:
+        Malformed: It is none.
+    """
+    return signature_of(Said(json_of(text), "signature"))
+
+
+def system_facts(system: Description) -> dict[str, str]:
+    """The description without its paths, which are another's on another machine."""
+    return {
+        "format": FORMAT,
+        "name": system.name,
+        "tick_ms": str(system.tick_ms),
+        "levels": compact([asdict(level) for level in system.levels]),
+        "wires": compact([[wire.source, wire.target] for wire in system.wires]),
+    }
+
+
+def system_of(facts: Mapping[str, str], generated: Path, database: Path) -> Description:
+    """The description again, with paths of here.
+
+    Raises:
+        KeyError, TypeError, ValueError: The facts are none.
+    """
+    if facts["format"] != FORMAT:
+        raise ValueError(f"format {facts['format']}, not {FORMAT}")
+    levels = tuple(map(level_of, Said({"levels": json_of(facts["levels"])}).each("levels", MOST_LEVELS)))
+    wires = tuple(wire_of(source, target) for source, target in json_of(facts["wires"]))
+    tick_ms = Said({"tick_ms": int(facts["tick_ms"])}).whole("tick_ms", 1, LONGEST_MS)
+    return Description(file_name(facts["name"], "name"), generated, database, tick_ms, levels, wires)
+
+
+def fingerprints(system: Description) -> dict[str, str]:
+    """A digest of everything generated for each program: equal digests, equal tables."""
+    found = {}
+    for program in sorted({level.program for level in system.levels}):
+        digest = hashlib.sha256()
+        for path in generated_files(system.generated, program):
+            text = content(path) if path.is_file() else b""
+            digest.update(f"{path.parent.name}/{path.name} {len(text)}\n".encode() + text)
+        found[program] = digest.hexdigest()
+    return found
+
+
+def outside_wires(system: Description) -> tuple[Wire, ...]:
+    """The buffers that no level fills."""
+    levels = {level.name for level in system.levels}
+    return tuple(wire for wire in system.wires if wire.source.partition(".")[0] not in levels)
+
+
+def buffer_leaves(sign: Signature, wire: Wire) -> tuple[Leaf, ...]:
+    """The leaves that a buffer fills."""
+    run = sign.record(wire.target.partition(".")[2])
+    return sign.leaves[run.start : run.stop]

@@ -1,0 +1,119 @@
+"""The state of a level in the words of its table.
+
+In: a signature and values. Out: names and texts; beside the leaves a level has `table`, `line`, `fault` and
+`assumptions_failed`.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from rcsc.run.adopt import Begun
+from rcsc.run.signature import FAULTS, LevelSign, Signature, Value, Values
+
+TRACED = ("table", "line", "fault", "fault_at", "assumptions_failed")
+"""What a cycle leaves beside the leaves; a leaf of the same name hides it."""
+
+
+def line_of(sign: Signature, level: LevelSign, values: Values) -> str:
+    """The line that the cycle ran; empty for none."""
+    lines = sign.tables.get(sign.table_of(level, values), ())
+    at = int(values[len(sign.leaves)])
+    return lines[at] if 0 <= at < len(lines) else ""
+
+
+def fault_of(sign: Signature, values: Values) -> str:
+    """What stopped the cycle; `none` for nothing."""
+    at = int(values[len(sign.leaves) + 1])
+    return FAULTS[at] if 0 <= at < len(FAULTS) else f"{at}?"
+
+
+def refused_of(sign: Signature, values: Values) -> str:
+    """The leaf that was refused, or the assumption that ended the cycle; empty for none."""
+    return sign.fault_at(values)
+
+
+def failed_of(sign: Signature, values: Values) -> str:
+    """The assumptions that did not hold, by spaces."""
+    return " ".join(sign.failures(values))
+
+
+def traced(sign: Signature, level: LevelSign, values: Values) -> dict[str, str]:
+    """What the cycle left beside the leaves."""
+    said = (
+        sign.table_of(level, values), line_of(sign, level, values), fault_of(sign, values),
+        refused_of(sign, values), failed_of(sign, values),
+    )  # fmt: skip
+    return dict(zip(TRACED, said, strict=True))
+
+
+def words(sign: Signature, level: LevelSign, values: Values) -> dict[str, str]:
+    """Everything, by name."""
+    said = {leaf.name: leaf.shown(value) for leaf, value in zip(sign.leaves, values, strict=False)}
+    return traced(sign, level, values) | said
+
+
+def fault_in_words(sign: Signature, level: LevelSign, values: Values) -> str:
+    """`table acquire: no line matches`, `table acquire: input refused, `status_in``; empty where the cycle ended well."""
+    if int(values[len(sign.leaves) + 1]) == 0:
+        return ""
+    leaf = refused_of(sign, values)
+    return f"table {sign.table_of(level, values)}: {fault_of(sign, values)}" + (f", `{leaf}`" if leaf else "")
+
+
+def begun_in_words(begun: Begun) -> str:
+    """From what state a level went on that was started again."""
+    return _BEGUN[begun]
+
+
+_BEGUN = {
+    Begun.CHECKPOINT: "from the state that its last cycle left",
+    Begun.ANEW: "anew, its command failed and its orders at rest",
+}
+
+
+def plain(value: Value) -> Value | str:
+    """A number that JSON and CSV can hold."""
+    return repr(value) if isinstance(value, float) and not math.isfinite(value) else value
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """One thing that is read off a level's values.
+
+    Attributes:
+        members: What it may be, in order; empty for numbers, bools and free text.
+        c_type: Of a leaf; empty for text.
+    """
+
+    name: str
+    members: tuple[str, ...]
+    c_type: str
+    unit: str
+    read: Callable[[Values], Value | str]
+
+
+def columns(sign: Signature, level: LevelSign) -> tuple[Column, ...]:
+    """Every column of a level: what the cycle did, then the leaves in declared order."""
+    leaves = tuple(_leaf(sign, at) for at in range(len(sign.leaves)))
+    taken = {leaf.name for leaf in sign.leaves}
+    return (*(one for one in _trace(sign, level) if one.name not in taken), *leaves)
+
+
+def _leaf(sign: Signature, at: int) -> Column:
+    leaf = sign.leaves[at]
+    if leaf.members:
+        return Column(leaf.name, leaf.members, "", leaf.unit, lambda values: leaf.shown(values[at]))
+    return Column(leaf.name, (), leaf.c_type, leaf.unit, lambda values: values[at])
+
+
+def _trace(sign: Signature, level: LevelSign) -> tuple[Column, ...]:
+    tables = (level.table,) if level.table else tuple(dict.fromkeys(level.tables.values()))
+    lines = tuple(dict.fromkeys(line for table in tables for line in sign.tables.get(table, ())))
+    return (
+        Column("table", tables, "", "", lambda values: sign.table_of(level, values)),
+        Column("line", ("", *lines), "", "", lambda values: line_of(sign, level, values)),
+        Column("fault", FAULTS, "", "", lambda values: fault_of(sign, values)),
+        Column("fault_at", (), "", "", lambda values: refused_of(sign, values)),
+        Column("assumptions_failed", (), "", "", lambda values: failed_of(sign, values)),
+    )

@@ -1,0 +1,316 @@
+"""A recorded run, tick by tick, as its levels saw it: the order that each took, its report, its orders and the reports that it saw.
+
+In: a log. Out: `Frame`s, in the words of the tables. What an order and a report are is told by their fields (Haynes et al.
+1984, section 9): an order has `inc_command` and `input_command`, a report `inc_command_echo`, `ref_command_echo` and
+`status_report`. A level sees a report before it orders: so the report is set against the order that stood before the cycle.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from rcsc.lang.model import pending
+from rcsc.run.log.finding import LoggedCycle
+from rcsc.run.log.read import Log, LoggedLevel
+from rcsc.run.log.states import failed_of, fault_of, line_of, refused_of
+from rcsc.run.signature import Leaf, Values
+
+NUMBER, COMMAND = "inc_command", "input_command"
+ECHO, ECHOED, STATUS = "inc_command_echo", "ref_command_echo", "status_report"
+
+
+@dataclass(frozen=True, slots=True)
+class Said:
+    """A value by its name, and whether this cycle changed it."""
+
+    name: str
+    value: str
+    changed: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Order:
+    """An order as it stands behind the cycle.
+
+    Attributes:
+        buffer: The level's own name of it.
+        other: Who is at the other end of the buffer; empty where the log does not say.
+        number: Its number; None for what is not numbered.
+        new: Whether the number is not what it was.
+        altered: Whether the command is not what it was, though the number is.
+        fields: What else it says that is not as it was at first, or that changed.
+    """
+
+    buffer: str
+    other: str
+    number: int | None
+    command: str
+    new: bool
+    altered: bool
+    fields: tuple[Said, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Reported:
+    """A report, and the order that it is set against.
+
+    Attributes:
+        echoed: The command that it is about.
+        of_number: The number of the order; None where there is none to be set against.
+        of_command: Its command.
+    """
+
+    buffer: str
+    other: str
+    echo: int | None
+    echoed: str
+    status: str
+    of_number: int | None
+    of_command: str
+    fields: tuple[Said, ...]
+
+    @property
+    def matches(self) -> bool:
+        """Whether the number echoed is that of the order."""
+        return self.echo == self.of_number
+
+    @property
+    def same_command(self) -> bool:
+        """Whether it is about the command of the order."""
+        return self.echoed == self.of_command
+
+
+@dataclass(frozen=True, slots=True)
+class State:
+    """A state variable, or an output that nobody answers.
+
+    Attributes:
+        deferred: Whether its next value waits for an echo.
+        pending: Its deferred next value where that is another; empty otherwise.
+    """
+
+    name: str
+    before: str
+    now: str
+    deferred: bool = False
+    pending: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Box:
+    """A level in a tick.
+
+    Attributes:
+        ran: Whether it had a cycle; if not, everything else is empty.
+        lines: What matched: one where all is well.
+        fault: What ended the cycle early; empty for nothing.
+        wrong: What went wrong in it, in words.
+        above: The order taken, and the report given upward, where there are such.
+        below: The reports seen, each beside the order that was given to the same.
+        inputs: Other inputs that changed.
+        states: Those that are deferred, and whatever else changed.
+    """
+
+    level: str
+    ran: bool
+    table: str = ""
+    lines: tuple[str, ...] = ()
+    fault: str = ""
+    wrong: str = ""
+    above: tuple[tuple[Order | None, Reported | None], ...] = ()
+    below: tuple[tuple[Reported | None, Order | None], ...] = ()
+    inputs: tuple[Said, ...] = ()
+    states: tuple[State, ...] = ()
+
+    @property
+    def matched(self) -> str:
+        """Which lines matched, as it is said."""
+        if len(self.lines) > 1:
+            return f"lines {', '.join(self.lines[:-1])} and {self.lines[-1]} match"
+        return f"line {self.lines[0]}" if self.lines else self.fault or "no line"
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """A tick: every level of the log, from the top down."""
+
+    tick: int
+    boxes: tuple[Box, ...]
+
+
+def frames(log: Log) -> Iterator[Frame]:
+    """Every tick of a log."""
+    wires = _wires(log)
+    for tick in log.ticks:
+        yield Frame(tick, tuple(_box(log, level, tick, wires) for level in log.levels))
+
+
+def _wires(log: Log) -> dict[str, str]:
+    """Who is at the other end of each variable, `level.variable`."""
+    found: dict[str, str] = {}
+    for wire in log.system().wires:
+        found[wire.target] = wire.source.partition(".")[0]
+        found[wire.source] = wire.target.partition(".")[0]
+    return found
+
+
+def _box(log: Log, level: LoggedLevel, tick: int, wires: Mapping[str, str]) -> Box:
+    at = level.track.place(tick)
+    if at < 1 or level.track.ticks[at] != tick:
+        return Box(level.name, ran=False)
+    restart = level.restarted(at)
+    before = level.track.layout.unpack(level.track.packed[at - 1]) if restart is None else restart.values
+    after = level.track.layout.unpack(level.track.packed[at])
+    told = log.finding.cycles.get((tick, level.name)) if log.finding is not None else None
+    return _Cycle(level, before, after, wires).box(told)
+
+
+@dataclass(frozen=True, slots=True)
+class _Cycle:
+    """One cycle of a level: every leaf before and behind it."""
+
+    logged: LoggedLevel
+    before: Values
+    after: Values
+    wires: Mapping[str, str]
+
+    def box(self, told: LoggedCycle | None) -> Box:
+        """What there is to be seen."""
+        sign, level = self.logged.sign, self.logged.level
+        fault, leaf = fault_of(sign, self.after), refused_of(sign, self.after)
+        line, failed = line_of(sign, level, self.after), failed_of(sign, self.after)
+        lines = told.matched if told is not None and told.matched else (line,) if line else ()
+        above, below = self._exchanges()
+        return Box(
+            level.name,
+            ran=True,
+            table=sign.table_of(level, self.after),
+            lines=lines,
+            fault="" if fault == "none" else fault + (f": {leaf}" if leaf else ""),
+            wrong=told.wrong if told is not None else f"assumptions fail: {failed}" if failed else "",
+            above=above,
+            below=below,
+            inputs=tuple(
+                said for record in self._aside() for said in self._fields(record, only_changed=True)
+            ),
+            states=tuple(self._states()),
+        )
+
+    # --- orders and reports ---
+
+    def _exchanges(
+        self,
+    ) -> tuple[
+        tuple[tuple[Order | None, Reported | None], ...], tuple[tuple[Reported | None, Order | None], ...]
+    ]:
+        """With whoever orders this level, and with those that it orders."""
+        sides: dict[tuple[str, bool], tuple[str, str]] = {}
+        for record, kind in self._records().items():
+            order, report = self._has(record, COMMAND), self._has(record, STATUS)
+            if order != report and kind != "state":
+                key = self._other(record) or record, order is (kind == "input")
+                held = sides.get(key, ("", ""))
+                sides[key] = (record, held[1]) if order else (held[0], record)
+        above, below = [], []
+        for (_, upward), (order_of, report_of) in sides.items():
+            given = self._order(order_of) if order_of else None
+            if upward:
+                above.append((given, self._reported(report_of, order_of, self.after) if report_of else None))
+            else:
+                below.append((self._reported(report_of, order_of, self.before) if report_of else None, given))
+        return tuple(above), tuple(below)
+
+    def _order(self, record: str) -> Order:
+        number = f"{record}.{NUMBER}"
+        command, before = (self._word(values, f"{record}.{COMMAND}") for values in (self.after, self.before))
+        numbered = number in self.logged.sign.index
+        new = numbered and self._value(self.after, number) != self._value(self.before, number)
+        return Order(
+            record,
+            self._other(record),
+            int(self._value(self.after, number)) if numbered else None,
+            command,
+            new,
+            numbered and not new and command != before,
+            self._fields(record, but=(NUMBER, COMMAND)),
+        )
+
+    def _reported(self, record: str, order: str, stood: Values) -> Reported:
+        """A report, against the order as it stood then."""
+        echo, number = f"{record}.{ECHO}", f"{order}.{NUMBER}"
+        echoed, known = f"{record}.{ECHOED}", self.logged.sign.index
+        return Reported(
+            record,
+            self._other(record),
+            int(self._value(self.after, echo)) if echo in known else None,
+            self._word(self.after, echoed) if echoed in known else "",
+            self._word(self.after, f"{record}.{STATUS}"),
+            int(self._value(stood, number)) if order and number in known else None,
+            self._word(stood, f"{order}.{COMMAND}") if order else "",
+            self._fields(record, but=(ECHO, ECHOED, STATUS)),
+        )
+
+    # --- everything else ---
+
+    def _aside(self) -> Iterator[str]:
+        """Inputs that are neither orders nor reports."""
+        for record, kind in self._records().items():
+            if kind == "input" and not self._is_said(record):
+                yield record
+
+    def _states(self) -> Iterator[State]:
+        """Deferred ones first, whether or not they changed; then what changed of the others, and of outputs to nobody who answers."""
+        index, leaves = self.logged.sign.index, self.logged.sign.leaves
+        deferred = [leaf.name for leaf in leaves if pending(leaf.name) in index]
+        nexts = {str(pending(name)) for name in deferred}
+        for name in deferred:
+            now, then = self._word(self.after, name), self._word(self.after, pending(name))
+            yield State(name, self._word(self.before, name), now, True, then if then != now else "")
+        said = {*deferred, *nexts}
+        for leaf in leaves:
+            aside = leaf.kind == "state" or (leaf.kind == "output" and not self._is_said(leaf.name))
+            if aside and leaf.name not in said and self._changed(leaf):
+                yield State(leaf.name, self._word(self.before, leaf.name), self._word(self.after, leaf.name))
+
+    def _fields(
+        self, record: str, but: tuple[str, ...] = (), *, only_changed: bool = False
+    ) -> tuple[Said, ...]:
+        """The leaves of a record that are not as at first, or that changed; an array in it as one."""
+        aside = {f"{record}.{name}" for name in but}
+        arrays: dict[str, list[Leaf]] = {}
+        for at in self.logged.sign.record(record):
+            leaf = self.logged.sign.leaves[at]
+            if leaf.name not in aside:
+                arrays.setdefault(leaf.name.partition("[")[0], []).append(leaf)
+        found = []
+        for name, leaves in arrays.items():
+            changed = any(map(self._changed, leaves))
+            at_first = all(self._value(self.after, leaf.name) == leaf.initial for leaf in leaves)
+            if changed or not (only_changed or at_first):
+                words = [self._word(self.after, leaf.name) for leaf in leaves]
+                shown = words[0] if "[" not in leaves[0].name else f"({', '.join(words)})"
+                found.append(Said(name if only_changed else name.removeprefix(f"{record}."), shown, changed))
+        return tuple(found)
+
+    def _records(self) -> dict[str, str]:
+        """Variables, records and arrays whole, with their kinds, in declared order."""
+        return {leaf.name.partition(".")[0].partition("[")[0]: leaf.kind for leaf in self.logged.sign.leaves}
+
+    def _is_said(self, name: str) -> bool:
+        """Whether it is an order or a report, or a leaf of one."""
+        record = name.partition(".")[0]
+        return self._has(record, COMMAND) or self._has(record, STATUS)
+
+    def _has(self, record: str, field: str) -> bool:
+        return f"{record}.{field}" in self.logged.sign.index
+
+    def _other(self, record: str) -> str:
+        return self.wires.get(f"{self.logged.name}.{record}", "")
+
+    def _changed(self, leaf: Leaf) -> bool:
+        return self._value(self.before, leaf.name) != self._value(self.after, leaf.name)
+
+    def _value(self, values: Values, name: str) -> bool | int | float:
+        return values[self.logged.sign.index[name]]
+
+    def _word(self, values: Values, name: str) -> str:
+        return self.logged.sign.leaves[self.logged.sign.index[name]].shown(self._value(values, name))

@@ -1,0 +1,279 @@
+"""Common memory of several processes: one block of shared memory for a whole system.
+
+In: a description and signatures, from which every process computes the same layout. Out: `SharedMemoryBuffers`.
+
+A level's region holds its complete state as canonical bytes. The buffers that it gives are part of that state, so one commit
+publishes them all together with the checkpoint: a level that is killed at any instant goes on from its last committed
+cycle, and nobody has seen anything of a later one. Each buffer from outside the levels has a region of its own.
+
+A region is a word and two slots. The word is the stamp of the committed slot, and says by its parity which one that is. A
+writer fills the other slot and then sets the word: killed in between, it leaves the old slot and the old word. A slot
+starts with its own stamp, 0 while it is being written, and carries a checksum; a reader that meets a writer finds the
+stamp changed, and tries again. What does not agree with its checksum is never believed.
+
+One process writes a region; a level is not started twice.
+"""
+
+import struct
+import time
+import zlib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import Enum, auto
+from typing import Self
+
+from rcsc.run.description import BadDescription, Description
+from rcsc.run.processes.block import Block
+from rcsc.run.signature import FORMATS, Signature, Values
+
+HEAD = struct.Struct("<QQII")  # stamp, which buffers are there, checksum, nothing
+LINE = 64  # bytes of a cache line: writers of different regions do not slow each other
+CHECKPOINT = 1 << 63
+MOST_BUFFERS = 63
+TRIES = 10_000
+# From one stamp to the next. Odd, so that slots take turns; and no byte of it is 00 or ff, so that the stamps differ in every
+# byte, whatever is carried: a damaged word does not name the slot before.
+STEP = 0x9E37_79B9_7F4A_7C15
+STAMPS = 1 << 64
+
+
+class Absent(Enum):
+    """Why there is no checkpoint."""
+
+    BLANK = auto()  # the level has never run
+    LOST = auto()  # it has, or somebody else wrote here: what is there is not believed
+
+
+@dataclass(frozen=True, slots=True)
+class Region:
+    """What one process writes in one commit.
+
+    Attributes:
+        at: First byte.
+        packed: The payload.
+        slot: Bytes of a slot.
+    """
+
+    at: int
+    packed: struct.Struct
+    slot: int
+
+    def place(self, stamp: int) -> int:
+        """First byte of the slot of a stamp."""
+        return self.at + LINE + (stamp & 1) * self.slot
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """A buffer: part of a region's payload.
+
+    Attributes:
+        region: Name of the region.
+        first: First byte in the payload.
+        bit: Says in the slot's head that the buffer is there.
+    """
+
+    region: str
+    first: int
+    packed: struct.Struct
+    bit: int
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """Where everything lies; the same in every process.
+
+    Attributes:
+        seed: Of the checksums, from the layout itself: what another layout wrote is not believed.
+    """
+
+    regions: Mapping[str, Region]
+    places: Mapping[str, Place]
+    size: int
+    seed: int
+
+
+@dataclass(frozen=True, slots=True)
+class Image:
+    """What a committed slot held."""
+
+    stamp: int
+    mask: int
+    payload: bytes
+
+
+def layout(system: Description, signs: Mapping[str, Signature]) -> Layout:
+    """The layout of a system.
+
+    Args:
+        system: Levels and wires.
+        signs: By the level's name.
+
+    Raises:
+        BadDescription: A buffer joins what does not fit, or nothing that is a level.
+    """
+    payloads = {level.name: signs[level.name].packed for level in system.levels}
+    places: dict[str, Place] = {}
+    for wire in system.wires:
+        owner, _, variable = wire.source.partition(".")
+        taker, _, taken = wire.target.partition(".")
+        ends = [
+            _record(signs[name], part) for name, part in ((owner, variable), (taker, taken)) if name in signs
+        ]
+        if not ends or len({text for _, text in ends}) > 1:
+            raise BadDescription(f"buffer `{wire.source}` = `{wire.target}` does not fit")
+        if wire.source in places:
+            continue
+        first, text = ends[0]
+        packed = struct.Struct(f"<{text}")
+        if owner in signs:
+            bit = 1 << sum(one.region == owner for one in places.values())
+            places[wire.source] = Place(owner, first, packed, bit)
+        else:
+            payloads[wire.source] = packed
+            places[wire.source] = Place(wire.source, 0, packed, 1)
+    if any(place.bit >= CHECKPOINT for place in places.values()):
+        raise BadDescription(f"a level gives more than {MOST_BUFFERS} buffers")
+    return _laid(payloads, places)
+
+
+def _record(sign: Signature, variable: str) -> tuple[int, str]:
+    """Where a record begins in the canonical bytes, and its format."""
+    try:
+        run = sign.record(variable)
+    except KeyError as error:
+        raise BadDescription(f"program `{sign.program}` has no variable `{variable}`") from error
+    formats = [FORMATS[leaf.c_type] for leaf in sign.leaves]
+    return struct.calcsize("<" + "".join(formats[: run.start])), "".join(formats[run.start : run.stop])
+
+
+def _laid(payloads: Mapping[str, struct.Struct], places: Mapping[str, Place]) -> Layout:
+    regions, at = {}, 0
+    for name, packed in payloads.items():
+        slot = -(-(HEAD.size + packed.size) // LINE) * LINE
+        regions[name] = Region(at, packed, slot)
+        at += LINE + 2 * slot
+    said = [(name, one.at, one.packed.format) for name, one in regions.items()]
+    said += [(name, one.first, one.packed.format) for name, one in places.items()]
+    return Layout(regions, places, at, zlib.crc32(repr(said).encode()))
+
+
+@dataclass(slots=True)
+class SharedMemoryBuffers:
+    """The buffers of a system in a block of shared memory; a transport between processes.
+
+    Attributes:
+        block: Where the regions are; whoever made it removes it.
+    """
+
+    block: Block
+    layout: Layout
+    _images: dict[str, Image] = field(default_factory=dict)
+    _read: dict[str, tuple[bytes, Values]] = field(default_factory=dict)
+
+    @classmethod
+    def create(cls, layout: Layout) -> Self:
+        """A new block in which no buffer holds anything."""
+        made = cls(Block.create(layout.size), layout)
+        for name, region in layout.regions.items():
+            made._commit(name, 0, bytes(region.packed.size))
+        return made
+
+    @classmethod
+    def attach(cls, name: str, layout: Layout) -> Self:
+        """The block of that name.
+
+        Raises:
+            FileNotFoundError: There is none.
+        """
+        return cls(Block.attach(name), layout)
+
+    def publish(self, name: str, values: Values) -> None:
+        """Make this the latest value."""
+        place = self.layout.places[name]
+        held = self._image(place.region)
+        mask, payload = (
+            (held.mask, held.payload) if held else (0, bytes(self.layout.regions[place.region].packed.size))
+        )
+        new = place.packed.pack(*values)
+        rest = payload[place.first + len(new) :]
+        # A checkpoint says what the outputs were after a cycle, and this is none.
+        self._commit(place.region, (mask | place.bit) & ~CHECKPOINT, payload[: place.first] + new + rest)
+
+    def latest(self, name: str) -> Values | None:
+        """The latest value; None before the first. The same tuple, for as long as the value is the same."""
+        place = self.layout.places[name]
+        held = self._image(place.region)
+        known = self._read.get(name)
+        if held is None or not held.mask & place.bit:
+            return known[1] if known else None
+        now = held.payload[place.first : place.first + place.packed.size]
+        if known is not None and known[0] == now:
+            return known[1]
+        values: Values = place.packed.unpack(now)
+        self._read[name] = now, values
+        return values
+
+    def commit(self, level: str, values: Values) -> None:
+        """Makes this the level's checkpoint, and publishes every buffer that it gives, in one step.
+
+        Args:
+            level: Its name.
+            values: All leaves and the trace after a cycle.
+        """
+        self._commit(level, CHECKPOINT | (CHECKPOINT - 1), self.layout.regions[level].packed.pack(*values))
+
+    def checkpoint(self, level: str) -> Values | Absent:
+        """All leaves and the trace after the level's last cycle."""
+        self._images.pop(level, None)
+        held = self._image(level)
+        if held is not None and held.mask & CHECKPOINT:
+            values: Values = self.layout.regions[level].packed.unpack(held.payload)
+            return values
+        return Absent.BLANK if held is not None and held.mask == 0 else Absent.LOST
+
+    def close(self) -> None:
+        """Lets go of the block."""
+        self.block.close()
+
+    def _commit(self, name: str, mask: int, payload: bytes) -> None:
+        region = self.layout.regions[name]
+        held = self._image(name)
+        # After garbage, a stamp that no reader has met: it would take the new value for one that it knows.
+        stamp = ((held.stamp if held else time.time_ns()) + STEP) % STAMPS
+        image = HEAD.pack(stamp, mask, self._checksum(stamp, mask, payload), 0) + payload
+        at = region.place(stamp)
+        self.block.set_word(at, 0)
+        self.block.write(at + 8, image[8:])
+        self.block.set_word(at, stamp)
+        self.block.set_word(region.at, stamp)
+        self._images[name] = Image(stamp, mask, payload)
+
+    def _image(self, name: str) -> Image | None:
+        """The committed slot; None where nothing is to be believed."""
+        region, known = self.layout.regions[name], self._images.get(name)
+        for _ in range(TRIES):
+            stamp = self.block.word(region.at)
+            if known is not None and known.stamp == stamp:
+                return known
+            found = self._slot(region, stamp)
+            if found is not None:
+                self._images[name] = found
+                return found
+            if self.block.word(region.at) == stamp:  # no writer has been here: the slot is bad
+                return None
+        return known
+
+    def _slot(self, region: Region, stamp: int) -> Image | None:
+        at = region.place(stamp)
+        image = self.block.read(at, HEAD.size + region.packed.size)
+        # The stamp before and after says that no writer was here; the checksum, that one had been, in whatever order
+        # this machine shows one processor's stores to another.
+        said, mask, checksum, _ = HEAD.unpack_from(image)
+        payload = image[HEAD.size :]
+        if not said == stamp == self.block.word(at) or checksum != self._checksum(stamp, mask, payload):
+            return None
+        return Image(stamp, mask, payload)
+
+    def _checksum(self, stamp: int, mask: int, payload: bytes) -> int:
+        return zlib.crc32(payload, zlib.crc32(struct.pack("<QQ", stamp, mask), self.layout.seed))

@@ -1,0 +1,207 @@
+"""What runs in a process of its own: a level, or what stands outside the levels.
+
+In: a `Setting`, which travels to the process, and names. Out: cycles, each committed in one step, until the process is told to
+end, meets a fault, or is left alone.
+"""
+
+import contextlib
+import importlib
+import os
+import signal
+import struct
+import time
+from collections.abc import Iterator, Sized
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Protocol
+
+from rcsc.run.adopt import restart
+from rcsc.run.buffers import Buffers
+from rcsc.run.description import Description
+from rcsc.run.executors import CExecutor, PythonExecutor, build
+from rcsc.run.levels import RunningLevel, StateTableError, running_level
+from rcsc.run.processes.memory import Absent, SharedMemoryBuffers, layout
+from rcsc.run.signature import Signature, Values
+from rcsc.run.system import Kind, Outside, signatures
+
+if TYPE_CHECKING:
+    from multiprocessing.connection import Connection
+
+FAULTY = 3  # a level's exit code after a fault; which one stands in its checkpoint
+REFUSED = 4  # of a process that was refused a state or values; it has told why
+MOST_TOLD = 4096
+NAP_S = 20e-6
+HEED_S = 0.1
+"""A signal does not end a sleep; a period may be long where the system runs slower than the clock."""
+
+
+class Transport(Buffers, Protocol):
+    """Buffers between processes, with checkpoints of the levels; what a network would have to do."""
+
+    def commit(self, level: str, values: Values) -> None:
+        """Makes this the level's checkpoint, and publishes every buffer that it gives, in one step."""
+        ...
+
+    def checkpoint(self, level: str) -> Values | Absent:
+        """All leaves and the trace after the level's last cycle."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Factory:
+    """What makes something in the process that needs it.
+
+    Attributes:
+        name: `module:function`.
+        arguments: Of the function; they travel to the process.
+    """
+
+    name: str
+    arguments: tuple[Any, ...] = ()
+
+    def make(self) -> Any:
+        """What the function returns."""
+        module, _, function = self.name.partition(":")
+        return getattr(importlib.import_module(module), function)(*self.arguments)
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """What all processes of a system are told.
+
+    Attributes:
+        queries: Makes the database's questions by name.
+        rate: Seconds of the system in one of the clock; 0 is as fast as possible.
+        kind: Of the executors; each level's process builds its own.
+        block: Name of the shared memory.
+    """
+
+    description: Description
+    queries: Factory | None
+    rate: float
+    kind: Kind
+    block: str
+    parent: int
+
+
+@dataclass(slots=True)
+class Paced:
+    """Waits between cycles; a cycle that is late is not made up for.
+
+    Attributes:
+        period_s: By the clock; 0 is as fast as possible.
+    """
+
+    period_s: float
+    _due: float = field(default_factory=time.monotonic)
+
+    def wait(self, told: Sized = ()) -> None:
+        """Until the next cycle is due, or not much longer than until something is `told`."""
+        if self.period_s == 0:
+            time.sleep(NAP_S)  # lets others run: there may be more processes than processors
+            return
+        now = time.monotonic()
+        self._due = max(self._due + self.period_s, now)
+        while now < self._due and not told:
+            time.sleep(min(self._due - now, HEED_S))
+            now = time.monotonic()
+
+
+def begin(level: RunningLevel, transport: Transport) -> None:
+    """Goes on from the last committed cycle; where that is lost, or ended in a fault, starts safely."""
+    held = transport.checkpoint(level.name)
+    if held is Absent.BLANK:
+        return
+    if isinstance(held, Absent) or fault_of(level.sign, held):
+        restart(level, transport)
+    else:
+        restart(level, transport, held)
+
+
+def cycle(level: RunningLevel, transport: Transport) -> int:
+    """One cycle of a level; the fault, 0 for none."""
+    level.take(transport)
+    fault = level.run()
+    transport.commit(level.name, level.values)
+    return fault
+
+
+def fault_of(sign: Signature, values: Values) -> int:
+    """The fault that a checkpoint ended in; 0 for none."""
+    return int(values[len(sign.leaves) + 1])
+
+
+def serve_level(setting: Setting, name: str, told: "Connection") -> None:
+    """A level's process, from its start to SIGTERM or a fault; what it was refused is sent."""
+    with _telling(told), _attached(setting) as (signs, transport):
+        level = _level(setting, name, signs[name])
+        begin(level, transport)
+        period_s = level.level.period_ms / 1000 / setting.rate if setting.rate else 0.0
+        for _ in _rounds(setting, period_s):
+            if cycle(level, transport):
+                raise SystemExit(FAULTY)
+
+
+def serve_outside(setting: Setting, factory: Factory, told: "Connection") -> None:
+    """A process for what stands outside the levels, until it is over: until one part of it says `over`."""
+    with _telling(told), _attached(setting) as (_, transport):
+        made: tuple[Outside, ...] = tuple(factory.make())
+        period_s = setting.description.tick_ms / 1000 / setting.rate if setting.rate else 0.0
+        for tick in _rounds(setting, period_s):
+            for one in made:
+                for name, values in one.step(tick, transport.latest).items():
+                    _publish(transport, name, values)
+            if any(getattr(one, "over", False) for one in made):
+                return
+
+
+def _publish(transport: Transport, name: str, values: Values) -> None:
+    try:
+        transport.publish(name, values)
+    except struct.error as error:
+        raise StateTableError(f"buffer `{name}` cannot hold what was published: {error}") from error
+
+
+@contextlib.contextmanager
+def _telling(told: "Connection") -> Iterator[None]:
+    """Sends why a level was refused a state or values, and ends the process with `REFUSED`."""
+    try:
+        yield
+    except StateTableError as error:
+        told.send_bytes(str(error).encode()[:MOST_TOLD])
+        raise SystemExit(REFUSED) from None
+
+
+@contextlib.contextmanager
+def _attached(setting: Setting) -> Iterator[tuple[dict[str, Signature], SharedMemoryBuffers]]:
+    signs = signatures(setting.description)
+    buffers = SharedMemoryBuffers.attach(setting.block, layout(setting.description, signs))
+    try:
+        yield signs, buffers
+    finally:
+        if os.getppid() != setting.parent:  # its maker was killed and cannot
+            buffers.block.unlink()
+        buffers.close()
+
+
+def _rounds(setting: Setting, period_s: float) -> Iterator[int]:
+    """Counts rounds, each when it is due, until SIGTERM or until nobody is there who started this process."""
+    told: list[int] = []
+    signal.signal(signal.SIGTERM, lambda number, _: told.append(number))
+    pace, tick = Paced(period_s), 0
+    while not told and os.getppid() == setting.parent:
+        yield tick
+        tick += 1
+        pace.wait(told)
+
+
+def _level(setting: Setting, name: str, sign: Signature) -> RunningLevel:
+    system = setting.description
+    spec = next(one for one in system.levels if one.name == name)
+    level = next(one for one in sign.levels if one.name == name)
+    made = (
+        CExecutor(build(system.generated, [sign]), sign, level)
+        if setting.kind == "c"
+        else PythonExecutor(system.generated, sign, level)
+    )
+    queries = setting.queries.make() if setting.queries else {}
+    return running_level(spec, system, sign, made, queries)

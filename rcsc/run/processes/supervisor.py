@@ -1,0 +1,306 @@
+"""The whole system as processes: one a level, and one for each thing that stands outside, over shared memory.
+
+In: a description, and factories by name for what a process makes for itself. Out: a `Supervisor`, with which processes are
+stopped and started again while the others run; `run_processes`, which runs them all.
+
+Nobody waits for anybody: a level takes what the buffers hold, runs a cycle, and commits its state and its outputs in one step.
+What it sees is at times older or newer than in one process; tables that keep the protocol of numbers and echoes do not mind.
+"""
+
+import contextlib
+import os
+import signal
+import sys
+import time
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import FrameType
+from typing import TYPE_CHECKING, Any, Self
+
+from rcsc.host import children
+from rcsc.run.description import Description
+from rcsc.run.processes.memory import Absent, SharedMemoryBuffers, layout
+from rcsc.run.processes.serve import FAULTY, MOST_TOLD, REFUSED, Factory, Setting, serve_level, serve_outside
+from rcsc.run.system import Kind, StateTableError, signatures
+from rcsc.run.unproved import refuse_unproved
+
+if TYPE_CHECKING:
+    from multiprocessing.connection import Connection
+    from multiprocessing.context import SpawnProcess
+
+PATIENCE_S, GRACE_S = 5.0, 0.5
+MOST_RESTARTS = 20
+STILL_PERIODS, STILL_S = 25, 0.2
+"""A process that has committed nothing for so many periods, and so many seconds, is looked at."""
+LOOP_CPU_S, WAIT_S = 5.0, 10.0
+"""One that computes for so long without a commit loops; one that waits for so long hangs. One that gets no processor does neither."""
+
+
+@dataclass(slots=True)
+class _Pulse:
+    """When a process was last seen to do something.
+
+    Attributes:
+        stamp: Of its last commit; 0 for what has no region of its own.
+        since_s: By the clock.
+        cpu_s: Of the processor, that it had used by then.
+    """
+
+    stamp: int
+    since_s: float
+    cpu_s: float
+
+
+class Supervisor:
+    """Processes of one system; a context: all run inside it, and nothing of them is left after it.
+
+    Attributes:
+        buffers: The shared memory, to look at and to prepare.
+    """
+
+    def __init__(
+        self,
+        description: Description,
+        kind: Kind,
+        outside: Mapping[str, Factory],
+        *,
+        queries: Factory | None = None,
+        rate: float = 1.0,
+    ) -> None:
+        self._signs = signatures(description)
+        laid = layout(description, self._signs)
+        self._outside = outside
+        self._running: dict[str, SpawnProcess] = {}
+        self._told: dict[str, Connection] = {}
+        self._pulses: dict[str, _Pulse] = {}
+        tick_s = description.tick_ms / 1000
+        periods_s = dict.fromkeys(outside, tick_s) | {
+            name: level.period_ms / 1000
+            for name, sign in self._signs.items()
+            for level in sign.levels
+            if level.name == name
+        }
+        self._still_s = {
+            name: max(STILL_S, STILL_PERIODS * period_s / (rate or 1.0))
+            for name, period_s in periods_s.items()
+        }
+        self.buffers = SharedMemoryBuffers.create(laid)
+        self._setting = Setting(description, queries, rate, kind, self.buffers.block.name, os.getpid())
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The processes: the levels from the top down, then what stands outside."""
+        return *self._signs, *self._outside
+
+    def __enter__(self) -> Self:
+        try:
+            for name in self.names:
+                self.start(name)
+        except BaseException:
+            self.close()
+            raise
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def start(self, name: str) -> None:
+        """Starts a process; again, if it has ended.
+
+        Raises:
+            ValueError: It runs.
+        """
+        if self.runs(name):
+            raise ValueError(f"`{name}` runs")
+        told, tells = children.pipe()
+        work: tuple[Callable[..., None], tuple[Any, ...]] = (
+            (serve_level, (self._setting, name, tells))
+            if name in self._signs
+            else (serve_outside, (self._setting, self._outside[name], tells))
+        )
+        made = children.process(name, work[0], *work[1])
+        children.start(made)
+        tells.close()
+        self._running[name] = made
+        if name in self._told:
+            self._told[name].close()
+        self._told[name] = told
+        self._pulses.pop(name, None)
+
+    def stop(self, name: str, how: signal.Signals = signal.SIGTERM) -> None:
+        """Ends a process: SIGTERM after its cycle, SIGKILL at once."""
+        process = self._running[name]
+        if process.pid is not None and process.is_alive():
+            os.kill(process.pid, how)
+        _ended(process, time.monotonic() + PATIENCE_S)
+
+    def runs(self, name: str) -> bool:
+        """Whether it has been started and has not ended."""
+        return name in self._running and self._running[name].is_alive()
+
+    def code(self, name: str) -> int | None:
+        """How it ended: 0 well, a negative number by that signal; None while it runs."""
+        return self._running[name].exitcode
+
+    @property
+    def over(self) -> bool:
+        """Whether something outside has come to its end."""
+        return any(self.code(name) == 0 for name in self._outside)
+
+    def check(self) -> None:
+        """Looks for processes that ended by themselves.
+
+        Raises:
+            StateTableError: A level met a fault, or was refused a state or values.
+            ChildProcessError: A process ended by an exception; what it was stands on the standard error stream.
+        """
+        for name in self._running:
+            code = self.code(name)
+            if code == REFUSED and self._told[name].poll():
+                raise StateTableError(self._told[name].recv_bytes(MOST_TOLD).decode(errors="replace"))
+            if code == FAULTY and name in self._signs:
+                raise StateTableError(self._said(name))
+            if code is not None and code > 0:
+                raise ChildProcessError(f"process `{name}` ended with code {code}")
+
+    def killed(self) -> tuple[str, ...]:
+        """Processes that a signal ended."""
+        return tuple(name for name in self._running if (self.code(name) or 0) < 0)
+
+    def still(self) -> dict[str, str]:
+        """Processes that run and stand still, and why: of each, whether it was stopped, loops, or waits for something."""
+        found = {name: self._why_still(name) for name in self._running if self.runs(name)}
+        return {name: why for name, why in found.items() if why}
+
+    def _why_still(self, name: str) -> str:
+        region = self.buffers.layout.regions.get(name)
+        stamp = 0 if region is None else self.buffers.block.word(region.at)
+        state, cpu_s = _state(self._running[name].pid or 0)
+        now_s, pulse = time.monotonic(), self._pulses.get(name)
+        idle = region is None and state not in STOPPED  # nothing is known of what it does
+        if pulse is None or pulse.stamp != stamp or idle:
+            self._pulses[name] = _Pulse(stamp, now_s, cpu_s)
+            return ""
+        if now_s - pulse.since_s < self._still_s[name]:
+            return ""
+        if state in STOPPED:
+            return "stopped by a signal"
+        if cpu_s - pulse.cpu_s > LOOP_CPU_S:
+            return f"{LOOP_CPU_S:g} s of computing without an end of its cycle"
+        waits = state in WAITING and now_s - pulse.since_s > max(WAIT_S, self._still_s[name])
+        return "waiting for something that does not come" if waits else ""
+
+    def close(self) -> None:
+        """Ends all, and removes the shared memory."""
+        with children.interrupts_held():
+            for process in self._running.values():
+                process.terminate()
+            until_s = time.monotonic() + GRACE_S
+            for process in self._running.values():
+                _ended(process, until_s)
+                process.close()
+            self._running.clear()
+            for told in self._told.values():
+                told.close()
+            self.buffers.block.unlink()
+            self.buffers.close()
+
+    def _said(self, name: str) -> str:
+        values = self.buffers.checkpoint(name)
+        if isinstance(values, Absent):
+            return f"level `{name}`: a fault"
+        return f"level `{name}`: {self._signs[name].fault_said(values)}"
+
+
+def run_processes(
+    description: Description,
+    kind: Kind,
+    outside: Mapping[str, Factory],
+    *,
+    queries: Factory | None = None,
+    rate: float = 1.0,
+    watch: Callable[[Supervisor], None] | None = None,
+    told: Callable[[str], None] | None = None,
+) -> None:
+    """Runs the system until something outside is over, or Ctrl-C or SIGTERM ends all; a level that is killed or still is begun again.
+
+    Args:
+        description: Levels and wires.
+        kind: Of the executors.
+        outside: Factories of `Sequence[Outside]` by the name of their process.
+        queries: Makes the database's questions by name, in each level's process.
+        rate: Seconds of the system in one of the clock; 0 is as fast as possible.
+        watch: Called some fifty times a second.
+        told: Called with what happened to a level that stood still; else it goes to the standard error stream.
+
+    Raises:
+        UnprovedExecutors: Executors are made of tables that are not proved.
+        StateTableError: A level met a fault.
+        ChildProcessError: A process ended by an exception, was killed too often, or stands still outside the levels.
+        KeyboardInterrupt: Ctrl-C, or SIGTERM.
+    """
+    refuse_unproved(description)
+    restarts = 0
+    say = told or _say
+    with _terminable(), Supervisor(description, kind, outside, queries=queries, rate=rate) as system:
+        while not system.over:
+            system.check()
+            for name, why in system.still().items():
+                if name in outside:
+                    raise ChildProcessError(f"process `{name}` stands still: {why}")
+                say(f"level `{name}` stood still ({why}); it is started again")
+                system.stop(name, signal.SIGKILL)
+            for name in system.killed():
+                if name in outside:
+                    raise ChildProcessError(
+                        f"process `{name}` was killed; what it did cannot be taken up again"
+                    )
+                restarts += 1
+                if restarts > MOST_RESTARTS:
+                    raise ChildProcessError(f"process `{name}` was killed; there were {restarts} of them")
+                system.start(name)
+            if watch is not None:
+                watch(system)
+            time.sleep(0.02)
+
+
+STOPPED, WAITING = frozenset("Tt"), frozenset("SD")
+
+
+def _state(pid: int) -> tuple[str, float]:
+    """A process's state and the seconds of processor time it has used. Source: proc(5), /proc/PID/stat."""
+    try:
+        text = Path(f"/proc/{pid}/stat").read_text(encoding="ascii", errors="replace")
+    except OSError:
+        return "", 0.0
+    fields = text.rpartition(")")[2].split()
+    return fields[0], (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def _ended(process: "SpawnProcess", until_s: float) -> None:
+    """Waits for the end of a process that was told, and kills it then; at once where it stands still and hears nothing."""
+    if process.pid is not None and _state(process.pid)[0] in STOPPED:
+        process.kill()
+    process.join(max(0.0, until_s - time.monotonic()))
+    if process.is_alive():
+        process.kill()
+        process.join()
+
+
+def _say(text: str) -> None:
+    sys.stderr.write(f"{text}\n")
+
+
+@contextlib.contextmanager
+def _terminable() -> Iterator[None]:
+    """SIGTERM ends as Ctrl-C does, with everything cleaned up."""
+
+    def end(_number: int, _frame: FrameType | None) -> None:
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGTERM, end)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)

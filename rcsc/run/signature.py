@@ -1,0 +1,371 @@
+"""What a generated program looks like from outside: its leaves, tables and levels, from the symbol file beside it.
+
+In: `generated/c/NAME.json`. Out: a `Signature`. The canonical bytes of a state are its leaves in declared order and
+then the trace, little-endian, without padding: the same for every executor and machine.
+"""
+
+import re
+import struct
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache
+from pathlib import Path
+from typing import TypeAlias
+
+from rcsc.host.files.names import BadName, identifier, inside, shown
+from rcsc.host.files.read import MIB, Malformed, Said, json_of, text
+from rcsc.run.description import BadDescription
+
+Value: TypeAlias = bool | int | float
+Values: TypeAlias = tuple[Value, ...]
+
+FORMATS = {
+    "bool": "?", "uint8_t": "B", "int8_t": "b", "uint16_t": "H", "int16_t": "h", "uint32_t": "I", "int32_t": "i",
+    "uint64_t": "Q", "int64_t": "q", "double": "d",
+}  # fmt: skip
+TRACE = ("line", "fault", "fault_at")
+"""What a cycle leaves beside the leaves; the words of failed assumptions come after it."""
+FAILED = ("assumptions_failed",)
+"""The words of failed assumptions, 64 in each, where the symbol file names no others."""
+FAULTS = (
+    "none",
+    "input refused",
+    "no line matches",
+    "several lines match",
+    "extern refused",
+    "assumption failed",
+    "state refused",
+    "reals computed otherwise here",
+)
+STOPPED = FAULTS.index("assumption failed")
+
+
+MOST_SYMBOL_BYTES, MOST_LEAVES, MOST_LEVELS, LONGEST_PERIOD_MS = 64 * MIB, 1_000_000, 100_000, 2**31 - 1
+
+
+@dataclass(frozen=True, slots=True)
+class Leaf:
+    """One scalar of a program's state.
+
+    Attributes:
+        kind: `input`, `state` or `output`.
+        place: How the C struct calls it; `attribute` is its name in Python.
+        members: Of an enumeration; empty for numbers and bools.
+    """
+
+    name: str
+    kind: str
+    place: str
+    attribute: str
+    c_type: str
+    members: tuple[str, ...]
+    low: float | None
+    high: float | None
+    unit: str
+    initial: Value
+    doc: str
+
+    def shown(self, value: Value) -> str:
+        """The value in the table's words."""
+        if self.members:
+            return self.members[int(value)] if 0 <= value < len(self.members) else f"{int(value)}?"
+        return ("false", "true")[bool(value)] if self.c_type == "bool" else repr(value)
+
+    def read(self, text: str) -> Value:
+        """The value that a text means.
+
+        Raises:
+            ValueError: It is none of this leaf's.
+        """
+        if self.members:
+            return self.members.index(text)
+        if self.c_type == "bool":
+            return ("false", "true").index(text) == 1
+        value: Value = float(text) if self.c_type == "double" else int(text)
+        if self.low is not None and self.high is not None and not self.low <= value <= self.high:
+            raise ValueError(f"{text} lies outside {self.low} .. {self.high}")
+        return value
+
+
+@dataclass(frozen=True, slots=True)
+class LevelSign:
+    """A level: which functions run it, and which table."""
+
+    name: str
+    cycle: str
+    period_ms: int
+    table: str
+    by: str
+    tables: Mapping[int, str]
+
+
+@dataclass(frozen=True, slots=True)
+class Signature:
+    """A program from outside.
+
+    Attributes:
+        monitored: Assumptions that the executors check.
+        stops: By table, those that end the cycle where they fail.
+    """
+
+    program: str
+    struct_name: str
+    init: str
+    leaves: tuple[Leaf, ...]
+    tables: Mapping[str, tuple[str, ...]]
+    levels: tuple[LevelSign, ...]
+    monitored: tuple[str, ...]
+    index: Mapping[str, int] = field(default_factory=dict)
+    failed: tuple[str, ...] = FAILED
+    stops: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    invariants: tuple[str, ...] = ()
+
+    @property
+    def check(self) -> str:
+        """The C function that checks a state."""
+        return f"{self.program}_check"
+
+    @property
+    def trace(self) -> tuple[str, ...]:
+        """The members of the trace, in order."""
+        return (*TRACE, *self.failed)
+
+    @property
+    def trace_format(self) -> str:
+        """The trace's members as `struct` calls them."""
+        return "i" * len(TRACE) + "Q" * len(self.failed)
+
+    def failures(self, values: Values) -> tuple[str, ...]:
+        """The monitored assumptions that failed in the cycle that left these values."""
+        words = [int(word) for word in values[len(self.leaves) + len(TRACE) :]]
+        return tuple(name for at, name in enumerate(self.monitored) if words[at // 64] >> at % 64 & 1)
+
+    @property
+    def packed(self) -> struct.Struct:
+        """Leaves and trace as canonical bytes."""
+        return struct.Struct("<" + "".join(FORMATS[leaf.c_type] for leaf in self.leaves) + self.trace_format)
+
+    def form(self, run: range) -> str:
+        """The format of these leaves in which `struct.pack` refuses what is not of their types; a bool is packed as a number."""
+        types = (FORMATS[self.leaves[at].c_type] for at in run)
+        return "<" + "".join("B" if one == "?" else one for one in types)
+
+    def record(self, name: str) -> range:
+        """Positions of the leaves of a variable: a record's or array's are next to each other.
+
+        Raises:
+            KeyError: There is no such variable.
+        """
+        found = [
+            at
+            for at, leaf in enumerate(self.leaves)
+            if leaf.name == name or leaf.name.startswith((f"{name}.", f"{name}["))
+        ]
+        if not found:
+            raise KeyError(name)
+        return range(found[0], found[-1] + 1)
+
+    def table_of(self, level: LevelSign, values: Values) -> str:
+        """The table that the level ran in the cycle that left these values."""
+        return level.table or level.tables.get(int(values[self.index[level.by]]), "?")
+
+    def fault_at(self, values: Values) -> str:
+        """What the fault of a cycle is about: the leaf that was refused, or the assumption; empty for nothing."""
+        fault, at = (int(values[len(self.leaves) + place]) for place in (1, 2))
+        if fault == STOPPED:
+            return self.monitored[at] if 0 <= at < len(self.monitored) else f"{at}?"
+        if at >= len(self.leaves):
+            return self._invariant(at)
+        return self.leaves[at].name if 0 <= at < len(self.leaves) else ""
+
+    def fault_said(self, values: Values) -> str:
+        """A fault in words: `input refused: `width` = 9`, `assumption failed: `calm``, `no line matches`."""
+        fault, at = (int(values[len(self.leaves) + place]) for place in (1, 2))
+        word = FAULTS[fault] if 0 <= fault < len(FAULTS) else f"{fault}?"
+        about = self.fault_at(values)
+        if not about:
+            return word
+        if fault == STOPPED:
+            return f"{word}: `{about}`"
+        return f"{word}: {self.unfit(at, values)}"
+
+    def _invariant(self, at: int) -> str:
+        at -= len(self.leaves)
+        return self.invariants[at] if at < len(self.invariants) else f"{at}?"
+
+    def unfit(self, at: int, values: Values) -> str:
+        """What `check` found wrong with a state, in words: `width` = 300, or the invariant that does not hold."""
+        if at >= len(self.leaves):
+            return f"invariant `{self._invariant(at)}` does not hold"
+        return f"`{self.leaves[at].name}` = {self.leaves[at].shown(values[at])}"
+
+
+def generated_files(generated: Path, program: str) -> tuple[Path, ...]:
+    """What was generated of a program: symbol file, C, header, Python; all in the generated folder.
+
+    The symbol file bears the program's name; the others one that no library keeps, as the symbol file says.
+
+    Raises:
+        BadDescription: The name is none of a program, or a link leads out of the folder.
+    """
+    try:
+        symbols = inside(generated, "c", f"{identifier(program, 'program')}.json")
+        try:
+            word = _said(text(symbols, MOST_SYMBOL_BYTES)).name("program")
+        except (OSError, Malformed):
+            word = program
+        return symbols, *sources_of(generated, word)
+    except BadName as error:
+        raise BadDescription(str(error)) from error
+
+
+def sources_of(generated: Path, word: str) -> tuple[Path, Path, Path]:
+    """The C, the header and the Python that bear a program's word, in the generated folder.
+
+    Raises:
+        BadName: It is none, or a link leads out of the folder.
+    """
+    name = identifier(word, "program")
+    source, header = (inside(generated, "c", f"{name}{ending}") for ending in (".c", ".h"))
+    return source, header, inside(generated, "python", f"{name}.py")
+
+
+def signature(path: Path) -> Signature:
+    """Reads a symbol file.
+
+    Raises:
+        OSError: It cannot be read.
+        ValueError: It is no symbol file.
+    """
+    try:
+        return _signature(text(path, MOST_SYMBOL_BYTES))
+    except Malformed as error:
+        raise ValueError(f"{path} is no symbol file of rcsc's: {error}") from error
+
+
+@lru_cache(maxsize=16)  # to assemble a system reads each symbol file several times
+def _said(found: str) -> Said:
+    return Said(json_of(found))
+
+
+@lru_cache(maxsize=16)
+def _signature(found: str) -> Signature:
+    return signature_of(_said(found))
+
+
+def signature_of(said: Said) -> Signature:
+    """Returns the signature that a symbol file, or a log's copy of one, holds.
+
+    What is called by name is called so by this program alone: its functions begin with its own name.
+
+    Raises:
+        Malformed: A name in it is none, a value does not fit its type, or something is missing.
+    """
+    program = said.name("program")
+    leaves = tuple(map(_leaf, said.each("leaves", MOST_LEAVES)))
+    index = {leaf.name: at for at, leaf in enumerate(leaves)}
+    if len(index) < len(leaves):
+        raise Malformed("two leaves have one name")
+    tables, stops = _tables(said)
+    levels = tuple(_level(one, program, index) for one in said.each("levels", MOST_LEVELS))
+    if len(tables) == 0 and levels:
+        raise Malformed("it has levels and no table")
+    monitored, failed = said.names("monitored"), said.names("failed", FAILED)
+    if len(monitored) > 64 * len(failed):
+        raise Malformed(f"{len(failed)} words for {len(monitored)} assumptions")
+    return Signature(
+        program,
+        _own(said.name("struct" if "struct" in said.value else "struct_name"), f"{program}_t", ""),
+        _own(said.name("init"), f"{program}_init", ""),
+        leaves,
+        tables,
+        levels,
+        monitored,
+        index,
+        failed,
+        stops,
+        said.names("invariants", ()),
+    )
+
+
+def _own(name: str, begins: str, rest: str) -> str:
+    """A name in C that is the program's own, not one of a library's."""
+    if not (name.startswith(begins) if rest else name == begins):
+        raise Malformed(f"{shown(name)} is not `{begins}{rest}`")
+    return name
+
+
+def _leaf(said: Said) -> Leaf:
+    members, c_type, initial = (
+        said.names("members", ()),
+        said.one_of("c_type", tuple(FORMATS)),
+        said.number("initial"),
+    )
+    if not _fits(c_type, initial) or (members and not 0 <= (initial or 0) < len(members)):
+        raise Malformed(f"{said.where}.initial is no `{c_type}` of it")
+    assert initial is not None
+    return Leaf(
+        said.member("name"),
+        said.one_of("kind", ("input", "state", "output")),
+        said.member("path" if "path" in said.value else "place"),
+        said.name("attribute"),
+        c_type,
+        members,
+        said.number("low", None),
+        said.number("high", None),
+        said.text("unit", ""),
+        initial,
+        said.text("doc"),
+    )
+
+
+def _fits(c_type: str, value: object) -> bool:
+    """Whether a value is one of the type, and not of another that happens to be equal."""
+    if type(value) is not {"bool": bool, "double": float}.get(c_type, int):
+        return False
+    try:
+        struct.pack(f"<{FORMATS[c_type]}", value)
+    except struct.error:
+        return False
+    return True
+
+
+def _tables(said: Said) -> tuple[dict[str, tuple[str, ...]], dict[str, tuple[str, ...]]]:
+    """The lines of each table, and what stops it: a list of tables in a symbol file, two tables of them in a log."""
+    if isinstance(said.value.get("tables"), dict):
+        lines, stops = said.table("tables"), said.table("stops") if "stops" in said.value else Said({})
+        return (
+            {identifier(name, "table"): lines.lines(name) for name in lines.value},
+            {identifier(name, "table"): stops.names(name) for name in stops.value},
+        )
+    several = tuple(said.each("tables", MOST_LEVELS))
+    return (
+        {one.name("name"): one.lines("lines") for one in several},
+        {one.name("name"): one.names("stops") for one in several if "stops" in one.value},
+    )
+
+
+def _level(said: Said, program: str, index: Mapping[str, int]) -> LevelSign:
+    by, tables = said.text("by", ""), {}
+    if "tables" in said.value:
+        named = said.table("tables")
+        tables = {_key(value): named.name(value) for value in named.value}
+    if (by or tables) and by not in index:
+        raise Malformed(f"{said.where}.by: {shown(by)} is no leaf")
+    table = said.name("table", "") if said.value.get("table") else ""
+    if not table and not by:
+        raise Malformed(f"{said.where} has no table")
+    return LevelSign(
+        said.name("name"),
+        _own(said.name("cycle"), f"{program}_", "..."),
+        said.whole("period_ms", 1, LONGEST_PERIOD_MS),
+        table,
+        by,
+        tables,
+    )
+
+
+def _key(text: str) -> int:
+    if re.fullmatch(r"-?[0-9]{1,19}", text) is None:
+        raise Malformed(f"{shown(text)} is no value of a command")
+    return int(text)

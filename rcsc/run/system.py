@@ -1,0 +1,262 @@
+"""The whole system in one process: all levels and what stands outside them, one control tick at a time.
+
+In each tick every level that is due takes the buffers as the tick before left them, all run, and all give: what a
+level sees does not hang on the order of the levels, and is the same with every executor.
+"""
+
+import struct
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Literal, Protocol
+
+from rcsc.host.described import Document, KeyPath, nearest
+from rcsc.run.adopt import Restarted, restart
+from rcsc.run.buffers import Buffers, CommonMemory
+from rcsc.run.description import BadDescription, Description
+from rcsc.run.executors import CExecutor, Executor, PythonExecutor, build
+from rcsc.run.levels import Query, RunningLevel, running_level
+from rcsc.run.levels import StateTableError as StateTableError  # noqa: PLC0414  # callers look for it here
+from rcsc.run.signature import Signature, Values, generated_files, signature
+from rcsc.run.unproved import refuse_unproved
+
+Kind = Literal["c", "python"]
+
+
+class Outside(Protocol):
+    """What stands outside the levels: a robot, a hand, a camera, a workstation."""
+
+    def step(self, tick: int, latest: Callable[[str], Values | None]) -> Mapping[str, Values]:
+        """Look at the buffers as the tick before left them; what it publishes."""
+        ...
+
+
+@dataclass(slots=True)
+class System:
+    """Levels from the top down, what stands outside, and the buffers between.
+
+    Attributes:
+        tick: Ticks done so far.
+        watch: Called after each tick.
+        restarts: Levels that were started again before the present tick, in order; who watches the tick sees them.
+        forms: For each buffer with a level at an end, the format of what it can hold (`Signature.form`).
+    """
+
+    description: Description
+    levels: tuple[RunningLevel, ...]
+    outside: tuple[Outside, ...]
+    buffers: Buffers = field(default_factory=CommonMemory)
+    tick: int = 0
+    watch: list[Callable[["System", tuple[RunningLevel, ...]], None]] = field(default_factory=list)
+    restarts: list[Restarted] = field(default_factory=list)
+    forms: Mapping[str, str] = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Finds what the buffers with a level at an end can hold."""
+        taken = {take.buffer: take.form for level in self.levels for take in level.takes}
+        self.forms = taken | {
+            give.buffer: level.sign.form(range(give.first, give.end))
+            for level in self.levels
+            for give in level.gives
+        }
+
+    def step(self) -> None:
+        """One control tick.
+
+        Raises:
+            StateTableError: A level was refused an input, no line or several matched, or what stands outside published no such values.
+        """
+        due = tuple(
+            one for one in self.levels if self.tick * self.description.tick_ms % one.level.period_ms == 0
+        )
+        for level in due:
+            level.take(self.buffers)
+        given = [one.step(self.tick, self.buffers.latest) for one in self.outside]
+        faulty = [level for level in due if level.run()]
+        for level in due:
+            level.give(self.buffers)
+        for published in given:
+            for name, values in published.items():
+                self._publish(name, values)
+        self.tick += 1
+        for watch in self.watch:
+            watch(self, due)
+        self.restarts.clear()
+        for level in faulty:
+            raise StateTableError(_said(level, self.tick))
+
+    def _publish(self, name: str, values: Values) -> None:
+        """Raises: StateTableError: What stands outside published what the buffer cannot hold."""
+        try:
+            if name in self.forms:
+                struct.pack(self.forms[name], *values)
+        except struct.error as error:
+            raise StateTableError(f"buffer `{name}` cannot hold what was published: {error}") from error
+        self.buffers.publish(name, values)
+
+    def restart(self, name: str, checkpoint: Values | None = None) -> None:
+        """Has a level lose what it was doing, as one whose process is killed and started again, before the next tick.
+
+        Args:
+            name: The level's.
+            checkpoint: What it goes on from: all leaves and the trace; None where that is lost, too.
+
+        Raises:
+            KeyError: There is none of that name.
+        """
+        self.restarts.append(restart(self.level(name), self.buffers, checkpoint))
+
+    def level(self, name: str) -> RunningLevel:
+        """A level by its name.
+
+        Raises:
+            KeyError: There is none.
+        """
+        return next((one for one in self.levels if one.name == name), None) or _missing(name)
+
+
+def _missing(name: str) -> RunningLevel:
+    raise KeyError(name)
+
+
+def _said(level: RunningLevel, tick: int) -> str:
+    return f"level `{level.name}`, table `{level.table}`, cycle {tick}: {level.sign.fault_said(level.values)}"
+
+
+def signatures(system: Description, *, fitting: bool = True) -> dict[str, Signature]:
+    """The signature of each level's program, by the level's name.
+
+    Args:
+        system: The description.
+        fitting: Whether the levels are to run together, and so must fit each other.
+
+    Raises:
+        BadDescription: A program is not there, or the description does not fit the programs.
+    """
+    found, page = {}, system.review()
+    for at, spec in enumerate(system.levels):
+        path, *_ = generated_files(system.generated, spec.program)
+        place: KeyPath = ("level", at, "name" if spec.program == spec.name else "program")
+        try:
+            found[spec.name] = signature(path)
+        except OSError:
+            made = sorted(one.stem for one in path.parent.glob("*.json"))
+            helps = nearest(spec.program, made) or ("run `rcsc compile`",)
+            page.wrong(place, f"program `{spec.program}` is not compiled: `{path}` cannot be read", *helps)
+        except ValueError as error:
+            page.wrong(place, str(error))
+    if page.faults:
+        raise page.bad(BadDescription)
+    if fitting:
+        _check_fit(system, found)
+    return found
+
+
+def _check_fit(system: Description, signs: Mapping[str, Signature]) -> None:
+    """What the description says of levels and variables is so in their programs.
+
+    Raises:
+        BadDescription: Something is not; all that is not is told at once.
+    """
+    page = system.review()
+    for at, spec in enumerate(system.levels):
+        sign = signs[spec.name]
+        level = next((one for one in sign.levels if one.name == spec.name), None)
+        if level is None:
+            names = [one.name for one in sign.levels]
+            page.wrong(
+                ("level", at, "name"),
+                f"program `{sign.program}` has no level `{spec.name}`",
+                *nearest(spec.name, names),
+            )
+        elif level.period_ms % system.tick_ms:
+            page.wrong(
+                ("tick_ms",),
+                f"`tick_ms` is {system.tick_ms}, and level `{spec.name}` runs every {level.period_ms} ms: no whole number of ticks",
+                f"the period stands in program `{sign.program}`",
+            )
+        for number, feed in enumerate(spec.feeds):
+            path: KeyPath = ("level", at, "feed", number)
+            _check_variable(page, (*path, "into"), sign, feed.into, "input")
+            for place, key in enumerate(feed.keys):
+                _check_variable(page, (*path, "keys", place), sign, key, one=True)
+    for wire in system.wires:
+        for end, kind in ((wire.source, ""), (wire.target, "input")):
+            owner, _, variable = end.partition(".")
+            if owner in signs:
+                _check_variable(page, ("buffers", wire.source), signs[owner], variable, kind)
+    if not page.faults:
+        _check_ends(page, system, signs)
+    for name, shown in system.displays.items():
+        for place, text in enumerate(shown):
+            owner, _, variable = text.partition(".")
+            if owner not in signs:
+                page.wrong(("displays", name, place), f"there is no level `{owner}` to show", *nearest(owner, list(signs)))  # fmt: skip
+            else:
+                _check_variable(page, ("displays", name, place), signs[owner], variable, one=True)
+    if page.faults:
+        raise page.bad(BadDescription)
+
+
+def _check_variable(
+    page: Document, path: KeyPath, sign: Signature, variable: str, kind: str = "", *, one: bool = False
+) -> None:
+    """Note where the program has no such variable, or not of that kind, or not one scalar where one is wanted."""
+    try:
+        leaves = [sign.leaves[at] for at in sign.record(variable)]
+    except KeyError:
+        names = sorted({part for leaf in sign.leaves for part in (leaf.name, leaf.name.partition(".")[0])})
+        page.wrong(path, f"program `{sign.program}` has no variable `{variable}`", *nearest(variable, names))
+        return
+    if kind and any(leaf.kind != kind for leaf in leaves):
+        page.wrong(path, f"`{variable}` of program `{sign.program}` is filled, and is no {kind}")
+    if one and variable not in sign.index:
+        page.wrong(path, f"`{variable}` of program `{sign.program}` has {len(leaves)} parts; name one")
+
+
+def _check_ends(page: Document, system: Description, signs: Mapping[str, Signature]) -> None:
+    """Note buffers between levels whose two ends hold other things."""
+    for wire in system.wires:
+        ends = []
+        for end in (wire.source, wire.target):
+            owner, _, variable = end.partition(".")
+            if owner in signs:
+                leaves = [signs[owner].leaves[at] for at in signs[owner].record(variable)]
+                ends.append(
+                    [(leaf.name.removeprefix(variable), leaf.c_type, leaf.members) for leaf in leaves]
+                )
+        if len(ends) == 2 and ends[0] != ends[1]:
+            page.wrong(("buffers", wire.source), f"`{wire.source}` and `{wire.target}` hold other things")
+
+
+def executors(system: Description, signs: Mapping[str, Signature], kind: Kind) -> dict[str, Executor]:
+    """An executor for each level.
+
+    Raises:
+        NotBuilt: The C could not be built.
+    """
+    levels = {name: next(one for one in sign.levels if one.name == name) for name, sign in signs.items()}
+    if kind == "python":
+        return {name: PythonExecutor(system.generated, sign, levels[name]) for name, sign in signs.items()}
+    library = build(system.generated, list({sign.program: sign for sign in signs.values()}.values()))
+    return {name: CExecutor(library, sign, levels[name]) for name, sign in signs.items()}
+
+
+def assemble(
+    system: Description, kind: Kind, queries: Mapping[str, Query], outside: Iterable[Outside] = ()
+) -> System:
+    """The system, ready for its first tick.
+
+    Raises:
+        BadDescription: It does not fit together, or its executors are made of tables that are not proved.
+        NotBuilt: The C could not be built.
+    """
+    refuse_unproved(system)
+    signs = signatures(system)
+    for name, sign in signs.items():
+        if not any(one.name == name for one in sign.levels):
+            raise BadDescription(f"program `{sign.program}` has no level `{name}`")
+    made = executors(system, signs, kind)
+    levels: Sequence[RunningLevel] = [
+        running_level(spec, system, signs[spec.name], made[spec.name], queries) for spec in system.levels
+    ]
+    return System(system, tuple(levels), tuple(outside))

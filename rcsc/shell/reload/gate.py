@@ -1,0 +1,298 @@
+"""Whether a level may take new tables where it stands: what they do otherwise, and whether that is met at once.
+
+In: the level as it runs and as it would be, both with what they mean, and the buffers. Out: `Judged`, or a refusal where the
+proofs of the new tables do not speak of the present state.
+
+The next cycle is run on both executors from the present state, with the inputs that the buffers hold, and both are put back: nothing has
+happened. What the cycles after it can come to is the difference's to say (`rcsc.diff`), which is proved. A level with extern
+procedures is not tried out: they may do something.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from rcsc.diagnostics.codes import Code
+from rcsc.diagnostics.render import plain
+from rcsc.diff.changes.difference import Difference, ProgramDifference
+from rcsc.diff.compare import compare
+from rcsc.diff.present import Met, knows, within_reach
+from rcsc.diff.text import headline, rows
+from rcsc.lang.interpret import admit, call, evaluate, holds, matching_lines, settle
+from rcsc.lang.leaves import read_by
+from rcsc.lang.model import Enum, Expr, Kind, Level, OneTable, Program, Table, Value, pending, spell
+from rcsc.run.buffers import Buffers
+from rcsc.run.levels import RunningLevel
+from rcsc.run.signature import FAULTS, Signature, Values
+from rcsc.shell.reload.refusal import Refused
+from rcsc.solvers.options import Options
+from rcsc.table.cover import UndecidedError
+
+REACH_STEPS = 5_000_000
+"""Budget of a question whether some input leads to a change; in doubt it is said to."""
+MOST_LEAVES = 12
+"""Leaves that are shown of a cycle."""
+
+
+@dataclass(frozen=True, slots=True)
+class Running:
+    """A level and what its tables mean.
+
+    Attributes:
+        program: None where the sources of what runs are not known.
+    """
+
+    level: RunningLevel
+    program: Program | None
+
+
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """What a reload would do.
+
+    Attributes:
+        said: The difference, and what of it the present state meets.
+        doubts: Why somebody has to say that it is meant; empty where the next cycle does as before.
+    """
+
+    said: tuple[str, ...]
+    doubts: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class _Tried:
+    """A level's next cycle.
+
+    Attributes:
+        taken: All leaves and the trace when the inputs have been taken.
+        left: The same after the cycle; as taken where it was not run.
+    """
+
+    taken: Values
+    left: Values
+
+
+def judge(old: Running, new: RunningLevel, program: Program, buffers: Buffers) -> Judged:
+    """What the new tables do otherwise, and whether the present state is where they do.
+
+    Args:
+        old: What runs.
+        new: What would run, in the same state.
+        program: What its tables mean.
+        buffers: As they stand.
+
+    Raises:
+        Refused: An assumption of the new tables does not hold, or they do not know a state.
+    """
+    quiet = not _extern(program)
+    tried = _tried(new, buffers, run=quiet)
+    if quiet:
+        _proved(old, new, program, tried.taken)
+    if old.program is None:
+        return Judged((), ("the sources of what runs are not known, so that the two cannot be compared",))
+    found = compare(new.name, old.program, program, Options(), follow=True)
+    met = _met(found, new, program) if found.changed else ()
+    said = (*_difference(found), *_reach(found, met))
+    if found.undecided:
+        return Judged(said, (f"the solver gave up on {', '.join(found.undecided)}",))
+    if not quiet or _extern(old.program):
+        why = "the next cycle was not tried out, and assumptions not looked at: an extern procedure might do something"
+        return Judged(said, (why,) if met or not quiet else ())
+    at = old.level.executor.check()
+    if at >= 0:
+        wrong = old.level.sign.unfit(at, old.level.values)
+        return Judged(said, (f"what runs was not tried out, as it cannot go on from this state: {wrong}",))
+    left = _tried(old.level, buffers, run=True).left
+    return Judged(said, tuple(_otherwise(met, old.level, new, (left, tried.left))))
+
+
+# --- the next cycle --------------------------------------------------------------------
+
+
+def _extern(program: Program) -> bool:
+    return any(one.extern is not None for one in program.procedures)
+
+
+def _tried(level: RunningLevel, buffers: Buffers, *, run: bool) -> _Tried:
+    """The level's next cycle; the level is left as it was."""
+    kept = level.values
+    level.take(buffers)
+    taken = level.executor.values()
+    if run:
+        level.run()
+    left = level.values if run else taken
+    level.put_back(kept)
+    level.values = kept  # the trace too, which the executor does not take back
+    return _Tried(taken, left)
+
+
+def _look(program: Program, level: RunningLevel, taken: Values) -> tuple[Table, Mapping[str, Value]] | None:
+    """The table of the next cycle and what it sees; None where an input is refused first.
+
+    Source: `rcsc.lang.interpret.cycle`, up to where the table looks.
+
+    Args:
+        program: What the level's tables mean; without extern procedures.
+        level: The level.
+        taken: All leaves, with the inputs.
+    """
+    one = model_of(program, level)
+    now = admit(program, {leaf.name: value for leaf, value in zip(level.sign.leaves, taken, strict=False)})
+    if isinstance(now, str):
+        return None
+    settle(program, now)
+    for procedure in one.preprocess:
+        call(program, procedure, [], now)
+    tables = one.tables
+    name = (
+        tables.table if isinstance(tables, OneTable) else dict(tables.tables)[evaluate(tables.selector, now)]
+    )
+    return next(table for table in program.tables if table.name == name), now
+
+
+def model_of(program: Program, level: RunningLevel) -> Level:
+    """The level as its program has it."""
+    return next(one for one in program.levels if one.name == level.name)
+
+
+def _otherwise(
+    met: Sequence[Met], old: RunningLevel, new: RunningLevel, left: tuple[Values, Values]
+) -> Iterator[str]:
+    """What the next cycle would leave otherwise; nothing where the two versions leave the same."""
+    one, two = (_words(level.sign, values) for level, values in zip((old, new), left, strict=True))
+    differing = [name for name in one if name in two and one[name] != two[name]]
+    faults = [
+        FAULTS[int(values[len(level.sign.leaves) + 1])]
+        for level, values in zip((old, new), left, strict=True)
+    ]
+    if not differing and faults[0] == faults[1]:
+        return
+    if not met:
+        raise RuntimeError(
+            f"level {new.name}: nothing is said to differ in the next cycle, but {differing} do"
+        )
+    before, after = (_ran(level, values) for level, values in zip((old, new), left, strict=True))
+    yield f"in the present state the next cycle would do otherwise: {before} before, {after} now"
+    for name in differing[:MOST_LEAVES]:
+        yield f"  {name}: {one[name]} -> {two[name]}"
+    if len(differing) > MOST_LEAVES:
+        yield f"  and {len(differing) - MOST_LEAVES} more"
+
+
+def _words(sign: Signature, values: Values) -> dict[str, str]:
+    return {leaf.name: leaf.shown(value) for leaf, value in zip(sign.leaves, values, strict=False)}
+
+
+def _ran(level: RunningLevel, values: Values) -> str:
+    """`table position, line 4`; the fault where it met one."""
+    sign = level.sign
+    table = sign.table_of(level.level, values)
+    at, fault = int(values[len(sign.leaves)]), int(values[len(sign.leaves) + 1])
+    lines = sign.tables.get(table, ())
+    return f"table `{table}`, {FAULTS[fault] if fault else f'line `{lines[at]}`' if 0 <= at < len(lines) else 'no line'}"
+
+
+# --- the difference --------------------------------------------------------------------
+
+
+def _difference(found: ProgramDifference) -> Iterator[str]:
+    """In table words, as `rcsc diff` shows it."""
+    whole = Difference("what runs", "what is there now", (found,))
+    yield from plain(rows(whole, quiet=True)).splitlines()
+    yield headline(whole)
+
+
+def _met(found: ProgramDifference, new: RunningLevel, program: Program) -> tuple[Met, ...]:
+    now = {leaf.name: value for leaf, value in zip(new.sign.leaves, new.values, strict=False)}
+    return within_reach(found, program, model_of(program, new), now, Options(steps=REACH_STEPS))
+
+
+def _reach(found: ProgramDifference, met: Sequence[Met]) -> Iterator[str]:
+    """What of the difference the next cycle could come to with any inputs."""
+    if found.undecided or not found.changed:
+        return
+    if met:
+        yield f"within reach of the present state, with some inputs: {'; '.join(_met_said(met))}"
+    else:
+        yield "out of reach of the present state: whatever the inputs, the next cycle does as before"
+
+
+def _met_said(met: Sequence[Met]) -> list[str]:
+    """Each part once, with what matched before and matches now."""
+    said: dict[str, None] = {}
+    for one in met:
+        name = (
+            f"{one.part.what} {one.part.name}"
+            if "`" in one.part.name
+            else f"{one.part.what} `{one.part.name}`"
+        )
+        if one.change is None:
+            said[f"{name}, {', '.join(one.part.said)}"] = None
+        elif one.part.what == "table":
+            lines = dict.fromkeys((one.change.before, one.change.after))
+            said[f"{name}, {' -> '.join(lines)}"] = None
+        else:
+            said[name] = None
+    return list(said)
+
+
+# --- what the proofs of the new tables speak of ---------------------------------------
+
+
+def _proved(old: Running, new: RunningLevel, program: Program, taken: Values) -> None:
+    """The table that the next cycle runs was proved for what it will see."""
+    looked = _look(program, new, taken)
+    if looked is not None:
+        _in_proof(new, program, *looked)
+        _known(old, new, program, *looked)
+
+
+def _in_proof(level: RunningLevel, program: Program, table: Table, now: Mapping[str, Value]) -> None:
+    """The assumptions of the table that the next cycle runs hold of what it sees."""
+    for one in program.assumptions:
+        if one.name in table.assumptions and not holds(one.condition, now):
+            raise Refused(
+                Code.SHELL_RELOAD,
+                f"level `{level.name}` keeps its tables: assumption `{one.name}` of table `{table.name}` does not hold of the "
+                f"present state: {witness(program, one.condition, now)}",
+                "the table was proved for other states: let the level come to one of those, or set what the assumption speaks of",
+            )
+
+
+def witness(program: Program, condition: Expr, now: Mapping[str, Value]) -> str:
+    """The leaves that a condition reads, as they are."""
+    names = dict.fromkeys(read_by(condition))
+    return ", ".join(f"{name} = {spell(program.variable(name).type, now[name])}" for name in names)
+
+
+def _known(old: Running, new: RunningLevel, program: Program, table: Table, now: Mapping[str, Value]) -> None:
+    """The table has a line for each of the states that it tests, as it is and as it is to be; or never had one."""
+    for one in program.variables:
+        if one.kind is not Kind.STATE or not isinstance(one.type, Enum) or one.name not in table.variables:
+            continue
+        told = [] if matching_lines(table, now) else [("is", now[one.name])]
+        if one.deferred_until is not None and now[pending(one.name)] != now[one.name]:
+            told.append(("is to be", now[pending(one.name)]))
+        for word, value in told:
+            state = spell(one.type, value)
+            if not _has_line(program, table.name, one.name, state) and (
+                old.program is None or _has_line(old.program, table.name, one.name, state)
+            ):
+                raise Refused(
+                    Code.SHELL_RELOAD,
+                    f"level `{new.name}` keeps its tables: `{one.name}` {word} {state}, for which table `{table.name}` "
+                    "has no line",
+                    f"add a line for {state}, or let the level leave it first",
+                )
+
+
+def _has_line(program: Program, name: str, leaf: str, state: str) -> bool:
+    """Whether the table of that name has a line for a state; in doubt not, and where there is no such table."""
+    table = next((one for one in program.tables if one.name == name), None)
+    kinds = {str(one.name): one.type for one in program.variables}
+    kind = kinds.get(leaf)
+    if table is None or not isinstance(kind, Enum) or state not in kind.members:
+        return False
+    try:
+        return knows(program, table, leaf, kind.members.index(state), Options())
+    except UndecidedError:
+        return False

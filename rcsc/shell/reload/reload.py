@@ -1,0 +1,228 @@
+"""New tables for a level that runs: proved and compiled beside it, in its present state.
+
+In: a running level, the system's description and where it stands. Out: `Reloaded`, or a refusal that says why; then the
+old level runs on. Whether it is taken is for `gate` to judge.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from rcsc.diagnostics.codes import Code
+from rcsc.diagnostics.diagnostic import Severity
+from rcsc.diagnostics.render import one_line
+from rcsc.diagnostics.report import Report
+from rcsc.driver import TARGETS, compile_
+from rcsc.driver.settings import Settings
+from rcsc.host.children import scratch
+from rcsc.lang.interpret import holds
+from rcsc.lang.model import Program, Value
+from rcsc.lang.project import load
+from rcsc.lang.resolve import resolve
+from rcsc.run.description import BadDescription, Description, LevelSpec, places
+from rcsc.run.executors import NotBuilt
+from rcsc.run.levels import Query, RunningLevel, running_level
+from rcsc.run.log.schema import fingerprints
+from rcsc.run.signature import Leaf, Signature, generated_files, signature
+from rcsc.run.system import Kind, executors
+from rcsc.shell.reload.gate import witness
+from rcsc.shell.reload.refusal import Refused
+from rcsc.shell.reload.sources import Kept, kept, laid_out
+from rcsc.solvers.options import Options
+
+MOST_SHOWN = 5
+
+
+@dataclass(frozen=True, slots=True)
+class Plant:
+    """Where a system comes from, to make a level of it again.
+
+    Attributes:
+        path: Its description; sources stand beside it.
+    """
+
+    path: Path
+    system: Description
+    kind: Kind
+    queries: Mapping[str, Query]
+
+
+@dataclass(frozen=True, slots=True)
+class Reloaded:
+    """A level with new tables, in the state of the old one.
+
+    Attributes:
+        digest: Of its executors, as `rcsc.run.log.schema.fingerprints` has it.
+        sources: What they were made of.
+        said: What became of its variables.
+    """
+
+    level: RunningLevel
+    program: Program
+    digest: str
+    sources: Kept
+    said: str
+
+
+def source_of(plant: Plant, spec: LevelSpec) -> Path:
+    """The file that a level's program is compiled of.
+
+    Raises:
+        Refused: It is not where it is looked for.
+    """
+    tried = places(plant.path, spec.program)
+    found = next((one for one in tried if one.is_file()), None)
+    if found is None:
+        looked = " and ".join(f"`{one}`" for one in tried)
+        raise Refused(
+            Code.SHELL_RELOAD, f"the tables of level `{spec.name}` are not there", f"looked for {looked}"
+        )
+    return found
+
+
+def program_of(plant: Plant, spec: LevelSpec, held: Kept | None) -> Program:
+    """What the tables that the executors were compiled of mean.
+
+    Args:
+        plant: Where the system comes from.
+        spec: The level.
+        held: Its sources as they were when it began to run; None where they were not there.
+
+    Raises:
+        Refused: They had changed since they were compiled, or are not in order.
+    """
+    source = source_of(plant, spec)
+    with laid_out(held or kept(source)) as there:
+        made = compile_(_settings(there), plant.system.generated, TARGETS, only_check=True)
+        if made.report.failed:
+            raise Refused(
+                Code.SHELL_RELOAD,
+                f"`{source}` is not what level `{spec.name}` runs: {_why(made.report)}",
+                f"`reload {spec.name}` takes it",
+            )
+        return _resolved(there)
+
+
+def reload(plant: Plant, spec: LevelSpec, old: RunningLevel) -> Reloaded:
+    """The level with the tables as they are now.
+
+    Raises:
+        Refused: They are not proved, or the present state is not in what was proved.
+    """
+    source = source_of(plant, spec)
+    sources = kept(source)
+    with scratch("reload") as place:
+        made = compile_(_settings(source), place, TARGETS, only_check=False)
+        if made.report.failed:
+            raise _refused(spec.name, f"it is not proved: {_why(made.report)}")
+        program = _resolved(source)
+        try:
+            there = replace(plant.system, generated=place)
+            sign = signature(generated_files(there.generated, spec.program)[0])
+            executor = executors(there, {spec.name: sign}, plant.kind)[spec.name]
+            level = running_level(spec, there, sign, executor, plant.queries)
+        except (OSError, ValueError, StopIteration, BadDescription, NotBuilt) as error:
+            raise _refused(spec.name, str(error) or "it has no such level") from error
+        digest = fingerprints(there)[spec.program]
+    _same_buffers(old, level)
+    said = _carried(old, level)
+    _in_proof(level, program)
+    return Reloaded(level, program, digest, sources, said)
+
+
+def _settings(source: Path) -> Settings:
+    return Settings((str(source),), Options())
+
+
+def _resolved(source: Path) -> Program:
+    loaded = load([str(source)])
+    program = resolve(loaded.roots[0], loaded)
+    assert isinstance(program, Program)  # it was compiled a moment ago
+    return program
+
+
+def _refused(level: str, why: str, *helps: str) -> Refused:
+    return Refused(Code.SHELL_RELOAD, f"level `{level}` keeps its tables: {why}", *helps)
+
+
+def _why(report: Report) -> str:
+    errors = [one for one in report.found if one.severity is Severity.ERROR]
+    shown = [one_line(one, report.sources) for one in errors[:MOST_SHOWN]]
+    more = [f"and {len(errors) - MOST_SHOWN} more"] if len(errors) > MOST_SHOWN else []
+    return "\n".join(["", *shown, *more])
+
+
+def _same_buffers(old: RunningLevel, new: RunningLevel) -> None:
+    """What the level's neighbours see keeps its form: they were compiled for it."""
+    for one, made in ((_buffers(old), _buffers(new)), (_buffers(new), _buffers(old))):
+        for name, form in one.items():
+            if made.get(name) != form:
+                raise _refused(
+                    old.name,
+                    f"buffer `{name}` has another form",
+                    "reload is of one level; end the shell and compile",
+                )
+
+
+def _buffers(level: RunningLevel) -> dict[str, list[object]]:
+    runs = [(take.buffer, take.first, take.first + take.count) for take in level.takes]
+    runs += [(give.buffer, give.first, give.end) for give in level.gives]
+    return {
+        name: [
+            (leaf.name, leaf.c_type, leaf.members, leaf.low, leaf.high)
+            for leaf in level.sign.leaves[first:end]
+        ]
+        for name, first, end in runs
+    }
+
+
+def _carried(old: RunningLevel, new: RunningLevel) -> str:
+    """Puts the old values into the new level, by name; what became of them."""
+    values: list[Value] = [
+        _value(old, leaf) if leaf.name in old.sign.index else leaf.initial for leaf in new.sign.leaves
+    ]
+    new.put_back(tuple(values))  # `_in_proof` looks at it
+    added = [leaf.name for leaf in new.sign.leaves if leaf.name not in old.sign.index]
+    gone = [leaf.name for leaf in old.sign.leaves if leaf.name not in new.sign.index]
+    parts = [f"{len(values) - len(added)} variables keep their values"]
+    parts += [f"new: {', '.join(added)}"] if added else []
+    parts += [f"gone: {', '.join(gone)}"] if gone else []
+    return "; ".join(parts)
+
+
+def _value(old: RunningLevel, leaf: Leaf) -> Value:
+    """The old value as a value of the new leaf."""
+    before, value = old.sign.leaves[old.sign.index[leaf.name]], old.value(leaf.name)
+    if _form(before) != _form(leaf):
+        raise _refused(old.name, f"`{leaf.name}` was {_form(before)} and is now {_form(leaf)}")
+    shown = before.shown(value)
+    if leaf.members:
+        if shown not in leaf.members:
+            raise _refused(old.name, f"`{leaf.name}` = {shown}, which its new type does not have")
+        return leaf.members.index(shown)
+    if leaf.low is not None and leaf.high is not None and not leaf.low <= value <= leaf.high:
+        raise _refused(
+            old.name, f"`{leaf.name}` = {shown} lies outside its new range {leaf.low} .. {leaf.high}"
+        )
+    return value
+
+
+def _form(leaf: Leaf) -> str:
+    if leaf.members:
+        return "an enumeration"
+    if leaf.c_type == "bool":
+        return "a bool"
+    return f"{'a real' if leaf.c_type == 'double' else 'an int'}{f' in {leaf.unit}' if leaf.unit else ''}"
+
+
+def _in_proof(level: RunningLevel, program: Program) -> None:
+    """The invariants, which every cycle keeps, hold of the present values."""
+    sign: Signature = level.sign
+    now = {leaf.name: value for leaf, value in zip(sign.leaves, level.values, strict=False)}
+    for one in program.invariants:
+        if not holds(one.condition, now):
+            raise _refused(
+                level.name,
+                f"invariant `{one.name}` does not hold of the present state: {witness(program, one.condition, now)}",
+                "it is proved to be kept, but of a state in which it holds: set what it speaks of first",
+            )

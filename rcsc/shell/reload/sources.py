@@ -1,0 +1,59 @@
+"""The sources of what runs, kept from before anybody edits them: what a running table says, when its file says something else.
+
+In: a root file. Out: `Kept`, and the same files laid out elsewhere.
+"""
+
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from rcsc.host.children import scratch
+from rcsc.lang.project import PROJECT_FILE, load, project_root
+
+
+@dataclass(frozen=True, slots=True)
+class Kept:
+    """A root file and all that it uses.
+
+    Attributes:
+        root: The root file below the project's folder.
+        texts: Contents by path below the project's folder; the project's own file, too.
+    """
+
+    root: str
+    texts: Mapping[str, bytes]
+
+
+def kept(source: Path) -> Kept:
+    """The texts as they are now, of exactly the files that a check reads; what cannot be read is left out."""
+    project = os.path.abspath(project_root(str(source)))
+    texts = {_below(name, project): one.text.encode() for name, one in load([str(source)]).sources.items()}
+    return Kept(_below(str(source), project), {PROJECT_FILE: b"", **texts})
+
+
+def _below(file: str, project: str) -> str:
+    """The path below the project's folder, by names or else by where links lead; the whole path of what is elsewhere."""
+    whole = os.path.abspath(file)
+    folder, name = os.path.split(whole)
+    for path, above in (
+        (whole, project),
+        (os.path.join(os.path.realpath(folder), name), os.path.realpath(project)),
+    ):
+        if os.path.commonpath((path, above)) == above:
+            return os.path.relpath(path, above)
+    return whole
+
+
+@contextmanager
+def laid_out(held: Kept) -> Iterator[Path]:
+    """The root file among the others, in a folder that is gone afterwards; nothing is written anywhere else."""
+    with scratch("reload") as place:
+        for name, text in held.texts.items():
+            if os.path.isabs(name):
+                continue
+            path = place / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(text)
+        yield place / held.root

@@ -1,0 +1,385 @@
+"""Z3 behind a small typed face; its only importer, and only when a question is asked.
+
+In: terms built by the functions here. Out: `Answer`s. A time-out, exhausted memory, an exception and
+`unknown` are all `UNKNOWN`: nobody can take them for a proof.
+"""
+
+import struct
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from enum import Enum, auto
+from fractions import Fraction
+from functools import cache
+from typing import Any, NewType
+
+from rcsc.lang.model import Bool, Real, Scalar, Value
+
+Term = NewType("Term", object)
+"""A Z3 expression; only this module looks inside."""
+
+
+class Answer(Enum):
+    """What the solver says of the formulas together."""
+
+    SATISFIABLE = auto()
+    UNSATISFIABLE = auto()
+    UNKNOWN = auto()
+
+
+STEPS = 20_000_000
+"""Steps of Z3 (its `rlimit`) a question: some seconds, and the same verdict on every machine."""
+TOGETHER = 20
+"""All questions about a table, or about a procedure, take at most as many steps as so many of them may."""
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What one question may cost.
+
+    Attributes:
+        steps: Z3's own count of what it does (`rlimit`): the budget, which does not depend on the machine.
+        memory_mb: For all questions of the process.
+        cpu_s: Seconds of processor time, a backstop against what Z3 does without counting it; `cut_short` tells of it.
+    """
+
+    steps: int = STEPS
+    memory_mb: int = 4_096
+    cpu_s: float = 60.0
+
+    @classmethod
+    def of(cls, steps: int, memory_mb: int = 4_096) -> "Limits":
+        """Limits whose backstop leaves the steps several times what they take."""
+        return cls(steps, memory_mb, max(60.0, 3e-6 * steps))
+
+
+@cache
+def _z3() -> Any:
+    import z3
+
+    return z3
+
+
+_cut: list[int] = []
+"""Processor time, in seconds, of each question of this process that the backstop ended."""
+
+
+def cut_short() -> int:
+    """How many questions of this process were ended by the processor time that they took: no verdict that saw one is kept."""
+    return len(_cut)
+
+
+@dataclass(slots=True)
+class Budget:
+    """What all questions that are asked inside `together` may cost.
+
+    Attributes:
+        left: Steps; with none left nothing more is asked, and every answer is `UNKNOWN`.
+    """
+
+    left: int
+
+    @property
+    def spent(self) -> bool:
+        """Whether there are none left."""
+        return self.left <= 0
+
+
+_budgets: list[Budget] = []
+
+
+@contextmanager
+def together(steps: int) -> Iterator[Budget]:
+    """Inside, all questions of all solvers take at most so many steps."""
+    budget = Budget(steps)
+    _budgets.append(budget)
+    try:
+        yield budget
+    finally:
+        _budgets.remove(budget)
+
+
+def spent() -> bool:
+    """Whether no question is asked any more, so that none need be made."""
+    return any(one.spent for one in _budgets)
+
+
+def troubles() -> tuple[type[BaseException], ...]:
+    """What Z3 and exhausted memory raise, also outside a check: nothing is proved then."""
+    loaded = sys.modules.get("z3")
+    return (MemoryError,) if loaded is None else (MemoryError, loaded.Z3Exception)
+
+
+def _double_sort() -> Any:
+    return _z3().Float64()
+
+
+def variable(name: str, kind: Scalar) -> Term:
+    """A fresh constant: Bool, IEEE double, or a mathematical integer (also for enumerations)."""
+    z3 = _z3()
+    if isinstance(kind, Bool):
+        return Term(z3.Bool(name))
+    return Term(z3.FP(name, _double_sort()) if isinstance(kind, Real) else z3.Int(name))
+
+
+def literal(kind: Scalar, value: Value) -> Term:
+    """A constant of the kind."""
+    z3 = _z3()
+    if isinstance(kind, Bool):
+        return Term(z3.BoolVal(bool(value)))
+    return Term(z3.FPVal(float(value), _double_sort()) if isinstance(kind, Real) else z3.IntVal(int(value)))
+
+
+def member(name: str) -> Term:
+    """A fresh constant for a member of an enumeration, by index, in 16 bits: quicker than an integer."""
+    return Term(_z3().BitVec(name, 16))
+
+
+def member_literal(index: int) -> Term:
+    """A member as a constant; indices are far below the sign bit, so that order is theirs."""
+    return Term(_z3().BitVecVal(index, 16))
+
+
+def number(name: str) -> Term:
+    """A fresh constant for a real number, with no end to its digits."""
+    return Term(_z3().Real(name))
+
+
+def fraction(value: float) -> Term:
+    """A finite double as the number that it is."""
+    return Term(_z3().RealVal(str(Fraction(value))))
+
+
+def as_number(term: Term) -> Term:
+    """An integer among the real numbers."""
+    return Term(_z3().ToReal(term))
+
+
+def truth(value: bool) -> Term:
+    """The constant true or false."""
+    return Term(_z3().BoolVal(value))
+
+
+def negation(term: Term) -> Term:
+    """Its opposite."""
+    return Term(_z3().Not(term))
+
+
+def all_of(terms: Sequence[Term]) -> Term:
+    """Every one; true when there are none."""
+    return (
+        Term(_z3().And(list(terms))) if terms else truth(True)
+    )  # other solvers do not read `and` of nothing
+
+
+def any_of(terms: Sequence[Term]) -> Term:
+    """At least one; false when there are none."""
+    return Term(_z3().Or(list(terms))) if terms else truth(False)
+
+
+def implication(left: Term, right: Term) -> Term:
+    """Left implies right."""
+    return Term(_z3().Implies(left, right))
+
+
+def choice(condition: Term, then: Term, orelse: Term) -> Term:
+    """`then` where the condition holds, else `orelse`."""
+    return Term(then if then is orelse else _z3().If(condition, then, orelse))
+
+
+def equal(left: Term, right: Term, kind: Scalar) -> Term:
+    """Equality of two values of the kind; 0.0 equals -0.0."""
+    return Term(_z3().fpEQ(left, right) if isinstance(kind, Real) else left == right)
+
+
+def at_most(left: Term, right: Term, kind: Scalar) -> Term:
+    """`left <= right`; false comes before true."""
+    z3: Any = _z3()
+    a: Any = left
+    if isinstance(kind, Bool):
+        return Term(z3.Implies(left, right))
+    return Term(z3.fpLEQ(left, right) if isinstance(kind, Real) else a <= right)
+
+
+def below(left: Term, right: Term, kind: Scalar) -> Term:
+    """`left < right`; false comes before true."""
+    z3: Any = _z3()
+    a: Any = left
+    if isinstance(kind, Bool):
+        return Term(z3.And(z3.Not(left), right))
+    return Term(z3.fpLT(left, right) if isinstance(kind, Real) else a < right)
+
+
+def integer_operation(op: str, left: Term, right: Term) -> Term:
+    """`+ - * / mod` of mathematical integers, the first three also of real numbers; `/` rounds toward zero, `mod` goes with it."""
+    z3: Any = _z3()
+    a: Any = left
+    b: Any = right
+    if op in ("+", "-", "*"):
+        return Term({"+": a + b, "-": a - b, "*": a * b}[op])
+    size = z3.If(a >= 0, a, -a) / z3.If(b >= 0, b, -b)
+    quotient = z3.If((a >= 0) == (b > 0), size, -size)
+    return Term(quotient if op == "/" else a - quotient * b)
+
+
+def quotient(left: Term, right: float) -> Term:
+    """A real number divided by one that is not zero."""
+    a: Any = left
+    return Term(a / _z3().RealVal(str(Fraction(right))))
+
+
+def double_operation(op: str, left: Term, right: Term) -> Term:
+    """`+ - * /` of doubles, rounded to nearest even."""
+    z3: Any = _z3()
+    operation = {"+": z3.fpAdd, "-": z3.fpSub, "*": z3.fpMul, "/": z3.fpDiv}[op]
+    return Term(operation(z3.RNE(), left, right))
+
+
+def minus(term: Term, kind: Scalar) -> Term:
+    """The negative."""
+    a: Any = term
+    return Term(_z3().fpNeg(a) if isinstance(kind, Real) else -a)
+
+
+def absolute(term: Term, kind: Scalar) -> Term:
+    """The value without its sign."""
+    z3: Any = _z3()
+    a: Any = term
+    return Term(z3.fpAbs(a) if isinstance(kind, Real) else z3.If(a < 0, -a, a))
+
+
+def to_double(term: Term) -> Term:
+    """The nearest double of an integer."""
+    z3: Any = _z3()
+    return Term(z3.fpRealToFP(z3.RNE(), z3.ToReal(term), _double_sort()))
+
+
+def to_integer(term: Term) -> Term:
+    """A finite double without its fraction."""
+    z3: Any = _z3()
+    return Term(z3.ToInt(z3.fpToReal(z3.fpRoundToIntegral(z3.RTZ(), term))))
+
+
+class Solver:
+    """One incremental solver.
+
+    Attributes:
+        queries: How often it was asked.
+        refuted: Where it remembers: of each answer that there is none, what was asserted besides what stands for good.
+    """
+
+    def __init__(self, limits: Limits = Limits(), *, remembers: bool = False) -> None:
+        z3 = _z3()
+        z3.set_param("memory_max_size", limits.memory_mb)
+        self._solver: Any = z3.Solver()
+        self._steps = self._given = limits.steps
+        self._solver.set("rlimit", limits.steps)
+        self._cpu_s = self._patience_s = limits.cpu_s
+        self._wait()
+        self._solver.set("random_seed", 0)
+        self.queries = 0
+        self.refuted: list[Term] = []
+        self._remembers = remembers
+        self._added: list[list[Term]] = []
+
+    def add(self, *terms: Term) -> None:
+        """Asserts the terms."""
+        self._solver.add(*terms)
+        if self._added:
+            self._added[-1] += terms
+
+    def push(self) -> None:
+        """Remembers what is asserted."""
+        self._solver.push()
+        self._added.append([])
+
+    def pop(self) -> None:
+        """Goes back to what was remembered."""
+        self._solver.pop()
+        self._added.pop()
+
+    def check(self, *assuming: Term) -> Answer:
+        """Whether all asserted terms, and these, hold together for some values."""
+        if spent():
+            return Answer.UNKNOWN
+        z3 = _z3()
+        self.queries += 1
+        self._give(min([self._steps, *(one.left for one in _budgets)]))
+        try:
+            answer, why = self._answer(assuming)
+        except (z3.Z3Exception, MemoryError) as error:
+            answer, why = z3.unknown, str(error)
+        if "interrupted" in why:  # Z3 takes Ctrl-C for itself
+            raise KeyboardInterrupt
+        if answer == z3.unsat and self._remembers:
+            self.refuted.append(all_of([*(term for terms in self._added for term in terms), *assuming]))
+        if answer == z3.sat:
+            return Answer.SATISFIABLE
+        return Answer.UNSATISFIABLE if answer == z3.unsat else Answer.UNKNOWN
+
+    def _answer(self, assuming: tuple[Term, ...]) -> tuple[Any, str]:
+        """Z3's answer and why there is none; asked again where other processes took the time that it was given."""
+        z3 = _z3()
+        while True:
+            counted = self._count()
+            used_s, passed_s = time.thread_time(), time.monotonic()
+            answer = self._solver.check(*assuming)
+            if answer != z3.unknown:
+                self._charge(counted)
+                return answer, ""
+            used_s, passed_s = time.thread_time() - used_s, time.monotonic() - passed_s
+            why = str(self._solver.reason_unknown())
+            if passed_s < 0.9 * self._patience_s or "interrupted" in why:
+                self._charge(counted)
+                return answer, why
+            if used_s >= 0.9 * self._cpu_s:
+                _cut.append(round(used_s))
+                return answer, why
+            self._patience_s *= 4
+            self._wait()
+
+    def _give(self, steps: int) -> None:
+        """Has Z3 end the next question after so many steps."""
+        if steps != self._given:
+            self._given = steps
+            self._solver.set("rlimit", steps)
+
+    def _count(self) -> int:
+        """Steps that Z3 has counted so far, where anybody wants to know."""
+        return int(self._solver.statistics().get_key_value("rlimit count")) if _budgets else 0
+
+    def _charge(self, before: int) -> None:
+        """Takes what a question cost from all budgets; not what an attempt cost that only the clock ended."""
+        used = self._count() - before
+        for one in _budgets:
+            one.left -= used
+
+    def _wait(self) -> None:
+        """Has Z3 end a question after so much time as passes, which on a busy machine is more than it gets."""
+        self._solver.set("timeout", max(1, round(1000 * self._patience_s)))
+
+    def script(self) -> str:
+        """What is asserted as an SMT-LIB 2 script, with `(check-sat)` at its end."""
+        return f"(set-logic ALL)\n{self._solver.to_smt2()}"
+
+    def refutations(self) -> str:
+        """A script that has no model exactly if each answer that there is none was right; where there was one, and outside `push`."""
+        self.push()
+        self.add(any_of(self.refuted))
+        script = self.script()
+        self.pop()
+        return script
+
+    def value(self, term: Term, kind: Scalar) -> Value:
+        """The value of a constant in the model of the last satisfiable answer."""
+        z3 = _z3()
+        found = self._solver.model().eval(term, model_completion=True)
+        if isinstance(kind, Bool):
+            return bool(z3.is_true(found))
+        if isinstance(kind, Real):
+            bits = z3.simplify(z3.fpToIEEEBV(found)).as_long()
+            double: float = struct.unpack("<d", struct.pack("<Q", bits))[0]
+            return double + 0.0
+        return int(found.as_long())

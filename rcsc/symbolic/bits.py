@@ -1,0 +1,351 @@
+"""Nodes of a symbolic run as clauses of propositional logic: the search is done on bits, the confirmation on integers.
+
+In: nodes (`symbolic.values`). Out: literals and clauses, for a SAT solver. What is exact and what is not is said in
+`keyed`, with which this agrees: booleans, members and integers exact, reals by their keys, the rest any value within its bounds.
+Numbers are two's complement, lowest bit first, as wide as their bounds need; gates after Tseitin ("On the complexity of
+derivation in propositional calculus", 1968), each made once. Values that are only copied and compared for equality get as
+many bits as tell them apart (Pnueli, Rodeh, Shtrichman and Siegel, "Deciding equality formulas by small domains
+instantiations", 1999), and their ranges are forgotten.
+"""
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Self
+
+from rcsc.lang.model import COMPARISONS, Bool, Enum, Op, Real, Scalar, key_bounds, real_key
+from rcsc.symbolic.values import Node, parts_first
+
+Literal = int
+"""A variable, counted from 1, or its opposite, negative."""
+Word = tuple[Literal, ...]
+TRUE, FALSE = 1, -1
+WIDEST = 66
+
+
+@dataclass(slots=True)
+class Bits:
+    """Makes literals and words; one of these for all the nodes of one question.
+
+    Attributes:
+        clauses: What is to be asserted; whoever hands them on empties it.
+        count: Variables made.
+    """
+
+    clauses: list[list[Literal]] = field(default_factory=lambda: [[TRUE]])
+    count: int = 1
+    _few: "Mapping[Node, Few]" = field(default_factory=dict)
+    _words: dict[Node, Word] = field(default_factory=dict)
+    _named: dict[str, Word] = field(default_factory=dict)
+    _gates: dict[tuple[str, Literal, Literal], Literal] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, nodes: Sequence[Node]) -> Self:
+        """For these nodes, and nothing else."""
+        return cls(_few=few(nodes))
+
+    def fresh(self) -> Literal:
+        """A new variable."""
+        self.count += 1
+        return self.count
+
+    def word(self, node: Node) -> Word:
+        """The bits of a node: one for a truth value."""
+        for one in parts_first(node, known=self._words):
+            self._words[one] = self._made(one)
+        return self._words[node]
+
+    def literal(self, node: Node) -> Literal:
+        """The literal of a truth value."""
+        return self.word(node)[0]
+
+    def equals(self, word: Word, kind: Scalar, key: int) -> Literal:
+        """That a word of the kind has this key."""
+        if isinstance(kind, Bool):
+            return word[0] if key else -word[0]
+        return self._equal(word, constant(key))
+
+    def both(self, a: Literal, b: Literal) -> Literal:
+        """The literal of *a and b*."""
+        if a in (b, TRUE) or b == FALSE:
+            return b
+        if b == TRUE or a == FALSE:
+            return a
+        if a == -b:
+            return FALSE
+        key = ("and", min(a, b), max(a, b))
+        if key not in self._gates:
+            gate = self._gates[key] = self.fresh()
+            self.clauses += [[-gate, a], [-gate, b], [gate, -a, -b]]
+        return self._gates[key]
+
+    def all_of(self, literals: Iterable[Literal]) -> Literal:
+        """The literal of all of them together."""
+        found = TRUE
+        for one in literals:
+            found = self.both(found, one)
+        return found
+
+    def _either(self, a: Literal, b: Literal) -> Literal:
+        return -self.both(-a, -b)
+
+    def _same(self, a: Literal, b: Literal) -> Literal:
+        """That they are the same."""
+        if a in (TRUE, FALSE) or b in (TRUE, FALSE):
+            known, other = (a, b) if a in (TRUE, FALSE) else (b, a)
+            return other if known == TRUE else -other
+        if a in (b, -b):
+            return TRUE if a == b else FALSE
+        sign = (a < 0) != (b < 0)
+        a, b = sorted((abs(a), abs(b)))
+        key = ("same", a, b)
+        if key not in self._gates:
+            gate = self._gates[key] = self.fresh()
+            self.clauses += [[-gate, -a, b], [-gate, a, -b], [gate, a, b], [gate, -a, -b]]
+        return -self._gates[key] if sign else self._gates[key]
+
+    def _mux(self, when: Literal, one: Literal, two: Literal) -> Literal:
+        if when == TRUE or one == two:
+            return one
+        if when == FALSE:
+            return two
+        if one in (TRUE, FALSE) or two in (TRUE, FALSE) or one == -two:
+            return self._either(self.both(when, one), self.both(-when, two))
+        if when < 0:
+            when, one, two = -when, two, one
+        key = (f"mux {when}", one, two)
+        if key not in self._gates:
+            gate = self._gates[key] = self.fresh()
+            self.clauses += [[-when, -one, gate], [-when, one, -gate], [when, -two, gate], [when, two, -gate]]
+            self.clauses += [[-one, -two, gate], [one, two, -gate]]
+        return self._gates[key]
+
+    # --- words ---
+
+    def _equal(self, a: Word, b: Word) -> Literal:
+        return self.all_of(self._same(x, y) for x, y in _aligned(a, b))
+
+    def _below(self, a: Word, b: Word) -> Literal:
+        """That the first is less."""
+        pairs = list(_aligned(a, b))
+        found = FALSE
+        for x, y in pairs[:-1]:
+            found = self._mux(self._same(x, y), found, y)
+        x, y = pairs[-1]  # of the sign, the greater is the less
+        return self._mux(self._same(x, y), found, x)
+
+    def _sum(self, a: Word, b: Word, carry: Literal) -> Word:
+        found = []
+        for x, y in _aligned((*a, a[-1]), (*b, b[-1])):
+            half = -self._same(x, y)
+            found.append(-self._same(half, carry))
+            carry = self._mux(half, carry, x)
+        return tuple(found)
+
+    def _choice(self, when: Literal, one: Word, two: Word) -> Word:
+        return tuple(self._mux(when, x, y) for x, y in _aligned(one, two))
+
+    def _opposite(self, a: Word) -> Word:
+        return self._sum((FALSE,), tuple(-x for x in a), TRUE)
+
+    def _product(self, a: Word, factor: int) -> Word:
+        found: Word = (FALSE,)
+        for at in range(abs(factor).bit_length()):
+            if abs(factor) >> at & 1:
+                found = self._sum(found, (*(FALSE,) * at, *a), FALSE)
+        return self._opposite(found) if factor < 0 else found
+
+    # --- nodes ---
+
+    def _made(self, node: Node) -> Word:
+        parts = [self._words[part] for part in node.args]
+        if node in self._few and node.op not in ("choice", "narrowed"):
+            return self._one_of_few(node, self._few[node])
+        match node.op:
+            case "constant":
+                return _constant(node.kind, node.low)
+            case "variable":
+                return self._variable(node.name, node.kind)
+            case "choice":
+                return self._choice(parts[0][0], parts[1], parts[2])
+            case "narrowed":
+                return parts[0]
+            case _:
+                return self._operation(Op(node.op), node, parts)
+
+    def _one_of_few(self, node: Node, one: "Few") -> Word:
+        if node.op == "constant":
+            return tuple(TRUE if one.constants[node.low] >> at & 1 else FALSE for at in range(one.width))
+        if node.op != "variable":
+            return tuple(self.fresh() for _ in range(one.width))
+        if node.name not in self._named:
+            self._named[node.name] = tuple(self.fresh() for _ in range(one.width))
+        return self._named[node.name]
+
+    def _variable(self, name: str, kind: Scalar) -> Word:
+        if name not in self._named:
+            self._named[name] = (self.fresh(),) if isinstance(kind, Bool) else self._within(*key_bounds(kind))
+        return self._named[name]
+
+    def _within(self, low: int, high: int) -> Word:
+        """A word of any value from `low` to `high`."""
+        signed = low < 0
+        width = max(low.bit_length(), (-low - 1).bit_length() if signed else 0, high.bit_length())
+        found = tuple(self.fresh() for _ in range(width)) + ((self.fresh(),) if signed else (FALSE,))
+        self.clauses.append([-self._below(found, constant(low))])
+        self.clauses.append([-self._below(constant(high), found)])
+        return found
+
+    def _operation(self, op: Op, node: Node, parts: list[Word]) -> Word:
+        if op is Op.NOT:
+            return (-parts[0][0],)
+        if op is Op.AND:
+            return (self.all_of(part[0] for part in parts),)
+        if not all(arg.ordered for arg in node.args):
+            return self._any(node)
+        if op in COMPARISONS:
+            return (self._compared(op, node, parts),)
+        return self._number(op, node, parts)
+
+    def _compared(self, op: Op, node: Node, parts: list[Word]) -> Literal:
+        if isinstance(node.args[0].kind, Bool):
+            parts = [(*part, FALSE) for part in parts]
+        if op is Op.EQ:
+            return self._equal(*parts)
+        return self._below(*parts) if op is Op.LT else -self._below(parts[1], parts[0])
+
+    def _number(self, op: Op, node: Node, parts: list[Word]) -> Word:
+        a, b = parts[0], parts[-1]
+        if op is Op.NEG:
+            return self._opposite(a)
+        if op is Op.ABS:
+            return self._choice(a[-1], self._opposite(a), a)
+        if op in (Op.MIN, Op.MAX):
+            first = -self._below(b, a)
+            return self._choice(first if op is Op.MIN else -first, a, b)
+        if isinstance(node.args[0].kind, Real) or isinstance(node.kind, Real):
+            return self._any(node)
+        if op is Op.ADD:
+            return self._sum(a, b, FALSE)
+        if op is Op.SUB:
+            return self._sum(a, tuple(-x for x in b), TRUE)
+        if op is Op.MUL and any(arg.known for arg in node.args):
+            known = 0 if node.args[0].known else 1
+            return self._product(parts[1 - known], int(node.args[known].low))
+        one, two = node.args[0], node.args[-1]
+        if op is Op.MOD and two.known and one.low >= 0 and one.high < 2 * two.low:
+            return self._choice(self._below(a, b), a, self._sum(a, tuple(-x for x in b), TRUE))
+        return self._any(node)
+
+    def _any(self, node: Node) -> Word:
+        """Any value within the bounds of the node."""
+        if isinstance(node.kind, Bool):
+            return (self.fresh(),)
+        if not (math.isfinite(node.low) and math.isfinite(node.high)):
+            return tuple(self.fresh() for _ in range(WIDEST))
+        real = isinstance(node.kind, Real)
+        return self._within(
+            *((real_key(node.low), real_key(node.high)) if real else (int(node.low), int(node.high)))
+        )
+
+
+def constant(key: int) -> Word:
+    """A number as a word."""
+    return tuple(TRUE if key >> at & 1 else FALSE for at in range(key.bit_length() + 1))
+
+
+def _constant(kind: Scalar, value: int | float) -> Word:
+    if isinstance(kind, Bool):
+        return (TRUE if value else FALSE,)
+    return constant(real_key(float(value)) if isinstance(kind, Real) else int(value))
+
+
+def _aligned(a: Word, b: Word) -> Iterable[tuple[Literal, Literal]]:
+    """Bit by bit, the shorter one with its sign repeated."""
+    width = max(len(a), len(b))
+    return zip((*a, *(a[-1],) * (width - len(a))), (*b, *(b[-1],) * (width - len(b))), strict=True)
+
+
+def key_of_bits(word: Sequence[bool]) -> int:
+    """The number that a word stands for."""
+    size = sum(1 << at for at, one in enumerate(word[:-1]) if one)
+    return size - (1 << (len(word) - 1)) if word[-1] else size
+
+
+# --- values that are only copied and compared ---
+
+
+@dataclass(frozen=True, slots=True)
+class Few:
+    """What the nodes of one class share: bits that tell all its values apart, and numbers for its constants."""
+
+    width: int
+    constants: Mapping[int | float, int]
+
+
+def few(nodes: Sequence[Node]) -> dict[Node, Few]:
+    """Numbers in these nodes that are only copied and compared for equality, each with its class."""
+    every = [node for node in parts_first(*nodes) if not isinstance(node.kind, Bool | Enum)]
+    classes = _Classes()
+    calculated = _joined(parts_first(*nodes), classes)
+    spoilt = {classes.of(node) for node in calculated}
+    members: dict[Node, list[Node]] = {}
+    for node in every:
+        if classes.of(node) not in spoilt:
+            members.setdefault(classes.of(node), []).append(node)
+    found: dict[Node, Few] = {}
+    for one in members.values():
+        values = dict.fromkeys(node.low for node in one if node.op == "constant")
+        names = {node.name for node in one if node.op == "variable"}
+        others = sum(node.op not in ("constant", "variable", "choice", "narrowed") for node in one)
+        width = max(1, (len(values) + len(names) + others - 1).bit_length())
+        shared = Few(width, {value: at for at, value in enumerate(values)})
+        found |= dict.fromkeys(one, shared)
+    return found
+
+
+@dataclass(slots=True)
+class _Classes:
+    """Disjoint sets of nodes."""
+
+    _up: dict[Node, Node] = field(default_factory=dict)
+
+    def of(self, node: Node) -> Node:
+        """The one that stands for its set."""
+        while (up := self._up.get(node, node)) is not node:
+            self._up[node] = self._up.get(up, up)
+            node = up
+        return node
+
+    def join(self, one: Node, two: Node) -> None:
+        self._up[self.of(one)] = self.of(two)
+
+
+def _joined(nodes: Iterable[Node], classes: _Classes) -> set[Node]:
+    """Joins what is copied or compared; returns what is calculated with, or ordered."""
+    calculated: set[Node] = set()
+    named: dict[str, Node] = {}
+    for node in nodes:
+        match node.op:
+            case "choice":
+                classes.join(node, node.args[1])
+                classes.join(node, node.args[2])
+            case "narrowed":
+                classes.join(node, node.args[0])
+            case "variable":
+                classes.join(node, named.setdefault(node.name, node))
+            case Op.EQ if all(arg.ordered for arg in node.args):
+                classes.join(*node.args)
+            case "constant" | Op.NOT | Op.AND:
+                pass
+            case _:
+                calculated |= _calculated(node)
+    return calculated
+
+
+def _calculated(node: Node) -> set[Node]:
+    """The node and its parts, where its value depends on theirs here (see `Bits._number`)."""
+    real = isinstance(node.args[0].kind, Real) or isinstance(node.kind, Real)
+    if real and node.op not in (*COMPARISONS, Op.NEG, Op.ABS, Op.MIN, Op.MAX):
+        return set()
+    return {node, *node.args}

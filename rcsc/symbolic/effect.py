@@ -1,0 +1,246 @@
+"""What actions do, as values: the state behind them, what it rests on, and which extern procedures are called.
+
+In: statements of one program, and leaves that another program's run may share. Out: an `Effect`; two of them are the
+same where `same_effect` holds. Text plays no part: only what is written matters, and where a run goes wrong.
+
+Nodes that are built alike are made one (`Shared`), so that most of what two versions have in common folds without
+a solver.
+"""
+
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass, field
+
+from rcsc.diagnostics.source import Span
+from rcsc.lang.model import Expr, Procedure, Program, Scalar, Statement
+from rcsc.symbolic import values
+from rcsc.symbolic.evaluation import Obligation
+from rcsc.symbolic.execution import Run
+from rcsc.symbolic.values import CONSTANT, FALSE, NARROWED, TRUE, Node
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ExternCall:
+    """A call of an extern procedure: the cycle may end there, so that what was written before is seen.
+
+    Attributes:
+        spelled: Name and implementation, and the leaves that it reads and writes.
+        path: When the call is reached.
+        given: What it is called with.
+        before: The leaves written so far.
+    """
+
+    spelled: str
+    path: Node
+    given: tuple[Node, ...]
+    before: Mapping[str, Node]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Effect:
+    """What a run does.
+
+    Attributes:
+        leaves: The value behind the run of every leaf that it may write.
+        wrote: For each of them, when it is written.
+        owed: What must hold that nothing goes wrong on the way: no overflow, no index outside its array, no value out of
+            its range. What is owed twice is there once.
+        calls: Calls of extern procedures, in order.
+    """
+
+    leaves: Mapping[str, Node]
+    wrote: Mapping[str, Node]
+    owed: tuple[Node, ...]
+    calls: tuple[ExternCall, ...]
+
+    @property
+    def good(self) -> Node:
+        """That nothing goes wrong."""
+        return values.all_of(self.owed)
+
+
+class Shared:
+    """Nodes made one where they are built alike, and the leaves that all runs begin with."""
+
+    def __init__(self) -> None:
+        self.start: dict[str, Node] = {}
+        self._known: dict[tuple[object, ...], Node] = {}
+        self._of: dict[Node, Node] = {}
+        self._bare: dict[tuple[object, ...], int] = {}
+        self._number: dict[Node, int] = {}
+
+    def one(self, node: Node) -> Node:
+        """The node that stands for all that are built like this one."""
+        for part in values.parts_first(node):
+            if part not in self._of:
+                args = tuple(self._of[arg] for arg in part.args)
+                key = (part.op, tuple(map(id, args)), part.kind, part.low, part.high, part.name)
+                known = self._known.get(key)
+                if known is None:
+                    same = all(one is two for one, two in zip(args, part.args, strict=True))
+                    known = part if same else Node(part.op, args, part.kind, part.low, part.high, part.name)
+                    self._known[key] = known
+                    self._of[known] = known
+                self._of[part] = known
+        return self._of[node]
+
+    def equal(self, one: Node, two: Node) -> Node:
+        """That two values are the same; known where they are built alike, whatever was learnt of their bounds.
+
+        A value that is kept is no NaN: that is owed.
+        """
+        return TRUE if self._built(one) == self._built(two) else values.equal(one, two)
+
+    def _built(self, node: Node) -> int:
+        """A number for how a value is built."""
+        for part in values.parts_first(node):
+            if part not in self._number:
+                args = tuple(self._number[arg] for arg in part.args)
+                if part.op == NARROWED:
+                    self._number[part] = args[0]
+                    continue
+                worth = part.low if part.op == CONSTANT else 0
+                key = (part.op, args, type(part.kind), part.name, worth)
+                self._number[part] = self._bare.setdefault(key, len(self._bare))
+        return self._number[node]
+
+
+@dataclass(slots=True)
+class _Followed(Run):
+    """A run that notes its calls of extern procedures."""
+
+    calls: list[ExternCall] = field(default_factory=list)
+
+    def call(self, procedure: Procedure, args: list[tuple[Span, Node]]) -> None:
+        """As `Run.call`; the results of the n-th extern call have the same names in every run."""
+        if procedure.extern is not None:
+            given = (*(self.leaf(name) for name in procedure.reads), *(value for _, value in args))
+            said = f"{procedure.name} {procedure.extern} {procedure.reads} {procedure.writes}"
+            self.calls.append(ExternCall(said, self.path, given, dict(self.state.leaves)))
+        Run.call(self, procedure, args)
+
+    def any_value(self, name: str, kind: Scalar) -> Node:
+        """A value that nothing is known of; named by its place among the extern calls, or in the run."""
+        self.fresh.append(values.variable(f"{name} ({max(1, len(self.calls))})", kind))
+        return self.fresh[-1]
+
+
+@dataclass(slots=True)
+class Meaning:
+    """Conditions and actions of one program as values over shared leaves.
+
+    Attributes:
+        bad: Where a condition that was asked for cannot be evaluated.
+    """
+
+    program: Program
+    kinds: Mapping[str, Scalar]
+    shared: Shared
+    bad: list[Node] = field(default_factory=list)
+    _procedures: dict[str, Procedure] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._procedures = {str(one.name): one for one in self.program.procedures}
+
+    def _run(self) -> _Followed:
+        return _Followed(self._procedures, self.kinds, self.shared.start)
+
+    def condition(self, expr: Expr) -> Node:
+        """The condition; where it is undefined is added to `bad`."""
+        run = self._run()
+        found = run.evaluate(expr)
+        self.bad += [self.shared.one(values.negation(_paid(one))) for one in run.obligations]
+        return self.shared.one(found)
+
+    def effect(self, body: Iterable[Statement], given: Iterable[Node] = ()) -> Effect:
+        """What the statements do where all of `given` holds.
+
+        Raises:
+            TooLongError, RecursionError: It has more steps than are followed.
+        """
+        run = self._run()
+        for node in given:
+            run.assume(node)
+        run.execute(body)
+        return self._made(run)
+
+    def procedure(self, name: str, args: Iterable[Node]) -> Effect:
+        """What a procedure does with these arguments.
+
+        Raises:
+            TooLongError, RecursionError: As `effect`.
+        """
+        run = self._run()
+        procedure = self._procedures[name]
+        run.call(procedure, [(procedure.span, arg) for arg in args])
+        return self._made(run)
+
+    def _made(self, run: _Followed) -> Effect:
+        one = self.shared.one
+        calls = tuple(
+            ExternCall(
+                call.spelled,
+                one(call.path),
+                tuple(map(one, call.given)),
+                {name: one(node) for name, node in call.before.items()},
+            )
+            for call in run.calls
+        )
+        return Effect(
+            {name: one(node) for name, node in run.state.leaves.items()},
+            {name: one(node) for name, node in run.state.wrote.items()},
+            tuple(dict.fromkeys(one(_paid(owed)) for owed in run.obligations)),
+            calls,
+        )
+
+
+def _paid(owed: Obligation) -> Node:
+    return values.follows(owed.path, owed.good)
+
+
+def value_behind(effect: Effect, leaf: str, shared: Shared) -> Node:
+    """The leaf's value behind the run."""
+    return effect.leaves.get(leaf, shared.start[leaf])
+
+
+def goes_wrong_otherwise(one: Effect, two: Effect, shared: Shared) -> Node:
+    """That one of the runs comes to its end and the other does not; what both owe plays no part."""
+    first = values.all_of(node for node in one.owed if node not in two.owed)
+    second = values.all_of(node for node in two.owed if node not in one.owed)
+    if first is second:
+        return FALSE
+    both = values.all_of(node for node in one.owed if node in two.owed)
+    return shared.one(values.both(both, values.negation(values.equal(first, second))))
+
+
+def same_calls(one: Effect, two: Effect, leaves: Collection[str], shared: Shared) -> Node:
+    """The same extern procedures, at the same points, in the same states, with the same values.
+
+    A result that is refused ends the cycle, so that what was written before the call is seen.
+    """
+    if [call.spelled for call in one.calls] != [call.spelled for call in two.calls]:
+        return values.all_of(values.negation(call.path) for call in (*one.calls, *two.calls))
+    found = []
+    for first, second in zip(one.calls, two.calls, strict=True):
+        seen = [leaf for leaf in leaves if leaf in first.before or leaf in second.before]
+        pairs = [
+            *zip(first.given, second.given, strict=True),
+            *(
+                (first.before.get(leaf, shared.start[leaf]), second.before.get(leaf, shared.start[leaf]))
+                for leaf in seen
+            ),
+        ]
+        both = values.both(first.path, second.path)
+        neither = values.negation(values.either(first.path, second.path))
+        found.append(
+            values.either(values.both(both, values.all_of(shared.equal(a, b) for a, b in pairs)), neither)
+        )
+    return values.all_of(found)
+
+
+def several(nodes: Iterable[Node]) -> Node:
+    """That at least two of them hold."""
+    before, found = FALSE, FALSE
+    for node in nodes:
+        found = values.either(found, values.both(before, node))
+        before = values.either(before, node)
+    return found

@@ -1,0 +1,162 @@
+"""Expressions of the model as solver terms, and the least witness.
+
+In: a program's leaves and expressions. Out: terms whose values are exactly `interpret.evaluate`'s wherever
+that is defined; that it is defined is proved apart (`obligations`).
+"""
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+
+from rcsc.lang.model import (
+    Among,
+    Apply,
+    Bool,
+    Expr,
+    Int,
+    Literal,
+    Op,
+    Read,
+    ReadLocal,
+    Real,
+    Scalar,
+    Select,
+    Value,
+    Variable,
+    key_bounds,
+    key_of,
+    value_of_key,
+)
+from rcsc.solvers import smt
+from rcsc.solvers.smt import Answer, Solver, Term
+
+_ORDER: Mapping[Op, Callable[[Term, Term, Scalar], Term]] = {
+    Op.EQ: smt.equal,
+    Op.NE: lambda a, b, kind: smt.negation(smt.equal(a, b, kind)),
+    Op.LT: smt.below,
+    Op.LE: smt.at_most,
+    Op.GT: lambda a, b, kind: smt.below(b, a, kind),
+    Op.GE: lambda a, b, kind: smt.at_most(b, a, kind),
+}
+_LOGIC: Mapping[Op, Callable[[list[Term]], Term]] = {
+    Op.NOT: lambda terms: smt.negation(terms[0]),
+    Op.AND: smt.all_of,
+    Op.OR: smt.any_of,
+    Op.IMPLIES: lambda terms: smt.implication(terms[0], terms[1]),
+}
+
+
+@dataclass(slots=True)
+class Frame:
+    """The term of every leaf and local at one point of a run."""
+
+    leaves: dict[str, Term]
+    local: dict[str, Term] = field(default_factory=dict)
+
+
+def encode(expr: Expr, frame: Frame) -> Term:
+    """The term of `expr` in the frame."""
+    match expr:
+        case Literal(value=value, type=kind):
+            return smt.literal(kind, value)
+        case Read(name=name):
+            return frame.leaves[name]
+        case ReadLocal(name=name):
+            return frame.local[name]
+        case Select(leaves=leaves, index=index):
+            at = encode(index, frame)
+            found = frame.leaves[leaves[-1]]
+            for number in range(len(leaves) - 2, -1, -1):
+                here = smt.equal(at, smt.literal(index.type, number), index.type)
+                found = smt.choice(here, frame.leaves[leaves[number]], found)
+            return found
+        case Among(subject=subject, values=values):
+            term = encode(subject, frame)
+            kind = subject.type
+            return smt.any_of([smt.equal(term, smt.literal(kind, value), kind) for value in values])
+        case Apply(op=op, args=args):
+            return operation(op, args[0].type, [encode(arg, frame) for arg in args])
+
+
+def operation(op: Op, kind: Scalar, terms: list[Term]) -> Term:
+    """The term of an operator over operands, the first of which is of type `kind`."""
+    if op in _LOGIC:
+        return _LOGIC[op](terms)
+    if op in _ORDER:
+        return _ORDER[op](terms[0], terms[1], kind)
+    match op:
+        case Op.NEG:
+            return smt.minus(terms[0], kind)
+        case Op.ABS:
+            return smt.absolute(terms[0], kind)
+        case Op.MIN:
+            return smt.choice(smt.below(terms[1], terms[0], kind), terms[1], terms[0])
+        case Op.MAX:
+            return smt.choice(smt.below(terms[0], terms[1], kind), terms[1], terms[0])
+        case Op.TO_REAL:
+            return smt.to_double(terms[0])
+        case Op.TO_INT:
+            return smt.to_integer(terms[0])
+        case _:
+            arithmetic = smt.double_operation if isinstance(kind, Real) else smt.integer_operation
+            return arithmetic(op.value, terms[0], terms[1])
+
+
+def within(term: Term, kind: Scalar) -> Term:
+    """That the term is a value of the kind: in range, and finite."""
+    if isinstance(kind, Bool):
+        return smt.truth(True)
+    low, high = (kind.low, kind.high) if isinstance(kind, Int | Real) else key_bounds(kind)
+    least, greatest = smt.literal(kind, low), smt.literal(kind, high)
+    return smt.all_of([smt.at_most(least, term, kind), smt.at_most(term, greatest, kind)])
+
+
+def declared(variables: Iterable[Variable]) -> tuple[Frame, list[Term]]:
+    """A frame of fresh constants, one a leaf, and that each is in its range."""
+    frame = Frame({})
+    domain = []
+    for variable in variables:
+        frame.leaves[variable.name] = smt.variable(variable.name, variable.type)
+        if not isinstance(variable.type, Bool):
+            domain.append(within(frame.leaves[variable.name], variable.type))
+    return frame, domain
+
+
+def least_witness(solver: Solver, variables: Iterable[Variable], frame: Frame) -> dict[str, Value] | None:
+    """The least values, in declared order, for which what is asserted holds; None where none is found.
+
+    Any model of Z3's may change with its version; the least one depends on the question alone. Where the
+    solver gives up on the way, the values found last stand: a witness still, but not the least. The solver is
+    left with the witness asserted.
+    """
+    shown = list(variables)
+    if solver.check() is not Answer.SATISFIABLE:
+        return None
+    last = _model(solver, shown, frame)
+    for variable in shown:
+        term, kind = frame.leaves[variable.name], variable.type
+        low, high = key_bounds(kind)[0], last[variable.name]
+        middle = low  # most are at their least
+        while low < high:
+            answer = solver.check(at_most_key(term, kind, middle))
+            if answer is Answer.SATISFIABLE:
+                last = _model(solver, shown, frame)
+                high = last[variable.name]
+            elif answer is Answer.UNSATISFIABLE:
+                low = middle + 1
+            else:
+                break
+            middle = (low + high) // 2
+        solver.add(smt.equal(term, smt.literal(kind, value_of_key(kind, high)), kind))
+    return {variable.name: value_of_key(variable.type, last[variable.name]) for variable in shown}
+
+
+def _model(solver: Solver, variables: Iterable[Variable], frame: Frame) -> dict[str, int]:
+    """The keys of the last model."""
+    return {v.name: key_of(v.type, solver.value(frame.leaves[v.name], v.type)) for v in variables}
+
+
+def at_most_key(term: Term, kind: Scalar, key: int) -> Term:
+    """That the term's key is at most `key`."""
+    if isinstance(kind, Bool):
+        return smt.negation(term) if key < 1 else smt.truth(True)
+    return smt.at_most(term, smt.literal(kind, value_of_key(kind, key)), kind)

@@ -1,0 +1,311 @@
+"""Symbolic values of expressions, and what evaluating them owes.
+
+In: expressions and a state. Out: values, and obligations: at which place, on which path, what must hold
+there. A value that owes something is taken to have paid from there on: later values rest on it, and the first
+that does not is reported.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+from rcsc.diagnostics.codes import Code
+from rcsc.diagnostics.source import Span
+from rcsc.lang.model import (
+    COMPARISONS,
+    I64_MAX,
+    I64_MIN,
+    NOWHERE,
+    U64_MAX,
+    Among,
+    Apply,
+    Expr,
+    Int,
+    Literal,
+    Op,
+    Procedure,
+    Read,
+    ReadLocal,
+    Scalar,
+    Select,
+)
+from rcsc.symbolic import values
+from rcsc.symbolic.values import FALSE, TRUE, Fact, Node
+
+MOST_STEPS = 2_000_000
+"""Statements and array elements that one run follows."""
+
+_RESULTS = {
+    Op.ADD: "sum",
+    Op.SUB: "difference",
+    Op.MUL: "product",
+    Op.DIV: "quotient",
+    Op.MOD: "remainder",
+    Op.NEG: "negative",
+    Op.ABS: "absolute value",
+    Op.MIN: "least",
+    Op.MAX: "greatest",
+}
+_LEAVES = "can leave 64 bits"
+
+
+class TooLongError(Exception):
+    """A run has more steps than are followed."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Obligation:
+    """Something that must hold at a place.
+
+    Attributes:
+        path: When the place is reached.
+        good: What must hold there.
+    """
+
+    code: Code
+    message: str
+    span: Span
+    path: Node
+    good: Node
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ExternResults:
+    """A call of an extern procedure.
+
+    Attributes:
+        path: When it is made.
+        results: What it gives, in the order in which it writes.
+        refusals: Whether each is refused, if it comes to that; FALSE where it cannot be.
+    """
+
+    procedure: str
+    path: Node
+    results: tuple[Node, ...]
+    refusals: tuple[Node, ...]
+
+
+@dataclass(slots=True)
+class State:
+    """Values at one point of a run.
+
+    Attributes:
+        leaves: Of the leaves written so far; the others are as they were.
+        local: Of parameters, locals and loop variables.
+        assigned: For a local declared without a value, when it has one.
+        wrote: For each leaf that the present action may have written, when it has.
+    """
+
+    leaves: dict[str, Node] = field(default_factory=dict)
+    local: dict[str, Node] = field(default_factory=dict)
+    assigned: dict[str, Node] = field(default_factory=dict)
+    wrote: dict[str, Node] = field(default_factory=dict)
+
+    def copy(self) -> "State":
+        """A state that can go its own way."""
+        return State(dict(self.leaves), dict(self.local), dict(self.assigned), dict(self.wrote))
+
+
+def word(kinds: Iterable[Int]) -> tuple[int, int]:
+    """The 64-bit type in which an operation on these is done: unsigned where none can be negative."""
+    return (0, U64_MAX) if min(kind.low for kind in kinds) >= 0 else (I64_MIN, I64_MAX)
+
+
+@dataclass(slots=True)
+class Evaluation:
+    """One symbolic run, as far as expressions go.
+
+    Attributes:
+        procedures: All of the program's, by name.
+        kinds: The type of every leaf.
+        start: The leaves before the run, made as they are met; runs may share it.
+        obligations: What is owed and bounds do not settle, in the order met.
+        settled: How many obligations bounds settled.
+        stops: Called where a cycle may end early (an extern procedure's result is refused).
+        cell: Where the present action or condition is written.
+        fresh: Values that the run has made up: results of extern procedures, locals without a value.
+        suffix: Behind their names, where several runs are followed by one question: each run has its own.
+        refusals: Whether results of extern procedures may be refused; else a run goes on as if none were.
+        ended: That one was refused: what would be written later stays as it is.
+        answered: What extern procedures give, in the order in which they can be called.
+    """
+
+    procedures: Mapping[str, Procedure]
+    kinds: Mapping[str, Scalar]
+    start: dict[str, Node]
+    state: State = field(default_factory=State)
+    path: Node = TRUE
+    facts: dict[Node, Fact] = field(default_factory=dict)
+    obligations: list[Obligation] = field(default_factory=list)
+    settled: int = 0
+    stops: Callable[["Evaluation", str], None] | None = None
+    cell: Span = NOWHERE
+    fresh: list[Node] = field(default_factory=list)
+    suffix: str = ""
+    steps: int = 0
+    refusals: bool = False
+    ended: Node = FALSE
+    answered: list[ExternResults] = field(default_factory=list)
+
+    # --- owing ---
+
+    def owe(self, code: Code, message: str, span: Span, good: Node) -> None:
+        """Adds an obligation, unless the bounds settle it."""
+        if self.path is FALSE or (good.known and good.low):
+            self.settled += 1
+        else:
+            self.obligations.append(Obligation(code, message, self._written_at(span), self.path, good))
+
+    def owe_inside(
+        self, code: Code, node: Node, ends: tuple[int | float, int | float], message: str, span: Span
+    ) -> Node:
+        """Owes that the node lies within the ends; from then on it does."""
+        low, high = ends
+        if node.ordered and low <= node.low and node.high <= high:
+            self.settled += 1
+            return node
+        self.owe(code, message, span, values.inside(node, low, high))
+        return values.narrowed(node, low, high)
+
+    def _written_at(self, span: Span) -> Span:
+        """Expressions in a table's cell are found by the cell."""
+        return span if span.file else self.cell
+
+    def assume(self, condition: Node) -> None:
+        """What is known from the start: its bounds are used; asserting it is the asker's business."""
+        values.learn(condition, self.facts)
+
+    @contextmanager
+    def where(self, condition: Node, *, holds: bool = True) -> Iterator[None]:
+        """Inside, the path is the one on which the condition holds (or does not)."""
+        path, facts = self.path, self.facts
+        self.path = values.both(path, condition if holds else values.negation(condition))
+        self.facts = dict(facts)
+        values.learn(condition, self.facts, holds=holds)
+        yield
+        self.path, self.facts = path, facts
+
+    def step(self, many: int = 1) -> None:
+        """Counts what is followed."""
+        self.steps += many
+        if self.steps > MOST_STEPS:
+            raise TooLongError
+
+    # --- expressions ---
+
+    def evaluate(self, expr: Expr) -> Node:
+        """The value of an expression; what it owes is added."""
+        match expr:
+            case Literal(value=value, type=kind):
+                return values.constant(kind, value)
+            case Read(name=name):
+                return self.leaf(name)
+            case ReadLocal(name=name, type=kind, span=span):
+                return self._local(name, kind, span)
+            case Select(leaves=leaves, index=index):
+                return self._selected(leaves, self.index(index, len(leaves)))
+            case Among(subject=subject, values=members):
+                return values.among(self.evaluate(subject), members)
+            case Apply(op=Op.AND | Op.OR | Op.IMPLIES):
+                return self._logic(expr)
+            case Apply(op=Op.NOT, args=(inner,)):
+                return values.negation(self.evaluate(inner))
+            case Apply(op=op, args=args):
+                return self._applied(expr, op, tuple(self.evaluate(arg) for arg in args))
+
+    def leaf(self, name: str) -> Node:
+        """The value of a leaf, within what is known of it here."""
+        node = self.state.leaves.get(name)
+        if node is None:
+            if name not in self.start:
+                self.start[name] = values.variable(name, self.kinds[name])
+            node = self.start[name]
+        return self._sharpened(node)
+
+    def _sharpened(self, node: Node) -> Node:
+        fact = self.facts.get(values.root(node))
+        return node if fact is None else values.narrowed(node, *fact)
+
+    def _local(self, name: str, kind: Scalar, span: Span) -> Node:
+        good = self.state.assigned.get(name, TRUE)
+        message = f"`{name}` can be read before it is assigned"
+        self.owe(Code.USE_BEFORE_ASSIGNMENT, message, span, good)
+        if name not in self.state.local:
+            self.state.local[name] = self.any_value(name, kind)
+        return self._sharpened(self.state.local[name])
+
+    def any_value(self, name: str, kind: Scalar) -> Node:
+        """A value of the type that nothing else is known of."""
+        self.fresh.append(values.variable(f"{name}!{len(self.fresh) + 1}{self.suffix}", kind))
+        return self.fresh[-1]
+
+    def index(self, expr: Expr, length: int) -> Node:
+        """An index of an array of this length."""
+        message = f"the index can lie outside 0 .. {length - 1}"
+        return self.owe_inside(Code.INDEX, self.evaluate(expr), (0, length - 1), message, expr.span)
+
+    def _selected(self, leaves: tuple[str, ...], index: Node) -> Node:
+        low, high = max(int(index.low), 0), min(int(index.high), len(leaves) - 1)
+        low = min(low, high)
+        self.step(high - low)
+        found = self.leaf(leaves[high])
+        for at in range(high - 1, low - 1, -1):
+            here = values.equal(index, values.constant(index.kind, at))
+            found = values.choice(here, self.leaf(leaves[at]), found)
+        return found
+
+    def _logic(self, expr: Apply) -> Node:
+        """The right operand is looked at only where the left one does not decide."""
+        left = self.evaluate(expr.args[0])
+        with self.where(left, holds=expr.op is not Op.OR):
+            right = self.evaluate(expr.args[1])
+        join = {Op.AND: values.both, Op.OR: values.either, Op.IMPLIES: values.follows}
+        return join[expr.op](left, right)
+
+    def _applied(self, expr: Apply, op: Op, args: tuple[Node, ...]) -> Node:
+        kinds = [arg.type for arg in expr.args]
+        if op in (Op.DIV, Op.MOD):
+            args = self._divisor(expr, args)
+        if isinstance(kinds[0], Int) and op is not Op.TO_REAL:
+            return self._whole(expr, op, args, [kind for kind in kinds if isinstance(kind, Int)])
+        if op in COMPARISONS:
+            return values.compare(op, *args)
+        if op is Op.TO_INT and isinstance(expr.type, Int):
+            return self._truncated(expr, args[0], expr.type)
+        return values.arithmetic(op, args, expr.type)
+
+    def _divisor(self, expr: Apply, args: tuple[Node, ...]) -> tuple[Node, ...]:
+        divisor = args[1]
+        nonzero = values.negation(values.equal(divisor, values.constant(divisor.kind, 0)))
+        self.owe(Code.DIVISION_BY_ZERO, "the divisor can be zero", expr.args[1].span, nonzero)
+        facts: dict[Node, Fact] = {}
+        values.learn(nonzero, facts)
+        fact = facts.get(values.root(divisor))
+        return args[0], divisor if fact is None else values.narrowed(divisor, *fact)
+
+    def _whole(self, expr: Apply, op: Op, args: tuple[Node, ...], kinds: list[Int]) -> Node:
+        """An operation on integers; operands and result share one 64-bit type."""
+        if isinstance(expr.type, Int):
+            kinds = [*kinds, expr.type]
+        ends = word(kinds)
+        message = "this value can lie outside the 64 bits in which it is used"
+        args = tuple(
+            self.owe_inside(Code.OVERFLOW, arg, ends, message, written.span)
+            for arg, written in zip(args, expr.args, strict=True)
+        )
+        if op in COMPARISONS:
+            return values.compare(op, *args)
+        if op is Op.MOD:  # the machine divides first
+            quotient = values.arithmetic(Op.DIV, args, expr.type)
+            self.owe_inside(Code.OVERFLOW, quotient, ends, f"the {_RESULTS[Op.DIV]} {_LEAVES}", expr.span)
+        found = values.arithmetic(op, args, expr.type)
+        return self.owe_inside(Code.OVERFLOW, found, ends, f"the {_RESULTS[op]} {_LEAVES}", expr.span)
+
+    def _truncated(self, expr: Apply, arg: Node, kind: Int) -> Node:
+        """A double without its fraction, where that is in 64 bits; never so of a NaN."""
+        low, high = word([kind])
+        least = values.constant(arg.kind, -1.0 if low == 0 else float(low))
+        above = values.compare(Op.LT if low == 0 else Op.LE, least, arg)
+        below = values.compare(Op.LT, arg, values.constant(arg.kind, float(high)))
+        self.owe(Code.OVERFLOW, f"the whole number {_LEAVES}", expr.span, values.both(above, below))
+        return values.narrowed(values.arithmetic(Op.TO_INT, (arg,), kind), low, high)

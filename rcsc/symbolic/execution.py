@@ -1,0 +1,199 @@
+"""Symbolic runs of statements.
+
+In: statements and a state. Out: the state behind them, and what they owe (`evaluation`). Every way through
+`if` and `case` is followed once; states are merged behind. Loops are unrolled, calls run in place.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from rcsc.diagnostics.codes import Code
+from rcsc.diagnostics.source import Span
+from rcsc.lang.model import (
+    Assign,
+    Bool,
+    Call,
+    Case,
+    Expr,
+    For,
+    If,
+    Int,
+    Local,
+    Place,
+    Procedure,
+    Real,
+    Scalar,
+    Statement,
+    ToElement,
+    ToLeaf,
+    spell,
+)
+from rcsc.symbolic import values
+from rcsc.symbolic.evaluation import Evaluation, ExternResults, State
+from rcsc.symbolic.values import FALSE, TRUE, Node
+
+
+@dataclass(slots=True)
+class Run(Evaluation):
+    """One symbolic run."""
+
+    def execute(self, body: Iterable[Statement]) -> None:
+        """Runs statements; the state is changed."""
+        for statement in body:
+            if self.path is FALSE:
+                return
+            self.step()
+            match statement:
+                case Assign(place=place, value=value):
+                    self._assign(place, value)
+                case Local(name=name, type=kind, value=value):
+                    self._declare(name, kind, value)
+                case If(condition=condition, then=then, orelse=orelse):
+                    self._branch(self.evaluate(condition), then, orelse)
+                case Case():
+                    self._case(statement)
+                case For(name=name, low=low, high=high, body=inner):
+                    for count in range(low, high + 1):
+                        self.state.local[name] = values.constant(Int(low, high), count)
+                        self.execute(inner)
+                case Call(procedure=name, args=args):
+                    self.call(self.procedures[name], [(arg.span, self.evaluate(arg)) for arg in args])
+
+    def _stored(self, kind: Scalar, value: Node, what: str, span: Span) -> Node:
+        """The value as kept in a place of this type."""
+        if not isinstance(kind, Int | Real):
+            return value
+        ends = f"{spell(kind, kind.low)} .. {spell(kind, kind.high)}"
+        message = f"the value can lie outside {ends}, the range of `{what}`"
+        return self.owe_inside(Code.ASSIGNED_RANGE, value, (kind.low, kind.high), message, span)
+
+    def _assign(self, place: Place, value: Expr) -> None:
+        found = self.evaluate(value)
+        if isinstance(place, ToElement):
+            what = place.leaves[0].rpartition("[")[0] or place.leaves[0]
+            self._set_element(place, self._stored(place.type, found, what, value.span))
+        elif isinstance(place, ToLeaf):
+            self.write(place.name, self._stored(place.type, found, place.name, value.span), TRUE)
+        else:
+            self.state.local[place.name] = self._stored(place.type, found, place.name, value.span)
+            self.state.assigned.pop(place.name, None)
+
+    def write(self, leaf: str, value: Node, when: Node) -> None:
+        """Writes a leaf, where `when` holds."""
+        if when is not TRUE:
+            value = values.choice(when, value, self.leaf(leaf))
+        if self.ended is not FALSE:
+            value = values.choice(self.ended, self.leaf(leaf), value)
+        self.state.leaves[leaf] = value
+        self.state.wrote[leaf] = values.either(self.state.wrote.get(leaf, FALSE), when)
+
+    def _set_element(self, place: ToElement, value: Node) -> None:
+        index = self.index(place.index, len(place.leaves))
+        low, high = max(int(index.low), 0), min(int(index.high), len(place.leaves) - 1)
+        self.step(max(high - low, 0))
+        for at in range(low, high + 1):
+            self.write(place.leaves[at], value, values.equal(index, values.constant(index.kind, at)))
+
+    def _declare(self, name: str, kind: Scalar, value: Expr | None) -> None:
+        self.state.local.pop(name, None)
+        self.state.assigned[name] = FALSE
+        if value is not None:
+            self.state.local[name] = self._stored(kind, self.evaluate(value), name, value.span)
+            del self.state.assigned[name]
+
+    def _branch(self, condition: Node, then: tuple[Statement, ...], orelse: tuple[Statement, ...]) -> None:
+        if condition.known:
+            self.execute(then if condition.low else orelse)
+            return
+        before = self.state
+        self.state = before.copy()
+        with self.where(condition):
+            self.execute(then)
+        one, self.state = self.state, before.copy()
+        with self.where(condition, holds=False):
+            self.execute(orelse)
+        self.state = self._merged(condition, one, self.state)
+
+    def _case(self, statement: Case) -> None:
+        """The arms are disjoint, so that their order does not matter."""
+        subject = self.evaluate(statement.subject)
+        before, outer, facts = self.state, self.path, self.facts
+        arms: list[tuple[Node, State]] = []
+        left = TRUE
+        for arm in statement.arms:
+            chosen = values.among(subject, arm.values)
+            if chosen is not FALSE:
+                self.state = before.copy()
+                with self.where(chosen):
+                    self.execute(arm.body)
+                arms.append((chosen, self.state))
+            left = values.both(left, values.negation(chosen))
+        self.state, self.path, self.facts = before.copy(), values.both(outer, left), dict(facts)
+        values.learn(left, self.facts)
+        self.execute(statement.orelse)
+        self.path, self.facts = outer, facts
+        for chosen, state in reversed(arms):
+            self.state = self._merged(chosen, state, self.state)
+
+    def _merged(self, condition: Node, one: State, two: State) -> State:
+        """One state where the condition holds, the other elsewhere."""
+        self.step(len(one.leaves) + len(two.leaves))
+        self.state = State()
+
+        def leaf(state: State, name: str) -> Node:
+            return state.leaves[name] if name in state.leaves else self.leaf(name)
+
+        leaves = {
+            name: values.choice(condition, leaf(one, name), leaf(two, name))
+            for name in {**one.leaves, **two.leaves}
+        }
+        local = {**two.local, **one.local}  # a local that only one of the two has is that one's
+        for name in one.local.keys() & two.local.keys():
+            local[name] = values.choice(condition, one.local[name], two.local[name])
+        assigned = _joined(condition, one.assigned, two.assigned, TRUE)
+        wrote = _joined(condition, one.wrote, two.wrote, FALSE)
+        return State(leaves, local, assigned, wrote)
+
+    # --- calls ---
+
+    def call(self, procedure: Procedure, args: list[tuple[Span, Node]]) -> None:
+        """Runs a procedure in place; an extern one gives any values in range."""
+        given = {
+            param.name: self._stored(param.type, value, param.name, span)
+            for param, (span, value) in zip(procedure.params, args, strict=True)
+        }
+        if procedure.extern is not None:
+            self._extern(procedure)
+            return
+        outer = self.state.local, self.state.assigned
+        self.state.local, self.state.assigned = given, {}
+        self.execute(procedure.body)
+        self.state.local, self.state.assigned = outer
+
+    def _extern(self, procedure: Procedure) -> None:
+        """Its results are admitted one after the other; the cycle ends at the first that is refused."""
+        path = values.both(self.path, values.negation(self.ended))
+        given, refused = list[Node](), list[Node]()
+        for name in procedure.writes:
+            if self.stops is not None:
+                self.stops(self, procedure.name)
+            value = self.any_value(f"{name} from {procedure.name}", self.kinds[name])
+            given.append(value)
+            refused.append(self._refusal(f"{name} refused from {procedure.name}"))
+            self.write(name, value, TRUE)
+        self.answered.append(ExternResults(str(procedure.name), path, tuple(given), tuple(refused)))
+
+    def _refusal(self, name: str) -> Node:
+        """That the result is refused, where a run follows that: from here on the cycle has ended then."""
+        if not self.refusals:
+            return FALSE
+        refused = self.any_value(name, Bool())
+        self.ended = values.either(self.ended, values.both(self.path, refused))
+        return refused
+
+
+def _joined(condition: Node, one: dict[str, Node], two: dict[str, Node], otherwise: Node) -> dict[str, Node]:
+    return {
+        name: values.choice(condition, one.get(name, otherwise), two.get(name, otherwise))
+        for name in {**one, **two}
+    }

@@ -1,0 +1,171 @@
+"""Nodes of a symbolic run as solver terms over bounded integers.
+
+In: nodes (`symbolic.values`). Out: terms, and the ranges of the variables they read. What is exact and what is not:
+
+- Booleans, enumerations (by index) and integers are exact; `mod` of a value below twice its divisor is a choice.
+- A real is its *key* (`model.real_key`): an integer that orders as the doubles do. Equality and order, least,
+  greatest, opposite and absolute value of reals are therefore exact.
+- Any other operation (arithmetic of reals, products and quotients of variables) gives *any* value within the bounds of the
+  node, the same one for the same operation on the same operands, where as much is known of them; a comparison with what may be a
+  NaN gives any truth value. So the terms allow whatever the executors can do, and more: what is proved of them holds, and a trace found in
+  them is run before it is believed.
+"""
+
+import math
+from dataclasses import dataclass, field
+
+from rcsc.lang.model import COMPARISONS, Bool, Enum, Int, Op, Real, Scalar, real_key
+from rcsc.solvers import smt
+from rcsc.solvers.smt import Term
+from rcsc.symbolic import values
+from rcsc.symbolic.values import Node, parts_first
+
+KEY = Int(-(2**63), 2**63)
+"""The type in which every number stands."""
+
+
+def sort(kind: Scalar) -> Scalar:
+    """Bool or `KEY`: what a value of the type is to the solver (members of enumerations have a sort of their own)."""
+    return kind if isinstance(kind, Bool) else KEY
+
+
+@dataclass(slots=True)
+class Keyed:
+    """Makes terms; one of these for all the nodes of one question.
+
+    Attributes:
+        ranges: What is to be asserted of the variables met so far.
+        guessed: How many operations were left open.
+    """
+
+    ranges: list[Term] = field(default_factory=list)
+    guessed: int = 0
+    _terms: dict[Node, Term] = field(default_factory=dict)
+    _variables: dict[str, Term] = field(default_factory=dict)
+    _open: dict[tuple[str, Scalar, tuple[int, ...]], Term] = field(default_factory=dict)
+    _numbers: dict[tuple[object, ...], int] = field(default_factory=dict)
+    _number_of: dict[Node, int] = field(default_factory=dict)
+
+    def term(self, node: Node) -> Term:
+        """The term of a node; parts first, without recursion."""
+        for one in parts_first(node, known=self._terms):
+            self._terms[one] = self._made(one)
+        return self._terms[node]
+
+    def variable(self, name: str, kind: Scalar) -> Term:
+        """The term of a variable, in its declared range."""
+        if name not in self._variables:
+            found = self.fresh(name, kind)
+            if not isinstance(kind, Bool):
+                self.within(found, *values.bounds(kind), kind)
+            self._variables[name] = found
+        return self._variables[name]
+
+    def fresh(self, name: str, kind: Scalar) -> Term:
+        """A constant of the sort that values of the type have here; its range is not asserted."""
+        return smt.member(name) if isinstance(kind, Enum) else smt.variable(name, sort(kind))
+
+    def literal(self, kind: Scalar, value: int | float) -> Term:
+        """A constant."""
+        if isinstance(kind, Bool):
+            return smt.truth(bool(value))
+        return _key(kind, real_key(float(value)) if isinstance(kind, Real) else int(value))
+
+    def equal(self, term: Term, node: Node) -> Term:
+        """That the term is the node's value."""
+        return smt.equal(term, self.term(node), sort(node.kind))
+
+    def has(self, term: Term, kind: Scalar, key: int) -> Term:
+        """That the term, of a value of the type, has this key."""
+        if isinstance(kind, Bool):
+            return term if key else smt.negation(term)
+        return smt.equal(term, _key(kind, key), KEY)
+
+    def within(self, term: Term, low: int | float, high: int | float, kind: Scalar) -> None:
+        """Asserts that a number or member lies within finite bounds."""
+        least, greatest = self.literal(kind, low), self.literal(kind, high)
+        self.ranges.append(smt.all_of([smt.at_most(least, term, KEY), smt.at_most(term, greatest, KEY)]))
+
+    def _made(self, node: Node) -> Term:
+        parts = [self._terms[part] for part in node.args]
+        match node.op:
+            case "constant":
+                return self.literal(node.kind, node.low)
+            case "variable":
+                return self.variable(node.name, node.kind)
+            case "choice":
+                return smt.choice(*parts)
+            case "narrowed":
+                return parts[0]
+            case _:
+                return self._operation(Op(node.op), node, parts)
+
+    def _operation(self, op: Op, node: Node, parts: list[Term]) -> Term:
+        if op is Op.NOT:
+            return smt.negation(parts[0])
+        if op is Op.AND:
+            return smt.all_of(parts)
+        if not all(arg.ordered for arg in node.args):
+            return self.any(node)
+        if op in COMPARISONS:
+            compare = {Op.EQ: smt.equal, Op.LT: smt.below, Op.LE: smt.at_most}[op]
+            return compare(parts[0], parts[1], sort(node.args[0].kind))
+        return self._number(op, node, parts)
+
+    def _number(self, op: Op, node: Node, parts: list[Term]) -> Term:
+        """Arithmetic: exact where it is linear, or only orders."""
+        zero = smt.literal(KEY, 0)
+        if op is Op.NEG:
+            return smt.minus(parts[0], KEY)
+        if op is Op.ABS:
+            return smt.choice(smt.below(parts[0], zero, KEY), smt.minus(parts[0], KEY), parts[0])
+        if op in (Op.MIN, Op.MAX):
+            first = smt.at_most(parts[0], parts[1], KEY)
+            return (
+                smt.choice(first, parts[0], parts[1])
+                if op is Op.MIN
+                else smt.choice(first, parts[1], parts[0])
+            )
+        if isinstance(node.args[0].kind, Real) or isinstance(node.kind, Real):
+            return self.of_reals(op, node, parts)
+        if op in (Op.ADD, Op.SUB) or (op is Op.MUL and any(arg.known for arg in node.args)):
+            return smt.integer_operation(op.value, parts[0], parts[1])
+        if (
+            op is Op.MOD
+            and node.args[1].known
+            and node.args[0].low >= 0
+            and node.args[0].high < 2 * node.args[1].low
+        ):
+            wrapped = smt.integer_operation("-", parts[0], parts[1])
+            return smt.choice(smt.below(parts[0], parts[1], KEY), parts[0], wrapped)
+        return self.any(node)
+
+    def of_reals(self, op: Op, node: Node, parts: list[Term]) -> Term:  # noqa: ARG002 - for those who know more
+        """An operation with a real in it."""
+        return self.any(node)
+
+    def any(self, node: Node) -> Term:
+        """Any value within the bounds of the node."""
+        key = node.op, node.kind, tuple(self._written(arg) for arg in node.args)
+        found = self._open.get(key)
+        if found is None:
+            self.guessed += 1
+            found = self._open[key] = self.fresh(f"any!{self.guessed}", node.kind)
+        if not isinstance(node.kind, Bool) and math.isfinite(node.low) and math.isfinite(node.high):
+            self.within(found, node.low, node.high, node.kind)
+        return found
+
+    def _written(self, node: Node) -> int:
+        """A number for the node that every node has which is written the same, and of which the same is known.
+
+        What is known holds only where the node is reached: one value for both that and another place would carry it there.
+        """
+        for one in parts_first(node, known=self._number_of):
+            parts = tuple(self._number_of[arg] for arg in one.args)
+            key = one.op, one.kind, one.name, one.low, one.high, parts
+            self._number_of[one] = self._numbers.setdefault(key, len(self._numbers))
+        return self._number_of[node]
+
+
+def _key(kind: Scalar, key: int) -> Term:
+    return smt.member_literal(key) if isinstance(kind, Enum) else smt.literal(KEY, key)

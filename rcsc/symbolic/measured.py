@@ -1,0 +1,71 @@
+"""Nodes as terms in which sums of reals are followed: how far something goes, where order alone does not tell.
+
+In: nodes. Out: terms as `keyed` makes them, but that a real is a real number, and every rounded operation lies within a known
+distance of the exact one. Exact: order, least, greatest, opposite, absolute value. Sums, differences, and products and quotients
+with a constant: within half a unit in the last place of the greatest result that the bounds allow, and with the sign of the exact
+one (IEEE 754, section 4.3.1: to nearest, which keeps the order). The rest: any value within its bounds. So, again, the terms
+allow all that the executors can do, and more.
+
+Slower than `keyed`, for the solver has to reason in fractions; asked only where that leaves something open.
+"""
+
+import math
+
+from rcsc.lang.model import Op, Real, Scalar
+from rcsc.solvers import smt
+from rcsc.solvers.smt import Term
+from rcsc.symbolic.keyed import KEY, Keyed
+from rcsc.symbolic.values import CONSTANT, VARIABLE, Node
+
+ULP = 2.0**-52
+"""Twice the greatest error of a rounded result, as a share of it."""
+
+
+class Measured(Keyed):
+    """Makes terms with reals that are numbers."""
+
+    def fresh(self, name: str, kind: Scalar) -> Term:
+        """A constant."""
+        return smt.number(name) if isinstance(kind, Real) else super().fresh(name, kind)
+
+    def literal(self, kind: Scalar, value: int | float) -> Term:
+        """A constant value."""
+        return smt.fraction(value) if isinstance(kind, Real) else super().literal(kind, value)
+
+    def of_reals(self, op: Op, node: Node, parts: list[Term]) -> Term:
+        """Linear operations, rounded; the others are any value."""
+        if op is Op.TO_REAL:
+            return self._rounded(node, smt.as_number(parts[0]))
+        if op in (Op.ADD, Op.SUB) or (op is Op.MUL and any(arg.known for arg in node.args)):
+            return self._rounded(node, smt.integer_operation(op.value, parts[0], parts[1]))
+        divisor = node.args[-1]
+        if op is Op.DIV and divisor.known and divisor.low:
+            return self._rounded(node, smt.quotient(parts[0], divisor.low))
+        return self.any(node)
+
+    def _rounded(self, node: Node, exact: Term) -> Term:
+        """A value near the exact one, wherever the operands are what is known of them where the node is reached."""
+        found = self.any(node)
+        most = max(abs(node.low), abs(node.high), 1.0)
+        if math.isfinite(most):
+            slack, zero = smt.fraction(most * ULP), smt.fraction(0.0)
+            least = smt.integer_operation("-", exact, slack)
+            greatest = smt.integer_operation("+", exact, slack)
+            near = [
+                smt.at_most(least, found, KEY),
+                smt.at_most(found, greatest, KEY),
+                smt.implication(smt.at_most(zero, exact, KEY), smt.at_most(zero, found, KEY)),
+                smt.implication(smt.at_most(exact, zero, KEY), smt.at_most(found, zero, KEY)),
+            ]
+            self.ranges.append(smt.implication(self._reached(node), smt.all_of(near)))
+        return found
+
+    def _reached(self, node: Node) -> Term:
+        """That each operand has a value which it may have there; elsewhere the node is not read."""
+        parts = [arg for arg in node.args if arg.op not in (CONSTANT, VARIABLE)]
+        return smt.all_of([one for arg in parts for one in self._inside(arg)])
+
+    def _inside(self, node: Node) -> list[Term]:
+        term = self.term(node)
+        low, high = (self.literal(node.kind, end) for end in (node.low, node.high))
+        return [smt.at_most(low, term, KEY), smt.at_most(term, high, KEY)]

@@ -1,0 +1,112 @@
+"""Counterexamples by trial, where doubles make Z3 slow: edges and a fixed pseudo-random sample.
+
+In: conditions. Out: values for which all hold, or nothing, which proves nothing. The same conditions give the same values.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from random import Random
+
+from rcsc.lang.interpret import operated
+from rcsc.lang.model import Bool, Op, Real, Value, Variable, key_bounds, key_of, real_key, value_of_key
+from rcsc.symbolic.values import CHOICE, CONSTANT, NARROWED, VARIABLE, Node, parts_first
+from rcsc.symbolic.values import variable as variable_of
+
+SAMPLES = 400
+MOST_NODES = 1_500
+"""Larger questions go to Z3 at once."""
+
+Point = dict[str, Value]
+
+
+def found(conditions: Sequence[Node], variables: Sequence[Node]) -> Point | None:
+    """A point at which all conditions hold, made small variable by variable; None where no trial succeeds."""
+    order = list(parts_first(*conditions))
+    if len(order) > MOST_NODES:
+        return None
+    random = Random(0)  # noqa: S311  # a sample, not a secret
+    best: Point | None = None
+    for number in range(SAMPLES):
+        point = {one.name: _pick(one, number, random) for one in variables}
+        if _all_hold(order, conditions, point) and (best is None or _less(point, best, variables)):
+            best = point
+    return None if best is None else _lowered(order, conditions, variables, best)
+
+
+def points(variables: Sequence[Variable]) -> Iterator[Point]:
+    """Values of these variables to try: ends first, then edges and others; always the same."""
+    random = Random(0)  # noqa: S311  # a sample, not a secret
+    nodes = [variable_of(str(one.name), one.type) for one in variables]
+    for number in range(SAMPLES):
+        yield {one.name: _pick(one, number, random) for one in nodes}
+
+
+def holds_at(condition: Node, point: Mapping[str, Value]) -> bool:
+    """Whether a condition holds at a point that has a value for each of its variables; not where it is undefined."""
+    return _all_hold(list(parts_first(condition)), [condition], point)
+
+
+def _pick(variable: Node, number: int, random: Random) -> Value:
+    low, high = key_bounds(variable.kind)
+    ends = [low, high]
+    if number < len(ends):
+        return value_of_key(variable.kind, ends[number])
+    near = [key for key in (-1, 0, 1, real_key(1.0), real_key(-1.0)) if low <= key <= high]
+    kind = random.randrange(4)
+    if kind == 0:
+        return value_of_key(variable.kind, random.choice([*ends, *near]))
+    if kind == 1 and isinstance(variable.kind, Real):
+        return random.uniform(variable.kind.low, variable.kind.high) + 0.0
+    return value_of_key(variable.kind, random.randint(low, high))
+
+
+def _less(one: Point, two: Point, variables: Sequence[Node]) -> bool:
+    names = [variable.name for variable in variables]
+    return [one[name] for name in names] < [two[name] for name in names]
+
+
+def _lowered(
+    order: Sequence[Node], conditions: Sequence[Node], variables: Sequence[Node], point: Point
+) -> Point:
+    """Each variable in turn as low as bisection finds, the others as they are."""
+    for variable in variables:
+        kind = variable.kind
+        low, high = key_bounds(kind)[0], key_of(kind, point[variable.name])
+        middle = low
+        while low < high:
+            trial = {**point, variable.name: value_of_key(kind, middle)}
+            if _all_hold(order, conditions, trial):
+                point, high = trial, middle
+            else:
+                low = middle + 1
+            middle = (low + high) // 2
+    return point
+
+
+def _all_hold(order: Sequence[Node], conditions: Sequence[Node], point: Mapping[str, Value]) -> bool:
+    known: dict[Node, Value | None] = {}
+    for node in order:
+        known[node] = _value(node, [known[part] for part in node.args], point)
+    return all(known[condition] for condition in conditions)
+
+
+def _value(node: Node, parts: list[Value | None], point: Mapping[str, Value]) -> Value | None:
+    """The node's value; None where it is not defined."""
+    match node.op:
+        case _ if node.op == CONSTANT:
+            return bool(node.low) if isinstance(node.kind, Bool) else node.low
+        case _ if node.op == VARIABLE:
+            return point[node.name]
+        case _ if node.op == NARROWED:
+            return parts[0]
+        case _ if node.op == CHOICE:
+            return None if parts[0] is None else parts[1] if parts[0] else parts[2]
+        case Op.AND:
+            return False if False in parts else None if None in parts else True
+    return None if None in parts else _computed(node, [part for part in parts if part is not None])
+
+
+def _computed(node: Node, parts: list[Value]) -> Value | None:
+    try:
+        return operated(Op(node.op), node.args[0].kind, *parts)
+    except (ArithmeticError, ValueError):
+        return None

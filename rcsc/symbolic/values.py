@@ -1,0 +1,340 @@
+"""Values of a symbolic run: a graph with bounds on every node; solver terms only when one is asked for.
+
+In: operations of the model. Out: nodes that share what they have in common, folded where the bounds say the
+value. Most of what a program owes is settled by the bounds alone, without Z3.
+
+A node of type Real whose bounds are infinite may also be a NaN. Source of the bounds: `lang.expressions.intervals`.
+"""
+
+import math
+import sys
+from collections.abc import Container, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+from rcsc.lang.expressions import intervals
+from rcsc.lang.interpret import divide
+from rcsc.lang.model import COMPARISONS, Bool, Int, Op, Real, Scalar, Value, key_bounds
+from rcsc.solvers import smt
+from rcsc.solvers.smt import Term
+from rcsc.symbolic.encode import operation, within
+
+_GREATEST = int(sys.float_info.max)
+CONSTANT, VARIABLE, CHOICE, NARROWED = "constant", "variable", "choice", "narrowed"
+
+
+@dataclass(eq=False, slots=True)
+class Node:
+    """One value.
+
+    Attributes:
+        op: An operator of the model, or one of the four words above.
+        kind: Bool, Enum, Int or Real; its own bounds are those of the declaration, not of the node.
+        low: Least value it can have where it is reached; likewise `high`.
+        name: Of a variable.
+        term: Made on demand.
+    """
+
+    op: str
+    args: "tuple[Node, ...]"
+    kind: Scalar
+    low: int | float
+    high: int | float
+    name: str = ""
+    term: Term | None = None
+
+    @property
+    def known(self) -> bool:
+        """Whether it can have one value only."""
+        return self.low == self.high
+
+    @property
+    def ordered(self) -> bool:
+        """Whether it is certainly no NaN."""
+        return not isinstance(self.kind, Real) or (math.isfinite(self.low) and math.isfinite(self.high))
+
+
+def constant(kind: Scalar, value: Value) -> Node:
+    """A constant."""
+    point = float(value) if isinstance(kind, Real) else int(value)
+    return Node(CONSTANT, (), kind, point, point)
+
+
+TRUE, FALSE = constant(Bool(), True), constant(Bool(), False)
+
+
+def truth(value: bool) -> Node:
+    """The constant true or false."""
+    return TRUE if value else FALSE
+
+
+def bounds(kind: Scalar) -> tuple[int | float, int | float]:
+    """Least and greatest value of the type, booleans and members as integers."""
+    return (kind.low, kind.high) if isinstance(kind, Int | Real) else key_bounds(kind)
+
+
+def variable(name: str, kind: Scalar) -> Node:
+    """Any value of the type."""
+    low, high = bounds(kind)
+    return Node(VARIABLE, (), kind, low, high, name)
+
+
+def root(node: Node) -> Node:
+    """The node without what was learnt of its bounds."""
+    while node.op == NARROWED:
+        node = node.args[0]
+    return node
+
+
+def narrowed(node: Node, low: int | float, high: int | float) -> Node:
+    """The same value where it is known to lie within the bounds too."""
+    low, high = max(low, node.low), min(high, node.high)
+    if (low, high) == (node.low, node.high) or low > high:
+        return node
+    if low == high:
+        return constant(node.kind, low)
+    return Node(NARROWED, (root(node),), node.kind, low, high)
+
+
+# --- truth -----------------------------------------------------------------------------
+
+
+def negation(one: Node) -> Node:
+    """Its opposite."""
+    if one.known:
+        return truth(not one.low)
+    return one.args[0] if one.op == Op.NOT else Node(Op.NOT, (one,), Bool(), 0, 1)
+
+
+def both(one: Node, two: Node) -> Node:
+    """One and the other."""
+    if one.known:
+        return two if one.low else FALSE
+    if two.known:
+        return one if two.low else FALSE
+    return one if one is two else Node(Op.AND, (one, two), Bool(), 0, 1)
+
+
+def either(one: Node, two: Node) -> Node:
+    """One or the other."""
+    return negation(both(negation(one), negation(two)))
+
+
+def follows(one: Node, two: Node) -> Node:
+    """The second wherever the first."""
+    return either(negation(one), two)
+
+
+def all_of(nodes: Iterable[Node]) -> Node:
+    """Every one."""
+    found = TRUE
+    for node in nodes:
+        found = both(found, node)
+    return found
+
+
+def any_of(nodes: Iterable[Node]) -> Node:
+    """At least one."""
+    return negation(all_of(negation(node) for node in nodes))
+
+
+# --- values ----------------------------------------------------------------------------
+
+
+def choice(condition: Node, one: Node, two: Node) -> Node:
+    """The first where the condition holds, else the second."""
+    if condition.known:
+        return one if condition.low else two
+    if one is two or (one.known and two.known and one.low == two.low):
+        return one
+    low, high = min(one.low, two.low), max(one.high, two.high)
+    return Node(CHOICE, (condition, one, two), one.kind, low, high)
+
+
+def among(subject: Node, values: Sequence[Value]) -> Node:
+    """That the subject is one of the constants."""
+    return any_of(compare(Op.EQ, subject, constant(subject.kind, value)) for value in values)
+
+
+def compare(op: Op, one: Node, two: Node) -> Node:
+    """A comparison, decided where the bounds do."""
+    if op is Op.NE:
+        return negation(compare(Op.EQ, one, two))
+    if op in (Op.GT, Op.GE):
+        return compare(Op.LT if op is Op.GT else Op.LE, two, one)
+    if one.ordered and two.ordered:
+        decided = _decided(op, one, two)
+        if decided is not None:
+            return truth(decided)
+    return Node(op, (one, two), Bool(), 0, 1)
+
+
+def _decided(op: Op, one: Node, two: Node) -> bool | None:
+    if op is Op.EQ:
+        if one.high < two.low or two.high < one.low:
+            return False
+        return True if root(one) is root(two) or (one.known and two.known) else None
+    if root(one) is root(two):
+        return op is Op.LE
+    always = one.high < two.low if op is Op.LT else one.high <= two.low
+    never = one.low >= two.high if op is Op.LT else one.low > two.high
+    return True if always else False if never else None
+
+
+def arithmetic(op: Op, args: tuple[Node, ...], kind: Scalar) -> Node:
+    """Any operator on numbers but comparisons; `kind` is that of the result."""
+    low, high = _bounds(op, args)
+    found = Node(op, args, kind, low, high)
+    if low != high or not found.ordered or (isinstance(kind, Real) and not all(arg.known for arg in args)):
+        return found
+    return constant(kind, low)
+
+
+def _bounds(op: Op, args: tuple[Node, ...]) -> tuple[int | float, int | float]:
+    one = args[0]
+    if op is Op.TO_REAL:
+        return float(one.low), float(one.high)
+    if op is Op.TO_INT:
+        return (int(one.low), int(one.high)) if one.ordered else (-_GREATEST, _GREATEST)
+    if isinstance(one.kind, Real):
+        kinds: tuple[Int | Real, ...] = tuple(Real(float(arg.low), float(arg.high)) for arg in args)
+    else:
+        kinds = tuple(Int(int(arg.low), int(arg.high)) for arg in args)
+    if op is Op.MOD and all(arg.known for arg in args) and args[1].low:
+        rest = int(one.low) - int(args[1].low) * divide(int(one.low), int(args[1].low))
+        return rest, rest
+    found = intervals.apply(op, kinds, ())
+    assert isinstance(found, Int | Real)
+    return found.low, found.high
+
+
+def equal(one: Node, two: Node) -> Node:
+    """That two values of one type are the same."""
+    return compare(Op.EQ, one, two)
+
+
+def inside(node: Node, low: int | float, high: int | float) -> Node:
+    """That it lies within the bounds; false of a NaN."""
+    least, greatest = constant(node.kind, low), constant(node.kind, high)
+    return both(compare(Op.LE, least, node), compare(Op.LE, node, greatest))
+
+
+# --- terms -----------------------------------------------------------------------------
+
+
+def term_of(node: Node) -> Term:
+    """The solver's term of the node; parts first, without recursion."""
+    for one in parts_first(node):
+        if one.term is None:
+            one.term = _term(one, [part.term for part in one.args if part.term is not None])
+    assert node.term is not None
+    return node.term
+
+
+def _term(node: Node, parts: list[Term]) -> Term:
+    if node.op == CONSTANT:
+        return smt.literal(node.kind, node.low)
+    if node.op == VARIABLE:
+        return smt.variable(node.name, node.kind)
+    if node.op == CHOICE:
+        return smt.choice(*parts)
+    return parts[0] if node.op == NARROWED else operation(Op(node.op), node.args[0].kind, parts)
+
+
+def variables(nodes: Iterable[Node]) -> dict[str, Node]:
+    """The variables below the nodes, by name."""
+    return {one.name: one for one in parts_first(*nodes) if one.op == VARIABLE}
+
+
+def domain(found: Iterable[Node]) -> list[Term]:
+    """That each variable is a value of its type."""
+    return [within(term_of(one), one.kind) for one in found if not isinstance(one.kind, Bool)]
+
+
+def parts_first(*nodes: Node, known: Container[Node] = ()) -> Iterator[Node]:
+    """Every node once, parts before wholes; but those that are known, and what only they are made of."""
+    seen: set[Node] = set()
+    stack = [(node, False) for node in reversed(nodes)]
+    while stack:
+        node, ready = stack.pop()
+        if ready:
+            yield node
+        elif node not in seen and node not in known:
+            seen.add(node)
+            stack.append((node, True))
+            stack.extend((part, False) for part in node.args if part not in seen)
+
+
+# --- what a condition tells --------------------------------------------------------------
+
+Fact = tuple[int | float, int | float]
+
+
+def learn(condition: Node, facts: dict[Node, Fact], *, holds: bool = True) -> None:
+    """Adds to `facts` the bounds that roots have where the condition holds (or does not)."""
+    waiting = [(condition, holds)]
+    while waiting:
+        node, yes = waiting.pop()
+        if node.op == Op.NOT:
+            waiting.append((node.args[0], not yes))
+        elif node.op == Op.AND and yes:
+            waiting += [(part, True) for part in node.args]
+        elif node.op == Op.AND:
+            _learn_either(node, facts)
+        elif node.op in COMPARISONS:
+            _learn_compared(Op(node.op), (node.args[0], node.args[1]), facts, yes)
+        elif isinstance(node.kind, Bool):
+            _meet(facts, node, int(yes), int(yes))
+
+
+def _learn_either(node: Node, facts: dict[Node, Fact]) -> None:
+    """Of `not (a and b)`: a root that both negations bound lies within the hull of the two."""
+    sides: list[dict[Node, Fact]] = []
+    for part in node.args:
+        one: dict[Node, Fact] = {}
+        if part.op == Op.AND:
+            _learn_either(part, one)
+        else:
+            learn(part, one, holds=False)
+        sides.append(one)
+    for key in sides[0].keys() & sides[1].keys():
+        (a, b), (c, d) = sides[0][key], sides[1][key]
+        _meet(facts, key, min(a, c), max(b, d))
+
+
+def _learn_compared(op: Op, sides: tuple[Node, Node], facts: dict[Node, Fact], yes: bool) -> None:
+    one, two = sides
+    if not yes and not (one.ordered and two.ordered):
+        return
+    if op is Op.EQ:
+        (_learn_equal if yes else _learn_unequal)(one, two, facts)
+        return
+    if not yes:
+        op, one, two = (Op.LE if op is Op.LT else Op.LT), two, one
+    strict = op is Op.LT
+    _meet(facts, one, one.low, _step(two.high, -1, one.kind) if strict else two.high)
+    _meet(facts, two, _step(one.low, 1, two.kind) if strict else one.low, two.high)
+
+
+def _learn_equal(one: Node, two: Node, facts: dict[Node, Fact]) -> None:
+    low, high = max(one.low, two.low), min(one.high, two.high)
+    _meet(facts, one, low, high)
+    _meet(facts, two, low, high)
+
+
+def _learn_unequal(one: Node, two: Node, facts: dict[Node, Fact]) -> None:
+    for node, other in ((one, two), (two, one)):
+        if other.known and node.low == other.low:
+            _meet(facts, node, _step(node.low, 1, node.kind), node.high)
+        elif other.known and node.high == other.low:
+            _meet(facts, node, node.low, _step(node.high, -1, node.kind))
+
+
+def _meet(facts: dict[Node, Fact], node: Node, low: int | float, high: int | float) -> None:
+    key = root(node)
+    before = facts.get(key, (key.low, key.high))
+    facts[key] = max(before[0], low), min(before[1], high)
+
+
+def _step(value: int | float, by: int, kind: Scalar) -> int | float:
+    """The next value of the kind."""
+    return math.nextafter(value, math.inf * by) if isinstance(kind, Real) else value + by

@@ -1,1 +1,0 @@
-"""What was written: text to tree and back."""

@@ -1,0 +1,139 @@
+"""Z3 asked what masks, counting and region trees have answered; two queries a table.
+
+In: a table and what was found. Out: whether Z3 agrees. Source: `notes/formal.md`, 1.2.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from enum import Enum, auto
+
+from rcsc.lang.leaves import read_by
+from rcsc.lang.model import Expr, Program, Snapshot, Table, Variable
+from rcsc.solvers import smt
+from rcsc.solvers.options import Options
+from rcsc.solvers.smt import Answer, Solver, Term
+from rcsc.symbolic.encode import declared, encode, least_witness
+from rcsc.table.certificate import must_cover
+from rcsc.table.verdict import Found, Gap, Overlap, Undecided
+
+
+def shown(program: Program, table: Table) -> list[Variable]:
+    """The variables of a witness, in declared order: what the table or its assumptions read."""
+    assumed = (a.condition for a in program.assumptions if a.name in table.assumptions)
+    wanted = set(table.variables).union(*map(read_by, assumed))
+    return [variable for variable in program.variables if variable.name in wanted]
+
+
+class Asked:
+    """One solver that knows the table's domain and assumptions, and each line as a literal."""
+
+    def __init__(self, program: Program, table: Table, options: Options) -> None:
+        self.program, self.table = program, table
+        self.frame, domain = declared(program.variables)
+        self.solver = Solver(options.limits)
+        self.solver.add(*domain)
+        wanted = set(table.assumptions)
+        self.solver.add(*[encode(a.condition, self.frame) for a in program.assumptions if a.name in wanted])
+        self._lines: dict[int, Term] = {}
+        self._tests: dict[int, Term] = {}
+
+    def line(self, at: int) -> Term:
+        """That a line matches."""
+        if at not in self._lines:
+            self._lines[at] = smt.all_of(
+                [self._test(test.condition, id(test)) for test in self.table.lines[at].tests if test]
+            )
+        return self._lines[at]
+
+    def _test(self, condition: Expr, key: int) -> Term:
+        if key not in self._tests:
+            self._tests[key] = encode(condition, self.frame)
+        return self._tests[key]
+
+    def none(self) -> Term:
+        """That no line matches."""
+        return smt.negation(smt.any_of([self.line(at) for at in range(len(self.table.lines))]))
+
+    def witness(self, *terms: Term) -> Snapshot | None:
+        """The least input for which the terms hold; None where the solver gives up."""
+        self.solver.push()
+        self.solver.add(*terms)
+        found = least_witness(self.solver, shown(self.program, self.table), self.frame)
+        self.solver.pop()
+        return found
+
+    def holds(self, *terms: Term) -> Answer:
+        """Whether the terms can hold together."""
+        return self.solver.check(*terms)
+
+
+_COSTLY = 60_000
+"""Lines times columns above which Z3 takes more than about a second (`tests/bench`)."""
+_STEPS = 20_000_000
+"""Budget of each question that is asked only because it should be cheap."""
+
+
+class Agreement(Enum):
+    """What Z3 says of the verdict."""
+
+    AGREES = auto()
+    DISAGREES = auto()
+    NOT_ASKED = auto()
+    UNKNOWN = auto()
+
+
+def worth_asking(table: Table, options: Options) -> bool:
+    """Whether Z3 is to be asked, by what it should cost."""
+    if options.solver == "both":
+        return True
+    cells = sum(1 for line in table.lines for test in line.tests if test is not None)
+    return options.solver == "auto" and cells * len(table.lines) <= _COSTLY
+
+
+def confirm(program: Program, table: Table, found: tuple[Found, ...], options: Options) -> Agreement:
+    """Z3's own answer to whether two lines meet and whether there is a gap, against what was found."""
+    if not worth_asking(table, options) or any(isinstance(one, Undecided) for one in found):
+        return Agreement.NOT_ASKED
+    if options.solver == "auto":
+        options = replace(options, steps=min(options.steps, _STEPS))
+    asked = Asked(program, table, options)
+    overlap = _some_overlap(asked)
+    gaps = [one for one in found if isinstance(one, Gap)]
+    gap = _some_gap(asked, gaps) if must_cover(table) or gaps else None
+    said = (
+        (overlap, any(isinstance(one, Overlap) for one in found)),
+        (gap, bool(gaps)),
+    )
+    if any(answer is Answer.UNKNOWN for answer, _ in said):
+        return Agreement.UNKNOWN
+    agrees = all(answer is None or (answer is Answer.SATISFIABLE) == wrong for answer, wrong in said)
+    return Agreement.AGREES if agrees else Agreement.DISAGREES
+
+
+def _some_gap(asked: Asked, gaps: Sequence[Gap]) -> Answer:
+    """Whether no line matches some input: first at one that was found, which costs little."""
+    for witness in (one.witnesses[0] for one in gaps if one.witnesses):
+        here = [
+            smt.equal(asked.frame.leaves[v.name], smt.literal(v.type, witness[v.name]), v.type)
+            for v in asked.program.variables
+            if v.name in witness
+        ]
+        if asked.holds(asked.none(), *here) is Answer.SATISFIABLE:
+            return Answer.SATISFIABLE
+    return asked.holds(asked.none())
+
+
+def _some_overlap(asked: Asked) -> Answer:
+    """Whether two lines can match at once: each line against all before it."""
+    terms = []
+    seen = smt.truth(False)
+    from rcsc.lang.model import Bool
+
+    for at in range(len(asked.table.lines)):
+        bit = smt.variable(f"line!{at}", Bool())
+        before = seen
+        seen = smt.variable(f"seen!{at}", Bool())
+        asked.solver.add(smt.equal(bit, asked.line(at), Bool()))
+        asked.solver.add(smt.equal(seen, smt.any_of([before, bit]), Bool()))
+        terms.append(smt.all_of([before, bit]))
+    return asked.holds(smt.any_of(terms))

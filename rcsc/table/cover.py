@@ -1,0 +1,327 @@
+"""Where a condition holds: the least input, and boxes that make up the region exactly.
+
+In: conditions as values over leaves. Out: boxes of keys, disjoint, each as wide as it goes, and whether they are all. Each
+box is shown by Z3 to lie inside, and that nothing is left outside them; *unknown* raises, so that nobody takes it for an answer.
+
+Source: house style, example 6, for the least witness; `boxes.Search.grown` for growing in declared order.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise, product
+from math import prod
+
+from rcsc.lang.interval_sets import furthest, joined, meet, size
+from rcsc.lang.model import (
+    COMPARISONS,
+    Bool,
+    Box,
+    Enum,
+    Kind,
+    Op,
+    Real,
+    Value,
+    Variable,
+    VariableName,
+    key_bounds,
+    key_of,
+    value_of_key,
+)
+from rcsc.solvers import smt
+from rcsc.solvers.options import Options
+from rcsc.solvers.smt import Answer, Solver, Term
+from rcsc.symbolic import trial, values
+from rcsc.symbolic.encode import Frame, at_most_key, least_witness
+from rcsc.symbolic.values import CHOICE, CONSTANT, NARROWED, VARIABLE, Node
+from rcsc.table.verdict import Region
+
+_MOST_CLASSES = 64
+"""Classes of one variable that are tried one by one when a box is grown."""
+
+
+class UndecidedError(Exception):
+    """The solver gave up; what it was asked."""
+
+
+@dataclass(frozen=True, slots=True)
+class Cover:
+    """Boxes that lie inside a region.
+
+    Attributes:
+        boxes: Disjoint, each maximal in declared order; a variable left out is free.
+        exact: Whether together they are the whole region.
+        inputs: How many inputs the boxes hold, over all variables of the space; None where a variable is real.
+    """
+
+    boxes: tuple[Region, ...]
+    exact: bool
+    inputs: int | None
+
+
+class Space:
+    """Questions about inputs: all values of the variables for which `given` holds.
+
+    Attributes:
+        variables: In declared order.
+        queries: How often the solver was asked.
+    """
+
+    def __init__(self, variables: Iterable[Node], given: Sequence[Node], options: Options) -> None:
+        self.nodes = {node.name: node for node in variables}
+        self.variables = [
+            Variable(VariableName(name), Kind.INPUT, node.kind, 0) for name, node in self.nodes.items()
+        ]
+        self.frame = Frame({name: values.term_of(node) for name, node in self.nodes.items()})
+        self.given = list(given)
+        self.options = options
+        self.queries = 0
+        self._plain: Solver | None = None
+        self._bounds: dict[tuple[str, int, int], Term] = {}
+
+    # --- single questions ---
+
+    def solver(self, *nodes: Node) -> Solver:
+        """A solver that knows the domain, what is given, and these."""
+        made = Solver(self.options.limits)
+        made.add(*values.domain(self.nodes.values()), *map(values.term_of, (*self.given, *nodes)))
+        return made
+
+    def possible(self, *nodes: Node) -> bool:
+        """Whether all of them can hold together.
+
+        Raises:
+            UndecidedError: The solver gave up.
+        """
+        if any(node.known and not node.low for node in nodes):
+            return False
+        if self._plain is None:
+            self._plain = self.solver()
+        return self.answered(self._plain, *map(values.term_of, nodes))
+
+    def answered(self, solver: Solver, *terms: Term) -> bool:
+        """Whether what the solver knows can hold together with the terms.
+
+        Raises:
+            UndecidedError: The solver gave up.
+        """
+        self.queries += 1
+        answer = solver.check(*terms)
+        if answer is Answer.UNKNOWN:
+            raise UndecidedError
+        return answer is Answer.SATISFIABLE
+
+    def witness(self, *nodes: Node) -> dict[str, Value]:
+        """The least input for which they hold together, which they can.
+
+        Raises:
+            UndecidedError: The solver gave up.
+        """
+        return self._least(self.solver(*nodes))
+
+    def _least(self, solver: Solver) -> dict[str, Value]:
+        before = solver.queries
+        found = least_witness(solver, self.variables, self.frame)
+        self.queries += solver.queries - before
+        if found is None:
+            raise UndecidedError
+        return found
+
+    def volume(self, names: Iterable[str]) -> int | None:
+        """How many values the variables can have together; None where one is real."""
+        kinds = [self.nodes[name].kind for name in names]
+        if any(isinstance(kind, Real) for kind in kinds):
+            return None
+        return prod(high - low + 1 for low, high in map(key_bounds, kinds))
+
+    # --- boxes ---
+
+    def cover(self, wanted: Node, allowed: Node, most: int) -> Cover:
+        """Boxes within `allowed` that hold all of `wanted`, as far as `most` of them do.
+
+        Raises:
+            UndecidedError: The solver gave up.
+        """
+        bad = self.solver(values.negation(allowed))
+        cuts = _cuts(allowed, self.nodes)
+        hull, _ = self._hull(allowed, cuts)
+        if all(hull.values()) and not self.answered(bad, *self._inside(hull)):
+            return self._made([hull], exact=True)
+        seeds = self.solver(wanted)
+        found: list[dict[str, Box]] = []
+        while self.answered(seeds):
+            if len(found) == most:
+                return self._made(found, exact=False)
+            seeds.push()
+            seed = self._least(seeds)
+            seeds.pop()
+            found.append(self._grown(seed, bad, (cuts, hull), found))
+            seeds.add(smt.negation(smt.all_of(self._inside(found[-1]))))
+        return self._made(found, exact=True)
+
+    def around(self, condition: Node) -> tuple[Region, tuple[Node, ...]]:
+        """A box around all of the condition, and what it asks besides: together they are the condition."""
+        hull, rest = self._hull(condition, _cuts(condition, self.nodes))
+        return self._made([hull], exact=True).boxes[0], tuple(rest)
+
+    def _hull(self, allowed: Node, cuts: Mapping[str, list[int]]) -> tuple[dict[str, Box], list[Node]]:
+        """What conditions on one variable each leave of that variable, and the other conditions."""
+        rest: list[Node] = []
+        hull: dict[str, Box] = {name: (key_bounds(node.kind),) for name, node in self.nodes.items()}
+        for part in _conjuncts(allowed):
+            found = values.variables([part])
+            if len(found) != 1 or any(node.op not in _PLAIN for node in values.parts_first(part)):
+                rest.append(part)
+                continue
+            [(name, node)] = found.items()
+            kind = node.kind
+            classes = _classes(cuts[name], key_bounds(kind)[1])
+            inside = [one for one in classes if trial.holds_at(part, {name: value_of_key(kind, one[0])})]
+            hull[name] = meet(hull[name], joined(inside))
+        return hull, rest
+
+    def _made(self, found: list[dict[str, Box]], *, exact: bool) -> Cover:
+        whole = {name: (key_bounds(node.kind),) for name, node in self.nodes.items()}
+        real = any(isinstance(node.kind, Real) for node in self.nodes.values())
+        inputs = None if real else sum(prod(map(size, box.values())) for box in found)
+        narrowed = tuple({name: part for name, part in box.items() if part != whole[name]} for box in found)
+        return Cover(narrowed, exact, inputs)
+
+    def _grown(
+        self,
+        seed: Mapping[str, Value],
+        bad: Solver,
+        limits: tuple[Mapping[str, list[int]], Mapping[str, Box]],
+        others: list[dict[str, Box]],
+    ) -> dict[str, Box]:
+        """The box around the seed that is grown within the hull: several variables at once where that fits."""
+        cuts, hull = limits
+        point = {name: key_of(node.kind, seed[name]) for name, node in self.nodes.items()}
+        box: dict[str, Box] = {name: ((at, at),) for name, at in point.items()}
+
+        def fits(parts: Mapping[str, Box]) -> bool:
+            trial_ = {**box, **parts}
+            if any(_meet(trial_, other) for other in others):
+                return False
+            return not self.answered(bad, *self._inside(trial_))
+
+        def grow(names: list[str]) -> None:
+            whole = {name: hull[name] for name in names}
+            if fits(whole):
+                box.update(whole)
+            elif len(names) > 1:
+                middle = len(names) // 2
+                grow(names[:middle])
+                grow(names[middle:])
+            else:
+                [name] = names
+                classes = _within(cuts[name], hull[name])
+                box[name] = _widest(point[name], classes, lambda part: fits({name: part}))
+
+        names = [name for name, part in hull.items() if part != box[name]]
+        if names:
+            grow(names)
+        return box
+
+    def _inside(self, box: Mapping[str, Box]) -> list[Term]:
+        """That each variable lies in its part of the box."""
+        terms = []
+        for name, part in box.items():
+            if part != (key_bounds(self.nodes[name].kind),):
+                terms.append(smt.any_of([self._between(name, low, high) for low, high in part]))
+        return terms
+
+    def _between(self, name: str, low: int, high: int) -> Term:
+        known = self._bounds.get((name, low, high))
+        if known is None:
+            kind, term = self.nodes[name].kind, self.frame.leaves[name]
+            least, greatest = key_bounds(kind)
+            parts = []
+            if low == high:
+                parts.append(smt.equal(term, smt.literal(kind, value_of_key(kind, low)), kind))
+            else:
+                parts += [smt.negation(at_most_key(term, kind, low - 1))] if low > least else []
+                parts += [at_most_key(term, kind, high)] if high < greatest else []
+            known = self._bounds[name, low, high] = smt.all_of(parts)
+        return known
+
+
+def _meet(one: Mapping[str, Box], two: Mapping[str, Box]) -> bool:
+    """Whether two boxes over the same variables have an input in common."""
+    return all(meet(part, two[name]) for name, part in one.items())
+
+
+def _classes(starts: list[int], last: int) -> list[tuple[int, int]]:
+    """The classes that begin at the starts."""
+    return [(low, high - 1) for low, high in pairwise([*starts, last + 1])]
+
+
+def _within(starts: list[int], part: Box) -> list[tuple[int, int]]:
+    """The classes in a part of the variable's values, which cuts no class."""
+    edges = sorted({*(start for start in starts), *(low for low, _ in part), *(high + 1 for _, high in part)})
+    pairs = [(low, high - 1) for low, high in pairwise(edges)]
+    return [one for one in pairs if any(low <= one[0] <= high for low, high in part)]
+
+
+def _widest(at: int, classes: list[tuple[int, int]], fits: Callable[[Box], bool]) -> Box:
+    """The classes that fit beside the one of `at`, or as far as it goes within that."""
+    home = next(one for one in classes if one[0] <= at <= one[1])
+    if not fits((home,)):
+        return (_stretched(at, home, fits),)
+    near = sorted(classes, key=lambda one: abs(one[0] - home[0]))[:_MOST_CLASSES]
+    return joined(one for one in sorted(near) if one == home or fits((one,)))
+
+
+def _stretched(at: int, ends: tuple[int, int], fits: Callable[[Box], bool]) -> tuple[int, int]:
+    """As far up, then down, from `at` as fits."""
+    top = furthest(at, ends[1], lambda end: fits(((at, end),)))
+    bottom = -furthest(-at, -ends[0], lambda end: fits(((-end, top),)))
+    return bottom, top
+
+
+_PLAIN = {*COMPARISONS, Op.NOT, Op.AND, CONSTANT, VARIABLE, NARROWED}
+"""What a condition is made of whose value is the same all over a class."""
+
+
+def _conjuncts(condition: Node) -> Iterator[Node]:
+    """The conditions that it joins by `and`."""
+    waiting = [condition]
+    while waiting:
+        node = waiting.pop()
+        if node.op == Op.AND:
+            waiting.extend(node.args)
+        else:
+            yield node
+
+
+def _cuts(condition: Node, nodes: Mapping[str, Node]) -> dict[str, list[int]]:
+    """For each variable the keys at which a class of alike values begins, as far as constants say."""
+    starts = {name: {key_bounds(node.kind)[0]} for name, node in nodes.items()}
+    for node in values.parts_first(condition):
+        if node.op in COMPARISONS:
+            sides = [list(_ends(side)) for side in node.args]
+            for left, right in (*product(*sides), *product(*reversed(sides))):
+                if left.op == VARIABLE and left.name in starts and right.op == CONSTANT:
+                    key = key_of(left.kind, right.low)
+                    starts[left.name].update((key, key + 1))
+    found = {}
+    for name, node in nodes.items():
+        low, high = key_bounds(node.kind)
+        if isinstance(node.kind, Bool | Enum):
+            starts[name].update(range(low, high + 1))
+        found[name] = sorted(start for start in starts[name] if low <= start <= high)
+    return found
+
+
+def _ends(node: Node) -> Iterator[Node]:
+    """What a value is chosen from."""
+    waiting, seen = [node], set[Node]()
+    while waiting and len(seen) < _MOST_CLASSES:
+        one = values.root(waiting.pop())
+        if one not in seen:
+            seen.add(one)
+            if one.op == CHOICE:
+                waiting.extend(one.args[1:])
+            elif one.op in (Op.MIN, Op.MAX):
+                waiting.extend(one.args)
+            else:
+                yield one

@@ -1,0 +1,88 @@
+"""One table, decided by whatever suits it, confirmed by Z3, certified."""
+
+import time
+from itertools import islice
+from typing import TYPE_CHECKING
+
+from rcsc.lang.leaves import read_by
+from rcsc.lang.model import AssumptionName, Backing, Program, Table
+from rcsc.solvers.options import Options
+from rcsc.table import boxes
+from rcsc.table.certificate import box_certificate, must_cover
+from rcsc.table.verdict import DeadLine, Found, Gap, Overlap, SolversDisagree, TableVerdict, Undecided
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+
+def prove_table(program: Program, table: Table, options: Options) -> TableVerdict:
+    """Whether exactly one line of the table matches every input, over the declared ranges under its assumptions."""
+    begun = time.perf_counter()
+    used: tuple[AssumptionName, ...] = ()
+    certificate: Mapping[str, object] | None = None
+    settled = _by_boxes(program, table) if boxes.applies(table) else None
+    if settled is not None and (not table.assumptions or not _wrong(table, settled)):
+        method, found = "boxes", settled
+        if not _wrong(table, found):
+            certificate = box_certificate(program, table)
+            if _narrows(program, table):
+                from rcsc.table.relational import under_assumptions
+
+                found = under_assumptions(program, table, options, settled)
+    else:
+        from rcsc.table.relational import decide
+
+        decided = decide(program, table, options)
+        method, found, certificate, used = "tree", decided.found, decided.certificate, decided.used
+    confirmed = False
+    if options.solver != "boxes":
+        confirmed, found = _confirmed(program, table, found, options)
+    standing = {a.name: a.standing for a in program.assumptions}
+    backing = Backing(method, confirmed, tuple((name, standing[name]) for name in used))
+    return TableVerdict(table, found, backing, certificate, time.perf_counter() - begun)
+
+
+def _by_boxes(program: Program, table: Table) -> tuple[Found, ...]:
+    decided = boxes.Boxes.of(program, table)
+    pairs = list(islice(decided.overlaps(), boxes.MOST_PAIRS))
+    found: list[Found] = [DeadLine(at) for at in decided.dead()]
+    found.extend(decided.both(first, second) for first, second in pairs)
+    try:
+        gap = decided.gap(disjoint=not pairs)
+    except boxes.BudgetError:
+        return (*found, Undecided("whether every input is matched by some line; first mend the overlaps"))
+    if gap is not None:
+        found.append(gap)
+    return tuple(found)
+
+
+def _narrows(program: Program, table: Table) -> bool:
+    """Whether an assumption reads what the table's conditions read."""
+    assumed = [one for one in program.assumptions if one.name in table.assumptions]
+    return any(not set(read_by(one.condition)).isdisjoint(table.variables) for one in assumed)
+
+
+def _wrong(table: Table, found: tuple[Found, ...]) -> bool:
+    """Whether there is more than inputs that fall to a DEFAULT line."""
+    return any(not isinstance(one, Gap) or must_cover(table) for one in found)
+
+
+def _confirmed(
+    program: Program, table: Table, found: tuple[Found, ...], options: Options
+) -> tuple[bool, tuple[Found, ...]]:
+    """Whether Z3 agrees; what it finds wrong with the verdict is added."""
+    from rcsc.table.confirm import Agreement, confirm, worth_asking
+
+    if not worth_asking(table, options):
+        return False, found
+    match confirm(program, table, found, options):
+        case Agreement.AGREES:
+            return True, found
+        case Agreement.DISAGREES:
+            pairs = sum(isinstance(one, Overlap) for one in found)
+            return False, (*found, SolversDisagree(f"{pairs} overlapping pairs were found"))
+        case Agreement.UNKNOWN:
+            left = Undecided("Z3 gave no answer within its limits")
+            return False, (*found, left) if options.solver == "both" else found
+        case Agreement.NOT_ASKED:
+            return False, found

@@ -1,0 +1,195 @@
+"""What was found of a table, as diagnostics."""
+
+from collections.abc import Collection, Iterator
+from math import prod
+
+from rcsc.diagnostics.codes import Code
+from rcsc.diagnostics.diagnostic import Diagnostic, Label, MatchedLine, Severity, WitnessColumn
+from rcsc.lang.interval_sets import size
+from rcsc.lang.model import Program, Scalar, Table, key_bounds, spell
+from rcsc.table import boxes
+from rcsc.table import spell as words
+from rcsc.table.certificate import must_cover
+from rcsc.table.repair import closing_line, parting_cell
+from rcsc.table.verdict import (
+    ContradictoryAssumptions,
+    DeadLine,
+    Gap,
+    Overlap,
+    Region,
+    SolversDisagree,
+    TableVerdict,
+    Undecided,
+    Witness,
+)
+
+MOST_PAIRS = 20
+"""Overlapping pairs shown of one table; then how many more."""
+
+
+def diagnostics(program: Program, verdict: TableVerdict, unproved: Collection[str] = ()) -> list[Diagnostic]:
+    """The verdict's findings, ready to show; `unproved` are invariants and assumptions that should be proved and are not."""
+    table = verdict.table
+    overlaps = [one for one in verdict.found if isinstance(one, Overlap)]
+    shown = [_overlap(program, table, one) for one in overlaps[:MOST_PAIRS]]
+    if len(overlaps) > MOST_PAIRS:
+        least = "at least " if len(overlaps) == boxes.MOST_PAIRS else ""
+        message = (
+            f"and {least}{len(overlaps) - MOST_PAIRS} more pairs of lines of table `{table.name}` overlap"
+        )
+        shown.append(Diagnostic(Code.OVERLAP, message, Label(table.span)))
+    return shown + list(_others(program, verdict, unproved))
+
+
+def _others(program: Program, verdict: TableVerdict, unproved: Collection[str]) -> Iterator[Diagnostic]:
+    table = verdict.table
+    for one in verdict.found:
+        match one:
+            case Gap():
+                yield _gap(program, table, one)
+            case DeadLine(line, assuming):
+                yield _dead(table, line, assuming, _under(table, unproved))
+            case ContradictoryAssumptions():
+                message = f"the assumptions of table `{table.name}` contradict each other, an invariant or the declared ranges"
+                yield Diagnostic(Code.CONTRADICTORY_ASSUMPTIONS, message, Label(table.span))
+            case Undecided(what):
+                helps = ("give each query more steps with `--steps`, or simplify the conditions",)
+                message = f"table `{table.name}` could not be decided: {what}"
+                yield Diagnostic(Code.UNDECIDED, message, Label(table.span), help=helps)
+            case SolversDisagree(what):
+                message = f"Z3 disagrees about table `{table.name}`: {what}; this is a bug in rcsc"
+                yield Diagnostic(Code.SOLVERS_DISAGREE, message, Label(table.span))
+            case Overlap():
+                pass
+    if table.default is None or table.default.unreachable or verdict.undecided:
+        return
+    if not any(isinstance(one, Gap | ContradictoryAssumptions) for one in verdict.found):
+        message = f"the DEFAULT line of table `{table.name}` is never reached"
+        helps = ("declare it: `DEFAULT unreachable`; that is then proved",)
+        label = Label(table.default.span)
+        yield Diagnostic(
+            Code.DEFAULT_DEAD,
+            message,
+            label,
+            notes=_under(table, unproved),
+            help=helps,
+            severity=Severity.WARNING,
+        )
+
+
+def _dead(table: Table, line: int, assuming: bool, under: tuple[str, ...]) -> Diagnostic:
+    label = Label(table.lines[line].cell_span(-1))
+    name = f"line `{table.lines[line].name}` of table `{table.name}`"
+    if not assuming:
+        helps = ("delete the line, or correct its conditions",)
+        return Diagnostic(Code.DEAD_LINE, f"{name} can never match", label, help=helps)
+    message = f"{name} matches only where an assumption fails"
+    return Diagnostic(Code.DEAD_LINE, message, label, notes=under, severity=Severity.WARNING)
+
+
+def _under(table: Table, unproved: Collection[str]) -> tuple[str, ...]:
+    """What dead lines and a dead DEFAULT may rest on."""
+    names = ", ".join(f"`{name}`{' (not proved)' if name in unproved else ''}" for name in table.assumptions)
+    return (f"under {names}",) if names else ()
+
+
+# --- overlaps ------------------------------------------------------------------------
+
+
+def _overlap(program: Program, table: Table, found: Overlap) -> Diagnostic:
+    one, two = table.lines[found.first], table.lines[found.second]
+    column = _column(program, table, found.witness, (found.first, found.second), found.region)
+    repair = parting_cell(program, table, found)
+    return Diagnostic(
+        Code.OVERLAP,
+        f"lines `{one.name}` and `{two.name}` of table `{table.name}` both match some input",
+        Label(two.cell_span(-1), "this line"),
+        related=(Label(one.cell_span(-1), "and this one"),),
+        help=(repair,) if repair else (),
+        witnesses=(column,),
+    )
+
+
+# --- gaps ----------------------------------------------------------------------------
+
+
+def _gap(program: Program, table: Table, found: Gap) -> Diagnostic:
+    columns = tuple(
+        _column(program, table, witness, (), region)
+        for witness, region in zip(found.witnesses, found.regions, strict=True)
+    )
+    share = f"{_share(*found.count)} of the inputs" if found.count else "some inputs"
+    if must_cover(table) and table.default is None:
+        repair = closing_line(program, table, found)
+        message = f"no line of table `{table.name}` matches {share}"
+        return Diagnostic(
+            Code.GAP,
+            message,
+            Label(table.span),
+            help=(repair,) if repair else (),
+            witnesses=columns,
+            more=_more(program, found),
+        )
+    assert table.default is not None
+    label = Label(table.default.span)
+    if table.default.unreachable:
+        message = f"the DEFAULT line of table `{table.name}` is declared unreachable, but {share} fall to it"
+        return Diagnostic(Code.DEFAULT_REACHED, message, label, witnesses=columns, more=_more(program, found))
+    message = f"{share} fall to the DEFAULT line of table `{table.name}`"
+    return Diagnostic(
+        Code.DEFAULT_COVERS,
+        message,
+        label,
+        witnesses=columns,
+        more=_more(program, found),
+        severity=Severity.NOTE,
+    )
+
+
+def _more(program: Program, found: Gap) -> int:
+    """Inputs outside the regions shown, where they were counted; the regions do not meet."""
+    if found.count is None:
+        return 0
+    bounds = {str(v.name): key_bounds(v.type) for v in program.variables}
+    shown = 0
+    for witness, region in zip(found.witnesses, found.regions, strict=True):
+        sizes = (size((region or {}).get(name, (bounds[name],))) for name in witness)
+        shown += prod(sizes) if region is not None else 1
+    return max(0, found.count[0] - shown)
+
+
+def _share(count: int, total: int) -> str:
+    percent = 100 * count / total
+    shown = f"{percent:.3g} %" if percent >= 0.001 else "less than 0.001 %"
+    return f"{count:,} of {total:,} ({shown})"
+
+
+# --- witnesses -----------------------------------------------------------------------
+
+
+def _column(
+    program: Program, table: Table, witness: Witness, lines: tuple[int, ...], region: Region | None
+) -> WitnessColumn:
+    kinds: dict[str, Scalar] = {v.name: v.type for v in program.variables}
+    names = tuple(name for name in kinds if name in witness)
+    matched = tuple(
+        MatchedLine(
+            table.lines[at].name, tuple(_cells(table, at, name) for name in names), table.lines[at].span
+        )
+        for at in lines
+    )
+    values = tuple(spell(kinds[name], witness[name]) for name in names)
+    return WitnessColumn(table.name, names, values, matched, words.region(kinds, region))
+
+
+def _cells(table: Table, line: int, name: str) -> str:
+    """What a line says of a variable; conditions over several stand with the first of them."""
+    said = []
+    for test, column in zip(table.lines[line].tests, table.columns, strict=True):
+        if test is not None and test.variables and test.variables[0] == name:
+            said.append(
+                test.text
+                if column.variable == name or column.subject is None
+                else f"{column.heading} {test.text}"
+            )
+    return "; ".join(said)

@@ -1,0 +1,184 @@
+"""A whole program: its invariants, its tables, and all that its procedures owe.
+
+The only place where a `ProvedProgram` is made, and only when nothing is wrong and nothing undecided.
+"""
+
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass, replace
+
+from rcsc.diagnostics.diagnostic import Diagnostic, Severity, sort_key
+from rcsc.host import children
+from rcsc.lang.meaning import relying, with_stops
+from rcsc.lang.model import (
+    AssumptionName,
+    Backing,
+    Program,
+    ProvedProgram,
+    Standing,
+    Table,
+    TableName,
+    seal_of_proof,
+)
+from rcsc.procedures.discharge import Tally
+from rcsc.procedures.invariants import assumptions_satisfiable, at_first, properties_elsewhere
+from rcsc.procedures.obligations import Obligations, defined_alone
+from rcsc.solvers import smt
+from rcsc.solvers.options import Options
+from rcsc.solvers.smt import Answer
+from rcsc.table.certificate import program_certificate, with_witness
+from rcsc.table.decide import prove_table
+from rcsc.table.diagnose import diagnostics
+from rcsc.table.verdict import ContradictoryAssumptions, Found, TableVerdict, Undecided
+
+TOO_MANY_STEPS = f"the questions about it take, together, more than {smt.TOGETHER} times the steps of one"
+
+
+@dataclass(frozen=True, slots=True)
+class ProgramVerdict:
+    """What was found of a program.
+
+    Attributes:
+        findings: Errors, warnings and notes, by position.
+        proved: Set only when there is no error.
+        tables: One verdict a table.
+        certificate: Of all tables; None where something is not proved.
+        tally: How the obligations of procedures and conditions were settled.
+        program: What was proved, with the stopping assumptions of the tables that were looked at.
+        unproved: Invariants, and assumptions declared `proved`, that are not proved: what rests on one is not, either.
+        unsafe: Tables of which a line owes what is not shown.
+    """
+
+    findings: tuple[Diagnostic, ...]
+    proved: ProvedProgram | None
+    tables: tuple[TableVerdict, ...]
+    certificate: Mapping[str, object] | None
+    tally: Tally
+    program: Program
+    unproved: frozenset[str] = frozenset()
+    unsafe: frozenset[str] = frozenset()
+
+
+def prove_program(
+    program: Program, options: Options, only: Collection[TableName] | None = None
+) -> ProgramVerdict:
+    """Prove the program's tables (or `only` these) and everything that its procedures owe.
+
+    Tables may rely on the invariants: they are shown in the same step, by induction over cycles.
+    """
+    found = [*at_first(program), *properties_elsewhere(program)]
+    owed = Obligations(program, options)
+    wanted = [table for table in program.tables if only is None or table.name in only]
+    found += owed.prove(wanted)
+    unproved = _unproved(program, found)
+    program = with_stops(program, owed.stops)
+    assuming = relying(program)
+    known = {table.name for table in wanted}
+    tables = [table for table in assuming.tables if table.name in known]
+    made = _verdicts(assuming, tables, options, owed.undefined)
+    verdicts = tuple(_with_invariants(program, verdict) for verdict in made)
+    for verdict in verdicts:
+        if verdict.table.name not in owed.undefined:
+            found += diagnostics(assuming, verdict, unproved)
+    findings = tuple(sorted(dict.fromkeys(found), key=sort_key))
+    wrong = any(one.severity is Severity.ERROR for one in findings)
+    if wrong or only is not None:
+        unsafe = frozenset(owed.unsafe)
+        return ProgramVerdict(findings, None, verdicts, None, owed.tally, program, unproved, unsafe)
+    backings = tuple((verdict.table.name, verdict.backing) for verdict in verdicts)
+    proved = ProvedProgram(program, backings, seal_of_proof())
+    certificate = _certificate(program, verdicts)
+    return ProgramVerdict(findings, proved, verdicts, certificate, owed.tally, program)
+
+
+def _unproved(program: Program, found: Iterable[Diagnostic]) -> frozenset[str]:
+    """Invariants and assumptions declared `proved` of which these findings leave the proof incomplete.
+
+    Invariants are shown by one induction in which every run rests on all of them, and on what it owes itself: any
+    error breaks it. An assumption that is proved rests on the invariants.
+    """
+    errors = [one for one in found if one.severity is Severity.ERROR]
+    spans = {one.primary.span for one in errors}
+    broken = bool(errors and program.invariants)
+    claimed = (one for one in program.assumptions if one.standing is Standing.PROVED)
+    return frozenset(
+        (
+            *(one.name for one in program.invariants if broken),
+            *(str(one.name) for one in claimed if broken or one.span in spans),
+        )
+    )
+
+
+def _with_invariants(program: Program, verdict: TableVerdict) -> TableVerdict:
+    """The verdict, resting on every invariant where the ranges alone do not show its conditions to be defined."""
+    if not program.invariants or defined_alone(program, verdict.table):
+        return verdict
+    named = dict(verdict.backing.assumptions)
+    more = {AssumptionName(one.name): Standing.PROVED for one in program.invariants}
+    backing = replace(verdict.backing, assumptions=tuple((named | more).items()))
+    return replace(verdict, backing=backing)
+
+
+def _verdicts(
+    program: Program, tables: list[Table], options: Options, undefined: Collection[str]
+) -> tuple[TableVerdict, ...]:
+    """Each table's verdict, in order; in processes where there are several tables and jobs."""
+    defined = [table for table in tables if table.name not in undefined]
+    if options.jobs > 1 and len(defined) > 1:
+        made = _in_processes(program, defined, options)
+    else:
+        made = [_verdict(program, table, options) for table in defined]
+    by_name = {one.table.name: one for one in made}
+    why = Undecided("a condition is not defined for every input")
+    return tuple(by_name.get(table.name) or _left_open(table, why) for table in tables)
+
+
+def _verdict(program: Program, table: Table, options: Options) -> TableVerdict:
+    """One table; where the solver was cut short, which another machine might not have done, it is left open."""
+    before = smt.cut_short()
+    with smt.together(options.together) as budget:
+        verdict = _uncut_verdict(program, table, options)
+    if budget.spent and verdict.undecided:
+        verdict = replace(verdict, found=(*_decided(verdict), Undecided(TOO_MANY_STEPS)), certificate=None)
+    if smt.cut_short() > before:
+        left = Undecided("a question to the solver took more processor time than it may")
+        verdict = replace(verdict, found=(*verdict.found, left), certificate=None)
+    return verdict
+
+
+def _decided(verdict: TableVerdict) -> tuple[Found, ...]:
+    return tuple(one for one in verdict.found if not isinstance(one, Undecided))
+
+
+def _uncut_verdict(program: Program, table: Table, options: Options) -> TableVerdict:
+    """One table, its assumptions not contradictory; exhausted memory leaves it open."""
+    try:
+        verdict = prove_table(program, table, options)
+        if not table.assumptions or any(isinstance(one, ContradictoryAssumptions) for one in verdict.found):
+            return verdict
+        possible = assumptions_satisfiable(program, table, options)
+    except smt.troubles() as trouble:
+        return _left_open(table, Undecided(f"{type(trouble).__name__}: {trouble}"))
+    if not isinstance(possible, Answer):
+        made = verdict.certificate
+        return replace(verdict, certificate=made and with_witness(made, program, table, possible))
+    wrong = ContradictoryAssumptions() if possible is Answer.UNSATISFIABLE else Undecided("its assumptions")
+    return replace(verdict, found=(wrong,), certificate=None)
+
+
+def _left_open(table: Table, why: Undecided) -> TableVerdict:
+    return TableVerdict(table, (why,), Backing("none", confirmed_by_z3=False), None, 0.0)
+
+
+def _in_processes(program: Program, tables: list[Table], options: Options) -> list[TableVerdict]:
+    """Each table in a process of a pool; none outlives this call, also when it is interrupted."""
+    one_each = replace(options, jobs=1)
+    with children.pool(min(options.jobs, len(tables))) as pool:
+        waiting = [pool.submit(_verdict, program, table, one_each) for table in tables]
+        return [
+            replace(children.answer(one), table=table) for one, table in zip(waiting, tables, strict=True)
+        ]
+
+
+def _certificate(program: Program, verdicts: tuple[TableVerdict, ...]) -> Mapping[str, object]:
+    tables = [verdict.certificate for verdict in verdicts if verdict.certificate is not None]
+    return program_certificate(program, tables)

@@ -1,0 +1,180 @@
+"""Least points, and boxes that hold throughout, by exact linear arithmetic.
+
+In: clauses over a `Universe` whose columns are leaves. Out: the least point in the order of the
+columns given, and the widest box around it on which a condition holds. Clauses that speak of terms
+that are not linear are for a solver (`smt`).
+
+Source: house style, example 6 (pin each variable, in declared order, to the least value that fits).
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+
+from rcsc.lang.interval_sets import furthest
+from rcsc.lang.model import Box
+from rcsc.table.regions.atoms import Atom, Clauses, Every, Formula, Some, Universe, clauses, every, some
+from rcsc.table.regions.linear import Simplex, integer_point
+from rcsc.table.regions.region import Answer, Bounds, Point
+from rcsc.table.regions.splitting import Tree
+
+_ROUNDS = 200
+"""Systems looked at for an integer point before the tree of regions looks for it."""
+
+
+def find(universe: Universe, parts: Sequence[Formula], budget: int = 2_000) -> Point | Answer:
+    """A point at which all parts hold; `NONE` when there is none, `UNKNOWN` past the budget."""
+    wanted = clauses(parts)
+    if not wanted.rest and not wanted.impossible and all(len(box) == 1 for _, box in wanted.boxes):
+        try:
+            return _corner(universe, {form: box[0] for form, box in wanted.boxes})
+        except TimeoutError:
+            pass  # the tree asks itself how long it goes on
+    tree = Tree(
+        universe,
+        (),
+        (wanted,),
+        lambda _: Answer.UNKNOWN,
+        default=False,
+        budget=budget,
+        first_only=True,
+    )
+    found = tree.run()
+    if found.gaps:
+        return found.gaps[0][1]
+    return Answer.UNKNOWN if found.undecided else Answer.NONE
+
+
+def _corner(universe: Universe, bounds: Mapping[int, Bounds]) -> Point | Answer:
+    """A point within the bounds on forms, of leaves only, all put to one system.
+
+    First each bound on several columns is drawn in by half the sum of its coefficients: a point of what is
+    left stays within the bounds when it is rounded to integers. Only where nothing is left are fractions
+    bounded one after the other.
+    """
+    forms, singles = universe.forms, universe.single
+    if any(universe.columns[column].opaque for form in bounds for column, _ in forms[form]):
+        return Answer.UNKNOWN
+    used = sorted({column for form in bounds if len(forms[form]) > 1 for column, _ in forms[form]})
+    system = _system(universe, bounds, used, draw_in=True)
+    if system.refute() is None:
+        at = {column: round(system.value(singles[column])) for column in used}
+        if all(
+            low <= sum(k * at[column] for column, k in forms[form]) <= high
+            for form, (low, high) in bounds.items()
+            if len(forms[form]) > 1
+        ):
+            return _completed(universe, bounds, at)
+    system = _system(universe, bounds, used, draw_in=False)
+    found = integer_point(system, [singles[column] for column in used], _ROUNDS)
+    if found is None:
+        return Answer.NONE
+    return _completed(universe, bounds, {column: int(found.value(singles[column])) for column in used})
+
+
+def _system(
+    universe: Universe, bounds: Mapping[int, Bounds], used: Sequence[int], *, draw_in: bool
+) -> Simplex:
+    forms, singles = universe.forms, universe.single
+    system = Simplex()
+    for column in used:
+        form = singles[column]
+        system.add_column(form, *bounds.get(form, (universe.low[form], universe.high[form])))
+    for form, (low, high) in bounds.items():
+        if len(forms[form]) > 1:
+            margin = (sum(abs(k) for _, k in forms[form]) + 1) // 2 if draw_in else 0
+            if low + margin > high - margin:
+                margin = 0
+            terms = [(singles[column], k) for column, k in forms[form]]
+            system.add_form(form, terms, low + margin, high - margin)
+    return system
+
+
+def _completed(universe: Universe, bounds: Mapping[int, Bounds], at: Mapping[int, int]) -> Point:
+    """The point with the least value of every column that no bound on several columns speaks of."""
+    return {
+        column: at[column] if column in at else bounds.get(form, (universe.low[form],))[0]
+        for column, form in enumerate(universe.single)
+    }
+
+
+def least(universe: Universe, parts: Sequence[Formula], columns: Sequence[int]) -> Point | Answer:
+    """The least point at which all parts hold: first in the first of `columns`, and so on."""
+    best = find(universe, parts)
+    pinned = list(parts)
+    for column in columns:
+        if isinstance(best, Answer):
+            return best
+        form = universe.single[column]
+        low, high = universe.low[form], best[column]
+        while low < high:
+            middle = low if high == best[column] and low == universe.low[form] else (low + high) // 2
+            trial = find(universe, [*pinned, universe.atom(form, ((low, middle),))])
+            if trial is Answer.UNKNOWN:
+                return trial
+            if isinstance(trial, Answer):
+                low = middle + 1
+            else:
+                best, high = trial, trial[column]
+        pinned.append(universe.atom(form, ((low, low),)))
+    return best
+
+
+def inside(universe: Universe, bounds: Mapping[int, Bounds]) -> list[Formula]:
+    """A region as formulas."""
+    return [universe.atom(form, (interval,)) for form, interval in bounds.items()]
+
+
+def widest(
+    universe: Universe,
+    point: Mapping[int, int],
+    columns: Sequence[int],
+    holds: Callable[[list[Formula]], bool],
+) -> dict[int, Bounds]:
+    """The box around `point` that is grown in the order of `columns` as far as `holds` is true of it.
+
+    Args:
+        universe: Where the columns are from.
+        point: Where to begin.
+        columns: What to grow, in this order; others stay free.
+        holds: Whether what is looked for is true throughout a box (given as atoms).
+    """
+    box = {column: (point[column], point[column]) for column in columns}
+
+    def fits(column: int, low: int, high: int) -> bool:
+        trial = {**box, column: (low, high)}
+        return holds([universe.atom(universe.single[c], (bounds,)) for c, bounds in trial.items()])
+
+    for column in columns:
+        form = universe.single[column]
+        least_, greatest = universe.low[form], universe.high[form]
+        at = point[column]
+        if fits(column, least_, greatest):
+            box[column] = (least_, greatest)
+            continue
+        top = furthest(at, greatest, lambda end, c=column, a=at: fits(c, a, end))  # type: ignore[misc]  # bound early
+        bottom = -furthest(-at, -least_, lambda end, c=column, t=top: fits(c, -end, t))  # type: ignore[misc]  # as above
+        box[column] = (bottom, top)
+    return box
+
+
+def negated(universe: Universe, formula: Formula) -> Formula:
+    """The opposite of a formula."""
+    match formula:
+        case Atom(form=form, box=box):
+            return universe.atom(form, complement(box, universe.low[form], universe.high[form]))
+        case Every(parts):
+            return some(negated(universe, part) for part in parts)
+        case Some(parts):
+            return every(negated(universe, part) for part in parts)
+
+
+def complement(box: Box, low: int, high: int) -> Box:
+    """What of `low .. high` is not in the box."""
+    edges = [low - 1, *(end for interval in box for end in interval), high + 1]
+    return tuple((a + 1, b - 1) for a, b in zip(edges[::2], edges[1::2], strict=True) if a + 1 <= b - 1)
+
+
+def whole(line: Clauses) -> Formula:
+    """Clauses as one formula."""
+    if line.impossible:
+        return Some(())
+    return every((*(Atom(form, box) for form, box in line.boxes), *line.rest))

@@ -1,0 +1,328 @@
+"""Exactly one line, decided by a tree of regions: splits, and leaves that each say why.
+
+In: a table's lines and assumptions as clauses over one `Universe`. Out: a `Search`: the tree in
+preorder, overlapping pairs and a gap with points, and how much nobody could decide. A region is
+split on the bound that leaves fewest candidate lines, until an assumption is false in it, no
+rational point is in it, its lines are boxes that can be counted, or one line holds all over it.
+Linear arithmetic is asked only where no line or several are left, or where a split leaves a
+line on both sides; a solver only where a term is not linear or rounding to integers does not end.
+
+Source: `notes/performance.md`, A.3; `linear` for what is empty, `boxleaf` for counting.
+"""
+
+from bisect import bisect_right
+from collections.abc import Sequence
+from itertools import combinations
+from math import prod
+
+from rcsc.table.regions.atoms import Clauses, Universe, meet
+from rcsc.table.regions.boxleaf import defect, parting
+from rcsc.table.regions.linear import Multipliers, Simplex
+from rcsc.table.regions.region import (
+    Answer,
+    Bounds,
+    Candidate,
+    Counted,
+    Empty,
+    Node,
+    Only,
+    Open,
+    Oracle,
+    Outside,
+    Point,
+    Question,
+    Region,
+    Rests,
+    Search,
+    Split,
+    atoms,
+)
+
+_ROUNDS = 200
+"""Splits in a row, made to round one vertex to integers, before a solver is asked."""
+_PATIENCE = 3
+"""Regions left undecided by the solver, after which it is asked no more: each may cost its full time."""
+
+
+class Tree:
+    """One search; `run` builds the tree."""
+
+    def __init__(
+        self,
+        universe: Universe,
+        lines: Sequence[Clauses],
+        assumptions: Sequence[Clauses],
+        oracle: Oracle,
+        *,
+        default: bool,
+        budget: int = 60_000,
+        first_only: bool = False,
+    ) -> None:
+        """Prepare the root.
+
+        Args:
+            universe: The columns and forms that the clauses speak of.
+            lines: The lines, in order.
+            assumptions: The assumptions that may be used, in order.
+            oracle: Asked about regions with terms that are not linear, and past the budget.
+            default: Whether inputs that no line matches are allowed (a reachable DEFAULT).
+            budget: How many nodes at most before the rest is left to the oracle.
+            first_only: Stop at the first finding.
+        """
+        self.universe = universe
+        self.default = default
+        self.oracle = oracle
+        self.budget = budget
+        self.first_only = first_only
+        self.search = Search()
+        self._singles = frozenset(universe.single)
+        candidates = [Candidate(i, dict(c.boxes), c.rest) for i, c in enumerate(lines) if not c.impossible]
+        given = [Candidate(i, dict(c.boxes), c.rest) for i, c in enumerate(assumptions)]
+        self.root = Region({}, candidates, [c for c in given if not c.holds], Simplex())
+        self.root.carve = tuple(
+            (form, box[0]) for c in given for form, box in c.boxes.items() if len(box) == 1
+        )
+        for i, clause in enumerate(assumptions):
+            if clause.impossible and self.root.known is None:
+                self.root.known = Outside(i)
+
+    def run(self) -> Search:
+        """Decide every region, in preorder."""
+        stack = [self.root]
+        while stack:
+            region = stack.pop()
+            node, children = self._decide(region)
+            self.search.nodes.append(node)
+            stack.extend(reversed(children))
+            if self.first_only and self.search.refuted:
+                break
+        return self.search
+
+    def _decide(self, region: Region) -> tuple[Node, list[Region]]:
+        """A leaf, or a split and its two regions."""
+        if region.known is not None:
+            if isinstance(region.known, Outside):
+                self.search.used.add(region.known.assumption)
+            return region.known, []
+        if self.default and len(region.lines) <= 1:
+            return Only(-1), []
+        if len(region.lines) == 1 and region.lines[0].holds:
+            return Only(region.lines[0].index), []
+        if len(self.search.nodes) > self.budget:
+            return self._ask(region), []
+        holding = [line.index for line in region.lines if line.holds]
+        fresh = [pair for pair in combinations(holding, 2) if pair not in self.search.overlaps]
+        if fresh or not region.lines:
+            return self._probe(region, fresh)
+        if len(holding) > 1 and self._all_known(region):
+            return Open(), []
+        return self._narrow(region)
+
+    # --- findings ----------------------------------------------------------------------
+
+    def _all_known(self, region: Region) -> bool:
+        """Whether splitting further could tell of no other pair (two lines hold, so no gap)."""
+        others = [line.index for line in region.lines]
+        return all(pair in self.search.overlaps for pair in combinations(others, 2))
+
+    def _probe(self, region: Region, pairs: list[tuple[int, int]]) -> tuple[Node, list[Region]]:
+        """Look for a point of a region that is wrong all over, if it has any."""
+        multipliers = self._refute(region)
+        if multipliers is not None:
+            return Empty(multipliers), []
+        if region.open:
+            return self._split(region, *self._best(region, region.open))
+        if self._is_opaque(region):
+            return self._ask(region), []
+        form = self._fractional(region)
+        if form is not None:
+            if region.rounds >= _ROUNDS:
+                return self._ask(region), []
+            return self._split(region, form, int(region.simplex.value(form) // 1), region.rounds + 1)
+        point = self._point(region)
+        self.search.overlaps.update(dict.fromkeys(pairs, point))
+        if not region.lines:
+            self.search.gaps.append((region.bounds, point))
+        settled = all(line.holds for line in region.lines)
+        return (Open(), []) if settled else self._narrow(region)
+
+    def _ask(self, region: Region) -> Node:
+        """Leave the region to the solver."""
+        if self.search.undecided >= _PATIENCE:
+            self.search.undecided += 1
+            return Open()
+        bounds = tuple((form, low, high) for form, (low, high) in sorted(region.bounds.items()))
+        answer = self.oracle(Question(bounds, tuple(line.index for line in region.lines)))
+        if answer is Answer.NONE:
+            self.search.used.update(assumption.index for assumption in self.root.open)
+            return Rests()
+        if isinstance(answer, Answer):
+            self.search.undecided += 1
+        else:
+            self.search.witnesses.append(answer)
+        return Open()
+
+    def _is_opaque(self, region: Region) -> bool:
+        """Whether a bound speaks of a term that is not a leaf."""
+        columns, forms = self.universe.columns, self.universe.forms
+        return any(columns[column].opaque for form in region.bounds for column, _ in forms[form])
+
+    def _fractional(self, region: Region) -> int | None:
+        """A column (as a form) that the vertex does not give an integer."""
+        for form in self.universe.single:
+            if region.simplex.knows(form) and region.simplex.value(form).denominator != 1:
+                return form
+        return None
+
+    def _point(self, region: Region) -> Point:
+        """The vertex, with the least value of every column that it leaves open."""
+        found = {}
+        for column, form in enumerate(self.universe.single):
+            known = region.simplex.knows(form)
+            found[column] = int(region.simplex.value(form)) if known else self._range(region, form)[0]
+        return found
+
+    # --- splits ------------------------------------------------------------------------
+
+    def _narrow(self, region: Region) -> tuple[Node, list[Region]]:
+        """Count boxes where boxes are all that is left, else split."""
+        if region.carve:
+            return self._carve(region)
+        if all(not line.rest and self._singles.issuperset(line.boxes) for line in region.lines):
+            extents = {form: self._range(region, form) for line in region.lines for form in line.boxes}
+            boxes = [line.boxes for line in region.lines]
+            wrong = defect(boxes, extents, cover=not self.default)
+            if wrong is None:
+                sizes = (high - low + 1 for low, high in extents.values())
+                return Counted(None if self.default else prod(sizes), parting(boxes)), []
+            region.carve = tuple((form, bounds) for form, bounds in wrong.items() if bounds != extents[form])
+            if region.carve:
+                return self._carve(region)
+        return self._split(region, *self._best(region, region.lines))
+
+    def _carve(self, region: Region) -> tuple[Node, list[Region]]:
+        """One split toward the part that is to be cut out."""
+        (form, (low, high)), *later = region.carve
+        least, greatest = self._range(region, form)
+        if (low <= least and high >= greatest) or high < least or low > greatest:
+            region.carve = tuple(later)
+            return self._narrow(region)
+        at_low = low > least
+        node, children = self._split(region, form, low - 1 if at_low else high)
+        if children:
+            children[at_low].carve = region.carve
+        return node, children
+
+    def _best(self, region: Region, candidates: Sequence[Candidate]) -> tuple[int, int]:
+        """The form and cut that leave fewest candidates on both sides together."""
+        lows: dict[int, list[int]] = {}
+        highs: dict[int, list[int]] = {}
+        cuts: dict[int, set[int]] = {}
+        for candidate in candidates:
+            for form, box in candidate.boxes.items():
+                lows.setdefault(form, []).append(box[0][0])
+                highs.setdefault(form, []).append(box[-1][1])
+                if len(box) > 1:
+                    cuts.setdefault(form, set()).update(high for _, high in box)
+            for part in candidate.rest:
+                for atom in atoms(part):
+                    edges = (cut for low, high in atom.box for cut in (low - 1, high))
+                    cuts.setdefault(atom.form, set()).update(edges)
+        best = (-1, -1, 0, 0)
+        for form in lows.keys() | cuts.keys():
+            starts, ends = sorted(lows.get(form, ())), sorted(highs.get(form, ()))
+            least, greatest = self._range(region, form)
+            for cut in {low - 1 for low in starts}.union(ends, cuts.get(form, ())):
+                if least <= cut < greatest:
+                    left, right = bisect_right(ends, cut), len(starts) - bisect_right(starts, cut)
+                    best = max(best, (left + right, min(left, right), -form, -cut))
+        return -best[2], -best[3]
+
+    def _split(self, region: Region, form: int, cut: int, rounds: int = 0) -> tuple[Node, list[Region]]:
+        """Both sides of `form <= cut`; a side that linear arithmetic finds empty is a leaf at once."""
+        least, greatest = self._range(region, form)
+        if not least <= cut < greatest:
+            return self._without_full_boxes(region)
+        sides = [self._side(region, form, least, cut), self._side(region, form, cut + 1, greatest)]
+        for side in sides:
+            side.rounds = rounds
+        if sum(len(side.lines) for side in sides) > len(region.lines) and self._has_arithmetic(region, form):
+            multipliers = self._refute(region)
+            if multipliers is not None:
+                return Empty(multipliers), []
+            for side in sides:
+                if side.known is None:
+                    multipliers = self._refute(side)
+                    side.known = None if multipliers is None else Empty(multipliers)
+        return Split(form, cut), sides
+
+    def _without_full_boxes(self, region: Region) -> tuple[Node, list[Region]]:
+        """Decide the region once boxes that are all of its range are dropped: no bound could part them.
+
+        Such a box arises where a disjunction joins to everything (`x < y or x >= y`).
+        """
+        before = [*region.lines, *region.open]
+        region.lines = [self._dropped(region, line) for line in region.lines]
+        region.open = [kept for kept in (self._dropped(region, one) for one in region.open) if not kept.holds]
+        if [*region.lines, *region.open] == before:
+            return self._ask(region), []
+        return self._decide(region)
+
+    def _dropped(self, region: Region, candidate: Candidate) -> Candidate:
+        boxes = {
+            form: box
+            for form, box in candidate.boxes.items()
+            if meet(box, (whole := self._range(region, form),)) != (whole,)
+        }
+        return (
+            candidate
+            if len(boxes) == len(candidate.boxes)
+            else Candidate(candidate.index, boxes, candidate.rest)
+        )
+
+    def _side(self, region: Region, form: int, low: int, high: int) -> Region:
+        lines = [kept for line in region.lines if (kept := line.within(form, low, high)) is not None]
+        side = Region({**region.bounds, form: (low, high)}, lines, [], region.simplex, (*region.stale, form))
+        for assumption in region.open:
+            kept = assumption.within(form, low, high)
+            if kept is None:
+                side.known = side.known or Outside(assumption.index)
+            elif not kept.holds:
+                side.open.append(kept)
+        return side
+
+    def _range(self, region: Region, form: int) -> Bounds:
+        known = region.bounds.get(form)
+        return (self.universe.low[form], self.universe.high[form]) if known is None else known
+
+    # --- linear arithmetic -------------------------------------------------------------
+
+    def _has_arithmetic(self, region: Region, form: int) -> bool:
+        """Whether a bound on a form of several columns plays a part."""
+        forms = self.universe.forms
+        return len(forms[form]) > 1 or any(len(forms[bound]) > 1 for bound in region.bounds)
+
+    def _refute(self, region: Region) -> Multipliers | None:
+        """Multipliers that show the region to be empty; else its simplex stands at a vertex."""
+        if not region.stale:
+            return None
+        simplex, changed = region.simplex.copy(), False
+        for form in dict.fromkeys(region.stale):
+            if simplex.knows(form):
+                simplex.restrict(form, *self._range(region, form))
+                changed = True
+            elif len(self.universe.forms[form]) > 1:
+                self._enter(simplex, region, form)
+                changed = True
+        multipliers = simplex.refute() if changed else None
+        if multipliers is None:
+            region.simplex, region.stale = simplex, ()
+        return multipliers
+
+    def _enter(self, simplex: Simplex, region: Region, form: int) -> None:
+        """Add a form, and the columns it is made of."""
+        terms = [(self.universe.single[column], k) for column, k in self.universe.forms[form]]
+        for single, _ in terms:
+            if not simplex.knows(single):
+                simplex.add_column(single, *self._range(region, single))
+        simplex.add_form(form, terms, *self._range(region, form))

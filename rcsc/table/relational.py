@@ -1,0 +1,361 @@
+"""Tables with conditions across variables, or that rely on assumptions: a region tree, exact arithmetic, Z3.
+
+In: a table. Out: what is wrong with it, with least witnesses and the regions around them, and the certificate
+of a table in order. Linear arithmetic settles what it can; terms that are not linear are asked of Z3, in
+one solver that is made when first needed; *unknown* is a finding, never a proof.
+"""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+from rcsc.lang.interpret import holds, matching_lines
+from rcsc.lang.model import (
+    AssumptionName,
+    Expr,
+    Program,
+    Read,
+    Real,
+    Snapshot,
+    Standing,
+    Table,
+    Value,
+    key_of,
+    value_of_key,
+)
+from rcsc.lang.questions import question
+from rcsc.solvers import smt
+from rcsc.solvers.options import Options
+from rcsc.solvers.smt import Answer, Term
+from rcsc.symbolic import trial
+from rcsc.symbolic.encode import encode
+from rcsc.table.certificate import must_cover, tree_certificate
+from rcsc.table.confirm import Asked, shown
+from rcsc.table.regions.atoms import Formula, Universe, assumptions_of, lines_of, some
+from rcsc.table.regions.least import find, inside, least, negated, whole, widest
+from rcsc.table.regions.region import Answer as Unsettled
+from rcsc.table.regions.region import Bounds, Point, Question, Rests, Search
+from rcsc.table.regions.splitting import Tree
+from rcsc.table.verdict import ContradictoryAssumptions, DeadLine, Found, Gap, Overlap, Region, Undecided
+
+_MOST_CANDIDATES = 64
+"""Lines in one question to the solver: it states every pair of them."""
+_MOST_GROWN = 20
+"""Findings of one table that are given the region around them."""
+_MOST_LINES_GROWN = 64
+"""Lines of a table above which no region is grown around a gap."""
+_MOST_GAPS = 64
+"""Regions of a gap among which linear arithmetic looks for the least input."""
+_MOST_LINES_TRIED = 200
+"""Lines of a table above which no inputs are tried by the interpreter."""
+_STEPS_OF_LEAST = 2_000_000
+"""Budget of a search for the least input, where some is known."""
+_MOST_REPROVED = 2_000
+"""Nodes of a tree above which it is not tried whether an assumption can be spared."""
+
+
+@dataclass(frozen=True, slots=True)
+class Decided:
+    """What was found, the certificate of a table in order, and the assumptions that were needed."""
+
+    found: tuple[Found, ...]
+    certificate: Mapping[str, object] | None
+    used: tuple[AssumptionName, ...]
+
+
+def decide(program: Program, table: Table, options: Options) -> Decided:
+    """Decide the table under its assumptions."""
+    return _Decision(program, table, options).decided()
+
+
+def under_assumptions(
+    program: Program, table: Table, options: Options, settled: tuple[Found, ...]
+) -> tuple[Found, ...]:
+    """What is found under the assumptions of a table that is right without them: dead lines, and what falls to DEFAULT.
+
+    Args:
+        program: Where the assumptions are declared.
+        table: It has no overlap, and no gap but inputs that fall to its DEFAULT line, for any input.
+        options: Limits.
+        settled: That gap, where there is one.
+    """
+    return _Decision(program, table, options).under_assumptions(settled)
+
+
+class _Decision:
+    """One table being decided.
+
+    Attributes:
+        universe: Columns and forms of the lines and assumptions; every variable of a witness is a column.
+        lines, assumed: As formulas.
+    """
+
+    def __init__(self, program: Program, table: Table, options: Options) -> None:
+        self.program, self.table, self.options = program, table, options
+        self.universe = Universe()
+        self.variables = shown(program, table)
+        self.columns = [self.universe.column(Read(v.name, v.type)) for v in self.variables]
+        self.clauses = lines_of(self.universe, table)
+        self.assumptions = assumptions_of(self.universe, program, table)
+        self.lines = [whole(line) for line in self.clauses]
+        self.assumed = [whole(assumption) for assumption in self.assumptions]
+        self._asked: Asked | None = None
+        self._tried: tuple[Snapshot, ...] | None = None
+
+    @property
+    def tried(self) -> tuple[Snapshot, ...]:
+        """Inputs that the assumptions allow, tried before Z3 is asked: for it doubles are slow. None where there are none."""
+        if self._tried is None:
+            few = len(self.table.lines) <= _MOST_LINES_TRIED
+            reals = few and any(isinstance(v.type, Real) for v in self.variables)
+            every = trial.points(self.program.variables) if reals else ()
+            self._tried = tuple(one for one in every if self.allowed(one))
+        return self._tried
+
+    def allowed(self, snapshot: Snapshot) -> bool:
+        """Whether the table's assumptions hold, and every condition of its lines is defined."""
+        names = self.table.assumptions
+        if not all(_holds(one.condition, snapshot) for one in self.program.assumptions if one.name in names):
+            return False
+        try:
+            self.matching(snapshot)
+        except (ArithmeticError, IndexError, ValueError):
+            return False
+        return True
+
+    @property
+    def asked(self) -> Asked:
+        """Z3, made when first asked."""
+        if self._asked is None:
+            self._asked = Asked(self.program, self.table, self.options)
+        return self._asked
+
+    def decided(self) -> Decided:
+        """Everything about the table."""
+        wrong = self.contradiction()
+        if wrong:
+            return Decided(wrong, None, ())
+        kept = tuple(range(len(self.assumptions)))
+        search = self.search(kept)
+        if search.proved:
+            kept, search = self.spared(search)
+        found = (*self.overlaps(search), *self.gap(search), *self.dead())
+        if search.undecided:
+            found = (*found, Undecided(f"{search.undecided} regions of the input space"))
+        names = tuple(self.table.assumptions[at] for at in kept)
+        certificate = (
+            tree_certificate(self.table, self.universe, search.nodes, names) if search.proved else None
+        )
+        return Decided(found, certificate, names if search.proved else self.table.assumptions)
+
+    def under_assumptions(self, settled: tuple[Found, ...]) -> tuple[Found, ...]:
+        """Dead lines, and a gap that DEFAULT takes, under the assumptions."""
+        wrong = self.contradiction()
+        if wrong:
+            return wrong
+        gaps = [found for one in settled if isinstance(one, Gap) for found in self.narrowed_gap(one)]
+        return (*self.dead(), *gaps)
+
+    def contradiction(self) -> tuple[Found, ...]:
+        """That the assumptions cannot hold together, or that nobody could tell."""
+        if not self.table.assumptions:
+            return ()
+        possible = self.satisfiable(self.assumed)
+        if possible is Answer.SATISFIABLE:
+            return ()
+        return (
+            ContradictoryAssumptions() if possible is Answer.UNSATISFIABLE else Undecided("the assumptions"),
+        )
+
+    def narrowed_gap(self, gap: Gap) -> list[Found]:
+        """The gap under the assumptions: one of its witnesses that they allow, else whatever the solver finds."""
+        singles = self.universe.single
+        columns = {str(v.name): (v, column) for v, column in zip(self.variables, self.columns, strict=True)}
+        for witness in gap.witnesses:
+            here = [(*columns[name], value) for name, value in witness.items() if name in columns]
+            keys = [(singles[column], key_of(v.type, value)) for v, column, value in here]
+            pinned = [self.universe.atom(form, ((key, key),)) for form, key in keys]
+            point = least(self.universe, [*pinned, *self.assumed], self.columns)
+            if not isinstance(point, Unsettled):
+                return [Gap((self.snapshot(point),), (None,))]
+        return self.gap(Search())
+
+    def search(self, kept: Sequence[int], budget: int = 60_000, *, alone: bool = False) -> Search:
+        """The tree under some of the assumptions; `alone` without the solver, to the first finding."""
+        return Tree(
+            self.universe,
+            self.clauses,
+            [self.assumptions[at] for at in kept],
+            (lambda _: Unsettled.UNKNOWN) if alone else self.oracle,
+            default=not must_cover(self.table),
+            budget=budget,
+            first_only=alone,
+        ).run()
+
+    def spared(self, search: Search) -> tuple[tuple[int, ...], Search]:
+        """The assumptions that the proof cannot do without, one after the other left out, and its tree.
+
+        Where a solver or a large tree was needed, every assumption that some leaf rests on is kept.
+        """
+        everything = tuple(range(len(self.assumptions)))
+        if Rests() in search.nodes or len(search.nodes) > _MOST_REPROVED:
+            return everything, search
+        kept = everything
+        for at in everything:
+            fewer = tuple(one for one in kept if one != at)
+            again = self.search(fewer, 2 * _MOST_REPROVED, alone=True)
+            if again.proved:
+                kept, search = fewer, again
+        return kept, search
+
+    def oracle(self, asked: Question) -> Snapshot | Unsettled:
+        """Z3's answer about a region, as the tree asks it."""
+        if len(asked.candidates) > _MOST_CANDIDATES or smt.spent():
+            return Unsettled.UNKNOWN
+        columns, forms = self.universe.columns, self.universe.forms
+        bounds = {
+            tuple((columns[column].name, k) for column, k in forms[form]): (low, high)
+            for form, low, high in asked.bounds
+        }
+        conditions = question(self.program, self.table, self.table.assumptions, bounds, asked.candidates)
+        for snapshot in self.tried:
+            if all(_holds(one, snapshot) for one in conditions):
+                return snapshot
+        z3 = self.asked
+        answer = z3.holds(*(encode(condition, z3.frame) for condition in conditions))
+        if answer is Answer.SATISFIABLE:
+            leaves = z3.frame.leaves
+            return {str(v.name): z3.solver.value(leaves[v.name], v.type) for v in self.program.variables}
+        return Unsettled.NONE if answer is Answer.UNSATISFIABLE else Unsettled.UNKNOWN
+
+    # --- findings ----------------------------------------------------------------------
+
+    def satisfiable(self, formulas: Sequence[Formula], *terms: Term) -> Answer:
+        """Whether the formulas can hold together under no assumption but what they say."""
+        point = find(self.universe, formulas)
+        if point is Unsettled.UNKNOWN:
+            return self.asked.holds(*terms)
+        return Answer.UNSATISFIABLE if isinstance(point, Unsettled) else Answer.SATISFIABLE
+
+    def overlaps(self, search: Search) -> list[Found]:
+        """Every overlapping pair with its least witness."""
+        pairs = set(search.overlaps)
+        for seen in search.witnesses:
+            pairs.update(combinations(self.matching(seen), 2))
+        found: list[Found] = []
+        for first, second in sorted(pairs):
+            grown = len(found) < _MOST_GROWN
+            found.append(self.overlap(first, second, grown=grown))
+        return found
+
+    def matching(self, snapshot: Snapshot) -> list[int]:
+        """Positions of the lines that match."""
+        names = set(matching_lines(self.table, snapshot))
+        return [at for at, line in enumerate(self.table.lines) if line.name in names]
+
+    def overlap(self, first: int, second: int, *, grown: bool) -> Found:
+        """A pair of lines that overlaps, at its least input."""
+        both = [self.lines[first], self.lines[second]]
+        point = least(self.universe, [*both, *self.assumed], self.columns)
+        if isinstance(point, Unsettled):
+            seen = [one for one in self.tried if {first, second} <= set(self.matching(one))]
+            witness = self.witness(seen, lambda z3: (z3.line(first), z3.line(second)))
+            pair = f"lines `{self.table.lines[first].name}` and `{self.table.lines[second].name}`"
+            return Undecided(pair) if witness is None else Overlap(first, second, witness)
+        outside = some(negated(self.universe, line) for line in both)
+        region = self.around(point, [[outside]]) if grown else None
+        return Overlap(first, second, self.snapshot(point), region)
+
+    def gap(self, search: Search) -> list[Found]:
+        """The least input that no line matches, if there is one; also where DEFAULT takes it."""
+        seen = [snapshot for snapshot in search.witnesses if not self.matching(snapshot)]
+        if must_cover(self.table) and not search.gaps and not seen:
+            return []
+        if search.gaps and not seen and len(search.gaps) <= _MOST_GAPS:
+            points = [
+                least(self.universe, inside(self.universe, part), self.columns) for part, _ in search.gaps
+            ]
+            settled = [point for point in points if not isinstance(point, Unsettled)]
+            if len(settled) == len(points):
+                point = min(settled, key=lambda one: [one[column] for column in self.columns])
+                few = len(self.lines) <= _MOST_LINES_GROWN
+                region = self.around(point, [[line] for line in self.lines]) if few else None
+                return [Gap((self.snapshot(point),), (region,))]
+        seen += [snapshot for snapshot in self.tried if not self.matching(snapshot)]
+        if not must_cover(self.table) and not seen:
+            z3 = self.asked
+            if z3.holds(z3.none()) is Answer.UNSATISFIABLE:
+                return []
+        witness = self.witness(seen, lambda z3: (z3.none(),))
+        return [Undecided("what no line matches")] if witness is None else [Gap((witness,), (None,))]
+
+    def dead(self) -> list[Found]:
+        """Lines that no input matches, those that only an assumption excludes told apart from those that ranges and invariants do."""
+        standing = {one.name: one.standing for one in self.program.assumptions}
+        names = zip(self.table.assumptions, self.assumed, strict=True)
+        sure = [formula for name, formula in names if standing[name] is Standing.PROVED]
+        found: list[Found] = []
+        for at, line in enumerate(self.lines):
+            point = find(self.universe, [line, *self.assumed])
+            if isinstance(point, Unsettled):
+                answer = Answer.UNSATISFIABLE
+                if point is Unsettled.UNKNOWN and any(at in self.matching(one) for one in self.tried):
+                    answer = Answer.SATISFIABLE
+                elif point is Unsettled.UNKNOWN:
+                    answer = self.asked.holds(self.asked.line(at))
+                if answer is Answer.UNSATISFIABLE:
+                    assuming = len(sure) < len(self.assumed)
+                    assuming = assuming and find(self.universe, [line, *sure]) is not Unsettled.NONE
+                    found.append(DeadLine(at, assuming))
+                elif answer is Answer.UNKNOWN:
+                    found.append(Undecided(f"whether line `{self.table.lines[at].name}` can match"))
+        return found
+
+    def witness(
+        self, seen: Sequence[Snapshot], terms: Callable[[Asked], tuple[Term, ...]]
+    ) -> Snapshot | None:
+        """The least input for which the terms hold; where Z3 gives up, the least of those that are known."""
+        z3 = self.asked
+        if seen:
+            few = replace(self.options, steps=min(self.options.steps, _STEPS_OF_LEAST))
+            z3 = Asked(self.program, self.table, few)
+        found = z3.witness(*terms(z3))
+        if found is None and seen:
+            best = min(seen, key=lambda one: [key_of(v.type, one[v.name]) for v in self.variables])
+            found = {v.name: best[v.name] for v in self.variables}
+        return found
+
+    # --- witnesses ---------------------------------------------------------------------
+
+    def snapshot(self, point: Point) -> dict[str, Value]:
+        """The point's values of the variables that are shown."""
+        pairs = zip(self.variables, self.columns, strict=True)
+        return {v.name: value_of_key(v.type, point[column]) for v, column in pairs}
+
+    def around(self, point: Point, wrong: Iterable[Sequence[Formula]]) -> Region:
+        """The widest box around the point in which, under the assumptions, none of `wrong` can hold."""
+        never = [list(formulas) for formulas in wrong]
+
+        def holds(box: list[Formula]) -> bool:
+            return all(
+                find(self.universe, [*box, *self.assumed, *formulas]) is Unsettled.NONE for formulas in never
+            )
+
+        box = widest(self.universe, point, self.columns, holds)
+        return {
+            v.name: (bounds,)
+            for v, column in zip(self.variables, self.columns, strict=True)
+            if (bounds := box[column]) != self._extent(column)
+        }
+
+    def _extent(self, column: int) -> Bounds:
+        found = self.universe.columns[column]
+        return found.low, found.high
+
+
+def _holds(condition: Expr, snapshot: Snapshot) -> bool:
+    """Whether a condition is defined and true."""
+    try:
+        return holds(condition, snapshot)
+    except (ArithmeticError, IndexError, ValueError):
+        return False

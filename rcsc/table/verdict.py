@@ -1,0 +1,98 @@
+"""What was found of one table: findings as data, and what the verdict rests on.
+
+Keys are those of `rcsc.lang.model`: order-preserving integers for every kind of value.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from rcsc.lang.model import Backing, Box, Snapshot, Table
+
+Witness: TypeAlias = Snapshot
+"""A value for every test variable of the table."""
+
+Region: TypeAlias = Mapping[str, Box]
+"""For some of the variables the keys that they may have; the others are free."""
+
+
+@dataclass(frozen=True, slots=True)
+class Overlap:
+    """Two lines (by position) that match the same input; `region` is where both do, all over it."""
+
+    first: int
+    second: int
+    witness: Witness
+    region: Region | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Gap:
+    """Inputs that no line matches.
+
+    Attributes:
+        witnesses: The least one, and the least outside the regions already shown.
+        regions: Around each a region that no line matches.
+        count: How many inputs there are, and of how many; None where nobody counted.
+    """
+
+    witnesses: tuple[Witness, ...]
+    regions: tuple[Region | None, ...]
+    count: tuple[int, int] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class DeadLine:
+    """A line that no input matches.
+
+    Attributes:
+        assuming: Whether that rests on an assumption: where it fails the line may match, so that it is no mistake to write it.
+    """
+
+    line: int
+    assuming: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class ContradictoryAssumptions:
+    """No input satisfies the assumptions, so that anything could be proved of the table."""
+
+
+@dataclass(frozen=True, slots=True)
+class Undecided:
+    """Nobody could tell: a time-out, exhausted memory, or a question beyond the solver."""
+
+    what: str
+
+
+@dataclass(frozen=True, slots=True)
+class SolversDisagree:
+    """Z3 says something else: a bug in rcsc."""
+
+    what: str
+
+
+Found: TypeAlias = Overlap | Gap | DeadLine | ContradictoryAssumptions | Undecided | SolversDisagree
+
+
+@dataclass(frozen=True, slots=True)
+class TableVerdict:
+    """The verdict on one table.
+
+    Attributes:
+        found: What is wrong; a gap too where a DEFAULT line takes it (the report tells them apart).
+        backing: What it rests on.
+        certificate: For `rcsc certify`; None where there is nothing to certify.
+        seconds: How long it took.
+    """
+
+    table: Table
+    found: tuple[Found, ...]
+    backing: Backing
+    certificate: Mapping[str, object] | None
+    seconds: float
+
+    @property
+    def undecided(self) -> bool:
+        """Whether something was left open."""
+        return any(isinstance(one, Undecided) for one in self.found)

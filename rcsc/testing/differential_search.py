@@ -1,0 +1,98 @@
+"""Looks for inputs on which the executors disagree; what it finds is the simplest such session.
+
+In: executors, a target, how many examples. Out: a disagreement, or None. The examples are the same each time.
+"""
+
+from collections.abc import Callable, Iterator
+from random import Random
+
+from rcsc.lang.model import OneTable, Program, Table
+from rcsc.testing.agree import Compared, Disagreement, Executors, keeps_invariants, run_lines, run_session
+from rcsc.testing.executors.sessions import Session
+from rcsc.testing.executors.targets import Target
+from rcsc.testing.inputs.sampling import declarations, session, snapshot
+
+TRIES = 10
+"""Sessions that are drawn for each that starts where the invariants hold."""
+TOGETHER = 8
+"""Snapshots that go through a matcher at once."""
+
+
+def table_of(program: Program, target: Target) -> Table | None:
+    """The table whose lines the inputs should aim at."""
+    if target.kind != "cycle":
+        return program.tables[target.number]
+    tables = program.levels[target.number].tables
+    names = [tables.table] if isinstance(tables, OneTable) else [name for _, name in tables.tables]
+    return next((table for table in program.tables if table.name == names[0]), None)
+
+
+def hunt_sessions(
+    executors: Executors, target: Target, compared: Compared, examples: int, most_cycles: int = 8
+) -> Disagreement | None:
+    """Runs drawn sessions of a step or a cycle.
+
+    Args:
+        executors: Of the program.
+        target: The step or cycle.
+        compared: Counts what was compared.
+        examples: How many sessions.
+        most_cycles: Longest session.
+    """
+    program = executors.program
+    known, table = declarations(program), table_of(program, target)
+    random = Random(target.function)  # noqa: S311  # repeatable on purpose
+    left = examples
+    for _ in range(TRIES * examples):
+        drawn = session(known, table, most_cycles, random)
+        if not keeps_invariants(program, drawn):
+            continue
+        if found := run_session(executors, target, drawn, compared):
+            return simplest(program, found, lambda one: _differs(executors, target, one, compared))
+        left -= 1
+        if not left:
+            break
+    return None
+
+
+def _differs(executors: Executors, target: Target, one: Session, compared: Compared) -> Disagreement | None:
+    if not keeps_invariants(executors.program, one):
+        return None
+    return run_session(executors, target, one, compared)
+
+
+def hunt_lines(
+    executors: Executors, target: Target, compared: Compared, examples: int
+) -> Disagreement | None:
+    """Runs drawn snapshots through a matcher, some at a time."""
+    program = executors.program
+    known, table = declarations(program), table_of(program, target)
+    random = Random(target.function)  # noqa: S311  # repeatable on purpose
+    for _ in range(max(1, examples // TOGETHER)):
+        drawn = [snapshot(known, table, random) for _ in range(TOGETHER)]
+        if found := run_lines(executors, target, drawn, compared):
+            return simplest(program, found, lambda one: run_lines(executors, target, [one.start], compared))
+    return None
+
+
+def simplest(
+    program: Program, found: Disagreement, differs: Callable[[Session], Disagreement | None]
+) -> Disagreement:
+    """A disagreement with as few cycles, and as few values that are not initial, as can be had one by one."""
+    for one in _shorter(found):
+        found = differs(one) or found
+    for variable in program.variables:
+        name = str(variable.name)
+        start = {**found.session.start, name: variable.initial}
+        changed = tuple({**r, name: variable.initial} if name in r else r for r in found.session.readings)
+        found = differs(Session(start, changed)) or found
+    return found
+
+
+def _shorter(found: Disagreement) -> Iterator[Session]:
+    """The session cut after the cycle that differs, then its last cycles alone."""
+    start, kept = found.session.start, found.session.readings[: found.cycle]
+    yield Session(start, kept)
+    for count in (4, 2, 1):
+        if count < len(kept):
+            yield Session(start, kept[-count:])

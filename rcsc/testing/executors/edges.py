@@ -1,0 +1,213 @@
+"""The values of each leaf at which something can change: constants, their neighbours, bounds.
+
+In: a program. Out: keys (see `rcsc.lang.model`) and readings outside the declared range.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping
+from math import inf, nan
+
+from rcsc.lang.interpret import holds
+from rcsc.lang.model import (
+    Among,
+    Apply,
+    Assign,
+    Bool,
+    Call,
+    Case,
+    Enum,
+    Expr,
+    For,
+    If,
+    Int,
+    Literal,
+    Local,
+    Program,
+    Read,
+    Real,
+    Scalar,
+    Select,
+    Snapshot,
+    Statement,
+    Table,
+    TableByCommand,
+    Test,
+    ToElement,
+    Value,
+    Variable,
+    key_bounds,
+    key_of,
+    value_of_key,
+)
+
+MOST_COMPANIONS = 8
+
+
+def parts(expr: Expr) -> Iterator[Expr]:
+    """`expr` and every expression inside it."""
+    yield expr
+    match expr:
+        case Apply(args=args):
+            for arg in args:
+                yield from parts(arg)
+        case Select(index=index):
+            yield from parts(index)
+        case Among(subject=subject):
+            yield from parts(subject)
+        case _:
+            pass
+
+
+def reads(expr: Expr) -> set[str]:
+    """Every leaf that `expr` may read."""
+    found: set[str] = set()
+    for part in parts(expr):
+        if isinstance(part, Read):
+            found.add(part.name)
+        elif isinstance(part, Select):
+            found.update(part.leaves)
+    return found
+
+
+def expressions(body: Iterable[Statement]) -> Iterator[Expr]:
+    """Every expression of the statements, inner statements included."""
+    for statement in body:
+        match statement:
+            case Assign(place=place, value=value):
+                yield value
+                if isinstance(place, ToElement):
+                    yield place.index
+            case Local(value=value):
+                yield from () if value is None else (value,)
+            case If(condition=condition, then=then, orelse=orelse):
+                yield condition
+                yield from expressions((*then, *orelse))
+            case Case(subject=subject, arms=arms, orelse=orelse):
+                for arm in arms:
+                    yield Among(subject, arm.values)
+                    yield from expressions(arm.body)
+                yield from expressions(orelse)
+            case For(body=inner):
+                yield from expressions(inner)
+            case Call(args=args):
+                yield from args
+
+
+def tests_of(table: Table) -> tuple[Test, ...]:
+    """Every distinct test of the table, in order of its first line."""
+    found: dict[tuple[str, Expr], Test] = {}
+    for line in table.lines:
+        for test in line.tests:
+            if test is not None:
+                found.setdefault((test.text, test.condition), test)
+    return tuple(found.values())
+
+
+def relational_tests(table: Table) -> tuple[Test, ...]:
+    """The tests that are no box, in order of their first line."""
+    return tuple(test for test in tests_of(table) if test.box is None)
+
+
+def all_expressions(program: Program) -> Iterator[Expr]:
+    """Every expression that the executors evaluate."""
+    for table in program.tables:
+        yield from (test.condition for test in tests_of(table))
+        for line in table.lines:
+            yield from expressions(action.statement for action in line.actions)
+    for procedure in program.procedures:
+        yield from expressions(procedure.body)
+    yield from (assumption.condition for assumption in program.assumptions)
+    yield from (invariant.condition for invariant in program.invariants)
+    yield from (v.deferred_until for v in program.variables if v.deferred_until is not None)
+    for level in program.levels:
+        if isinstance(level.tables, TableByCommand):
+            yield level.tables.selector
+
+
+def _constants(expr: Expr) -> Iterator[tuple[Scalar, Value]]:
+    for part in parts(expr):
+        if isinstance(part, Literal):
+            yield part.type, part.value
+        elif isinstance(part, Among):
+            yield from ((part.subject.type, value) for value in part.values)
+
+
+def _same_kind(left: Scalar, right: Scalar) -> bool:
+    if isinstance(left, Enum) and isinstance(right, Enum):
+        return left.name == right.name
+    return type(left) is type(right)
+
+
+def leaf_edges(program: Program) -> dict[str, tuple[int, ...]]:
+    """For every leaf the keys at which a test, guard or bound may turn, with their neighbours."""
+    kinds = {variable.name: variable.type for variable in program.variables}
+    near: dict[str, set[int]] = {name: set() for name in kinds}
+    for expr in all_expressions(program):
+        constants = list(_constants(expr))
+        for name in reads(expr) if constants else ():
+            kind = kinds[name]  # type: ignore[index]  # every name read is a leaf
+            for other, value in constants:
+                if _same_kind(kind, other):
+                    key = key_of(kind, value)
+                    near[name].update((key - 1, key, key + 1))
+    for table in program.tables:
+        for test in tests_of(table):
+            if test.box is not None:
+                near[test.variables[0]].update(k + d for ends in test.box for k in ends for d in (-1, 0, 1))
+    return {variable.name: _inside(variable, near[variable.name]) for variable in program.variables}
+
+
+def _inside(variable: Variable, near: set[int]) -> tuple[int, ...]:
+    low, high = key_bounds(variable.type)
+    own = {low, high, key_of(variable.type, variable.initial), low + 1, high - 1}
+    if isinstance(variable.type, Int | Real):
+        own |= {0, 1, -1}
+    return tuple(sorted(key for key in near | own if low <= key <= high))
+
+
+def companions(program: Program) -> dict[str, tuple[str, ...]]:
+    """For every leaf those it is compared with in one expression, of the same kind."""
+    kinds: Mapping[str, Scalar] = {variable.name: variable.type for variable in program.variables}
+    found: dict[str, set[str]] = {}
+    for expr in all_expressions(program):
+        names = reads(expr)
+        if 1 < len(names) <= MOST_COMPANIONS:
+            for name in names:
+                found.setdefault(name, set()).update(
+                    other for other in names if other != name and _same_kind(kinds[name], kinds[other])
+                )
+    return {name: tuple(sorted(others)) for name, others in found.items() if others}
+
+
+def representable(kind: Scalar) -> tuple[int, int]:
+    """Least and greatest integer of the C type of a leaf of this kind (not for reals).
+
+    Source: the executors' rule, the smallest of the (u)int8 .. 64 types that holds the range.
+    """
+    low, high = key_bounds(kind)
+    for bits in (8, 16, 32, 64):
+        if low >= 0 and high < 1 << bits:
+            return 0, (1 << bits) - 1
+        if low < 0 and -(1 << bits - 1) <= low and high < 1 << bits - 1:
+            return -(1 << bits - 1), (1 << bits - 1) - 1
+    return low, high
+
+
+def outside(kind: Scalar) -> tuple[Value, ...]:
+    """Readings that a C variable of this kind can hold and that lie outside the range."""
+    if isinstance(kind, Real):
+        low, high = key_bounds(kind)
+        beyond = [float(value_of_key(kind, key)) for key in (low - 1, high + 1)]
+        return (nan, inf, -inf, *(value for value in beyond if abs(value) != inf))
+    if isinstance(kind, Bool):
+        return ()
+    low, high = key_bounds(kind)
+    least, greatest = representable(kind)
+    strange = {k for k in (least, low - 1, high + 1, greatest) if not low <= k <= high}
+    return tuple(sorted(k for k in strange if least <= k <= greatest))
+
+
+def may_be_matched(program: Program, table: Table, snapshot: Snapshot) -> bool:
+    """Whether the table's conditions are defined: the invariants hold, and no stopping assumption fails."""
+    rests = [one.condition for one in program.invariants]
+    rests += [one.condition for one in program.assumptions if one.name in table.stops]
+    return all(holds(condition, snapshot) for condition in rests)

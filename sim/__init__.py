@@ -1,1 +1,0 @@
-"""What stands outside the control levels when no robot does: stand-ins for robot, hand and camera."""

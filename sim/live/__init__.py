@@ -1,5 +1,0 @@
-"""The live page: what a run does, in a browser on the same machine, while it runs. Needs the extra `live`."""
-
-from sim.live.server import Live
-
-__all__ = ["Live"]

@@ -1,0 +1,196 @@
+"""Counterexamples: chosen from a campaign's findings, shrunk by its workers, saved as files, and run again.
+
+In: records. Out: for each a folder with `episode.json`, `script.csv`, `log.mcap` and `finding.json`.
+"""
+
+import json
+import re
+import time
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rcsc.host.files import write_atomically
+from rcsc.host.files.names import shown
+from rcsc.host.files.read import json_of, text
+from rcsc.run.description import description
+from rcsc.run.system import Kind
+from rcsc_cell.campaign.journal import Record
+from rcsc_cell.campaign.rig import Rig, digest
+from rcsc_cell.campaign.runner import death
+from rcsc_cell.campaign.shrink import MOST_TRIES, shrink
+from rcsc_cell.campaign.work import SURVIVES, TRIES, Shrunk, attempt, logged, shrunk
+from rcsc_cell.campaign.worker_pool import Crashed, Crew
+from rcsc_cell.episodes.episode import Episode, Outcome, script
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor, Future
+
+MOST = 20
+"""Counterexamples that are made of one campaign; the others stay in its journal."""
+
+
+MOST_CHARACTERS = 120
+"""Of a property, in the name of a folder."""
+
+
+class BadEpisode(Exception):  # noqa: N818  # what happened, not an error of ours
+    """The file holds no episode; says why."""
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """A finding that a counterexample is to be made of: an episode's number, its faults, and the property."""
+
+    index: int
+    faults: tuple[str, ...]
+    property: str
+
+    def name(self, seed: int) -> str:
+        """Of its folder."""
+        return f"{seed}-{self.index}-{re.sub('[^a-z0-9]+', '-', self.property.lower()).strip('-')[:MOST_CHARACTERS]}"
+
+
+def choices(records: Iterable[Record]) -> tuple[Choice, ...]:
+    """For each property and set of faults the episode with the lowest number: others would likely shrink to the same.
+
+    Whatever has several faults counts as one set. Those of fewer faults come first, as they say more.
+    """
+    found: dict[tuple[str, tuple[str, ...]], Choice] = {}
+    for record in sorted(records, key=lambda one: one.index):
+        for finding in record.findings:
+            kind = record.faults if len(record.faults) < 2 else ("several",)
+            choice = Choice(record.index, record.faults, finding.property)
+            found.setdefault((finding.property, kind), choice)
+    return tuple(sorted(found.values(), key=lambda one: (min(len(one.faults), 2), one.index, one.property)))
+
+
+def counterexamples(
+    rig: Rig, seed: int, wanted: Sequence[Choice], crew: Crew
+) -> Iterator[tuple[Choice, Shrunk]]:
+    """Shrinks all at once, each in a worker; those that a worker dies of, one try a task.
+
+    Raises:
+        WorkersGone: Nobody is left to do it.
+        OtherTables: A worker is of another checkout.
+    """
+    careful = [one for one in wanted if one.property == SURVIVES]
+    flying: dict[Choice, tuple[Future[Shrunk], Executor]] = {}
+    for one in wanted:
+        if one.property != SURVIVES:
+            future = crew.submit(shrunk, rig, digest(rig.system), seed, one.index, one.property)
+            flying[one] = future, crew.executor
+    for one, (future, executor) in flying.items():
+        try:
+            yield one, future.result()
+        except crew.deaths as died:
+            crew.survive(died, executor)
+            careful.append(one)
+    for one in careful:
+        yield one, _carefully(rig, seed, one, crew)
+
+
+def _carefully(rig: Rig, seed: int, choice: Choice, crew: Crew) -> Shrunk:
+    """Shrinks from here, so that a worker may die of each try."""
+
+    def fails(episode: Episode) -> bool:
+        return any(one.property == choice.property for one in _survived(rig, episode, crew).findings)
+
+    tries = TRIES.get(choice.property, MOST_TRIES)
+    least = shrink(rig.episode(seed, choice.index), fails, tries)
+    try:
+        return crew.call(logged, rig, least, choice.property)
+    except Crashed:
+        found = next(one for one in _survived(rig, least, crew).findings if one.property == choice.property)
+        return Shrunk(least, found, b"")
+
+
+def _survived(rig: Rig, episode: Episode, crew: Crew) -> Outcome:
+    begun_s = time.monotonic()
+    try:
+        return crew.call(attempt, rig, episode)
+    except Crashed:
+        return death(rig, time.monotonic() - begun_s)
+
+
+# --- as files ---
+
+
+def save(folder: Path, rig: Rig, seed: int, choice: Choice, made: Shrunk) -> Path:
+    """Writes a counterexample; the folder that has it.
+
+    Raises:
+        OSError: It cannot be written.
+    """
+    place = folder / choice.name(seed)
+    place.mkdir(parents=True, exist_ok=True)
+    said = _origin(rig, seed, choice) | {
+        "tick": made.found.tick,
+        "said": made.found.said,
+        "faults": list(choice.faults),
+    }
+    write_atomically(place / "episode.json", made.episode.to_json().encode())
+    write_atomically(place / "script.csv", script(made.episode.rows).encode())
+    if made.log:
+        write_atomically(place / "log.mcap", made.log)
+    else:
+        (place / "log.mcap").unlink(missing_ok=True)  # of another time
+    write_atomically(place / "finding.json", (json.dumps(said, indent=1) + "\n").encode())
+    return place
+
+
+def is_saved(folder: Path, rig: Rig, seed: int, choice: Choice) -> bool:
+    """Whether the folder has this counterexample, of these tables; `finding.json` is written last."""
+    try:
+        said = json_of(text(folder / choice.name(seed) / "finding.json"))
+        return bool(said | _origin(rig, seed, choice) == said)
+    except (OSError, ValueError, TypeError):
+        return False
+
+
+def _origin(rig: Rig, seed: int, choice: Choice) -> dict[str, Any]:
+    return {
+        "property": choice.property,
+        "seed": seed,
+        "index": choice.index,
+        "backend": rig.backend,
+        "executor": rig.executor,
+        "digest": digest(rig.system),
+    }
+
+
+def saved_episode(path: Path) -> Episode:
+    """The episode in a file, or in a counterexample's folder.
+
+    Raises:
+        BadEpisode: There is none.
+    """
+    file = path / "episode.json" if path.is_dir() else path
+    try:
+        return Episode.from_json(text(file))
+    except OSError as error:
+        raise BadEpisode(f"{file} cannot be read: {error.strerror}") from error
+    except ValueError as error:
+        raise BadEpisode(f"{file}: {error}") from error
+
+
+def again(path: Path, rig: Rig | None = None, executor: Kind | None = None) -> Outcome:
+    """Runs a saved episode; what it raises is a finding, too. A regression case passes when there is none.
+
+    Args:
+        path: Its file or folder.
+        rig: System, limit and what runs; the plant is the episode's own.
+        executor: Instead of the episode's.
+
+    Raises:
+        BadEpisode: The file holds none.
+        BadDescription, BadData, NotBuilt: The system is not in order.
+    """
+    episode = saved_episode(path)
+    rig = rig or Rig()
+    levels = {level.name for level in description(rig.system).levels}
+    for one in episode.restarts:
+        if one.level not in levels:
+            raise BadEpisode(f"{path}: there is no level {shown(one.level)} to start again")
+    return attempt(rig, replace(episode, executor=executor) if executor else episode)

@@ -1,0 +1,130 @@
+"""The runner: gives chunks of episodes to a crew, keeps what comes back in the journal, and survives workers that do not.
+
+In: how many episodes, a crew, a journal. Out: records as they come. When a worker dies, whatever was under way is suspected, and is
+played again with nothing beside it: whole chunks first, and the episodes of one that kills again one by one. An episode
+that kills a worker by itself is recorded as `crash`, or as `hang` if it was ended for that.
+"""
+
+import time
+from collections import deque
+from collections.abc import Iterator
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future, wait
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from rcsc_cell.campaign.journal import Journal, Record
+from rcsc_cell.campaign.rig import Rig, digest
+from rcsc_cell.campaign.work import CRASH, ENDS, HANG, SURVIVES, no_end, odd, play
+from rcsc_cell.campaign.worker_pool import Crew, WorkersGone
+from rcsc_cell.episodes.episode import Finding, Outcome
+from rcsc_cell.episodes.part_faults import fault_classes
+
+Chunk: TypeAlias = tuple[int, ...]
+Records: TypeAlias = tuple[Record, ...]
+
+CHUNKS = {"kinematic": 10, "mujoco": 4}
+"""Episodes a task at most: about a second of work, which handing over does not slow, and which is all that a kill loses."""
+
+_AHEAD = 2
+"""Chunks that wait for each worker, so that none waits for a chunk."""
+
+
+def campaign(
+    rig: Rig, seed: int, episodes: int, crew: Crew, journal: Journal, poll_s: float = 0.5
+) -> Iterator[Records]:
+    """Plays what the journal lacks of episodes 0 to `episodes` - 1; at least every `poll_s`, what came in since.
+
+    Raises:
+        WorkersGone: Nobody is left to play.
+        OtherTables: A worker is of another checkout.
+        BadDescription, BadData, NotBuilt: The system is not in order.
+        OSError: The journal cannot be written.
+    """
+    todo = [index for index in range(episodes) if index not in journal.records]
+    size = min(CHUNKS[rig.backend], max(1, len(todo) // (4 * crew.workers)))
+    chunks = deque(tuple(todo[at : at + size]) for at in range(0, len(todo), size))
+    round_ = _Round(rig, seed, crew, chunks)
+    try:
+        while round_.busy:
+            records = round_.step(poll_s)
+            journal.add(records)
+            yield records
+    except CancelledError as error:
+        raise WorkersGone("the workers were lost") from error
+    finally:
+        for future in round_.flying:
+            future.cancel()
+
+
+@dataclass(frozen=True, slots=True)
+class _Flight:
+    """A chunk under way, and with whom."""
+
+    chunk: Chunk
+    executor: Executor
+
+
+class _Round:
+    """Chunks that wait, that are suspected, and that fly."""
+
+    def __init__(self, rig: Rig, seed: int, crew: Crew, waiting: deque[Chunk]) -> None:
+        self._rig, self._seed, self._crew = rig, seed, crew
+        self._digest = digest(rig.system)
+        self._waiting = waiting
+        self._suspects: deque[Chunk] = deque()
+        self._alone = False
+        self._since_s = 0.0
+        self.flying: dict[Future[Records], _Flight] = {}
+
+    @property
+    def busy(self) -> bool:
+        """Whether anything is left."""
+        return bool(self._waiting or self._suspects or self.flying)
+
+    def step(self, poll_s: float) -> Records:
+        """Hands out, waits for at most so long, and takes what is done."""
+        self._submit()
+        done, _ = wait(self.flying, timeout=poll_s, return_when=FIRST_COMPLETED)
+        return tuple(record for future in done for record in self._taken(future))
+
+    def _submit(self) -> None:
+        """Suspects fly alone, others together."""
+        if self.flying and (self._alone or self._suspects):
+            return
+        self._alone = bool(self._suspects)
+        if self._alone:
+            self._since_s = time.monotonic()
+            self._fly(self._suspects.popleft())
+        while not self._alone and self._waiting and len(self.flying) < _AHEAD * self._crew.workers:
+            self._fly(self._waiting.popleft())
+
+    def _fly(self, chunk: Chunk) -> None:
+        future = self._crew.submit(play, self._rig, self._digest, self._seed, chunk)
+        self.flying[future] = _Flight(chunk, self._crew.executor)
+
+    def _taken(self, future: Future[Records]) -> Records:
+        flight = self.flying.pop(future)
+        try:
+            return future.result()
+        except self._crew.deaths as death:
+            self._crew.survive(death, flight.executor)
+        if not self._alone:
+            self._suspects.append(flight.chunk)
+        elif len(flight.chunk) > 1:
+            self._suspects.extendleft((index,) for index in reversed(flight.chunk))
+        else:
+            return (self._guilty(flight.chunk[0]),)
+        return ()
+
+    def _guilty(self, index: int) -> Record:
+        """The record of an episode that a worker died of."""
+        outcome = death(self._rig, time.monotonic() - self._since_s)
+        faults = fault_classes(self._rig.episode(self._seed, index))
+        return Record(index, faults, outcome.end, 0, outcome.findings, 0, "")
+
+
+def death(rig: Rig, took_s: float) -> Outcome:
+    """What became of an episode that a worker died of after so long: one past the limit was ended for that."""
+    if took_s > rig.limit_s:
+        return odd(HANG, Finding(ENDS, 0, no_end(rig)))
+    return odd(CRASH, Finding(SURVIVES, 0, "the process that ran it died"))

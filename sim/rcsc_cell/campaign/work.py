@@ -1,0 +1,208 @@
+"""What workers do: play episodes, within a limit of time, and say what became of them; shrink one; keep its log.
+
+In: a rig and numbers, which travel. Out: records and episodes, which travel back. An episode that raises, or does not end, is
+a finding of its own; one that takes the worker with it is the runner's to notice.
+"""
+
+import contextlib
+import ctypes
+import faulthandler
+import os
+import signal
+import threading
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from types import FrameType
+
+from rcsc.host.children import scratch
+from rcsc.run.description import BadDescription
+from rcsc.run.executors import NotBuilt
+from rcsc_cell.campaign.journal import Record
+from rcsc_cell.campaign.rig import Rig, digest, mask
+from rcsc_cell.campaign.shrink import MOST_TRIES, shrink
+from rcsc_cell.database.build import BadData
+from rcsc_cell.episodes.episode import Episode, Finding, Outcome
+from rcsc_cell.episodes.part_faults import fault_classes
+
+CRASH, HANG, ERROR = "crash", "hang", "error"
+SURVIVES, ENDS, RAISES = "the process survives", "the run ends in time", "nothing is raised"
+"""Properties that only a campaign can look at."""
+
+TRIES = {SURVIVES: 60, ENDS: 12}
+"""How often a shrinking may try where each try is dear: it costs a process, or the whole limit."""
+
+
+class OtherTables(Exception):  # noqa: N818  # what happened, not an error of ours
+    """A worker has other tables, data or programs than the campaign."""
+
+
+class _OutOfTime(BaseException):
+    """Goes through every `except Exception` of what is run."""
+
+
+@dataclass(frozen=True, slots=True)
+class Shrunk:
+    """A counterexample.
+
+    Attributes:
+        log: Its log, whole; empty where none could be kept.
+    """
+
+    episode: Episode
+    found: Finding
+    log: bytes
+
+
+def play(rig: Rig, wanted: str, seed: int, indices: Sequence[int]) -> tuple[Record, ...]:
+    """Plays episodes of a campaign, one after the other.
+
+    Args:
+        rig: On what.
+        wanted: The digest that tables, data and programs must have here.
+        seed: The campaign's.
+        indices: Which of its episodes.
+
+    Raises:
+        OtherTables: They have not.
+        BadDescription, BadData, NotBuilt: The system is not in order here.
+    """
+    _same(rig, wanted)
+    return tuple(_record(rig, index, rig.episode(seed, index)) for index in indices)
+
+
+def _same(rig: Rig, wanted: str) -> None:
+    if digest(rig.system) != wanted:
+        raise OtherTables("a worker has other tables, data or programs than this campaign")
+
+
+def _record(rig: Rig, index: int, episode: Episode) -> Record:
+    outcome = attempt(rig, episode)
+    lines = mask(outcome.lines, rig.system)
+    return Record(
+        index, fault_classes(episode), outcome.end, outcome.ticks, outcome.findings, lines, outcome.digest
+    )
+
+
+def attempt(rig: Rig, episode: Episode, log: Path | None = None) -> Outcome:
+    """Runs an episode; what it raises, and that it does not end, are findings.
+
+    Raises:
+        BadDescription, BadData, NotBuilt: The system is not in order; that is no episode's doing.
+    """
+    try:
+        with within(rig.limit_s):
+            return rig.run(episode, rig.system, log)
+    except _OutOfTime:
+        return odd(HANG, Finding(ENDS, 0, no_end(rig)))
+    except (BadDescription, BadData, NotBuilt):
+        raise
+    except Exception as error:  # noqa: BLE001  # whatever it is, it is this episode's finding
+        kind = type(error).__name__
+        return odd(f"{ERROR}:{kind}", Finding(RAISES, 0, f"{kind}: {error}"[:300]))
+
+
+def no_end(rig: Rig) -> str:
+    """What is said of an episode that hangs: the same however it was ended."""
+    return f"no end within {rig.limit_s:g} s"
+
+
+def odd(end: str, finding: Finding) -> Outcome:
+    """What became of an episode that has no outcome of its own."""
+    return Outcome((), (finding,), end, 0, frozenset(), "")
+
+
+def shrunk(rig: Rig, wanted: str, seed: int, index: int, name: str) -> Shrunk:
+    """The counterexample that an episode of a campaign is for a property, as small as it gets, with its log.
+
+    Raises:
+        OtherTables: As `play`.
+    """
+    _same(rig, wanted)
+    fails = partial(fails_in, rig, name)
+    return logged(rig, shrink(rig.episode(seed, index), fails, TRIES.get(name, MOST_TRIES)), name)
+
+
+def fails_in(rig: Rig, name: str, episode: Episode) -> bool:
+    """Whether a property does not hold in an episode."""
+    return any(found.property == name for found in attempt(rig, episode).findings)
+
+
+def logged(rig: Rig, episode: Episode, name: str) -> Shrunk:
+    """The counterexample with its log, which is of what happened up to where it broke off."""
+    with scratch("campaign") as folder:
+        path = folder / "log.mcap"
+        outcome = attempt(rig, episode, path)
+        found = next((one for one in outcome.findings if one.property == name), Finding(name, 0, outcome.end))
+        return Shrunk(episode, found, path.read_bytes() if path.is_file() else b"")
+
+
+# --- the limit of time ---
+
+_OWN = threading.Event()
+"""Set in a process that is a campaign's worker and nothing else, which may be ended."""
+
+_GRACE = 2.0
+"""What does not react to being stopped within so many limits is ended with its process."""
+
+
+def own_process() -> None:
+    """Marks this process as a campaign's worker, which may be ended."""
+    _OWN.set()
+
+
+@contextlib.contextmanager
+def within(seconds: float) -> Iterator[None]:
+    """Stops what runs in it after so long; in a worker's own process also what does not react.
+
+    Raises:
+        _OutOfTime: It was stopped.
+    """
+    stop = (
+        _by_alarm(seconds) if threading.current_thread() is threading.main_thread() else _by_thread(seconds)
+    )
+    with contextlib.ExitStack() as stack:
+        if _OWN.is_set():
+            faulthandler.dump_traceback_later(
+                _GRACE * seconds, exit=True, file=stack.enter_context(open(os.devnull, "w"))
+            )
+            stack.callback(faulthandler.cancel_dump_traceback_later)
+        stack.enter_context(stop)
+        yield
+
+
+@contextlib.contextmanager
+def _by_alarm(seconds: float) -> Iterator[None]:
+    def ring(_: int, __: FrameType | None) -> None:
+        raise _OutOfTime
+
+    before = signal.signal(signal.SIGALRM, ring)
+    signal.setitimer(signal.ITIMER_REAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
+
+
+@contextlib.contextmanager
+def _by_thread(seconds: float) -> Iterator[None]:
+    """For threads, which get no signals: another one raises it in this one, at its next step of Python."""
+    lock, running = threading.Lock(), [True]
+    target = ctypes.c_ulong(threading.get_ident())
+
+    def ring() -> None:
+        with lock:
+            if running[0]:
+                ctypes.pythonapi.PyThreadState_SetAsyncExc(target, ctypes.py_object(_OutOfTime))
+
+    timer = threading.Timer(seconds, ring)
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        with lock:
+            running[0] = False
+        timer.cancel()

@@ -1,0 +1,137 @@
+"""Who plays: any standard executor, and how one that broke is made anew.
+
+In: processes here, or the address of a scheduler. Out: a `Crew`.
+"""
+
+import contextlib
+from collections.abc import Callable, Iterator
+from concurrent.futures import BrokenExecutor, Executor, Future
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
+
+from rcsc.host import children
+from rcsc.run.log.export import MissingPackage
+from rcsc_cell.campaign.work import own_process
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+_CONNECT_S = 10
+
+
+class WorkersGone(Exception):  # noqa: N818  # what happened, not an error of ours
+    """Nobody is left to play, or nobody was found; what is done is kept."""
+
+
+class Crashed(Exception):  # noqa: N818  # likewise
+    """A worker died of the one task that it had."""
+
+
+@dataclass(slots=True)
+class Crew:
+    """An executor and what a campaign must know of it.
+
+    Attributes:
+        executor: Any; only `submit` is used.
+        workers: How many tasks it does at once.
+        deaths: What a future raises when a worker died.
+        renew: Makes another executor, where one that lost a worker is of no more use.
+    """
+
+    executor: Executor
+    workers: int = 1
+    deaths: tuple[type[BaseException], ...] = (BrokenExecutor,)
+    renew: Callable[[], Executor] | None = None
+
+    def submit(self, task: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> Future[R]:
+        """A task, for any worker.
+
+        Raises:
+            WorkersGone: The executor takes none, and cannot be made anew.
+        """
+        try:
+            return self.executor.submit(task, *args, **kwargs)
+        except BrokenExecutor as error:
+            self.survive(error, self.executor)
+            return self.executor.submit(task, *args, **kwargs)
+
+    def survive(self, death: BaseException, executor: Executor) -> None:
+        """After a worker's death: goes on with another executor, where this one is broken and still in use.
+
+        Raises:
+            WorkersGone: There is no other.
+        """
+        if not isinstance(death, BrokenExecutor) or executor is not self.executor:
+            return
+        if self.renew is None:
+            raise WorkersGone("a worker died, and took the executor with it") from death
+        self.executor.shutdown(wait=False)
+        self.executor = self.renew()
+
+    def call(self, task: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
+        """A task while nothing else is under way: if a worker dies, it dies of that.
+
+        Raises:
+            Crashed: It did.
+            WorkersGone: And nobody is left.
+        """
+        future = self.submit(task, *args, **kwargs)
+        executor = self.executor
+        try:
+            return future.result()
+        except self.deaths as death:
+            self.survive(death, executor)
+            raise Crashed from death
+
+
+@contextlib.contextmanager
+def processes(workers: int) -> Iterator[Crew]:
+    """Processes on this machine, which begin anew rather than as copies: what this process holds open stays its own.
+
+    When it ends early, by an error or an interrupt, so do they.
+    """
+
+    def made() -> Executor:
+        return children.executor(workers, own_process)
+
+    crew = Crew(made(), workers, renew=made)
+    try:
+        yield crew
+    except BaseException:
+        children.kill(crew.executor)
+        raise
+    finally:
+        crew.executor.shutdown(cancel_futures=True)
+
+
+@contextlib.contextmanager
+def cluster(address: str) -> Iterator[Crew]:
+    """The workers of a `dask.distributed` scheduler.
+
+    Raises:
+        MissingPackage: distributed is not installed.
+        WorkersGone: No scheduler answers there.
+    """
+    try:
+        from distributed import Client
+    except ImportError as error:
+        raise MissingPackage("distributed", "cluster") from error
+    try:
+        client = Client(address, timeout=_CONNECT_S, set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise WorkersGone(f"no scheduler answers at {address}") from error
+    with client:
+        yield crew_of(client)
+
+
+def crew_of(client: "Client") -> Crew:
+    """The workers that a client sees now."""
+    from distributed.scheduler import KilledWorker
+
+    threads: dict[str, Any] = client.nthreads()
+    return Crew(
+        client.get_executor(pure=False), max(1, sum(threads.values())), (BrokenExecutor, KilledWorker)
+    )

@@ -1,0 +1,286 @@
+"""The plant below the levels: controllers of robot, hand, camera and vise, over a mechanism that is physics or kinematics.
+
+The controllers are the same for both, so that what a mechanism does is all that can differ. Buffers in: orders of PRIMITIVE, the
+gripper's level, vision and the workstation. Buffers out: what robot, hand, camera and vise report.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from math import atan2, cos, nan, pi, sin
+from typing import Any, Literal, Protocol, get_type_hints
+
+import numpy as np
+
+from rcsc.host.files.plain import alike, plain, read
+from rcsc.run.signature import Value, Values
+from rcsc_cell.cell.arm import Joints, plate
+from rcsc_cell.cell.faults import Faults
+from rcsc_cell.cell.fixture import MachineController, ViseController
+from rcsc_cell.cell.robot import FOLLOW, Robot
+from rcsc_cell.database.ask import Database
+from rcsc_cell.database.pose import Pose, nine
+from rcsc_cell.vision.flood import Features, Found
+from rcsc_cell.vision.line import Surface
+from rcsc_cell.workstation.orders import MACHINE_ORDER, MACHINE_REPORT, VISE_ORDER, VISE_REPORT
+
+CYCLE_S = 0.04
+EMPTY_MM = 95.0
+"""Between the pads at first."""
+JAWS_MM = 20.0
+"""How far the jaws are open at first."""
+PICTURE_TICKS = 3
+"""From the flash to what the image processing says."""
+DARK, FLOOD, LINE = 0, 1, 2
+WIDE_MM = 120.0
+FLAT_COS = cos(10.0 * pi / 180.0)
+"""A surface that leans by more does not lie flat."""
+RANGE_MM, ASIDE_MM = 2000.0, 500.0
+"""The declared ranges of what vision says, in tables/vocabulary.rcs."""
+WEAK_MM = 6.0
+"""How far from what it closes on a weak jaw stops."""
+NO_PICTURE: tuple[Value, ...] = (False, 0.0, 0.0, 1.0, 0.0, 0.0, False)
+
+CONTROLLERS = ("robot", "vise", "machine", "_grip", "_asked", "_picture", "_developing")
+"""What a plant remembers from one cycle to the next, beside its mechanism."""
+
+Latest = Callable[[str], Values | None]
+
+
+@dataclass(frozen=True, slots=True)
+class _Words:
+    state: int
+    inc: int
+
+
+@dataclass(frozen=True, slots=True)
+class Noise:
+    """A generator of noise, as numpy says it."""
+
+    bit_generator: Literal["PCG64"]
+    state: _Words
+    has_uint32: Literal[0, 1]
+    uinteger: int
+
+
+def noise_of(rng: np.random.Generator) -> Noise:
+    """The generator's state."""
+    made: Noise = read(Noise, dict(rng.bit_generator.state))
+    return made
+
+
+def put_noise(rng: np.random.Generator, noise: Noise) -> None:
+    """Puts a generator into a state.
+
+    Raises:
+        ValueError: It has none such.
+    """
+    try:
+        rng.bit_generator.state = plain(noise)
+    except OverflowError as error:
+        raise ValueError("the state is of no noise") from error
+
+
+@dataclass(frozen=True, slots=True)
+class Grip:
+    """What the fingers are to do: toward an opening, with at most a force; `drive` is false where they are to stay."""
+
+    drive: bool
+    opening_mm: float
+    force_n: float
+    speed_mm_s: float
+
+
+REST = Grip(False, 0.0, 0.0, 0.0)
+DROP = Grip(True, WIDE_MM, 400.0, 300.0)
+
+
+class Mechanism(Protocol):
+    """What moves."""
+
+    faults: Faults
+
+    def reset(self) -> None:
+        """Everything as at first, what faults changed too."""
+        ...
+
+    def joints(self) -> Joints:
+        """The joints as they are, in radians."""
+        ...
+
+    def hand(self) -> tuple[float, float]:
+        """Between the pads, in mm; the force on them, in N."""
+        ...
+
+    def jaws(self) -> tuple[float, float]:
+        """The vise's right and left jaw, in mm from where they touch a part."""
+        ...
+
+    def advance(self, goal: Joints, grip: Grip, jaws_mm: tuple[float, float]) -> None:
+        """One cycle: the joints go to the goal in equal steps, fingers and jaws to their own."""
+        ...
+
+    def flood(self, wanted: Features, expected_mm: float) -> Found | None:
+        """A flood picture, looked at for a part; None where none matches."""
+        ...
+
+    def lines(self, expected_mm: float) -> Surface | None:
+        """A picture with two lines, looked at for a part; None where the lines do not fall on a surface."""
+        ...
+
+    def parts(self) -> tuple[Pose, ...]:
+        """Where the parts are in truth: for those who judge a run, never for those who control it."""
+        ...
+
+    def state(self) -> dict[str, Any]:
+        """All that the next cycle hangs on, in plain values."""
+        ...
+
+    def restore(self, said: Mapping[str, Any]) -> None:
+        """Takes a state of the same cell; ValueError where it is of another."""
+        ...
+
+    def touching(self) -> frozenset[tuple[str, str]]:
+        """What touched what in the last cycle, by the names of the things, in order: for those who judge."""
+        ...
+
+
+@dataclass(slots=True)
+class Plant:
+    """Controllers over a mechanism; stands outside the levels.
+
+    Attributes:
+        objects: What each part is, by its number in the tables.
+    """
+
+    database: Database
+    mechanism: Mechanism
+    robot: Robot
+    objects: tuple[int, ...]
+    vise: ViseController = field(default_factory=ViseController)
+    machine: MachineController = field(default_factory=MachineController)
+    _grip: Grip = REST
+    _asked: tuple[int, int] = (0, 0)
+    _picture: tuple[Value, ...] = (0, *NO_PICTURE)
+    _developing: tuple[Value, ...] = (0, *NO_PICTURE)
+
+    @property
+    def faults(self) -> Faults:
+        """What goes wrong."""
+        return self.mechanism.faults
+
+    def step(self, tick: int, latest: Latest) -> Mapping[str, Values]:
+        """One cycle of everything."""
+        self._command(latest("primitive.to_robot"))
+        right, left = self.mechanism.jaws()
+        to_right, to_left, vise = self.vise.step(latest(VISE_ORDER), right, left)
+        machine = self.machine.step(latest(MACHINE_ORDER), right, left)
+        grip = self._grasp(latest("gripper.to_hand"))
+        self.mechanism.advance(self.robot.joints, grip, (self._pressed(right, to_right), to_left))
+        self._look(tick, latest("vision.to_camera"))
+        opening_mm, force_n = self.mechanism.hand()
+        fixture = {} if self.faults.vise_mute else {VISE_REPORT: vise, MACHINE_REPORT: machine}
+        return {
+            "robot.report": self.robot.report(self._measured()),
+            "hand.report": (opening_mm, self._grip.force_n if self.faults.jammed else force_n),
+            "camera.picture": self._picture,
+        } | fixture
+
+    @property
+    def plate(self) -> tuple[float, ...]:
+        """The nine numbers of where the wrist plate is in truth."""
+        return nine(plate(self.mechanism.joints()))
+
+    # --- put back after a stop ---
+
+    def state(self) -> dict[str, Any]:
+        """Controllers and mechanism in plain values; faults are none of it."""
+        return {name: plain(getattr(self, name)) for name in CONTROLLERS} | {
+            "mechanism": self.mechanism.state()
+        }
+
+    def restore(self, said: Mapping[str, Any]) -> None:
+        """Takes a state of the same cell.
+
+        Raises:
+            ValueError: It is of another, or of none.
+        """
+        if set(said) != {*CONTROLLERS, "mechanism"}:
+            raise ValueError("not the state of a plant")
+        hints = get_type_hints(Plant)
+        held = {name: read(hints[name], said[name]) for name in CONTROLLERS}
+        strange = [name for name, one in held.items() if not alike(getattr(self, name), one)]
+        if strange:
+            raise ValueError(f"not the state of the plant's `{strange[0]}`")
+        self.mechanism.restore(said["mechanism"])
+        for name, value in held.items():
+            setattr(self, name, value)
+
+    # --- robot and hand ---
+
+    def _measured(self) -> Joints:
+        joints = self.mechanism.joints()
+        return (nan, *joints[1:]) if self.faults.unreadable else joints
+
+    def _command(self, order: Values | None) -> None:
+        if order is not None and self.faults.robot_refuses and int(order[1]) == FOLLOW:
+            self.robot.refuse(int(order[0]), FOLLOW, self.mechanism.joints())
+        else:
+            self.robot.order(order, self._measured())
+
+    def _grasp(self, order: Values | None) -> Grip:
+        if order is not None:
+            drive, opening, force, speed = order
+            self._grip = Grip(bool(drive), float(opening), float(force), float(speed))
+        return DROP if self.faults.drops else self._grip
+
+    # --- vise ---
+
+    def _pressed(self, right_mm: float, wanted_mm: float) -> float:
+        """Where the right jaw is sent: a weak one goes no farther in than `WEAK_MM`, and is not pushed out by that."""
+        return max(wanted_mm, min(right_mm, WEAK_MM)) if self.faults.vise_weak else wanted_mm
+
+    # --- camera ---
+
+    def _look(self, tick: int, order: Values | None) -> None:
+        """A flash is seen at once; what it shows is said some cycles later."""
+        if order is not None and int(order[0]) != self._asked[0]:
+            self._asked = (int(order[0]), tick)
+            self._developing = (int(order[0]), *self._shot(int(order[1]), int(order[2])))
+        ready = tick - self._asked[1] >= PICTURE_TICKS + self.faults.late_ticks
+        if ready and not self.faults.dark:
+            self._picture = self._developing
+
+    def _shot(self, fire: int, wanted: int) -> tuple[Value, ...]:
+        """matched, x, y, cosine and sine of the turn, range, flat."""
+        expected_mm = float(self.database.part(wanted)[1])
+        if self.faults.blind or fire == DARK or expected_mm <= 0.0:
+            return NO_PICTURE
+        if fire == FLOOD:
+            found = self._found(wanted, expected_mm)
+            return NO_PICTURE if found is None else (True, *self._in_hand(found), False)
+        surface = self.mechanism.lines(expected_mm)
+        if surface is None:
+            return NO_PICTURE
+        flat = surface.normal[2] >= FLAT_COS and not self.faults.tilted
+        return (True, 0.0, 0.0, 1.0, 0.0, min(RANGE_MM, surface.range_mm), flat)
+
+    def _found(self, wanted: int, expected_mm: float) -> Found | None:
+        """Where the camera sees the part; None where it sees none, or where none can be looked for."""
+        size = self.database.sizes.get(wanted)
+        if size is None or min(size) <= 0.0:
+            return None
+        return self.mechanism.flood(Features(size[0], size[1]), expected_mm)
+
+    def _in_hand(self, found: Found) -> tuple[float, float, float, float, float]:
+        """From camera coordinates to the hand's: along the plate's x, to the left of it, and a turn about the vertical.
+
+        By that turn the plate's x comes to lie along the part's long side. The camera's picture has the plate's y to the right and
+        its x up, and the hand looks down: its left is the picture's left.
+        """
+        camera_x, camera_y, _ = self.database.hand.camera_mm
+        x = camera_x + found.y_mm + self.faults.shifted_mm
+        y = -(camera_y + found.x_mm)
+        turn = atan2(-cos(found.roll_rad), sin(found.roll_rad))
+        turn -= pi * round(turn / pi)
+        far = max(-ASIDE_MM, min(ASIDE_MM, x)), max(-ASIDE_MM, min(ASIDE_MM, y))
+        return (*far, cos(turn), sin(turn), min(RANGE_MM, found.range_mm))

@@ -1,0 +1,113 @@
+"""Whether the arm can go where the database says: every point, and the straight lines between those that follow one another.
+
+In: a database. Out: what is wrong, by point; nothing where all is well.
+"""
+
+import hashlib
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+from pathlib import Path
+
+from rcsc.host.cache import Cache
+from rcsc_cell.cell.arm import Joints, solve
+from rcsc_cell.database.ask import Database
+from rcsc_cell.database.build import BadData
+from rcsc_cell.database.pose import pose_of
+
+STEP_MM = 10.0
+"""Lines are looked at so often."""
+JUMP_RAD = 0.35
+"""A joint that would turn farther from one step to the next is turning over."""
+HOME: Joints = (0.6, 1.03, -3.23, 0.0, -0.94, 0.26)
+"""An elbow up, a hand down: from where the home pose is looked for."""
+RULES = ("arm.py", "reach.py")
+"""The modules that say where the arm can be."""
+
+
+def home(database: Database) -> Joints | None:
+    """The joints at the home pose; None where the arm cannot be there."""
+    plate = pose_of([float(value) for value in database.home])
+    return None if plate is None else solve(plate, HOME)
+
+
+def unreachable(database: Database) -> tuple[str, ...]:
+    """Points that the arm cannot take, and paths on which it would have to turn over."""
+    start = home(database)
+    if start is None:
+        return ("the robot cannot be at its home",)
+    return tuple(_problems(database, start))
+
+
+def checked(database: Database, cache: Cache | None = None) -> None:
+    """Has the arm go everywhere in the database, before anything moves.
+
+    Args:
+        database: The cell.
+        cache: Where it is kept which databases have passed; the arm need not go anywhere in one of them. None for nowhere.
+
+    Raises:
+        BadData: It cannot be somewhere.
+    """
+    seen = _digest(database)
+    if cache is not None and cache.load("reach", seen) is not None:
+        return
+    problems = unreachable(database)
+    if problems:
+        raise BadData(problems)
+    if cache is not None:
+        cache.store({}, "reach", seen)
+
+
+def _digest(database: Database) -> str:
+    """Of all that the database says, and of the rules of reach, which stand outside what a cache knows to be its tool."""
+    hashed = hashlib.sha256(repr(database).encode())
+    for rules in RULES:
+        hashed.update(Path(__file__).with_name(rules).read_bytes())
+    return hashed.hexdigest()
+
+
+def _problems(database: Database, start: Joints) -> Iterator[str]:
+    names = {number: name for name, number in database.locations.items()}
+    stops: dict[str, list[tuple[float, ...]]] = {}
+    for location, sector, row in database.routes():
+        _, leaves, many, comes, more, hover, grasp, view = (int(value) for value in row)
+        where = f"location `{names[location]}`" + (f", sector {sector}" if sector else "")
+        approach = [_plate(database, comes + at) for at in range(more)]
+        departure = [_plate(database, leaves + at) for at in range(many)]
+        stops[where] = [approach[0], *departure[-1:]]
+        for what, path in (
+            ("approach and departure", [*approach, *departure]),
+            ("hover and grasp", [_plate(database, view), _plate(database, hover), _plate(database, grasp)]),
+        ):
+            if not _passes(path, start):
+                yield f"{where}: the arm cannot go along its {what}"
+    for a, first in stops.items():
+        for b, second in stops.items():
+            if a != b and not _passes([first[-1], second[0]], start):
+                yield f"the arm cannot go from {a} to {b}"
+
+
+def _plate(database: Database, point: int) -> tuple[float, ...]:
+    return tuple(float(value) for value in database.point(point)[1:10])
+
+
+def _passes(path: Sequence[tuple[float, ...]], start: Joints) -> bool:
+    """Whether the arm follows the lines without turning over."""
+    joints = _at(path[0], start)
+    for a, b in pairwise(path):
+        far = max(abs(x - y) for x, y in zip(a, b, strict=True))
+        steps = max(1, round(far / STEP_MM))
+        for at in range(1, steps + 1):
+            if joints is None:
+                return False
+            share = at / steps
+            after = _at([x + (y - x) * share for x, y in zip(a, b, strict=True)], joints)
+            if after is None or max(abs(x - y) for x, y in zip(joints, after, strict=True)) > JUMP_RAD:
+                return False
+            joints = after
+    return joints is not None
+
+
+def _at(numbers: Sequence[float], near: Joints) -> Joints | None:
+    plate = pose_of(numbers)
+    return None if plate is None else solve(plate, near)

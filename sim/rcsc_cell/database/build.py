@@ -1,0 +1,533 @@
+"""From the data file to the database; every reference resolves and every pose is within reach, or nothing is made.
+
+In: `cell.toml`, and the names of parts as the tables have them. Out: a SQLite file, or what is wrong.
+"""
+
+import hashlib
+import json
+import sqlite3
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from math import hypot
+from pathlib import Path
+from typing import Any, TypeAlias
+
+from rcsc.diagnostics.codes import Code
+from rcsc.diagnostics.diagnostic import Diagnostic
+from rcsc.diagnostics.source import Source
+from rcsc.host.described import (
+    BadFile,
+    Document,
+    Either,
+    Entries,
+    Flag,
+    KeyPath,
+    Kind,
+    Listing,
+    Number,
+    Record,
+    Text,
+    nearest,
+    read_document,
+)
+from rcsc.host.files import written_whole
+from rcsc.host.files.read import content
+from rcsc_cell.database.pose import DOWN, Pose, Rotation, about_y, about_z, nine, product
+
+SCHEMA = """
+create table meta (digest text not null);
+create table objects (number integer primary key, name text unique not null, length_mm size real not null, width_mm size real not null,
+  height_mm size real not null, stock integer not null,
+  expected_range_mm size real not null, grip_range_mm size real not null, lift_mm real not null);
+create table grasps (object integer not null references objects, grasp integer not null, approach_mm size real not null,
+  departure_mm size real not null, grip_mm size real not null, tolerance_mm size real not null,
+  force_n force real not null, speed_mm_s room real not null,
+  primary key (object, grasp));
+create table locations (number integer primary key, name text unique not null, vision integer not null, buffer integer not null,
+  vupos integer references locations, safe integer references locations);
+create table trajectories (name text primary key not null, speed_mm_s room real not null,
+  accel_mm_s2 rate real not null, breakpoint_mm size real not null);
+create table points (number integer primary key, location integer not null references locations, sector integer not null,
+  role text not null,
+  x0 real not null, y0 real not null, z0 real not null,
+  x1 real not null, y1 real not null, z1 real not null,
+  x2 real not null, y2 real not null, z2 real not null,
+  trajectory text not null references trajectories);
+create table stations (name text primary key not null, x_mm real not null, y_mm real not null, z_mm real not null, yaw_deg real not null,
+  length_mm room real not null, width_mm room real not null, vise text, vblock text);
+create table places (location integer not null references locations, sector integer not null, depart_first integer not null,
+  depart_count integer not null, approach_first integer not null, approach_count integer not null, hover integer not null,
+  grasp integer not null, view integer not null, primary key (location, sector));
+create table robot (
+  x0 real not null, y0 real not null, z0 real not null,
+  x1 real not null, y1 real not null, z1 real not null,
+  x2 real not null, y2 real not null, z2 real not null,
+  tool_mm size real not null, pad_mm size real not null,
+  camera_x_mm real not null, camera_y_mm real not null, camera_z_mm real not null);
+create table parts (object integer not null references objects, x_mm real not null, y_mm real not null, z_mm real not null,
+  yaw_deg real not null);
+"""
+"""Each type's last word is SQLite's, all of it a key of `COLUMNS`."""
+HOVER_MM = 100.0
+"""How far above a part the robot turns its hand before it goes down."""
+DEPTH_MM, CLEARANCE_MM = 12.0, 4.0
+"""From the top of a part to the middle of the pads, if the pads then stay so far above what it lies on: vision errs by 2 mm."""
+
+
+class BadData(BadFile):
+    """The data says something that cannot be; `problems` has every such thing."""
+
+    def __init__(
+        self,
+        problems: Sequence[str] = (),
+        found: Sequence[Diagnostic] = (),
+        sources: Mapping[str, Source] | None = None,
+    ) -> None:
+        self.problems = tuple(problems) or tuple(one.message for one in found)
+        super().__init__("; ".join(problems), found, sources)
+
+
+LENGTH, SIZE, ROOM = Number(-10_000, 10_000), Number(0, 10_000), Number(0.001, 10_000)
+ANGLE, FORCE, RATE = Number(-360, 360), Number(0, 100_000), Number(0.001, 1_000_000)
+POSE = Record({"x": LENGTH, "y": LENGTH, "z": LENGTH, "yaw": ANGLE}, {"tilt": ANGLE})
+ON_STATION = Record({"x": LENGTH, "y": LENGTH, "yaw": ANGLE}, {"z": LENGTH})
+MOTION: Mapping[str, Kind] = {"speed_mm_s": ROOM, "accel_mm_s2": RATE, "breakpoint_mm": SIZE}
+GRASP: Mapping[str, Kind] = {
+    "approach_mm": SIZE, "departure_mm": SIZE, "grip_mm": SIZE, "tolerance_mm": SIZE, "force_n": FORCE,
+    "speed_mm_s": ROOM,
+}  # fmt: skip
+VISE: Mapping[str, Kind] = {
+    "bed_mm": Listing(ROOM, 3, 3), "between_mm": ROOM, "open_mm": SIZE, "beyond_mm": SIZE, "left_n": FORCE,
+    "right_n": FORCE,
+}  # fmt: skip
+VBLOCK: Mapping[str, Kind] = {"wall_mm": ROOM, "width_mm": ROOM, "bottom_mm": SIZE}
+WAY = Listing(Either((LENGTH, Listing(LENGTH, 3, 3), Text())))
+ROBOT = Record(
+    {
+        "reach_mm": Listing(SIZE, 2, 2),
+        "height_mm": Listing(LENGTH, 2, 2),
+        "home": POSE,
+        "tool_mm": SIZE,
+        "pad_mm": SIZE,
+        "hold_mm": SIZE,
+        "camera_mm": Listing(LENGTH, 3, 3),
+    }
+)
+OBJECT = Record(
+    {"size_mm": Listing(SIZE, 3, 3)}, {"stock": Number(0, 99, whole=True), "grasp": Entries(Record(GRASP))}
+)
+STATION = Record(
+    {"at": POSE, "size_mm": Listing(ROOM, 2, 2)}, {"vise": Record(VISE), "vblock": Record(VBLOCK)}
+)
+LOCATION = Record(
+    {"at": POSE},
+    {
+        "station": Text(),
+        "via": WAY,
+        "approach": WAY,
+        "departure": WAY,
+        "vision": Flag(),
+        "buffer": Flag(),
+        "vupos": Text(),
+        "safe": Text(),
+        "sectors": Listing(Listing(LENGTH, 2, 2), least=1, most=10_000),
+        "trajectory": Text(),
+    },
+)
+CELL = Record(
+    {
+        "robot": ROBOT,
+        "trajectory": Entries(Record(MOTION), least=1),
+        "object": Entries(OBJECT, least=1),
+        "location": Entries(LOCATION, least=1),
+    },
+    {
+        "station": Entries(STATION),
+        "part": Listing(Record({"object": Text(), "at": ON_STATION}, {"station": Text()})),
+    },
+)
+"""What a data file may say: lengths in mm, angles in degrees, forces in N, speeds in mm/s."""
+COLUMNS: Mapping[str, Kind] = {
+    "integer": Number(0, 1_000_000, whole=True), "real": Number(), "size real": Number(0, 1_000_000), "room real": ROOM,
+    "force real": FORCE, "rate real": RATE, "text": Text(),
+}  # fmt: skip
+"""What a column of the database may hold, by its type."""
+
+
+@dataclass(frozen=True, slots=True)
+class Limit:
+    """A leaf that an answer of the database fills, and what it may hold."""
+
+    leaf: str
+    low: float
+    high: float
+
+
+Limits: TypeAlias = Mapping[str, Sequence[Sequence[Limit | None]]]
+"""By question: for each level that asks it, the limit of each value of the answer."""
+
+
+@dataclass(frozen=True, slots=True)
+class At:
+    """What a fault is of, in words, and where that stands in the file."""
+
+    words: str
+    path: KeyPath
+
+    def __str__(self) -> str:
+        return self.words
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where a thing of the data is: axes that stand on a station, or on the floor under the robot.
+
+    Attributes:
+        frame: The station's axes.
+        hand: The pads' axes, seen from the base.
+    """
+
+    frame: Pose
+    hand: Pose
+
+    def moved(self, x_mm: float, y_mm: float, z_mm: float) -> "Place":
+        """The same, beside or above, along the station's axes."""
+        to = self.frame.point((x_mm, y_mm, z_mm))
+        by = [a - b for a, b in zip(to, self.frame.at_mm, strict=True)]
+        at = self.hand.at_mm
+        return Place(self.frame, Pose(self.hand.turn, (at[0] + by[0], at[1] + by[1], at[2] + by[2])))
+
+    def plate(self, tool_mm: float) -> Pose:
+        """The wrist plate of a hand that is there."""
+        return self.hand @ Pose(UPRIGHT, (0.0, 0.0, -tool_mm))
+
+
+UPRIGHT: Rotation = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+FLOOR = Pose(UPRIGHT, (0.0, 0.0, 0.0))
+
+
+def read_data(path: Path) -> Document:
+    """The data file, of which nothing but single values and keys has been checked.
+
+    Raises:
+        BadData: It cannot be read, or holds what no data file may; everything that is wrong with it is told.
+    """
+    document = read_document(path, Code.BAD_DATA, BadData)
+    document.check(CELL)
+    if document.faults:
+        raise document.bad(BadData)
+    return document
+
+
+def digest(data: Path, objects: Sequence[str], limits: Limits) -> str:
+    """What a database must have been made of to be fresh: the data, the tables' names and limits, and this module's rules."""
+    hashed = hashlib.sha256(content(Path(__file__)) + "\0".join(objects).encode())
+    hashed.update(repr(sorted(limits.items())).encode())
+    hashed.update(content(data))
+    return hashed.hexdigest()
+
+
+def build(data: Path, database: Path, objects: Sequence[str], limits: Limits | None = None) -> None:
+    """Makes the database anew.
+
+    Args:
+        data: The data file.
+        database: The file to be written; it is replaced only when everything is right.
+        objects: Names of parts in the tables, in their order.
+        limits: What the levels can hold of each answer.
+
+    Raises:
+        BadData: Something is wrong with the data; nothing is written.
+        OSError: The file cannot be written.
+    """
+    rows = _Rows(read_data(data), objects, limits or {})
+    if rows.document.faults:
+        raise rows.document.bad(BadData)
+    database.parent.mkdir(parents=True, exist_ok=True)
+    with written_whole(database) as beside:  # several processes may find it stale at once
+        _fill(beside, rows, data, digest(data, objects, limits or {}))
+
+
+def _fill(database: Path, rows: "_Rows", data: Path, made_of: str) -> None:
+    made = sqlite3.connect(database)
+    try:
+        made.execute("pragma journal_mode = off")  # it is another's only when it is whole
+        made.executescript("pragma foreign_keys = on;" + SCHEMA)
+        made.execute("begin")
+        made.execute("pragma defer_foreign_keys = on")  # locations name one another
+        for table, lines in rows.tables.items():
+            for line in lines:
+                made.execute(f"insert into {table} values ({', '.join('?' * len(line))})", line)  # noqa: S608  # our own table names
+        made.execute("insert into meta values (?)", (made_of,))
+        made.commit()
+    except sqlite3.Error as error:
+        raise BadData((f"{data}: {error}; the database that was there is kept",)) from error
+    finally:
+        made.close()
+
+
+class _Rows:
+    """The rows of every table, and everything that is wrong with them."""
+
+    def __init__(self, document: Document, objects: Sequence[str], limits: Limits) -> None:
+        said = document.value
+        self.document, self.said, self.objects, self.limits = document, said, objects, limits
+        self._ranges()
+        self.numbers = {name: at for at, name in enumerate(said["location"], 1)}
+        self.tool_mm = float(said["robot"]["tool_mm"])
+        self.points: list[tuple[Any, ...]] = []
+        self.tables: dict[str, list[tuple[Any, ...]]] = {
+            "objects": list(self._objects()),
+            "grasps": list(self._grasps()),
+            "locations": list(self._locations()),
+            "stations": list(self._stations()),
+            "trajectories": list(self._trajectories()),
+        }
+        places = list(self._places())
+        self.tables |= {"points": self.points, "places": places, "parts": list(self._parts())}
+        robot = said["robot"]
+        at = At("home", ("robot", "home"))
+        home = self._place(robot["home"], None, at).plate(self.tool_mm)
+        self._reached(home, at, "hand")
+        camera = [float(value) for value in robot["camera_mm"]]
+        self.tables["robot"] = [(*nine(home), self.tool_mm, float(robot["pad_mm"]), *camera)]
+
+    def wrong(self, where: At, what: str, *helps: str) -> None:
+        """Notes a problem."""
+        self.document.wrong(where.path, f"{where}: {what}", *helps)
+
+    def _ranges(self) -> None:
+        for key in ("reach_mm", "height_mm"):
+            low, high = self.said["robot"][key]
+            if low > high:
+                self.wrong(At("robot", ("robot", key)), f"`{key}` goes from {low:g} to {high:g}")
+
+    def _within(self, question: str, values: Sequence[Any], where: At, keys: Sequence[str] = ()) -> None:
+        """Every level that asks can hold every value of the answer, of which None is looked at elsewhere.
+
+        Args:
+            question: What is asked.
+            values: The answer, without the first value, which says whether there is one.
+            where: What the answer is of.
+            keys: Of each value, from the last, in the file.
+        """
+        for limits in self.limits.get(question, ()):
+            for at, (limit, value) in enumerate(zip(limits[1:], values, strict=False)):
+                if limit is None or value is None or limit.low <= value <= limit.high:
+                    continue
+                key = keys[at - len(values)] if len(values) - at <= len(keys) else ""
+                place = At(where.words, (*where.path, key)) if key else where
+                holds = f"{limit.low:.12g} .. {limit.high:.12g}"
+                self.wrong(place, f"`{limit.leaf}` would be {value:.12g}, and holds {holds}")
+
+    # --- parts ---
+
+    def _object(self, name: str, where: At) -> int:
+        if name in self.objects:
+            return self.objects.index(name)
+        self.wrong(where, f"no part is called `{name}` in the tables", *nearest(name, self.objects))
+        return 0
+
+    def _objects(self) -> Iterator[tuple[Any, ...]]:
+        camera_mm, pads_mm = self._view()
+        for name, one in self.said["object"].items():
+            length, width, height = map(float, one["size_mm"])
+            where = At(f"object `{name}`", ("object", name))
+            stock = int(one.get("stock", 0))
+            expected = max(0.0, camera_mm - height)
+            depth = depth_mm(height, float(self.said["robot"]["pad_mm"]))
+            grip = max(0.0, camera_mm - pads_mm - depth)
+            lift = height - depth - float(self.said["robot"]["hold_mm"]) if height > 0 else 0.0
+            self._within("part", (expected, grip, lift), where)
+            yield self._object(name, where), name, length, width, height, stock, expected, grip, lift
+
+    def _view(self) -> tuple[float, float]:
+        """How far the camera is above the station where vision looks, and how far the pads are when they take the part there."""
+        for one in self.said["location"].values():
+            looks = self.said["location"].get(one.get("vupos", ""))
+            if one.get("vision") and looks is not None:
+                camera_z = self.tool_mm - float(self.said["robot"]["camera_mm"][2])
+                return float(looks["at"]["z"]) + camera_z, float(one["at"]["z"])
+        return 0.0, 0.0
+
+    def _grasps(self) -> Iterator[tuple[Any, ...]]:
+        for name, one in self.said["object"].items():
+            for grasp, how in one.get("grasp", {}).items():
+                where = At(f"object `{name}`, grasp {grasp}", ("object", name, "grasp", grasp))
+                row = [float(how[key]) for key in GRASP]
+                self._within("fingers", row, where, tuple(GRASP))
+                if not row[2] <= row[0] or not row[2] <= row[1]:
+                    self.wrong(where, "the fingers do not open wider than the part")
+                if grasp not in GRASPS:
+                    self.wrong(where, "a grasp is numbered 0 .. 9")
+                    continue
+                yield self._object(name, where), int(grasp), *row
+
+    def _parts(self) -> Iterator[tuple[Any, ...]]:
+        for number, one in enumerate(self.said.get("part", ())):
+            where = At(f"part `{one['object']}`", ("part", number))
+            frame, at = self._frame(one.get("station"), where), one["at"]
+            x, y, z = frame.point((float(at["x"]), float(at["y"]), float(at.get("z", 0.0))))
+            yield (
+                self._object(one["object"], where),
+                x,
+                y,
+                z,
+                float(at["yaw"]) + self._yaw(one.get("station")),
+            )
+
+    # --- places ---
+
+    def _locations(self) -> Iterator[tuple[Any, ...]]:
+        for name, one in self.said["location"].items():
+            where = At(f"location `{name}`", ("location", name))
+            links = ("vupos", "safe")
+            linked = [self._named(one.get(key), At(f"{where}, {key}", (*where.path, key))) for key in links]
+            flags = bool(one.get("vision")), bool(one.get("buffer"))
+            self._within("place", (*flags, *(to or 0 for to in linked)), where)
+            if one.get("vision") and linked[0] is None:
+                self.wrong(where, "vision needs a `vupos` to look from")
+            yield (
+                self.numbers[name],
+                name,
+                int(one.get("vision", False)),
+                int(one.get("buffer", False)),
+                *linked,
+            )
+
+    def _named(self, name: str | None, where: At) -> int | None:
+        if name is None:
+            return None
+        if name not in self.numbers:
+            self.wrong(where, f"no location is called `{name}`", *nearest(name, list(self.numbers)))
+        return self.numbers.get(name)
+
+    def _stations(self) -> Iterator[tuple[Any, ...]]:
+        for name, one in self.said.get("station", {}).items():
+            at, (length, width) = one["at"], map(float, one["size_mm"])
+            where = (float(at["x"]), float(at["y"]), float(at["z"]), float(at["yaw"]))
+            vise = _floats(one["vise"], VISE) if "vise" in one else None
+            vblock = _floats(one["vblock"], VBLOCK) if "vblock" in one else None
+            yield name, *where, length, width, vise, vblock
+
+    def _trajectories(self) -> Iterator[tuple[Any, ...]]:
+        for name, one in self.said["trajectory"].items():
+            row = [one[key] for key in MOTION]
+            where = At(f"trajectory `{name}`", ("trajectory", name))
+            self._within("point", (*[None] * 9, *row), where, tuple(MOTION))
+            yield name, *row
+
+    def _frame(self, station: str | None, where: At) -> Pose:
+        if station is None:
+            return FLOOR
+        if station not in self.said.get("station", {}):
+            names = list(self.said.get("station", {}))
+            self.wrong(where, f"no station is called `{station}`", *nearest(station, names))
+            return FLOOR
+        at = self.said["station"][station]["at"]
+        return Pose(about_z(float(at["yaw"])), (float(at["x"]), float(at["y"]), float(at["z"])))
+
+    def _yaw(self, station: str | None) -> float:
+        return (
+            float(self.said["station"][station]["at"]["yaw"])
+            if station in self.said.get("station", {})
+            else 0.0
+        )
+
+    def _place(self, at: Mapping[str, float], station: str | None, where: At) -> Place:
+        frame = self._frame(station, where)
+        turn = product(about_z(float(at["yaw"])), product(DOWN, about_y(float(at.get("tilt", 0.0)))))
+        return Place(frame, frame @ Pose(turn, (float(at["x"]), float(at["y"]), float(at["z"]))))
+
+    def _places(self) -> Iterator[tuple[Any, ...]]:
+        for name, one in self.said["location"].items():
+            where = At(f"location `{name}`", ("location", name))
+            reference = self._place(one["at"], one.get("station"), where)
+            for sector, (x_mm, y_mm) in enumerate(one.get("sectors", [[0.0, 0.0]])):
+                yield self._row(name, one, sector, reference.moved(float(x_mm), float(y_mm), 0.0))
+
+    def _row(self, name: str, one: Mapping[str, Any], sector: int, place: Place) -> tuple[Any, ...]:
+        key = self.numbers[name], sector
+        where = At(f"location `{name}`, sector {sector}", ("location", name))
+        fine = "fine" if one.get("via") or one.get("approach") else "fast"
+        through = one.get("trajectory", "fast")
+        out = one.get("departure", one.get("via", ())[::-1])
+        departs = [self._point(where, key, "departure", to, through) for to in self._path(place, out, where)]
+        into = one.get("approach", one.get("via", ()))
+        comes = [self._point(where, key, "approach", to, through) for to in self._path(place, into, where)]
+        comes.append(self._point(where, key, "arrival", place, fine))
+        hover = self._point(where, key, "hover", place.moved(0.0, 0.0, HOVER_MM), "fast")
+        grasp = self._point(where, key, "grasp", place, "fine")
+        view = self._point(where, key, "view", self._viewpoint(place, one, where), "fast")
+        ways = departs[0] if departs else 0, len(departs), comes[0], len(comes), hover, grasp, view
+        self._within("route", ways, where)
+        return *key, *ways
+
+    def _path(self, place: Place, said: Sequence[Any], where: At) -> list[Place]:
+        """What the robot comes or goes through: a height, an offset, or another location."""
+        return [self._through(place, one, where) for one in said]
+
+    def _through(self, place: Place, said: str | float | list[float], where: At) -> Place:
+        if isinstance(said, str):
+            other = self.said["location"].get(said)
+            if other is None:
+                self.wrong(where, f"no location is called `{said}`", *nearest(said, list(self.numbers)))
+                return place
+            return self._place(other["at"], other.get("station"), where)
+        if isinstance(said, list):
+            x_mm, y_mm, z_mm = map(float, said)
+            return place.moved(x_mm, y_mm, z_mm)
+        return place.moved(0.0, 0.0, float(said))
+
+    def _viewpoint(self, place: Place, one: Mapping[str, Any], where: At) -> Place:
+        """From where the camera, not the hand, would stand over the place: vision's second look is centred on the part."""
+        looks = self.said["location"].get(one.get("vupos", ""))
+        if not one.get("vision") or looks is None:
+            return place
+        from_ = self._place(looks["at"], looks.get("station"), where)
+        camera_x, camera_y, _ = map(float, self.said["robot"]["camera_mm"])
+        above = from_.hand.point((-camera_x, -camera_y, 0.0))
+        return Place(from_.frame, Pose(from_.hand.turn, above))
+
+    def _reached(self, plate: Pose, where: At, role: str) -> None:
+        robot = self.said["robot"]
+        x_mm, y_mm, z_mm = plate.at_mm
+        if not robot["reach_mm"][0] <= hypot(x_mm, y_mm) <= robot["reach_mm"][1]:
+            self.wrong(where, f"the {role} is {hypot(x_mm, y_mm):.0f} mm from the base, out of reach")
+        if not robot["height_mm"][0] <= z_mm <= robot["height_mm"][1]:
+            self.wrong(where, f"the {role} is {z_mm:.0f} mm high, out of reach")
+
+    def _point(self, where: At, key: tuple[int, int], role: str, place: Place, trajectory: str) -> int:
+        plate = place.plate(self.tool_mm)
+        self._reached(plate, where, role)
+        motions = self.said["trajectory"]
+        if trajectory in motions:
+            self._within("point", nine(plate), where)
+        else:
+            self.wrong(where, f"no trajectory is called `{trajectory}`", *nearest(trajectory, list(motions)))
+        number = len(self.points) + 1
+        self.points.append((number, *key, role, *nine(plate), trajectory))
+        return number
+
+
+def depth_mm(height_mm: float, pad_mm: float) -> float:
+    """From the top of a part to the middle of the pads that take it from above.
+
+    Args:
+        height_mm: Of the part.
+        pad_mm: From the middle of the pads to their lower edge.
+    """
+    return min(DEPTH_MM, height_mm - pad_mm - CLEARANCE_MM)
+
+
+GRASPS = frozenset("0123456789")
+
+
+def _floats(said: Mapping[str, Any], keys: Iterable[str]) -> str:
+    """The numbers of a fixture, as JSON."""
+    return json.dumps(
+        {
+            key: [float(x) for x in said[key]] if isinstance(said[key], list) else float(said[key])
+            for key in keys
+        }
+    )

@@ -1,0 +1,228 @@
+"""An episode: one run of the cell with everything that is odd about it, as a value; and what became of it.
+
+In: parts, a script, what goes wrong and when. Out: rows, findings, lines of tables, a digest. An episode travels as JSON, and gives
+the same outcome in every process and with both kinds of executors.
+"""
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, fields
+from itertools import chain
+from pathlib import Path
+from typing import Literal, get_args
+
+from rcsc.host.files.names import shown
+from rcsc.host.files.plain import plain, read
+from rcsc.host.files.read import json_of
+from rcsc.run.system import Kind
+from rcsc_cell.cell.faults import Faults
+from rcsc_cell.cell.ready import Backend
+from rcsc_cell.workstation.script import RowEnd
+
+SYSTEM = Path(__file__).parents[3] / "tables" / "system.toml"
+HARM = Literal["lost", "doubled", "stale", "delayed"]
+COLUMNS = "command,part,source,dest,end_at"
+
+FAULTS: Mapping[str, str] = {
+    **{one.name: "a switch of rcsc_cell.cell.faults" for one in fields(Faults)},
+    "lost": "a buffer: what is published in some cycles never arrives",
+    "doubled": "a buffer: each value is read in two cycles, and every other one never",
+    "stale": "a buffer: readers see one value for some cycles",
+    "delayed": "a buffer: values arrive some cycles late, in order",
+    "restarted": "a level: it loses its state, and goes on as a restarted process does",
+    "pushed": "parts: somebody pushes one that lies there; without physics only",
+    "missing part": "parts: what the script asks for is nowhere",
+    "wrong part": "parts: another lies where it should be",
+    "two parts": "parts: two of a kind lie there",
+    "odd size": "parts: a size that the database does not have",
+    "odd weight": "parts: a density or a friction that is not usual",
+    "changed command": "the script: another command comes before the last one has ended",
+}
+"""Fault classes, and how each is injected."""
+
+
+REACH: Mapping[str, tuple[float, float]] = {
+    "seed": (0, 2**64), "step_s": (0.0002, 0.04), "tick": (0, 1_000_000), "first_tick": (0, 1_000_000),
+    "last_tick": (-1, 2_000_000), "ticks": (0, 10_000), "part": (0, 1000), "value": (-1e6, 1e6), "x_mm": (-1e4, 1e4),
+    "y_mm": (-1e4, 1e4), "yaw_deg": (-1e4, 1e4), "size_mm": (0.1, 1000.0), "density_kg_m3": (1.0, 1e5), "friction": (0.0, 100.0),
+}  # fmt: skip
+"""Between what each number of an episode lies; what is drawn lies well within."""
+
+
+@dataclass(frozen=True, slots=True)
+class PartSpec:
+    """A part that lies on a station at first.
+
+    Attributes:
+        object: What it is in truth; a name of the database.
+        station: On which it lies; its place there is seen from the station.
+        size_mm: Length, width and height; empty for the database's.
+        friction: Against everything but the pads.
+    """
+
+    object: str
+    station: str = "buffer"
+    x_mm: float = 0.0
+    y_mm: float = 0.0
+    yaw_deg: float = 0.0
+    size_mm: tuple[float, ...] = ()
+    density_kg_m3: float = 2700.0
+    friction: float = 0.4
+
+
+@dataclass(frozen=True, slots=True)
+class FaultSpec:
+    """A switch of `rcsc_cell.cell.faults.Faults` in these ticks, the last included."""
+
+    name: str
+    first_tick: int
+    last_tick: int
+    value: float = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class TransportSpec:
+    """What happens to a buffer in these ticks; `ticks` is how late a delayed value comes."""
+
+    buffer: str
+    kind: HARM
+    first_tick: int
+    last_tick: int
+    ticks: int = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Restart:
+    """A level loses its state before it runs in this tick."""
+
+    tick: int
+    level: str
+
+
+@dataclass(frozen=True, slots=True)
+class Interruption:
+    """From this tick on TASK is given another command, whatever is under way; no interlock looks at it."""
+
+    tick: int
+    row: str
+
+
+@dataclass(frozen=True, slots=True)
+class Push:
+    """Somebody pushes a part that lies there, by its number in `parts`; seen from the base."""
+
+    tick: int
+    part: int
+    x_mm: float
+    y_mm: float
+
+
+@dataclass(frozen=True, slots=True)
+class Episode:
+    """One run.
+
+    Attributes:
+        rows: Of the script, each a line of CSV as in tables/scripts.
+        step_s: Of physics.
+    """
+
+    backend: Backend = "kinematic"
+    executor: Kind = "c"
+    seed: int = 0
+    parts: tuple[PartSpec, ...] = ()
+    rows: tuple[str, ...] = ()
+    faults: tuple[FaultSpec, ...] = ()
+    transport: tuple[TransportSpec, ...] = ()
+    restarts: tuple[Restart, ...] = ()
+    interruptions: tuple[Interruption, ...] = ()
+    step_s: float = 0.002
+    pushes: tuple[Push, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Refuses what no episode can be.
+
+        Raises:
+            ValueError: A backend, an executor, a fault or a harm that nobody knows; a number that is out of reach; a push with physics.
+        """
+        known = {one.name for one in fields(Faults)}
+        for said, words in (
+            (self.backend, get_args(Backend)),
+            (self.executor, get_args(Kind)),
+            *((fault.name, known) for fault in self.faults),
+            *((one.kind, get_args(HARM)) for one in self.transport),
+        ):
+            if said not in words:
+                raise ValueError(f"{shown(said)} is none of {', '.join(sorted(words))}")
+        for what, number in self._numbers():
+            low, high = REACH[what]
+            if not low <= number <= high:
+                raise ValueError(f"`{what}` is {number:g}, and lies between {low:g} and {high:g}")
+        if any(len(part.size_mm) not in (0, 3) for part in self.parts):
+            raise ValueError("a size is a length, a width and a height")
+        if self.pushes and self.backend != "kinematic":
+            raise ValueError("with physics nothing but a force moves a part")
+
+    def _numbers(self) -> Iterator[tuple[str, float]]:
+        """Every number in it, by the name of its field."""
+        yield from (("seed", self.seed), ("step_s", self.step_s))
+        lists: tuple[tuple[object, ...], ...] = (
+            self.parts,
+            self.faults,
+            self.transport,
+            self.restarts,
+            self.interruptions,
+            self.pushes,
+        )
+        for one in chain.from_iterable(lists):
+            for name in REACH:
+                value = getattr(one, name, ())
+                yield from ((name, number) for number in (value if isinstance(value, tuple) else (value,)))
+
+    def to_json(self) -> str:
+        """As text that `from_json` reads; the same text for the same episode."""
+        return json.dumps(asdict(self), indent=1) + "\n"
+
+    @classmethod
+    def from_json(cls, text: str) -> "Episode":
+        """An episode that `to_json` wrote.
+
+        Raises:
+            ValueError: The text is none.
+        """
+        said = json_of(text)
+        if not isinstance(said, dict):
+            raise ValueError("no episode: no table of names and values")  # noqa: TRY004  # what was read, not what was called
+        made: Episode = read(cls, {**plain(Episode()), **said})
+        return made
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """A property that did not hold, first in this tick."""
+
+    property: str
+    tick: int
+    said: str
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What became of an episode.
+
+    Attributes:
+        end: `done`; `failed:REASON`; `refused` by an interlock, or because the script cannot be read; `state-table error`; `hang`.
+        lines: Level, table and line that ran.
+        digest: Of every level's values in every cycle, as canonical bytes.
+    """
+
+    rows: tuple[RowEnd, ...]
+    findings: tuple[Finding, ...]
+    end: str
+    ticks: int
+    lines: frozenset[tuple[str, str, str]]
+    digest: str
+
+
+def script(rows: Sequence[str]) -> str:
+    """The rows as the text of a script, for `rcsc run`."""
+    return "\n".join((COLUMNS, *rows)) + "\n"

@@ -1,0 +1,236 @@
+"""Episodes by seed, for campaigns: no Hypothesis, leaning on edges.
+
+In: a seed. Out: an `Episode`. One in five is nominal; the others have one fault, or several; one in six has a script that is not
+legal. With physics only scripts that keep what is held clear of what stands about: where to go is the workstation's to know.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from random import Random
+
+from rcsc_cell.cell.ready import Backend
+from rcsc_cell.episodes.episode import (
+    HARM,
+    Episode,
+    FaultSpec,
+    Interruption,
+    PartSpec,
+    Push,
+    Restart,
+    TransportSpec,
+)
+
+LEVELS = ("task", "emove", "vision", "primitive", "gripper")
+BUFFERS = (
+    "workstation.order",
+    "task.report",
+    "task.to_emove",
+    "emove.report",
+    "emove.to_primitive",
+    "primitive.report",
+    "emove.to_vision",
+    "vision.report",
+    "primitive.to_robot",
+    "robot.report",
+    "primitive.to_gripper",
+    "gripper.report",
+    "gripper.to_hand",
+    "hand.report",
+    "vision.to_camera",
+    "camera.picture",
+)
+HARMS: tuple[HARM, ...] = ("lost", "doubled", "stale", "delayed")
+VALUES: Mapping[str, tuple[float, ...]] = {
+    "joint_stuck": (1.0, 2.0, 3.0, 4.0, 5.0, 6.0),
+    "late_ticks": (1.0, 20.0, 95.0, 120.0),
+    "shifted_mm": (-30.0, -5.0, 2.0, 5.0, 30.0),
+}
+"""What switches that are no yes or no are set to; late pictures on both sides of the four seconds that are waited for."""
+SWITCHES = (
+    "robot_stuck", "joint_stuck", "robot_refuses", "unreadable", "hand_stuck", "hand_weak", "jammed", "slips", "drops",
+    "blind", "dark", "late_ticks", "noisy", "shifted_mm", "tilted", "vise_stuck", "vise_weak", "vise_mute",
+)  # fmt: skip
+KINDS = {"tbox": "BOXT", "bbox": "BOXB", "flag": "FLAG", "hous": "HOUS"}
+SIZES: Mapping[str, tuple[float, float, float]] = {
+    "tbox": (80.0, 60.0, 40.0),
+    "bbox": (80.0, 60.0, 30.0),
+    "flag": (60.0, 40.0, 20.0),
+    "hous": (70.0, 50.0, 50.0),
+}
+MAKE_BOXT = (
+    '"VISE-OPEN RIGHT, CLOSE LEFT",,,,',
+    "MOVE,BOXT (2),BUFFER,FIX-MAC1,",
+    "VISE-CLOSE RIGHT,,,,",
+    "RELEASE,,,,FIX-MAC2",
+    '"MOVE",CLOSE-GRIP,,FIX-MAC3,',
+    "VISE-OPEN RIGHT,,,,",
+    "MOVE,,,FIX-MAC4,",
+    "VISE-CLOSE RIGHT,,,,",
+    "MOVE,,,FIX-SAFE,",
+    "ENGRAVE PART,,,,",
+    "ACQUIRE,BOXT (2),FIX-MAC5,,",
+    '"VISE-OPEN RIGHT, OPEN LEFT",,,,',
+    "TRANSFER,BOXT (2),,V-BLK1,V-BLK2",
+    "TRANSFER,BOXT (3),V-BLK3,V-BLK4,V-BLK2",
+)
+"""The first rows of Fig. 7, as corrected."""
+EMPTY_HAND = ("MOVE,,,WS-SAFE,", "MOVE,,,FIX-SAFE,", "MOVE,,,BUFFER-SAFE,", "MOVE,,,V-BLK2,", "PAUSE,,,,")
+NOT_LEGAL = (
+    "RELEASE,,,,",
+    "CLEAR,,,STATION(1),",
+    "MOVE,BOXT (2),BUFFER,,",
+    "ACQUIRE,BOXT (2),,,",
+    "TRANSFER,,,STATION(0),",
+    "TRANSFER,BOXT (2),BUFFER,,WS-SAFE",
+    "MOVE,,,,",
+)
+"""Nothing held, no source, no destination: TASK has to refuse them (section 8.1, lines 2 and 3)."""
+ONLY_WITHOUT_PHYSICS = (
+    "MOVE,,,FIX-MAC1,",
+    "MOVE,BOXT (2),BUFFER,V-BLK3,",
+    "ACQUIRE,BOXT (2),STATION(2),,",
+    "MOVE,CLOSE-GRIP,,V-BLK2,",
+)
+
+
+def draw(seed: int, backend: Backend = "kinematic") -> Episode:
+    """The episode of a seed."""
+    random = Random(f"episode {seed}")  # noqa: S311  # repeatable on purpose
+    kind = random.choice(tuple(KINDS))
+    episode = Episode(backend, "c", seed, _parts(random, kind), _script(random, kind, backend))
+    if random.random() < 0.2:
+        return episode
+    for _ in range(1 if random.random() < 0.6 else random.randint(2, 4)):
+        episode = random.choice(ODDITIES)(random, episode)
+    return episode
+
+
+# --- parts and scripts ---
+
+
+def place(random: Random, kind: str) -> PartSpec:
+    """A part somewhere on the buffer, where the camera sees it from its first pose."""
+    edge = random.random() < 0.2
+    x_mm = random.choice((-80.0, 60.0)) if edge else random.uniform(-70.0, 50.0)
+    y_mm = random.choice((-80.0, 80.0)) if edge else random.uniform(-70.0, 70.0)
+    return PartSpec(kind, "buffer", round(x_mm, 1), round(y_mm, 1), round(random.uniform(-85.0, 85.0), 1))
+
+
+def _parts(random: Random, kind: str) -> tuple[PartSpec, ...]:
+    return (place(random, kind),)
+
+
+def _script(random: Random, kind: str, backend: Backend) -> tuple[str, ...]:
+    part = f"{KINDS[kind]} (2)"
+    scripts: list[tuple[str, ...]] = [
+        (f"TRANSFER,{part},BUFFER,STATION({random.randint(0, 3)}),WS-SAFE",),
+        (f"ACQUIRE,{part},BUFFER,,", "MOVE,,,WS-SAFE,", f"CLEAR,,,STATION({random.randint(0, 3)}),"),
+        (f"ACQUIRE,{part},BUFFER,,", "RELEASE,,,,BUFFER-SAFE", f"TRANSFER,{part},BUFFER,STATION(1),"),
+        (f"MOVE,{part},BUFFER,STATION(2),", "RELEASE,,,,"),
+        (random.choice(EMPTY_HAND), random.choice(EMPTY_HAND), f"ACQUIRE,{part},BUFFER,,"),
+    ]
+    if kind == "tbox":
+        scripts += [MAKE_BOXT[: random.randint(1, len(MAKE_BOXT))]] * 2
+    rows = random.choice(scripts)
+    if random.random() < 1 / 6:
+        bad = NOT_LEGAL if backend == "mujoco" else NOT_LEGAL + ONLY_WITHOUT_PHYSICS
+        at = random.randint(0, len(rows))
+        rows = (*rows[:at], random.choice(bad), *rows[at:])
+    return rows
+
+
+# --- what goes wrong ---
+
+
+def when(random: Random, rows: Sequence[str]) -> int:
+    """A tick at which something may be under way; the first ones more often than others."""
+    return random.choice((0, 1, 2)) if random.random() < 0.1 else random.randint(3, 250 + 40 * len(rows))
+
+
+def lasting(random: Random) -> int:
+    """For how many ticks."""
+    return random.choice((1, 2, 5, 20, 60, 200, 100_000))
+
+
+def _switch(random: Random, episode: Episode) -> Episode:
+    name, first = random.choice(SWITCHES), when(random, episode.rows)
+    value = random.choice(VALUES.get(name, (1.0,)))
+    return replace(
+        episode, faults=(*episode.faults, FaultSpec(name, first, first + lasting(random) - 1, value))
+    )
+
+
+def _harm(random: Random, episode: Episode) -> Episode:
+    first = when(random, episode.rows)
+    last = first + random.choice((0, 1, 3, 10, 40, 100))
+    kind = random.choice(HARMS)
+    ticks = random.choice((1, 3, 8)) if kind == "delayed" else 3
+    one = TransportSpec(random.choice(BUFFERS), kind, first, last, ticks)
+    return replace(episode, transport=(*episode.transport, one))
+
+
+def _restart(random: Random, episode: Episode) -> Episode:
+    one = Restart(when(random, episode.rows), random.choice(LEVELS))
+    return replace(episode, restarts=(*episode.restarts, one))
+
+
+def _interruption(random: Random, episode: Episode) -> Episode:
+    rows = (*EMPTY_HAND, "PAUSE,,,,", *NOT_LEGAL[:2])
+    one = Interruption(when(random, episode.rows), random.choice(rows))
+    return replace(episode, interruptions=(*episode.interruptions, one))
+
+
+def _push(random: Random, episode: Episode) -> Episode:
+    if episode.backend != "kinematic" or not episode.parts:
+        return _switch(random, episode)
+    x_mm, y_mm = (random.choice((-40.0, -5.0, 0.0, 5.0, 40.0)) for _ in range(2))
+    one = Push(when(random, episode.rows), random.randrange(len(episode.parts)), x_mm, y_mm)
+    return replace(episode, pushes=(*episode.pushes, one))
+
+
+def _other_parts(random: Random, episode: Episode) -> Episode:
+    first = episode.parts[0] if episode.parts else place(random, "tbox")
+    return replace(episode, parts=random.choice((_none, _another, _two, _sized, _weighing))(random, first))
+
+
+def _none(_: Random, __: PartSpec) -> tuple[PartSpec, ...]:
+    return ()
+
+
+def _another(random: Random, part: PartSpec) -> tuple[PartSpec, ...]:
+    others = [kind for kind in KINDS if kind != part.object]
+    return (replace(part, object=random.choice(others), size_mm=()),)
+
+
+def _two(random: Random, part: PartSpec) -> tuple[PartSpec, ...]:
+    """One beside the other, or so that they are nearly one patch."""
+    gap_mm = random.choice((105.0, 130.0, 150.0))
+    y_mm = part.y_mm - gap_mm if part.y_mm > 0 else part.y_mm + gap_mm
+    return (part, replace(part, object=random.choice((part.object, *KINDS)), y_mm=round(y_mm, 1), size_mm=()))
+
+
+def _sized(random: Random, part: PartSpec) -> tuple[PartSpec, ...]:
+    """Off by less than is tolerated, by a little more, by much."""
+    more_mm = [random.choice((0.0, 1.0, -1.0, 2.5, -2.5, 10.0, -10.0)) for _ in range(3)]
+    size = tuple(a + b for a, b in zip(SIZES[part.object], more_mm, strict=True))
+    return (replace(part, size_mm=size),)
+
+
+def _weighing(random: Random, part: PartSpec) -> tuple[PartSpec, ...]:
+    density, friction = random.choice((600.0, 2700.0, 7800.0)), random.choice((0.15, 0.4, 0.9))
+    return (replace(part, density_kg_m3=density, friction=friction),)
+
+
+ODDITIES: tuple[Callable[[Random, Episode], Episode], ...] = (
+    _switch,
+    _switch,
+    _switch,
+    _harm,
+    _harm,
+    _restart,
+    _interruption,
+    _push,
+    _other_parts,
+    _other_parts,
+)
+"""As often as each is drawn."""

@@ -1,0 +1,99 @@
+"""What a loop is made of: the system read once in a process, the script's rows, the operator, and parts where they lie.
+
+In: an episode and the path of a system. Out: what `rcsc_cell.episodes.loop` puts together.
+"""
+
+from collections.abc import Iterable
+from functools import lru_cache
+from pathlib import Path
+
+from rcsc.host.children import scratch
+from rcsc.run.description import Description, description
+from rcsc.run.signature import Signature
+from rcsc.run.system import signatures
+from rcsc_cell.cell.mujoco_model import Body
+from rcsc_cell.cell.ready import Lying
+from rcsc_cell.database.ask import Database
+from rcsc_cell.database.build import BadData
+from rcsc_cell.database.pose import about_z
+from rcsc_cell.episodes.episode import Episode, Interruption, PartSpec, script
+from rcsc_cell.episodes.operator import Operator, order
+from rcsc_cell.workstation.prepared import database_of, needs_cell
+from rcsc_cell.workstation.script import BadScript, Row, read_script
+from rcsc_cell.workstation.station import workstation
+
+
+def ready(system: Path) -> tuple[Description, dict[str, Signature], Database]:
+    """The description, the signatures and the database, read once while their files do not change.
+
+    Raises:
+        BadDescription, BadData: They are not in order.
+    """
+    folder = system.parent.parent
+    files = [system, *sorted((folder / "generated" / "c").glob("*.json")), system.parent / "cell.toml"]
+    return _ready(system, tuple((str(one), one.stat().st_mtime_ns) for one in files if one.is_file()))
+
+
+@lru_cache(maxsize=64)
+def _ready(
+    system: Path, _files: tuple[tuple[str, int], ...]
+) -> tuple[Description, dict[str, Signature], Database]:
+    said = description(system)
+    signs = signatures(said)
+    needs_cell(said, signs)
+    return said, signs, database_of(said, signs)
+
+
+@lru_cache(maxsize=1024)
+def rows_of(rows: tuple[str, ...]) -> tuple[Row, ...]:
+    """Rows of a script.
+
+    Raises:
+        BadScript: One says nothing that a workstation can do.
+    """
+    with scratch("rows") as folder:
+        path = folder / "rows.csv"
+        path.write_text(script(rows), encoding="utf-8")
+        return read_script(path)
+
+
+def operator_of(episode: Episode, database: Database, task: Signature) -> Operator:
+    """The workstation with the episode's script, and whoever interrupts it.
+
+    Raises:
+        BadScript: A row says nothing, or names what nobody knows.
+        ValueError: An interruption is none of TASK's commands.
+    """
+    station = workstation(rows_of(episode.rows), database.locations, task)
+    operator = Operator(station, [])
+    operator.changes = commands(episode.interruptions, operator)
+    return operator
+
+
+def commands(changes: Iterable[Interruption], operator: Operator) -> list[tuple[int, Row]]:
+    """Ticks and rows; a row that TASK cannot be told is refused now."""
+    found = []
+    for one in sorted(changes, key=lambda change: change.tick):
+        [row] = rows_of((one.row,))
+        for name in (row.source, row.dest, row.end_at):
+            if name and name not in operator.station.locations:
+                raise BadScript(f"no location is called `{name}`")
+        order(operator.station, row, 0)
+        found.append((one.tick, row))
+    return found
+
+
+def lying(database: Database, part: PartSpec) -> Lying:
+    """A part where the episode has it.
+
+    Raises:
+        BadData: No part or no station is called so.
+    """
+    if part.object not in database.objects or part.station not in database.stations:
+        raise BadData((f"no part is called `{part.object}`, or no station `{part.station}`",))
+    number = database.objects[part.object]
+    length, width, height = part.size_mm or database.sizes[number]
+    station = database.stations[part.station]
+    at_mm = station.frame.point((part.x_mm, part.y_mm, height / 2))
+    turn = about_z(station.yaw_deg + part.yaw_deg)
+    return Lying(number, Body((length, width, height), at_mm, turn, part.density_kg_m3, part.friction))

@@ -1,0 +1,135 @@
+"""The report of a run in the cell: one HTML page that needs nothing else.
+
+In: a `Story`, filled from a finished run. Out: a file with the filmstrip, what became of each row of the script, plots, where
+the parts ended, which lines of the tables ran, how near the joints came to their limits, and timing. The page has no
+scripts and fetches nothing; it says so to the browser.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from rcsc.host.files import write_atomically
+from rcsc_cell.pictures.page import PAGES
+from rcsc_cell.pictures.plot import plot
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """A row of the script: `state` is `done`, `failed`, `refused` or what else became of it; `reason` may be empty."""
+
+    number: int
+    text: str
+    state: str
+    cycles: int
+    reason: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """A picture of the cell at a tick; `svg` is a document of `rcsc_cell.pictures`."""
+
+    tick: int
+    caption: str
+    svg: str
+
+
+@dataclass(frozen=True, slots=True)
+class Matched:
+    """How often a line of a table ran."""
+
+    level: str
+    table: str
+    line: str
+    count: int
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """A measured number."""
+
+    name: str
+    value: float
+    unit: str
+
+
+@dataclass(frozen=True, slots=True)
+class Placement:
+    """Where a part was to end, and where it ended: lengths in mm, angles in degrees, in words as they are to be read."""
+
+    part: str
+    wanted: str
+    found: str
+    error_mm: float
+
+
+@dataclass(frozen=True, slots=True)
+class Story:
+    """A finished run.
+
+    Attributes:
+        title: Of the page.
+        rows: Of the script.
+        frames: The filmstrip.
+        series: What moved: (seconds, value) by name, a unit in the name.
+        matched: Lines of tables, also those that never ran, in the order of the tables.
+        timing: How long things took.
+        placements: Of the parts.
+        margins_deg: The least distance of each joint from its limits.
+        tick_ms: Of the system.
+    """
+
+    title: str
+    rows: Sequence[Row] = ()
+    frames: Sequence[Frame] = ()
+    series: Mapping[str, Sequence[tuple[float, float]]] = field(default_factory=dict)
+    matched: Sequence[Matched] = ()
+    timing: Sequence[Figure] = ()
+    placements: Sequence[Placement] = ()
+    margins_deg: Sequence[float] = ()
+    tick_ms: int = 40
+
+
+@dataclass(frozen=True, slots=True)
+class _Table:
+    """The lines of one table, and how many of them ran."""
+
+    name: str
+    lines: tuple[Matched, ...]
+    ran: int
+    most: int
+
+
+def report(path: Path, story: Story) -> None:
+    """Writes the page.
+
+    Raises:
+        OSError: The file could not be written.
+    """
+    write_atomically(path, page(story).encode())
+
+
+def page(story: Story) -> str:
+    """The page; the same text for the same story."""
+    return PAGES.get_template("report.html.jinja").render(
+        story=story,
+        seconds=lambda tick: tick * story.tick_ms / 1000,
+        plots=[(name, plot(points)) for name, points in story.series.items()],
+        tables=_tables(story.matched),
+    )
+
+
+def _tables(matched: Sequence[Matched]) -> list[_Table]:
+    """The lines by table; tables and lines stay in their order."""
+    lines: dict[tuple[str, str], list[Matched]] = {}
+    for one in matched:
+        lines.setdefault((one.level, one.table), []).append(one)
+    return [
+        _Table(
+            level if table == level else f"{level} · {table}",
+            tuple(found),
+            sum(one.count > 0 for one in found),
+            max(one.count for one in found),
+        )
+        for (level, table), found in lines.items()
+    ]

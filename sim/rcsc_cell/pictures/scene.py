@@ -1,0 +1,268 @@
+"""The cell as far as a log says it: the arm where the wrist plate's nine numbers are, and every place and part that a buffer names.
+
+In: a log, a description of the same system, and the cell's database. Out: a picture and its caption for each tick. What names something
+is told by the description: it is what the database is asked for. A log holds numbers and names; where they are, the database says.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+
+from rcsc.run.description import Description
+from rcsc.run.log.read import Log, LoggedLevel
+from rcsc.run.log.ticks import STATUS
+from rcsc.run.signature import Values
+from rcsc_cell.cell.arm import Joints, solve
+from rcsc_cell.cell.mujoco_model import OPEN_MM
+from rcsc_cell.cell.reach import home
+from rcsc_cell.cell.ready import lying
+from rcsc_cell.database.ask import Database
+from rcsc_cell.database.build import BadData
+from rcsc_cell.database.pose import Pose, Vector, pose_of
+from rcsc_cell.pictures.stick import Scene, pads, stick
+from rcsc_cell.pictures.things import Mark, block, outline
+from rcsc_cell.pictures.views import ALONE
+
+PLATE, OPENING = ".plate", ".opening_mm"
+"""How the names end of nine numbers of the wrist plate, and of how far the fingers are apart."""
+
+
+@dataclass(frozen=True, slots=True)
+class Drawn:
+    """The cell in a tick: an SVG document, and what is to be said about it, a sentence each."""
+
+    svg: str
+    caption: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class _Key:
+    """Leaves that the database is asked for."""
+
+    query: str
+    leaves: tuple[str, ...]
+
+
+@dataclass(slots=True)
+class _Named:
+    """Something of the cell that is named.
+
+    Attributes:
+        by: The leaves that name it, with their levels.
+        at_mm: Where; more places than one where it is not said which; none where the data does not know it.
+    """
+
+    name: str
+    by: list[str] = field(default_factory=list)
+    at_mm: tuple[Vector, ...] = ()
+    part: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class _Plate:
+    """Nine numbers of the wrist plate, and the leaves that they are of."""
+
+    name: str
+    numbers: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """A cell to be drawn.
+
+    Attributes:
+        data: What the file is called that says where things are.
+        rest: The joints at rest.
+    """
+
+    log: Log
+    system: Description
+    database: Database
+    data: str
+    rest: Joints
+
+    def drawn(self, tick: int) -> Drawn:
+        """The cell as of a tick."""
+        held = {level.name: level.track.latest(tick) for level in self.log.levels}
+        states = {name: values for name, values in held.items() if values is not None}
+        named = self._named(states)
+        plates = list(self._plates(states))
+        plate, joints, said = self._arm(plates)
+        others = tuple(self._others(plates, plate))
+        marks = (*(Mark(one.name, at) for one in named for at in one.at_mm), *others)
+        parts = {one.part for one in named}
+        names = {number: name for name, number in self.database.objects.items()}
+        blocks = tuple(
+            block(
+                names[one.object],
+                Pose(one.body.turn, one.body.at_mm),
+                one.body.size_mm,
+                named=one.object in parts,
+            )
+            for one in lying(self.database)
+        )
+        outlines = tuple(map(outline, self.database.stations.values()))
+        scene = Scene(outlines, (), self.database.hand.tool_mm, blocks, marks)
+        return Drawn(
+            stick(plate, self._opening_mm(states), joints, scene, ALONE),
+            (said, *self._told(named), *(f"`{one.name}` is marked." for one in others)),
+        )
+
+    # --- the arm ---
+
+    def _arm(self, plates: list[_Plate]) -> tuple[tuple[float, ...], Joints | None, str]:
+        """The plate that is drawn, the joints that bring it there, and which it is; at rest where none is a pose."""
+        for one in plates:
+            pose = pose_of(one.numbers)
+            if pose is not None:
+                joints = solve(pose, self.rest)
+                cannot = "" if joints is not None else "; the arm cannot be there"
+                return one.numbers, joints, f"The hand is where `{one.name}` says{cannot}."
+        at_rest = tuple(float(value) for value in self.database.home)
+        if plates:
+            none = " and ".join(f"`{one.name}`" for one in plates)
+            return at_rest, self.rest, f"No pose is in {none}; the arm is drawn at rest."
+        return at_rest, self.rest, "The log holds no pose; the arm is drawn at rest."
+
+    def _plates(self, states: Mapping[str, Values]) -> Iterator[_Plate]:
+        """What is ordered before what is reported, and that before what else there is."""
+        found = []
+        for level, values in self._levels(states):
+            for at, leaf in enumerate(level.sign.leaves):
+                name, _, index = leaf.name.partition("[")
+                if index == "0]" and name.endswith(PLATE) and len(level.sign.record(name)) == 9:
+                    record = name.removesuffix(PLATE)
+                    reported = f"{record}.{STATUS}" in level.sign.index
+                    rank = 0 if leaf.kind == "output" else 1 if reported else 2
+                    numbers = tuple(float(value) for value in values[at : at + 9])
+                    found.append((rank, _Plate(f"{level.name}.{name}", numbers)))
+        yield from (plate for _, plate in sorted(found, key=lambda one: one[0]))
+
+    def _others(self, plates: list[_Plate], drawn: tuple[float, ...]) -> Iterator[Mark]:
+        """Where the pads are by other nine numbers than those that are drawn."""
+        for one in plates:
+            pose = pose_of(one.numbers)
+            if pose is not None and one.numbers != drawn:
+                yield Mark(one.name, pads(pose, self.database.hand.tool_mm))
+
+    def _opening_mm(self, states: Mapping[str, Values]) -> float:
+        """What is reported of the fingers; open where nothing is."""
+        for level, values in self._levels(states):
+            for at, leaf in enumerate(level.sign.leaves):
+                reported = f"{leaf.name.removesuffix(OPENING)}.{STATUS}" in level.sign.index
+                if leaf.kind == "input" and leaf.name.endswith(OPENING) and reported:
+                    return float(values[at])
+        return OPEN_MM
+
+    # --- what is named ---
+
+    def _named(self, states: Mapping[str, Values]) -> list[_Named]:
+        """Everything that is named, each once."""
+        found: dict[str, _Named] = {}
+        for level, values in self._levels(states):
+            for key in self._keys(level):
+                if (one := self._one(level, key, values)) is not None:
+                    held = found.setdefault(one.name, one)
+                    held.by += [by for by in one.by if by not in held.by]
+        return list(found.values())
+
+    def _one(self, level: LoggedLevel, key: _Key, values: Values) -> _Named | None:
+        """What these leaves name; None where they name nothing."""
+        first = level.sign.leaves[level.sign.index[key.leaves[0]]]
+        asked = [int(values[level.sign.index[leaf]]) for leaf in key.leaves]
+        if asked[0] == 0:
+            return None
+        by = [f"{level.name}.{first.name}"]
+        if key.query in _OF_PARTS:
+            name = first.shown(asked[0])
+            return _Named(name, by, (), self.database.objects.get(name, -1))
+        if key.query == "point":
+            pose = pose_of([float(value) for value in self.database.point(asked[0])[1:10]])
+            at_mm = () if pose is None else (pose.point((0.0, 0.0, self.database.hand.tool_mm)),)
+            return _Named(f"point {asked[0]}", by, at_mm)
+        names = {number: name for name, number in self.database.locations.items()}
+        name, sectors = names.get(asked[0], f"location {asked[0]}"), self._sectors(asked[0])
+        said = asked[1:] if len(sectors) > 1 else []
+        shown = f"{name}({said[0]})" if said else name
+        return _Named(shown, by, self._places(asked[0], asked[1:] or sectors))
+
+    def _sectors(self, location: int) -> list[int]:
+        """Of a pallet; of every other location it is one."""
+        return [number for place, number, _ in self.database.routes() if place == location]
+
+    def _places(self, location: int, sectors: list[int]) -> tuple[Vector, ...]:
+        every = (self.database.pads(location, number) for number in sectors)
+        return tuple(one for one in every if one is not None)
+
+    def _keys(self, level: LoggedLevel) -> Iterator[_Key]:
+        """What the database is asked for, and whatever else in the level's buffers is a part by the same words."""
+        known = [
+            key
+            for key in self._asked(level)
+            if key.query in _ASKED and all(leaf in level.sign.index for leaf in key.leaves)
+        ]
+        yield from known
+        words = {
+            level.sign.leaves[level.sign.index[key.leaves[0]]].members
+            for key in known
+            if key.query in _OF_PARTS
+        }
+        for leaf in level.sign.leaves:
+            if leaf.members and leaf.members in words and leaf.kind != "state":
+                yield _Key("part", (leaf.name,))
+
+    def _asked(self, level: LoggedLevel) -> Iterator[_Key]:
+        """What the database is asked for of a level: its own leaves, and those that a buffer carries to another level's."""
+        for spec in self.system.levels:
+            for feed in spec.feeds:
+                if spec.name == level.name:
+                    yield _Key(feed.query, feed.keys)
+                for wire in self.system.wires:
+                    giver, _, source = wire.source.partition(".")
+                    taker, _, target = wire.target.partition(".")
+                    inside = all(key.startswith(f"{target}.") for key in feed.keys)
+                    if giver == level.name and taker == spec.name and inside:
+                        leaves = (source + key.removeprefix(target) for key in feed.keys)
+                        yield _Key(feed.query, tuple(leaves))
+
+    def _told(self, named: list[_Named]) -> Iterator[str]:
+        lying_here = {part.object for part in self.database.parts}
+        for one in named:
+            by = ", ".join(f"`{leaf}`" for leaf in one.by)
+            if one.part is not None:
+                if one.part < 0:
+                    yield f"{one.name} ({by}): no part of `{self.data}`."
+                elif one.part in lying_here:
+                    yield f"{one.name} ({by}) is marked where `{self.data}` has it."
+                else:
+                    yield f"{one.name} ({by}): `{self.data}` has none lying about."
+            elif one.at_mm:
+                yield f"{one.name} ({by}) is marked."
+            else:
+                yield f"{one.name} ({by}): `{self.data}` does not say where."
+
+    def _levels(self, states: Mapping[str, Values]) -> Iterator[tuple[LoggedLevel, Values]]:
+        return ((level, states[level.name]) for level in self.log.levels if level.name in states)
+
+
+_OF_PARTS = frozenset({"part", "fingers"})
+_ASKED = _OF_PARTS | {"place", "route", "point"}
+"""Questions whose answers stand somewhere in the cell."""
+
+
+def cell(log: Log, system: Description, database: Database) -> Cell:
+    """The cell of a log.
+
+    Raises:
+        BadData: The robot cannot be at its home.
+    """
+    rest = home(database)
+    if rest is None:
+        raise BadData(("the robot cannot be at its home",))
+    return Cell(log, system, database, system.database.name, rest)
+
+
+def same_system(log: Log, system: Description) -> bool:
+    """Whether a log is one of this system, or of some of its levels."""
+    here = {(spec.name, spec.program) for spec in system.levels}
+    there = {(spec.name, spec.program) for spec in log.system().levels}
+    return log.facts["name"] == system.name and there <= here

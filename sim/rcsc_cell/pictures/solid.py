@@ -1,0 +1,250 @@
+"""The cell as a solid picture: SVG of a MuJoCo model, drawn with numpy alone, the same text for the same state.
+
+In: a model and its data. Out: an SVG document. Boxes, cylinders, capsules, balls and planes are drawn; groups from 3 up, the shapes
+for collisions only, are not. The picture needs no graphics driver, so that it can be had on any machine.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from html import escape
+from math import radians, tan
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from rcsc_cell.pictures.order import Faces, painted
+from rcsc_cell.pictures.shapes import Floats, Integers, Shape, box, capsule, cylinder
+
+DRAWN_GROUPS = (0, 1, 2)
+NEAR_M = 0.05
+"""What is nearer to the eye than that is not drawn."""
+FLOOR_M = 1.6
+"""A floor without end is drawn so far to each side."""
+GRID_M = 0.2
+AMBIENT = 0.4
+LIGHT = np.array((1.0, -1.4, 2.8)) / np.sqrt(10.8)
+"""Where the light comes from, one long."""
+_BACKGROUND = "#e9edf0"
+_FLOOR, _FLOOR_LINE = "#d3d8dc", "#b9c0c6"
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """From where the cell is seen.
+
+    Attributes:
+        eye_m: Where the eye is.
+        look_m: What stands in the middle of the picture.
+        width_px: Of the picture.
+        height_px: Of the picture.
+        field_deg: From the picture's lower edge to its upper.
+    """
+
+    eye_m: tuple[float, float, float]
+    look_m: tuple[float, float, float]
+    width_px: int = 720
+    height_px: int = 520
+    field_deg: float = 40.0
+
+
+OVERVIEW = View((1.75, -1.15, 1.5), (0.32, 0.0, 0.52), field_deg=44.0)
+
+
+@dataclass(frozen=True, slots=True)
+class _Camera:
+    """Rows: right, up and forward of the eye, seen from the base; and pixels to one at distance one."""
+
+    eye: Floats
+    axes: Floats
+    scale: float
+    middle: tuple[float, float]
+
+    def seen(self, points: Floats) -> Floats:
+        """Points as the eye has them: right, up, distance."""
+        return np.asarray((points - self.eye) @ self.axes.T)
+
+    def flat(self, seen: Floats) -> Floats:
+        """Pixels of points that the eye has before it; shape (..., 2)."""
+        across = seen[..., :2] / seen[..., 2:] * (self.scale, -self.scale)
+        return np.asarray(across + self.middle)
+
+
+def solid(model: Any, data: Any, view: View = OVERVIEW, text: Sequence[str] = ()) -> str:
+    """The picture, as an SVG document.
+
+    Args:
+        model: An `MjModel`.
+        data: Its `MjData`; `geom_xpos` and `geom_xmat` must be fresh (`mj_forward` or `mj_kinematics`).
+        view: From where.
+        text: Lines in the upper left corner.
+    """
+    camera = _camera(view)
+    size = f'viewBox="0 0 {view.width_px} {view.height_px}" width="{view.width_px}" height="{view.height_px}"'
+    return "\n".join((
+        f'<svg xmlns="http://www.w3.org/2000/svg" {size}>',
+        f'<rect class="sky" width="100%" height="100%" fill="{_BACKGROUND}"/>',
+        *_floors(model, data, camera),
+        *_bodies(model, data, camera),
+        *_lines(text),
+        "</svg>\n",
+    ))  # fmt: skip
+
+
+def _camera(view: View) -> _Camera:
+    eye = np.array(view.eye_m)
+    forward = np.array(view.look_m) - eye
+    forward /= np.linalg.norm(forward)
+    right = np.cross(forward, (0.0, 0.0, 1.0))
+    right /= np.linalg.norm(right)
+    scale = view.height_px / 2 / tan(radians(view.field_deg) / 2)
+    axes = np.stack((right, np.cross(right, forward), forward))
+    return _Camera(eye, axes, scale, (view.width_px / 2, view.height_px / 2))
+
+
+def _lines(text: Sequence[str]) -> Iterator[str]:
+    for at, line in enumerate(text):
+        yield (
+            f'<text class="caption" x="12" y="{22 + 18 * at}" font-family="monospace" font-size="14" '
+            f'fill="#20262b">{escape(line)}</text>'
+        )
+
+
+# --- bodies ---
+
+
+def _bodies(model: Any, data: Any, camera: _Camera) -> Iterator[str]:
+    shapes, colours, places = [], [], []
+    for geom in range(model.ngeom):
+        if int(model.geom_group[geom]) not in DRAWN_GROUPS:
+            continue
+        shape = _shape(int(model.geom_type[geom]), [float(value) for value in model.geom_size[geom]])
+        if shape is not None:
+            shapes.append(shape)
+            colours.append(_colour(model, geom))
+            places.append((np.array(data.geom_xmat[geom]).reshape(3, 3), np.array(data.geom_xpos[geom])))
+    if shapes:
+        yield from _polygons(_scene(shapes, places), np.array(colours), camera)
+
+
+def _shape(kind: int, size: list[float]) -> Shape | None:
+    """The solid of a geom; None for what is not drawn."""
+    match mujoco.mjtGeom(kind):
+        case mujoco.mjtGeom.mjGEOM_BOX:
+            return box(*size)
+        case mujoco.mjtGeom.mjGEOM_CYLINDER:
+            return cylinder(size[0], size[1])
+        case mujoco.mjtGeom.mjGEOM_CAPSULE:
+            return capsule(size[0], size[1])
+        case mujoco.mjtGeom.mjGEOM_SPHERE:
+            return capsule(size[0], 0.0)
+        case _:
+            return None
+
+
+def _colour(model: Any, geom: int) -> Floats:
+    material = int(model.geom_matid[geom])
+    rgba = model.mat_rgba[material] if material >= 0 else model.geom_rgba[geom]
+    return np.array(rgba[:3], dtype=np.float64)
+
+
+def _scene(shapes: Sequence[Shape], places: Sequence[tuple[Floats, Floats]]) -> Faces:
+    corners = [len(shape.corners) for shape in shapes]
+    faces = [len(shape.faces) for shape in shapes]
+    first_corner = np.cumsum([0, *corners[:-1]])
+    most = max(shape.faces.shape[1] for shape in shapes)
+    return Faces(
+        np.vstack([shape.corners @ turn.T + at for shape, (turn, at) in zip(shapes, places, strict=True)]),
+        np.vstack([
+            np.pad(shape.faces + first, ((0, 0), (0, most - shape.faces.shape[1])), mode="edge")
+            for shape, first in zip(shapes, first_corner, strict=True)
+        ]),
+        np.vstack([shape.normals @ turn.T for shape, (turn, _) in zip(shapes, places, strict=True)]),
+        np.repeat(np.arange(len(shapes)), faces),
+        np.cumsum([0, *faces[:-1]]),
+        first_corner,
+    )  # fmt: skip
+
+
+def _polygons(scene: Faces, colours: Floats, camera: _Camera) -> Iterator[str]:
+    shown, flat = _shown(scene, camera)
+    boxes = np.concatenate((flat.min(axis=1), flat.max(axis=1)), axis=1)
+    light = (
+        AMBIENT + (1 - AMBIENT) * (0.5 + 0.5 * scene.normals @ LIGHT) ** 1.5
+    )  # faces in the shade differ, too
+    shades = np.clip(colours[scene.solid] * light[:, None] * 255, 0, 255).astype(int)
+    where = {int(face): at for at, face in enumerate(shown)}
+    for face in painted(scene, camera.eye, boxes, shown):
+        red, green, blue = (int(value) for value in shades[face])
+        yield _polygon(flat[where[face]], f"#{red:02x}{green:02x}{blue:02x}")
+
+
+def _shown(scene: Faces, camera: _Camera) -> tuple[Integers, Floats]:
+    """The faces that are turned to the eye, before it and in the picture, and their corners in pixels."""
+    seen = camera.seen(scene.corners)
+    from_eye = camera.eye - scene.corners[scene.faces[:, 0]]
+    towards = np.einsum("ij,ij->i", scene.normals, from_eye) > 0.0
+    found = np.flatnonzero(towards & (seen[scene.faces, 2] > NEAR_M).all(axis=1))
+    flat = camera.flat(seen[scene.faces[found]])
+    within = (flat.max(axis=1) > 0.0) & (flat.min(axis=1) < np.array(camera.middle) * 2)
+    kept = within.all(axis=1)
+    return found[kept], flat[kept]
+
+
+def _polygon(points: Floats, colour: str) -> str:
+    """A face; its edge is drawn in its own colour, else hair lines would show between neighbours."""
+    said: list[str] = []
+    for x, y in points.tolist():
+        corner = f"{x:.1f},{y:.1f}"
+        if not said or said[-1] != corner:  # a padded face repeats its last corner
+            said.append(corner)
+    return f'<polygon points="{" ".join(said)}" fill="{colour}" stroke="{colour}" stroke-width=".5"/>'
+
+
+# --- floors ---
+
+
+def _floors(model: Any, data: Any, camera: _Camera) -> Iterator[str]:
+    for geom in range(model.ngeom):
+        kind = mujoco.mjtGeom(int(model.geom_type[geom]))
+        if kind == mujoco.mjtGeom.mjGEOM_PLANE and int(model.geom_group[geom]) in DRAWN_GROUPS:
+            turn, at = np.array(data.geom_xmat[geom]).reshape(3, 3), np.array(data.geom_xpos[geom])
+            half = [min(float(size) or FLOOR_M, FLOOR_M) for size in model.geom_size[geom][:2]]
+            yield from _floor(turn, at, (half[0], half[1]), camera)
+
+
+def _floor(turn: Floats, at: Floats, half: tuple[float, float], camera: _Camera) -> Iterator[str]:
+    """A plane of such half sides, and its grid."""
+
+    def flat(points: Sequence[tuple[float, float]]) -> str:
+        inside = np.array([(x, y, 0.0) for x, y in points])
+        ahead = _ahead(camera.seen(inside @ turn.T + at))
+        return " ".join(f"{x:.1f},{y:.1f}" for x, y in camera.flat(ahead).tolist()) if len(ahead) else ""
+
+    long, wide = half
+    yield (
+        f'<polygon class="floor" points="{flat([(-long, -wide), (long, -wide), (long, wide), (-long, wide)])}" '
+        f'fill="{_FLOOR}"/>'
+    )
+    lines = [[(x, -wide), (x, wide)] for x in _marks(long)] + [[(-long, y), (long, y)] for y in _marks(wide)]
+    path = "".join(f"M{found.replace(' ', 'L')}" for line in lines if (found := flat(line)))
+    yield f'<path class="tiles" d="{path}" fill="none" stroke="{_FLOOR_LINE}" stroke-width=".7"/>'
+
+
+def _marks(half: float) -> list[float]:
+    many = int(half / GRID_M + 1e-9)
+    return [GRID_M * at for at in range(-many, many + 1)]
+
+
+def _ahead(seen: Floats) -> Floats:
+    """What of a polygon or line lies before the eye.
+
+    Source: Sutherland and Hodgman, "Reentrant polygon clipping", CACM 1974, for one plane.
+    """
+    kept: list[Floats] = []
+    for a, b in zip(seen, np.roll(seen, -1, axis=0), strict=True):
+        if a[2] >= NEAR_M:
+            kept.append(a)
+        if (a[2] < NEAR_M) != (b[2] < NEAR_M) and (len(seen) > 2 or a is not seen[-1]):
+            kept.append(a + (b - a) * ((NEAR_M - a[2]) / (b[2] - a[2])))
+    return np.array(kept)

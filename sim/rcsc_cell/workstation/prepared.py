@@ -1,0 +1,213 @@
+"""A cell ready to run: system, database, workstation and what else stands outside the levels.
+
+In: the description's path, a script. Out: a `Run` that is stepped to its end.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from rcsc.host.described import Document
+from rcsc.run.description import NO_DATA, BadDescription, Description, description
+from rcsc.run.signature import Leaf, Signature
+from rcsc.run.system import Kind, Outside, System, assemble, signatures
+from rcsc_cell.database.ask import Database, fresh, open_database
+from rcsc_cell.database.build import Limit, build, digest
+from rcsc_cell.workstation.script import ROBOT, Row, read_script
+from rcsc_cell.workstation.station import Result, Workstation, workstation
+
+MOST_TICKS = 100_000
+"""Ticks after which a run is given up: more than an hour of control time."""
+
+
+@dataclass(slots=True)
+class Run:
+    """A script in the making.
+
+    Attributes:
+        station: The first of what stands outside.
+    """
+
+    system: System
+    station: Workstation
+    database: Database
+
+    def steps(self, most: int = MOST_TICKS) -> Iterator[Result]:
+        """Runs to the end of the script, or to what stops it and until TASK has paused; each result as it comes.
+
+        Raises:
+            StateTableError: A level met a fault that the proofs exclude.
+        """
+        known = len(self.station.results)
+        while not (self.station.over and self.station.at_rest) and self.system.tick < most:
+            self.system.step()
+            while known < len(self.station.results):
+                yield self.station.results[known]
+                known += 1
+
+
+def parts_of(signs: Mapping[str, Signature]) -> tuple[str, ...]:
+    """Names of parts as the tables have them.
+
+    Raises:
+        BadDescription: No level has any.
+    """
+    leaves = signs["task"].leaves if "task" in signs else ()
+    found = next((leaf.members for leaf in leaves if leaf.name == "command.obj"), ())
+    if not found:
+        raise BadDescription(
+            "the data names parts, and no level `task` has an enumeration `command.obj` of them"
+        )
+    return found
+
+
+def limits_of(system: Description, signs: Mapping[str, Signature]) -> dict[str, list[list[Limit | None]]]:
+    """What the levels can hold of each answer of the database, by question."""
+    found: dict[str, list[list[Limit | None]]] = {}
+    for spec in system.levels:
+        for feed in spec.feeds:
+            run = signs[spec.name].record(feed.into)
+            leaves = [signs[spec.name].leaves[at] for at in run]
+            found.setdefault(feed.query, []).append([_limit(spec.name, leaf) for leaf in leaves])
+    return found
+
+
+def _limit(level: str, leaf: Leaf) -> Limit | None:
+    if leaf.low is None or leaf.high is None:
+        return None
+    return Limit(f"{level}.{leaf.name}", leaf.low, leaf.high)
+
+
+def database_path(system: Description) -> Path:
+    """Where the database of the system is kept when nobody says."""
+    return system.database.parent / ".rcsc-cache" / f"{system.name}.sqlite"
+
+
+def needs_data(system: Description) -> None:
+    """Refuse a system without data.
+
+    Raises:
+        BadDescription: It names none.
+    """
+    if system.database.name == NO_DATA:
+        page = system.review()
+        page.wrong(("data",), "the description names no `data`, of which the database would be made")
+        raise page.bad(BadDescription)
+
+
+def needs_cell(system: Description, signs: Mapping[str, Signature]) -> None:
+    """Refuse a system that workstation, robot, hand and camera of the cell cannot be put beside.
+
+    Raises:
+        BadDescription: A buffer or a word that they need is not there; every one is told.
+    """
+    needs_data(system)
+    page = system.review()
+    targets = {wire.source: wire.target for wire in system.wires}
+    for source, (level, record, fields) in BUFFERS.items():
+        inner = f"{level}.{record}"
+        if level not in signs:
+            page.wrong(("level",), f"the cell needs a level `{level}`, for buffer `{source}`")
+        elif source not in targets or inner not in (source, targets[source]):
+            page.wrong(("buffers",), f"the cell needs buffer `{source}`, with `{inner}` at the level's end")
+        else:
+            sign = signs[level]
+            leaves = [sign.leaves[at].name for at in sign.record(record)]
+            if [name.removeprefix(f"{record}.") for name in leaves] != list(fields):
+                page.wrong(("buffers", source), f"the cell needs in `{inner}`: {', '.join(fields)}")
+    if not page.faults:
+        _need_words(page, signs)
+    if page.faults:
+        raise page.bad(BadDescription)
+
+
+def _need_words(page: Document, signs: Mapping[str, Signature]) -> None:
+    for (level, variable), words in WORDS.items():
+        sign = signs[level]
+        missing = [word for word in words if word not in sign.leaves[sign.index[variable]].members]
+        if missing:
+            page.wrong(("level",), f"the cell needs in `{level}.{variable}` the words {', '.join(missing)}")
+
+
+_PLATE = tuple(f"plate[{at}]" for at in range(9))
+BUFFERS: Mapping[str, tuple[str, str, tuple[str, ...]]] = {
+    "workstation.order": ("task", "command", (
+        "inc_command", "input_command", "obj", "grasp", "source_locpt", "dest_locpt", "end_at_locpt", "sector",
+    )),
+    "task.report": ("task", "report", (
+        "inc_command_echo", "ref_command_echo", "status_report", "status_parameter", "failure",
+    )),
+    "primitive.to_robot": ("primitive", "to_robot", ("inc_command", "input_command", *_PLATE)),
+    "robot.report": ("primitive", "robot", (
+        "inc_command_echo", "ref_command_echo", "status_report", "failure", *_PLATE,
+    )),
+    "gripper.to_hand": ("gripper", "to_hand", ("drive", "opening_mm", "force_n", "speed_mm_s")),
+    "hand.report": ("gripper", "hand", ("opening_mm", "force_n")),
+    "vision.to_camera": ("vision", "to_camera", ("number", "fire", "obj_ptr")),
+    "camera.picture": ("vision", "camera", (
+        "number", "matched", "x_mm", "y_mm", "c", "s", "range_mm", "flat",
+    )),
+}  # fmt: skip
+"""What workstation, robot, hand and camera write and read: of each buffer the level, its variable, and the fields in order."""
+WORDS: Mapping[tuple[str, str], tuple[str, ...]] = {
+    ("task", "command.input_command"): ROBOT,
+    ("task", "command.obj"): ("null_obj",),
+    ("task", "report.status_report"): ("done", "executing", "failed"),
+}
+
+
+def database_of(system: Description, signs: Mapping[str, Signature], path: Path | None = None) -> Database:
+    """The database, made anew where the data has changed; as it is where `path` says which.
+
+    Raises:
+        BadData: The data or the file is not in order.
+        BadDescription: It names no data.
+    """
+    if path is not None:
+        return open_database(path)
+    needs_data(system)
+    kept, parts, limits = database_path(system), parts_of(signs), limits_of(system, signs)
+    if not system.database.is_file() or not fresh(kept, digest(system.database, parts, limits)):
+        build(system.database, kept, parts, limits)
+    return open_database(kept)
+
+
+def script_path(name: str, system: Path) -> Path:
+    """The script that a name means: a file, or one of those that stand with the system."""
+    path = Path(name)
+    return path if path.suffix == ".csv" or path.is_file() else system.parent / "scripts" / f"{name}.csv"
+
+
+def safe_places(database: Database) -> dict[str, str]:
+    """The safe location of each location that has one, by name."""
+    names = {number: name for name, number in database.locations.items()}
+    safe = {name: int(database.place(number)[4]) for name, number in database.locations.items()}
+    return {name: names[number] for name, number in safe.items() if number}
+
+
+def prepare(
+    path: Path,
+    rows: tuple[Row, ...] | str,
+    kind: Kind,
+    outside: Callable[[Database], Iterable[Outside]],
+    database: Path | None = None,
+) -> Run:
+    """A cell ready for its first tick.
+
+    Args:
+        path: The system's description.
+        rows: The script, or its name.
+        kind: Which executors run.
+        outside: Makes what stands outside, from the database: robot, hand, camera, vise and machine.
+        database: A database to be used as it is.
+
+    Raises:
+        BadDescription, BadData, BadScript, NotBuilt: Something is not in order; nothing has moved.
+    """
+    system = description(path)
+    signs = signatures(system)
+    needs_cell(system, signs)
+    held = database_of(system, signs, database)
+    script = read_script(script_path(rows, path)) if isinstance(rows, str) else rows
+    station = workstation(script, held.locations, signs["task"], safe_places(held))
+    return Run(assemble(system, kind, held.queries, [station, *outside(held)]), station, held)

@@ -1,0 +1,122 @@
+"""Scripts as data: one row a command, as Fig. 7 prints them.
+
+In: a CSV file with the columns command, part, source, dest, end_at. Out: rows, or what is wrong with them, by row.
+"""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import NamedTuple
+
+from rcsc.host.files.read import MIB, Malformed, rows_of, text
+
+COLUMNS = ("command", "part", "source", "dest", "end_at")
+ROBOT = ("acquire", "move", "release", "transfer", "clear", "pause")
+MACHINE = ("ENGRAVE PART", "MACHINE DOVETAIL")
+PARTS = {"BOXT": "tbox", "BOXB": "bbox", "FLAG": "flag", "HOUS": "hous", "CLOSE-GRIP": "close_grip"}
+"""Parts as Fig. 7 calls them, and as the tables do."""
+
+
+class BadScript(Exception):  # noqa: N818  # what happened, not an error of ours
+    """The script cannot be read; says every row that is wrong."""
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One command.
+
+    Attributes:
+        number: As the file counts, from 1.
+        robot: TASK's command; empty for the vise and the machine.
+        vise: What each jaw is to do: `right` and `left`, True to open.
+        machine: What the machine is to do.
+    """
+
+    number: int
+    text: str
+    robot: str = ""
+    vise: Mapping[str, bool] = field(default_factory=dict)
+    machine: str = ""
+    part: str = ""
+    grasp: int = 0
+    source: str = ""
+    dest: str = ""
+    end_at: str = ""
+    sector: int = 0
+
+
+def read_script(path: Path) -> tuple[Row, ...]:
+    """The rows of a script.
+
+    Raises:
+        BadScript: The file cannot be read, or a row says nothing that a workstation can do.
+    """
+    try:
+        lines = rows_of(text(path, MIB), COLUMNS)
+    except OSError as error:
+        raise BadScript(f"{path} cannot be read: {error.strerror}") from error
+    except Malformed as error:
+        raise BadScript(f"{path}: {error}") from error
+    rows, wrong = [], []
+    for number, line in enumerate(lines, 1):
+        try:
+            rows.append(_row(number, {key: value.strip() for key, value in line.items()}))
+        except ValueError as error:
+            wrong.append(f"{path}, row {number}: {error}")
+    if wrong:
+        raise BadScript("\n".join(wrong))
+    return tuple(rows)
+
+
+def _row(number: int, line: Mapping[str, str]) -> Row:
+    text = " ".join(line[key] for key in COLUMNS if line[key])
+    command = line["command"]
+    if command.startswith("VISE-"):
+        return Row(number, text, vise=_jaws(command.removeprefix("VISE-")))
+    if command in MACHINE:
+        return Row(number, text, machine=command)
+    if command.lower() not in ROBOT:
+        raise ValueError(f"`{command}` is no command of the workstation")
+    part, grasp = _part(line["part"])
+    (source, a), (dest, b), (end_at, c) = (_place(line[key]) for key in ("source", "dest", "end_at"))
+    return Row(number, text, command.lower(), {}, "", part, grasp, source, dest, end_at, max(a, b, c))
+
+
+def _jaws(text: str) -> dict[str, bool]:
+    """`OPEN RIGHT, CLOSE LEFT` and the like."""
+    jaws = {}
+    for one in text.split(","):
+        words = one.split()
+        if len(words) != 2 or words[0] not in ("OPEN", "CLOSE") or words[1] not in ("LEFT", "RIGHT"):
+            raise ValueError(f"`VISE-{text}` says nothing that a vise can do")
+        jaws[words[1].lower()] = words[0] == "OPEN"
+    return jaws
+
+
+def _part(text: str) -> tuple[str, int]:
+    """`BOXT (2)`: a part, and which pair of faces the fingers take."""
+    if not text:
+        return "", 0
+    found = re.fullmatch(r"([A-Z-]+)(?: \((\d)\))?", text)
+    if found is None or found[1] not in PARTS:
+        raise ValueError(f"`{text}` is no part; known are {', '.join(PARTS)}")
+    return PARTS[found[1]], int(found[2] or 0)
+
+
+def _place(text: str) -> tuple[str, int]:
+    """`STATION(3)`: a location, and its sector."""
+    found = re.fullmatch(r"([A-Z0-9-]*)(?:\((\d+)\))?", text)
+    if found is None:
+        raise ValueError(f"`{text}` is no location")
+    return found[1], int(found[2] or 0)
+
+
+class RowEnd(NamedTuple):
+    """What became of a row: `state` is done, failed, refused, or changed where another command came first."""
+
+    number: int
+    text: str
+    state: str
+    reason: str
+    ticks: int

@@ -1,0 +1,350 @@
+"""The workstation as it runs: one command after the other to TASK, the vise and the machine; it stops at a failure.
+
+In: a script, the database's names, the words of TASK's command buffer. Out: one result a row; the order buffers.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal, cast
+
+from rcsc.host.files.plain import plain, read
+from rcsc.run.signature import Leaf, Signature, Value, Values
+from rcsc_cell.workstation.interlocks import Cell, after, refusal
+from rcsc_cell.workstation.orders import (
+    CLOSED_MM,
+    DONE,
+    FAILED,
+    MACHINE_ORDER,
+    MACHINE_REPORT,
+    VISE_ORDER,
+    VISE_REPORT,
+    Latest,
+    Orders,
+    ajar,
+)
+from rcsc_cell.workstation.rest import NOTHING, Progress, rest, stands
+from rcsc_cell.workstation.script import MACHINE, ROBOT, BadScript, Row
+
+ANSWER_TICKS = 75
+"""Within which the vise and the machine have repeated an order's number, and the vise has ended: 3 s; it gives up after two."""
+MACHINE_TICKS = 500
+"""Within which the machine has ended: 20 s."""
+PAUSE_TICKS = 200
+"""Within which TASK has answered PAUSE: 8 s; far less is enough, whatever was under way."""
+NUMBER = "inc_command"
+IN_GRIPPER = "status_parameter"
+"""What TASK reports beside its status: the part in the gripper."""
+State = Literal["running", "done", "failed", "refused"]
+Now = tuple[State, str]
+"""How a row stands, and why it failed."""
+RUNNING: Now = ("running", "")
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """What became of a row."""
+
+    row: Row
+    state: State
+    reason: str
+    first_tick: int
+    ticks: int
+
+
+@dataclass(frozen=True, slots=True)
+class _State:
+    """What a stopped workstation goes on from; its orders stand in their buffers."""
+
+    at: int
+    cell: Cell
+    progress: Progress
+    trouble: str
+
+
+@dataclass(slots=True)
+class Workstation:
+    """Runs a script.
+
+    Attributes:
+        words: TASK's command and report buffers, leaf by leaf, to speak in its words.
+        cell: What it knows of the cell.
+        at: The row under way, from 0.
+        results: Rows that are over.
+        trouble: Why TASK did not pause after a failure; empty when it did.
+        progress: How far the row under way has come, over all its tries.
+        safe: The safe location of each that has one.
+    """
+
+    rows: tuple[Row, ...]
+    locations: Mapping[str, int]
+    order: tuple[Leaf, ...]
+    report: tuple[Leaf, ...]
+    cell: Cell = field(default_factory=Cell)
+    at: int = 0
+    results: list[Result] = field(default_factory=list)
+    trouble: str = ""
+    progress: Progress = field(default_factory=Progress)
+    safe: Mapping[str, str] = field(default_factory=dict)
+    _task: Orders = field(init=False)
+    _vise: Orders = field(default_factory=lambda: Orders(VISE_ORDER, VISE_REPORT))
+    _machine: Orders = field(default_factory=lambda: Orders(MACHINE_ORDER, MACHINE_REPORT))
+    _since: int = -1  # the tick at which the row began
+    _paused: int = -1  # the tick at which PAUSE went down that is not answered yet
+
+    def __post_init__(self) -> None:
+        """Finds the numbers in TASK's buffers."""
+        self._task = Orders(
+            "workstation.order",
+            "task.report",
+            _place(self.report, "inc_command_echo"),
+            _place(self.order, NUMBER),
+        )
+
+    def step(self, tick: int, latest: Latest) -> Mapping[str, Values]:
+        """One tick: begin a row, wait for it, or rest."""
+        lines = (self._task, self._vise, self._machine)
+        for line in lines:
+            line.catch_up(latest)
+        if self._paused >= 0:
+            self._await_pause(tick, latest)
+        elif not self.over:
+            self._work(tick, latest)
+        return {line.order: line.sent for line in lines if line.sent}
+
+    @property
+    def over(self) -> bool:
+        """Whether every row is done, or one was not."""
+        return self.at >= len(self.rows) or self.stopped is not None
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether the PAUSE that follows a failure has been answered, or was waited for in vain."""
+        return self._paused < 0
+
+    @property
+    def stopped(self) -> Result | None:
+        """The result that stopped the script."""
+        last = self.results[-1] if self.results else None
+        return last if last is not None and last.state != "done" and last.row is self.rows[self.at] else None
+
+    def resume(self) -> None:
+        """Tries the row that stopped the script again, once TASK has paused: what is left of it."""
+        if self.stopped is not None:
+            self.results.pop()
+            self._since = -1
+
+    def begin_at(self, row: int) -> None:
+        """Goes on at another row, as if those between were done.
+
+        Args:
+            row: From 0; one that is behind leaves the cell as it is.
+        """
+        if row > self.at:
+            self.cell = self._before
+        for one in self.rows[self.at : row]:
+            self.cell = after(self.cell, one)
+        if row != self.at:
+            self.at, self.progress = row, Progress()
+
+    def state(self) -> dict[str, Any]:
+        """What a stopped workstation goes on from, in plain values; its orders stand in their buffers."""
+        trouble = self.trouble if self.at_rest else "TASK has not paused"
+        return cast(dict[str, Any], plain(_State(self.at, self.cell, self.progress, trouble)))
+
+    def restore(self, said: Mapping[str, Any]) -> None:
+        """Stands as the one that said this, and tries its row again; numbers go on from what stands in the buffers.
+
+        Raises:
+            ValueError: Nothing of ours said it.
+        """
+        held: _State = read(_State, said)
+        if not 0 <= held.at <= len(self.rows):
+            raise ValueError(f"the script has {len(self.rows)} rows, and was stopped in row {held.at + 1}")
+        self.at, self.cell, self.trouble, self.progress = held.at, held.cell, held.trouble, held.progress
+        self.results.clear()
+        self._since = self._paused = -1
+
+    # --- the row under way ---
+
+    @property
+    def _before(self) -> Cell:
+        """The cell as it was before the first try of the row under way: `after` is told of whole rows only."""
+        return self.progress.before if self.progress.tried else self.cell
+
+    def _work(self, tick: int, latest: Latest) -> None:
+        row = self.rows[self.at]
+        if self._since < 0:
+            self._begin(row, tick, latest)
+            return
+        state, why = self._now(row, tick - self._since, latest)
+        if state != "running":
+            self._end(row, tick, state, why)
+
+    def _begin(self, row: Row, tick: int, latest: Latest) -> None:
+        self._since = tick
+        if self.trouble:
+            self._end(row, tick, "failed", self.trouble)
+            return
+        left = self._left(row, latest) if row.robot else row
+        why = refusal(self.cell, left)
+        if why:
+            self._end(row, tick, "refused", why)
+        elif row.vise:
+            self._vise.send(self._jaws(row))
+        elif row.machine:
+            self._machine.send((MACHINE.index(row.machine) + 1,))
+        else:
+            self.progress.begin(self.cell)
+            self._tell(left.robot, left)
+
+    def _left(self, row: Row, latest: Latest) -> Row:
+        """What is to be done of a row for TASK: all of it, or the rest."""
+        report = latest(self._task.report)
+        held = NOTHING if report is None else self._word(report, IN_GRIPPER)
+        return rest(row, self.progress, held, self.safe)
+
+    def _end(self, row: Row, tick: int, state: State, reason: str) -> None:
+        self.results.append(Result(row, state, reason, self._since, tick - self._since))
+        if state == "done":
+            self.cell = after(self._before, row)
+            self.at += 1
+            self._since, self.progress = -1, Progress()
+        elif state == "failed":
+            self._tell("pause", Row(row.number, "PAUSE", "pause"))
+            self._paused = tick
+
+    def _await_pause(self, tick: int, latest: Latest) -> None:
+        """Nothing else is sent before TASK has paused: an order could fall into one that it still carries out."""
+        report = self._task.answer(latest)
+        status = "" if report is None else self._word(report, "status_report")
+        if report is not None and status == "failed":
+            self._paused, self.trouble = -1, f"TASK does not pause: {self._word(report, 'failure')}"
+        elif status == "done":
+            self._paused, self.trouble = -1, ""
+        elif tick - self._paused >= PAUSE_TICKS:
+            self._paused, self.trouble = -1, "TASK does not answer PAUSE"
+
+    # --- how it stands ---
+
+    def _now(self, row: Row, ticks: int, latest: Latest) -> Now:
+        if row.vise:
+            return self._vise_now(row, ticks, latest)
+        if row.machine:
+            return self._machine_now(ticks, latest)
+        return self._task_now(row, latest)
+
+    def _task_now(self, row: Row, latest: Latest) -> Now:
+        report = self._task.answer(latest)
+        if report is None:
+            return RUNNING
+        self.progress.seen(self._word(report, IN_GRIPPER))
+        match self._word(report, "status_report"):
+            case "done":
+                return "done", ""
+            case "failed":
+                failure = self._word(report, "failure")
+                held = self._word(report, IN_GRIPPER)
+                self.progress.failed(row, held, failure)
+                self.cell = stands(row, self.progress, held, self.cell)
+                return "failed", failure
+            case _:
+                return RUNNING
+
+    def _vise_now(self, row: Row, ticks: int, latest: Latest) -> Now:
+        right_open, left_open = self._jaws(row)
+        report = self._vise.answer(latest)
+        if report is not None and report[1] == FAILED:
+            wrong = ajar(report, right_open=right_open, left_open=left_open)
+            return "failed", wrong or "the vise does not come to rest"
+        return _answered("vise", report, ticks, ANSWER_TICKS)
+
+    def _machine_now(self, ticks: int, latest: Latest) -> Now:
+        report, vise = self._machine.answer(latest), latest(VISE_REPORT)
+        if report is not None and report[1] == FAILED:
+            loose = vise is not None and max(vise[2], vise[3]) >= CLOSED_MM
+            return "failed", f"the machine stopped{': the vise is not closed' if loose else ''}"
+        return _answered("machine", report, ticks, MACHINE_TICKS)
+
+    # --- what is sent ---
+
+    def _jaws(self, row: Row) -> tuple[bool, bool]:
+        """How the right and the left jaw are to stand; one that the row does not name stays as it is."""
+        return row.vise.get("right", self.cell.right_open), row.vise.get("left", self.cell.left_open)
+
+    def _tell(self, command: str, row: Row) -> None:
+        said: dict[str, Value | str] = {
+            "input_command": command,
+            "obj": row.part or "null_obj",
+            "grasp": row.grasp,
+            "source_locpt": self.locations.get(row.source, 0),
+            "dest_locpt": self.locations.get(row.dest, 0),
+            "end_at_locpt": self.locations.get(row.end_at, 0),
+            "sector": row.sector,
+        }
+        self._task.send([_value(leaf, said[_last(leaf)]) for leaf in self.order if _last(leaf) != NUMBER])
+
+    def _word(self, report: Values, name: str) -> str:
+        at = _place(self.report, name)
+        return self.report[at].shown(report[at])
+
+
+def workstation(
+    rows: Sequence[Row],
+    locations: Mapping[str, int],
+    task: Signature,
+    safe: Mapping[str, str] | None = None,
+) -> Workstation:
+    """A workstation that runs the rows from the first.
+
+    Args:
+        rows: The script.
+        locations: Numbers of locations by name.
+        task: TASK's program.
+        safe: The safe location of each that has one.
+
+    Raises:
+        BadScript: A row names a place or a part that nobody knows.
+    """
+    order = tuple(task.leaves[at] for at in task.record("command"))
+    report = tuple(task.leaves[at] for at in task.record("report"))
+    parts = next(leaf.members for leaf in order if _last(leaf) == "obj")
+    wrong = [
+        f"row {row.number}: no location is called `{name}`"
+        for row in rows
+        for name in (row.source, row.dest, row.end_at)
+        if name and name not in locations
+    ]
+    wrong += [
+        f"row {row.number}: no part is called `{row.part}`"
+        for row in rows
+        if row.part and row.part not in parts
+    ]
+    wrong += [
+        f"row {row.number}: `{row.robot}` is no command"
+        for row in rows
+        if row.robot and row.robot not in ROBOT
+    ]
+    if wrong:
+        raise BadScript("\n".join(wrong))
+    return Workstation(tuple(rows), locations, order, report, safe=safe or {})
+
+
+def _answered(who: str, report: Values | None, ticks: int, most: int) -> Now:
+    """How an order stands that has not failed: status is the report's second value."""
+    if report is not None and report[1] == DONE:
+        return "done", ""
+    if report is None:
+        return RUNNING if ticks < ANSWER_TICKS else ("failed", f"the {who} does not answer")
+    return RUNNING if ticks < most else ("failed", f"the {who} did not end in {most} cycles")
+
+
+def _place(leaves: Sequence[Leaf], name: str) -> int:
+    return next(at for at, leaf in enumerate(leaves) if _last(leaf) == name)
+
+
+def _last(leaf: Leaf) -> str:
+    return leaf.name.rpartition(".")[2]
+
+
+def _value(leaf: Leaf, said: Value | str) -> Value:
+    return leaf.members.index(said) if isinstance(said, str) else said
