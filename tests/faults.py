@@ -4,7 +4,8 @@
 of a fault is kept in a folder by content, so that a run which is stopped goes on, and one after a change to a table asks only what is new.
 
 - *check*: `rcsc check` of the level's program fails.
-- *compose*: a goal of the level in its environment is not proved (`prove_level`) which is proved of the shipped one, or which that has not;
+- *compose*: an obligation of the level in its environment is not proved (`prove_level`) which is proved of the shipped one, or which that
+has not;
   or a command is not shown to end, or a line never reached, of which the shipped one has the contrary; or one of a level below that may
   assume less than before.
 - *campaign*: in three kinematic episodes, with an interruption, a weak hand and a restart among them, a property does not hold. The
@@ -26,11 +27,11 @@ from multiprocessing import get_context
 from pathlib import Path
 
 from rcsc import driver
-from rcsc.compose.contract.obligations import Goal, Sort
-from rcsc.compose.contract.transition import Stepper
+from rcsc.compose.contract.obligations import Obligation, Sort
+from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.invariant.search import Effort
 from rcsc.compose.proof.level import LevelProof, prove_level
-from rcsc.compose.proof.system import NoProgramError, steppers
+from rcsc.compose.proof.system import NoProgramError, transition_systems
 from rcsc.diagnostics.diagnostic import Severity
 from rcsc.driver.settings import Settings
 from rcsc.emit.write import write
@@ -132,12 +133,12 @@ def by_check(fault: Fault) -> Answer:
 def by_compose(fault: Fault, sound: Mapping[str, "Standing"]) -> Answer:
     """The levels that are other than the shipped ones, in their environment."""
     with tempfile.TemporaryDirectory(prefix="rcsc-fault-") as name:
-        made = steppers(tables_with(fault, Path(name)))
+        made = transition_systems(tables_with(fault, Path(name)))
     lost = []
     for level, before in sound.items():
         if level == fault.level or repr(made[level].links) != before.links:
             now = standing(made[level], prove_level(made[level], EFFORT), before.needed)
-            lost += [f"{level}: {goal}" for goal in sorted(now.open - before.open)]
+            lost += [f"{level}: {obligation}" for obligation in sorted(now.open - before.open)]
     return Answer(bool(lost), "; ".join(lost[:3]))
 
 
@@ -166,7 +167,8 @@ class Standing:
     """What is proved of a level, in words.
 
     Attributes:
-        open: Goals that are not proved; of fields that are not numbered only those that a level below counts on (`needed`); commands that
+        open: Obligations that are not proved; of fields that are not numbered only those that a level below counts on (`needed`);
+        commands that
             are not shown to end; lines that are never reached.
         links: What its environment is, to see whether it changed.
     """
@@ -176,31 +178,33 @@ class Standing:
     needed: frozenset[str]
 
 
-def standing(stepper: Stepper, proof: LevelProof, needed: frozenset[str]) -> Standing:
+def standing(ts: TransitionSystem, proof: LevelProof, needed: frozenset[str]) -> Standing:
     """What a proof leaves open."""
     left = frozenset(
-        _words(goal) for goal in proof.open if goal.sort is not Sort.NUMBERED or goal.name in needed
+        _words(obligation)
+        for obligation in proof.open
+        if obligation.sort is not Sort.NUMBERED or obligation.name in needed
     )
     endless = frozenset(f"{one.table}: the command ends" for one in proof.endings if not one.proved)
     seen = proof.context.unreached if proof.context is not None else ()
     unreached = frozenset(f"{table}: line {line} is reached" for table, line in seen)
-    return Standing(left | endless | unreached, repr(stepper.links), needed)
+    return Standing(left | endless | unreached, repr(ts.links), needed)
 
 
-def _words(goal: Goal) -> str:
-    return f"{goal.table}: {goal.shown}" if goal.table else goal.shown
+def _words(obligation: Obligation) -> str:
+    return f"{obligation.table}: {obligation.shown}" if obligation.table else obligation.shown
 
 
 def shipped(levels: Iterable[str]) -> dict[str, Standing]:
     """What is proved of the shipped levels."""
-    made = steppers(REPO / "tables" / "system.toml")
+    made = transition_systems(REPO / "tables" / "system.toml")
     return {
         level: standing(made[level], prove_level(made[level], EFFORT), _needed(made, level))
         for level in levels
     }
 
 
-def _needed(made: Mapping[str, Stepper], level: str) -> frozenset[str]:
+def _needed(made: Mapping[str, TransitionSystem], level: str) -> frozenset[str]:
     """The fields of the level's orders of which a level below assumes that they are numbered."""
     found = set()
     for below in made[level].links.below:

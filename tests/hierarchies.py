@@ -1,13 +1,13 @@
-"""Random small hierarchies: the composed proof against exhaustive enumeration, goal by goal.
+"""Random small hierarchies: the composed proof against exhaustive enumeration, obligation by obligation.
 
 `python -m tests.hierarchies --count 10000 --jobs 2` prints what agreed and every disagreement with its seed; `--show SEED` prints one
 hierarchy, without the slips that its disagreement does not need. Exit status 1 where something disagrees.
 
-What is compared, of every level of every hierarchy: the goals themselves; each goal that is *proved* with every reachable state; each trace
-that is shown with the contract, with what the interpreter does on its inputs, and with the length of the shortest. That a goal is *not
-proved* although it holds is counted (`incomplete`), and is no disagreement. A command that is shown to end may not go on for ever in
-any run. Where two neighbours agree, both run together with real buffers (`hierarchies_together`), and nothing that was proved of either
-may break.
+What is compared, of every level of every hierarchy: the obligations themselves; each obligation that is *proved* with every reachable
+state; each trace that is shown with the contract, with what the interpreter does on its inputs, and with the length of the shortest. That
+an obligation is *not proved* although it holds is counted (`incomplete`), and is no disagreement. A command that is shown to end may not
+go on for ever in any run. Where two neighbours agree, both run together with real buffers (`hierarchies_together`), and nothing that was
+proved of either may break.
 """
 
 import argparse
@@ -25,13 +25,13 @@ from pathlib import Path
 from random import Random
 
 from rcsc.compose.contract.claims import FOUND, SAFE, Closed, Need, closed
-from rcsc.compose.contract.obligations import Goal, Sort
-from rcsc.compose.contract.transition import Stepper
+from rcsc.compose.contract.obligations import Obligation, Sort
+from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.counterexample.trace import NotReproducedError, Trace, shortest
 from rcsc.compose.invariant.search import Effort
 from rcsc.compose.proof.assume_guarantee import agreements, claims
 from rcsc.compose.proof.level import LevelProof, Verdict, essential, prove_level
-from rcsc.compose.proof.system import NoProgramError, steppers
+from rcsc.compose.proof.system import NoProgramError, transition_systems
 from rcsc.lang.interpret import Fault
 from rcsc.symbolic.values import TRUE
 from tests.hierarchies_endless import edges, endless
@@ -58,7 +58,7 @@ class Disagreement:
 
     what: str
     level: str
-    goal: str
+    obligation: str
     more: str = ""
 
 
@@ -67,7 +67,7 @@ class Judged:
     """What was found of one hierarchy.
 
     Attributes:
-        counts: Levels, goals and traces, and how they agreed.
+        counts: Levels, obligations and traces, and how they agreed.
     """
 
     seed: int
@@ -81,16 +81,16 @@ class Judged:
 class Known:
     """A level with its proof and its states, None where they are too many; and how each table's command may go on for ever."""
 
-    stepper: Stepper
+    ts: TransitionSystem
     role: Role
     proof: LevelProof
     truth: Explored | None
     forever: Mapping[str, str] = field(default_factory=dict)
 
 
-def key_of(goal: Goal) -> Key:
-    """What names a goal."""
-    return goal.sort, goal.table, goal.name
+def key_of(obligation: Obligation) -> Key:
+    """What names an obligation."""
+    return obligation.sort, obligation.table, obligation.name
 
 
 def judged(made: Hierarchy, seed: int = 0, traces: int = 1) -> Judged:
@@ -98,8 +98,8 @@ def judged(made: Hierarchy, seed: int = 0, traces: int = 1) -> Judged:
 
     Args:
         made: The hierarchy.
-        seed: Chooses the goals that are to be shown.
-        traces: How many of the goals that break are to be shown by a trace, of each level.
+        seed: Chooses the obligations that are to be shown.
+        traces: How many of the obligations that break are to be shown by a trace, of each level.
     """
     begun = time.perf_counter()
     try:
@@ -115,13 +115,13 @@ def _compared(made: Hierarchy, seed: int, traces: int) -> Judged:
     random = Random(seed)  # noqa: S311  # repeatable on purpose
     with tempfile.TemporaryDirectory(prefix="rcsc-hierarchy-") as folder:
         try:
-            made_steppers = steppers(written(made, Path(folder)))
+            made_systems = transition_systems(written(made, Path(folder)))
         except NoProgramError as error:
             if "can lie outside" not in str(error) and "can be zero" not in str(error):
                 raise
             return Judged(seed, Counter({"hierarchies": 1, "hierarchies that are refused": 1}))
-    known = {level.name: _known(made, level.name, made_steppers) for level in made.levels}
-    follows = closed(claims(made_steppers, {name: one.proof for name, one in known.items()}))
+    known = {level.name: _known(made, level.name, made_systems) for level in made.levels}
+    follows = closed(claims(made_systems, {name: one.proof for name, one in known.items()}))
     apart: list[Disagreement] = []
     incomplete: list[Disagreement] = []
     for one in known.values():
@@ -152,27 +152,27 @@ def forget() -> None:
 _KNOWN: dict[tuple[str, ...], tuple[LevelProof, Explored | None, Mapping[str, str]]] = {}
 
 
-def _known(made: Hierarchy, name: str, made_steppers: dict[str, Stepper]) -> Known:
+def _known(made: Hierarchy, name: str, made_systems: dict[str, TransitionSystem]) -> Known:
     """A level's proof and its states; many hierarchies have a level in common."""
-    stepper = made_steppers[name]
+    ts = made_systems[name]
     level = next(one for one in made.levels if one.name == name)
-    role = Role(stepper.program, stepper.level, stepper.links, dict(level.said).get("next") in ODD)
+    role = Role(ts.program, ts.level, ts.links, dict(level.said).get("next") in ODD)
     text = files(made)
-    words = (text[f"{name}.rcs"], text["words.rcs"], repr(stepper.links))
+    words = (text[f"{name}.rcs"], text["words.rcs"], repr(ts.links))
     if words not in _KNOWN:
         seen: set[State] = set()
         try:
             truth: Explored | None = explored(role, seen=seen)
         except TooManyError:
             truth = None
-        proof = prove_level(stepper, LITTLE)
+        proof = prove_level(ts, LITTLE)
         every = edges(role, seen) if truth is not None and proof.endings else []
         forever = {one.table: endless(every, one.table, one.still) for one in proof.endings}
         found = tuple(
-            (replace(goal, holds=TRUE), verdict) for goal, verdict in proof.found
+            (replace(obligation, holds=TRUE), verdict) for obligation, verdict in proof.found
         )  # without their many nodes
         _KNOWN[words] = replace(proof, found=found), truth, forever
-    return Known(stepper, role, *_KNOWN[words])
+    return Known(ts, role, *_KNOWN[words])
 
 
 def _verdicts(
@@ -188,7 +188,7 @@ def _verdicts(
     in a level in which no cycle computes what is not defined.
     """
     name = one.proof.level
-    keys = {key_of(goal) for goal, _ in one.proof.found} - {SAFE}
+    keys = {key_of(obligation) for obligation, _ in one.proof.found} - {SAFE}
     if (every := wanted(one.role)) != keys:
         yield Disagreement("other goals", name, str(sorted(every ^ keys)))
     if truth.undefined and follows[name, SAFE].proved:
@@ -196,24 +196,27 @@ def _verdicts(
     seen = one.proof.context
     for line in sorted(truth.lines & set(() if seen is None else seen.unreached)):
         yield Disagreement("never reached, but runs", name, str(line))
-    for goal, verdict in one.proof.found:
-        if goal.key == SAFE:
+    for obligation, verdict in one.proof.found:
+        if obligation.key == SAFE:
             continue
-        proved = follows[name, goal.key].proved
-        breaks = truth.breaks(key_of(goal))
+        proved = follows[name, obligation.key].proved
+        breaks = truth.breaks(key_of(obligation))
         said = "rests on what is not proved" if verdict in FOUND and not proved else verdict.value
         truly = "not defined" if truth.undefined else "breaks" if breaks else "holds"
         counts[f"{said}, {truly}"] += 1
         if truth.undefined:
             if proved:
-                yield Disagreement("proved, but not defined", name, _shown(goal))
+                yield Disagreement("proved, but not defined", name, _shown(obligation))
         elif breaks and verdict in FOUND:
             yield Disagreement(
-                "proved, but breaks", name, _shown(goal), f"in {truth.least.get(key_of(goal))} cycles"
+                "proved, but breaks",
+                name,
+                _shown(obligation),
+                f"in {truth.least.get(key_of(obligation))} cycles",
             )
         elif not breaks and verdict not in FOUND:
             incomplete.append(
-                Disagreement(f"{verdict.value}, but holds", name, _shown(goal), goal.sort.value)
+                Disagreement(f"{verdict.value}, but holds", name, _shown(obligation), obligation.sort.value)
             )
 
 
@@ -241,36 +244,40 @@ def _endings(
             )
 
 
-def _shown(goal: Goal) -> str:
-    return f"{goal.table}: {goal.shown}" if goal.table else goal.shown
+def _shown(obligation: Obligation) -> str:
+    return f"{obligation.table}: {obligation.shown}" if obligation.table else obligation.shown
 
 
 def _traces(
     one: Known, truth: Explored, counts: Counter[str], random: Random, many: int
 ) -> Iterator[Disagreement]:
-    """Traces for some goals that break; and for one that is open and does not, that there is none."""
-    goals = [goal for goal, _ in one.proof.found]
-    breaking = [goal for goal in goals if truth.least.get(key_of(goal), MOST_CYCLES + 1) <= MOST_CYCLES]
-    for goal in random.sample(breaking, min(many, len(breaking))):
-        counts["traces"] += 1
-        yield from _trace(one, goal, truth.least[key_of(goal)])
-    sound = [
-        goal
-        for goal, verdict in one.proof.found
-        if verdict not in FOUND and goal.key != SAFE and key_of(goal) not in truth.least
-        # a fact that is declared is not proved where no first cycle can keep to it; no run of the contract breaks it
-        if not (goal.sort is Sort.ASSUMPTION and goal.name in one.stepper.trusted)
+    """Traces for some obligations that break; and for one that is open and does not, that there is none."""
+    obligations = [obligation for obligation, _ in one.proof.found]
+    breaking = [
+        obligation
+        for obligation in obligations
+        if truth.least.get(key_of(obligation), MOST_CYCLES + 1) <= MOST_CYCLES
     ]
-    for goal in sound[:1]:
+    for obligation in random.sample(breaking, min(many, len(breaking))):
+        counts["traces"] += 1
+        yield from _trace(one, obligation, truth.least[key_of(obligation)])
+    sound = [
+        obligation
+        for obligation, verdict in one.proof.found
+        if verdict not in FOUND and obligation.key != SAFE and key_of(obligation) not in truth.least
+        # a fact that is declared is not proved where no first cycle can keep to it; no run of the contract breaks it
+        if not (obligation.sort is Sort.ASSUMPTION and obligation.name in one.ts.trusted)
+    ]
+    for obligation in sound[:1]:
         counts["traces that there are not"] += 1
-        yield from _trace(one, goal, None)
+        yield from _trace(one, obligation, None)
 
 
-def _trace(one: Known, goal: Goal, least: int | None) -> Iterator[Disagreement]:
-    """The trace of a goal that breaks in `least` cycles, never if None, is one, and no longer."""
-    name, shown = one.proof.level, _shown(goal)
+def _trace(one: Known, obligation: Obligation, least: int | None) -> Iterator[Disagreement]:
+    """The trace of an obligation that breaks in `least` cycles, never if None, is one, and no longer."""
+    name, shown = one.proof.level, _shown(obligation)
     try:
-        trace = shortest(one.stepper, goal, least or 4)
+        trace = shortest(one.ts, obligation, least or 4)
     except NotReproducedError as error:
         if not error.guessed:  # a sum of reals is open to the search, and says so
             yield Disagreement("trace does not run", name, shown, f"least {least}")
@@ -281,11 +288,11 @@ def _trace(one: Known, goal: Goal, least: int | None) -> Iterator[Disagreement]:
         return
     if least is None or len(trace.steps) != least:
         yield Disagreement("trace of another length", name, shown, f"{len(trace.steps)}, least {least}")
-    if (why := _wrong(one.role, goal, trace)) is not None:
+    if (why := _wrong(one.role, obligation, trace)) is not None:
         yield Disagreement("trace is none", name, shown, why)
 
 
-def _wrong(role: Role, goal: Goal, trace: Trace) -> str | None:
+def _wrong(role: Role, obligation: Obligation, trace: Trace) -> str | None:
     """Why a trace is none: run again, with the contract looked at."""
     now = dict(role.start)
     for number, step in enumerate(trace.steps, 1):
@@ -297,7 +304,7 @@ def _wrong(role: Role, goal: Goal, trace: Trace) -> str | None:
             return f"cycle {number} is against what is declared"
         if ran.fault is not Fault.OK and ran.fault not in EARLY and number < len(trace.steps):
             return f"cycle {number} ends the run"
-        broke = key_of(goal) in set(broken(role, now, taken, ran))
+        broke = key_of(obligation) in set(broken(role, now, taken, ran))
         if broke != (number == len(trace.steps)):
             return f"cycle {number} {'breaks' if broke else 'does not break'} it"
         now = ran.after
@@ -312,11 +319,11 @@ def _together(
 ) -> Iterator[Disagreement]:
     """Neighbours that agree, with real buffers."""
     names = [level.name for level in made.levels]
-    agreed = agreements({n: k.stepper for n, k in known.items()}, {n: k.proof for n, k in known.items()})
+    agreed = agreements({n: k.ts for n, k in known.items()}, {n: k.proof for n, k in known.items()})
     for above, below in pairwise(names):
         both = {(above, f"proved of `{below}`"), (below, f"proved of `{above}`")}
         holds = all(one.holds for one in agreed if (one.level, one.reason.split(":")[0]) in both)
-        if not holds or any(goal.sort is Sort.NUMBERED for goal in essential(known[above].proof)):
+        if not holds or any(obligation.sort is Sort.NUMBERED for obligation in essential(known[above].proof)):
             counts["pairs that do not agree"] += 1
             continue
         upper, lower = known[above], known[below]
@@ -348,9 +355,9 @@ def _pair(
 def _proved(proof: LevelProof, follows: Mapping[Need, Closed]) -> frozenset[Key]:
     """What is found so where it has to rest on the contract alone, too: the two break nothing of it."""
     return frozenset(
-        key_of(goal)
-        for goal, verdict in proof.found
-        if verdict is Verdict.PROVED or follows[proof.level, goal.key].proved
+        key_of(obligation)
+        for obligation, verdict in proof.found
+        if verdict is Verdict.PROVED or follows[proof.level, obligation.key].proved
     )
 
 
@@ -420,7 +427,9 @@ def _run(seeds: range, jobs: int, out: Path | None) -> int:
         "seeds": [seeds.start, seeds.stop],
         "seconds": round(seconds, 1),
         "counts": dict(sorted(counts.items())),
-        "disagreements": [[seed, found.what, found.level, found.goal, found.more] for seed, found in apart],
+        "disagreements": [
+            [seed, found.what, found.level, found.obligation, found.more] for seed, found in apart
+        ],
         "incomplete": dict(open_.most_common()),
     }
     sys.stdout.write(json.dumps(said, indent=2) + "\n")

@@ -63,7 +63,7 @@ class Compiled:
         run: One cycle of the level, after which outputs do not show safe values yet.
         settle: Its first part: deferred states and preprocess; raises where an extern procedure is refused.
         in_range: Whether every leaf of a state is in range.
-        stated: Each invariant's condition, then each property's: of the state behind a cycle and of that before it.
+        stated: Each invariant's condition, then each property's: of the state after a cycle and of that before it.
     """
 
     run: Cycle

@@ -1,4 +1,4 @@
-"""Every state that a level can reach in its environment, and the least number of cycles in which each goal breaks.
+"""Every state that a level can reach in its environment, and the least number of cycles in which each obligation breaks.
 
 In: a role. Out: `Explored`. States are the same under other names for their numbers (`hierarchies_world`). What a cycle did not read, it
 would have done with any other value (`Reading`), and an input that the contract does not speak of is not remembered. Cycles run
@@ -66,8 +66,8 @@ class Explored:
     """What is true of a level.
 
     Attributes:
-        least: Goals that break in a run from the first cycle, with the least number of cycles.
-        restarted: Goals that break in a run from a restart only.
+        least: Obligations that break in a run from the first cycle, with the least number of cycles.
+        restarted: Obligations that break in a run from a restart only.
         states: How many there are, up to the names of numbers; `cycles`, how many were run.
         lines: That ran, each with its table.
         undefined: Whether some cycle computes what is not defined, or a value outside its range.
@@ -81,7 +81,7 @@ class Explored:
     undefined: bool = False
 
     def breaks(self, key: Key) -> bool:
-        """Whether a goal breaks in any run."""
+        """Whether an obligation breaks in any run."""
         return key in self.least or key in self.restarted
 
 

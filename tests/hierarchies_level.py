@@ -47,7 +47,7 @@ Result = tuple[str, tuple[Value, ...]]
 """An extern procedure, and what one call of it gave."""
 _Begins = Callable[[dict[str, Value], set[str], "Script"], None]
 Key = tuple[Sort, str, str]
-"""A goal: its sort, its table, its name."""
+"""An obligation: its sort, its table, its name."""
 FLAG = "new_command"
 EARLY = frozenset({Fault.EXTERN, Fault.ASSUMPTION})
 """Faults after which the next cycle runs."""
@@ -188,7 +188,7 @@ class Role:
 
     @cached_property
     def remembered(self) -> frozenset[str]:
-        """Inputs whose last values the contract, or a goal, speaks of."""
+        """Inputs whose last values the contract, or an obligation, speaks of."""
         found = {f"{below.report}.inc_command_echo" for below in self.links.below}
         if (above := self.links.above) is not None:
             found |= {f"{above.order}.inc_command", *above.numbered}
@@ -202,7 +202,7 @@ class Role:
 
     @cached_property
     def watched(self) -> frozenset[str]:
-        """Inputs that a goal reads in the cycle in which they come, or that are remembered."""
+        """Inputs that an obligation reads in the cycle in which they come, or that are remembered."""
         above = self.links.above
         own = {f"{above.order}.input_command"} if above is not None else set()
         return self.remembered | own | (self._stated & set(self.inputs))

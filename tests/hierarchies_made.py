@@ -60,7 +60,7 @@ class MadeLevel:
         more: What else it has (`hierarchies_more`).
         states: What else it states: assumptions, invariants and properties, as declared.
         statuses: What reports can say.
-        asks: Whom it asks where: extern procedures before and behind its table, by the place in the list that they take.
+        asks: Whom it asks where: extern procedures before and after its table, by the place in the list that they take.
     """
 
     name: str

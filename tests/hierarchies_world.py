@@ -1,8 +1,8 @@
 """What the environment of a level may do, and what is to be true of every cycle: on concrete states, in the words of `rcsc.compose`.
 
-Nothing of `rcsc.compose.contract.transition` and `goals` is used but the names of the sorts: this is written anew, to hold them against
-it. What makes the inputs few: programs compare numbers for equality and add one (or two, in slips); so a state is the same under another
-name for each number that the superior gave, and under a shift of those that go down. Of echoes it matters whether they are of the
+Nothing of `rcsc.compose.contract.transition` and `obligations` is used but the names of the sorts: this is written anew, to hold them
+against it. What makes the inputs few: programs compare numbers for equality and add one (or two, in slips); so a state is the same under
+another name for each number that the superior gave, and under a shift of those that go down. Of echoes it matters whether they are of the
 last order; where a program computes with an echo (`Role.odd`), the ones near it are tried, too.
 """
 
@@ -111,11 +111,11 @@ def canonical(role: Role, state: Mapping[str, Value], but: str = "") -> dict[str
     return found
 
 
-# --- the goals ---------------------------------------------------------------------------------
+# --- the obligations ---------------------------------------------------------------------------------
 
 
 def wanted(role: Role) -> frozenset[Key]:
-    """Every goal of a level."""
+    """Every obligation of a level."""
     found: set[Key] = set()
     chosen = role.level.tables
     tables = (chosen.table,) if isinstance(chosen, OneTable) else tuple(name for _, name in chosen.tables)
@@ -146,7 +146,7 @@ def wanted(role: Role) -> frozenset[Key]:
 
 
 def broken(role: Role, before: Mapping[str, Value], taken: Mapping[str, Value], ran: Ran) -> Iterator[Key]:
-    """The goals that a cycle breaks; one that a fault ends publishes nothing, and breaks those of its table only."""
+    """The obligations that a cycle breaks; one that a fault ends publishes nothing, and breaks those of its table only."""
     if ran.fault is UNDEFINED:
         return  # nobody can say what it does
     table = role.tables[ran.table]
@@ -169,7 +169,7 @@ def broken(role: Role, before: Mapping[str, Value], taken: Mapping[str, Value], 
 
 
 def _broken_stated(role: Role, before: Mapping[str, Value], after: Mapping[str, Value]) -> Iterator[Key]:
-    """Invariants hold before the cycle and behind it; properties of both."""
+    """Invariants hold before the cycle and after it; properties of both."""
     stated = role.compiled.stated
     many = len(role.program.invariants)
     for one, condition in zip(role.program.invariants, stated[:many], strict=True):

@@ -22,7 +22,7 @@ from rcsc.run.executors import CExecutor, PythonExecutor
 from rcsc.run.executors import build as build_executors
 from rcsc.run.signature import signature
 from rcsc.testing.agree import Compared, Disagreement, Executors, run_init, run_sanitized
-from rcsc.testing.differential_search import hunt_lines, hunt_sessions
+from rcsc.testing.differential_search import search_lines, search_sessions
 from rcsc.testing.esbmc import Said, prove_function
 from rcsc.testing.executors.equality import same_value
 from rcsc.testing.executors.externs import python_stand_ins, with_c_stand_ins
@@ -84,9 +84,9 @@ def found_of(
         if target.kind == "init":
             one = run_init(executors, target)
         elif is_matcher(target):
-            one = hunt_lines(executors, target, compared, examples)
+            one = search_lines(executors, target, compared, examples)
         else:
-            one = hunt_sessions(executors, target, compared, examples)
+            one = search_sessions(executors, target, compared, examples)
         yield from (one,) if one else ()
 
 

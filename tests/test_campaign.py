@@ -1,4 +1,4 @@
-"""Campaigns: the same outcomes with any crew, kills survived on both sides, journals, shrinking, counterexamples, the command."""
+"""Campaigns: the same outcomes with any worker pool, kills survived on both sides, journals, shrinking, counterexamples, the command."""
 
 import copy
 import json
@@ -38,7 +38,7 @@ from rcsc_cell.campaign.runner import campaign
 from rcsc_cell.campaign.shrink import shrink
 from rcsc_cell.campaign.summary import as_json, as_text, summary
 from rcsc_cell.campaign.work import OtherTables, play
-from rcsc_cell.campaign.worker_pool import Crew, WorkersGone, crew_of, processes
+from rcsc_cell.campaign.worker_pool import WorkerPool, WorkersGone, pool_of, processes
 from rcsc_cell.episodes.episode import (
     FAULTS,
     SYSTEM,
@@ -58,35 +58,35 @@ CALM = Rig(draw=fake.calm, run=fake.play)
 
 
 @contextmanager
-def threads(count: int) -> Iterator[Crew]:
+def threads(count: int) -> Iterator[WorkerPool]:
     with ThreadPoolExecutor(count) as pool:
-        yield Crew(pool, count)
+        yield WorkerPool(pool, count)
 
 
-def played(rig: Rig, count: int, crew: Crew, path: Path, seed: int = 5) -> dict[int, Record]:
+def played(rig: Rig, count: int, pool: WorkerPool, path: Path, seed: int = 5) -> dict[int, Record]:
     with Journal(path, header(rig, seed)) as journal:
-        for _ in campaign(rig, seed, count, crew, journal):
+        for _ in campaign(rig, seed, count, pool, journal):
             pass
         return dict(journal.records)
 
 
 def alone(rig: Rig, count: int, seed: int = 5) -> dict[int, Record]:
-    """The records without any crew."""
+    """The records without any worker pool."""
     return {one.index: one for one in play(rig, digest(rig.system), seed, range(count))}
 
 
-# --- the same with any crew ---
+# --- the same with any worker pool ---
 
 
 @pytest.mark.parametrize("workers", [1, 3, 64])
 def test_records_do_not_depend_on_the_crew(workers: int, tmp_path: Path) -> None:
-    with threads(workers) as crew:
-        assert played(CALM, 150, crew, tmp_path / "j") == alone(CALM, 150)
+    with threads(workers) as pool:
+        assert played(CALM, 150, pool, tmp_path / "j") == alone(CALM, 150)
 
 
 def test_processes_play_as_threads_do(tmp_path: Path) -> None:
-    with processes(2) as crew:
-        assert played(CALM, 100, crew, tmp_path / "j") == alone(CALM, 100)
+    with processes(2) as pool:
+        assert played(CALM, 100, pool, tmp_path / "j") == alone(CALM, 100)
 
 
 def test_a_cluster_plays_as_threads_do(tmp_path: Path) -> None:
@@ -97,9 +97,9 @@ def test_a_cluster_plays_as_threads_do(tmp_path: Path) -> None:
         LocalCluster(n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None) as cluster,
         Client(cluster) as client,
     ):
-        crew = crew_of(client)
-        assert crew.workers == 2
-        found = played(rig, 40, crew, tmp_path / "j")
+        pool = pool_of(client)
+        assert pool.workers == 2
+        found = played(rig, 40, pool, tmp_path / "j")
     assert found == alone(rig, 40)  # in threads what hangs is stopped otherwise than in a main thread
     assert {record.end for record in found.values()} == {"done", "failed:part_lost", "hang"}
 
@@ -118,8 +118,8 @@ def test_a_worker_that_dies_costs_its_own_episode_and_no_other(tmp_path: Path) -
     rig = replace(CALM, draw=fake.wild)
     kills = {at for at in range(40) if fake.KILLS in _faults(rig, at)}
     assert 1 < len(kills) < 9
-    with processes(2) as crew:
-        found = played(rig, 40, crew, tmp_path / "j")
+    with processes(2) as pool:
+        found = played(rig, 40, pool, tmp_path / "j")
     assert {at for at, one in found.items() if one.end == "crash"} == kills
     assert all([one.property for one in found[at].findings] == ["the process survives"] for at in kills)
     expected = play(rig, digest(rig.system), 5, [at for at in range(40) if at not in kills])
@@ -139,8 +139,8 @@ def test_what_hangs_is_stopped_and_so_is_what_cannot_be_stopped(tmp_path: Path) 
         rig = replace(CALM, draw=draw, limit_s=0.25)
         hang = {at for at in range(16) if {fake.HANGS, fake.STUCK} & set(_faults(rig, at))}
         assert hang
-        with processes(1) as crew:
-            found = played(rig, 16, crew, tmp_path / draw.__name__)
+        with processes(1) as pool:
+            found = played(rig, 16, pool, tmp_path / draw.__name__)
         assert {at for at, one in found.items() if one.end == "hang"} == hang
         assert all(
             found[at].findings == (Finding("the run ends in time", 0, "no end within 0.25 s"),) for at in hang
@@ -170,9 +170,9 @@ def test_an_executor_that_breaks_for_good_ends_the_campaign_and_loses_nothing(
     takes: int, tmp_path: Path
 ) -> None:
     with pytest.raises(WorkersGone):
-        played(CALM, 300, Crew(Dying(takes)), tmp_path / "j")
-    with threads(2) as crew:
-        assert played(CALM, 300, crew, tmp_path / "j") == alone(CALM, 300)
+        played(CALM, 300, WorkerPool(Dying(takes)), tmp_path / "j")
+    with threads(2) as pool:
+        assert played(CALM, 300, pool, tmp_path / "j") == alone(CALM, 300)
 
 
 def test_a_broken_executor_is_made_anew_when_it_takes_no_task(tmp_path: Path) -> None:
@@ -182,7 +182,7 @@ def test_a_broken_executor_is_made_anew_when_it_takes_no_task(tmp_path: Path) ->
         made.append(Dying(3))
         return made[-1]
 
-    assert played(CALM, 300, Crew(Dying(2), renew=renew), tmp_path / "j") == alone(CALM, 300)
+    assert played(CALM, 300, WorkerPool(Dying(2), renew=renew), tmp_path / "j") == alone(CALM, 300)
     assert len(made) == 10  # 30 chunks: 2, and 28 by threes
 
 
@@ -211,7 +211,7 @@ def test_the_deaths_that_one_executor_reports_cost_no_other(tmp_path: Path) -> N
         made.append(Dying(1000))
         return made[-1]
 
-    assert played(CALM, 9, Crew(Doomed(), 2, renew=renew), tmp_path / "j") == alone(CALM, 9)
+    assert played(CALM, 9, WorkerPool(Doomed(), 2, renew=renew), tmp_path / "j") == alone(CALM, 9)
     assert len(made) == 1
 
 
@@ -220,9 +220,9 @@ def test_what_was_under_way_beside_a_killer_is_not_blamed(tmp_path: Path) -> Non
     killer = next(at for at in range(200) if fake.KILLS in _faults(rig, at))
     beside = [killer - 2, killer - 1, killer + 1, killer + 2]
     assert not any(fake.KILLS in _faults(rig, at) for at in beside)
-    with processes(2) as crew, Journal(tmp_path / "j", header(rig, 5)) as journal:
+    with processes(2) as pool, Journal(tmp_path / "j", header(rig, 5)) as journal:
         journal.add(_record(at) for at in range(killer - 2))
-        for _ in campaign(rig, 5, killer + 3, crew, journal):
+        for _ in campaign(rig, 5, killer + 3, pool, journal):
             pass
         assert [journal.records[at].end == "crash" for at in sorted([killer, *beside])] == [
             False,
@@ -244,21 +244,21 @@ def test_a_worker_of_another_checkout_is_refused() -> None:
 def test_a_campaign_goes_on_and_plays_nothing_twice(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path, runs = tmp_path / "j", tmp_path / "runs"
     monkeypatch.setenv(fake.RUNS, str(runs))
-    with threads(2) as crew:
+    with threads(2) as pool:
         with Journal(path, header(CALM, 5)) as journal:
-            for _ in zip(campaign(CALM, 5, 200, crew, journal), range(3), strict=False):
+            for _ in zip(campaign(CALM, 5, 200, pool, journal), range(3), strict=False):
                 pass
             some = len(journal.records)
         assert 0 < some < 200
         together = threading.Barrier(2)  # which both threads reach only after what was under way and is lost
-        for one in [crew.executor.submit(together.wait) for _ in range(2)]:
+        for one in [pool.executor.submit(together.wait) for _ in range(2)]:
             one.result()
         runs.unlink()
-        found = played(CALM, 200, crew, path)
+        found = played(CALM, 200, pool, path)
         assert len(runs.read_text().split()) == 200 - some
-        played(CALM, 200, crew, path)
+        played(CALM, 200, pool, path)
         assert len(runs.read_text().split()) == 200 - some
-        assert len(played(CALM, 230, crew, path)) == 230
+        assert len(played(CALM, 230, pool, path)) == 230
     monkeypatch.delenv(fake.RUNS)
     assert found == alone(CALM, 200)
 
@@ -547,8 +547,8 @@ def test_one_counterexample_for_each_property_and_set_of_faults() -> None:
 def test_a_counterexample_of_the_cell_is_small_replays_and_fails_again(tmp_path: Path) -> None:
     rig = Rig(run=fake.dislike)
     records = next(found for at in range(40) if (found := play(rig, digest(SYSTEM), 2, [at]))[0].findings)
-    with threads(1) as crew:
-        [(choice, made)] = counterexamples(rig, 2, choices(records)[:1], crew)
+    with threads(1) as pool:
+        [(choice, made)] = counterexamples(rig, 2, choices(records)[:1], pool)
     place = save(tmp_path, rig, 2, choice, made)
     assert sorted(one.name for one in place.iterdir()) == [
         "episode.json",
@@ -573,8 +573,8 @@ def test_what_kills_its_process_is_shrunk_all_the_same() -> None:
     rig = replace(CALM, draw=fake.wild)
     fatal = [at for at in range(200) if len(_faults(rig, at)) == 2 and fake.KILLS in _faults(rig, at)]
     index = min(fatal, key=lambda at: len(rig.episode(5, at).to_json()))  # each try is a process
-    with processes(1) as crew:
-        [(_, made)] = counterexamples(rig, 5, [Choice(index, (), "the process survives")], crew)
+    with processes(1) as pool:
+        [(_, made)] = counterexamples(rig, 5, [Choice(index, (), "the process survives")], pool)
     assert made.episode == Episode(faults=(replace(made.episode.faults[0]),))
     assert [(one.name, one.first_tick == one.last_tick) for one in made.episode.faults] == [
         (fake.KILLS, True)

@@ -12,9 +12,9 @@ from random import Random
 import pytest
 
 from rcsc.commands import run
-from rcsc.compose.contract.obligations import Goal, Sort, goals
+from rcsc.compose.contract.obligations import Obligation, Sort, obligations
 from rcsc.compose.contract.predicates import point
-from rcsc.compose.contract.transition import Cycle, Stepper
+from rcsc.compose.contract.transition import Cycle, TransitionSystem
 from rcsc.compose.contract.variants import undeferred
 from rcsc.compose.contract.walk import Walk
 from rcsc.compose.counterexample.finding import of_trace, time_line
@@ -23,7 +23,7 @@ from rcsc.compose.invariant.cubes import Reached
 from rcsc.compose.invariant.search import Effort
 from rcsc.compose.proof.assume_guarantee import agreements
 from rcsc.compose.proof.level import LevelProof, Verdict, certificate, essential, prove_level
-from rcsc.compose.proof.system import NoProgramError, SystemProof, prove_system, steppers
+from rcsc.compose.proof.system import NoProgramError, SystemProof, prove_system, transition_systems
 from rcsc.lang.interpret import Fault, cycle, initial
 from rcsc.lang.model import Kind, Real
 from rcsc.run.adopt import adopt
@@ -60,8 +60,8 @@ def without_line(start: str) -> Edit:
     return lambda text: "\n".join(line for line in text.split("\n") if not line.strip().startswith(start))
 
 
-def goal_of(stepper: Stepper, sort: Sort, table: str = "", name: str = "") -> Goal:
-    every = goals(stepper, stepper.cycle(stepper.anywhere()))
+def obligation_of(ts: TransitionSystem, sort: Sort, table: str = "", name: str = "") -> Obligation:
+    every = obligations(ts, ts.cycle(ts.havoc()))
     return next(one for one in every if (one.sort, one.table, one.name) == (sort, table, name))
 
 
@@ -71,9 +71,9 @@ def small() -> SystemProof:
 
 
 @pytest.fixture(scope="module")
-def upper() -> tuple[Stepper, LevelProof]:
-    stepper = steppers(SMALL / "system.toml")["upper"]
-    return stepper, prove_level(stepper, LITTLE)
+def upper() -> tuple[TransitionSystem, LevelProof]:
+    ts = transition_systems(SMALL / "system.toml")["upper"]
+    return ts, prove_level(ts, LITTLE)
 
 
 # --- what is right is proved ---------------------------------------------------------------
@@ -92,38 +92,38 @@ def test_what_a_level_assumes_of_a_level_is_what_was_proved_of_it(small: SystemP
 
 
 def test_no_state_that_the_interpreter_reaches_breaks_the_invariant(
-    upper: tuple[Stepper, LevelProof],
+    upper: tuple[TransitionSystem, LevelProof],
 ) -> None:
-    stepper, proof = upper
+    ts, proof = upper
     assert proof.clauses
     for seed in range(1000, 1012):  # other walks than those that the search began with
-        walk = Walk(stepper.program, stepper.level, stepper.links, Random(seed))  # noqa: S311  # repeatable on purpose
+        walk = Walk(ts.program, ts.level, ts.links, Random(seed))  # noqa: S311  # repeatable on purpose
         for state in walk.states(80):
-            here = Reached.of([point(stepper, proof.features, state)], len(proof.features))
+            here = Reached.of([point(ts, proof.predicates, state)], len(proof.predicates))
             assert not any(here.shows(clause) for clause in proof.clauses)
 
 
-def test_the_proof_is_the_same_each_time(upper: tuple[Stepper, LevelProof]) -> None:
-    stepper, proof = upper
-    again = prove_level(stepper, LITTLE)
+def test_the_proof_is_the_same_each_time(upper: tuple[TransitionSystem, LevelProof]) -> None:
+    ts, proof = upper
+    again = prove_level(ts, LITTLE)
     assert again.clauses == proof.clauses
 
 
 # --- certificates --------------------------------------------------------------------------
 
 
-def test_another_solver_confirms_every_question(upper: tuple[Stepper, LevelProof]) -> None:
+def test_another_solver_confirms_every_question(upper: tuple[TransitionSystem, LevelProof]) -> None:
     questions = certificate(*upper)
     assert {name.split()[0] for name in questions} == {"first", "restart", "step", "goals", "lines", "ends"}
     assert [name for name, text in questions.items() if not cvc5_refutes(text)] == []
 
 
-def test_another_solver_refuses_an_invariant_that_is_none(upper: tuple[Stepper, LevelProof]) -> None:
-    stepper, proof = upper
-    features = [one.name for one in proof.features]
-    never = ((features.index("cur_state"), 2),)  # that the level is never under way
-    false = LevelProof(proof.level, proof.found, proof.features, (*proof.clauses, never), 0, 0, 0.0)
-    assert not all(cvc5_refutes(text) for text in certificate(stepper, false).values())
+def test_another_solver_refuses_an_invariant_that_is_none(upper: tuple[TransitionSystem, LevelProof]) -> None:
+    ts, proof = upper
+    predicates = [one.name for one in proof.predicates]
+    never = ((predicates.index("cur_state"), 2),)  # that the level is never under way
+    false = LevelProof(proof.level, proof.found, proof.predicates, (*proof.clauses, never), 0, 0, 0.0)
+    assert not all(cvc5_refutes(text) for text in certificate(ts, false).values())
 
 
 # --- what is wrong is found ----------------------------------------------------------------
@@ -156,13 +156,13 @@ UPPER_FAULTS: dict[str, tuple[Edit, Sort, str, str]] = {
 @pytest.mark.parametrize("fault", UPPER_FAULTS)
 def test_a_fault_of_a_level_is_found_with_the_shortest_run_that_shows_it(fault: str, tmp_path: Path) -> None:
     edit, sort, table, name = UPPER_FAULTS[fault]
-    stepper = steppers(changed(tmp_path, upper=edit))["upper"]
-    goal = goal_of(stepper, sort, table, name)
-    assert prove_level(stepper, LITTLE).verdict(sort, table, name) is not Verdict.PROVED
-    trace = shortest(stepper, goal)
+    ts = transition_systems(changed(tmp_path, upper=edit))["upper"]
+    obligation = obligation_of(ts, sort, table, name)
+    assert prove_level(ts, LITTLE).verdict(sort, table, name) is not Verdict.PROVED
+    trace = shortest(ts, obligation)
     assert isinstance(trace, Trace)
-    assert [broken(stepper, goal, step) for step in trace.steps] == [False] * (len(trace.steps) - 1) + [True]
-    assert shortest(stepper, goal, most=len(trace.steps) - 1) is None
+    assert [broken(ts, obligation, step) for step in trace.steps] == [False] * (len(trace.steps) - 1) + [True]
+    assert shortest(ts, obligation, most=len(trace.steps) - 1) is None
 
 
 def test_a_subordinate_that_echoes_another_command_breaks_what_its_superior_assumes(tmp_path: Path) -> None:
@@ -197,7 +197,7 @@ def test_a_superior_that_does_not_number_breaks_what_its_subordinate_assumes(tmp
 def test_levels_that_begin_with_different_orders_do_not_agree(
     small: SystemProof, level: str, leaf: str
 ) -> None:
-    made = steppers(SMALL / "system.toml")
+    made = transition_systems(SMALL / "system.toml")
     proofs = {proof.level: proof for proof in small.levels}
     assert all(one.holds for one in agreements(made, proofs))
     program = made[level].program
@@ -215,14 +215,14 @@ def test_an_order_without_a_report_is_refused(tmp_path: Path) -> None:
         path.read_text(encoding="utf-8").replace('"lower.report" = "upper.lower"\n', ""), encoding="utf-8"
     )
     with pytest.raises(BadDescription, match=r"`lower\.command` needs one buffer to `upper`"):
-        steppers(path)
+        transition_systems(path)
 
 
 def test_a_level_without_tables_is_refused(tmp_path: Path) -> None:
     path = changed(tmp_path)
     (tmp_path / "lower.rcs").unlink()
     with pytest.raises(NoProgramError, match="no program `lower`"):
-        steppers(path)
+        transition_systems(path)
 
 
 # --- the translation ------------------------------------------------------------------------
@@ -230,16 +230,14 @@ def test_a_level_without_tables_is_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("level", ["task", "emove", "vision", "primitive", "gripper"])
 def test_a_cycle_as_nodes_is_the_interpreter_s_cycle(level: str) -> None:
-    stepper = steppers(SHIPPED)[level]
-    walk = Walk(stepper.program, stepper.level, stepper.links, Random(7))  # noqa: S311  # repeatable on purpose
+    ts = transition_systems(SHIPPED)[level]
+    walk = Walk(ts.program, ts.level, ts.links, Random(7))  # noqa: S311  # repeatable on purpose
     compared = 0
     for at, state in enumerate(walk.states(240)):
         if at % 12:
             continue
-        made = of_constants(stepper, state)
-        outcome = cycle(
-            stepper.program, stepper.level, {k: v for k, v in state.items() if k in outcome_leaves(stepper)}
-        )
+        made = of_constants(ts, state)
+        outcome = cycle(ts.program, ts.level, {k: v for k, v in state.items() if k in outcome_leaves(ts)})
         assert outcome.fault is Fault.OK
         for name, value in outcome.snapshot.items():
             node = made.after[name]
@@ -249,35 +247,33 @@ def test_a_cycle_as_nodes_is_the_interpreter_s_cycle(level: str) -> None:
     assert compared > 200
 
 
-def of_constants(stepper: Stepper, state: dict[str, int | bool | float]) -> Cycle:
+def of_constants(ts: TransitionSystem, state: dict[str, int | bool | float]) -> Cycle:
     """One cycle from a concrete state that takes the same inputs again."""
-    nodes = {name: values.constant(kind, state[name]) for name, kind in stepper.kinds.items()}
-    taken = {str(v.name): nodes[v.name] for v in stepper.program.variables if v.kind.value == "input"}
-    return stepper.cycle(nodes, taken=taken)
+    nodes = {name: values.constant(kind, state[name]) for name, kind in ts.kinds.items()}
+    taken = {str(v.name): nodes[v.name] for v in ts.program.variables if v.kind.value == "input"}
+    return ts.cycle(nodes, taken=taken)
 
 
-def outcome_leaves(stepper: Stepper) -> set[str]:
-    return {str(v.name) for v in stepper.program.variables}
+def outcome_leaves(ts: TransitionSystem) -> set[str]:
+    return {str(v.name) for v in ts.program.variables}
 
 
 @pytest.mark.parametrize("level", ["task", "emove", "vision", "primitive", "gripper"])
 def test_a_restart_is_what_the_system_does(level: str) -> None:
     """With every input as it is initially, `adopt` starts a level with the values that the proof takes for a restart."""
-    stepper = steppers(SHIPPED)[level]
+    ts = transition_systems(SHIPPED)[level]
     sign = signatures(description(SHIPPED))[level]
-    start = initial(stepper.program)
+    start = initial(ts.program)
     leaves = [leaf.name for leaf in sign.leaves]
     if set(leaves) != set(start):
         pytest.fail("`generated` is not of these tables: run `rcsc compile`")
     adopted = dict(zip(leaves, adopt(sign, tuple(start[leaf] for leaf in leaves)), strict=False))
-    for name, node in stepper.restarted().items():
+    for name, node in ts.restarted().items():
         if node.known and name in adopted:
             assert node.low == int(adopted[name]) or isinstance(node.kind, Real), name
-    free = {name for name, node in stepper.restarted().items() if not node.known}
-    inputs = {str(v.name) for v in stepper.program.variables if v.kind is Kind.INPUT}
-    numbers = {f"{below.order}.inc_command" for below in stepper.links.below} | (
-        {"to_camera.number"} & set(start)
-    )
+    free = {name for name, node in ts.restarted().items() if not node.known}
+    inputs = {str(v.name) for v in ts.program.variables if v.kind is Kind.INPUT}
+    numbers = {f"{below.order}.inc_command" for below in ts.links.below} | ({"to_camera.number"} & set(start))
     assert free == inputs | numbers | {"inc_command_seen"}
     assert all(adopted[name] == 1 for name in numbers)  # the one after the one that stands echoed
 
@@ -296,17 +292,19 @@ NOT_NUMBERED = {
 
 def proved_in_its_environment(level: str) -> None:
     """Prove a shipped level, and have cvc5 confirm it."""
-    stepper = steppers(SHIPPED)[level]
-    proof = prove_level(stepper)
+    ts = transition_systems(SHIPPED)[level]
+    proof = prove_level(ts)
     assert essential(proof) == ()
-    assert {goal.name for goal in proof.open} == NOT_NUMBERED.get(level, set())
-    assert {verdict for goal, verdict in proof.found if goal.sort is Sort.ASSUMPTION} <= {Verdict.PROVED}
+    assert {obligation.name for obligation in proof.open} == NOT_NUMBERED.get(level, set())
+    assert {verdict for obligation, verdict in proof.found if obligation.sort is Sort.ASSUMPTION} <= {
+        Verdict.PROVED
+    }
     assert proof.context is not None
     assert (proof.context.unreached, proof.context.restless) == ((), False)
     again = {(one.table, one.line, one.leaves) for one in proof.context.repeated}
     assert again <= {("goto", "1", ("length_mm",)), ("gothru", "1", ("length_mm",))}
     assert {one.table for one in proof.endings if not one.proved} == set()
-    questions = certificate(stepper, proof)
+    questions = certificate(ts, proof)
     # those about lines take cvc5 longest: `rcsc prove --certify` asks them
     asked = {name: text for name, text in questions.items() if not name.startswith("lines")}
     assert [name for name, text in asked.items() if not cvc5_refutes(text, 120_000_000)] == []
@@ -320,22 +318,20 @@ def test_the_shipped_levels_are_proved_in_their_environment(level: str) -> None:
 
 def test_without_deferral_the_published_argument_is_found_in_three_cycles() -> None:
     """Section 9: the next state is taken while the level below still reports the command before."""
-    shipped = steppers(SHIPPED)["task"]
-    stepper = shipped.of(undeferred(shipped.program))
-    goal = goal_of(stepper, Sort.ASSUMPTION, "acquire", "in_step")
-    trace = shortest(stepper, goal)
+    shipped = transition_systems(SHIPPED)["task"]
+    ts = shipped.of(undeferred(shipped.program))
+    obligation = obligation_of(ts, Sort.ASSUMPTION, "acquire", "in_step")
+    trace = shortest(ts, obligation)
     assert trace is not None
     assert len(trace.steps) == 3
     assert trace.steps[-1].failed == ("in_step",)
-    assert "assumption `in_step` fails" in "\n".join(
-        time_line({"task": stepper}, of_trace(stepper, goal, trace))
-    )
+    assert "assumption `in_step` fails" in "\n".join(time_line({"task": ts}, of_trace(ts, obligation, trace)))
 
 
 def test_a_path_begins_where_the_robot_is() -> None:
     """`here` settles when PAUSE is echoed; a command that comes in that very cycle finds `origin` answered for the place before."""
-    stepper = steppers(SHIPPED)["emove"]
-    assert shortest(stepper, goal_of(stepper, Sort.ASSUMPTION, "move_to", "in_step"), most=5) is None
+    ts = transition_systems(SHIPPED)["emove"]
+    assert shortest(ts, obligation_of(ts, Sort.ASSUMPTION, "move_to", "in_step"), most=5) is None
 
 
 # --- the command line ----------------------------------------------------------------------

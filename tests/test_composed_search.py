@@ -11,16 +11,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rcsc.commands import run
-from rcsc.compose.contract.obligations import Goal
-from rcsc.compose.contract.predicates import Feature
-from rcsc.compose.contract.transition import Cycle, Stepper
+from rcsc.compose.contract.obligations import Obligation
+from rcsc.compose.contract.predicates import Predicate
+from rcsc.compose.contract.transition import Cycle, TransitionSystem
 from rcsc.compose.invariant.cubes import Masks, Pair, Reached, shown
 from rcsc.compose.invariant.search import Effort, Found, search
 from rcsc.compose.proof.context import Again
 from rcsc.compose.proof.kept import keep, recall
 from rcsc.compose.proof.level import LevelProof, Verdict, prove_level
 from rcsc.compose.proof.ranking import parts
-from rcsc.compose.proof.system import prove_steppers, steppers
+from rcsc.compose.proof.system import prove_transition_systems, transition_systems
 from rcsc.compose.proof.termination import Phase, longest
 from rcsc.host.cache import Cache
 from rcsc.lang.interpret import divide
@@ -187,7 +187,7 @@ def test_what_is_known_where_a_branch_is_taken_is_not_carried_elsewhere() -> Non
 
 
 def test_a_variable_that_no_clause_speaks_of_has_a_value() -> None:
-    """As a random hierarchy had one: a feature of the first cycle that nothing there depends on."""
+    """As a random hierarchy had one: a predicate of the first cycle that nothing there depends on."""
     sat = Sat([[1], [-2]])
     assert sat.holds([])
     assert [literal for literal in (1, -1, 2, -2, 7, -7) if sat.value(literal)] == [1, -2, -7]
@@ -213,7 +213,7 @@ PAIRS = st.one_of(*(st.tuples(st.just(at), st.integers(-size, size - 1)) for at,
 
 @given(st.sets(PAIRS, max_size=5), st.sets(PAIRS, max_size=5))
 def test_a_cube_implies_what_is_implied_of_it(one: set[Pair], two: set[Pair]) -> None:
-    """As far as single pairs do; nothing else, however many values a feature has."""
+    """As far as single pairs do; nothing else, however many values a predicate has."""
     masks, first, second = Masks.of(SIZES), tuple(sorted(one)), tuple(sorted(two))
     follows = all(
         pair in one or any(at == pair[0] and 0 <= value != ~pair[1] and pair[1] < 0 for at, value in one)
@@ -224,7 +224,7 @@ def test_a_cube_implies_what_is_implied_of_it(one: set[Pair], two: set[Pair]) ->
 
 
 def test_a_clause_is_written_in_the_words_of_the_tables() -> None:
-    chosen = (Feature("state", Enum("stage", ("a", "b", "c", "d"))), Feature("new", Bool()))
+    chosen = (Predicate("state", Enum("stage", ("a", "b", "c", "d"))), Predicate("new", Bool()))
     assert shown(chosen, ((0, 2), (1, 0))) == "state = c and new = false"
     assert shown(chosen, ((0, ~1), (1, 1))) == "state /= b and new = true"
     assert shown(chosen, ((0, ~3), (0, ~0))) == "state is none of a, d"
@@ -253,7 +253,7 @@ def test_the_longest_way_and_ways_round(pairs: set[tuple[int, int]]) -> None:
 
 def proved(folder: Path, level: str, **edits: Edit) -> LevelProof:
     path = changed(folder, **edits) if edits else SMALL / "system.toml"
-    return prove_level(steppers(path)[level], LITTLE)
+    return prove_level(transition_systems(path)[level], LITTLE)
 
 
 def test_lines_of_the_small_levels_are_all_reached_and_say_the_same_again(tmp_path: Path) -> None:
@@ -333,7 +333,7 @@ def cache(tmp_path: Path) -> Cache:
 
 
 def test_a_proof_is_recalled_as_it_was_and_only_for_the_same_level(cache: Cache, tmp_path: Path) -> None:
-    upper = steppers(SMALL / "system.toml")["upper"]
+    upper = transition_systems(SMALL / "system.toml")["upper"]
     proof = prove_level(upper, LITTLE)
     assert recall(cache, upper, LITTLE) is None
     keep(cache, upper, LITTLE, proof)
@@ -341,40 +341,46 @@ def test_a_proof_is_recalled_as_it_was_and_only_for_the_same_level(cache: Cache,
     assert kept is not None
     assert kept.cached
     assert (kept.clauses, kept.context, kept.endings) == (proof.clauses, proof.context, proof.endings)
-    assert [(goal.key, verdict) for goal, verdict in kept.found] == [
-        (goal.key, verdict) for goal, verdict in proof.found
+    assert [(obligation.key, verdict) for obligation, verdict in kept.found] == [
+        (obligation.key, verdict) for obligation, verdict in proof.found
     ]
-    assert [one.name for one in kept.features] == [one.name for one in proof.features]
+    assert [one.name for one in kept.predicates] == [one.name for one in proof.predicates]
     other = changed(tmp_path / "other", upper=swap(DONE, DONE.replace("d_state", "f_state")))
-    assert recall(cache, steppers(other)["upper"], LITTLE) is None
+    assert recall(cache, transition_systems(other)["upper"], LITTLE) is None
     assert recall(cache, upper, Effort(walks=11, cycles=80)) is None
 
 
 def test_what_is_undecided_is_not_kept(cache: Cache) -> None:
-    upper = steppers(SMALL / "system.toml")["upper"]
+    upper = transition_systems(SMALL / "system.toml")["upper"]
     proof = prove_level(upper, LITTLE)
     given_up = LevelProof(
-        proof.level, tuple((goal, Verdict.UNDECIDED) for goal, _ in proof.found), (), (), 0, 0, 0.0
+        proof.level,
+        tuple((obligation, Verdict.UNDECIDED) for obligation, _ in proof.found),
+        (),
+        (),
+        0,
+        0,
+        0.0,
     )
     keep(cache, upper, LITTLE, given_up)
     assert recall(cache, upper, LITTLE) is None
 
 
 def test_a_system_is_not_proved_twice(cache: Cache, monkeypatch: pytest.MonkeyPatch) -> None:
-    made = steppers(SMALL / "system.toml")
-    first = prove_steppers(made, LITTLE, 1, tuple(made), None, cache)
+    made = transition_systems(SMALL / "system.toml")
+    first = prove_transition_systems(made, LITTLE, 1, tuple(made), None, cache)
 
     def never(*_: object) -> LevelProof:
         raise AssertionError
 
     monkeypatch.setattr("rcsc.compose.proof.system.prove_level", never)
-    again = prove_steppers(made, LITTLE, 1, tuple(made), None, cache)
+    again = prove_transition_systems(made, LITTLE, 1, tuple(made), None, cache)
     assert [one.clauses for one in again.levels] == [one.clauses for one in first.levels]
     assert again.agreements == first.agreements
     assert again.proved
     assert all(one.cached for one in again.levels)
     with pytest.raises(AssertionError):
-        prove_steppers(made, LITTLE, 1, tuple(made), None, None)
+        prove_transition_systems(made, LITTLE, 1, tuple(made), None, None)
 
 
 def test_levels_are_said_as_they_are_done_where_it_is_asked_for(
@@ -383,9 +389,9 @@ def test_levels_are_said_as_they_are_done_where_it_is_asked_for(
     """Each before the next one is begun, and nothing of it among what was found."""
     said: list[str] = []
 
-    def proving(stepper: Stepper, _: Effort) -> LevelProof:
+    def proving(ts: TransitionSystem, _: Effort) -> LevelProof:
         said.append(capsys.readouterr().err)
-        return LevelProof(stepper.level.name, (), (), (), 0, 0, 0.0)
+        return LevelProof(ts.level.name, (), (), (), 0, 0, 0.0)
 
     monkeypatch.setattr("rcsc.compose.proof.system.prove_level", proving)
     asked = ["prove", str(SMALL / "system.toml"), "--no-cache", "--jobs", "1", "--trace", "0", "--json"]
@@ -402,13 +408,17 @@ def test_what_z3_does_not_confirm_is_not_proved(monkeypatch: pytest.MonkeyPatch,
     """The search lies: the level is never under way, is always done, or is in no state at all, which only the first cycle breaks."""
 
     def lying(
-        stepper: Stepper, firsts: Sequence[Cycle], cycle: Cycle, wanted: Sequence[Goal], effort: Effort
+        ts: TransitionSystem,
+        firsts: Sequence[Cycle],
+        cycle: Cycle,
+        wanted: Sequence[Obligation],
+        effort: Effort,
     ) -> Found:
-        found = search(stepper, firsts, cycle, wanted, effort)
-        names = [one.name for one in found.features]
+        found = search(ts, firsts, cycle, wanted, effort)
+        names = [one.name for one in found.predicates]
         at = names.index("cur_state")
         return replace(found, clauses=(*found.clauses, *(((at, lie),) for lie in lies)))
 
     monkeypatch.setattr("rcsc.compose.proof.level.search", lying)
-    proof = prove_level(steppers(SMALL / "system.toml")["upper"], LITTLE)
+    proof = prove_level(transition_systems(SMALL / "system.toml")["upper"], LITTLE)
     assert {verdict for _, verdict in proof.found} == {Verdict.UNDECIDED}

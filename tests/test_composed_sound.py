@@ -10,17 +10,17 @@ import pytest
 
 from rcsc.commands import run
 from rcsc.compose.contract.claims import CONTRACT, FOUND, RUNS, SAFE, Claim, Key, closed
-from rcsc.compose.contract.obligations import Sort, unlooked
+from rcsc.compose.contract.obligations import Sort, unstated
 from rcsc.compose.contract.properties import property_kept
-from rcsc.compose.contract.transition import Stepper
-from rcsc.compose.counterexample.explain import Looking, look
+from rcsc.compose.contract.transition import TransitionSystem
+from rcsc.compose.counterexample.explain import Settings, explain
 from rcsc.compose.counterexample.finding import of_trace
 from rcsc.compose.counterexample.frozen import BadCaseError, case_breaks, read_case
-from rcsc.compose.counterexample.lasso import Lap, laps
+from rcsc.compose.counterexample.lasso import Lasso, lassos
 from rcsc.compose.counterexample.trace import Search, one_cycle, ran, ran_on, shortest
 from rcsc.compose.proof.assume_guarantee import agreements
 from rcsc.compose.proof.level import LevelProof, Verdict, prove_level
-from rcsc.compose.proof.system import NoProgramError, prove_system, steppers
+from rcsc.compose.proof.system import NoProgramError, prove_system, transition_systems
 from rcsc.compose.proof.termination import Ending
 from rcsc.lang.interpret import Fault, initial
 from rcsc.lang.model import Value
@@ -34,21 +34,21 @@ from tests.test_compose import LITTLE, SMALL, Edit, changed, swap
 from tests.test_endings import WAY, go
 
 
-def proved(folder: Path, edit: Edit) -> tuple[Stepper, LevelProof]:
-    stepper = steppers(changed(folder, lower=edit))["lower"]
-    return stepper, prove_level(stepper, LITTLE)
+def proved(folder: Path, edit: Edit) -> tuple[TransitionSystem, LevelProof]:
+    ts = transition_systems(changed(folder, lower=edit))["lower"]
+    return ts, prove_level(ts, LITTLE)
 
 
 def ending(proof: LevelProof, table: str) -> Ending:
     return next(one for one in proof.endings if one.table == table)
 
 
-def lines_run(stepper: Stepper, cycles: int, **inputs: Value) -> list[tuple[str, str]]:
+def lines_run(ts: TransitionSystem, cycles: int, **inputs: Value) -> list[tuple[str, str]]:
     """The table and the line of each cycle under one command."""
-    start = initial(stepper.program)
+    start = initial(ts.program)
     taken = {name: start[name] for name in ("command.inc_command", "command.input_command", "there")}
     taken |= {name.replace("__", "."): value for name, value in inputs.items()}
-    return [(step.table, step.line) for step in ran(stepper, start, [taken] * cycles)]
+    return [(step.table, step.line) for step in ran(ts, start, [taken] * cycles)]
 
 
 # --- what extern procedures give -----------------------------------------------------------------
@@ -69,11 +69,11 @@ def asking(text: str) -> str:
 
 
 def test_an_extern_procedure_may_give_something_else_in_the_next_cycle(tmp_path: Path) -> None:
-    stepper, proof = proved(tmp_path, asking)
-    start = initial(stepper.program)
+    ts, proof = proved(tmp_path, asking)
+    start = initial(ts.program)
     taken: dict[str, Value] = {"command.inc_command": 1, "command.input_command": 1, "there": False}
     turns = [(taken, (("ask", (at % 2 == 0,)),)) for at in range(40)]  # another answer each time
-    lines = [(step.table, step.line) for step in ran_on(stepper, start, turns)]
+    lines = [(step.table, step.line) for step in ran_on(ts, start, turns)]
     assert set(lines[1:]) == {("go", "2")}  # for ever, where it answers so
     assert not ending(proof, "go").proved
 
@@ -108,9 +108,9 @@ def test_what_the_preprocess_may_do_is_followed(edit: Edit, ends: bool, tmp_path
 
 def test_a_refusal_in_the_preprocess_passes_over_a_new_command(tmp_path: Path) -> None:
     """The flag is up when the module calls the procedure, and down in the cycle after the one that ended there."""
-    stepper, proof = proved(tmp_path, nested_extern)
-    assert [(goal.sort, goal.table) for goal in proof.open] == [(Sort.ANSWERED, "go")]
-    found = shortest(stepper, proof.open[0], 3)
+    ts, proof = proved(tmp_path, nested_extern)
+    assert [(obligation.sort, obligation.table) for obligation in proof.open] == [(Sort.ANSWERED, "go")]
+    found = shortest(ts, proof.open[0], 3)
     assert found is not None
     assert (found.steps[-1].fault, found.steps[-1].line) == (Fault.EXTERN, "")
 
@@ -133,8 +133,8 @@ def by_turns(text: str) -> str:
 
 
 def test_tables_that_take_turns_under_one_command_are_named(tmp_path: Path) -> None:
-    stepper, proof = proved(tmp_path, by_turns)
-    lines = lines_run(stepper, 40, command__inc_command=1)
+    ts, proof = proved(tmp_path, by_turns)
+    lines = lines_run(ts, 40, command__inc_command=1)
     assert {table for table, _ in lines[:2]} == {"go", "pause"} == {table for table, _ in lines[-2:]}
     assert all(not ending(proof, table).proved for table in ("go", "pause"))
 
@@ -153,13 +153,13 @@ def test_a_restart_adopts_an_order_only_under_the_name_that_the_system_knows(tmp
     path.write_text(
         path.read_text(encoding="utf-8").replace("lower.command", "lower.orders"), encoding="utf-8"
     )
-    stepper = steppers(path)["lower"]
-    assert stepper.links.above is not None
-    assert stepper.links.above.order == "orders"
-    start = initial(stepper.program) | {"orders.inc_command": 7}
-    step = one_cycle(stepper, start, {"orders.inc_command": 7})
+    ts = transition_systems(path)["lower"]
+    assert ts.links.above is not None
+    assert ts.links.above.order == "orders"
+    start = initial(ts.program) | {"orders.inc_command": 7}
+    step = one_cycle(ts, start, {"orders.inc_command": 7})
     assert step.after["new_command"]
-    assert prove_level(stepper, LITTLE).verdict(Sort.ONCE, "", "new_command") is not Verdict.PROVED
+    assert prove_level(ts, LITTLE).verdict(Sort.ONCE, "", "new_command") is not Verdict.PROVED
 
 
 @pytest.mark.parametrize(
@@ -168,14 +168,14 @@ def test_a_restart_adopts_an_order_only_under_the_name_that_the_system_knows(tmp
 )
 def test_the_proof_knows_every_state_that_a_restart_makes(stands: int | None, echo: int) -> None:
     """The order that stands in the level's own buffer may not be echoed yet: the next number is the one after that."""
-    stepper = steppers(SMALL / "system.toml")["upper"]
-    role = Role(stepper.program, stepper.level, stepper.links)
+    ts = transition_systems(SMALL / "system.toml")["upper"]
+    role = Role(ts.program, ts.level, ts.links)
     now = role.start | {"command.inc_command": 7, "lower.inc_command_echo": echo}
     made = adopted(role, now, {} if stands is None else {"to_lower.inc_command": stands})
     assert made["to_lower.inc_command"] == ((echo if stands is None else stands) + 1) % 65536
-    keyed, known = Keyed(), stepper.restarted()
+    keyed, known = Keyed(), ts.restarted()
     same = [
-        keyed.term(values.equal(known[leaf], values.constant(stepper.kinds[leaf], int(value))))
+        keyed.term(values.equal(known[leaf], values.constant(ts.kinds[leaf], int(value))))
         for leaf, value in made.items()
     ]
     solver = Solver()
@@ -233,9 +233,9 @@ def test_levels_that_take_orders_in_a_ring_are_no_system(many: int, ring: bool, 
     path.write_text("\n".join(wires) + "\n", encoding="utf-8")
     if ring:
         with pytest.raises(BadDescription, match="no highest level: `level0` takes orders of"):
-            steppers(path)
+            transition_systems(path)
     else:
-        assert list(steppers(path)) == names
+        assert list(transition_systems(path)) == names
 
 
 # --- what is assumed of a report, where the level does not number its orders ----------------------
@@ -281,19 +281,19 @@ def test_what_a_level_assumes_of_a_report_rests_on_how_it_numbers_its_orders(
     proof = prove_system(path, LITTLE)
     wrong = ("upper", (sort, "", name))
     assert wrong not in {need for need, one in proof.closed.items() if one.found}
-    for key in ((CONTRACT, "", "lower"), RUNS, *(goal.key for goal, _ in proof.levels[0].found)):
+    for key in ((CONTRACT, "", "lower"), RUNS, *(obligation.key for obligation, _ in proof.levels[0].found)):
         assert (sort, "", name) == key or wrong in proof.of("upper", key).lacks, key
 
 
 def test_an_honest_report_is_not_about_an_order_whose_number_stays(tmp_path: Path) -> None:
     """What the property says is broken by a run in which the level below echoes what it took."""
-    stepper = steppers(changed(tmp_path, upper=unnumbered))["upper"]
-    start = initial(stepper.program)
+    ts = transition_systems(changed(tmp_path, upper=unnumbered))["upper"]
+    start = initial(ts.program)
     order = {"command.inc_command": 1, "command.input_command": 1}
-    first = one_cycle(stepper, start, order)
+    first = one_cycle(ts, start, order)
     assert first.after["to_lower.input_command"] == 1
-    second = one_cycle(stepper, first.after, order)
-    assert not property_kept(stepper, "about", first.after, second.after)
+    second = one_cycle(ts, first.after, order)
+    assert not property_kept(ts, "about", first.after, second.after)
 
 
 # --- both ends of a buffer -----------------------------------------------------------------------
@@ -316,7 +316,7 @@ def test_both_ends_of_a_buffer_are_the_same(other: str, tmp_path: Path) -> None:
     assert old in words
     (tmp_path / "others.rcs").write_text(words.replace(old, new), encoding="utf-8")
     with pytest.raises(BadDescription, match="lower"):
-        steppers(tmp_path / "system.toml")
+        transition_systems(tmp_path / "system.toml")
 
 
 @pytest.mark.parametrize(
@@ -331,7 +331,7 @@ def test_a_buffer_fills_one_input_and_no_other_does(more: str, words: str, tmp_p
     path = changed(tmp_path, lower=swap("use words\n", "use words\n\n"))
     path.write_text(path.read_text(encoding="utf-8") + more + "\n", encoding="utf-8")
     with pytest.raises(BadDescription, match=words):
-        steppers(path)
+        transition_systems(path)
 
 
 def test_a_level_has_one_superior(tmp_path: Path) -> None:
@@ -344,7 +344,7 @@ def test_a_level_has_one_superior(tmp_path: Path) -> None:
     more = '"station.second" = "lower.second"\n"lower.other" = "station.other"\n'
     path.write_text(path.read_text(encoding="utf-8") + more, encoding="utf-8")
     with pytest.raises(BadDescription, match="numbered orders in `command` and in `second`"):
-        steppers(path)
+        transition_systems(path)
 
 
 @pytest.mark.parametrize(
@@ -368,9 +368,9 @@ def test_no_answer_of_the_database_is_a_key_of_a_question(
     assert "feed" in path.read_text(encoding="utf-8")
     if wrong:
         with pytest.raises(BadDescription, match="answer of the database itself"):
-            steppers(path)
+            transition_systems(path)
     else:
-        assert [one.into for one in steppers(path)["solo"].links.asked] == ["first", "second"]
+        assert [one.into for one in transition_systems(path)["solo"].links.asked] == ["first", "second"]
 
 
 # --- how levels begin ----------------------------------------------------------------------------
@@ -414,7 +414,7 @@ def test_levels_begin_with_what_each_assumes(
         )
         return text.replace("state new_command", "state old_speed : int 0 .. 9\nstate new_command")
 
-    made = steppers(changed(tmp_path, words=speeds, upper=compares))
+    made = transition_systems(changed(tmp_path, words=speeds, upper=compares))
     assert made["lower"].links.above is not None
     assert "command.speed" in made["lower"].links.above.numbered
     program = made["upper"].program
@@ -438,16 +438,16 @@ def falls_to_default(text: str) -> str:
 
 
 def test_default_passes_over_a_new_command_like_any_line_that_does_not_look(tmp_path: Path) -> None:
-    stepper = steppers(changed(tmp_path, upper=falls_to_default))["upper"]
-    role = Role(stepper.program, stepper.level, stepper.links)
-    now = initial(stepper.program) | {"command.inc_command": 1, "command.input_command": 1}
+    ts = transition_systems(changed(tmp_path, upper=falls_to_default))["upper"]
+    role = Role(ts.program, ts.level, ts.links)
+    now = initial(ts.program) | {"command.inc_command": 1, "command.input_command": 1}
     now |= {"lower.status_report": 1}  # it executes its first order
     ran_ = role.run(Reading(now))
     assert (ran_.table, ran_.line, ran_.after["begun"]) == ("work", "7", True)
-    again = one_cycle(stepper, ran_.after, {})
-    again = one_cycle(stepper, again.after, {"lower.inc_command_echo": again.after["to_lower.inc_command"]})
+    again = one_cycle(ts, ran_.after, {})
+    again = one_cycle(ts, again.after, {"lower.inc_command_echo": again.after["to_lower.inc_command"]})
     assert not again.after["new_command"]  # nobody answered it
-    assert prove_level(stepper, LITTLE).verdict(Sort.ANSWERED, "work", "new_command") is not Verdict.PROVED
+    assert prove_level(ts, LITTLE).verdict(Sort.ANSWERED, "work", "new_command") is not Verdict.PROVED
 
 
 # --- values that leave their range ---------------------------------------------------------------
@@ -459,7 +459,7 @@ def test_a_program_is_in_order_by_itself_before_anything_is_proved_of_the_levels
     with pytest.raises(
         NoProgramError, match=r"the value can lie outside 0 \.\. 9, the range of `c`: see `rcsc check"
     ):
-        steppers(changed(tmp_path, lower=over))
+        transition_systems(changed(tmp_path, lower=over))
 
 
 # --- answers that do not stay --------------------------------------------------------------------
@@ -473,12 +473,12 @@ def done_now_and_then(text: str) -> str:
 
 def test_an_answer_that_does_not_stay_is_none(tmp_path: Path) -> None:
     """A superior is taken to see an answer some time: it has to stay until it does."""
-    stepper, proof = proved(tmp_path, done_now_and_then)
-    lines = lines_run(stepper, 40, command__inc_command=1, command__input_command=1)
+    ts, proof = proved(tmp_path, done_now_and_then)
+    lines = lines_run(ts, 40, command__inc_command=1, command__input_command=1)
     assert {line for _, line in lines[2:]} == {"2", "3"}
     assert ending(proof, "go").endless == ("2",)
-    found = laps(stepper, ("go",), Search(8, legal=True))["go"]
-    assert isinstance(found, Lap)
+    found = lassos(ts, ("go",), Search(8, legal=True))["go"]
+    assert isinstance(found, Lasso)
     assert [step.line for step in found.trace.steps[found.first - 1 :]] in (["2", "3"], ["3", "2"])
 
 
@@ -562,23 +562,29 @@ RESULTS = {
 @pytest.mark.parametrize("result", RESULTS)
 def test_a_result_that_is_refused_ends_the_cycle_whatever_its_type(result: str, tmp_path: Path) -> None:
     path = solo(tmp_path, asks(*RESULTS[result]))
-    made = steppers(path)
+    made = transition_systems(path)
     proof = prove_system(path, LITTLE)
-    stated = {goal.name: verdict for goal, verdict in proof.levels[0].found if goal.sort is Sort.PROPERTY}
+    stated = {
+        obligation.name: verdict
+        for obligation, verdict in proof.levels[0].found
+        if obligation.sort is Sort.PROPERTY
+    }
     assert stated == {"together": Verdict.NOT_PROVED, "in_range": Verdict.PROVED}
-    [told] = look(made, proof, Looking(description(path), 4))
-    assert told.finding is not None
-    assert not told.beside
-    assert told.finding.broken.fault is Fault.EXTERN
-    assert told.in_c is (result not in {"all of a byte", "a truth value"})  # no C function can give more
+    [explanation] = explain(made, proof, Settings(description(path), 4))
+    assert explanation.finding is not None
+    assert not explanation.beside
+    assert explanation.finding.broken.fault is Fault.EXTERN
+    assert explanation.in_c is (
+        result not in {"all of a byte", "a truth value"}
+    )  # no C function can give more
 
 
 @pytest.mark.parametrize("where", ["preprocess", "line", "postprocess"])
 def test_a_cycle_ends_where_the_result_is_refused(where: str, tmp_path: Path) -> None:
     """Wherever the procedure is called: and only there does what comes after it not run."""
     path = solo(tmp_path, asks(*RESULTS["a number"], where))
-    stepper = steppers(path)["solo"]
-    found = shortest(stepper, next(goal for goal in prove_level(stepper, LITTLE).open), 3)
+    ts = transition_systems(path)["solo"]
+    found = shortest(ts, next(obligation for obligation in prove_level(ts, LITTLE).open), 3)
     assert found is not None
     last = found.steps[-1]
     assert (last.after["a"], last.after["b"], last.after["h"]) == (True, False, last.before["h"])
@@ -622,13 +628,13 @@ def starts_by_asking(text: str) -> str:
 
 
 def test_a_new_command_whose_line_is_cut_short_is_passed_over(tmp_path: Path) -> None:
-    stepper, proof = proved(tmp_path, starts_by_asking)
+    ts, proof = proved(tmp_path, starts_by_asking)
     assert proof.verdict(Sort.ANSWERED, "go", "new_command") is Verdict.NOT_PROVED
-    goal = next(one for one in proof.open if one.sort is Sort.ANSWERED)
-    found = shortest(stepper, goal, 3)
+    obligation = next(one for one in proof.open if one.sort is Sort.ANSWERED)
+    found = shortest(ts, obligation, 3)
     assert found is not None
     assert found.steps[-1].fault is Fault.EXTERN
-    finding = of_trace(stepper, goal, found)
+    finding = of_trace(ts, obligation, found)
     assert finding.ticks[-1]["lower"].line == "4"  # done, though it never began
 
 
@@ -645,11 +651,11 @@ def stops(text: str) -> str:
 
 def test_a_new_command_is_passed_over_where_a_stopping_assumption_fails(tmp_path: Path) -> None:
     """Whether or not there are extern procedures."""
-    stepper, proof = proved(tmp_path, stops)
-    goal = next(one for one in proof.open if one.sort is Sort.ANSWERED)
-    found = shortest(stepper, goal, 3)
+    ts, proof = proved(tmp_path, stops)
+    obligation = next(one for one in proof.open if one.sort is Sort.ANSWERED)
+    found = shortest(ts, obligation, 3)
     assert found is not None
-    assert (goal.table, found.steps[-1].fault) == ("go", Fault.ASSUMPTION)
+    assert (obligation.table, found.steps[-1].fault) == ("go", Fault.ASSUMPTION)
 
 
 def test_what_is_trusted_of_a_restart_is_named_of_both_levels(tmp_path: Path) -> None:
@@ -743,9 +749,9 @@ def test_what_breaks_where_invariants_are_broken_within_a_cycle_is_shown_by_a_ru
     text = within("9").replace("table t", "procedure hop { next later := 0 later := 1 }\ntable t", 1)
     text = text.replace("| false ||            |", "| false || hop        |")
     text = text.replace("input go", "state later : int 0 .. 1 deferred until go\ninput go")
-    made = steppers(solo(tmp_path, text))["solo"]
-    goal = next(one for one in prove_level(made, LITTLE).open if one.sort is Sort.DEFERRED)
-    trace = shortest(made, goal, 3)
+    made = transition_systems(solo(tmp_path, text))["solo"]
+    obligation = next(one for one in prove_level(made, LITTLE).open if one.sort is Sort.DEFERRED)
+    trace = shortest(made, obligation, 3)
     assert trace is not None
     assert [step.line for step in trace.steps] == ["no"]
 
@@ -952,11 +958,11 @@ def test_what_cannot_be_as_declared_in_a_later_state_is_told_as_taken_for_grante
 ) -> None:
     """After six cycles no input is: that the property holds says nothing of the seventh."""
     path = solo(tmp_path, LATER)
-    stepper = steppers(path)["solo"]
-    now = initial(stepper.program)
+    ts = transition_systems(path)["solo"]
+    now = initial(ts.program)
     for _ in range(7):
-        now = dict(one_cycle(stepper, now, {"x": 0}).after)
-    assert not property_kept(stepper, "few", now, now)
+        now = dict(one_cycle(ts, now, {"x": 0}).after)
+    assert not property_kept(ts, "few", now, now)
     assert run(["prove", str(path), "--no-cache"]) in {0, 1}
     said = capsys.readouterr().out.partition("taken for granted\n")[2]
     assert "level `solo` can be as its tables declare in every state that it comes to" in said
@@ -965,12 +971,14 @@ def test_what_cannot_be_as_declared_in_a_later_state_is_told_as_taken_for_grante
 def test_what_is_assumed_of_state_alone_is_to_be_proved(tmp_path: Path) -> None:
     """The level itself decides it, so that nobody has to believe it: and it may be wrong."""
     path = solo(tmp_path, BELIEVES.format(says="not y"))
-    made, whole = steppers(path), prove_system(path, LITTLE)
+    made, whole = transition_systems(path), prove_system(path, LITTLE)
     assert whole.of("solo", (Sort.ASSUMPTION, "t", "never")).verdict is Verdict.NOT_PROVED
-    told = [
-        one for one in look(made, whole, Looking(description(path), 4)) if one.goal.sort is Sort.ASSUMPTION
+    explanation = [
+        one
+        for one in explain(made, whole, Settings(description(path), 4))
+        if one.obligation.sort is Sort.ASSUMPTION
     ]
-    assert [(one.finding is not None, one.beside) for one in told] == [(True, ())]
+    assert [(one.finding is not None, one.beside) for one in explanation] == [(True, ())]
 
 
 # --- what is not recognised ------------------------------------------------------------------------
@@ -994,7 +1002,7 @@ def test_no_goal_is_left_out_because_of_a_name(part: str, tmp_path: Path) -> Non
     edits = {"words": renamed} if part != "the flag" else {}
     path = changed(tmp_path, lower=renamed, upper=renamed, **edits)
     whole = prove_system(path, LITTLE)
-    left = next(one for one in whole.levels if one.level == level).unlooked
+    left = next(one for one in whole.levels if one.level == level).unstated
     assert {one.sort for one in left} >= sorts
     assert not whole.whole
     assert run(["prove", str(path), "--trace", "0", "--strict", "--no-cache"]) == 1
@@ -1005,8 +1013,8 @@ def test_a_flag_is_looked_for_in_every_cell(tmp_path: Path) -> None:
     path = changed(
         tmp_path, lower=lambda text: text.replace("| line | new_command |", "| line | not not new_command |")
     )
-    stepper = steppers(path)["lower"]
-    assert unlooked(stepper) == ()
+    ts = transition_systems(path)["lower"]
+    assert unstated(ts) == ()
 
 
 # --- what is found of lines ------------------------------------------------------------------------
@@ -1051,7 +1059,7 @@ def test_a_fourth_status_answers_nothing(tmp_path: Path) -> None:
     path = changed(
         tmp_path, lower=waits, words=swap("done, executing, failed }", "done, executing, failed, waiting }")
     )
-    proof = prove_level(steppers(path)["lower"], LITTLE)
+    proof = prove_level(transition_systems(path)["lower"], LITTLE)
     assert "4" in ending(proof, "go").endless
 
 
@@ -1062,7 +1070,7 @@ def test_a_table_of_several_commands_is_one_goal(tmp_path: Path) -> None:
         words=swap("{ pause, go }", "{ pause, go, run }"),
         lower=swap("    go : go\n", "    go : go\n    run : go\n"),
     )
-    keys = [goal.key for goal, _ in prove_level(steppers(path)["lower"], LITTLE).found]
+    keys = [obligation.key for obligation, _ in prove_level(transition_systems(path)["lower"], LITTLE).found]
     assert len(keys) == len(set(keys))
 
 
@@ -1123,9 +1131,9 @@ def test_a_cycle_that_a_stopping_assumption_ends_is_shown_as_it_ran(  # where it
     stated = {"answered", "moves"}
     assert {name for name in stated if not whole.of("solo", (Sort.PROPERTY, "", name)).proved} == broken
     assert run(["prove", str(path), "--log", str(tmp_path / "found"), "--json"]) == 1
-    told = {one["name"]: one for one in json.loads(capsys.readouterr().out)["findings"]}
-    assert told.keys() == {*broken, "room"}
-    for name, one in told.items():
+    explanation = {one["name"]: one for one in json.loads(capsys.readouterr().out)["findings"]}
+    assert explanation.keys() == {*broken, "room"}
+    for name, one in explanation.items():
         [row] = one["time_line"]
         assert one["reproduces"]
         assert (row["line"], row["takes"]["at"]) == ("none", "2")

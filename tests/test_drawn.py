@@ -15,11 +15,11 @@ from hypothesis import strategies as st
 import rcsc_cell.pictures.finding_page
 from rcsc.commands import run
 from rcsc.compose.contract.obligations import Key, Sort
-from rcsc.compose.contract.transition import Stepper
+from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.counterexample.finding import Finding, of_trace
 from rcsc.compose.counterexample.replay import _begun, part_of, record
 from rcsc.compose.counterexample.trace import Search, Trace, traces
-from rcsc.compose.proof.system import steppers
+from rcsc.compose.proof.system import transition_systems
 from rcsc.host.files.names import BadName
 from rcsc.run.description import description
 from rcsc.run.log.finding import LoggedCycle, LoggedFinding, finding_facts, finding_of
@@ -38,7 +38,7 @@ from rcsc_cell.pictures.things import NAMED, Block, Mark
 from rcsc_cell.pictures.views import ALONE, TOP
 from rcsc_cell.workstation.prepared import database_of
 from tests.browser import Browser
-from tests.test_findings import LAST_ECHO, PUBLISHED, REPO, goal_of
+from tests.test_findings import LAST_ECHO, PUBLISHED, REPO, obligation_of
 
 SHIPPED = REPO / "tables" / "system.toml"
 SVG = "{http://www.w3.org/2000/svg}"
@@ -198,7 +198,7 @@ def test_a_log_of_a_finding_says_so(published: Path, capsys: pytest.CaptureFixtu
 class Found:
     """The runs that break `FALSE`, recorded."""
 
-    made: dict[str, Stepper]
+    made: dict[str, TransitionSystem]
     findings: dict[str, Finding]
     logs: dict[str, Path]
 
@@ -215,14 +215,14 @@ def found(tmp_path_factory: pytest.TempPathFactory) -> Found:
         path.write_text(
             text.replace("\nlevel ", f"\n## Not so.\nproperty not_so : {said}\n\nlevel "), encoding="utf-8"
         )
-    made = dict(steppers(folder / "tables" / "system.toml"))
+    made = dict(transition_systems(folder / "tables" / "system.toml"))
     key: Key = (Sort.PROPERTY, "", "not_so")
     findings, logs = {}, {}
     for level in FALSE:
-        goal = goal_of(made[level], key)
-        trace = traces(made[level], [goal], Search(most=2, legal=True))[key]
+        obligation = obligation_of(made[level], key)
+        trace = traces(made[level], [obligation], Search(most=2, legal=True))[key]
         assert isinstance(trace, Trace)
-        findings[level] = of_trace(made[level], goal, trace)
+        findings[level] = of_trace(made[level], obligation, trace)
         logs[level] = folder / f"{level}.mcap"
         record(findings[level], made, description(SHIPPED), logs[level])
     return Found(made, findings, logs)
@@ -444,10 +444,10 @@ def test_the_page_is_the_same_again_and_escaped(published: Path) -> None:
             replace(log, facts={**log.facts, "name": "<b>&"}), log.finding, None
         )
     text = rcsc_cell.pictures.finding_page.page(
-        log, replace(log.finding, goal="<i> `a<b`"), None, "for <u> reasons."
+        log, replace(log.finding, obligation="<i> `a<b`"), None, "for <u> reasons."
     )
     assert text == rcsc_cell.pictures.finding_page.page(
-        log, replace(log.finding, goal="<i> `a<b`"), None, "for <u> reasons."
+        log, replace(log.finding, obligation="<i> `a<b`"), None, "for <u> reasons."
     )
     for said in ("&lt;i&gt; <code>a&lt;b</code>", "for &lt;u&gt; reasons."):
         assert said in text

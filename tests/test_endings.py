@@ -6,12 +6,12 @@ from pathlib import Path
 import pytest
 
 from rcsc.commands import run
-from rcsc.compose.counterexample.lasso import Lap, laps
+from rcsc.compose.counterexample.lasso import Lasso, lassos
 from rcsc.compose.counterexample.trace import NotReproducedError, Search
 from rcsc.compose.proof.context import gives_an_order
 from rcsc.compose.proof.level import certificate, prove_level
 from rcsc.compose.proof.ranking import Counted, least_power, parts
-from rcsc.compose.proof.system import steppers
+from rcsc.compose.proof.system import transition_systems
 from rcsc.compose.proof.termination import Ending, longest
 from rcsc.lang.model import Int, Op, Real
 from rcsc.solvers import smt
@@ -59,7 +59,7 @@ def go(lines: str, states: str = "", seen: str = "on := false", begin: str = "",
 
 
 def ending(folder: Path, edit: Edit) -> Ending:
-    found = prove_level(steppers(changed(folder, lower=edit))["lower"], LITTLE)
+    found = prove_level(transition_systems(changed(folder, lower=edit))["lower"], LITTLE)
     assert found.open == ()
     return next(one for one in found.endings if one.table == "go")
 
@@ -143,7 +143,7 @@ def test_what_has_to_stand_still_is_said(tmp_path: Path) -> None:
                             "if to_lower.input_command /= old_command or which /= old_which {")  # fmt: skip
         return text.replace("  old_command := to_lower", "  old_which := which\n  old_command := to_lower")
 
-    found = prove_level(steppers(changed(tmp_path, upper=edit))["upper"], LITTLE)
+    found = prove_level(transition_systems(changed(tmp_path, upper=edit))["upper"], LITTLE)
     assert found.open == ()
     work = next(one for one in found.endings if one.table == "work")
     assert (work.proved, work.still) == (True, ("which",))
@@ -160,14 +160,14 @@ def test_what_has_to_stand_still_is_said(tmp_path: Path) -> None:
     ],
 )
 def test_another_solver_says_that_it_ends(edit: Edit, tmp_path: Path) -> None:
-    stepper = steppers(changed(tmp_path, lower=edit))["lower"]
-    proof = prove_level(stepper, LITTLE)
-    questions = certificate(stepper, proof)
+    ts = transition_systems(changed(tmp_path, lower=edit))["lower"]
+    proof = prove_level(ts, LITTLE)
+    questions = certificate(ts, proof)
     assert {"lines 1", "ends pause 1", "ends go 1", "ends go 2"} <= questions.keys()
     assert [name for name, text in questions.items() if not cvc5_refutes(text)] == []
     # what is claimed beyond what is found again is not confirmed
     false = replace(proof, endings=tuple(replace(one, counted=()) for one in proof.endings))
-    claimed = certificate(stepper, false)
+    claimed = certificate(ts, false)
     assert [name for name, text in claimed.items() if not cvc5_refutes(text)] == [
         "lines and endings as before"
     ]
@@ -193,14 +193,14 @@ def test_a_refutation_that_is_wrong_is_not_confirmed() -> None:
 # --- runs that go round --------------------------------------------------------------------------
 
 
-def lap(folder: Path, level: str, table: str, **edits: Edit) -> Lap | NotReproducedError | None:
-    stepper = steppers(changed(folder, **edits))[level]
-    return laps(stepper, (table,), Search(8, legal=True)).get(table)
+def lasso(folder: Path, level: str, table: str, **edits: Edit) -> Lasso | NotReproducedError | None:
+    ts = transition_systems(changed(folder, **edits))[level]
+    return lassos(ts, (table,), Search(8, legal=True)).get(table)
 
 
 def test_a_line_that_waits_goes_round(tmp_path: Path) -> None:
     """For what nobody brings: the shortest run is to take the command, and to wait; it is new no more, and to wait again."""
-    found = lap(
+    found = lasso(
         tmp_path,
         "lower",
         "go",
@@ -208,7 +208,7 @@ def test_a_line_that_waits_goes_round(tmp_path: Path) -> None:
             "  | 2 | false | going | false | || | executing |\n  | 3 | false | going | true | || | executing |\n"
         ),
     )
-    assert isinstance(found, Lap)
+    assert isinstance(found, Lasso)
     assert ([step.line for step in found.trace.steps], found.first) == (["1", "2", "2"], 3)
 
 
@@ -216,17 +216,17 @@ def test_lines_that_take_turns_go_round_together(tmp_path: Path) -> None:
     lines = (
         "  | 2 | false | going | | true || | executing |\n  | 3 | false | going | | false || | executing |\n"
     )
-    found = lap(tmp_path, "lower", "go", lower=go(lines, **TICK))
-    assert isinstance(found, Lap)
+    found = lasso(tmp_path, "lower", "go", lower=go(lines, **TICK))
+    assert isinstance(found, Lasso)
     lines_run = [step.line for step in found.trace.steps]
     assert (len(lines_run), found.first, set(lines_run[2:])) == (4, 3, {"2", "3"})
 
 
 def test_what_ends_goes_nowhere_round(tmp_path: Path) -> None:
     counts = go(WAY, "state c : int 0 .. 3", "on := c >= 3", "c := 0", "c := min(c + 1, 3)")
-    assert lap(tmp_path / "counts", "lower", "go", lower=counts) is None
+    assert lasso(tmp_path / "counts", "lower", "go", lower=counts) is None
     # a real's way is open to the solver; the interpreter does not come round
-    real = lap(tmp_path / "real", "lower", "go", lower=way("x := min(100.0, x + 30.0)"))
+    real = lasso(tmp_path / "real", "lower", "go", lower=way("x := min(100.0, x + 30.0)"))
     assert isinstance(real, NotReproducedError)
     assert real.guessed
 
@@ -241,8 +241,8 @@ def again(text: str) -> str:
 
 def test_order_after_order_goes_round(tmp_path: Path) -> None:
     """Its numbers go on, and everything else is as before."""
-    found = lap(tmp_path, "upper", "work", upper=again)
-    assert isinstance(found, Lap)
+    found = lasso(tmp_path, "upper", "work", upper=again)
+    assert isinstance(found, Lasso)
     steps = found.trace.steps[found.first - 1 :]
     numbers = [step.after["to_lower.inc_command"] for step in steps]
     assert len(set(numbers)) == 2
@@ -364,7 +364,7 @@ def test_changes_of_state_are_counted_after_the_cycle_that_takes_the_command(
 ) -> None:
     """As often as an enumeration of all runs finds: but not in the cycle that takes it, as the first of a run does."""
     path = changed(tmp_path, lower=flagged)
-    one = steppers(path)["lower"]
+    one = transition_systems(path)["lower"]
     role, seen = Role(one.program, one.level, one.links), set[State]()
     explored(role, seen=seen)
     names = list(role.start)
@@ -386,7 +386,7 @@ def test_changes_of_state_are_counted_after_the_cycle_that_takes_the_command(
 
 
 def of_lower(folder: Path, edit: Edit) -> list[Edge]:
-    one = steppers(changed(folder, lower=edit))["lower"]
+    one = transition_systems(changed(folder, lower=edit))["lower"]
     role, seen = Role(one.program, one.level, one.links), set[State]()
     explored(role, seen=seen)
     return edges(role, seen)
@@ -402,9 +402,9 @@ def test_the_enumeration_sees_rounds_and_their_end(tmp_path: Path) -> None:
 
 
 def test_the_enumeration_sees_order_after_order_and_what_stands_still() -> None:
-    one = steppers(SMALL / "system.toml")["upper"]
+    one = transition_systems(SMALL / "system.toml")["upper"]
     assert "to_lower.inc_command" in one.kinds
-    assert gives_an_order(one, one.cycle(one.anywhere())).op != "constant"
+    assert gives_an_order(one, one.cycle(one.havoc())).op != "constant"
     states: list[State] = [(0,), (1,)]
     there, back = ("in", True), ("in", False)
     round_ = [

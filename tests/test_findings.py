@@ -16,8 +16,8 @@ import rcsc.compose.counterexample.trace
 import rcsc.lang.interpret
 from rcsc.commands import run
 from rcsc.compose.contract.environment import leaves_under
-from rcsc.compose.contract.obligations import Goal, Key, Sort, goals, may_meet, pairs
-from rcsc.compose.contract.transition import Stepper
+from rcsc.compose.contract.obligations import Key, Obligation, Sort, may_meet, obligations, pairs
+from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.contract.variants import VARIANTS, defaults_reported, first_match, undeferred
 from rcsc.compose.counterexample.finding import Finding, of_trace, rows, time_line
 from rcsc.compose.counterexample.frozen import BadCaseError, case_breaks, frozen, read_case
@@ -34,7 +34,7 @@ from rcsc.compose.counterexample.trace import (
     shortest,
     traces,
 )
-from rcsc.compose.proof.system import steppers
+from rcsc.compose.proof.system import transition_systems
 from rcsc.host.files.write import UNPROVED
 from rcsc.lang.interpret import Fault, holds, matching_lines
 from rcsc.lang.model import LineName, Program, Table, Value, VariableName, key_bounds, spell, value_of_key
@@ -61,9 +61,9 @@ Edit = Callable[[str], str]
 
 @dataclass(frozen=True)
 class Looked:
-    """A level and the traces of its goals."""
+    """A level and the traces of its obligations."""
 
-    stepper: Stepper
+    ts: TransitionSystem
     found: dict[Key, Found]
 
     def trace(self, sort: Sort, table: str = "", name: str = "") -> Trace:
@@ -72,20 +72,20 @@ class Looked:
         return found
 
     def finding(self, key: Key) -> Finding:
-        return of_trace(self.stepper, goal_of(self.stepper, key), self.trace(*key))
+        return of_trace(self.ts, obligation_of(self.ts, key), self.trace(*key))
 
 
-def every(stepper: Stepper) -> tuple[Goal, ...]:
-    one = stepper.cycle(stepper.anywhere())
-    return (*goals(stepper, one), *pairs(one))
+def every(ts: TransitionSystem) -> tuple[Obligation, ...]:
+    one = ts.cycle(ts.havoc())
+    return (*obligations(ts, one), *pairs(one))
 
 
-def goal_of(stepper: Stepper, key: Key) -> Goal:
-    return next(goal for goal in every(stepper) if goal.key == key)
+def obligation_of(ts: TransitionSystem, key: Key) -> Obligation:
+    return next(obligation for obligation in every(ts) if obligation.key == key)
 
 
-def looked(stepper: Stepper, search: Search = LEGAL) -> Looked:
-    return Looked(stepper, traces(stepper, every(stepper), search))
+def looked(ts: TransitionSystem, search: Search = LEGAL) -> Looked:
+    return Looked(ts, traces(ts, every(ts), search))
 
 
 def edited(source: Path, folder: Path, **edits: Edit) -> Path:
@@ -106,13 +106,13 @@ def swap(old: str, new: str) -> Edit:
 
 @pytest.fixture(scope="module")
 def published() -> Looked:
-    return looked(steppers(PUBLISHED)["task"])
+    return looked(transition_systems(PUBLISHED)["task"])
 
 
 @pytest.fixture(scope="module")
 def made_by_force(published: Looked, tmp_path_factory: pytest.TempPathFactory) -> Description:
     folder = tmp_path_factory.mktemp("published")
-    assert make([published.stepper.program], folder, altered=False) == ("task",)
+    assert make([published.ts.program], folder, altered=False) == ("task",)
     return replace(description(PUBLISHED), generated=folder)
 
 
@@ -146,7 +146,7 @@ def test_every_hazard_of_the_published_table_is_found_with_its_shortest_run(publ
 )
 def test_no_shorter_run_shows_it(published: Looked, key: Key) -> None:
     shorter = replace(LEGAL, most=HAZARDS[key] - 1)
-    assert traces(published.stepper, [goal_of(published.stepper, key)], shorter) == {}
+    assert traces(published.ts, [obligation_of(published.ts, key)], shorter) == {}
 
 
 def test_the_level_around_it_is_the_published_table() -> None:
@@ -163,7 +163,7 @@ def test_the_level_around_it_is_the_published_table() -> None:
 def test_the_state_written_over_is_the_hazard_that_the_readme_tells(published: Looked) -> None:
     """REMOVE-FROM-BUFFER-DB finds no flag: `f_state` is written while `state_5` is pending, and PICKUP goes down."""
     step = published.trace(Sort.DEFERRED, "", "cur_state").steps[-1]
-    kind = published.stepper.kinds["cur_state"]
+    kind = published.ts.kinds["cur_state"]
     assert [spell(kind, step.after[name]) for name in ("cur_state", "cur_state.next")] == [
         "f_state",
         "state_5",
@@ -176,7 +176,7 @@ def test_the_state_written_over_is_the_hazard_that_the_readme_tells(published: L
 
 def unlawful(looked: Looked, trace: Trace) -> Iterator[str]:
     """Where the environment does what none can that began with the level: told from the run alone."""
-    links = looked.stepper.links
+    links = looked.ts.links
     assert links.above is not None
     number = f"{links.above.order}.inc_command"
     for below in links.below:
@@ -205,17 +205,17 @@ def test_what_is_shown_first_is_what_levels_can_do_that_begin_together(published
 
 def test_the_contract_leaves_room_for_more() -> None:
     """Numbers that have gone round: what no level that began with this one can echo, the contract allows."""
-    stepper = steppers(LAST_ECHO)["upper"]
+    ts = transition_systems(LAST_ECHO)["upper"]
     key = (Sort.NEXT_NUMBER, "", "to_lower")
-    assert traces(stepper, [goal_of(stepper, key)], LEGAL) == {}
-    wide = Looked(stepper, traces(stepper, [goal_of(stepper, key)], Search(most=4)))
+    assert traces(ts, [obligation_of(ts, key)], LEGAL) == {}
+    wide = Looked(ts, traces(ts, [obligation_of(ts, key)], Search(most=4)))
     assert list(unlawful(wide, wide.trace(*key)))
 
 
 def test_inputs_change_only_where_they_must(published: Looked) -> None:
     """The time line of a run, whole: the simplest one, whatever model the solver would give."""
     finding = published.finding((Sort.ONE_LINE, "acquire", "14 and 15"))
-    assert time_line({"task": published.stepper}, finding) == [
+    assert time_line({"task": published.ts}, finding) == [
         "cycle 1: table `acquire`, line `16`",
         "  takes emove.status_report = failed",
         (
@@ -230,40 +230,46 @@ def test_inputs_change_only_where_they_must(published: Looked) -> None:
 
 def test_a_run_does_not_go_on_behind_a_fault() -> None:
     """Every line stands twice, so that the first order is a fault: nothing that needs it done, or another cycle, is found."""
-    stepper = steppers(LAST_ECHO)["upper"]
-    [table] = stepper.program.tables
+    ts = transition_systems(LAST_ECHO)["upper"]
+    [table] = ts.program.tables
     again = tuple(replace(line, name=LineName(f"{line.name}_again")) for line in table.lines)
-    twice = stepper.of(replace(stepper.program, tables=(replace(table, lines=(*table.lines, *again)),)))
+    twice = ts.of(replace(ts.program, tables=(replace(table, lines=(*table.lines, *again)),)))
     names = {"start and start_again", "end and end_again", "to_lower", "to_lower.input_command"}
-    wanted = [goal for goal in every(twice) if goal.name in names and goal.sort is not Sort.WAITS]
-    assert {goal.name for goal in wanted} == names
+    wanted = [
+        obligation
+        for obligation in every(twice)
+        if obligation.name in names and obligation.sort is not Sort.WAITS
+    ]
+    assert {obligation.name for obligation in wanted} == names
     found = traces(twice, wanted, Search(most=4))
     assert {key[2] for key in found} == {"start and start_again"}
 
 
 def test_what_a_faulty_cycle_would_have_left_is_not_looked_at() -> None:
     """An order before the echo meets two lines: that it has the number of the one before does not count."""
-    stepper = steppers(LAST_ECHO)["upper"]
-    [table] = stepper.program.tables
+    ts = transition_systems(LAST_ECHO)["upper"]
+    [table] = ts.program.tables
     start, busy = table.lines[:2]
     state = [column.variable for column in table.columns].index(VariableName("cur_state"))
     late = (*start.tests[:state], busy.tests[state], *start.tests[state + 1 :])
     added = replace(start, name=LineName("start_at_work"), tests=late)
-    changed = replace(stepper.program, tables=(replace(table, lines=(*table.lines, added)),))
-    goals_of = every(stepper.of(changed))
-    [wanted] = [goal for goal in goals_of if goal.key == (Sort.NUMBERED, "", "to_lower.input_command")]
-    assert traces(stepper, [wanted], Search(most=3, legal=True))
-    assert traces(stepper.of(changed), [wanted], Search(most=3, legal=True)) == {}
+    changed = replace(ts.program, tables=(replace(table, lines=(*table.lines, added)),))
+    obligations_of = every(ts.of(changed))
+    [wanted] = [
+        obligation
+        for obligation in obligations_of
+        if obligation.key == (Sort.NUMBERED, "", "to_lower.input_command")
+    ]
+    assert traces(ts, [wanted], Search(most=3, legal=True))
+    assert traces(ts.of(changed), [wanted], Search(most=3, legal=True)) == {}
 
 
 def test_a_pair_of_lines_is_not_broken_by_another(published: Looked) -> None:
     step = published.trace(Sort.ONE_LINE, "acquire", "14 and 15").steps[-1]
     assert step.matched == ("14", "15")
-    assert broken(
-        published.stepper, goal_of(published.stepper, (Sort.ONE_LINE, "acquire", "14 and 15")), step
-    )
+    assert broken(published.ts, obligation_of(published.ts, (Sort.ONE_LINE, "acquire", "14 and 15")), step)
     assert not broken(
-        published.stepper, goal_of(published.stepper, (Sort.ONE_LINE, "acquire", "10 and 14")), step
+        published.ts, obligation_of(published.ts, (Sort.ONE_LINE, "acquire", "10 and 14")), step
     )
 
 
@@ -274,32 +280,32 @@ def test_a_run_can_begin_with_a_restart(tmp_path: Path) -> None:
         text = text.replace("nextstate(f_state)", "nextstate(d_state)")
         return text.replace("cur_state in {d_state, f_state} and ref", "cur_state = d_state and ref")
 
-    stepper = steppers(edited(SMALL / "system.toml", tmp_path, upper=never_failed))["upper"]
-    goal = goal_of(stepper, (Sort.ASSUMPTION, "work", "in_step"))
-    assert traces(stepper, [goal], LEGAL) == {}
-    found = traces(stepper, [goal], replace(LEGAL, restarted=True))[goal.key]
+    ts = transition_systems(edited(SMALL / "system.toml", tmp_path, upper=never_failed))["upper"]
+    obligation = obligation_of(ts, (Sort.ASSUMPTION, "work", "in_step"))
+    assert traces(ts, [obligation], LEGAL) == {}
+    found = traces(ts, [obligation], replace(LEGAL, restarted=True))[obligation.key]
     assert isinstance(found, Trace)
     assert found.restarted
-    first = of_trace(stepper, goal, found).start("upper")
-    assert spell(stepper.kinds["cur_state"], first["cur_state"]) == "f_state"
+    first = of_trace(ts, obligation, found).start("upper")
+    assert spell(ts.kinds["cur_state"], first["cur_state"]) == "f_state"
 
 
 # --- what does not reproduce ---------------------------------------------------------------
 
 
 def test_a_run_that_the_interpreter_does_not_do_is_a_bug(monkeypatch: pytest.MonkeyPatch) -> None:
-    stepper = steppers(LAST_ECHO)["upper"]
-    goal = goal_of(stepper, (Sort.NUMBERED, "", "to_lower.input_command"))
+    ts = transition_systems(LAST_ECHO)["upper"]
+    obligation = obligation_of(ts, (Sort.NUMBERED, "", "to_lower.input_command"))
     monkeypatch.setattr(rcsc.compose.counterexample.trace, "broken", lambda *_: False)
     with pytest.raises(NotReproducedError) as raised:
-        shortest(stepper, goal)
+        shortest(ts, obligation)
     assert not raised.value.guessed
     assert raised.value.beside == ("every leaf that the solver spoke of is the same in both",)
 
 
 def test_where_the_interpreter_parts_from_the_solver_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    stepper = steppers(LAST_ECHO)["upper"]
-    goal = goal_of(stepper, (Sort.NUMBERED, "", "to_lower.input_command"))
+    ts = transition_systems(LAST_ECHO)["upper"]
+    obligation = obligation_of(ts, (Sort.NUMBERED, "", "to_lower.input_command"))
     true_cycle = rcsc.lang.interpret.cycle
 
     def other(*args: object) -> object:
@@ -309,7 +315,7 @@ def test_where_the_interpreter_parts_from_the_solver_is_said(monkeypatch: pytest
 
     monkeypatch.setattr(rcsc.compose.counterexample.trace, "cycle", other)
     with pytest.raises(NotReproducedError) as raised:
-        shortest(stepper, goal)
+        shortest(ts, obligation)
     assert raised.value.beside == ("cycle 2: `to_lower.input_command` = drill by the solver, rest as it ran",)
 
 
@@ -325,9 +331,9 @@ def test_arithmetic_that_was_left_open_is_no_bug(tmp_path: Path) -> None:
             "assume square monitored : x * x = x * x * 1.0 or x < 0.5\n\ntable go assuming square {",
         ),
     )
-    stepper = steppers(path)["lower"]
+    ts = transition_systems(path)["lower"]
     with pytest.raises(NotReproducedError) as raised:
-        shortest(stepper, goal_of(stepper, (Sort.ASSUMPTION, "go", "square")))
+        shortest(ts, obligation_of(ts, (Sort.ASSUMPTION, "go", "square")))
     assert raised.value.guessed
 
 
@@ -340,7 +346,7 @@ def test_a_finding_is_run_by_both_executors_and_its_log_replays(
 ) -> None:
     finding = published.finding(key)
     path = tmp_path / "finding.mcap"
-    record(finding, {"task": published.stepper}, made_by_force, path)
+    record(finding, {"task": published.ts}, made_by_force, path)
     log = read(path)
     assert log.complete
     assert len(log.ticks) == len(finding.ticks)
@@ -358,19 +364,19 @@ def test_a_log_of_a_finding_holds_what_the_environment_gave(
 ) -> None:
     finding = published.finding((Sort.ONE_LINE, "acquire", "13 and 14"))
     path = tmp_path / "finding.mcap"
-    record(finding, {"task": published.stepper}, made_by_force, path)
+    record(finding, {"task": published.ts}, made_by_force, path)
     log = read(path)
     assert set(log.buffers) == {
         "workstation.order", "emove.report", "database.task.vision_needed", "database.task.source_known",
     }  # fmt: skip
-    reports = leaves_under(published.stepper.program, "emove")
+    reports = leaves_under(published.ts.program, "emove")
     for tick, steps in enumerate(finding.ticks, 1):
         given = log.buffers["emove.report"].latest(tick)
         assert given == tuple(steps["task"].taken[leaf] for leaf in reports)
 
 
 def test_an_executor_that_does_something_else_is_a_bug(published: Looked, tmp_path: Path) -> None:
-    make([published.stepper.program], tmp_path, altered=False)
+    make([published.ts.program], tmp_path, altered=False)
     module = tmp_path / "python" / "task.py"
     text = module.read_text(encoding="utf-8")
     assert "s.report_failure = s.failure" in text
@@ -378,7 +384,7 @@ def test_an_executor_that_does_something_else_is_a_bug(published: Looked, tmp_pa
     finding = published.finding((Sort.ONE_LINE, "acquire", "14 and 15"))
     system = replace(description(PUBLISHED), generated=tmp_path)
     with pytest.raises(ExecutorsDifferError) as raised:
-        record(finding, {"task": published.stepper}, system, tmp_path / "a.mcap")
+        record(finding, {"task": published.ts}, system, tmp_path / "a.mcap")
     assert raised.value.beside == (
         "tick 1, level `task`: `report.failure` = state by the interpreter, none by the Python executor",
     )
@@ -386,7 +392,7 @@ def test_an_executor_that_does_something_else_is_a_bug(published: Looked, tmp_pa
 
 def test_a_level_that_ends_in_another_line_is_a_bug(published: Looked, tmp_path: Path) -> None:
     """The trace is compared, too: here the C takes line 14 where two match."""
-    make([published.stepper.program], tmp_path, altered=False)
+    make([published.ts.program], tmp_path, altered=False)
     source = tmp_path / "c" / "task.c"
     text = source.read_text(encoding="utf-8")
     assert "line = several ? (-2) : line;" in text
@@ -396,7 +402,7 @@ def test_a_level_that_ends_in_another_line_is_a_bug(published: Looked, tmp_path:
     with pytest.raises(
         ExecutorsDifferError, match=r"several_lines, failed: none by the interpreter, .* by the C executor"
     ):
-        record(finding, {"task": published.stepper}, system, tmp_path / "a.mcap")
+        record(finding, {"task": published.ts}, system, tmp_path / "a.mcap")
 
 
 # --- made by force -------------------------------------------------------------------------
@@ -475,7 +481,7 @@ def test_first_match_runs_the_first_of_the_lines_that_match() -> None:
     changed = 0
     random = Random(5)  # noqa: S311  # repeatable on purpose
     for path, level in ((FIRST_MATCH, "upper"), (PUBLISHED, "task")):
-        program = steppers(path)[level].program
+        program = transition_systems(path)[level].program
         table, other = program.tables[0], first_match(program).tables[0]
         kinds = {str(v.name): v.type for v in program.variables}
         for _ in range(3000):
@@ -490,19 +496,19 @@ def test_first_match_runs_the_first_of_the_lines_that_match() -> None:
 
 
 def test_first_match_leaves_tables_alone_whose_lines_part() -> None:
-    program = steppers(LAST_ECHO)["upper"].program
+    program = transition_systems(LAST_ECHO)["upper"].program
     assert first_match(program) == program
     assert may_meet(program.tables[0]) == []
 
 
 def test_of_two_lines_that_match_the_first_loses_the_command() -> None:
     """`busy` comes first: the new command is seen in that one cycle, and never answered; in the next nobody knows of it."""
-    plain = steppers(FIRST_MATCH)["upper"]
+    plain = transition_systems(FIRST_MATCH)["upper"]
     key = (Sort.ANSWERED, "pass_down", "new_command")
     assert key not in looked(plain).found  # the cell stops there: two lines match
     found = looked(plain.of(first_match(plain.program)))
     assert [step.line for step in found.trace(*key).steps] == ["start", "busy"]
-    shown = rows({"upper": found.stepper}, found.finding(key))
+    shown = rows({"upper": found.ts}, found.finding(key))
     assert [row.wrong for row in shown] == [
         "",
         "the new command is passed over: seen once more, `new_command` is down",
@@ -513,11 +519,11 @@ def test_of_two_lines_that_match_the_first_loses_the_command() -> None:
 
 def test_numbers_taken_from_the_last_echo_lose_a_command() -> None:
     """Two orders before an echo have one number: the level below never sees the second, and says that it is done."""
-    made = steppers(LAST_ECHO)
+    made = transition_systems(LAST_ECHO)
     upper, lower = made["upper"], made["lower"]
     found = broken_together(upper, lower, upper.links.below[0], LEGAL)
     assert isinstance(found, Finding)
-    assert found.goal.sort is Sort.SAME_ORDER
+    assert found.obligation.sort is Sort.SAME_ORDER
     ran = [(row.level, row.line) for row in rows(made, found)]
     assert ran == [
         ("upper", "start"), ("lower", "rest"), ("upper", "start"), ("lower", "rest"), ("upper", "end"), ("lower", "ended"),
@@ -531,7 +537,7 @@ def test_numbers_taken_from_the_last_echo_lose_a_command() -> None:
 def test_the_same_numbers_in_order_lose_none() -> None:
     """The other example numbers its orders one after the other, and so does the small system."""
     for path, level in ((FIRST_MATCH, "upper"), (SMALL / "system.toml", "upper")):
-        made = steppers(path)
+        made = transition_systems(path)
         upper = made[level].of(first_match(made[level].program))
         assert broken_together(upper, made["lower"], upper.links.below[0], replace(LEGAL, most=4)) is None
 
@@ -542,24 +548,24 @@ def test_a_report_about_another_order_is_found_together(tmp_path: Path) -> None:
         tmp_path,
         lower=swap("ref_command_echo := command.input_command", "ref_command_echo := go"),
     )
-    made = steppers(path)
+    made = transition_systems(path)
     upper, lower = made["upper"], made["lower"]
     found = broken_together(upper, lower, upper.links.below[0], LEGAL)
     assert isinstance(found, Finding)
-    assert (found.level, found.goal.sort, len(found.ticks)) == ("upper", Sort.OF_ITS_ORDER, 2)
+    assert (found.level, found.obligation.sort, len(found.ticks)) == ("upper", Sort.OF_ITS_ORDER, 2)
 
 
 def test_what_falls_to_default_is_found_where_it_is_asked_for(published: Looked) -> None:
     key = (Sort.NO_DEFAULT, "acquire", "")
     assert key not in published.found
-    stepper = published.stepper.of(defaults_reported(published.stepper.program))
-    found = traces(stepper, [goal_of(stepper, key)], LEGAL)[key]
+    ts = published.ts.of(defaults_reported(published.ts.program))
+    found = traces(ts, [obligation_of(ts, key)], LEGAL)[key]
     assert isinstance(found, Trace)
     assert found.steps[-1].line == "16"
 
 
 def test_a_two_level_finding_is_a_log_of_both(tmp_path: Path) -> None:
-    made = steppers(LAST_ECHO)
+    made = transition_systems(LAST_ECHO)
     found = broken_together(made["upper"], made["lower"], made["upper"].links.below[0], LEGAL)
     assert isinstance(found, Finding)
     assert (
@@ -592,7 +598,7 @@ def test_a_case_does_not_say_what_its_own_levels_give_each_other() -> None:
     )
     assert [sorted(tick) for tick in json.loads(text)["ticks"]] == [["lower", "upper"]] * 3
     assert [tick["lower"] for tick in json.loads(text)["ticks"]] == [{}, {}, {}]
-    made = steppers(LAST_ECHO)
+    made = transition_systems(LAST_ECHO)
     found = broken_together(made["upper"], made["lower"], made["upper"].links.below[0], LEGAL)
     assert isinstance(found, Finding)
     case = REPO / "tests" / "findings" / "any.json"
@@ -603,7 +609,7 @@ def test_a_finding_thaws_as_it_was_frozen(published: Looked, tmp_path: Path) -> 
     for key in HAZARDS:
         path = tmp_path / "case.json"
         path.write_text(
-            frozen(published.finding(key), {"task": published.stepper}, PUBLISHED, path), encoding="utf-8"
+            frozen(published.finding(key), {"task": published.ts}, PUBLISHED, path), encoding="utf-8"
         )
         case = read_case(path)
         assert not case.expects_broken
@@ -628,11 +634,11 @@ def test_a_case_is_kept_once_the_table_is_mended(tmp_path: Path) -> None:
 
 
 def test_a_case_under_another_rule_is_to_stay_broken(tmp_path: Path) -> None:
-    plain = steppers(SMALL / "system.toml")["upper"]
+    plain = transition_systems(SMALL / "system.toml")["upper"]
     found = looked(plain.of(undeferred(plain.program)), replace(LEGAL, most=3))
     finding = found.finding((Sort.ASSUMPTION, "work", "in_step"))
     path = tmp_path / "case.json"
-    made = {"upper": found.stepper}
+    made = {"upper": found.ts}
     path.write_text(
         frozen(finding, made, SMALL / "system.toml", path, ("without-deferral",)), encoding="utf-8"
     )
@@ -680,9 +686,7 @@ def test_a_case_that_cannot_be_run_says_why(
 
 
 def test_the_cell_that_parts_two_lines_is_shown(published: Looked) -> None:
-    said = {
-        key[2]: helps(published.stepper, published.finding(key)) for key in HAZARDS if key[0] is Sort.ONE_LINE
-    }
+    said = {key[2]: helps(published.ts, published.finding(key)) for key in HAZARDS if key[0] is Sort.ONE_LINE}
     assert said["14 and 15"] == (
         "in line `14` write `/= executing` under `status_in`: proved to part the two lines",
     )
@@ -693,7 +697,7 @@ def test_the_cell_that_parts_two_lines_is_shown(published: Looked) -> None:
 
 def test_the_weakest_condition_holds_of_just_the_inputs_that_one_line_matches(tmp_path: Path) -> None:
     """In the place of `in_step`, read by the language itself, on every input of the table."""
-    program = steppers(SMALL / "system.toml")["upper"].program
+    program = transition_systems(SMALL / "system.toml")["upper"].program
     weakest = weakest_condition(program, table_of(program, "work"))
     text = (SMALL / "upper.rcs").read_text(encoding="utf-8")
     start = text.index("assume in_step")
@@ -701,7 +705,7 @@ def test_the_weakest_condition_holds_of_just_the_inputs_that_one_line_matches(tm
     path = edited(
         SMALL / "system.toml", tmp_path, upper=swap(stated, f"assume in_step monitored : {weakest}")
     )
-    changed = steppers(path)["upper"].program
+    changed = transition_systems(path)["upper"].program
     table, [condition] = table_of(changed, "work"), [one.condition for one in changed.assumptions]
     held = [
         holds(condition, seen) is (len(matching_lines(table, seen)) == 1)
@@ -713,7 +717,7 @@ def test_the_weakest_condition_holds_of_just_the_inputs_that_one_line_matches(tm
 
 
 def test_a_condition_that_would_be_long_is_not_shown() -> None:
-    program = steppers(REPO / "tables" / "system.toml")["task"].program
+    program = transition_systems(REPO / "tables" / "system.toml")["task"].program
     assert weakest_condition(program, table_of(program, "acquire")) == ""
 
 
@@ -737,16 +741,16 @@ def inputs_of(program: Program, table: Table) -> Iterator[dict[str, Value]]:
 
 def test_a_line_that_no_table_has_is_proposed_where_none_matches() -> None:
     """What section 9 says: additional lines would do, but would nearly double the table."""
-    shipped_task = steppers(REPO / "tables" / "system.toml")["task"]
-    stepper = shipped_task.of(undeferred(shipped_task.program))
-    goal = goal_of(stepper, (Sort.NO_DEFAULT, "acquire", ""))
-    trace = shortest(stepper, goal, most=3, legal=True)
+    shipped_task = transition_systems(REPO / "tables" / "system.toml")["task"]
+    ts = shipped_task.of(undeferred(shipped_task.program))
+    obligation = obligation_of(ts, (Sort.NO_DEFAULT, "acquire", ""))
+    trace = shortest(ts, obligation, most=3, legal=True)
     assert trace is not None
-    finding = of_trace(stepper, goal, trace)
-    seen = seen_by_table(stepper, finding.broken)
+    finding = of_trace(ts, obligation, trace)
+    seen = seen_by_table(ts, finding.broken)
     assert seen is not None
-    assert matching_lines(table_of(stepper.program, "acquire"), seen) == []
-    [why, row] = helps(stepper, finding)
+    assert matching_lines(table_of(ts.program, "acquire"), seen) == []
+    [why, row] = helps(ts, finding)
     assert why.startswith("no line matches while new_command = false")
     assert "closes this part of the gap and overlaps no other: proved" in row
 

@@ -10,11 +10,11 @@ from random import Random
 import pytest
 
 from rcsc.compose.contract.claims import Claim, Closed, Need, closed
-from rcsc.compose.contract.obligations import Goal, Sort
-from rcsc.compose.contract.transition import Stepper
+from rcsc.compose.contract.obligations import Obligation, Sort
+from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.contract.walk import Walk
 from rcsc.compose.counterexample.trace import NotReproducedError, Trace, shortest
-from rcsc.compose.proof.system import steppers
+from rcsc.compose.proof.system import transition_systems
 from rcsc.symbolic import values
 from rcsc.symbolic.execution import Run
 from tests import hierarchies, hierarchies_together, hierarchies_world
@@ -42,7 +42,7 @@ def _nothing_known() -> Iterator[None]:
 
 
 def roles(made: Hierarchy, folder: Path) -> dict[str, Role]:
-    known = steppers(written(made, folder))
+    known = transition_systems(written(made, folder))
     odd = {level.name: dict(level.said).get("next") in ODD for level in made.levels}
     return {name: Role(one.program, one.level, one.links, odd[name]) for name, one in known.items()}
 
@@ -177,7 +177,7 @@ def test_a_prover_that_believes_in_a_better_world_is_found_out(monkeypatch: pyte
     slip = said(plain(), 0, released="begun")
     assert words(slip) == set()
     forget()
-    monkeypatch.setattr(Stepper, "_protocol", lambda *_: values.FALSE)
+    monkeypatch.setattr(TransitionSystem, "_protocol", lambda *_: values.FALSE)
     assert words(slip) >= {"proved, but breaks", "no trace found"}
 
 
@@ -191,8 +191,8 @@ def test_a_contract_that_is_not_kept_is_found_out(clause: str, monkeypatch: pyte
 def test_a_trace_that_is_too_long_or_none_is_found_out(monkeypatch: pytest.MonkeyPatch) -> None:
     slip = said(plain(), 0, released="begun")
 
-    def longer(stepper: Stepper, goal: Goal, most: int) -> Trace | None:
-        trace = shortest(stepper, goal, most)
+    def longer(ts: TransitionSystem, obligation: Obligation, most: int) -> Trace | None:
+        trace = shortest(ts, obligation, most)
         return trace and replace(trace, steps=(trace.steps[0], *trace.steps))
 
     monkeypatch.setattr(hierarchies, "shortest", longer)

@@ -9,21 +9,21 @@ from pathlib import Path
 import pytest
 
 from rcsc.commands import run
-from rcsc.compose.contract.obligations import Sort, goals
-from rcsc.compose.contract.transition import Stepper
+from rcsc.compose.contract.obligations import Sort, obligations
+from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.contract.variants import first_match, undeferred
 from rcsc.compose.counterexample.trace import shortest
 from rcsc.compose.promela.assemble import BROKEN, RESTARTED, TAKEN, TOLD, Model, emit
 from rcsc.compose.promela.cycle.aims import CONTRACT_BELOW
 from rcsc.compose.promela.cycle.statements import Check, Forget, Fork, Put, read, same
 from rcsc.compose.promela.instance import Breadth
-from rcsc.compose.promela.lazy_copy import Sunk, sunk
+from rcsc.compose.promela.lazy_copy import LazyCopy, lazy_copies
 from rcsc.compose.promela.liveness import needed
 from rcsc.compose.promela.selection import wanted
 from rcsc.compose.promela.spell import RESERVED, identifiers
 from rcsc.compose.promela.spin import Checked, Search, SpinError, check, tools
 from rcsc.compose.promela.trail import rerun, run_of, told
-from rcsc.compose.proof.system import steppers
+from rcsc.compose.proof.system import transition_systems
 from rcsc.lang.model import Bool, Enum
 
 REPO = Path(__file__).parents[1]
@@ -34,16 +34,16 @@ Edit = Callable[[str], str]
 
 
 @cache
-def _levels(path: Path) -> Mapping[str, Stepper]:
-    return steppers(path)
+def _levels(path: Path) -> Mapping[str, TransitionSystem]:
+    return transition_systems(path)
 
 
-def levels_of(path: Path) -> dict[str, Stepper]:
+def levels_of(path: Path) -> dict[str, TransitionSystem]:
     """The levels of a description; read once."""
     return dict(_levels(path))
 
 
-def changed(folder: Path, origin: Path = SMALL, **edits: Edit) -> dict[str, Stepper]:
+def changed(folder: Path, origin: Path = SMALL, **edits: Edit) -> dict[str, TransitionSystem]:
     """The small system, or another, with some files edited."""
     shutil.copytree(origin, folder, dirs_exist_ok=True, ignore=shutil.ignore_patterns(".rcsc-cache"))
     for name, edit in edits.items():
@@ -51,7 +51,7 @@ def changed(folder: Path, origin: Path = SMALL, **edits: Edit) -> dict[str, Step
         before = path.read_text(encoding="utf-8")
         assert edit(before) != before, f"the edit of {name} does nothing"
         path.write_text(edit(before), encoding="utf-8")
-    return steppers(folder / "system.toml")
+    return transition_systems(folder / "system.toml")
 
 
 def swap(old: str, new: str) -> Edit:
@@ -148,9 +148,9 @@ def test_a_fault_is_found_by_spin_as_by_the_prover_and_runs(fault: str, tmp_path
     said = run_of(model, system, found.trail)
     assert (said.aim.what, said.aim.table, said.aim.name) == (sort.value, table, name)
     assert said.ran, said.reason
-    every = goals(system["upper"], system["upper"].cycle(system["upper"].anywhere()))
-    goal = next(one for one in every if (one.sort, one.table, one.name) == (sort, table, name))
-    trace = shortest(system["upper"], goal)
+    every = obligations(system["upper"], system["upper"].cycle(system["upper"].havoc()))
+    obligation = next(one for one in every if (one.sort, one.table, one.name) == (sort, table, name))
+    trace = shortest(system["upper"], obligation)
     assert trace is not None
     restarted = said.lines[0].endswith("begins anew")
     assert (
@@ -262,13 +262,13 @@ def test_the_outside_echoes_the_last_order_or_an_older_one_and_never_the_next(tm
 def test_what_is_read_twice_is_drawn_where_it_is_read_first() -> None:
     seen, copy, other = (read(name, Enum("status", ("done", "failed"))) for name in ("seen", "copy", "other"))
     once = (Forget(("seen",)), Put("copy", seen), Check(0, same(copy, copy)))
-    assert sunk([once], frozenset({"seen"}), frozenset())[1] == (Sunk("copy", seen),)
+    assert lazy_copies([once], frozenset({"seen"}), frozenset())[1] == (LazyCopy("copy", seen),)
     twice = (*once, Put("other", seen), Check(1, same(other, copy)))
-    assert sunk([twice], frozenset({"seen"}), frozenset())[1] == ()
-    kept = sunk([once], frozenset({"seen"}), frozenset({"seen"}))
+    assert lazy_copies([twice], frozenset({"seen"}), frozenset())[1] == ()
+    kept = lazy_copies([once], frozenset({"seen"}), frozenset({"seen"}))
     assert kept == ((once,), ())
     written = (Put("seen", copy), *once)
-    assert sunk([written], frozenset({"seen"}), frozenset())[1] == ()
+    assert lazy_copies([written], frozenset({"seen"}), frozenset())[1] == ()
 
 
 def test_what_no_check_asks_for_is_left_out_but_not_what_it_depends_on() -> None:
@@ -296,7 +296,7 @@ def test_a_model_that_does_otherwise_than_the_interpreter_is_told_from_one_that_
 def test_the_same_tables_give_the_same_model_and_its_header_says_what_is_left_out() -> None:
     system = levels_of(SHIPPED)
     first = emit(system, ("gripper",), WINDOW)
-    assert first == emit(steppers(SHIPPED), ("gripper",), WINDOW)  # read anew
+    assert first == emit(transition_systems(SHIPPED), ("gripper",), WINDOW)  # read anew
     assert "gripper:waited: 0 .. 150 stands for itself with the gaps closed: 0 .. 1" in first.text
     assert "gripper:inc_command_seen: numbers go round after 4" in first.text
     assert "to_hand_opening_mm" not in first.text.partition("*/")[2]  # nothing asks for it

@@ -10,7 +10,7 @@ import pytest
 
 from rcsc.commands import run
 from rcsc.compose.contract.obligations import Sort
-from rcsc.compose.contract.transition import Stepper
+from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.invariant.search import Effort
 from rcsc.compose.promela.assemble import Model, emit
 from rcsc.compose.promela.instance import Breadth
@@ -128,7 +128,7 @@ def some_property(random: Random) -> str:
     return f"{some_condition(random, leaves)} {word} {some_condition(random, leaves, was=word == 'then')}"
 
 
-def every_broken(system: dict[str, Stepper], level: str) -> dict[str, bool]:
+def every_broken(system: dict[str, TransitionSystem], level: str) -> dict[str, bool]:
     """The names of what is broken in the instance, each found with those found before left out; and whether the interpreter does it."""
     runs: list[Run] = []
     while True:
@@ -152,7 +152,9 @@ def test_of_statements_at_random_spin_finds_broken_what_is_not_proved_and_no_mor
     proof = prove_level(system["lower"], Effort(walks=6, cycles=40))
     sorts = {Sort.PROPERTY, Sort.INVARIANT}
     not_proved = {
-        goal.name for goal, verdict in proof.found if goal.sort in sorts and verdict is not Verdict.PROVED
+        obligation.name
+        for obligation, verdict in proof.found
+        if obligation.sort in sorts and verdict is not Verdict.PROVED
     }
     assert 0 < len(not_proved) < len(stated)
     assert every_broken(system, "lower") == dict.fromkeys(not_proved, True)

@@ -13,17 +13,17 @@ import pytest
 
 from rcsc.commands import run
 from rcsc.compose.contract.environment import Links
-from rcsc.compose.contract.obligations import Goal, Sort, goals
-from rcsc.compose.contract.predicates import CLOSELY, Feature
+from rcsc.compose.contract.obligations import Obligation, Sort, obligations
+from rcsc.compose.contract.predicates import CLOSELY, Predicate
 from rcsc.compose.contract.properties import every_feature, property_kept
-from rcsc.compose.contract.transition import Stepper
+from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.contract.walk import Walk
 from rcsc.compose.counterexample.finding import of_trace, time_line
 from rcsc.compose.counterexample.trace import Search, Trace, broken, ran, shortest, traces
 from rcsc.compose.invariant.search import Effort, read
 from rcsc.compose.proof.kept import keep, recall
 from rcsc.compose.proof.level import LevelProof, Verdict, certificate, prove_level
-from rcsc.compose.proof.system import steppers
+from rcsc.compose.proof.system import transition_systems
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Severity
 from rcsc.diagnostics.source import Source
@@ -49,24 +49,28 @@ def program_of(text: str) -> Program:
     return program
 
 
-def alone(text: str) -> Stepper:
+def alone(text: str) -> TransitionSystem:
     """The one level of a text, whose inputs may have any value at any moment."""
     program = program_of(text)
     [level] = program.levels
     free = tuple(str(v.name) for v in program.variables if v.kind is Kind.INPUT)
-    return Stepper(program, level, Links(level.name, None, (), (), free))
+    return TransitionSystem(program, level, Links(level.name, None, (), (), free))
 
 
-def stated(stepper: Stepper) -> dict[str, Goal]:
-    every = goals(stepper, stepper.cycle(stepper.anywhere()))
-    return {goal.name: goal for goal in every if goal.sort in {Sort.INVARIANT, Sort.PROPERTY}}
+def stated(ts: TransitionSystem) -> dict[str, Obligation]:
+    every = obligations(ts, ts.cycle(ts.havoc()))
+    return {
+        obligation.name: obligation
+        for obligation in every
+        if obligation.sort in {Sort.INVARIANT, Sort.PROPERTY}
+    }
 
 
 def verdicts(proof: LevelProof) -> dict[str, bool]:
     return {
-        goal.name: verdict is Verdict.PROVED
-        for goal, verdict in proof.found
-        if goal.sort in {Sort.INVARIANT, Sort.PROPERTY}
+        obligation.name: verdict is Verdict.PROVED
+        for obligation, verdict in proof.found
+        if obligation.sort in {Sort.INVARIANT, Sort.PROPERTY}
     }
 
 
@@ -243,22 +247,20 @@ MEANINGS: dict[str, Meaning] = {
 
 @pytest.mark.parametrize("text", MEANINGS)
 def test_a_property_means_what_the_manual_says_of_every_two_cycles(text: str) -> None:
-    stepper = alone(f"{PAIR}property it : {text}\n")
+    ts = alone(f"{PAIR}property it : {text}\n")
     for p, q, p2, q2 in product((False, True), repeat=4):
         before, after = {"p": p, "q": q, "i": False}, {"p": p2, "q": q2, "i": True}
-        assert property_kept(stepper, "it", before, after) is MEANINGS[text](p, q, p2, q2)
+        assert property_kept(ts, "it", before, after) is MEANINGS[text](p, q, p2, q2)
 
 
 def test_was_goes_into_sets_and_arrays_with_their_index() -> None:
     kept = "state kept : array[2] of int 0 .. 9\nstate n : int 0 .. 1\n"
-    stepper = alone(
-        f"{kept}{PAIR}property whole : was kept[n] = 7\nproperty among : was (kept[n] in {{2, 7}})\n"
-    )
+    ts = alone(f"{kept}{PAIR}property whole : was kept[n] = 7\nproperty among : was (kept[n] in {{2, 7}})\n")
     before, after = {"kept[0]": 1, "kept[1]": 7, "n": 1}, {"kept[0]": 5, "kept[1]": 5, "n": 0}
     for name in ("whole", "among"):
-        assert property_kept(stepper, name, before, after)
-        assert not property_kept(stepper, name, after, before)
-        assert not property_kept(stepper, name, {**before, "n": 0}, {**before, "n": 1})
+        assert property_kept(ts, name, before, after)
+        assert not property_kept(ts, name, after, before)
+        assert not property_kept(ts, name, {**before, "n": 0}, {**before, "n": 1})
 
 
 def test_inputs_are_those_that_the_cycle_took() -> None:
@@ -267,14 +269,14 @@ def test_inputs_are_those_that_the_cycle_took() -> None:
         "level l { period 40 [ms] table t }\n"
         "property now : s = i\nproperty late : s = was i\nproperty behind : was s = was i\n"
     )
-    stepper = alone(text)
-    assert verdicts(prove_level(stepper, LITTLE)) == {"now": True, "late": False, "behind": False}
-    late = shortest(stepper, stated(stepper)["late"])
+    ts = alone(text)
+    assert verdicts(prove_level(ts, LITTLE)) == {"now": True, "late": False, "behind": False}
+    late = shortest(ts, stated(ts)["late"])
     assert late is not None
     assert [step.taken for step in late.steps] == [{"i": True}]
     # before the first cycle after a restart inputs are as they stand in the buffers, and `s` as at first
-    assert shortest(stepper, stated(stepper)["behind"]) is None
-    [restarted] = traces(stepper, [stated(stepper)["behind"]], Search(most=2, restarted=True)).values()
+    assert shortest(ts, stated(ts)["behind"]) is None
+    [restarted] = traces(ts, [stated(ts)["behind"]], Search(most=2, restarted=True)).values()
     assert isinstance(restarted, Trace)
     assert (restarted.restarted, len(restarted.steps), restarted.steps[0].before["i"]) == (True, 1, True)
 
@@ -290,7 +292,7 @@ table t {
 }
 level l { period 40 [ms] table t }
 """
-UNDEFINED: dict[str, int | None] = {  # behind the cycles `n` is 0, 1, 2, 3, 0, and so on
+UNDEFINED: dict[str, int | None] = {  # after the cycles `n` is 0, 1, 2, 3, 0, and so on
     "9 / n >= 1": 1,
     "9 / n >= 3": 1,
     "9 mod was n >= 0": 2,
@@ -308,10 +310,10 @@ UNDEFINED: dict[str, int | None] = {  # behind the cycles `n` is 0, 1, 2, 3, 0, 
 
 @pytest.mark.parametrize("text", UNDEFINED)
 def test_what_is_not_defined_does_not_hold(text: str) -> None:
-    stepper = alone(f"{COUNTING}property it : {text}\n")
+    ts = alone(f"{COUNTING}property it : {text}\n")
     least = UNDEFINED[text]
-    assert verdicts(prove_level(stepper, LITTLE)) == {"it": least is None}
-    trace = shortest(stepper, stated(stepper)["it"])
+    assert verdicts(prove_level(ts, LITTLE)) == {"it": least is None}
+    trace = shortest(ts, stated(ts)["it"])
     assert (None if trace is None else len(trace.steps)) == least
 
 
@@ -352,9 +354,9 @@ def some_property(random: Random) -> str:
             return some_condition(random, was=True)
 
 
-def enumerated(stepper: Stepper, starts: list[dict[str, Value]]) -> dict[str, int]:
+def enumerated(ts: TransitionSystem, starts: list[dict[str, Value]]) -> dict[str, int]:
     """Of each property that breaks in some run from these states, in how many cycles it can."""
-    program = stepper.program
+    program = ts.program
     inputs = [v for v in program.variables if v.kind is Kind.INPUT]
     offers = [
         dict(zip((str(v.name) for v in inputs), values, strict=True))
@@ -372,12 +374,10 @@ def enumerated(stepper: Stepper, starts: list[dict[str, Value]]) -> dict[str, in
         following = []
         for before in wave:
             for taken in offers:
-                outcome = cycle(program, stepper.level, {**before, **taken})
+                outcome = cycle(program, ts.level, {**before, **taken})
                 assert outcome.fault is Fault.OK
                 for one in program.properties:
-                    if one.name not in found and not property_kept(
-                        stepper, one.name, before, outcome.snapshot
-                    ):
+                    if one.name not in found and not property_kept(ts, one.name, before, outcome.snapshot):
                         found[one.name] = depth
                 if (key := tuple(outcome.snapshot.values())) not in seen:
                     seen.add(key)
@@ -391,30 +391,30 @@ def test_proofs_and_traces_are_what_enumeration_says(seed: int) -> None:
     random = Random(seed)  # noqa: S311  # repeatable on purpose
     text = GRIP.replace("grasps < 9", "grasps < 3").replace("0 .. 9", "0 .. 3")
     written = [f"property p{at} : {some_property(random)}\n" for at in range(MANY)]
-    stepper = alone(text + "".join(written))
-    start = dict(initial(stepper.program))
-    least = enumerated(stepper, [start])
+    ts = alone(text + "".join(written))
+    start = dict(initial(ts.program))
+    least = enumerated(ts, [start])
     anew = [
         {**start, "wanted": wanted, "touching": touching}
         for wanted, touching in product((0, 1), (False, True))
     ]
-    true = {f"p{at}" for at in range(MANY)} - least.keys() - enumerated(stepper, anew).keys()
+    true = {f"p{at}" for at in range(MANY)} - least.keys() - enumerated(ts, anew).keys()
     assert 5 < len(true) < MANY - 5
-    proof = prove_level(stepper, LITTLE)
+    proof = prove_level(ts, LITTLE)
     assert {name for name, proved in verdicts(proof).items() if proved} == true
-    found = traces(stepper, list(stated(stepper).values()), Search(most=8))
+    found = traces(ts, list(stated(ts).values()), Search(most=8))
     assert {name: len(one.steps) for (_, _, name), one in found.items() if isinstance(one, Trace)} == least
 
 
 # --- a level in its environment -----------------------------------------------------------------
 
 
-def with_properties(folder: Path, level: str, text: str) -> Stepper:
+def with_properties(folder: Path, level: str, text: str) -> TransitionSystem:
     """A level of the small system, with more in its program."""
     shutil.copytree(SMALL, folder, dirs_exist_ok=True)
     path = folder / f"{level}.rcs"
     path.write_text(path.read_text(encoding="utf-8") + text, encoding="utf-8")
-    return steppers(folder / "system.toml")[level]
+    return transition_systems(folder / "system.toml")[level]
 
 
 KEPT = {
@@ -436,40 +436,40 @@ BROKEN = {  # with the least number of cycles
 
 
 @pytest.fixture(scope="module")
-def upper(tmp_path_factory: pytest.TempPathFactory) -> Stepper:
+def upper(tmp_path_factory: pytest.TempPathFactory) -> TransitionSystem:
     every = {**KEPT, **{name: text for name, (text, _) in BROKEN.items()}}
     text = "".join(f"property {name} : {said}\n" for name, said in every.items())
     return with_properties(tmp_path_factory.mktemp("stated"), "upper", text)
 
 
 @pytest.fixture(scope="module")
-def proof(upper: Stepper) -> LevelProof:
+def proof(upper: TransitionSystem) -> LevelProof:
     return prove_level(upper, LITTLE)
 
 
 def test_what_is_true_of_a_level_for_any_delay_is_proved_and_nothing_else(proof: LevelProof) -> None:
     assert verdicts(proof) == {**dict.fromkeys(KEPT, True), **dict.fromkeys(BROKEN, False)}
-    assert {goal.name for goal in proof.open} == BROKEN.keys()  # all else is proved as before
+    assert {obligation.name for obligation in proof.open} == BROKEN.keys()  # all else is proved as before
 
 
 @pytest.mark.parametrize("name", BROKEN)
-def test_what_is_false_is_shown_by_the_shortest_run(upper: Stepper, name: str) -> None:
-    goal, least = stated(upper)[name], BROKEN[name][1]
-    trace = shortest(upper, goal)
+def test_what_is_false_is_shown_by_the_shortest_run(upper: TransitionSystem, name: str) -> None:
+    obligation, least = stated(upper)[name], BROKEN[name][1]
+    trace = shortest(upper, obligation)
     assert isinstance(trace, Trace)
-    assert [broken(upper, goal, step) for step in trace.steps] == [False] * (least - 1) + [True]
-    last = time_line({"upper": upper}, of_trace(upper, goal, trace))
+    assert [broken(upper, obligation, step) for step in trace.steps] == [False] * (least - 1) + [True]
+    last = time_line({"upper": upper}, of_trace(upper, obligation, trace))
     assert any(f"property `{name}` is broken" in line for line in last)
-    assert shortest(upper, goal, most=least - 1) is None
+    assert shortest(upper, obligation, most=least - 1) is None
 
 
-def test_another_solver_confirms_the_certificate(upper: Stepper, proof: LevelProof) -> None:
+def test_another_solver_confirms_the_certificate(upper: TransitionSystem, proof: LevelProof) -> None:
     questions = certificate(upper, proof)
     assert [name for name, text in questions.items() if not cvc5_refutes(text)] == []
 
 
 def test_a_kept_proof_comes_back_with_the_features_it_was_made_with(
-    upper: Stepper, proof: LevelProof, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    upper: TransitionSystem, proof: LevelProof, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("RCSC_CACHE_DIR", str(tmp_path))
     cache = open_cache(tmp_path)
@@ -477,8 +477,8 @@ def test_a_kept_proof_comes_back_with_the_features_it_was_made_with(
     keep(cache, upper, LITTLE, proof)
     again = recall(cache, upper, LITTLE)
     assert again is not None
-    assert (again.features, again.clauses, verdicts(again)) == (
-        proof.features,
+    assert (again.predicates, again.clauses, verdicts(again)) == (
+        proof.predicates,
         proof.clauses,
         verdicts(proof),
     )
@@ -486,13 +486,13 @@ def test_a_kept_proof_comes_back_with_the_features_it_was_made_with(
     assert recall(cache, other, LITTLE) is None
 
 
-def test_features_that_come_later_come_last(upper: Stepper) -> None:
-    """Clauses name features by their position."""
-    for stepper in (
+def test_features_that_come_later_come_last(upper: TransitionSystem) -> None:
+    """Clauses name predicates by their position."""
+    for ts in (
         upper,
         alone(f"{GRIP}property p : was done implies was touching or grasps = was grasps\n"),
     ):
-        few, more = (chosen(stepper, closely) for closely in (0, CLOSELY))
+        few, more = (chosen(ts, closely) for closely in (0, CLOSELY))
         assert few == more[: len(few)]
         assert len({one.name for one in more}) == len(more)
     assert len(more) > len(few) > 1  # what a procedure decides by, behind what the property speaks of
@@ -500,9 +500,9 @@ def test_features_that_come_later_come_last(upper: Stepper) -> None:
     assert "status_report" in {one.name for one in chosen(upper)} - {one.name for one in chosen(without)}
 
 
-def chosen(stepper: Stepper, closely: int = 0) -> tuple[Feature, ...]:
-    start = stepper.cycle(stepper.anywhere())
-    return every_feature(stepper, start, read(stepper, start, goals(stepper, start)), closely)
+def chosen(ts: TransitionSystem, closely: int = 0) -> tuple[Predicate, ...]:
+    start = ts.cycle(ts.havoc())
+    return every_feature(ts, start, read(ts, start, obligations(ts, start)), closely)
 
 
 # --- invariants ---------------------------------------------------------------------------------
@@ -510,22 +510,22 @@ def chosen(stepper: Stepper, closely: int = 0) -> tuple[Feature, ...]:
 
 def test_an_invariant_that_check_proves_may_be_false_after_a_restart(tmp_path: Path) -> None:
     """Nothing that the lower level does fails; but it begins anew with a failure, as `run.adopt` says."""
-    stepper = with_properties(
+    ts = with_properties(
         tmp_path,
         "lower",
         "invariant never_fails : status_report /= failed\ninvariant under_way : cur_state /= f_state implies status_report /= failed\n",
     )
     assert [
-        one for one in prove_program(stepper.program, Options()).findings if one.severity is Severity.ERROR
+        one for one in prove_program(ts.program, Options()).findings if one.severity is Severity.ERROR
     ] == []
-    assert verdicts(prove_level(stepper, LITTLE)) == {"never_fails": False, "under_way": True}
-    goal = stated(stepper)["never_fails"]
-    assert shortest(stepper, goal) is None
-    [trace] = traces(stepper, [goal], Search(most=2, restarted=True)).values()
+    assert verdicts(prove_level(ts, LITTLE)) == {"never_fails": False, "under_way": True}
+    obligation = stated(ts)["never_fails"]
+    assert shortest(ts, obligation) is None
+    [trace] = traces(ts, [obligation], Search(most=2, restarted=True)).values()
     assert isinstance(trace, Trace)
     assert (len(trace.steps), trace.restarted) == (1, True)
     assert "invariant `never_fails` does not hold" in "\n".join(
-        time_line({"lower": stepper}, of_trace(stepper, goal, trace))
+        time_line({"lower": ts}, of_trace(ts, obligation, trace))
     )
 
 
@@ -565,17 +565,17 @@ def test_prove_shows_what_breaks_as_the_executors_ran_it(
 
 
 def test_no_walk_of_the_shipped_levels_breaks_what_they_state() -> None:
-    made = steppers(SHIPPED)
+    made = transition_systems(SHIPPED)
     for level in ("task", "emove", "primitive"):
-        stepper = made[level]
-        names = [one.name for one in stepper.program.properties]
+        ts = made[level]
+        names = [one.name for one in ts.program.properties]
         assert len(names) >= 4
         spoken: set[Value] = set()
         for seed in (40, 41):
-            walk = Walk(stepper.program, stepper.level, stepper.links, Random(seed))  # noqa: S311  # repeatable on purpose
-            before: dict[str, Value] = dict(initial(stepper.program))
+            walk = Walk(ts.program, ts.level, ts.links, Random(seed))  # noqa: S311  # repeatable on purpose
+            before: dict[str, Value] = dict(initial(ts.program))
             for after in walk.states(60):
-                assert [name for name in names if not property_kept(stepper, name, before, after)] == []
+                assert [name for name in names if not property_kept(ts, name, before, after)] == []
                 spoken.add(after["status_report"])
                 before = after
         assert len(spoken) == 3  # the walks saw it done, executing and failed
@@ -586,12 +586,12 @@ def test_no_walk_of_the_shipped_levels_breaks_what_they_state() -> None:
 
 def test_a_grasp_that_failed_is_not_done_after_all() -> None:
     """IMMED-GRASP: the hand, done, measures too wide a part, and then, before PAUSE is echoed, another width that would fit."""
-    stepper = steppers(REPO / "tables" / "system.toml")["primitive"]
-    start = initial(stepper.program)
-    taken = {str(v.name): start[str(v.name)] for v in stepper.program.variables if v.kind is Kind.INPUT}
+    ts = transition_systems(REPO / "tables" / "system.toml")["primitive"]
+    start = initial(ts.program)
+    taken = {str(v.name): start[str(v.name)] for v in ts.program.variables if v.kind is Kind.INPUT}
 
     def member(leaf: str, name: str) -> int:
-        kind = stepper.kinds[leaf]
+        kind = ts.kinds[leaf]
         assert isinstance(kind, Enum)
         return kind.members.index(name)
 
@@ -611,5 +611,5 @@ def test_a_grasp_that_failed_is_not_done_after_all() -> None:
         taken = {**taken, **new}
         inputs.append(taken)
     status = "report.status_report"
-    said = [step.after[status] for step in ran(stepper, start, inputs)]
+    said = [step.after[status] for step in ran(ts, start, inputs)]
     assert said == [member(status, one) for one in ("executing", "failed", "failed", "failed", "failed")]

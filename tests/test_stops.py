@@ -13,7 +13,7 @@ import pytest
 
 from rcsc.commands.shared.show import backing
 from rcsc.compose.contract.environment import Links
-from rcsc.compose.contract.transition import Stepper
+from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.diagnostics.jsonform import table_from_json, table_to_json
 from rcsc.driver import TARGETS, compile_
 from rcsc.driver.settings import Settings
@@ -259,7 +259,7 @@ def test_a_cycle_of_the_proof_ends_where_the_interpreters_does() -> None:
     program = proved_of(STOPS)
     level = program.levels[0]
     free = tuple(str(v.name) for v in program.variables if v.kind is Kind.INPUT)
-    stepper = Stepper(program, level, Links(level.name, None, (), (), free))
+    ts = TransitionSystem(program, level, Links(level.name, None, (), (), free))
     start = initial(program) | {"n": 3}
     met: Counter[Fault] = Counter()
     for a, b, which in product((0, 7, 8, 9), (-9, 0, 2, 3), (0, 1)):
@@ -267,7 +267,7 @@ def test_a_cycle_of_the_proof_ends_where_the_interpreters_does() -> None:
         outcome = cycle(program, level, {**start, **taken})
         before = {str(v.name): constant(v.type, start[v.name]) for v in program.variables}
         given = {name: constant(program.variable(name).type, value) for name, value in taken.items()}
-        one = stepper.cycle(before, taken=given)
+        one = ts.cycle(before, taken=given)
         met[outcome.fault] += 1
         assert bool(one.refused.low) == (outcome.fault is Fault.ASSUMPTION)
         assert one.goes_on is TRUE

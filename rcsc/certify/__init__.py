@@ -7,14 +7,15 @@ expressions), and a solver for what the report says that it answered.
 
 1. `rcsc.lang.meaning.digest` binds the certificate to the whole program, and to which assumptions stop a cycle. The prover's options are
    not bound: nothing that is checked depends on them.
-2. What is owed is derived from the program (`owed`, by symbolic runs, `run`), never read from the certificate. The certificate only helps:
+2. What is owed is derived from the program (`owed`, by symbolic runs, `execution`), never read from the certificate. The certificate only
+helps:
    a tree of regions for each table (`table`), and an input at which its assumptions hold together.
 3. Each obligation is settled by the spans of its terms (`values`, `known`), by trying every case (`settle`), or by a solver that is
    given the question in SMT-LIB; else it is listed as not checked.
 
 Not claimed, and so not checked: that no line is dead, and what `rcsc prove` shows of levels together, properties included.
 
-The modules in the order in which data flows: `values`, `run`, `owed`, `table`, `known`, `settle`.
+The modules in the order in which data flows: `values`, `execution`, `owed`, `table`, `known`, `settle`.
 """
 
 from collections.abc import Mapping, Sequence

@@ -2,7 +2,7 @@
 
 Terms are built as the program computes; only constants are folded, since loops are unrolled. Every operation is
 total here: `a / 0` and `a mod 0` are 0, and the whole number of a NaN or an infinity is 0. That a program meets none of these
-is an obligation of its own (`run`), and no other obligation then depends on what stands there.
+is an obligation of its own (`execution`), and no other obligation then depends on what stands there.
 
 A *span* is the least and the greatest value of a term; it is None where the term may be a NaN. Infinite ends
 are no NaN. Doubles round to nearest even, which is monotone: the ends of a result are results of ends.

@@ -18,7 +18,7 @@ from rcsc.diagnostics.codes import Code
 if TYPE_CHECKING:
     from rcsc_cell.campaign.journal import Journal, Record
     from rcsc_cell.campaign.rig import Rig
-    from rcsc_cell.campaign.worker_pool import Crew
+    from rcsc_cell.campaign.worker_pool import WorkerPool
 
 _TO = click.Path(dir_okay=False, path_type=Path)
 _TERMINAL_S, _PLAIN_S = 1.0, 10.0
@@ -81,8 +81,8 @@ def campaign(  # noqa: PLR0913, PLR0917  # as many as there are options
             return 1
         if again is not None:
             return _again(again, rig, executor)
-        crew = _crew(scheduler, workers or cores())
-        return _campaign(rig, seed, episodes, crew, _journal(rig, seed, journal), save, json_)
+        pool = _pool(scheduler, workers or cores())
+        return _campaign(rig, seed, episodes, pool, _journal(rig, seed, journal), save, json_)
 
 
 @contextmanager
@@ -124,7 +124,7 @@ def _rig(path: Path, backend: str, executor: str | None, limit_s: float) -> "Rig
     )
 
 
-def _crew(scheduler: str | None, workers: int) -> AbstractContextManager["Crew"]:
+def _pool(scheduler: str | None, workers: int) -> AbstractContextManager["WorkerPool"]:
     from rcsc_cell.campaign.worker_pool import cluster, processes
 
     return processes(workers) if scheduler is None else cluster(scheduler)
@@ -141,16 +141,16 @@ def _journal(rig: "Rig", seed: int, path: Path | None) -> "Journal":
 
 
 def _campaign(  # as many as there are options
-    rig: "Rig", seed: int, episodes: int, hired: AbstractContextManager["Crew"], journal: "Journal", save: Path,
+    rig: "Rig", seed: int, episodes: int, hired: AbstractContextManager["WorkerPool"], journal: "Journal", save: Path,
     json_: Path | None,
 ) -> int:  # fmt: skip
     """Plays, sums up, and saves counterexamples."""
     from rcsc_cell.campaign.runner import campaign as play
 
-    with journal, hired as crew:
+    with journal, hired as pool:
         said = _Told(episodes, [one for at, one in journal.records.items() if at < episodes])
         try:
-            for new in play(rig, seed, episodes, crew, journal):
+            for new in play(rig, seed, episodes, pool, journal):
                 said(new)
         except KeyboardInterrupt:
             said.end()
@@ -163,7 +163,7 @@ def _campaign(  # as many as there are options
         records = [record for index, record in sorted(journal.records.items()) if index < episodes]
         _sum_up(rig, records, said, json_)
         click.echo(f"journal: {journal.path}")
-        _save(rig, seed, records, crew, save)
+        _save(rig, seed, records, pool, save)
     return 1 if any(one.findings for one in records) else 0
 
 
@@ -240,7 +240,7 @@ def _sum_up(rig: "Rig", records: list["Record"], said: _Told, json_: Path | None
     click.echo(f"wrote {json_}")
 
 
-def _save(rig: "Rig", seed: int, records: list["Record"], crew: "Crew", folder: Path) -> None:
+def _save(rig: "Rig", seed: int, records: list["Record"], pool: "WorkerPool", folder: Path) -> None:
     """Shrinks and saves what is not saved already, and says what to type."""
     from rcsc_cell.campaign.counterexamples import MOST, choices, counterexamples, is_saved, save
 
@@ -249,7 +249,7 @@ def _save(rig: "Rig", seed: int, records: list["Record"], crew: "Crew", folder: 
     for one in chosen[:MOST]:
         if one not in wanted:
             click.echo(f"saved before: {folder / one.name(seed)}")
-    for one, made in counterexamples(rig, seed, wanted, crew):
+    for one, made in counterexamples(rig, seed, wanted, pool):
         try:
             place = save(folder, rig, seed, one, made)
         except OSError as error:

@@ -184,7 +184,7 @@ def _summary(found: "Log") -> None:
     click.echo(found.checked.said)
     if (shown := found.finding) is not None:
         where = f"level `{shown.level}`" + (f", table `{shown.table}`" if shown.table else "")
-        click.echo(f"a finding, broken in cycle {shown.broken_at}: {where}: {shown.goal}")
+        click.echo(f"a finding, broken in cycle {shown.broken_at}: {where}: {shown.obligation}")
     for level in found.levels:
         _summed(level)
         for table in coverage(found):

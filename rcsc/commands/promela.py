@@ -13,7 +13,7 @@ from rcsc.host import children
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
 
-    from rcsc.compose.contract.transition import Stepper
+    from rcsc.compose.contract.transition import TransitionSystem
     from rcsc.compose.promela.assemble import Model
     from rcsc.compose.promela.instance import Breadth
     from rcsc.compose.promela.selection import Wanted
@@ -64,17 +64,17 @@ def promela(  # noqa: PLR0913, PLR0917  # as many as there are options
 
     No proof: a small instance is looked through, with few numbers, short counters and few values from outside; the header of each model
     says which. Printed of each model: whether every state was looked at, what its tables state that it cannot speak of, and, where
-    something is broken, the run that breaks it; at the end, how many goals of each sort there were.
+    something is broken, the run that breaks it; at the end, how many obligations of each sort there were.
     """
     from rcsc.compose.contract.variants import undeferred
     from rcsc.compose.promela.instance import Breadth
     from rcsc.compose.promela.spin import Search
-    from rcsc.compose.proof.system import NoProgramError, steppers
+    from rcsc.compose.proof.system import NoProgramError, transition_systems
     from rcsc.diagnostics.codes import Code
     from rcsc.run.description import BadDescription
 
     try:
-        made = steppers(system_path(system))
+        made = transition_systems(system_path(system))
     except NoProgramError as error:
         raise Stopped(Code.BAD_SYSTEM, str(error)) from error
     except BadDescription as error:
@@ -88,7 +88,7 @@ def promela(  # noqa: PLR0913, PLR0917  # as many as there are options
     return _check(made, models, breadth, Search(seconds, memory_mb, bitstate=bitstate), jobs)
 
 
-def _chosen(made: "Mapping[str, Stepper]", only: tuple[str, ...]) -> "list[Wanted]":
+def _chosen(made: "Mapping[str, TransitionSystem]", only: tuple[str, ...]) -> "list[Wanted]":
     """The models that are asked for.
 
     Raises:
@@ -115,7 +115,7 @@ def _chosen(made: "Mapping[str, Stepper]", only: tuple[str, ...]) -> "list[Wante
 
 
 def _models(
-    made: "Mapping[str, Stepper]", models: "list[Wanted]", breadth: "Breadth"
+    made: "Mapping[str, TransitionSystem]", models: "list[Wanted]", breadth: "Breadth"
 ) -> "Iterator[tuple[Wanted, Model]]":
     from rcsc.compose.promela.assemble import emit
 
@@ -123,7 +123,9 @@ def _models(
         yield one, emit(made, one.levels, breadth, progress=one.progress)
 
 
-def _write(folder: Path, made: "Mapping[str, Stepper]", models: "list[Wanted]", breadth: "Breadth") -> int:
+def _write(
+    folder: Path, made: "Mapping[str, TransitionSystem]", models: "list[Wanted]", breadth: "Breadth"
+) -> int:
     from rcsc.host.files import write_atomically
 
     folder.mkdir(parents=True, exist_ok=True)
@@ -135,7 +137,11 @@ def _write(folder: Path, made: "Mapping[str, Stepper]", models: "list[Wanted]", 
 
 
 def _check(
-    made: "Mapping[str, Stepper]", models: "list[Wanted]", breadth: "Breadth", search: "Search", jobs: int
+    made: "Mapping[str, TransitionSystem]",
+    models: "list[Wanted]",
+    breadth: "Breadth",
+    search: "Search",
+    jobs: int,
 ) -> int:
     from rcsc.compose.promela.spin import SpinError, check
     from rcsc.diagnostics.codes import Code
@@ -155,11 +161,11 @@ def _check(
             if isinstance(checked, Absent):
                 raise Stopped(Code.NO_SPIN, checked.reason)
             broken += _say(made, one, model, checked)
-    _say_goals(model for _, model, _ in waiting)
+    _say_obligations(model for _, model, _ in waiting)
     return 1 if broken else 0
 
 
-def _say(made: "Mapping[str, Stepper]", one: "Wanted", model: "Model", checked: "Checked") -> bool:
+def _say(made: "Mapping[str, TransitionSystem]", one: "Wanted", model: "Model", checked: "Checked") -> bool:
     """One model; whether something in it is broken."""
     from rcsc.compose.promela.trail import run_of
     from rcsc.diagnostics.codes import Code
@@ -195,8 +201,8 @@ def _say_left_out(model: "Model") -> None:
         click.echo(f"  not checked: {out.shown}")
 
 
-def _say_goals(models: "Iterable[Model]") -> None:
-    """How many different goals of each sort there were in the models, but for those that only ask whether commands end."""
+def _say_obligations(models: "Iterable[Model]") -> None:
+    """How many different obligations of each sort there were in the models, but for those that only ask whether commands end."""
     from rcsc.compose.contract.obligations import Sort
 
     every = {aim for model in models if not model.progress for aim in model.aims}

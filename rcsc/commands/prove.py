@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 
     from rich.table import Table
 
-    from rcsc.compose.contract.transition import Stepper
-    from rcsc.compose.counterexample.explain import Told
+    from rcsc.compose.contract.transition import TransitionSystem
+    from rcsc.compose.counterexample.explain import Explanation
     from rcsc.compose.counterexample.finding import Finding
     from rcsc.compose.proof.level import LevelProof
     from rcsc.compose.proof.system import SystemProof
@@ -91,7 +91,7 @@ def prove(  # noqa: PLR0913, PLR0917  # as many as there are options
     """
     from rcsc.compose.contract.variants import VARIANTS
     from rcsc.compose.invariant.search import Effort
-    from rcsc.compose.proof.system import NoProgramError, prove_steppers, steppers
+    from rcsc.compose.proof.system import NoProgramError, prove_transition_systems, transition_systems
     from rcsc.diagnostics.codes import Code
     from rcsc.host.cache import open_cache
     from rcsc.run.description import BadDescription
@@ -103,7 +103,7 @@ def prove(  # noqa: PLR0913, PLR0917  # as many as there are options
         return _again(cases)
     path = system_path(system)
     try:
-        made = steppers(path)
+        made = transition_systems(path)
     except NoProgramError as error:
         raise Stopped(Code.BAD_SYSTEM, str(error)) from error
     except BadDescription as error:
@@ -123,7 +123,7 @@ def prove(  # noqa: PLR0913, PLR0917  # as many as there are options
     cache = None if no_cache or variants else open_cache(path.parent)  # a variant is nobody's tables
     names = only or tuple(made)
     with _Said(names, wanted=progress) as said:
-        proof = prove_steppers(
+        proof = prove_transition_systems(
             made, effort, jobs or _jobs([made[name] for name in names]), names, said, cache
         )
     if certificate is not None:
@@ -136,17 +136,17 @@ def prove(  # noqa: PLR0913, PLR0917  # as many as there are options
         _say_agreements(proof)
         _say_whole(made, proof)
     keep = _Keep(path, logs, freeze, variants)
-    told = _look(made, proof, cycles, keep, None if as_json else _say_told)
+    explanation = _look(made, proof, cycles, keep, None if as_json else _say_told)
     if as_json:
-        click.echo(json.dumps(_as_json(proof, made, told), indent=2))
+        click.echo(json.dumps(_as_json(proof, made, explanation), indent=2))
     _say_not_agreed(proof)
     refused = _refused(made, proof, quiet=as_json) if confirms else []
-    if refused or any(one.bug for one in told):
+    if refused or any(one.bug for one in explanation):
         return 3
     return 0 if proof.whole or (proof.proved and not strict) else 1
 
 
-def _jobs(levels: "Iterable[Stepper]") -> int:
+def _jobs(levels: "Iterable[TransitionSystem]") -> int:
     """How many levels to prove at once where nobody says."""
     lines = sum(len(table.lines) for one in levels for table in one.program.tables)
     return min(2, os.cpu_count() or 1) if lines >= _WORTH_PROCESSES else 1
@@ -179,7 +179,7 @@ class _Said:
         self._doing()
 
 
-def _refused(made: "dict[str, Stepper]", proof: "SystemProof", *, quiet: bool) -> list[str]:
+def _refused(made: "dict[str, TransitionSystem]", proof: "SystemProof", *, quiet: bool) -> list[str]:
     """Questions that cvc5 does not answer as Z3 did; says how many there were."""
     from rcsc.commands.shared.proved import confirmed
     from rcsc.diagnostics.codes import Code
@@ -208,25 +208,27 @@ def _say_level(whole: "SystemProof", proof: "LevelProof") -> None:
     found_before = ", by an earlier run" if proof.cached else ""
     click.echo(click.style(f"level {proof.level}", bold=True) + f"  {proof.seconds:.1f} s{found_before}")
     for sort in Sort:
-        found = [goal for goal, _ in proof.found if goal.sort is sort]
+        found = [obligation for obligation, _ in proof.found if obligation.sort is sort]
         if sort is Sort.ASSUMPTION:
-            for goal in found:
-                said = standing(whole, proof.level, goal.key)
-                monitored = "" if whole.of(proof.level, goal.key).proved else "monitored: "
+            for obligation in found:
+                said = standing(whole, proof.level, obligation.key)
+                monitored = "" if whole.of(proof.level, obligation.key).proved else "monitored: "
                 together = " of the levels together" if said in {"not proved", "undecided"} else ""
-                click.echo(f"  {goal.table:28} {goal.name:24} {monitored}{said}{together}")
+                click.echo(f"  {obligation.table:28} {obligation.name:24} {monitored}{said}{together}")
         elif sort in {Sort.INVARIANT, Sort.PROPERTY}:
-            for goal in found:
-                click.echo(f"  {sort.value:28} {goal.name:24} {standing(whole, proof.level, goal.key)}")
+            for obligation in found:
+                click.echo(
+                    f"  {sort.value:28} {obligation.name:24} {standing(whole, proof.level, obligation.key)}"
+                )
         elif found:
-            beside = [goal.name for goal in besides(proof) if goal.sort is sort]
-            good = [goal for goal in found if whole.of(proof.level, goal.key).proved]
-            trusts = trusting(whole, proof.level, [goal.key for goal in good])
+            beside = [obligation.name for obligation in besides(proof) if obligation.sort is sort]
+            good = [obligation for obligation in found if whole.of(proof.level, obligation.key).proved]
+            trusts = trusting(whole, proof.level, [obligation.key for obligation in good])
             click.echo(f"  {sort.value}: {len(good)} of {len(found) - len(beside)} proved{trusts}")
-            for goal in found:
-                if goal not in good and goal.name not in beside:
+            for obligation in found:
+                if obligation not in good and obligation.name not in beside:
                     click.echo(
-                        f"    {goal.table or goal.name or 'within a cycle'}: {standing(whole, proof.level, goal.key)}"
+                        f"    {obligation.table or obligation.name or 'within a cycle'}: {standing(whole, proof.level, obligation.key)}"
                     )
             if beside:
                 click.echo(f"    beside the number, so that nobody relies on it: {', '.join(beside)}")
@@ -234,7 +236,7 @@ def _say_level(whole: "SystemProof", proof: "LevelProof") -> None:
         click.echo(f"  {line}")
     many = len(proof.clauses)
     click.echo(
-        f"  invariant: {many} clauses over {len(proof.features)} features; {proof.walked} states walked, {proof.learnt} learnt"
+        f"  invariant: {many} clauses over {len(proof.predicates)} features; {proof.walked} states walked, {proof.learnt} learnt"
     )
     for line in in_context(whole, proof):
         click.echo(f"  {line}")
@@ -246,10 +248,10 @@ def _say_invariants(proof: "SystemProof") -> None:
     for one in proof.levels:
         click.echo(f"invariant of level {one.level}: never")
         for clause in one.clauses:
-            click.echo(f"  {shown(one.features, clause)}")
+            click.echo(f"  {shown(one.predicates, clause)}")
 
 
-def _say_whole(made: "dict[str, Stepper]", proof: "SystemProof") -> None:
+def _say_whole(made: "dict[str, TransitionSystem]", proof: "SystemProof") -> None:
     from rcsc.commands.shared.proved import assumptions, left_out, reaction, trusted
 
     for line in (*reaction(made, proof), assumptions(proof), *trusted(proof), *left_out(proof)):
@@ -282,21 +284,21 @@ class _Keep:
 
 
 def _look(
-    made: "dict[str, Stepper]",
+    made: "dict[str, TransitionSystem]",
     proof: "SystemProof",
     cycles: int,
     keep: _Keep,
-    say: "Callable[[dict[str, Stepper], Told, int], None] | None",
-) -> "list[Told]":
+    say: "Callable[[dict[str, TransitionSystem], Explanation, int], None] | None",
+) -> "list[Explanation]":
     """What is not proved, each with its shortest trace where there is one."""
-    from rcsc.compose.counterexample.explain import Looking, look
+    from rcsc.compose.counterexample.explain import Settings, explain
     from rcsc.run.description import description
     from rcsc.run.executors import NotBuilt
 
-    looking = Looking(description(keep.system), cycles, altered=bool(keep.variants), log=keep.logs)
+    settings = Settings(description(keep.system), cycles, altered=bool(keep.variants), log=keep.logs)
     found = []
     try:
-        for one in look(made, proof, looking):
+        for one in explain(made, proof, settings):
             found.append(one)
             if keep.cases is not None and one.finding is not None and not one.beside:
                 _freeze(made, one.finding, keep.cases, keep)
@@ -311,7 +313,7 @@ def _look(
     return found
 
 
-def _freeze(made: "dict[str, Stepper]", finding: "Finding", folder: Path, keep: _Keep) -> None:
+def _freeze(made: "dict[str, TransitionSystem]", finding: "Finding", folder: Path, keep: _Keep) -> None:
     from rcsc.compose.counterexample.explain import file_name
     from rcsc.compose.counterexample.frozen import frozen
     from rcsc.host.files import write_atomically
@@ -334,7 +336,7 @@ def _again(cases: tuple[Path, ...]) -> int:
             breaks = case_breaks(case)
         except BadCaseError as error:
             raise Stopped(Code.BAD_CASE, str(error)) from error
-        said = f"level `{case.level}`: {case.goal.shown}: {'broken' if breaks else 'kept'}"
+        said = f"level `{case.level}`: {case.obligation.shown}: {'broken' if breaks else 'kept'}"
         if breaks is case.expects_broken:
             click.echo(f"{path}: {said}")
         else:
@@ -343,60 +345,73 @@ def _again(cases: tuple[Path, ...]) -> int:
     return 1 if wrong else 0
 
 
-def _say_told(made: "dict[str, Stepper]", told: "Told", cycles: int) -> None:
+def _say_told(made: "dict[str, TransitionSystem]", explanation: "Explanation", cycles: int) -> None:
     """One thing that is not proved; runs of as many cycles were looked for."""
     from rcsc.compose.contract.claims import SAFE
     from rcsc.diagnostics.codes import Code
 
-    where = f"level `{told.level}`" + (f", table `{told.goal.table}`" if told.goal.table else "")
-    if told.bug:
+    where = f"level `{explanation.level}`" + (
+        f", table `{explanation.obligation.table}`" if explanation.obligation.table else ""
+    )
+    if explanation.bug:
         click.echo(
-            f"error[{Code.NOT_REPRODUCED.value}]: {where}: the trace found does not run: {told.goal.shown}",
+            f"error[{Code.NOT_REPRODUCED.value}]: {where}: the trace found does not run: {explanation.obligation.shown}",
             err=True,
         )
-    elif told.warns:
-        click.echo(f"warning[{Code.ENDLESS.value}]: {where}: not shown: {told.goal.shown}", err=True)
+    elif explanation.warns:
+        click.echo(
+            f"warning[{Code.ENDLESS.value}]: {where}: not shown: {explanation.obligation.shown}", err=True
+        )
     else:
-        click.echo(f"error[{Code.NOT_COMPOSED.value}]: {where}: not proved: {told.goal.shown}", err=True)
-    if stated := _stated(made, told):
+        click.echo(
+            f"error[{Code.NOT_COMPOSED.value}]: {where}: not proved: {explanation.obligation.shown}", err=True
+        )
+    if stated := _stated(made, explanation):
         click.echo(f"  = note: it says: {stated}", err=True)
-    for line in told.beside:
+    for line in explanation.beside:
         click.echo(f"  = note: {line}", err=True)
-    if told.finding is not None and not told.beside:
-        _say_finding(made, told.finding, in_c=told.in_c)
-    elif told.guessed and told.goal.key == SAFE:
+    if explanation.finding is not None and not explanation.beside:
+        _say_finding(made, explanation.finding, in_c=explanation.in_c)
+    elif explanation.guessed and explanation.obligation.key == SAFE:
         click.echo("  = note: the run that shows it meets an operation that is not defined", err=True)
-    elif told.guessed:
+    elif explanation.guessed:
         click.echo("  = note: a trace that was found does not run: arithmetic was left open", err=True)
-    elif told.goal.sort.value == "assumption" and told.goal.name in made[told.level].trusted:
+    elif (
+        explanation.obligation.sort.value == "assumption"
+        and explanation.obligation.name in made[explanation.level].trusted
+    ):
         click.echo(
             "  = note: no first cycle can be as the tables declare, or no later one, or none that runs this table: "
             "what rests on it says nothing",
             err=True,
         )
-    elif cycles and not told.beside:
+    elif cycles and not explanation.beside:
         click.echo(f"  = note: no run of {cycles} cycles or fewer shows it", err=True)
-    for line in told.helps:
+    for line in explanation.helps:
         click.echo(f"  = help: {line}", err=True)
-    if told.others:
-        click.echo(f"  = note: no such run shows both of lines {', '.join(told.others)}", err=True)
-    if told.log is not None:
-        folder = told.log.parent / "generated"
-        click.echo(f"  = log: rcsc replay {told.log} --generated {folder}", err=True)
-        page = told.log.with_suffix(".html")
-        click.echo(f"  = picture: rcsc log {told.log} --report {page}", err=True)
+    if explanation.others:
+        click.echo(f"  = note: no such run shows both of lines {', '.join(explanation.others)}", err=True)
+    if explanation.log is not None:
+        folder = explanation.log.parent / "generated"
+        click.echo(f"  = log: rcsc replay {explanation.log} --generated {folder}", err=True)
+        page = explanation.log.with_suffix(".html")
+        click.echo(f"  = picture: rcsc log {explanation.log} --report {page}", err=True)
 
 
-def _stated(made: "dict[str, Stepper]", told: "Told") -> str:
+def _stated(made: "dict[str, TransitionSystem]", explanation: "Explanation") -> str:
     """What a property says, as it is written; empty for what is none."""
     from rcsc.compose.contract.obligations import Sort
 
-    if told.goal.sort is not Sort.PROPERTY:
+    if explanation.obligation.sort is not Sort.PROPERTY:
         return ""
-    return next(one.text for one in made[told.level].program.properties if one.name == told.goal.name)
+    return next(
+        one.text
+        for one in made[explanation.level].program.properties
+        if one.name == explanation.obligation.name
+    )
 
 
-def _say_finding(made: "dict[str, Stepper]", finding: "Finding", *, in_c: bool) -> None:
+def _say_finding(made: "dict[str, TransitionSystem]", finding: "Finding", *, in_c: bool) -> None:
     """The time line."""
     from rich.console import Console
 
@@ -405,13 +420,13 @@ def _say_finding(made: "dict[str, Stepper]", finding: "Finding", *, in_c: bool) 
     begins = ", after a restart" if finding.restarted else ""
     legal = "" if finding.legal else "; numbers have gone round, or a neighbour was restarted"
     run_by = "as the interpreter, the Python and the C executors run it"
-    if finding.goal.key == SAFE:
+    if finding.obligation.key == SAFE:
         run_by = "as the interpreter runs it; executors are to run nothing that is not safe"
     elif not in_c:
         run_by = "as the interpreter and the Python executor run it (no C function can give what is refused)"
     what = (
-        f"goes round from cycle {finding.lap} to cycle {finding.broken_at}"
-        if finding.lap
+        f"goes round from cycle {finding.lasso} to cycle {finding.broken_at}"
+        if finding.lasso
         else f"broken in cycle {finding.broken_at}"
     )
     click.echo(f"  = note: {what}{begins}, {run_by}{legal}", err=True)
@@ -423,7 +438,7 @@ def _say_finding(made: "dict[str, Stepper]", finding: "Finding", *, in_c: bool) 
         )
 
 
-def _time_line(made: "dict[str, Stepper]", finding: "Finding") -> "Table":
+def _time_line(made: "dict[str, TransitionSystem]", finding: "Finding") -> "Table":
     """A row a cycle: the line that matched, the inputs that changed, what else changed, and what went wrong."""
     from rich import box
     from rich.table import Table
@@ -459,7 +474,7 @@ def _say_not_agreed(proof: "SystemProof") -> None:
             )
 
 
-def _write(folder: Path, made: "dict[str, Stepper]", proof: "SystemProof") -> None:
+def _write(folder: Path, made: "dict[str, TransitionSystem]", proof: "SystemProof") -> None:
     from rcsc.compose.proof.level import certificate
     from rcsc.host.files import write_atomically
 
@@ -469,28 +484,30 @@ def _write(folder: Path, made: "dict[str, Stepper]", proof: "SystemProof") -> No
             write_atomically(folder / f"{one.level} {name}.smt2".replace(" ", "_"), text.encode())
 
 
-def _as_json(proof: "SystemProof", made: "dict[str, Stepper]", told: "list[Told]") -> dict[str, Any]:
+def _as_json(
+    proof: "SystemProof", made: "dict[str, TransitionSystem]", explanation: "list[Explanation]"
+) -> dict[str, Any]:
     from rcsc.commands.shared.proved import as_json, claim
 
     return {
         "proved": proof.proved,
         "whole": proof.whole,
-        "findings": [_told_as_json(made, one) for one in told],
+        "findings": [_told_as_json(made, one) for one in explanation],
         "levels": [
             {
                 "level": one.level,
                 "goals": [
                     {
-                        "what": goal.sort.value,
-                        "table": goal.table,
-                        "name": goal.name,
-                        **claim(proof, one.level, goal.key),
+                        "what": obligation.sort.value,
+                        "table": obligation.table,
+                        "name": obligation.name,
+                        **claim(proof, one.level, obligation.key),
                     }
-                    for goal, _ in one.found
+                    for obligation, _ in one.found
                 ],
                 "not_looked_at": [
                     {"what": each.sort.value, "table": each.table, "missing": each.missing}
-                    for each in one.unlooked
+                    for each in one.unstated
                 ],
                 "clauses": len(one.clauses),
                 **as_json(proof, one),
@@ -510,26 +527,26 @@ def _as_json(proof: "SystemProof", made: "dict[str, Stepper]", told: "list[Told]
     }
 
 
-def _told_as_json(made: "dict[str, Stepper]", told: "Told") -> dict[str, Any]:
+def _told_as_json(made: "dict[str, TransitionSystem]", explanation: "Explanation") -> dict[str, Any]:
     from dataclasses import asdict
 
     from rcsc.compose.counterexample.finding import rows
 
-    found = told.finding
+    found = explanation.finding
     return {
-        "level": told.level,
-        "severity": "warning" if told.warns else "error",
-        "what": told.goal.sort.value,
-        "table": told.goal.table,
-        "name": told.goal.name,
-        "says": _stated(made, told),
-        "lines": list(told.goal.lines),
-        "reproduces": found is not None and not told.beside,
-        "beside": list(told.beside),
+        "level": explanation.level,
+        "severity": "warning" if explanation.warns else "error",
+        "what": explanation.obligation.sort.value,
+        "table": explanation.obligation.table,
+        "name": explanation.obligation.name,
+        "says": _stated(made, explanation),
+        "lines": list(explanation.obligation.lines),
+        "reproduces": found is not None and not explanation.beside,
+        "beside": list(explanation.beside),
         "restarted": found is not None and found.restarted,
-        "lap": 0 if found is None else found.lap,
+        "lap": 0 if found is None else found.lasso,
         "time_line": [] if found is None else [asdict(row) for row in rows(made, found)],
-        "helps": list(told.helps),
-        "others": list(told.others),
-        "log": "" if told.log is None else str(told.log),
+        "helps": list(explanation.helps),
+        "others": list(explanation.others),
+        "log": "" if explanation.log is None else str(explanation.log),
     }

@@ -1,6 +1,6 @@
 """The levels proved together: for any delay, any order of commands, any answer of the database.
 
-What is proved, of each level alone in its environment (`level`):
+What is proved, of each level alone in its environment (`proof.level`):
 
 - every assumption of its tables holds in every cycle in which the table runs; exactly one line matches; DEFAULT is
   not reached where it is said to be unreachable; no state is written directly while another is pending;
@@ -12,7 +12,7 @@ What is proved, of each level alone in its environment (`level`):
   numbers, and numbers come one after the other.
 
 Besides, of its lines in their context: which are never reached, what one does that matches again (`context`), and that every
-command ends if every order is answered (`ends`, `rounds`).
+command ends if every order is answered (`proof.termination`, `proof.ranking`).
 
 What it assumes of its environment, the contract (`transition`), in words:
 
@@ -52,11 +52,8 @@ What it rests on besides:
 - What stands outside the levels (workstation, robot, hand, camera) keeps to the same contract by its own means; it is
   listed, not proved.
 
-Modules, in the order the data flows: `contract` (who is whose environment), `transition` (a cycle as nodes), `goals`,
-`properties`, `features` (what an invariant may speak of), `walk` (states to begin with); the search, which is not trusted:
-`bits` (nodes as clauses of propositional logic), `sat`, `cubes`, `frames` (the invariant), `search`; what it finds is asked anew:
-`keyed` and `measured` (nodes as terms), `confirm`, `context`, `rounds`, `ends`, `level`; then `kept` (the cache), `system`.
-What is not proved: `variants` (other rules), `trace` (the shortest failing run, run by the interpreter), `lap` (one that goes
-round), `simplest`, `finding` (its time line), `together` (two levels as they are), `weakest` (what would mend it), `rerun` (by
-the executors, as a log), `frozen` (as a case), `look`. `promela` is another translation, for Spin.
+Rooms, in the order the data flows: `contract` (a level, its environment, and what it owes in one cycle), `invariant` (PDR, whose clauses
+Z3 confirms), `proof` (of a level, and of the system), `counterexample` (runs that show what is not proved). `promela` is another
+translation, for Spin. Trusted are `contract.transition`, `symbolic.keyed` and `symbolic.measured` (a cycle as terms), the arguments here
+and in `proof.termination`, and Z3; not the search.
 """

@@ -57,7 +57,7 @@ def within_reach(
     """What of a difference the level's next cycle can come to if it begins in this state; inputs are free.
 
     Deferred values and `preprocess` are followed as the later version has them. In doubt it is said to come to it: a region
-    that its boxes do not say exactly counts as met, and so does what runs behind the table; arithmetic on doubles is taken
+    that its boxes do not say exactly counts as met, and so does what runs after the table; arithmetic on doubles is taken
     to give any value within its bounds.
 
     Args:

@@ -26,7 +26,7 @@ from rcsc.run.description import BadDescription, description, places
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from rcsc.compose.contract.transition import Stepper
+    from rcsc.compose.contract.transition import TransitionSystem
     from rcsc.lang.model import Program, Table
 
 
@@ -50,9 +50,9 @@ def outlined(system: Path, cache: Cache) -> Outline | None:
     return found
 
 
-def _read(system: Path) -> "tuple[dict[str, Stepper], dict[str, str]] | None":
-    """Steppers of all levels, and what they were read from; None where they cannot be, or a file has changed meanwhile."""
-    from rcsc.compose.proof.system import NoProgramError, loaded_program, steppers_of
+def _read(system: Path) -> "tuple[dict[str, TransitionSystem], dict[str, str]] | None":
+    """TransitionSystems of all levels, and what they were read from; None where they cannot be, or a file has changed meanwhile."""
+    from rcsc.compose.proof.system import NoProgramError, loaded_program, transition_systems_of
 
     looked_at = {str(system): digest_at(str(system))}
     programs: dict[str, Program] = {}
@@ -64,13 +64,13 @@ def _read(system: Path) -> "tuple[dict[str, Stepper], dict[str, str]] | None":
             if files is None:
                 return None
             looked_at |= {str(one): digest_at(str(one)) for one in places(system, spec.program)} | files
-        made = steppers_of(said, programs)
+        made = transition_systems_of(said, programs)
     except (BadDescription, NoProgramError):
         return None
     return (made, looked_at) if looked_at[str(system)] == digest_at(str(system)) else None
 
 
-def outline(made: "Mapping[str, Stepper]") -> Outline:
+def outline(made: "Mapping[str, TransitionSystem]") -> Outline:
     """What levels are made of."""
     from rcsc.compose.proof.assume_guarantee import promises
     from rcsc.compose.proof.kept import content
@@ -93,13 +93,13 @@ def outline(made: "Mapping[str, Stepper]") -> Outline:
     return Outline(levels, assumed)
 
 
-def _run_by(stepper: "Stepper") -> "list[Table]":
+def _run_by(ts: "TransitionSystem") -> "list[Table]":
     """The tables that the level runs."""
     from rcsc.lang.model import OneTable
 
-    chosen = stepper.level.tables
+    chosen = ts.level.tables
     names = {chosen.table} if isinstance(chosen, OneTable) else {table for _, table in chosen.tables}
-    return [one for one in stepper.program.tables if one.name in names]
+    return [one for one in ts.program.tables if one.name in names]
 
 
 def _table(table: "Table") -> TableOutline:

@@ -53,7 +53,7 @@ class _Place:
 
     def known(self, assumption: str) -> Known:
         """What is known of one of the table's assumptions."""
-        return self.standing.of_goal(self.level.name, (ASSUMPTION, self.table, assumption))
+        return self.standing.of_obligation(self.level.name, (ASSUMPTION, self.table, assumption))
 
     def rests(self, assumption: str) -> tuple[str, ...]:
         """What it rests on that is not proved, in words."""
@@ -161,7 +161,7 @@ class _Seen:
             for name, at in level.properties
             if at == file
         ]
-        state = _worst({made.of_goal(level, key) for _, made, level, key in stated})
+        state = _worst({made.of_obligation(level, key) for _, made, level, key in stated})
         systems = ", ".join(dict.fromkeys(system for system, *_ in stated))
         if state is Known.PROVED:
             words = dict.fromkeys(

@@ -275,7 +275,7 @@ class CText:
     # --- statements ---
 
     def block(self, body: tuple[Statement, ...], indent: int) -> Iterator[str]:
-        """Lines of C; behind a call that may fail the rest is guarded."""
+        """Lines of C; after a call that may fail the rest is guarded."""
         pad = "    " * indent
         for at, statement in enumerate(body):
             yield from self._statement(statement, indent)

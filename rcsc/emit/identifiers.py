@@ -265,7 +265,7 @@ def _flat(name: str) -> str:
 
 
 def _constants(program: Program, p: str, scope: Scope) -> dict[str, tuple[str, ...]]:
-    """`PROGRAM_ENUM_MEMBER`, with `_` behind it where macros of a library begin like that."""
+    """`PROGRAM_ENUM_MEMBER`, with `_` after it where macros of a library begin like that."""
     tail = "_" if p.upper().split("_")[0] in reserved.C_FAMILIES else ""
     return {
         enum.name: tuple(

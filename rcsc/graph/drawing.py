@@ -177,7 +177,7 @@ def plain(guard: str) -> str:
 
 
 def folded(text: str) -> Iterator[str]:
-    """The text in lines, broken behind commas and before `and`."""
+    """The text in lines, broken after commas and before `and`."""
     line = ""
     for piece in re.split(r"(?<=, )|(?= (?:and|or) )", text):
         if line and len(line) + len(piece.rstrip()) > MOST_LETTERS:

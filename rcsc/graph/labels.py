@@ -1,7 +1,7 @@
 """Guards and effects: a table's cells as text on an edge, and back.
 
 In: cells of the syntax tree. Out: one line of text, and the other way round. A guard is what a condition cell means with its
-heading before it: `status_in = done and loc_of_obj /= vis_reqd`. An effect is the action cells, each in parentheses behind its
+heading before it: `status_in = done and loc_of_obj /= vis_reqd`. An effect is the action cells, each in parentheses after its
 heading: `procedures(begin, set_source) command_out(move_to_obj)`; commas, because Mermaid ends a statement at `;`.
 """
 
@@ -97,7 +97,7 @@ def _constant(expr: tree.Expr) -> bool:
 
 
 def effect(headings: tuple[str, ...], cells: tuple[str, ...]) -> str:
-    """Action cells behind their headings; the blank ones left out.
+    """Action cells after their headings; the blank ones left out.
 
     Args:
         headings: As the table spells them.

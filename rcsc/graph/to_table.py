@@ -145,7 +145,7 @@ def _free(name: str, taken: set[str]) -> str:
 
 @dataclass(slots=True)
 class _Columns:
-    """The table's columns; one that the graph does not name comes behind those that it does.
+    """The table's columns; one that the graph does not name comes after those that it does.
 
     Attributes:
         fixed: Whether the graph names its columns: then a term under none of them goes to `when`.
@@ -173,9 +173,7 @@ class _Columns:
             actions: dict[str, str] = {}
             for heading, text in [*self._goes(line), *labels.effect_cells(line.edge.effect)]:
                 labels.check_actions(heading, text)
-                if (
-                    heading not in self.actions
-                ):  # going there comes first: what procedures decide comes behind
+                if heading not in self.actions:  # going there comes first: what procedures decide comes after
                     self.actions.insert(0 if heading == "procedures" else len(self.actions), heading)
                 before = actions.get(heading)
                 actions[heading] = f"{before}; {text}" if before else text

@@ -73,7 +73,7 @@ class Outcome:
     Attributes:
         snapshot: The complete state afterwards.
         line: The matched line; None where there was none.
-        line_index: Its position; DEFAULT is behind the last; -1 where there was none.
+        line_index: Its position; DEFAULT is after the last; -1 where there was none.
         fault: OK, or why it ended early.
         failed_assumptions: Assumptions that the executors check and that did not hold.
         fault_at: The leaf that was refused, or the first assumption that ended the cycle.

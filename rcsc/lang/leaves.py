@@ -44,7 +44,7 @@ def read_by(expr: Expr) -> Iterator[VariableName]:
 
 
 def one_earlier(expr: Expr) -> Expr:
-    """The same expression of the values behind the cycle before (`model.earlier`)."""
+    """The same expression of the values after the cycle before (`model.earlier`)."""
     match expr:
         case Read(name=name):
             return replace(expr, name=earlier(name))

@@ -208,11 +208,11 @@ def pending(name: str) -> VariableName:
 
 
 BEFORE = "was "
-"""What the name of a leaf begins with, in a property, where its value behind the cycle before is meant."""
+"""What the name of a leaf begins with, in a property, where its value after the cycle before is meant."""
 
 
 def earlier(name: str) -> VariableName:
-    """The name, in a property, of the value of a leaf behind the cycle before."""
+    """The name, in a property, of the value of a leaf after the cycle before."""
     return VariableName(f"{BEFORE}{name}")
 
 
@@ -507,14 +507,14 @@ class Invariant:
 
 @dataclass(frozen=True, slots=True)
 class Property:
-    """What holds behind every cycle of a level, in its environment; proved of the levels together (`compose`).
+    """What holds after every cycle of a level, in its environment; proved of the levels together (`compose`).
 
     Nothing is emitted for it, and no table relies on it.
 
     Attributes:
         condition: About a cycle: leaves as it leaves them, inputs as it took them; and, under the names that `earlier`
             gives, leaves as the cycle before left them (before the first: as the level begins).
-        text: As it was written, behind the colon.
+        text: As it was written, after the colon.
     """
 
     name: str

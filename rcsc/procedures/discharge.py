@@ -61,7 +61,7 @@ class Asker:
     """Asks for one program.
 
     Attributes:
-        order: Position of each leaf; other variables come behind.
+        order: Position of each leaf; other variables come last.
     """
 
     options: Options

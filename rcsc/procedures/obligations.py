@@ -289,7 +289,7 @@ class Obligations:
         self._settle(run, self._invariants, "", "")
 
     def _levels(self) -> None:
-        """What a level runs before its table and behind it, each list in one run."""
+        """What a level runs before its table and after it, each list in one run."""
         for level in self.program.levels:
             for words, names in (("preprocess", level.preprocess), ("postprocess", level.postprocess)):
                 calls = [Call(self._procedures[name].name) for name in names]

@@ -47,7 +47,7 @@ class Follow:
     """A line that can match in the cycle after another.
 
     Attributes:
-        line: Position of the first; DEFAULT is behind the last.
+        line: Position of the first; DEFAULT is after the last.
         then: Position of the second.
         needed: Columns of the second whose tests the first and the others do not imply.
     """
@@ -196,7 +196,7 @@ class _Cycles:
         return facts
 
     def _lines(self, run: Run) -> list[Node]:
-        """That each line matches then; DEFAULT behind the others."""
+        """That each line matches then; DEFAULT after the others."""
         lines = [
             values.all_of(run.evaluate(t.condition) for t in line.tests if t) for line in self.table.lines
         ]

@@ -17,7 +17,7 @@ from rcsc.solvers import smt
 from rcsc.solvers.options import Options
 from rcsc.solvers.smt import Answer, Solver
 from rcsc.symbolic import values
-from rcsc.symbolic.effect import Effect, Meaning, Shared, goes_wrong_otherwise, same_calls, value_behind
+from rcsc.symbolic.effect import Effect, Meaning, Shared, goes_wrong_otherwise, same_calls, value_after
 from rcsc.symbolic.encode import Frame, least_witness
 from rcsc.symbolic.evaluation import TooLongError
 from rcsc.symbolic.execution import Run
@@ -149,7 +149,7 @@ class _Question:
         yield RUN, goes_wrong_otherwise(one, two, self.shared)
         yield CALLS, values.both(good, values.negation(same_calls(one, two, leaves, self.shared)))
         for name in leaves:
-            pair = [value_behind(effect, name, self.shared) for effect in (one, two)]
+            pair = [value_after(effect, name, self.shared) for effect in (one, two)]
             same = self.shared.equal(*pair)
             if same is not values.TRUE:
                 yield name, values.both(good, values.negation(same))

@@ -33,7 +33,7 @@ class Step:
     """A line that can match in a state, and the state that it leads to.
 
     Attributes:
-        line: Its position; DEFAULT is behind the last.
+        line: Its position; DEFAULT is after the last.
         source: The state before, as a value of the variable.
         target: The state that the actions lead to.
         decided: Whether what the procedures compute decides it: the same line can lead elsewhere from there.

@@ -1,4 +1,4 @@
-"""What actions do, as values: the state behind them, what it rests on, and which extern procedures are called.
+"""What actions do, as values: the state after them, what it rests on, and which extern procedures are called.
 
 In: statements of one program, and leaves that another program's run may share. Out: an `Effect`; two of them are the
 same where `same_effect` holds. Text plays no part: only what is written matters, and where a run goes wrong.
@@ -40,7 +40,7 @@ class Effect:
     """What a run does.
 
     Attributes:
-        leaves: The value behind the run of every leaf that it may write.
+        leaves: The value after the run of every leaf that it may write.
         wrote: For each of them, when it is written.
         owed: What must hold that nothing goes wrong on the way: no overflow, no index outside its array, no value out of
             its range. What is owed twice is there once.
@@ -197,8 +197,8 @@ def _paid(owed: Obligation) -> Node:
     return values.follows(owed.path, owed.good)
 
 
-def value_behind(effect: Effect, leaf: str, shared: Shared) -> Node:
-    """The leaf's value behind the run."""
+def value_after(effect: Effect, leaf: str, shared: Shared) -> Node:
+    """The leaf's value after the run."""
     return effect.leaves.get(leaf, shared.start[leaf])
 
 

@@ -1,7 +1,7 @@
 """Symbolic runs of statements.
 
-In: statements and a state. Out: the state behind them, and what they owe (`evaluation`). Every way through
-`if` and `case` is followed once; states are merged behind. Loops are unrolled, calls run in place.
+In: statements and a state. Out: the state after them, and what they owe (`evaluation`). Every way through
+`if` and `case` is followed once; states are merged after. Loops are unrolled, calls run in place.
 """
 
 from collections.abc import Iterable

@@ -441,7 +441,7 @@ def _any(masks: Iterable[int]) -> int:
 
 
 def _intervals_meeting(stated: Mapping[Box, int], idle: int) -> Iterator[tuple[Box, int]]:
-    """For each single interval the lines whose intervals it meets: those that neither end before it nor begin behind it."""
+    """For each single interval the lines whose intervals it meets: those that neither end before it nor begin after it."""
     lows = sorted({box[0][0] for box in stated})
     highs = sorted({box[0][1] for box in stated})
     begin, end = dict.fromkeys(lows, 0), dict.fromkeys(highs, 0)

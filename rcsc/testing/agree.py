@@ -74,7 +74,7 @@ class Compared:
 
 
 class PythonRuns(Protocol):
-    """What the emitted Python does; see `python_executor`."""
+    """What the emitted Python does; see `executors.python`."""
 
     def run(self, target: Target, session: Session) -> list[Seen]:
         """Runs a session."""

@@ -27,7 +27,7 @@ def table_of(program: Program, target: Target) -> Table | None:
     return next((table for table in program.tables if table.name == names[0]), None)
 
 
-def hunt_sessions(
+def search_sessions(
     executors: Executors, target: Target, compared: Compared, examples: int, most_cycles: int = 8
 ) -> Disagreement | None:
     """Runs drawn sessions of a step or a cycle.
@@ -61,7 +61,7 @@ def _differs(executors: Executors, target: Target, one: Session, compared: Compa
     return run_session(executors, target, one, compared)
 
 
-def hunt_lines(
+def search_lines(
     executors: Executors, target: Target, compared: Compared, examples: int
 ) -> Disagreement | None:
     """Runs drawn snapshots through a matcher, some at a time."""

@@ -131,18 +131,20 @@ class Suite:
 
     def lines(self, target: Target, snapshots: Sequence[Snapshot]) -> Disagreement | None:
         """A matcher on the vectors and on drawn snapshots."""
-        from rcsc.testing.differential_search import hunt_lines
+        from rcsc.testing.differential_search import search_lines
 
         found = run_lines(self.executors, target, snapshots, self.compared)
-        return found or hunt_lines(self.executors, target, self.compared, self.options.examples)
+        return found or search_lines(self.executors, target, self.compared, self.options.examples)
 
     def steps(self, target: Target, snapshots: Sequence[Snapshot]) -> Disagreement | None:
         """A step from the vectors, a step or cycle in drawn sessions."""
-        from rcsc.testing.differential_search import hunt_sessions
+        from rcsc.testing.differential_search import search_sessions
 
         found = next(filter(None, (self.one_step(target, snapshot) for snapshot in snapshots)), None)
         options = self.options
-        return found or hunt_sessions(self.executors, target, self.compared, options.examples, options.cycles)
+        return found or search_sessions(
+            self.executors, target, self.compared, options.examples, options.cycles
+        )
 
     def one_step(self, target: Target, snapshot: Snapshot) -> Disagreement | None:
         """One step from a vector."""

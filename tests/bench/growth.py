@@ -19,7 +19,7 @@ from unittest.mock import patch
 from rcsc.compose.invariant.search import Effort
 from rcsc.compose.proof.assume_guarantee import agreements
 from rcsc.compose.proof.level import essential, prove_level
-from rcsc.compose.proof.system import steppers
+from rcsc.compose.proof.system import transition_systems
 from rcsc.solvers.sat import Sat
 from rcsc.solvers.smt import Solver
 from tests.hierarchies_made import BOTTOM, RIGHT, Hierarchy, Line, MadeLevel, MadeTable
@@ -128,7 +128,7 @@ def costs(made: Hierarchy, effort: Effort | None = None) -> list[Cost]:
         AssertionError: The levels are proved, and do not agree: they would be other levels than they are meant to be.
     """
     with tempfile.TemporaryDirectory(prefix="rcsc-growth-") as folder:
-        known = steppers(written(made, Path(folder)))
+        known = transition_systems(written(made, Path(folder)))
     found, proofs = [], {}
     for level in made.levels:
         begun = time.perf_counter()

@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from rcsc.compose.contract.claims import Key, Need
-    from rcsc.compose.contract.transition import Stepper
+    from rcsc.compose.contract.transition import TransitionSystem
     from rcsc.compose.proof.context import Context
     from rcsc.compose.proof.level import LevelProof
     from rcsc.compose.proof.ranking import Counted
@@ -42,8 +42,8 @@ def named(whole: "SystemProof", level: str, needs: "Sequence[Need]") -> str:
 
 
 def not_looked_at(proof: "LevelProof") -> Iterator[str]:
-    """Goals that could not be stated."""
-    for one in proof.unlooked:
+    """Obligations that could not be stated."""
+    for one in proof.unstated:
         yield f"not looked at: {one.shown}"
 
 
@@ -98,11 +98,11 @@ def left_out(whole: "SystemProof") -> Iterator[str]:
     """That it is not wholly proved, and why, where no finding says so."""
     if whole.whole or not whole.proved:
         return
-    unlooked = sum(len(one.unlooked) for one in whole.levels)
+    unstated = sum(len(one.unstated) for one in whole.levels)
     rests = sum(found.found and not found.proved for found in whole.closed.values())
     ends = sum(not one.proved for level in whole.levels for one in level.endings)
     said = [
-        f"{unlooked} not looked at" if unlooked else "",
+        f"{unstated} not looked at" if unstated else "",
         f"{rests} rest on what is not known" if rests else "",
         f"{ends} not shown to end" if ends else "",
     ]
@@ -134,10 +134,10 @@ def assumptions(proof: "SystemProof") -> str:
     from rcsc.compose.contract.obligations import Sort
 
     found = [
-        proof.of(one.level, goal.key)
+        proof.of(one.level, obligation.key)
         for one in proof.levels
-        for goal, _ in one.found
-        if goal.sort is Sort.ASSUMPTION
+        for obligation, _ in one.found
+        if obligation.sort is Sort.ASSUMPTION
     ]
     if not found:
         return "the tables assume nothing"
@@ -150,15 +150,15 @@ def assumptions(proof: "SystemProof") -> str:
     )
 
 
-def reaction(made: "Mapping[str, Stepper]", proof: "SystemProof") -> Iterator[str]:
+def reaction(made: "Mapping[str, TransitionSystem]", proof: "SystemProof") -> Iterator[str]:
     """The way of a PAUSE from the top down, as far as it is proved that it is passed on at once."""
     from rcsc.compose.contract.obligations import Sort
 
     passes = {
-        (one.level, goal.name)
+        (one.level, obligation.name)
         for one in proof.levels
-        for goal, _ in one.found
-        if goal.sort is Sort.PAUSES and proof.of(one.level, goal.key).proved
+        for obligation, _ in one.found
+        if obligation.sort is Sort.PAUSES and proof.of(one.level, obligation.key).proved
     }
     tops = [
         name
@@ -177,14 +177,12 @@ def reaction(made: "Mapping[str, Stepper]", proof: "SystemProof") -> Iterator[st
             yield f"a PAUSE of `{top}` is ordered {said} cycles of levels, besides what buffers take"
 
 
-def confirmed(stepper: "Stepper", proof: "LevelProof") -> "dict[str, bool]":
+def confirmed(ts: "TransitionSystem", proof: "LevelProof") -> "dict[str, bool]":
     """Each question of the certificate, and whether cvc5 refutes it within two minutes."""
     from rcsc.compose.proof.level import certificate
     from rcsc.solvers.smtlib import CVC5_STEPS, cvc5_refutes
 
-    return {
-        name: cvc5_refutes(text, steps=6 * CVC5_STEPS) for name, text in certificate(stepper, proof).items()
-    }
+    return {name: cvc5_refutes(text, steps=6 * CVC5_STEPS) for name, text in certificate(ts, proof).items()}
 
 
 def claim(whole: "SystemProof", level: str, key: "Key") -> dict[str, Any]:

@@ -27,7 +27,7 @@ SAFE: Key = ("every operation is defined and in range", "", "")
 ENDING: Key = ("every command ends", "", "")
 """What the endings of the level above rest on."""
 CONTRACT, UNREACHED, AGAIN = "the contract", "never reached", "does nothing when it matches again"
-"""Sorts of claims that are no goals of one cycle."""
+"""Sorts of claims that are no obligations of one cycle."""
 
 
 class Verdict(StrEnum):

@@ -1,6 +1,6 @@
 """What is proved of every level, as conditions on one cycle from any reachable state.
 
-In: a stepper and a cycle from anywhere. Out: `Goal`s, each of which is to hold in every cycle. They are of two kinds:
+In: a transition system and a cycle from any state. Out: `Obligation`s, each of which is to hold in every cycle. They are of two kinds:
 what is claimed of the level itself, and what it guarantees its neighbours, which is what they assume of it
 (`compose.__doc__`).
 """
@@ -14,7 +14,7 @@ from typing import TypeAlias
 from rcsc.compose.contract.claims import SAFE
 from rcsc.compose.contract.environment import COMMAND, ECHO, ECHOED, NUMBER, Below, leaves_under
 from rcsc.compose.contract.properties import invariants, kept_within, properties
-from rcsc.compose.contract.transition import Cycle, Stepper, TableAt, successor
+from rcsc.compose.contract.transition import Cycle, TableAt, TransitionSystem, successor
 from rcsc.lang.interval_sets import meet
 from rcsc.lang.leaves import read_by
 from rcsc.lang.model import Bool, Enum, Kind, Line, OneTable, Program, Table, pending
@@ -27,7 +27,7 @@ FLAG = "new_command"
 
 
 class Sort(StrEnum):
-    """What a goal is about; the value is how it is shown."""
+    """What an obligation is about; the value is how it is shown."""
 
     ASSUMPTION = "assumption"
     SOME_LINE = "some line matches"
@@ -45,18 +45,18 @@ class Sort(StrEnum):
     DEFERRED = "no state is written directly while another is pending"
     INVARIANT = "invariant"
     PROPERTY = "property"
-    ENDS = "the command ends"  # none of one cycle: `ends`, `lap`
+    ENDS = "the command ends"  # none of one cycle: `termination`, `lasso`
     PROTOCOL = "orders and reports"  # all of its sorts at once
     SAFE = SAFE[0]
 
 
 Key: TypeAlias = tuple[Sort, str, str]
-"""What tells the goals of a level apart: a key of a claim (`claims`)."""
+"""What tells the obligations of a level apart: a key of a claim (`claims`)."""
 
 
 @dataclass(frozen=True, slots=True)
-class Unlooked:
-    """Goals of a sort that cannot be stated, as a part of the level was not recognised; `missing`, what was looked for."""
+class Unstated:
+    """Obligations of a sort that cannot be stated, as a part of the level was not recognised; `missing`, what was looked for."""
 
     sort: Sort
     table: str
@@ -70,7 +70,7 @@ class Unlooked:
 
 
 @dataclass(frozen=True, slots=True)
-class Goal:
+class Obligation:
     """One condition.
 
     Attributes:
@@ -88,7 +88,7 @@ class Goal:
 
     @property
     def key(self) -> Key:
-        """The same for the same goal in any cycle."""
+        """The same for the same obligation in any cycle."""
         return self.sort, self.table, self.name
 
     @property
@@ -101,40 +101,42 @@ class Goal:
         return f"{self.sort.value}: `{self.name}`" if self.name else self.sort.value
 
 
-def goals(stepper: Stepper, cycle: Cycle) -> tuple[Goal, ...]:
-    """All goals of a level, its tables' first."""
+def obligations(ts: TransitionSystem, cycle: Cycle) -> tuple[Obligation, ...]:
+    """All obligations of a level, its tables' first."""
     return (
         *_tables(cycle),
-        *_upward(stepper, cycle),
-        *_downward(stepper, cycle),
-        *_own(stepper, cycle),
-        *_stated(stepper, cycle),
+        *_upward(ts, cycle),
+        *_downward(ts, cycle),
+        *_own(ts, cycle),
+        *_stated(ts, cycle),
     )
 
 
-def _tables(cycle: Cycle) -> Iterator[Goal]:
+def _tables(cycle: Cycle) -> Iterator[Obligation]:
     for at in cycle.tables:
         name = str(at.table.name)
         for assumption, condition in at.assumptions.items():
-            yield Goal(Sort.ASSUMPTION, name, assumption, values.follows(at.chosen, condition))
+            yield Obligation(Sort.ASSUMPTION, name, assumption, values.follows(at.chosen, condition))
         some = values.follows(at.runs, values.negation(at.none))
         if at.table.default is None:
-            yield Goal(Sort.SOME_LINE, name, "", some)
+            yield Obligation(Sort.SOME_LINE, name, "", some)
         elif at.table.default.unreachable:
-            yield Goal(Sort.NO_DEFAULT, name, "", some)
-        yield Goal(Sort.ONE_LINE, name, "", values.follows(at.runs, values.negation(at.several())))
+            yield Obligation(Sort.NO_DEFAULT, name, "", some)
+        yield Obligation(Sort.ONE_LINE, name, "", values.follows(at.runs, values.negation(at.several())))
 
 
-def pairs(cycle: Cycle) -> tuple[Goal, ...]:
+def pairs(cycle: Cycle) -> tuple[Obligation, ...]:
     """That no two lines match, pair by pair: what there is to look for where `ONE_LINE` is not proved."""
     found = []
     for at in cycle.tables:
         for one, two in may_meet(at.table):
             first, second = (str(at.table.lines[place].name) for place in (one, two))
             never = values.negation(values.both(at.matches[one], at.matches[two]))
-            goal = values.follows(at.runs, never)
+            obligation = values.follows(at.runs, never)
             found.append(
-                Goal(Sort.ONE_LINE, str(at.table.name), f"{first} and {second}", goal, (first, second))
+                Obligation(
+                    Sort.ONE_LINE, str(at.table.name), f"{first} and {second}", obligation, (first, second)
+                )
             )
     return tuple(found)
 
@@ -152,46 +154,46 @@ def may_meet(table: Table) -> list[tuple[int, int]]:
     ]
 
 
-def _upward(stepper: Stepper, cycle: Cycle) -> Iterator[Goal]:
+def _upward(ts: TransitionSystem, cycle: Cycle) -> Iterator[Obligation]:
     """What the superior assumes of this level."""
-    if (above := stepper.links.above) is None:
+    if (above := ts.links.above) is None:
         return
     number = values.equal(cycle.after[f"{above.report}.{ECHO}"], cycle.taken[f"{above.order}.{NUMBER}"])
     command = values.equal(cycle.after[f"{above.report}.{ECHOED}"], cycle.taken[f"{above.order}.{COMMAND}"])
     as_before = (
         values.all_of(  # where an extern procedure is refused it may be as late as if the level had not run
             values.equal(cycle.before[leaf], cycle.after[leaf])
-            for leaf in leaves_under(stepper.program, above.report)
+            for leaf in leaves_under(ts.program, above.report)
         )
     )
     late = values.both(cycle.refused, as_before)
-    yield Goal(Sort.ECHOES, "", above.report, values.either(values.both(number, command), late))
+    yield Obligation(Sort.ECHOES, "", above.report, values.either(values.both(number, command), late))
 
 
-def _downward(stepper: Stepper, cycle: Cycle) -> Iterator[Goal]:
+def _downward(ts: TransitionSystem, cycle: Cycle) -> Iterator[Obligation]:
     """What the subordinates assume of this level, and that it waits for them."""
-    for below in stepper.links.below:
+    for below in ts.links.below:
         number = f"{below.order}.{NUMBER}"
         before, after = cycle.before[number], cycle.after[number]
         same = values.equal(before, after)
-        for leaf in leaves_under(stepper.program, below.order):
+        for leaf in leaves_under(ts.program, below.order):
             if leaf != number:
                 kept = values.equal(cycle.before[leaf], cycle.after[leaf])
-                yield Goal(Sort.NUMBERED, "", leaf, values.follows(same, kept))
-        yield Goal(
+                yield Obligation(Sort.NUMBERED, "", leaf, values.follows(same, kept))
+        yield Obligation(
             Sort.NEXT_NUMBER, "", below.order, values.either(same, values.equal(after, successor(before)))
         )
-        if stepper.links.above is not None:
+        if ts.links.above is not None:
             command = f"{below.order}.{COMMAND}"
             kept = values.equal(cycle.before[command], cycle.after[command])
-            yield Goal(Sort.WAITS, "", below.order, values.follows(_waiting(stepper, cycle, below), kept))
-            if not list(_no_pause(stepper, below)):
-                yield Goal(Sort.PAUSES, "", below.order, _passes_on_a_pause(stepper, cycle, below))
+            yield Obligation(Sort.WAITS, "", below.order, values.follows(_waiting(ts, cycle, below), kept))
+            if not list(_no_pause(ts, below)):
+                yield Obligation(Sort.PAUSES, "", below.order, _passes_on_a_pause(ts, cycle, below))
 
 
-def _waiting(stepper: Stepper, cycle: Cycle, below: Below) -> Node:
+def _waiting(ts: TransitionSystem, cycle: Cycle, below: Below) -> Node:
     """The command is the last one, and the order is not echoed."""
-    above = stepper.links.above
+    above = ts.links.above
     assert above is not None
     number = f"{above.order}.{NUMBER}"
     sent = cycle.before[f"{below.order}.{NUMBER}"]
@@ -204,104 +206,103 @@ def _waiting(stepper: Stepper, cycle: Cycle, below: Below) -> Node:
     )
 
 
-def _passes_on_a_pause(stepper: Stepper, cycle: Cycle, below: Below) -> Node:
-    """Where a new order is the first command, PAUSE or its like, so is the order that stands below behind the cycle."""
-    above = stepper.links.above
+def _passes_on_a_pause(ts: TransitionSystem, cycle: Cycle, below: Below) -> Node:
+    """Where a new order is the first command, PAUSE or its like, so is the order that stands below after the cycle."""
+    above = ts.links.above
     assert above is not None
     taken, passed = f"{above.order}.{COMMAND}", f"{below.order}.{COMMAND}"
     new = values.negation(
         values.equal(cycle.before[f"{above.order}.{NUMBER}"], cycle.taken[f"{above.order}.{NUMBER}"])
     )
-    paused = values.equal(cycle.taken[taken], values.constant(stepper.kinds[taken], 0))
-    passes = values.equal(cycle.after[passed], values.constant(stepper.kinds[passed], 0))
+    paused = values.equal(cycle.taken[taken], values.constant(ts.kinds[taken], 0))
+    passes = values.equal(cycle.after[passed], values.constant(ts.kinds[passed], 0))
     return values.follows(values.both(new, paused), passes)
 
 
-def _own(stepper: Stepper, cycle: Cycle) -> Iterator[Goal]:
-    above = stepper.links.above
-    if above is not None and has_flag(stepper):
+def _own(ts: TransitionSystem, cycle: Cycle) -> Iterator[Obligation]:
+    above = ts.links.above
+    if above is not None and has_flag(ts):
         same = values.equal(cycle.before[f"{above.order}.{NUMBER}"], cycle.taken[f"{above.order}.{NUMBER}"])
         rises = values.both(cycle.after[FLAG], values.negation(cycle.before[FLAG]))
-        yield Goal(Sort.ONCE, "", FLAG, values.follows(same, values.negation(rises)))
+        yield Obligation(Sort.ONCE, "", FLAG, values.follows(same, values.negation(rises)))
         for at in cycle.tables:
             overlooking = _overlooking(at)
-            ends = bool(at.table.stops) or _asks(stepper.program)
+            ends = bool(at.table.stops) or _asks(ts.program)
             if overlooking or (overlooking is not None and ends):
-                yield _answered(stepper, cycle, at, overlooking)
-    for variable in stepper.program.variables:
+                yield _answered(ts, cycle, at, overlooking)
+    for variable in ts.program.variables:
         if variable.deferred_until is not None:
             untouched = values.equal(cycle.after[variable.name], cycle.middle[variable.name])
             agreed = values.equal(cycle.after[variable.name], cycle.after[pending(variable.name)])
-            yield Goal(Sort.DEFERRED, "", str(variable.name), values.either(untouched, agreed))
+            yield Obligation(Sort.DEFERRED, "", str(variable.name), values.either(untouched, agreed))
 
 
-def has_flag(stepper: Stepper) -> bool:
+def has_flag(ts: TransitionSystem) -> bool:
     """Whether the level keeps the flag of a new command."""
     return any(
-        v.name == FLAG and v.kind is Kind.STATE and isinstance(v.type, Bool)
-        for v in stepper.program.variables
+        v.name == FLAG and v.kind is Kind.STATE and isinstance(v.type, Bool) for v in ts.program.variables
     )
 
 
-def unlooked(stepper: Stepper) -> tuple[Unlooked, ...]:
-    """The goals that are not looked at, and what is missing for them."""
-    return tuple(_unlooked(stepper))
+def unstated(ts: TransitionSystem) -> tuple[Unstated, ...]:
+    """The obligations that are not looked at, and what is missing for them."""
+    return tuple(_unstated(ts))
 
 
-def _unlooked(stepper: Stepper) -> Iterator[Unlooked]:
-    links = stepper.links
+def _unstated(ts: TransitionSystem) -> Iterator[Unstated]:
+    links = ts.links
     for missing in links.unread:
-        yield Unlooked(Sort.PROTOCOL, "", missing)
+        yield Unstated(Sort.PROTOCOL, "", missing)
     if links.above is None:
         if links.below:
             for sort in (Sort.WAITS, Sort.PAUSES, Sort.ENDS):
-                yield Unlooked(sort, "", "the level takes no orders")
+                yield Unstated(sort, "", "the level takes no orders")
         return
     for below in links.below:
-        for missing in _no_pause(stepper, below):
-            yield Unlooked(Sort.PAUSES, "", missing)
-    if not has_flag(stepper):
+        for missing in _no_pause(ts, below):
+            yield Unstated(Sort.PAUSES, "", missing)
+    if not has_flag(ts):
         for sort in (Sort.ONCE, Sort.ANSWERED):
-            yield Unlooked(sort, "", f"there is no state `{FLAG} : bool`")
+            yield Unstated(sort, "", f"there is no state `{FLAG} : bool`")
         return
-    for table in run_by(stepper):
-        if not any(looks_for(FLAG, line) for line in table.lines) and not _rests(stepper, table):
-            yield Unlooked(Sort.ANSWERED, str(table.name), f"no line looks at `{FLAG}`")
+    for table in run_by(ts):
+        if not any(looks_for(FLAG, line) for line in table.lines) and not _rests(ts, table):
+            yield Unstated(Sort.ANSWERED, str(table.name), f"no line looks at `{FLAG}`")
 
 
-def _no_pause(stepper: Stepper, below: Below) -> Iterator[str]:
+def _no_pause(ts: TransitionSystem, below: Below) -> Iterator[str]:
     """Why it is not known what a PAUSE is: the first command, which has a table of its own."""
-    assert stepper.links.above is not None
-    if isinstance(stepper.level.tables, OneTable):
+    assert ts.links.above is not None
+    if isinstance(ts.level.tables, OneTable):
         yield "the level has one table for all commands"
-    for leaf in (f"{stepper.links.above.order}.{COMMAND}", f"{below.order}.{COMMAND}"):
-        if not isinstance(stepper.kinds[leaf], Enum):
+    for leaf in (f"{ts.links.above.order}.{COMMAND}", f"{below.order}.{COMMAND}"):
+        if not isinstance(ts.kinds[leaf], Enum):
             yield f"`{leaf}` is no enumeration"
 
 
-def run_by(stepper: Stepper) -> list[Table]:
+def run_by(ts: TransitionSystem) -> list[Table]:
     """The tables that the level runs."""
-    chosen = stepper.level.tables
+    chosen = ts.level.tables
     names = {chosen.table} if isinstance(chosen, OneTable) else {table for _, table in chosen.tables}
-    return [one for one in stepper.program.tables if one.name in names]
+    return [one for one in ts.program.tables if one.name in names]
 
 
-def _rests(stepper: Stepper, table: Table) -> bool:
+def _rests(ts: TransitionSystem, table: Table) -> bool:
     """Whether it is the table of the first command, PAUSE or its like, and of no other: it does the same whether that is new or not."""
-    chosen = stepper.level.tables
+    chosen = ts.level.tables
     return not isinstance(chosen, OneTable) and [
         value for value, name in chosen.tables if name == table.name
     ] == [0]
 
 
-def _stated(stepper: Stepper, cycle: Cycle) -> Iterator[Goal]:
+def _stated(ts: TransitionSystem, cycle: Cycle) -> Iterator[Obligation]:
     """What the program itself states."""
-    for name, holds in invariants(stepper.program, cycle):
-        yield Goal(Sort.INVARIANT, "", name, holds)
-    for name, holds in properties(stepper.program, cycle):
-        yield Goal(Sort.PROPERTY, "", name, holds)
-    if stepper.safety.within:
-        yield Goal(Sort.SAFE, "", "", kept_within(stepper.program, cycle, stepper.safety.invariants))
+    for name, holds in invariants(ts.program, cycle):
+        yield Obligation(Sort.INVARIANT, "", name, holds)
+    for name, holds in properties(ts.program, cycle):
+        yield Obligation(Sort.PROPERTY, "", name, holds)
+    if ts.safety.within:
+        yield Obligation(Sort.SAFE, "", "", kept_within(ts.program, cycle, ts.safety.invariants))
 
 
 def _asks(program: Program) -> bool:
@@ -324,15 +325,15 @@ def looks_for(leaf: str, line: Line) -> bool:
     return any(test is not None and leaf in map(str, read_by(test.condition)) for test in line.tests)
 
 
-def _answered(stepper: Stepper, cycle: Cycle, at: TableAt, overlooking: tuple[Node, ...]) -> Goal:
+def _answered(ts: TransitionSystem, cycle: Cycle, at: TableAt, overlooking: tuple[Node, ...]) -> Obligation:
     """Where such a line runs while the flag stands, or the cycle ends before a line is done, the flag outlasts it.
 
     If it is down as soon as the level sees the same once more, no line will answer the command, and what this line
     reports is taken for the answer.
     """
-    again = stepper.cycle(cycle.after, " again", taken=cycle.taken).middle[FLAG]
+    again = ts.cycle(cycle.after, " again", taken=cycle.taken).middle[FLAG]
     missed = values.any_of(overlooking)
     passed = values.all_of((at.chosen, values.negation(at.several()), missed))
     passed = values.either(passed, values.both(at.selected, cycle.interrupted))
     flagged = values.both(cycle.middle[FLAG], passed)
-    return Goal(Sort.ANSWERED, str(at.table.name), FLAG, values.follows(flagged, again))
+    return Obligation(Sort.ANSWERED, str(at.table.name), FLAG, values.follows(flagged, again))

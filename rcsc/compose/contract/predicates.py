@@ -1,6 +1,6 @@
-"""What the invariants may speak of: features of a state, truth values or members of an enumeration of any size.
+"""What the invariants may speak of: predicates of a state, truth values or members of an enumeration of any size.
 
-In: one cycle from anywhere, and the nodes that are to be proved. Out: the `Feature`s in their cone. Nothing here names a table or
+In: one cycle from any state, and the nodes that are to be proved. Out: the `Predicate`s in their cone. Nothing here names a table or
 a state; all of it is read from the model:
 
 - truth values and enumerations that conditions of tables, assumptions or the contract read, and flags;
@@ -14,7 +14,7 @@ from collections.abc import Container, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 
 from rcsc.compose.contract.environment import COMMAND
-from rcsc.compose.contract.transition import GHOST, Cycle, Leaves, Stepper
+from rcsc.compose.contract.transition import GHOST, Cycle, Leaves, TransitionSystem
 from rcsc.lang.interpret import call, holds
 from rcsc.lang.leaves import everything, expressions, read_by
 from rcsc.lang.meaning import spelled
@@ -45,11 +45,11 @@ from rcsc.symbolic.execution import Run
 from rcsc.symbolic.values import Node
 
 CLOSELY = 1
-"""Up to here, what is not proved is looked at with more features."""
+"""Up to here, what is not proved is looked at with more predicates."""
 
 
 @dataclass(frozen=True, slots=True)
-class Feature:
+class Predicate:
     """A truth value or a member; or, as a truth value, whether it equals another leaf, or what a module computes of it.
 
     Attributes:
@@ -95,10 +95,10 @@ class Feature:
         return spell(self.kind, value)
 
 
-def cone(cycle: Cycle, goals: Iterable[Node]) -> frozenset[str]:
-    """The leaves whose values before a cycle can influence the goals, now or in a later cycle."""
+def cone(cycle: Cycle, obligations: Iterable[Node]) -> frozenset[str]:
+    """The leaves whose values before a cycle can influence the obligations, now or in a later cycle."""
     found: set[str] = set()
-    waiting = [name for name in values.variables(goals) if name in cycle.before]
+    waiting = [name for name in values.variables(obligations) if name in cycle.before]
     while waiting:
         name = waiting.pop()
         if name not in found:
@@ -107,43 +107,46 @@ def cone(cycle: Cycle, goals: Iterable[Node]) -> frozenset[str]:
     return frozenset(found)
 
 
-def features(stepper: Stepper, cycle: Cycle, goals: Iterable[Node], closely: int = 0) -> tuple[Feature, ...]:
-    """The features in the cone of the goals, in declared order.
+def predicates(
+    ts: TransitionSystem, cycle: Cycle, obligations: Iterable[Node], closely: int = 0
+) -> tuple[Predicate, ...]:
+    """The predicates in the cone of the obligations, in declared order.
 
     Args:
-        stepper: The level.
-        cycle: From anywhere.
-        goals: What is to be proved.
-        closely: At 1 (`CLOSELY`) there are also those by which procedures decide, behind the others.
+        ts: The level.
+        cycle: From any state.
+        obligations: What is to be proved.
+        closely: At 1 (`CLOSELY`) there are also those by which procedures decide, after the others.
     """
-    inside = cone(cycle, goals)
-    program, kinds = stepper.program, stepper.kinds
-    read = _read(stepper)
-    computed = {leaf: module for leaf, module in _computed(stepper) if leaf in read}
+    inside = cone(cycle, obligations)
+    program, kinds = ts.program, ts.kinds
+    read = _read(ts)
+    computed = {leaf: module for leaf, module in _computed(ts) if leaf in read}
     chosen = [
         name
         for name, kind in kinds.items()
         if listed(kind) and (name in computed or (name in inside and (name in read or _flag(program, name))))
     ]
     parting = {
-        *_selector(stepper),
+        *_selector(ts),
         *(name for name in chosen if _flag(program, name) and name not in computed),
     }
-    found = [Feature(name, kinds[name], parts=name in parting) for name in chosen]
-    pairs = sorted({*compared(program), *_questions(stepper)})
-    found += [Feature(one, Bool(), other) for one, other in pairs if {one, other} <= inside and one in kinds]
+    found = [Predicate(name, kinds[name], parts=name in parting) for name in chosen]
+    pairs = sorted({*compared(program), *_questions(ts)})
     found += [
-        Feature(leaf, Bool(), module=module, procedures=stepper.procedures)
-        for leaf, module in computed.items()
+        Predicate(one, Bool(), other) for one, other in pairs if {one, other} <= inside and one in kinds
     ]
-    found += _cells(stepper, {*inside, *computed})
+    found += [
+        Predicate(leaf, Bool(), module=module, procedures=ts.procedures) for leaf, module in computed.items()
+    ]
+    found += _cells(ts, {*inside, *computed})
     if closely:
-        found += _branches(stepper, inside, {one.leaf for one in found})
+        found += _branches(ts, inside, {one.leaf for one in found})
     return tuple(found)
 
 
-def point(stepper: Stepper, chosen: tuple[Feature, ...], state: Mapping[str, Value]) -> tuple[int, ...]:
-    """The features of a state that was run; modules are run by the interpreter."""
+def point(ts: TransitionSystem, chosen: tuple[Predicate, ...], state: Mapping[str, Value]) -> tuple[int, ...]:
+    """The predicates of a state that was run; modules are run by the interpreter."""
     again: dict[str, dict[str, Value]] = {}
     found = []
     for one in chosen:
@@ -152,7 +155,7 @@ def point(stepper: Stepper, chosen: tuple[Feature, ...], state: Mapping[str, Val
         elif one.module is not None:
             if one.module.name not in again:
                 again[one.module.name] = dict(state)
-                call(stepper.program, one.module.name, [], again[one.module.name])
+                call(ts.program, one.module.name, [], again[one.module.name])
             found.append(int(state[one.leaf] == again[one.module.name][one.leaf]))
         elif one.other:
             found.append(int(state[one.leaf] == state[one.other]))
@@ -173,9 +176,9 @@ def _flag(program: Program, name: str) -> bool:
     )
 
 
-def _read(stepper: Stepper) -> set[str]:
+def _read(ts: TransitionSystem) -> set[str]:
     """Leaves that decide which line runs, or that the contract speaks of; with what they will be."""
-    program, level = stepper.program, stepper.level
+    program, level = ts.program, ts.level
     conditions = [one.condition for one in program.assumptions]
     conditions += [
         test.condition
@@ -187,35 +190,33 @@ def _read(stepper: Stepper) -> set[str]:
     if not isinstance(level.tables, OneTable):
         conditions.append(level.tables.selector)
     found = {str(name) for condition in conditions for name in read_by(condition)}
-    found |= {f"{below.order}.{COMMAND}" for below in stepper.links.below}
-    found |= {f"{GHOST}{asked.into}" for asked in stepper.links.asked}
+    found |= {f"{below.order}.{COMMAND}" for below in ts.links.below}
+    found |= {f"{GHOST}{asked.into}" for asked in ts.links.asked}
     return found | {
         str(pending(v.name)) for v in program.variables if v.deferred_until is not None and v.name in found
     }
 
 
-def _computed(stepper: Stepper) -> Iterator[tuple[str, Procedure]]:
+def _computed(ts: TransitionSystem) -> Iterator[tuple[str, Procedure]]:
     """Leaves that a module of the preprocess computes of inputs, flags, and what it writes itself."""
-    variables = {str(v.name): v for v in stepper.program.variables}
-    for name in stepper.level.preprocess:
-        module = stepper.procedures[name]
+    variables = {str(v.name): v for v in ts.program.variables}
+    for name in ts.level.preprocess:
+        module = ts.procedures[name]
         own = set(map(str, module.writes))
-        run = Run(stepper.procedures, stepper.kinds, stepper.anywhere())
+        run = Run(ts.procedures, ts.kinds, ts.havoc())
         run.execute((Call(module.name),))
         if run.fresh:
             continue  # it asks what nobody can say again
         for leaf in map(str, module.writes):
             used = values.variables([run.leaf(leaf)])
-            if all(
-                one in own or variables[one].kind is Kind.INPUT or _flag(stepper.program, one) for one in used
-            ):
+            if all(one in own or variables[one].kind is Kind.INPUT or _flag(ts.program, one) for one in used):
                 yield leaf, module
 
 
-def _cells(stepper: Stepper, inside: Container[str]) -> Iterator[Feature]:
+def _cells(ts: TransitionSystem, inside: Container[str]) -> Iterator[Predicate]:
     """Conditions of cells on numbers."""
-    kinds, seen = stepper.kinds, set()
-    for table in stepper.program.tables:
+    kinds, seen = ts.kinds, set()
+    for table in ts.program.tables:
         for column, tests in zip(
             table.columns, zip(*(line.tests for line in table.lines), strict=True), strict=True
         ):
@@ -225,24 +226,24 @@ def _cells(stepper: Stepper, inside: Container[str]) -> Iterator[Feature]:
                 name = spelled(test.condition)
                 if name not in seen and all(leaf in inside for leaf in test.variables):
                     seen.add(name)
-                    yield Feature(f"{column.heading} {test.text}", Bool(), condition=test.condition)
+                    yield Predicate(f"{column.heading} {test.text}", Bool(), condition=test.condition)
 
 
-def _branches(stepper: Stepper, inside: Container[str], there: Container[str]) -> Iterator[Feature]:
+def _branches(ts: TransitionSystem, inside: Container[str], there: Container[str]) -> Iterator[Predicate]:
     """What procedures decide by: truth values and members, and comparisons of numbers with a constant."""
-    kinds, seen = stepper.kinds, set()
-    for condition in _decisions(stepper.program):
+    kinds, seen = ts.kinds, set()
+    for condition in _decisions(ts.program):
         for name in dict.fromkeys(map(str, read_by(condition))):
             if name in inside and listed(kinds[name]) and name not in there and name not in seen:
                 seen.add(name)
-                yield Feature(name, kinds[name])
+                yield Predicate(name, kinds[name])
         for part in parts(condition):
             match part:
                 case Apply(op=op, args=(Read(name=leaf), Literal())) if op in COMPARISONS:
                     name = spelled(part)
                     if name not in seen and leaf in inside and not listed(kinds[leaf]):
                         seen.add(name)
-                        yield Feature(name, Bool(), condition=part)
+                        yield Predicate(name, Bool(), condition=part)
 
 
 def _decisions(program: Program) -> Iterator[Expr]:
@@ -271,14 +272,14 @@ def compared(program: Program) -> Iterator[tuple[str, str]]:
                     pass
 
 
-def _questions(stepper: Stepper) -> Iterator[tuple[str, str]]:
+def _questions(ts: TransitionSystem) -> Iterator[tuple[str, str]]:
     """What was asked of the database, and what would be asked now."""
-    for asked in stepper.links.asked:
+    for asked in ts.links.asked:
         for key in asked.keys:
             yield f"{GHOST}{asked.into} {key}", key
 
 
-def _selector(stepper: Stepper) -> Iterator[str]:
+def _selector(ts: TransitionSystem) -> Iterator[str]:
     """The leaves that select the table."""
-    if not isinstance(stepper.level.tables, OneTable):
-        yield from map(str, read_by(stepper.level.tables.selector))
+    if not isinstance(ts.level.tables, OneTable):
+        yield from map(str, read_by(ts.level.tables.selector))

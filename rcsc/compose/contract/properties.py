@@ -1,18 +1,18 @@
-"""The program's own invariants and properties: as conditions on one cycle, as features, and of a run.
+"""The program's own invariants and properties: as conditions on one cycle, as predicates, and of a run.
 
 In: a program and a cycle. Out: nodes that are to hold in every cycle; what the search has to look at for them; and whether a cycle that
 was run keeps them, as the interpreter says.
 
 An *invariant* is about state and outputs: it holds of the values with which the level begins, at first and after a restart, and
-behind every cycle. A *property* is about a cycle and the one before (`model.Property`): it holds behind every cycle, the first and the
+after every cycle. A *property* is about a cycle and the one before (`model.Property`): it holds after every cycle, the first and the
 first after a restart included, of inputs as the cycle took them; before those stands what the level begins with. It says nothing of a
-cycle before a restart and one behind it. What is not defined (a division by zero, an index outside) does not hold.
+cycle before a restart and one after it. What is not defined (a division by zero, an index outside) does not hold.
 """
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
 
-from rcsc.compose.contract.predicates import Feature, cone, features, listed
-from rcsc.compose.contract.transition import Cycle, Leaves, Stepper
+from rcsc.compose.contract.predicates import Predicate, cone, listed, predicates
+from rcsc.compose.contract.transition import Cycle, Leaves, TransitionSystem
 from rcsc.lang.interpret import holds
 from rcsc.lang.leaves import read_by
 from rcsc.lang.meaning import spelled
@@ -38,14 +38,14 @@ from rcsc.symbolic.execution import Run
 from rcsc.symbolic.values import Node
 
 _PARTIAL = frozenset({Op.DIV, Op.MOD, Op.TO_INT})
-"""Operations that are not defined of every value; no feature evaluates them."""
+"""Operations that are not defined of every value; no predicate evaluates them."""
 
 
 # --- as conditions on a cycle ----------------------------------------------------------------
 
 
 def invariants(program: Program, cycle: Cycle) -> Iterator[tuple[str, Node]]:
-    """Each invariant by name, before the cycle and behind it."""
+    """Each invariant by name, before the cycle and after it."""
     for one in program.invariants:
         yield one.name, values.both(_true(one.condition, cycle.before), _true(one.condition, cycle.after))
 
@@ -78,27 +78,27 @@ def _true(condition: Expr, leaves: Leaves) -> Node:
 
 
 def invariant_kept(
-    stepper: Stepper, name: str, before: Mapping[str, Value], after: Mapping[str, Value]
+    ts: TransitionSystem, name: str, before: Mapping[str, Value], after: Mapping[str, Value]
 ) -> bool:
-    """Whether the invariant holds before and behind a cycle that was run.
+    """Whether the invariant holds before and after a cycle that was run.
 
     Raises:
         StopIteration: There is no such invariant.
     """
-    condition = next(one.condition for one in stepper.program.invariants if one.name == name)
-    return all(_held(condition, state, stepper.kinds) for state in (before, after))
+    condition = next(one.condition for one in ts.program.invariants if one.name == name)
+    return all(_held(condition, state, ts.kinds) for state in (before, after))
 
 
 def property_kept(
-    stepper: Stepper, name: str, before: Mapping[str, Value], after: Mapping[str, Value]
+    ts: TransitionSystem, name: str, before: Mapping[str, Value], after: Mapping[str, Value]
 ) -> bool:
     """Whether the property holds of a cycle that was run.
 
     Raises:
         StopIteration: There is no such property.
     """
-    condition = next(one.condition for one in stepper.program.properties if one.name == name)
-    kinds = {**stepper.kinds, **{str(earlier(leaf)): kind for leaf, kind in stepper.kinds.items()}}
+    condition = next(one.condition for one in ts.program.properties if one.name == name)
+    kinds = {**ts.kinds, **{str(earlier(leaf)): kind for leaf, kind in ts.kinds.items()}}
     return _held(condition, {**after, **{str(earlier(leaf)): value for leaf, value in before.items()}}, kinds)
 
 
@@ -113,40 +113,40 @@ def _held(condition: Expr, state: Mapping[str, Value], kinds: Mapping[str, Scala
     return bool(_true(condition, leaves).low)
 
 
-# --- as features -----------------------------------------------------------------------------
+# --- as predicates -----------------------------------------------------------------------------
 
 
 def every_feature(
-    stepper: Stepper, cycle: Cycle, goals: Iterable[Node], closely: int = 0
-) -> tuple[Feature, ...]:
-    """What `features` chooses, and what invariants and properties speak of.
+    ts: TransitionSystem, cycle: Cycle, obligations: Iterable[Node], closely: int = 0
+) -> tuple[Predicate, ...]:
+    """What `predicates` chooses, and what invariants and properties speak of.
 
-    Those that there are at less closeness come first, in the same order, as clauses name features by their position.
+    Those that there are at less closeness come first, in the same order, as clauses name predicates by their position.
     """
-    wanted = list(goals)
-    first = features(stepper, cycle, wanted)
-    said = _said(stepper, cone(cycle, wanted), {one.name for one in first}) if _states(stepper) else ()
+    wanted = list(obligations)
+    first = predicates(ts, cycle, wanted)
+    said = _said(ts, cone(cycle, wanted), {one.name for one in first}) if _states(ts) else ()
     found = (*first, *said)
     if closely:
         there = {one.name for one in found}
-        closer = features(stepper, cycle, wanted, closely)
+        closer = predicates(ts, cycle, wanted, closely)
         found = (*found, *(one for one in closer if one.name not in there))
     return found
 
 
-def _states(stepper: Stepper) -> list[Expr]:
-    program = stepper.program
+def _states(ts: TransitionSystem) -> list[Expr]:
+    program = ts.program
     return [*(one.condition for one in program.invariants), *(one.condition for one in program.properties)]
 
 
-def _said(stepper: Stepper, inside: frozenset[str], there: set[str]) -> tuple[Feature, ...]:
+def _said(ts: TransitionSystem, inside: frozenset[str], there: set[str]) -> tuple[Predicate, ...]:
     """Truth values and members, and comparisons of numbers, as far as they matter for a later cycle."""
-    found: dict[str, Feature] = {}
-    for condition in _states(stepper):
+    found: dict[str, Predicate] = {}
+    for condition in _states(ts):
         for part in parts(condition):
             if len({name.startswith(BEFORE) for name in read_by(part)}) > 1:
                 continue  # it says of two cycles what no state shows
-            for one in _features_of(_of_one_cycle(part), stepper.kinds):
+            for one in _features_of(_of_one_cycle(part), ts.kinds):
                 read = {one.leaf, *([one.other] if one.other else [])}
                 if one.condition is not None:
                     read = set(map(str, read_by(one.condition)))
@@ -168,13 +168,13 @@ def _of_one_cycle(part: Expr) -> Expr:
             return part
 
 
-def _features_of(part: Expr, kinds: Mapping[str, Scalar]) -> Iterator[Feature]:
-    """The features that one part makes; none where it is a whole made of others."""
+def _features_of(part: Expr, kinds: Mapping[str, Scalar]) -> Iterator[Predicate]:
+    """The predicates that one part makes; none where it is a whole made of others."""
     match part:
         case Read(name=name) if listed(kinds[name]):
-            yield Feature(str(name), kinds[name])
+            yield Predicate(str(name), kinds[name])
         case Apply(op=Op.EQ | Op.NE, args=(Read(name=one), Read(name=two))) if one != two:
-            yield Feature(min(str(one), str(two)), Bool(), max(str(one), str(two)))
+            yield Predicate(min(str(one), str(two)), Bool(), max(str(one), str(two)))
         case Apply(op=op) if op in COMPARISONS:
             yield from _condition(part, kinds)
         case Among():
@@ -183,11 +183,11 @@ def _features_of(part: Expr, kinds: Mapping[str, Scalar]) -> Iterator[Feature]:
             pass
 
 
-def _condition(part: Expr, kinds: Mapping[str, Scalar]) -> Iterator[Feature]:
+def _condition(part: Expr, kinds: Mapping[str, Scalar]) -> Iterator[Predicate]:
     """A comparison of numbers, where it is defined of every value."""
     whole = all(
         not isinstance(one, Select) and not (isinstance(one, Apply) and one.op in _PARTIAL)
         for one in parts(part)
     )
     if whole and not all(listed(kinds[leaf]) for leaf in read_by(part)):
-        yield Feature(spelled(part), Bool(), condition=part)
+        yield Predicate(spelled(part), Bool(), condition=part)

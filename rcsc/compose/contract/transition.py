@@ -112,7 +112,7 @@ class Cycle:
         contract: What the environment keeps to; `undeclared`, the same without what tables are declared to rely on.
         middle: Every leaf that the table sees.
         tables: Each table that may run.
-        after: Every leaf and ghost behind the cycle.
+        after: Every leaf and ghost after the cycle.
         refused: An extern procedure's result is refused, or a stopping assumption fails, so that the cycle ends there;
             `unmatched`, before the table is looked at; `interrupted`, before its line is done.
         calls: Of extern procedures, in the order in which they can be made.
@@ -159,7 +159,7 @@ class Safety:
 
 
 @dataclass(slots=True)
-class Stepper:
+class TransitionSystem:
     """Makes cycles of one level.
 
     Attributes:
@@ -189,7 +189,7 @@ class Stepper:
         wanted = {str(one.name) for one in self.program.assumptions if one.standing is Standing.ASSUMED}
         if not wanted:
             return frozenset()
-        cycle = self.cycle(self.anywhere())
+        cycle = self.cycle(self.havoc())
         return frozenset(
             name
             for at in cycle.tables
@@ -197,11 +197,11 @@ class Stepper:
             if name in wanted and not set(values.variables([condition])) <= cycle.before.keys()
         )
 
-    def anywhere(self) -> Leaves:
+    def havoc(self) -> Leaves:
         """Any values at all: the start of a step of induction."""
         return {name: values.variable(name, kind) for name, kind in self.kinds.items()}
 
-    def first(self) -> Leaves:
+    def initial(self) -> Leaves:
         """The values before the first cycle."""
         start = {str(v.name): values.constant(v.type, v.initial) for v in self.program.variables}
         return {
@@ -215,7 +215,7 @@ class Stepper:
         A member that a state has no name for leaves it as it is initially, as there. An order has a number that no report can echo
         yet: the one after the order that stands in the buffer, which may be late; after the echo where none stands.
         """
-        start = self.first()
+        start = self.initial()
         inputs = {str(v.name) for v in self.program.variables if v.kind is Kind.INPUT}
         start |= {
             name: values.variable(f"{name} before restart", self.kinds[name]) for name in sorted(inputs)
@@ -239,9 +239,9 @@ class Stepper:
                 start[leaf] = values.choice(values.equal(late, start[echo]), successor(start[echo]), late)
         return start
 
-    def of(self, program: Program) -> "Stepper":
+    def of(self, program: Program) -> "TransitionSystem":
         """The same level with another program of the same leaves."""
-        return Stepper(
+        return TransitionSystem(
             program,
             next(one for one in program.levels if one.name == self.level.name),
             self.links,

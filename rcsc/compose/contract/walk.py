@@ -49,7 +49,7 @@ class Walk:
         self.ghosts = {leaf: state[leaf] for leaf in self.ghosts}
 
     def states(self, cycles: int) -> Iterator[dict[str, Value]]:
-        """The state behind each cycle; ends early where a cycle meets a fault, which is for the proof to find."""
+        """The state after each cycle; ends early where a cycle meets a fault, which is for the proof to find."""
         for _ in range(cycles):
             self._take()
             try:
@@ -65,7 +65,7 @@ class Walk:
             yield {**self.now, **self.ghosts}
 
     def _table(self) -> str:
-        """The table that ran, by what the cycle left (`Stepper.table_of`)."""
+        """The table that ran, by what the cycle left (`TransitionSystem.table_of`)."""
         if isinstance(self.level.tables, OneTable):
             return str(self.level.tables.table)
         return str(dict(self.level.tables.tables)[evaluate(self.level.tables.selector, self.now)])

@@ -1,17 +1,17 @@
 """What is not proved, looked at: the shortest run that shows it, run by the executors before it is shown, and what would mend it.
 
-In: steppers and the proof of their levels. Out: `Told`, one for each thing that is not proved; of lines that both match, one for
-each pair.
+In: transition systems and the proof of their levels. Out: `Explanation`, one for each thing that is not proved; of lines that both match,
+one for each pair.
 """
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from rcsc.compose.contract.obligations import Goal, Key, Sort, pairs
-from rcsc.compose.contract.transition import Stepper
+from rcsc.compose.contract.obligations import Key, Obligation, Sort, pairs
+from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.counterexample.finding import Finding, of_trace
-from rcsc.compose.counterexample.lasso import Lap, goal_of, laps
+from rcsc.compose.counterexample.lasso import Lasso, lassos, obligation_of
 from rcsc.compose.counterexample.pair import broken_together
 from rcsc.compose.counterexample.repair import helps
 from rcsc.compose.counterexample.replay import ExecutorsDifferError, make, only_in_python, record
@@ -26,12 +26,12 @@ SEARCHES = (Search(legal=True), Search(), Search(legal=True, restarted=True))
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
+class Explanation:
     """One thing that is not proved.
 
     Attributes:
-        level: Whose goal it is.
-        goal: Which.
+        level: Whose obligation it is.
+        obligation: Which.
         finding: The run that shows it; None where none was found.
         beside: Where the run does not reproduce: what each did, a line each.
         guessed: Whether that is no bug, as arithmetic was left open (`keyed`).
@@ -42,7 +42,7 @@ class Told:
     """
 
     level: str
-    goal: Goal
+    obligation: Obligation
     finding: Finding | None = None
     beside: tuple[str, ...] = ()
     guessed: bool = False
@@ -54,7 +54,7 @@ class Told:
     @property
     def warns(self) -> bool:
         """Whether it is no error: a command that is not shown to end may wait for what is right to wait for."""
-        return self.goal.sort is Sort.ENDS
+        return self.obligation.sort is Sort.ENDS
 
     @property
     def bug(self) -> bool:
@@ -63,8 +63,8 @@ class Told:
 
 
 @dataclass(frozen=True, slots=True)
-class Looking:
-    """How to look.
+class Settings:
+    """How to look for runs.
 
     Attributes:
         system: The system's description.
@@ -79,7 +79,9 @@ class Looking:
     log: Path | None = None
 
 
-def look(made: Mapping[str, Stepper], proof: SystemProof, looking: Looking) -> Iterator[Told]:
+def explain(
+    made: Mapping[str, TransitionSystem], proof: SystemProof, settings: Settings
+) -> Iterator[Explanation]:
     """Everything essential that is not proved, level by level.
 
     Raises:
@@ -87,135 +89,141 @@ def look(made: Mapping[str, Stepper], proof: SystemProof, looking: Looking) -> I
         OSError: A log cannot be written.
     """
     with scratch("findings") as kept:
-        rerun = _Rerun(made, looking, looking.log or kept)
+        rerun = _Rerun(made, settings, settings.log or kept)
         for one in proof.levels:
-            for told in _level(made, one.level, essential(one), looking):
-                yield rerun.run(told)
-            for told in _together(made, one.level, essential(one), looking):
-                yield rerun.run(told)
-            for told in _endless(made[one.level], one, looking):
-                yield rerun.run(told)
+            for explanation in _level(made, one.level, essential(one), settings):
+                yield rerun.run(explanation)
+            for explanation in _together(made, one.level, essential(one), settings):
+                yield rerun.run(explanation)
+            for explanation in _endless(made[one.level], one, settings):
+                yield rerun.run(explanation)
 
 
 def _level(
-    made: Mapping[str, Stepper], level: str, wanted: tuple[Goal, ...], looking: Looking
-) -> Iterator[Told]:
-    if not looking.most:
-        yield from (Told(level, goal) for goal in wanted)
+    made: Mapping[str, TransitionSystem], level: str, wanted: tuple[Obligation, ...], settings: Settings
+) -> Iterator[Explanation]:
+    if not settings.most:
+        yield from (Explanation(level, obligation) for obligation in wanted)
         return
-    stepper = made[level]
-    every = pairs(stepper.cycle(stepper.anywhere()))
+    ts = made[level]
+    every = pairs(ts.cycle(ts.havoc()))
     parted = {
-        goal.key: [one for one in every if one.table == goal.table]
-        for goal in wanted
-        if goal.sort is Sort.ONE_LINE
+        obligation.key: [one for one in every if one.table == obligation.table]
+        for obligation in wanted
+        if obligation.sort is Sort.ONE_LINE
     }
-    asked = [one for goal in wanted for one in parted.get(goal.key) or [goal]]
-    found = _found(stepper, asked, looking)
-    for goal in wanted:
-        if goal.key in parted:
-            yield from _pairs(stepper, goal, parted[goal.key], found)
+    asked = [one for obligation in wanted for one in parted.get(obligation.key) or [obligation]]
+    found = _found(ts, asked, settings)
+    for obligation in wanted:
+        if obligation.key in parted:
+            yield from _pairs(ts, obligation, parted[obligation.key], found)
         else:
-            yield _told(stepper, goal, found.get(goal.key))
+            yield _explanation(ts, obligation, found.get(obligation.key))
 
 
-def _found(stepper: Stepper, asked: list[Goal], looking: Looking) -> dict[Key, Found]:
+def _found(ts: TransitionSystem, asked: list[Obligation], settings: Settings) -> dict[Key, Found]:
     """What the searches find, one after the other, for what is still open."""
     found: dict[Key, Found] = {}
     for search in SEARCHES:
-        left = [goal for goal in asked if goal.key not in found]
+        left = [obligation for obligation in asked if obligation.key not in found]
         if left:
-            found |= traces(stepper, left, replace(search, most=looking.most))
+            found |= traces(ts, left, replace(search, most=settings.most))
     return found
 
 
-def _pairs(stepper: Stepper, goal: Goal, parted: list[Goal], found: Mapping[Key, Found]) -> Iterator[Told]:
+def _pairs(
+    ts: TransitionSystem, obligation: Obligation, parted: list[Obligation], found: Mapping[Key, Found]
+) -> Iterator[Explanation]:
     """The pairs of lines that both match in some run; the table as a whole where there is none."""
     shown = [one for one in parted if one.key in found]
     others = tuple(one.name for one in parted if one.key not in found)
     if not shown:
-        yield Told(stepper.level.name, goal, others=others)
+        yield Explanation(ts.level.name, obligation, others=others)
     for at, one in enumerate(shown):
-        yield replace(_told(stepper, one, found[one.key]), others=others if at == len(shown) - 1 else ())
+        yield replace(_explanation(ts, one, found[one.key]), others=others if at == len(shown) - 1 else ())
 
 
-def _told(stepper: Stepper, goal: Goal, found: Found | None) -> Told:
-    level = stepper.level.name
+def _explanation(ts: TransitionSystem, obligation: Obligation, found: Found | None) -> Explanation:
+    level = ts.level.name
     match found:
         case None:
-            return Told(level, goal)
+            return Explanation(level, obligation)
         case NotReproducedError():
-            return Told(level, goal, beside=found.beside or (str(found),), guessed=found.guessed)
+            return Explanation(level, obligation, beside=found.beside or (str(found),), guessed=found.guessed)
         case _:
-            return Told(level, goal, of_trace(stepper, goal, found))
+            return Explanation(level, obligation, of_trace(ts, obligation, found))
 
 
 def _together(
-    made: Mapping[str, Stepper], level: str, wanted: tuple[Goal, ...], looking: Looking
-) -> Iterator[Told]:
+    made: Mapping[str, TransitionSystem], level: str, wanted: tuple[Obligation, ...], settings: Settings
+) -> Iterator[Explanation]:
     """What becomes of orders that are not numbered as they should be, or not answered, with both levels as they are."""
     links = made[level].links
     records = {
-        goal.name.partition(".")[0] for goal in wanted if goal.sort in {Sort.NUMBERED, Sort.NEXT_NUMBER}
+        obligation.name.partition(".")[0]
+        for obligation in wanted
+        if obligation.sort in {Sort.NUMBERED, Sort.NEXT_NUMBER}
     }
     ends = [(level, one.name) for one in links.below if one.order in records]
-    if links.above is not None and any(goal.sort is Sort.ECHOES for goal in wanted):
+    if links.above is not None and any(obligation.sort is Sort.ECHOES for obligation in wanted):
         ends.append((links.above.name, level))
-    for upper, lower in ends if looking.most else []:
+    for upper, lower in ends if settings.most else []:
         if upper in made and lower in made:
             below = next(one for one in made[upper].links.below if one.name == lower)
-            search = Search(looking.most)
+            search = Search(settings.most)
             found = broken_together(made[upper], made[lower], below, search)
             if isinstance(found, Finding):
-                yield Told(found.level, found.goal, found)
+                yield Explanation(found.level, found.obligation, found)
             elif found is not None:
-                yield Told(lower, wanted[0], beside=(str(found),), guessed=found.guessed)
+                yield Explanation(lower, wanted[0], beside=(str(found),), guessed=found.guessed)
 
 
-def _endless(stepper: Stepper, proof: LevelProof, looking: Looking) -> Iterator[Told]:
+def _endless(ts: TransitionSystem, proof: LevelProof, settings: Settings) -> Iterator[Explanation]:
     """Commands that are not shown to end, each with a run after which it may go on for ever."""
     tables = [ending.table for ending in proof.endings if not ending.proved]
-    found: dict[str, Lap | NotReproducedError] = {}
-    for search in SEARCHES if looking.most else ():
-        found |= laps(
-            stepper, [one for one in tables if one not in found], replace(search, most=looking.most)
-        )
+    found: dict[str, Lasso | NotReproducedError] = {}
+    for search in SEARCHES if settings.most else ():
+        found |= lassos(ts, [one for one in tables if one not in found], replace(search, most=settings.most))
     for table in tables:
-        goal = goal_of(table)
+        obligation = obligation_of(table)
         match found.get(table):
-            case Lap() as lap:
-                yield Told(proof.level, goal, replace(of_trace(stepper, goal, lap.trace), lap=lap.first))
+            case Lasso() as lasso:
+                yield Explanation(
+                    proof.level, obligation, replace(of_trace(ts, obligation, lasso.trace), lasso=lasso.first)
+                )
             case other:
-                yield _told(stepper, goal, other)
+                yield _explanation(ts, obligation, other)
 
 
 @dataclass(slots=True)
 class _Rerun:
     """Runs findings on executors, which are made once a level."""
 
-    made: Mapping[str, Stepper]
-    looking: Looking
+    made: Mapping[str, TransitionSystem]
+    settings: Settings
     folder: Path
     _ready: set[str] = field(default_factory=set)
     _names: set[str] = field(default_factory=set)
 
-    def run(self, told: Told) -> Told:
+    def run(self, explanation: Explanation) -> Explanation:
         """With the log of its run, and what would mend the table."""
-        finding = told.finding
-        if finding is None or told.goal.sort is Sort.SAFE:  # what is not safe no executor is to run
-            return told
-        system = replace(self.looking.system, generated=self.folder / "generated")
+        finding = explanation.finding
+        if (
+            finding is None or explanation.obligation.sort is Sort.SAFE
+        ):  # what is not safe no executor is to run
+            return explanation
+        system = replace(self.settings.system, generated=self.folder / "generated")
         programs = {name: self.made[name].program for name in finding.levels if name not in self._ready}
-        make(programs.values(), system.generated, altered=self.looking.altered)
+        make(programs.values(), system.generated, altered=self.settings.altered)
         self._ready |= programs.keys()
         path = self.folder / f"{self._named(finding)}.mcap"
         try:
-            record(finding, self.made, system, path, altered=self.looking.altered)
+            record(finding, self.made, system, path, altered=self.settings.altered)
         except ExecutorsDifferError as error:
-            return replace(told, beside=error.beside)
-        kept = path if self.looking.log is not None else None
+            return replace(explanation, beside=error.beside)
+        kept = path if self.settings.log is not None else None
         in_c = not only_in_python(finding, self.made)
-        return replace(told, helps=helps(self.made[told.level], finding), log=kept, in_c=in_c)
+        return replace(explanation, helps=helps(self.made[explanation.level], finding), log=kept, in_c=in_c)
 
     def _named(self, finding: Finding) -> str:
         name = file_name(finding)
@@ -230,7 +238,12 @@ class _Rerun:
 
 def file_name(finding: Finding) -> str:
     """What its log and its case are called, without the end."""
-    goal = finding.goal
-    parts = (finding.level, goal.table, goal.sort.name.lower(), goal.name if goal.name != goal.table else "")
+    obligation = finding.obligation
+    parts = (
+        finding.level,
+        obligation.table,
+        obligation.sort.name.lower(),
+        obligation.name if obligation.name != obligation.table else "",
+    )
     text = "_".join(part for part in parts if part)
     return "".join(letter if letter.isalnum() or letter == "_" else "_" for letter in text)

@@ -1,4 +1,4 @@
-"""A finding: a run of one level or of several that breaks a goal, as the interpreter did it; its time line.
+"""A finding: a run of one level or of several that breaks an obligation, as the interpreter did it; its time line.
 
 In: traces. Out: `Finding`s; rows and lines of text, in the tables' words.
 """
@@ -6,8 +6,8 @@ In: traces. Out: `Finding`s; rows and lines of text, in the tables' words.
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
-from rcsc.compose.contract.obligations import Goal, Sort
-from rcsc.compose.contract.transition import Stepper
+from rcsc.compose.contract.obligations import Obligation, Sort
+from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.counterexample.trace import Step, Trace, one_cycle
 from rcsc.lang.interpret import Fault
 from rcsc.lang.model import Value, key_bounds, key_of, spell
@@ -18,26 +18,26 @@ class Finding:
     """A run.
 
     Attributes:
-        level: Whose goal it is.
-        goal: Which.
+        level: Whose obligation it is.
+        obligation: Which.
         ticks: For each tick the cycle of each level that ran in it, from the top down.
-        after: Ticks behind the one in which it is broken, which show what comes of it.
+        after: Ticks after the one in which it is broken, which show what comes of it.
         restarted: Whether it begins where a restart does, and not with the initial values.
         legal: Whether the levels around keep to more than the contract (`trace.Search.legal`).
-        lap: The cycle, from 1, before which all is as it is at the end, so that it may go on for ever; 0 where it is not about that.
+        lasso: The cycle, from 1, before which all is as it is at the end, so that it may go on for ever; 0 where it is not about that.
     """
 
     level: str
-    goal: Goal
+    obligation: Obligation
     ticks: tuple[Mapping[str, Step], ...]
     after: int = 0
     restarted: bool = False
     legal: bool = True
-    lap: int = 0
+    lasso: int = 0
 
     @property
     def broken_at(self) -> int:
-        """The tick in which the goal is broken, from 1."""
+        """The tick in which the obligation is broken, from 1."""
         return len(self.ticks) - self.after
 
     @property
@@ -55,14 +55,14 @@ class Finding:
         return next(tick[level].before for tick in self.ticks if level in tick)
 
 
-def of_trace(stepper: Stepper, goal: Goal, trace: Trace) -> Finding:
+def of_trace(ts: TransitionSystem, obligation: Obligation, trace: Trace) -> Finding:
     """The run of one level; what is passed over shows in the next cycle, in which the level sees the same again."""
     steps = list(trace.steps)
-    if goal.sort is Sort.ANSWERED:
-        steps.append(one_cycle(stepper, steps[-1].after, steps[-1].taken, steps[-1].answers))
-    ticks = tuple({stepper.level.name: step} for step in steps)
+    if obligation.sort is Sort.ANSWERED:
+        steps.append(one_cycle(ts, steps[-1].after, steps[-1].taken, steps[-1].answers))
+    ticks = tuple({ts.level.name: step} for step in steps)
     after = len(steps) - len(trace.steps)
-    return Finding(stepper.level.name, goal, ticks, after, trace.restarted, trace.legal)
+    return Finding(ts.level.name, obligation, ticks, after, trace.restarted, trace.legal)
 
 
 # --- for people ----------------------------------------------------------------------------
@@ -114,47 +114,47 @@ _WRONG = {
 }
 
 
-def rows(made: Mapping[str, Stepper], finding: Finding) -> tuple[Row, ...]:
+def rows(made: Mapping[str, TransitionSystem], finding: Finding) -> tuple[Row, ...]:
     """The time line, a row for each cycle of each level."""
     where = finding.broken_at, finding.level
-    goal = replace(finding.goal, name=str(finding.lap)) if finding.lap else finding.goal
+    obligation = replace(finding.obligation, name=str(finding.lasso)) if finding.lasso else finding.obligation
     return tuple(
-        _row(made[name], tick, step, goal if (tick, name) == where else None)
+        _row(made[name], tick, step, obligation if (tick, name) == where else None)
         for tick, steps in enumerate(finding.ticks, 1)
         for name, step in steps.items()
     )
 
 
-def _row(stepper: Stepper, tick: int, step: Step, broken: Goal | None) -> Row:
+def _row(ts: TransitionSystem, tick: int, step: Step, broken: Obligation | None) -> Row:
     """One cycle; what does not change is left out."""
-    kinds = stepper.kinds
+    kinds = ts.kinds
     changed = {
         name: spell(kinds[name], value) for name, value in step.after.items() if step.before[name] != value
     }
     takes = {name: said for name, said in changed.items() if name in step.taken}
-    takes |= dict(_answers(stepper, step))
+    takes |= dict(_answers(ts, step))
     leaves = {name: said for name, said in changed.items() if name not in step.taken}
     wrong = [f"assumption `{name}` fails" for name in step.failed]
     wrong += [_FAULTS[step.fault]] if step.fault in _FAULTS else []
     wrong += [_WRONG[broken.sort].format(broken.name)] if broken is not None and broken.sort in _WRONG else []
     line = " and ".join(step.matched) or "none"
-    return Row(tick, stepper.level.name, step.table, line, takes, leaves, "; ".join(wrong))
+    return Row(tick, ts.level.name, step.table, line, takes, leaves, "; ".join(wrong))
 
 
-def _answers(stepper: Stepper, step: Step) -> Iterator[tuple[str, str]]:
+def _answers(ts: TransitionSystem, step: Step) -> Iterator[tuple[str, str]]:
     """What extern procedures give, call by call; a value that is refused is in no type's words."""
     for procedure, given in step.answers:
-        writes = next(one.writes for one in stepper.program.procedures if one.name == procedure)
+        writes = next(one.writes for one in ts.program.procedures if one.name == procedure)
         for leaf, value in zip(writes, given, strict=True):
-            low, high = key_bounds(stepper.kinds[leaf])
-            inside = value == value and low <= key_of(stepper.kinds[leaf], value) <= high  # noqa: PLR0124  # no NaN
+            low, high = key_bounds(ts.kinds[leaf])
+            inside = value == value and low <= key_of(ts.kinds[leaf], value) <= high  # noqa: PLR0124  # no NaN
             yield (
                 f"{leaf} from {procedure}",
-                spell(stepper.kinds[leaf], value) if inside else f"{value}, refused",
+                spell(ts.kinds[leaf], value) if inside else f"{value}, refused",
             )
 
 
-def time_line(made: Mapping[str, Stepper], finding: Finding) -> list[str]:
+def time_line(made: Mapping[str, TransitionSystem], finding: Finding) -> list[str]:
     """The same as lines of text: of each cycle which line matched, what was taken, and what changed."""
     lines = []
     for row in rows(made, finding):

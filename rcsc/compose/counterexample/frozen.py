@@ -1,7 +1,7 @@
 """A finding, frozen: a case in JSON that is run again on the tables as they are then.
 
-In: a finding. Out: its text; and back: whether the same inputs break the same goal now. A case names values in the tables' words, and only
-those that change, so that it outlives changes that do not concern it.
+In: a finding. Out: its text; and back: whether the same inputs break the same obligation now. A case names values in the tables' words,
+and only those that change, so that it outlives changes that do not concern it.
 
 What a case expects is `kept` where it stands for a fault that is to be mended (it fails until it is), `broken` where it shows a
 hazard that is to stay visible: that of another rule than the language's, or of a published table.
@@ -16,14 +16,14 @@ from pathlib import Path
 from typing import Any
 
 from rcsc.compose.contract.given import Answer
-from rcsc.compose.contract.obligations import Goal, Sort
-from rcsc.compose.contract.transition import Stepper
+from rcsc.compose.contract.obligations import Obligation, Sort
+from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.contract.variants import VARIANTS
 from rcsc.compose.counterexample.finding import Finding
-from rcsc.compose.counterexample.lasso import lap_of
+from rcsc.compose.counterexample.lasso import lasso_of
 from rcsc.compose.counterexample.pair import broken_in, exchange
 from rcsc.compose.counterexample.trace import Step, broken, one_cycle
-from rcsc.compose.proof.system import NoProgramError, steppers
+from rcsc.compose.proof.system import NoProgramError, transition_systems
 from rcsc.host.files.names import shown
 from rcsc.host.files.read import content, json_of
 from rcsc.lang.interpret import initial
@@ -46,7 +46,7 @@ class Case:
     Attributes:
         system: The description's path.
         variants: Under which other rules (`variants.VARIANTS`).
-        level: Whose goal it is, with its sort, table, name and lines.
+        level: Whose obligation it is, with its sort, table, name and lines.
         start: For each level the leaves that do not begin as they do initially.
         ticks: For each tick, for each level that runs, the inputs that change; `answers`, what its extern procedures give.
     """
@@ -54,7 +54,7 @@ class Case:
     system: Path
     variants: tuple[str, ...]
     level: str
-    goal: Goal
+    obligation: Obligation
     start: Mapping[str, Mapping[str, str]]
     ticks: tuple[Mapping[str, Mapping[str, str]], ...]
     expects_broken: bool
@@ -62,10 +62,14 @@ class Case:
 
 
 def frozen(
-    finding: Finding, made: Mapping[str, Stepper], system: Path, case: Path, variants: tuple[str, ...] = ()
+    finding: Finding,
+    made: Mapping[str, TransitionSystem],
+    system: Path,
+    case: Path,
+    variants: tuple[str, ...] = (),
 ) -> str:
     """The text of the case that will stand at `case`."""
-    goal = finding.goal
+    obligation = finding.obligation
     exchanged = exchange(made, finding.levels)
     document = {
         "format": FORMAT,
@@ -74,10 +78,10 @@ def frozen(
         "expect": "broken" if variants else "kept",
         "goal": {
             "level": finding.level,
-            "what": goal.sort.name.lower(),
-            "table": goal.table,
-            "name": goal.name,
-            "lines": list(goal.lines),
+            "what": obligation.sort.name.lower(),
+            "table": obligation.table,
+            "name": obligation.name,
+            "lines": list(obligation.lines),
         },
         "start": {
             name: said for name in finding.levels if (said := _not_initial(made[name], finding.start(name)))
@@ -103,15 +107,15 @@ def _number(value: Value) -> Value | str:
     return value if isinstance(value, bool | int) or math.isfinite(value) else str(value)
 
 
-def _not_initial(stepper: Stepper, start: Mapping[str, Value]) -> dict[str, str]:
-    begun = initial(stepper.program)
-    return {name: spell(stepper.kinds[name], start[name]) for name in begun if begun[name] != start[name]}
+def _not_initial(ts: TransitionSystem, start: Mapping[str, Value]) -> dict[str, str]:
+    begun = initial(ts.program)
+    return {name: spell(ts.kinds[name], start[name]) for name in begun if begun[name] != start[name]}
 
 
-def _changed(stepper: Stepper, step: Step, exchanged: Container[str]) -> dict[str, str]:
+def _changed(ts: TransitionSystem, step: Step, exchanged: Container[str]) -> dict[str, str]:
     """The inputs that change, but for those that another level of the run gives."""
     return {
-        name: spell(stepper.kinds[name], value)
+        name: spell(ts.kinds[name], value)
         for name, value in step.taken.items()
         if step.before[name] != value and name not in exchanged
     }
@@ -137,7 +141,7 @@ def read_case(path: Path) -> Case:
             _system(path, said["system"]),
             _texts(said["variants"]),
             level,
-            Goal(sort, table, name, values.TRUE, lines),
+            Obligation(sort, table, name, values.TRUE, lines),
             _leaves(said["start"]),
             tuple(map(_leaves, said["ticks"])),
             {"broken": True, "kept": False}[said["expect"]],
@@ -194,13 +198,13 @@ def _system(case: Path, named: object) -> Path:
 
 
 def case_breaks(case: Case) -> bool:
-    """Whether the goal is broken in some tick; a fault ends the run.
+    """Whether the obligation is broken in some tick; a fault ends the run.
 
     Raises:
         BadCaseError: The case names what the tables do not have.
     """
     made = _made(case)
-    now = {name: _begun(stepper, case.start.get(name, {})) for name, stepper in made.items()}
+    now = {name: _begun(ts, case.start.get(name, {})) for name, ts in made.items()}
     exchanged = exchange(made, tuple(made))
     given = {name: {leaf: now[name][leaf] for leaf in leaves} for name, leaves in exchanged.items()}
     so_far: list[Step] = []
@@ -223,22 +227,22 @@ def case_breaks(case: Case) -> bool:
     return False
 
 
-def _answer(stepper: Stepper, said: Any) -> Answer:
+def _answer(ts: TransitionSystem, said: Any) -> Answer:
     """One call's results, as the case has them."""
     try:
         name, results = said
-        procedure = next(one for one in stepper.program.procedures if one.name == name and one.extern)
+        procedure = next(one for one in ts.program.procedures if one.name == name and one.extern)
         given = tuple(float(one) if isinstance(one, str) else one for one in results)
         if len(given) == len(procedure.writes) and all(isinstance(one, bool | int | float) for one in given):
             return str(name), given
     except (TypeError, ValueError, StopIteration):
         pass
-    raise BadCaseError(f"level `{stepper.level.name}` has no extern procedure that gives `{said}`")
+    raise BadCaseError(f"level `{ts.level.name}` has no extern procedure that gives `{said}`")
 
 
-def _made(case: Case) -> dict[str, Stepper]:
+def _made(case: Case) -> dict[str, TransitionSystem]:
     try:
-        made = steppers(case.system)
+        made = transition_systems(case.system)
         change: list[Callable[[Program], Program]] = [VARIANTS[name] for name in case.variants]
     except (BadDescription, NoProgramError) as error:
         raise BadCaseError(str(error)) from error
@@ -247,29 +251,29 @@ def _made(case: Case) -> dict[str, Stepper]:
     names = {case.level, *case.start, *(name for tick in case.ticks for name in tick)}
     if unknown := sorted(names - made.keys()):
         raise BadCaseError(f"there is no level `{unknown[0]}`")
-    made = {name: stepper for name, stepper in made.items() if name in names}
+    made = {name: ts for name, ts in made.items() if name in names}
     for one in change:
-        made = {name: stepper.of(one(stepper.program)) for name, stepper in made.items()}
+        made = {name: ts.of(one(ts.program)) for name, ts in made.items()}
     return made
 
 
-def _begun(stepper: Stepper, said: Mapping[str, str]) -> dict[str, Value]:
-    return {**initial(stepper.program), **_values(stepper, said)}
+def _begun(ts: TransitionSystem, said: Mapping[str, str]) -> dict[str, Value]:
+    return {**initial(ts.program), **_values(ts, said)}
 
 
-def _taken(stepper: Stepper, now: Mapping[str, Value], said: Mapping[str, str]) -> dict[str, Value]:
-    inputs = {str(v.name) for v in stepper.program.variables if v.kind is Kind.INPUT}
+def _taken(ts: TransitionSystem, now: Mapping[str, Value], said: Mapping[str, str]) -> dict[str, Value]:
+    inputs = {str(v.name) for v in ts.program.variables if v.kind is Kind.INPUT}
     if wrong := sorted(said.keys() - inputs):
-        raise BadCaseError(f"level `{stepper.level.name}` has no input `{wrong[0]}`")
-    return {name: now[name] for name in inputs} | _values(stepper, said)
+        raise BadCaseError(f"level `{ts.level.name}` has no input `{wrong[0]}`")
+    return {name: now[name] for name in inputs} | _values(ts, said)
 
 
-def _values(stepper: Stepper, said: Mapping[str, str]) -> dict[str, Value]:
+def _values(ts: TransitionSystem, said: Mapping[str, str]) -> dict[str, Value]:
     found = {}
     for name, text in said.items():
-        if name not in stepper.kinds:
-            raise BadCaseError(f"level `{stepper.level.name}` has no variable `{name}`")
-        found[name] = _value(name, stepper.kinds[name], text)
+        if name not in ts.kinds:
+            raise BadCaseError(f"level `{ts.level.name}` has no variable `{name}`")
+        found[name] = _value(name, ts.kinds[name], text)
     return found
 
 
@@ -291,16 +295,16 @@ def _value(name: str, kind: Scalar, text: str) -> Value:
     raise BadCaseError(f"`{name}` cannot be `{text}`")
 
 
-def _is_broken(made: Mapping[str, Stepper], case: Case, steps: list[Step]) -> bool:
-    """Whether the last of the level's cycles breaks the goal."""
-    stepper, step = made[case.level], steps[-1]
-    if case.goal.sort is Sort.ENDS:
-        return lap_of(stepper, case.goal.table, steps) is not None
-    if case.goal.sort in {Sort.SAME_ORDER, Sort.OF_ITS_ORDER}:
-        return broken_in(stepper, case.goal, step)
-    if case.goal.sort is Sort.SAFE and not stepper.safety.within:
+def _is_broken(made: Mapping[str, TransitionSystem], case: Case, steps: list[Step]) -> bool:
+    """Whether the last of the level's cycles breaks the obligation."""
+    ts, step = made[case.level], steps[-1]
+    if case.obligation.sort is Sort.ENDS:
+        return lasso_of(ts, case.obligation.table, steps) is not None
+    if case.obligation.sort in {Sort.SAME_ORDER, Sort.OF_ITS_ORDER}:
+        return broken_in(ts, case.obligation, step)
+    if case.obligation.sort is Sort.SAFE and not ts.safety.within:
         return False  # it is so whatever a cycle does
     try:
-        return broken(stepper, case.goal, step)
+        return broken(ts, case.obligation, step)
     except StopIteration as error:
-        raise BadCaseError(f"level `{case.level}` has no goal `{case.goal.shown}`") from error
+        raise BadCaseError(f"level `{case.level}` has no goal `{case.obligation.shown}`") from error

@@ -1,7 +1,8 @@
 """A level and the one below it, each as it is, and the buffers between them: what becomes of an order.
 
-In: two steppers and the link between them. Out: the shortest run in which what one assumes of the other is broken. It is looked for where
-a level is not proved to number its orders, or not to answer them: a level in its environment shows that, and only both show what is lost.
+In: two transition systems and the link between them. Out: the shortest run in which what one assumes of the other is broken. It is looked
+for where a level is not proved to number its orders, or not to answer them: a level in its environment shows that, and only both show
+what is lost.
 
 In each tick one of the levels runs, or both. Each sees what the other left in the buffer before this tick, so that whoever does not run
 for a while sees late, skips, and sees again. Of everything else what a level's contract says holds.
@@ -11,8 +12,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from rcsc.compose.contract.environment import COMMAND, NUMBER, Below, leaves_under
-from rcsc.compose.contract.obligations import Goal, Sort
-from rcsc.compose.contract.transition import Cycle, Leaves, Stepper, successor
+from rcsc.compose.contract.obligations import Obligation, Sort
+from rcsc.compose.contract.transition import Cycle, Leaves, TransitionSystem, successor
 from rcsc.compose.counterexample.finding import Finding
 from rcsc.compose.counterexample.simplest import Bounded, Simplest
 from rcsc.compose.counterexample.trace import NotReproducedError, Search, Step, one_cycle
@@ -35,7 +36,7 @@ class _Side:
     """
 
     name: str
-    stepper: Stepper
+    ts: TransitionSystem
     takes: Mapping[str, str]
     now: Leaves = field(init=False)
     taken: list[Leaves] = field(default_factory=list)
@@ -43,17 +44,17 @@ class _Side:
     cycles: list[Cycle] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self.now = self.stepper.first()
+        self.now = self.ts.initial()
 
     @property
     def inputs(self) -> list[str]:
         """Inputs that do not come from the other level."""
-        program = self.stepper.program
+        program = self.ts.program
         return [str(v.name) for v in program.variables if v.kind is Kind.INPUT and v.name not in self.takes]
 
 
 def broken_together(
-    upper: Stepper, lower: Stepper, below: Below, search: Search
+    upper: TransitionSystem, lower: TransitionSystem, below: Below, search: Search
 ) -> Finding | NotReproducedError | None:
     """The shortest run of both in which one breaks what the other assumes; None where there is none, or the solver gave up.
 
@@ -63,8 +64,8 @@ def broken_together(
     pair = _Pair(upper, lower, below)
     try:
         for tick in range(1, search.most + 1):
-            for goal in pair.further(tick):
-                if (found := pair.found(goal)) is not None:
+            for obligation in pair.further(tick):
+                if (found := pair.found(obligation)) is not None:
                     return found
     except GaveUpError:
         pass
@@ -75,8 +76,8 @@ def broken_together(
 class _Pair:
     """Both levels, tick by tick."""
 
-    upper: Stepper
-    lower: Stepper
+    upper: TransitionSystem
+    lower: TransitionSystem
     below: Below
     sides: tuple[_Side, _Side] = field(init=False)
     buffers: Leaves = field(init=False)
@@ -96,7 +97,7 @@ class _Pair:
             leaf: side.now[leaf] for side in self.sides for leaf in side.takes
         }  # nothing is published yet: each keeps what it begins with
 
-    def further(self, tick: int) -> tuple[Goal, Goal]:
+    def further(self, tick: int) -> tuple[Obligation, Obligation]:
         """One tick more; what is to hold in it."""
         before = [side.now for side in self.sides]
         for side in self.sides:
@@ -105,16 +106,16 @@ class _Pair:
         seen = dict(self.buffers)
         for side in self.sides:
             self._cycle(side, seen, tick)
-        return self._goals(before)
+        return self._obligations(before)
 
     def _cycle(self, side: _Side, seen: Leaves, tick: int) -> None:
         """One cycle of a level, if it runs."""
-        kinds = side.stepper.kinds
+        kinds = side.ts.kinds
         taken = {leaf: values.variable(f"{side.name} {leaf} {tick}", kinds[leaf]) for leaf in side.inputs}
         taken |= {leaf: seen[leaf] for leaf in side.takes}
-        one = side.stepper.cycle(side.now, f" of {side.name} {tick}", taken=taken)
+        one = side.ts.cycle(side.now, f" of {side.name} {tick}", taken=taken)
         runs = side.runs[-1]
-        kept = values.all_of((one.goes_on, one.contract, *_in_order(side.stepper, side.now, taken)))
+        kept = values.all_of((one.goes_on, one.contract, *_in_order(side.ts, side.now, taken)))
         self._run.add(values.follows(runs, kept))
         side.taken.append(taken)
         side.cycles.append(one)
@@ -124,7 +125,7 @@ class _Pair:
                     self.buffers[leaf] = values.choice(runs, one.after[source], self.buffers[leaf])
         side.now = {name: values.choice(runs, one.after[name], node) for name, node in side.now.items()}
 
-    def _goals(self, before: list[Leaves]) -> tuple[Goal, Goal]:
+    def _obligations(self, before: list[Leaves]) -> tuple[Obligation, Obligation]:
         upper, lower = self.sides
         above = self.lower.links.above
         assert above is not None
@@ -134,32 +135,32 @@ class _Pair:
         one = values.follows(
             values.both(lower.runs[-1], values.equal(before[1][number], taken[number])), same
         )
-        two = values.follows(upper.runs[-1], Stepper.echo(self.below, before[0], upper.taken[-1]))
+        two = values.follows(upper.runs[-1], TransitionSystem.echo(self.below, before[0], upper.taken[-1]))
         return (
-            Goal(Sort.SAME_ORDER, "", above.order, one),
-            Goal(Sort.OF_ITS_ORDER, "", self.below.report, two),
+            Obligation(Sort.SAME_ORDER, "", above.order, one),
+            Obligation(Sort.OF_ITS_ORDER, "", self.below.report, two),
         )
 
     # --- the run ---
 
-    def found(self, goal: Goal) -> Finding | NotReproducedError | None:
+    def found(self, obligation: Obligation) -> Finding | NotReproducedError | None:
         """The simplest run that breaks it in the last tick, as the interpreter runs it; None where there is none.
 
         Raises:
             GaveUpError: The solver did not decide.
         """
-        wrong = self._run.literal(values.negation(goal.holds))
+        wrong = self._run.literal(values.negation(obligation.holds))
         if not self._run.holds([wrong]):
             return None
         ticks = tuple(self._ran(Simplest(self._run, [wrong])))
-        stepper = self.upper if goal.sort is Sort.OF_ITS_ORDER else self.lower
-        level = stepper.level.name
-        if level not in ticks[-1] or not broken_in(stepper, goal, ticks[-1][level]):
-            return NotReproducedError(goal.shown, guessed=self._run.guessed)
-        return Finding(level, replace(goal, holds=values.FALSE), ticks)
+        ts = self.upper if obligation.sort is Sort.OF_ITS_ORDER else self.lower
+        level = ts.level.name
+        if level not in ticks[-1] or not broken_in(ts, obligation, ticks[-1][level]):
+            return NotReproducedError(obligation.shown, guessed=self._run.guessed)
+        return Finding(level, replace(obligation, holds=values.FALSE), ticks)
 
     def _ran(self, settled: Simplest) -> Iterator[dict[str, Step]]:
-        now = {side.name: dict(initial(side.stepper.program)) for side in self.sides}
+        now = {side.name: dict(initial(side.ts.program)) for side in self.sides}
         held = {leaf: now[side.name][leaf] for side in self.sides for leaf in side.takes}
         runs = [
             settled.settle([side.runs[at] for side in self.sides], [True, True])
@@ -176,8 +177,8 @@ class _Pair:
                     taken = dict(zip(side.inputs, free, strict=True)) | {
                         leaf: seen[leaf] for leaf in side.takes
                     }
-                    answers = settled.answers(side.stepper.program, side.cycles[at])
-                    steps[side.name] = one_cycle(side.stepper, now[side.name], taken, answers)
+                    answers = settled.answers(side.ts.program, side.cycles[at])
+                    steps[side.name] = one_cycle(side.ts, now[side.name], taken, answers)
                     now[side.name] = dict(steps[side.name].after)
                     self._publish(side, now[side.name], held)
             yield steps
@@ -190,7 +191,9 @@ class _Pair:
                 held |= {leaf: after[source] for leaf, source in other.takes.items()}
 
 
-def exchange(made: Mapping[str, Stepper], levels: Sequence[str]) -> dict[str, dict[str, tuple[str, str]]]:
+def exchange(
+    made: Mapping[str, TransitionSystem], levels: Sequence[str]
+) -> dict[str, dict[str, tuple[str, str]]]:
     """For each of these levels its inputs that another of them gives: which one, and how it calls them."""
     found: dict[str, dict[str, tuple[str, str]]] = {name: {} for name in levels}
     for name in levels:
@@ -203,25 +206,25 @@ def exchange(made: Mapping[str, Stepper], levels: Sequence[str]) -> dict[str, di
     return found
 
 
-def broken_in(stepper: Stepper, goal: Goal, step: Step) -> bool:
+def broken_in(ts: TransitionSystem, obligation: Obligation, step: Step) -> bool:
     """Whether the cycle, as it ran, breaks what a level assumes of its neighbour: `SAME_ORDER` or `OF_ITS_ORDER`.
 
     Raises:
         StopIteration: The level has no such neighbour.
     """
-    if goal.sort is Sort.SAME_ORDER:
-        return _taken_again(stepper, step)
-    kinds = stepper.kinds
-    below = next(one for one in stepper.links.below if one.report == goal.name)
+    if obligation.sort is Sort.SAME_ORDER:
+        return _taken_again(ts, step)
+    kinds = ts.kinds
+    below = next(one for one in ts.links.below if one.report == obligation.name)
     before, taken = (
         {name: values.constant(kinds[name], value) for name, value in of.items()}
         for of in (step.before, step.taken)
     )
-    holds = Stepper.echo(below, before, taken)
+    holds = TransitionSystem.echo(below, before, taken)
     return holds.known and not holds.low
 
 
-def _taken_again(lower: Stepper, step: Step) -> bool:
+def _taken_again(lower: TransitionSystem, step: Step) -> bool:
     """Whether another order is taken under the number that was taken last."""
     above = lower.links.above
     assert above is not None
@@ -232,19 +235,19 @@ def _taken_again(lower: Stepper, step: Step) -> bool:
     )
 
 
-def _renamed(stepper: Stepper, record: str, other: str) -> dict[str, str]:
+def _renamed(ts: TransitionSystem, record: str, other: str) -> dict[str, str]:
     """The leaves of a record, and how the other end of the buffer calls them."""
-    return {leaf: other + leaf.removeprefix(record) for leaf in leaves_under(stepper.program, record)}
+    return {leaf: other + leaf.removeprefix(record) for leaf in leaves_under(ts.program, record)}
 
 
-def _with(stepper: Stepper, **links: object) -> Stepper:
+def _with(ts: TransitionSystem, **links: object) -> TransitionSystem:
     """The level with a part of its environment left out, which is not assumed but there."""
-    return Stepper(stepper.program, stepper.level, replace(stepper.links, **links))  # type: ignore[arg-type]  # fields of Links
+    return TransitionSystem(ts.program, ts.level, replace(ts.links, **links))  # type: ignore[arg-type]  # fields of Links
 
 
-def _in_order(stepper: Stepper, before: Leaves, taken: Leaves) -> Iterator[Node]:
+def _in_order(ts: TransitionSystem, before: Leaves, taken: Leaves) -> Iterator[Node]:
     """Its superior's numbers come one after the other."""
-    if (above := stepper.links.above) is not None:
+    if (above := ts.links.above) is not None:
         number = f"{above.order}.{NUMBER}"
         yield values.either(
             values.equal(taken[number], before[number]),

@@ -1,12 +1,13 @@
 """What would mend a table where a run breaks it: a cell, a line, or the weakest condition under which exactly one line matches.
 
-In: a stepper and a finding. Out: sentences in table words, each proved of the table as it stands; none where nothing small is known.
+In: a transition system and a finding. Out: sentences in table words, each proved of the table as it stands; none where nothing small is
+known.
 """
 
 from collections.abc import Iterator, Mapping
 
 from rcsc.compose.contract.obligations import Sort
-from rcsc.compose.contract.transition import Stepper
+from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.counterexample.finding import Finding
 from rcsc.compose.counterexample.trace import Step, seen_by_table
 from rcsc.lang.interpret import matching_lines
@@ -19,35 +20,35 @@ MOST_REGIONS = 3
 """Regions that a condition may exclude and still be small."""
 
 
-def helps(stepper: Stepper, finding: Finding) -> tuple[str, ...]:
+def helps(ts: TransitionSystem, finding: Finding) -> tuple[str, ...]:
     """What to change in the table that the last cycle ran."""
     step = finding.broken
-    if finding.goal.sort not in {
+    if finding.obligation.sort not in {
         Sort.ASSUMPTION, Sort.SOME_LINE, Sort.ONE_LINE, Sort.NO_DEFAULT,
     }:  # fmt: skip
         return ()
-    table = next(one for one in stepper.program.tables if one.name == step.table)
+    table = next(one for one in ts.program.tables if one.name == step.table)
     if not boxes.applies(table):
         return ()
-    return tuple(dict.fromkeys(_said(stepper, table, step)))
+    return tuple(dict.fromkeys(_said(ts, table, step)))
 
 
-def _said(stepper: Stepper, table: Table, step: Step) -> Iterator[str]:
-    seen = seen_by_table(stepper, step)
+def _said(ts: TransitionSystem, table: Table, step: Step) -> Iterator[str]:
+    seen = seen_by_table(ts, step)
     if seen is None:
         return
     matching = [at for at, line in enumerate(table.lines) if line.name in matching_lines(table, seen)]
     if len(matching) > 1:
-        cell = parting_cell(stepper.program, table, Overlap(matching[0], matching[1], {}))
-        yield cell or f"lines {_names(table, matching)} both match {_while(stepper.program, table, matching)}"
+        cell = parting_cell(ts.program, table, Overlap(matching[0], matching[1], {}))
+        yield cell or f"lines {_names(table, matching)} both match {_while(ts.program, table, matching)}"
     elif not matching:
-        region = around(stepper.program, table, seen)
-        yield f"no line matches while {_conditions(stepper.program, region)}"
-        if row := closing_line(stepper.program, table, Gap((seen,), (region,))):
+        region = around(ts.program, table, seen)
+        yield f"no line matches while {_conditions(ts.program, region)}"
+        if row := closing_line(ts.program, table, Gap((seen,), (region,))):
             yield row
     else:
         yield f"line `{table.lines[matching[0]].name}` matches all the same, and no other"
-    if (weakest := weakest_condition(stepper.program, table)) and step.failed:
+    if (weakest := weakest_condition(ts.program, table)) and step.failed:
         yield f"exactly one line matches under no more than this: {weakest}: proved"
 
 

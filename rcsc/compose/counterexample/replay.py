@@ -1,6 +1,6 @@
 """A finding is a log: its run, done again by the generated executors, and kept so that it can be stepped.
 
-In: steppers, a system's description, and a run as the interpreter did it. Out: executors of the levels in it, a log that
+In: transition systems, a system's description, and a run as the interpreter did it. Out: executors of the levels in it, a log that
 `rcsc replay` steps, and the proof of the pudding: the Python and the C executors leave in every cycle what the interpreter left.
 
 Where a program does not prove, or is looked at under another rule than the language's (`variants`), its executors are made by force:
@@ -12,7 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from rcsc.compose.contract.environment import leaves_under
-from rcsc.compose.contract.transition import Stepper
+from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.counterexample.finding import Finding, rows
 from rcsc.compose.counterexample.trace import Step
 from rcsc.emit import emit_c, emit_python
@@ -91,7 +91,7 @@ def told_what_externs_give(program: Program) -> Program:
 
 
 def _stand_ins(program: Program) -> Iterator[str]:
-    """The same in C, behind the program's own text."""
+    """The same in C, after the program's own text."""
     externs = [one for one in program.procedures if one.extern is not None]
     if externs:
         yield answers.HEAD
@@ -106,7 +106,7 @@ def _stand_ins(program: Program) -> Iterator[str]:
         )
 
 
-def only_in_python(finding: Finding, made: Mapping[str, Stepper]) -> bool:
+def only_in_python(finding: Finding, made: Mapping[str, TransitionSystem]) -> bool:
     """Whether an extern procedure gives what no C function can: a refused value of a type that C's own does not exceed."""
     for steps in finding.ticks:
         for name, step in steps.items():
@@ -123,7 +123,12 @@ def only_in_python(finding: Finding, made: Mapping[str, Stepper]) -> bool:
 
 
 def record(
-    finding: Finding, made: Mapping[str, Stepper], system: Description, path: Path, *, altered: bool = False
+    finding: Finding,
+    made: Mapping[str, TransitionSystem],
+    system: Description,
+    path: Path,
+    *,
+    altered: bool = False,
 ) -> None:
     """Runs a finding on the executors in `system.generated`, both kinds, and writes what they do as a log.
 
@@ -150,7 +155,7 @@ def record(
             recorder(running, ran)
 
 
-def _logged(finding: Finding, made: Mapping[str, Stepper], altered: bool) -> LoggedFinding:
+def _logged(finding: Finding, made: Mapping[str, TransitionSystem], altered: bool) -> LoggedFinding:
     """What the log says of it besides the states."""
     cycles = {
         (row.tick, row.level): LoggedCycle(
@@ -162,8 +167,8 @@ def _logged(finding: Finding, made: Mapping[str, Stepper], altered: bool) -> Log
     }
     return LoggedFinding(
         finding.level,
-        finding.goal.table,
-        finding.goal.shown,
+        finding.obligation.table,
+        finding.obligation.shown,
         finding.broken_at,
         finding.restarted,
         finding.legal,
@@ -217,7 +222,7 @@ def _begun(finding: Finding, system: Description, kind: Kind) -> System:
 
 
 def _cycles(
-    finding: Finding, made: Mapping[str, Stepper], running: System, kind: Kind
+    finding: Finding, made: Mapping[str, TransitionSystem], running: System, kind: Kind
 ) -> Iterator[tuple[RunningLevel, ...]]:
     """Runs tick by tick; the levels that ran in each.
 
@@ -237,24 +242,24 @@ def _cycles(
         yield ran
 
 
-def _take(running: System, level: RunningLevel, stepper: Stepper, step: Step) -> None:
+def _take(running: System, level: RunningLevel, ts: TransitionSystem, step: Step) -> None:
     """Publishes what the environment gave in this cycle, and takes it."""
     for wire in running.description.wires:
         owner, _, variable = wire.target.partition(".")
         if owner == level.name:
-            leaves = leaves_under(stepper.program, variable)
+            leaves = leaves_under(ts.program, variable)
             running.buffers.publish(wire.source, tuple(step.taken[leaf] for leaf in leaves))
     level.take(running.buffers)
 
 
-def _beside(level: RunningLevel, step: Step, stepper: Stepper, kind: Kind, tick: int) -> Iterator[str]:
+def _beside(level: RunningLevel, step: Step, ts: TransitionSystem, kind: Kind, tick: int) -> Iterator[str]:
     """Where the executor left something else."""
     who = "Python" if kind == "python" else "C"
     there = f"tick {tick}, level `{level.name}`"
     count = len(level.sign.leaves)
     for leaf, value in zip(level.sign.leaves, level.values[:count], strict=True):
         if step.after[leaf.name] != value:
-            then = spell(stepper.kinds[leaf.name], step.after[leaf.name])
+            then = spell(ts.kinds[leaf.name], step.after[leaf.name])
             yield f"{there}: `{leaf.name}` = {then} by the interpreter, {leaf.shown(value)} by the {who} executor"
     said, did = _traced(step, level.sign.monitored), _did(level, level.values)
     if said != did:

@@ -1,8 +1,8 @@
-"""The shortest way from the first cycle to where a goal is broken, run before it is shown.
+"""The shortest way from the first cycle to where an obligation is broken, run before it is shown.
 
-In: a stepper and goals. Out: `Trace`s: what the environment gave in each cycle, and what the reference interpreter, which is the
-meaning of the language, made of it. The solver finds the inputs; the interpreter is run on them from the initial values, and only what it
-does is shown. Where it does not break the goal, the trace is not believed: `NotReproducedError`.
+In: a transition system and obligations. Out: `Trace`s: what the environment gave in each cycle, and what the reference interpreter, which
+is the meaning of the language, made of it. The solver finds the inputs; the interpreter is run on them from the initial values, and only
+what it does is shown. Where it does not break the obligation, the trace is not believed: `NotReproducedError`.
 
 Of the shortest runs one of the simplest is given, always the same: an input stays as it was in the cycle before where it can, and has the
 least value that fits where it cannot.
@@ -14,9 +14,9 @@ from typing import TypeAlias
 
 from rcsc.compose.contract.environment import COMMAND, ECHO, ECHOED, NUMBER, Below
 from rcsc.compose.contract.given import Answer, scripted
-from rcsc.compose.contract.obligations import Goal, Key, Sort, goals, pairs
+from rcsc.compose.contract.obligations import Key, Obligation, Sort, obligations, pairs
 from rcsc.compose.contract.properties import invariant_kept, property_kept
-from rcsc.compose.contract.transition import EARLY, GHOST, Cycle, Leaves, Stepper, successor
+from rcsc.compose.contract.transition import EARLY, GHOST, Cycle, Leaves, TransitionSystem, successor
 from rcsc.compose.counterexample.simplest import Bounded, Simplest, constant_of
 from rcsc.lang.interpret import (
     ExternError,
@@ -57,8 +57,8 @@ class NotReproducedError(Exception):
         beside: What the solver said and what the interpreter did, where they differ, a line each.
     """
 
-    def __init__(self, goal: str, *, guessed: bool = False, beside: tuple[str, ...] = ()) -> None:
-        super().__init__(goal)
+    def __init__(self, obligation: str, *, guessed: bool = False, beside: tuple[str, ...] = ()) -> None:
+        super().__init__(obligation)
         self.guessed, self.beside = guessed, beside
 
 
@@ -99,15 +99,15 @@ Given: TypeAlias = tuple[Mapping[str, Value], tuple[Answer, ...]]
 
 @dataclass(frozen=True, slots=True)
 class Trace:
-    """A run that breaks a goal in its last cycle; no shorter one does.
+    """A run that breaks an obligation in its last cycle; no shorter one does.
 
     Attributes:
-        goal: What it breaks, in words.
+        obligation: What it breaks, in words.
         restarted: Whether it begins where a restart does, and not with the initial values.
         legal: Whether its environment did only what a neighbour that began with it can do (`Search.legal`).
     """
 
-    goal: str
+    obligation: str
     steps: tuple[Step, ...]
     restarted: bool = False
     legal: bool = False
@@ -133,42 +133,46 @@ class Search:
 Found: TypeAlias = Trace | NotReproducedError
 
 
-def shortest(stepper: Stepper, goal: Goal, most: int = 10, *, legal: bool = False) -> Trace | None:
+def shortest(
+    ts: TransitionSystem, obligation: Obligation, most: int = 10, *, legal: bool = False
+) -> Trace | None:
     """The shortest trace of at most `most` cycles; None where there is none, or the solver gave up.
 
     Raises:
-        NotReproducedError: The interpreter does not break the goal there.
+        NotReproducedError: The interpreter does not break the obligation there.
     """
-    found = traces(stepper, (goal,), Search(most, legal=legal)).get(goal.key)
+    found = traces(ts, (obligation,), Search(most, legal=legal)).get(obligation.key)
     if isinstance(found, NotReproducedError):
         raise found
     return found
 
 
-def traces(stepper: Stepper, wanted: Sequence[Goal], search: Search) -> dict[Key, Found]:
-    """For each goal for which there is one the shortest trace, all found in one search."""
-    run = Unrolled(stepper, search)
-    waiting = {goal.key: goal for goal in wanted}
+def traces(ts: TransitionSystem, wanted: Sequence[Obligation], search: Search) -> dict[Key, Found]:
+    """For each obligation for which there is one the shortest trace, all found in one search."""
+    run = Unrolled(ts, search)
+    waiting = {obligation.key: obligation for obligation in wanted}
     found: dict[Key, Found] = {}
     for _ in range(search.most):
         if not waiting:
             break
         one = run.further()
-        here = {goal.key: _wrong(goal, one) for goal in (*goals(stepper, one), *pairs(one))}
-        for key, goal in list(waiting.items()):
+        here = {
+            obligation.key: _wrong(obligation, one) for obligation in (*obligations(ts, one), *pairs(one))
+        }
+        for key, obligation in list(waiting.items()):
             try:
                 if run.reaches(here[key]):
-                    found[key] = run.told(goal, here[key])
+                    found[key] = run.told(obligation, here[key])
                     del waiting[key]
             except GaveUpError:
                 del waiting[key]
     return found
 
 
-def _wrong(goal: Goal, one: Cycle) -> Node:
-    """That the cycle breaks the goal: what it leaves counts only where it does not end early."""
-    wrong = values.negation(goal.holds)
-    early = goal.sort in {Sort.ASSUMPTION, Sort.ONE_LINE, Sort.SOME_LINE, Sort.NO_DEFAULT}
+def _wrong(obligation: Obligation, one: Cycle) -> Node:
+    """That the cycle breaks the obligation: what it leaves counts only where it does not end early."""
+    wrong = values.negation(obligation.holds)
+    early = obligation.sort in {Sort.ASSUMPTION, Sort.ONE_LINE, Sort.SOME_LINE, Sort.NO_DEFAULT}
     return wrong if early else values.both(wrong, one.goes_on)
 
 
@@ -176,7 +180,7 @@ def _wrong(goal: Goal, one: Cycle) -> Node:
 class Unrolled:
     """Cycles one after the other, from the first of a run."""
 
-    stepper: Stepper
+    ts: TransitionSystem
     search: Search
     cycles: list[Cycle] = field(default_factory=list)
     _run: Bounded = field(default_factory=Bounded)
@@ -186,7 +190,7 @@ class Unrolled:
     _echoed: dict[str, Node] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self._start = self.stepper.restarted() if self.search.restarted else self.stepper.first()
+        self._start = self.ts.restarted() if self.search.restarted else self.ts.initial()
         self._now = self._start
 
     def further(self) -> Cycle:
@@ -194,7 +198,7 @@ class Unrolled:
         at = len(self.cycles) + 1
         if self.cycles:  # a fault would have ended the run
             self._run.add(self.cycles[-1].goes_on)
-        one = self.stepper.cycle(self._now, f" {at}")
+        one = self.ts.cycle(self._now, f" {at}")
         self.cycles.append(one)
         self._now = one.after
         self._run.add(one.contract)
@@ -203,12 +207,12 @@ class Unrolled:
         return one
 
     def _legal(self, one: Cycle, at: int) -> Iterator[Node]:
-        above = self.stepper.links.above
+        above = self.ts.links.above
         if above is not None:
             number = f"{above.order}.{NUMBER}"
             before, now = one.before[number], one.taken[number]
             yield values.either(values.equal(now, before), values.equal(now, successor(before)))
-        for below in self.stepper.links.below:
+        for below in self.ts.links.below:
             yield from self._answers(below, one, at)
 
     def _answers(self, below: Below, one: Cycle, at: int) -> Iterator[Node]:
@@ -233,8 +237,8 @@ class Unrolled:
         """
         return self._run.holds([self._run.literal(wrong)])
 
-    def told(self, goal: Goal, wrong: Node) -> Found:
-        """The simplest run that ends so, as the interpreter runs it; or that it does not break the goal.
+    def told(self, obligation: Obligation, wrong: Node) -> Found:
+        """The simplest run that ends so, as the interpreter runs it; or that it does not break the obligation.
 
         Raises:
             GaveUpError: The solver did not decide.
@@ -242,13 +246,13 @@ class Unrolled:
         settled = Simplest(self._run, [self._run.literal(wrong)])
         start, given = self._settled(settled)
         try:
-            trace = _ran(self.stepper, goal, given, start, self.search)
+            trace = _ran(self.ts, obligation, given, start, self.search)
         except (ArithmeticError, IndexError, ValueError):  # an operation that is not defined: `SAFE` says so
-            return NotReproducedError(goal.shown, guessed=True)
-        if _breaks(self.stepper, goal, trace, len(given)):
+            return NotReproducedError(obligation.shown, guessed=True)
+        if _breaks(self.ts, obligation, trace, len(given)):
             return trace
         beside = self._beside(trace) if self._run.holds(settled.given) else ()
-        return NotReproducedError(goal.shown, guessed=self.guessed or self._asks, beside=beside)
+        return NotReproducedError(obligation.shown, guessed=self.guessed or self._asks, beside=beside)
 
     def inputs(self, wrong: Node) -> tuple[dict[str, Value], list[Given]]:
         """Every leaf before the simplest run that ends so, and what its cycles are given.
@@ -265,7 +269,7 @@ class Unrolled:
 
     @property
     def _asks(self) -> bool:
-        """Whether extern procedures are called: a goal may speak of what they give in the cycle after the last."""
+        """Whether extern procedures are called: an obligation may speak of what they give in the cycle after the last."""
         return any(one.calls for one in self.cycles)
 
     def _settled(self, settled: Simplest) -> tuple[dict[str, Value], list[Given]]:
@@ -275,7 +279,7 @@ class Unrolled:
     def _simplest(self, settled: Simplest, start: Mapping[str, Value]) -> list[Given]:
         """What each cycle is given; an input stays as it was where it can, and so does what no condition reads."""
         found: list[Given] = []
-        program = self.stepper.program
+        program = self.ts.program
         inputs = [str(v.name) for v in program.variables if v.kind is Kind.INPUT]
         before = [start[name] for name in inputs]
         for one in self.cycles:
@@ -285,7 +289,7 @@ class Unrolled:
 
     def _begins(self, settled: Simplest) -> dict[str, Value]:
         """Every leaf before the first cycle."""
-        begun = dict(initial(self.stepper.program))
+        begun = dict(initial(self.ts.program))
         if self.search.restarted:
             names = list(begun)
             nodes = [self._start[name] for name in names]
@@ -298,12 +302,12 @@ class Unrolled:
         for number, (one, step) in enumerate(zip(self.cycles, trace.steps, strict=False), 1):
             said = {
                 name: value_of_key(kind, self._run.key(one.after[name]))
-                for name, kind in self.stepper.kinds.items()
+                for name, kind in self.ts.kinds.items()
                 if name in step.after and self._run.met(one.after[name])
             }
             other = [
                 f"cycle {number}: `{name}` = {spell(kind, said[name])} by the solver, {spell(kind, step.after[name])} as it ran"
-                for name, kind in self.stepper.kinds.items()
+                for name, kind in self.ts.kinds.items()
                 if name in said and said[name] != step.after[name]
             ]
             if other:
@@ -314,41 +318,41 @@ class Unrolled:
 # --- the run -------------------------------------------------------------------------------
 
 
-def replayed(stepper: Stepper, goal: Goal, inputs: Sequence[Given]) -> Trace:
+def replayed(ts: TransitionSystem, obligation: Obligation, inputs: Sequence[Given]) -> Trace:
     """The run on what the environment gives, from the initial values.
 
     Raises:
-        NotReproducedError: It does not break the goal in its last cycle.
+        NotReproducedError: It does not break the obligation in its last cycle.
     """
-    trace = _ran(stepper, goal, inputs, initial(stepper.program), Search())
-    if not _breaks(stepper, goal, trace, len(inputs)):
-        raise NotReproducedError(goal.shown)
+    trace = _ran(ts, obligation, inputs, initial(ts.program), Search())
+    if not _breaks(ts, obligation, trace, len(inputs)):
+        raise NotReproducedError(obligation.shown)
     return trace
 
 
 def _ran(
-    stepper: Stepper,
-    goal: Goal,
+    ts: TransitionSystem,
+    obligation: Obligation,
     given: Sequence[Given],
     start: Mapping[str, Value],
     search: Search,
 ) -> Trace:
-    return Trace(goal.shown, ran_on(stepper, start, given), search.restarted, search.legal)
+    return Trace(obligation.shown, ran_on(ts, start, given), search.restarted, search.legal)
 
 
 def ran(
-    stepper: Stepper, start: Mapping[str, Value], inputs: Sequence[Mapping[str, Value]]
+    ts: TransitionSystem, start: Mapping[str, Value], inputs: Sequence[Mapping[str, Value]]
 ) -> tuple[Step, ...]:
     """What the interpreter does, from `start` on these inputs, up to the first fault that ends a run."""
-    return ran_on(stepper, start, [(taken, ()) for taken in inputs])
+    return ran_on(ts, start, [(taken, ()) for taken in inputs])
 
 
-def ran_on(stepper: Stepper, start: Mapping[str, Value], given: Sequence[Given]) -> tuple[Step, ...]:
+def ran_on(ts: TransitionSystem, start: Mapping[str, Value], given: Sequence[Given]) -> tuple[Step, ...]:
     """The same with results of extern procedures."""
     now = dict(start)
     steps: list[Step] = []
     for taken, answers in given:
-        steps.append(one_cycle(stepper, now, taken, answers))
+        steps.append(one_cycle(ts, now, taken, answers))
         now = dict(steps[-1].after)
         if steps[-1].ends_the_run:
             break
@@ -356,15 +360,15 @@ def ran_on(stepper: Stepper, start: Mapping[str, Value], given: Sequence[Given])
 
 
 def one_cycle(
-    stepper: Stepper,
+    ts: TransitionSystem,
     before: Mapping[str, Value],
     taken: Mapping[str, Value],
     answers: tuple[Answer, ...] = (),
 ) -> Step:
     """What the interpreter does in one cycle, in which extern procedures give these answers."""
-    with scripted(stepper.program, answers):
-        outcome = cycle(stepper.program, stepper.level, {**before, **taken})
-    return _step(stepper, before, taken, outcome, answers)
+    with scripted(ts.program, answers):
+        outcome = cycle(ts.program, ts.level, {**before, **taken})
+    return _step(ts, before, taken, outcome, answers)
 
 
 @dataclass(slots=True)
@@ -385,55 +389,55 @@ class Halfway:
     acted: bool = False
 
 
-def halfway(stepper: Stepper, step: Step) -> Halfway:
+def halfway(ts: TransitionSystem, step: Step) -> Halfway:
     """The first part of a cycle, as the interpreter runs it again."""
-    program = stepper.program
+    program = ts.program
     now = admit(program, {**step.before, **step.taken})
     assert not isinstance(now, str)
     settle(program, now)
     found = Halfway(now, dict(now), now)
     try:
         with scripted(program, step.answers):
-            for name in stepper.level.preprocess:
+            for name in ts.level.preprocess:
                 call(program, name, [], now)
             found.matched, found.middle = True, dict(now)
-            execute(program, [action.statement for action in _actions(stepper, step)], now, {})
+            execute(program, [action.statement for action in _actions(ts, step)], now, {})
             found.acted = step.fault is not Fault.ASSUMPTION
     except ExternError:
         pass
     return found
 
 
-def _actions(stepper: Stepper, step: Step) -> tuple[Action, ...]:
+def _actions(ts: TransitionSystem, step: Step) -> tuple[Action, ...]:
     """What the line that ran does."""
-    table = next(one for one in stepper.program.tables if one.name == step.table)
+    table = next(one for one in ts.program.tables if one.name == step.table)
     lines: list[Line | Default] = [*table.lines, *([] if table.default is None else [table.default])]
     return next((one.actions for one in lines if one.name == step.line), ())
 
 
-def seen_by_table(stepper: Stepper, step: Step) -> Snapshot | None:
+def seen_by_table(ts: TransitionSystem, step: Step) -> Snapshot | None:
     """Every leaf as the table saw it; None where the cycle ended before."""
-    found = halfway(stepper, step)
+    found = halfway(ts, step)
     return found.middle if found.matched else None
 
 
-def _breaks(stepper: Stepper, goal: Goal, trace: Trace, cycles: int) -> bool:
-    return len(trace.steps) == cycles and broken(stepper, goal, trace.steps[-1])
+def _breaks(ts: TransitionSystem, obligation: Obligation, trace: Trace, cycles: int) -> bool:
+    return len(trace.steps) == cycles and broken(ts, obligation, trace.steps[-1])
 
 
 def _step(
-    stepper: Stepper,
+    ts: TransitionSystem,
     before: Mapping[str, Value],
     taken: Mapping[str, Value],
     outcome: Outcome,
     answers: tuple[Answer, ...],
 ) -> Step:
     after = outcome.snapshot
-    chosen = stepper.table_of(after)
+    chosen = ts.table_of(after)
     line = "" if outcome.line is None else str(outcome.line)
     matched: tuple[str, ...] = () if outcome.line is None else (line,)
     if outcome.fault is Fault.SEVERAL_LINES:
-        table = next(one for one in stepper.program.tables if one.name == chosen)
+        table = next(one for one in ts.program.tables if one.name == chosen)
         matched = tuple(map(str, matching_lines(table, after)))
     found = Step(
         dict(taken),
@@ -446,67 +450,67 @@ def _step(
         matched,
         answers,
     )
-    return replace(found, failed=(*found.failed, *_also_failed(stepper, found)))
+    return replace(found, failed=(*found.failed, *_also_failed(ts, found)))
 
 
-def _also_failed(stepper: Stepper, step: Step) -> tuple[str, ...]:
+def _also_failed(ts: TransitionSystem, step: Step) -> tuple[str, ...]:
     """Assumptions of the table that no executor looks at, and that did not hold."""
-    table = next(one for one in stepper.program.tables if one.name == step.table)
+    table = next(one for one in ts.program.tables if one.name == step.table)
     others = [
         one
-        for one in stepper.program.assumptions
+        for one in ts.program.assumptions
         if one.name in table.assumptions
         and one.standing is not Standing.MONITORED
         and one.name not in step.failed
     ]
-    seen = seen_by_table(stepper, step) if others else None
+    seen = seen_by_table(ts, step) if others else None
     return () if seen is None else tuple(str(one.name) for one in others if not holds(one.condition, seen))
 
 
-def broken(stepper: Stepper, goal: Goal, step: Step) -> bool:
-    """Whether the cycle, as it ran, breaks the goal."""
-    if goal.table and goal.table != step.table:
+def broken(ts: TransitionSystem, obligation: Obligation, step: Step) -> bool:
+    """Whether the cycle, as it ran, breaks the obligation."""
+    if obligation.table and obligation.table != step.table:
         return False
-    match goal.sort:
+    match obligation.sort:
         case Sort.ASSUMPTION:
-            return goal.name in step.failed
+            return obligation.name in step.failed
         case Sort.ONE_LINE:
-            return step.fault is Fault.SEVERAL_LINES and set(goal.lines) <= set(step.matched)
+            return step.fault is Fault.SEVERAL_LINES and set(obligation.lines) <= set(step.matched)
         case Sort.SOME_LINE:
             return step.fault is Fault.NO_LINE
         case Sort.NO_DEFAULT:
-            table = next(one for one in stepper.program.tables if one.name == goal.table)
+            table = next(one for one in ts.program.tables if one.name == obligation.table)
             return table.default is not None and step.line == table.default.name
         case Sort.INVARIANT:
-            kept = invariant_kept(stepper, goal.name, step.before, step.after)
+            kept = invariant_kept(ts, obligation.name, step.before, step.after)
             return not step.ends_the_run and not kept
         case Sort.PROPERTY:
-            kept = property_kept(stepper, goal.name, step.before, step.after)
+            kept = property_kept(ts, obligation.name, step.before, step.after)
             return not step.ends_the_run and not kept
         case Sort.SAFE:
-            return not step.ends_the_run and _broken_between(stepper, goal, step)
+            return not step.ends_the_run and _broken_between(ts, obligation, step)
         case _:
-            return _broken_between(stepper, goal, step)
+            return _broken_between(ts, obligation, step)
 
 
-def _broken_between(stepper: Stepper, goal: Goal, step: Step) -> bool:
-    """A goal about what stands before and behind a cycle."""
-    holds = _same(goals(stepper, as_cycle(stepper, step)), goal).holds
+def _broken_between(ts: TransitionSystem, obligation: Obligation, step: Step) -> bool:
+    """An obligation about what stands before and after a cycle."""
+    holds = _same(obligations(ts, as_cycle(ts, step)), obligation).holds
     return holds.known and not holds.low
 
 
-def as_cycle(stepper: Stepper, step: Step) -> Cycle:
+def as_cycle(ts: TransitionSystem, step: Step) -> Cycle:
     """A cycle as it ran, all its nodes constants; what stands within it, which no run is shown to break, as the table saw it."""
-    before, after = _constants(stepper, step.before), _constants(stepper, step.after)
+    before, after = _constants(ts, step.before), _constants(ts, step.after)
     taken = {name: after[name] for name in step.taken}
-    half = halfway(stepper, step)
-    middle = _constants(stepper, half.middle)
+    half = halfway(ts, step)
+    middle = _constants(ts, half.middle)
     return Cycle(
         before,
         taken,
         values.TRUE,
         {**middle, **taken},
-        stepper.tables(middle, matched=half.matched),
+        ts.tables(middle, matched=half.matched),
         after,
         values.truth(step.fault in EARLY),
         values.truth(not half.matched),
@@ -516,13 +520,13 @@ def as_cycle(stepper: Stepper, step: Step) -> Cycle:
     )
 
 
-def _same(every: tuple[Goal, ...], goal: Goal) -> Goal:
-    return next(one for one in every if one.key == goal.key)
+def _same(every: tuple[Obligation, ...], obligation: Obligation) -> Obligation:
+    return next(one for one in every if one.key == obligation.key)
 
 
-def _constants(stepper: Stepper, state: Mapping[str, Value]) -> Leaves:
+def _constants(ts: TransitionSystem, state: Mapping[str, Value]) -> Leaves:
     return {
         name: values.constant(kind, state[name])
-        for name, kind in stepper.kinds.items()
+        for name, kind in ts.kinds.items()
         if not name.startswith(GHOST)
-    } | {name: values.constant(kind, 0) for name, kind in stepper.kinds.items() if name.startswith(GHOST)}
+    } | {name: values.constant(kind, 0) for name, kind in ts.kinds.items() if name.startswith(GHOST)}

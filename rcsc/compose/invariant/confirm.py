@@ -1,13 +1,13 @@
-"""What a search found, asked anew of Z3: whether clauses are an invariant, and whether goals follow from them.
+"""What a search found, asked anew of Z3: whether clauses are an invariant, and whether obligations follow from them.
 
-In: features, the cycles with which a level begins, a cycle from anywhere, clauses. Out: questions, each of which has to be
+In: predicates, the cycles with which a level begins, a cycle from any state, clauses. Out: questions, each of which has to be
 answered *unsatisfiable*; they are also the certificate. Nothing of the search is used: other terms (`keyed`), another solver.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from rcsc.compose.contract.predicates import Feature
+from rcsc.compose.contract.predicates import Predicate
 from rcsc.compose.contract.transition import Cycle
 from rcsc.compose.invariant.pdr import Clause
 from rcsc.lang.model import Bool
@@ -26,10 +26,10 @@ class Confirmation:
         firsts: The first cycle, from the initial values; and that after a restart.
         cycle: Any later one.
         cases: Conditions on a cycle, of which at least one holds; each is asked apart, which is quicker.
-        rested_on: Solvers whose refutations something rests on besides the goals: part of the certificate.
+        rested_on: Solvers whose refutations something rests on besides the obligations: part of the certificate.
     """
 
-    features: tuple[Feature, ...]
+    predicates: tuple[Predicate, ...]
     firsts: Sequence[Cycle]
     cycle: Cycle
     cases: Sequence[Node]
@@ -43,7 +43,7 @@ class Confirmation:
     _ended: dict[tuple[int, int], Term] = field(default_factory=dict)
 
     def literal(self, at: int, value: int, *, after: bool) -> Term:
-        """That a feature has a value before, or behind, the cycle; of `~value`, that it has another."""
+        """That a predicate has a value before, or after, the cycle; of `~value`, that it has another."""
         if value < 0:
             return smt.negation(self.literal(at, ~value, after=after))
         key = after, at, value
@@ -57,10 +57,10 @@ class Confirmation:
         return self._literals[key]
 
     def node(self, at: int, *, after: bool) -> Node:
-        """A feature before, or behind, the cycle."""
+        """A predicate before, or after, the cycle."""
         if (after, at) not in self._nodes:
             leaves = self.cycle.after if after else self.cycle.before
-            self._nodes[after, at] = self.features[at].node(leaves)
+            self._nodes[after, at] = self.predicates[at].node(leaves)
         return self._nodes[after, at]
 
     def broken(self, clause: Clause, *, after: bool) -> Term:
@@ -79,7 +79,7 @@ class Confirmation:
     def known(self, clauses: Sequence[Clause]) -> Solver:
         """A solver in which one cycle starts where the clauses hold."""
         held = [self._held(clause) for clause in clauses]
-        for at in range(len(self.features)):
+        for at in range(len(self.predicates)):
             self.keyed.term(self.node(at, after=True))
         contract = self.keyed.term(self.cycle.contract)
         for case in self.cases:
@@ -91,7 +91,7 @@ class Confirmation:
     def in_other_terms(self, keyed: Keyed) -> "Confirmation":
         """The same, asked in other terms."""
         return Confirmation(
-            self.features, self.firsts, self.cycle, self.cases, keyed, self.limits, self.rested_on
+            self.predicates, self.firsts, self.cycle, self.cases, keyed, self.limits, self.rested_on
         )
 
     def step_question(self, clauses: Sequence[Clause], case: Node) -> Solver:
@@ -103,7 +103,7 @@ class Confirmation:
 
     def first_question(self, clauses: Sequence[Clause], first: Cycle) -> Solver:
         """That a first cycle leads to where a clause is broken: unsatisfiable, when they are an invariant."""
-        nodes = [one.node(first.after) for one in self.features]
+        nodes = [one.node(first.after) for one in self.predicates]
         equal = [self.keyed.equal(self._end(at), node) for at, node in enumerate(nodes)]
         solver = self.beginning(first)
         solver.add(*self.keyed.ranges, *equal, smt.any_of([self._stands(clause) for clause in clauses]))
@@ -117,8 +117,8 @@ class Confirmation:
         return solver
 
     def _end(self, at: int) -> Term:
-        """A constant for a feature behind the cycle: quicker to read from a model than what it is equal to."""
-        return self.keyed.fresh(f"end!{at}", self.features[at].kind)
+        """A constant for a predicate after the cycle: quicker to read from a model than what it is equal to."""
+        return self.keyed.fresh(f"end!{at}", self.predicates[at].kind)
 
     def _stands(self, clause: Clause) -> Term:
         """That the constants have the clause's values."""
@@ -129,5 +129,5 @@ class Confirmation:
             return smt.negation(self._at(at, ~value))
         key = at, value
         if key not in self._ended:
-            self._ended[key] = self.keyed.has(self._end(at), self.features[at].kind, value)
+            self._ended[key] = self.keyed.has(self._end(at), self.predicates[at].kind, value)
         return self._ended[key]

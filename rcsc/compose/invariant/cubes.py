@@ -1,7 +1,7 @@
-"""Combinations of values of features: what a clause of an invariant forbids, and which of them known states show.
+"""Combinations of values of predicates: what a clause of an invariant forbids, and which of them known states show.
 
-In: features and states (`features.point`). Out: `Cube`s, and answers about them. Of a feature with many values a cube says which value
-it has, or, of all but a few, which values it has not: one clause then speaks of as many members as an enumeration may have.
+In: predicates and states (`predicates.point`). Out: `Cube`s, and answers about them. Of a predicate with many values a cube says which
+value it has, or, of all but a few, which values it has not: one clause then speaks of as many members as an enumeration may have.
 """
 
 from collections.abc import Iterable, Sequence
@@ -11,24 +11,24 @@ from itertools import groupby
 import numpy as np
 import numpy.typing as npt
 
-from rcsc.compose.contract.predicates import Feature
+from rcsc.compose.contract.predicates import Predicate
 
 Point = tuple[int, ...]
-"""A value for each feature."""
+"""A value for each predicate."""
 Pair = tuple[int, int]
-"""A feature, by position, and its value; or `~value`, which is negative: that it has another."""
+"""A predicate, by position, and its value; or `~value`, which is negative: that it has another."""
 Cube = tuple[Pair, ...]
 """What stands together, in order."""
 
 
-def shown(chosen: Sequence[Feature], clause: Cube) -> str:
+def shown(chosen: Sequence[Predicate], clause: Cube) -> str:
     """A combination in the tables' words."""
     by_feature = groupby(clause, key=lambda pair: pair[0])
     return " and ".join(_said(chosen[at], [value for _, value in pairs]) for at, pairs in by_feature)
 
 
-def _said(one: Feature, found: Sequence[int]) -> str:
-    """What is said of one feature: its value, or those that it has not."""
+def _said(one: Predicate, found: Sequence[int]) -> str:
+    """What is said of one predicate: its value, or those that it has not."""
     if found[0] >= 0:
         return f"{one.name} = {one.shown(found[0])}"
     others = [one.shown(~value) for value in reversed(found)]
@@ -44,7 +44,7 @@ class Masks:
 
     @classmethod
     def of(cls, sizes: Iterable[int]) -> "Masks":
-        """Of features with so many values each."""
+        """Of predicates with so many values each."""
         made, count = cls(), 0
         for at, size in enumerate(sizes):
             for value in range(size):
@@ -62,7 +62,7 @@ class Masks:
         return sum(self._own[pair] for pair in cube)
 
     def implied(self, cube: Cube) -> int:
-        """All that hold where the cube does: that a feature has a value, and therefore no other."""
+        """All that hold where the cube does: that a predicate has a value, and therefore no other."""
         found = 0
         for pair in cube:
             found |= self._implied[pair]
@@ -77,7 +77,7 @@ class Reached:
 
     @classmethod
     def of(cls, points: Iterable[Point], width: int) -> "Reached":
-        """Of these; `width` features each."""
+        """Of these; `width` predicates each."""
         every = list(points)
         return cls(np.array(every, dtype=np.int32).reshape(len(every), width))
 
@@ -95,7 +95,7 @@ class Reached:
         return bool(self._inside(cube).any())
 
     def values(self, cube: Cube, at: int) -> set[int]:
-        """What a feature has in those that are in the cube."""
+        """What a predicate has in those that are in the cube."""
         return set(map(int, self._points[self._inside(cube), at]))
 
     def _inside(self, cube: Cube) -> npt.NDArray[np.bool_]:

@@ -1,26 +1,26 @@
-"""Inductive invariants found backwards from what is to be proved: clauses over the features of a level.
+"""Inductive invariants found backwards from what is to be proved: clauses over the predicates of a level.
 
-In: features, the cycles with which a level begins, a cycle from anywhere, its goals, and some states that are known to be
-reached. Out: clauses that hold behind every first cycle, that every cycle keeps, and from which no cycle breaks a goal; and the
-goals for which the features do not suffice.
+In: predicates, the cycles with which a level begins, a cycle from any state, its obligations, and some states that are known to be
+reached. Out: clauses that hold after every first cycle, that every cycle keeps, and from which no cycle breaks an obligation; and the
+obligations for which the predicates do not suffice.
 
-How: *frame* i is a set of clauses that hold behind every run of at most i cycles. A state of the last frame from which a cycle
-breaks a goal has to be excluded: it is asked whether a first cycle, or a cycle from the frame before, leads to it; if one does,
-that state is to be excluded first. If none does, the state is generalised, feature by feature, as long as that stays true: a
-feature is left out, or, if it has many values, all but a few of them are excluded with the one, so that clauses do not grow in
+How: *frame* i is a set of clauses that hold after every run of at most i cycles. A state of the last frame from which a cycle
+breaks an obligation has to be excluded: it is asked whether a first cycle, or a cycle from the frame before, leads to it; if one does,
+that state is to be excluded first. If none does, the state is generalised, predicate by predicate, as long as that stays true: a
+predicate is left out, or, if it has many values, all but a few of them are excluded with the one, so that clauses do not grow in
 number with the members of an enumeration. A clause is added. When every clause of a frame holds in the next one, they are an
 invariant. This is property directed reachability (Bradley, "SAT-based model checking without unrolling", 2011; Een, Mishchenko
-and Brayton, "Efficient implementation of property directed reachability", 2011) on states as the features show them, without
+and Brayton, "Efficient implementation of property directed reachability", 2011) on states as the predicates show them, without
 making that abstraction (Cimatti, Griggio, Mover and Tonetta, "IC3 modulo theories via implicit predicate abstraction", 2014).
 
-A goal that is reached so is not proved; it need not be false, since two states that the features do not tell apart are one here.
+An obligation that is reached so is not proved; it need not be false, since two states that the predicates do not tell apart are one here.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from heapq import heappop, heappush
 
-from rcsc.compose.contract.predicates import Feature
+from rcsc.compose.contract.predicates import Predicate
 from rcsc.compose.contract.transition import Cycle
 from rcsc.compose.invariant.cubes import Cube, Masks, Pair, Point, Reached
 from rcsc.lang.model import Bool
@@ -31,40 +31,42 @@ from rcsc.symbolic.values import Node
 Clause = Cube
 """What never stands together."""
 MANY = 2
-"""Of a feature with more values a clause may name those that are allowed, and so forbid all others at once."""
+"""Of a predicate with more values a clause may name those that are allowed, and so forbid all others at once."""
 TRIES = 8
 """How often it is asked, each time with one more value allowed, before a clause forbids a single one after all."""
 
 
 class Posed:
-    """A cycle as clauses, with a literal for every value of every feature before and behind it.
+    """A cycle as clauses, with a literal for every value of every predicate before and after it.
 
     Attributes:
-        sizes: How many values each feature has.
-        before: By feature and value, had or not; likewise `after`.
-        holds: The literal of each goal, by its position.
+        sizes: How many values each predicate has.
+        before: By predicate and value, had or not; likewise `after`.
+        holds: The literal of each obligation, by its position.
     """
 
-    def __init__(self, features: Sequence[Feature], cycle: Cycle, goals: Mapping[int, Node]) -> None:
-        starts = [one.node(cycle.before) for one in features]
-        ends = [one.node(cycle.after) for one in features]
-        bits = Bits.of((*starts, *ends, cycle.contract, *goals.values()))
-        self._kinds = [one.kind for one in features]
-        self.sizes = [one.size for one in features]
+    def __init__(
+        self, predicates: Sequence[Predicate], cycle: Cycle, obligations: Mapping[int, Node]
+    ) -> None:
+        starts = [one.node(cycle.before) for one in predicates]
+        ends = [one.node(cycle.after) for one in predicates]
+        bits = Bits.of((*starts, *ends, cycle.contract, *obligations.values()))
+        self._kinds = [one.kind for one in predicates]
+        self.sizes = [one.size for one in predicates]
         self._starts = [bits.word(node) for node in starts]
         self._ends = [bits.word(node) for node in ends]
-        self.before = self._values(bits, features, self._starts)
-        self.after = self._values(bits, features, self._ends)
-        self.holds = {at: bits.literal(node) for at, node in goals.items()}
+        self.before = self._values(bits, predicates, self._starts)
+        self.after = self._values(bits, predicates, self._ends)
+        self.holds = {at: bits.literal(node) for at, node in obligations.items()}
         contract = bits.literal(cycle.contract)
         self.sat = Sat([*bits.clauses, [contract]])
         self._count = bits.count
 
     @staticmethod
-    def _values(bits: Bits, features: Sequence[Feature], words: Sequence[Word]) -> dict[Pair, Literal]:
+    def _values(bits: Bits, predicates: Sequence[Predicate], words: Sequence[Word]) -> dict[Pair, Literal]:
         found = {
             (at, value): bits.equals(word, one.kind, value)
-            for at, (one, word) in enumerate(zip(features, words, strict=True))
+            for at, (one, word) in enumerate(zip(predicates, words, strict=True))
             for value in range(one.size)
         }
         return found | {(at, ~value): -literal for (at, value), literal in found.items()}
@@ -75,11 +77,11 @@ class Posed:
         return self._count
 
     def start(self) -> Point:
-        """The features before the cycle in the last model."""
+        """The predicates before the cycle in the last model."""
         return self._point(self._starts)
 
     def end(self) -> Point:
-        """The features behind the cycle in the last model."""
+        """The predicates after the cycle in the last model."""
         return self._point(self._ends)
 
     def _point(self, words: Sequence[Word]) -> Point:
@@ -91,13 +93,13 @@ class Posed:
 
 
 @dataclass(slots=True)
-class Frames:
+class PDR:
     """The search, for one level.
 
     Attributes:
         firsts: The cycles with which it begins.
         step: Any later one.
-        weights: Of the features; those of small weight are left out of a clause first.
+        weights: Of the predicates; those of small weight are left out of a clause first.
         known: Clauses that are an invariant already.
     """
 
@@ -117,21 +119,21 @@ class Frames:
         self._masks = Masks.of(self.step.sizes)
 
     def search(self, wanted: Iterable[int]) -> tuple[list[Clause], set[int]]:
-        """An invariant, and which goals it does not prove.
+        """An invariant, and which obligations it does not prove.
 
         Args:
-            wanted: The goals looked at, by position.
+            wanted: The obligations looked at, by position.
 
         Raises:
             GaveUpError: The solver did.
         """
-        goals = set(wanted)
+        obligations = set(wanted)
         for clause in self.known:
             self.step.sat.add([-self.step.before[pair] for pair in clause])
-        self._begin(goals)
+        self._begin(obligations)
         self._deepen()
         while True:
-            self._exclude(goals)
+            self._exclude(obligations)
             self._deepen()
             done = self._push()
             if done is not None:
@@ -140,32 +142,32 @@ class Frames:
                     *(cube for frame in self._frames[done + 1 :] for cube in frame),
                 ], self._open
 
-    # --- goals ---
+    # --- obligations ---
 
-    def _begin(self, goals: set[int]) -> None:
-        """Goals that a first cycle breaks are open."""
-        for at in sorted(goals):
+    def _begin(self, obligations: set[int]) -> None:
+        """Obligations that a first cycle breaks are open."""
+        for at in sorted(obligations):
             if any(first.sat.holds([-first.holds[at]]) for first in self.firsts):
-                self._leave(goals, [at])
+                self._leave(obligations, [at])
 
-    def _leave(self, goals: set[int], broken: Iterable[int]) -> None:
+    def _leave(self, obligations: set[int], broken: Iterable[int]) -> None:
         for at in broken:
-            goals.discard(at)
+            obligations.discard(at)
             self._open.add(at)
 
-    def _exclude(self, goals: set[int]) -> None:
-        """Excludes every state of the last frame from which a cycle breaks a goal, or leaves the goal open."""
+    def _exclude(self, obligations: set[int]) -> None:
+        """Excludes every state of the last frame from which a cycle breaks an obligation, or leaves the obligation open."""
         last = len(self._frames) - 1
         while True:
             switch = self.step.fresh()
-            self.step.sat.add([-switch, *(-self.step.holds[at] for at in sorted(goals))])
+            self.step.sat.add([-switch, *(-self.step.holds[at] for at in sorted(obligations))])
             if not self.step.sat.holds([*self._held[last:], switch]):
                 return
             point = self.step.start()
-            broken = [at for at in goals if not self.step.sat.value(self.step.holds[at])]
+            broken = [at for at in obligations if not self.step.sat.value(self.step.holds[at])]
             self.step.sat.add([-switch])
             if not self._block(point, last):
-                self._leave(goals, broken)
+                self._leave(obligations, broken)
 
     def _block(self, point: Point, last: int) -> bool:
         """Excludes a state from a frame, and first what leads to it; False where it is reached after all."""
@@ -248,7 +250,7 @@ class Frames:
         return cube
 
     def _wider(self, cube: Cube, pair: Pair, level: int) -> Cube | None:
-        """The cube with all values of a feature but those that are found to be allowed; None where these are too many."""
+        """The cube with all values of a predicate but those that are found to be allowed; None where these are too many."""
         at = pair[0]
         others = tuple(one for one in cube if one != pair)
         allowed: set[int] = set()

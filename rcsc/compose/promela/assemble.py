@@ -1,6 +1,6 @@
 """A Promela model of one level in its environment, or of several levels on top of one another.
 
-In: a system's steppers, which levels, a `Breadth`. Out: a `Model`: its text, what it checks, and what each name stands for. Every
+In: a system's transition systems, which levels, a `Breadth`. Out: a `Model`: its text, what it checks, and what each name stands for. Every
 level steps at any moment; what it does in a cycle is one atomic step (with `Breadth.split` two: it reads, and later it acts). The buffers
 between two levels of the model are the outputs themselves, read whole.
 """
@@ -8,7 +8,7 @@ between two levels of the model are the outputs themselves, read whole.
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
-from rcsc.compose.contract.transition import Stepper
+from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.promela.cycle.aims import Aim, Aims
 from rcsc.compose.promela.cycle.environment import STALE
 from rcsc.compose.promela.cycle.flows import Flows, Group
@@ -16,7 +16,7 @@ from rcsc.compose.promela.cycle.level_cycle import Machine, Maker
 from rcsc.compose.promela.cycle.stated import LeftOut
 from rcsc.compose.promela.cycle.statements import BOOL, NO, Block, read
 from rcsc.compose.promela.instance import Breadth, Domain, Smaller
-from rcsc.compose.promela.lazy_copy import Sunk, sunk
+from rcsc.compose.promela.lazy_copy import LazyCopy, lazy_copies
 from rcsc.compose.promela.liveness import mentioned, needed
 from rcsc.compose.promela.spell import Nodes, Speller, drawn_flag, identifiers, rendered
 from rcsc.lang.model import Expr, Kind, Read, Scalar, Value, earlier
@@ -52,13 +52,13 @@ class Model:
     told: Mapping[str, tuple[str, ...]]
     domains: Mapping[str, Domain]
     leading: Mapping[str, str]
-    copies: tuple[Sunk, ...]
+    copies: tuple[LazyCopy, ...]
     progress: bool = False
     left_out: tuple[LeftOut, ...] = ()
 
 
 def emit(
-    system: Mapping[str, Stepper],
+    system: Mapping[str, TransitionSystem],
     levels: tuple[str, ...],
     breadth: Breadth | None = None,
     skipped: frozenset[Aim] = frozenset(),
@@ -68,7 +68,7 @@ def emit(
     """The model of these levels, from the top down.
 
     Args:
-        system: Every level's stepper.
+        system: Every level's transition system.
         levels: Those in the model; the rest is outside and keeps to its contract.
         breadth: How much of the system the instance has.
         skipped: Checks that are left out.
@@ -106,7 +106,7 @@ class _Writer:
     between: frozenset[str] = field(init=False)
     steps: list[Block] = field(init=False)
     names: dict[str, str] = field(init=False)
-    copies: tuple[Sunk, ...] = ()
+    copies: tuple[LazyCopy, ...] = ()
     scratch: int = 0
 
     def __post_init__(self) -> None:
@@ -125,7 +125,7 @@ class _Writer:
         watched: list[Expr] = [read(STALE, BOOL)] if len(self.machines) > 1 else []
         watched += [one.ended for one in self.machines if self.progress and one.ended != NO]
         left, self.between = needed(blocks, watched)
-        left, copies = sunk(left, self.lazy, self.between)
+        left, copies = lazy_copies(left, self.lazy, self.between)
         self._draw_later(copies)
         self.copies = copies
         left, self.between = needed(left, watched)
@@ -133,7 +133,7 @@ class _Writer:
         used = sorted({*self.between, *(name for block in left for name in mentioned(block))})
         self.names = identifiers(sorted(used, key=list(self.kinds).index))
 
-    def _draw_later(self, copies: Iterable[Sunk]) -> None:
+    def _draw_later(self, copies: Iterable[LazyCopy]) -> None:
         """A copy is drawn as what it was copied from would have been."""
         for one in copies:
             self.lazy |= {one.name}
@@ -219,17 +219,19 @@ class _Writer:
 
     def _step(self, machine: Machine, block: Block) -> list[str]:
         tell = self._tell(machine)
-        speller = Speller(self.names, self.domains, self.lazy, lambda goal: self._alarm(goal, tell), tell)
+        speller = Speller(
+            self.names, self.domains, self.lazy, lambda obligation: self._alarm(obligation, tell), tell
+        )
         nodes: Nodes = speller.block(block)
         self.scratch = max(self.scratch, speller.deepest)
         nodes += tuple(self._cleared(block, speller.deepest))
         nodes += tuple(self._turned())
         return list(rendered(nodes, "      "))
 
-    def _alarm(self, goal: int, tell: str) -> Iterator[str]:
+    def _alarm(self, obligation: int, tell: str) -> Iterator[str]:
         if not self.progress:
             yield tell
-            yield f'printf("{BROKEN} {goal}\\n")'
+            yield f'printf("{BROKEN} {obligation}\\n")'
             yield "assert(false)"
 
     def _told(self, machine: Machine) -> tuple[str, ...]:

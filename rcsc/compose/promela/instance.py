@@ -7,7 +7,7 @@ as far as a run shows it, and what is not found is no proof:
 - *Counters* that are only counted and compared with constants have the gaps between these closed (`Breadth.gap`).
 - *Data* from outside takes one value for each class that conditions tell apart, at least `Breadth.values` (two where a property compares
   it with other data), at most `Breadth.most`; so do enumerations, but those of the protocol (commands, statuses), which take every value.
-- *Reals* are those few values, and what is computed of them is any of them (`flat`).
+- *Reals* are those few values, and what is computed of them is any of them (`cycle.statements`).
 """
 
 from bisect import bisect_right

@@ -16,16 +16,16 @@ from rcsc.lang.model import Bool, Expr, Read
 
 
 @dataclass(frozen=True, slots=True)
-class Sunk:
+class LazyCopy:
     """`name` was computed so of what was drawn for it."""
 
     name: str
     value: Expr
 
 
-def sunk(
+def lazy_copies(
     steps: Sequence[Block], drawn: frozenset[str], between: frozenset[str]
-) -> tuple[tuple[Block, ...], tuple[Sunk, ...]]:
+) -> tuple[tuple[Block, ...], tuple[LazyCopy, ...]]:
     """The steps with such copies forgotten, and the copies.
 
     Args:
@@ -36,15 +36,15 @@ def sunk(
     used = Counter(name for step in steps for name in _read(step))
     written = frozenset(name for step in steps for name in _written(step))
     once = frozenset(name for name in drawn - between - written if used[name] == 1)
-    found: list[Sunk] = []
+    found: list[LazyCopy] = []
     return tuple(tuple(_block(step, once, found)) for step in steps), tuple(found)
 
 
-def _block(block: Block, once: frozenset[str], found: list[Sunk]) -> Iterable[Flat]:
+def _block(block: Block, once: frozenset[str], found: list[LazyCopy]) -> Iterable[Flat]:
     for one in block:
         match one:
             case Put(name=name, value=value) if _only(value, once):
-                found.append(Sunk(name, value))
+                found.append(LazyCopy(name, value))
                 yield Forget((name,))
             case Fork(arms=arms, otherwise=otherwise):
                 ways = tuple((when, tuple(_block(body, once, found))) for when, body in arms)

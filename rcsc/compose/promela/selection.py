@@ -1,12 +1,12 @@
 """Which models a system is checked by: each level alone, and each over all its subordinates.
 
-In: a system's steppers. Out: `Wanted`s, from the bottom up, so that the small ones come first.
+In: a system's transition systems. Out: `Wanted`s, from the bottom up, so that the small ones come first.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from rcsc.compose.contract.transition import Stepper
+from rcsc.compose.contract.transition import TransitionSystem
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +29,7 @@ class Wanted:
         return f"{name}, do commands end?" if self.progress else name
 
 
-def wanted(system: Mapping[str, Stepper]) -> tuple[Wanted, ...]:
+def wanted(system: Mapping[str, TransitionSystem]) -> tuple[Wanted, ...]:
     """Every model of the system; whether commands end is asked of levels that order nobody in the system."""
     alone: list[Wanted] = []
     together: list[Wanted] = []
@@ -43,6 +43,6 @@ def wanted(system: Mapping[str, Stepper]) -> tuple[Wanted, ...]:
     return (*alone, *together)
 
 
-def can_end(stepper: Stepper) -> bool:
+def can_end(ts: TransitionSystem) -> bool:
     """Whether it can be asked whether its commands end: it has a superior, and its orders are nobody's to echo."""
-    return stepper.links.above is not None and not stepper.links.below
+    return ts.links.above is not None and not ts.links.below

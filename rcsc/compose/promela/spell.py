@@ -92,10 +92,10 @@ class Speller:
                 for name in names:
                     yield from (f"{self.names[name]} = 0", f"{drawn_flag(self.names[name])} = 0")
                 self.known.difference_update(names)
-            case Check(goal=goal, holds=holds):
+            case Check(obligation=obligation, holds=holds):
                 before, text = self._condition(holds)
                 yield from before
-                yield Choice(((text, ()), ("else", tuple(self.alarm(goal)))), pure=True)
+                yield Choice(((text, ()), ("else", tuple(self.alarm(obligation)))), pure=True)
                 self._release(before)
             case Tell():
                 yield self.tell

@@ -9,12 +9,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from rcsc.compose.contract.environment import ECHO, NUMBER, leaves_under
-from rcsc.compose.contract.obligations import Sort, goals
-from rcsc.compose.contract.transition import NUMBERS, SEEN, Stepper
+from rcsc.compose.contract.obligations import Sort, obligations
+from rcsc.compose.contract.transition import NUMBERS, SEEN, TransitionSystem
 from rcsc.compose.counterexample.trace import broken, one_cycle
 from rcsc.compose.promela.assemble import BROKEN, NONE, RESTARTED, TAKEN, TOLD, Model
 from rcsc.compose.promela.cycle.aims import CONTRACT, Aim
-from rcsc.compose.promela.lazy_copy import Sunk
+from rcsc.compose.promela.lazy_copy import LazyCopy
 from rcsc.lang.interpret import Fault, Outcome, cycle, evaluate, initial
 from rcsc.lang.leaves import read_by
 from rcsc.lang.model import BEFORE, Enum, Kind, Read, Table, Value, spell
@@ -22,7 +22,7 @@ from rcsc.run.adopt import ECHOES, FAILED, ORDER
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
+class Explanation:
     """What a trail prints: a cycle, or that a level reads, or begins anew.
 
     Attributes:
@@ -54,7 +54,7 @@ class Run:
     reason: str
 
 
-def told(model: Model, trail: Sequence[str]) -> tuple[Told, ...]:
+def told(model: Model, trail: Sequence[str]) -> tuple[Explanation, ...]:
     """The lines of a trail, read."""
     found = []
     for line in trail:
@@ -63,13 +63,13 @@ def told(model: Model, trail: Sequence[str]) -> tuple[Told, ...]:
             level, table, at, *values = rest
             names = model.told[level]
             known = tuple((name, int(v)) for name, v in zip(names, values, strict=True) if int(v) != NONE)
-            found.append(Told(word, level, int(table), int(at), known))
+            found.append(Explanation(word, level, int(table), int(at), known))
         elif word in {TAKEN, RESTARTED}:
-            found.append(Told(word, rest[0]))
+            found.append(Explanation(word, rest[0]))
     return tuple(found)
 
 
-def run_of(model: Model, system: Mapping[str, Stepper], trail: Sequence[str]) -> Run:
+def run_of(model: Model, system: Mapping[str, TransitionSystem], trail: Sequence[str]) -> Run:
     """The trail in words, and what the interpreter makes of it."""
     aim = model.aims[int(next(line for line in reversed(trail) if line.startswith(BROKEN)).split()[1])]
     events = told(model, trail)
@@ -81,7 +81,9 @@ def run_of(model: Model, system: Mapping[str, Stepper], trail: Sequence[str]) ->
 # --- words ----------------------------------------------------------------------------
 
 
-def _words(model: Model, system: Mapping[str, Stepper], events: Sequence[Told]) -> Iterator[str]:
+def _words(
+    model: Model, system: Mapping[str, TransitionSystem], events: Sequence[Explanation]
+) -> Iterator[str]:
     number, last = 0, len(events) - 1
     before: dict[str, int] = {}
     for at, event in enumerate(events):
@@ -121,12 +123,17 @@ def _value(model: Model, name: str, code: int) -> str:
 # --- the interpreter ------------------------------------------------------------------
 
 
-def rerun(model: Model, system: Mapping[str, Stepper], events: Sequence[Told], aim: Aim | None = None) -> str:
+def rerun(
+    model: Model,
+    system: Mapping[str, TransitionSystem],
+    events: Sequence[Explanation],
+    aim: Aim | None = None,
+) -> str:
     """Empty where the interpreter takes the same lines, and breaks the same in the last cycle; else in which it does not.
 
     Args:
         model: That the events are of.
-        system: Every level's stepper.
+        system: Every level's transition system.
         events: A run from the beginning.
         aim: What the last cycle breaks; none where it breaks nothing.
     """
@@ -139,9 +146,9 @@ def rerun(model: Model, system: Mapping[str, Stepper], events: Sequence[Told], a
     outcome: Outcome | None = None
     before: Mapping[str, Value] = {}
     for at, event in enumerate(events):
-        stepper, now = system[event.level], states[event.level]
+        ts, now = system[event.level], states[event.level]
         if event.word == RESTARTED:
-            _restart(stepper, now)
+            _restart(ts, now)
             now |= {
                 name.partition(":")[2]: model.domains[name].decoded(code)
                 for name, code in remembered[at].items()
@@ -153,18 +160,18 @@ def rerun(model: Model, system: Mapping[str, Stepper], events: Sequence[Told], a
         if event.word == TAKEN:
             continue
         number += 1
-        now |= _inputs(model, stepper, now, {**drawn[at], **remembered[at], **dict(event.values)})
-        outcome = cycle(stepper.program, stepper.level, now)
+        now |= _inputs(model, ts, now, {**drawn[at], **remembered[at], **dict(event.values)})
+        outcome = cycle(ts.program, ts.level, now)
         before, behind[event.level] = behind[event.level], dict(outcome.snapshot)
         states[event.level] = outcome.snapshot
-        if (at < len(events) - 1 or aim is None) and not _same(stepper, event, outcome):
-            return f"the interpreter goes another way in cycle {number}: {_did(stepper, outcome)}"
+        if (at < len(events) - 1 or aim is None) and not _same(ts, event, outcome):
+            return f"the interpreter goes another way in cycle {number}: {_did(ts, outcome)}"
     if aim is not None and (outcome is None or not _breaks(system[aim.level], aim, before, outcome)):
         return "the interpreter does not break it in the last cycle"
     return ""
 
 
-def _remembered(model: Model, events: Sequence[Told]) -> list[dict[str, int]]:
+def _remembered(model: Model, events: Sequence[Explanation]) -> list[dict[str, int]]:
     """For each event what a property says in the level's next cycle that was then: a value may be asked for so late."""
     after: dict[str, dict[str, int]] = {}
     found: list[dict[str, int]] = []
@@ -185,7 +192,7 @@ def _leaf(name: str) -> str:
     return f"{level}:{leaf.removeprefix(BEFORE)}"
 
 
-def _later(model: Model, events: Sequence[Told]) -> list[dict[str, int]]:
+def _later(model: Model, events: Sequence[Explanation]) -> list[dict[str, int]]:
     """For each event the next value of each copy: what was copied is known when it is first looked at."""
     copies = {one.name for one in model.copies}
     after: dict[str, int] = {}
@@ -197,11 +204,11 @@ def _later(model: Model, events: Sequence[Told]) -> list[dict[str, int]]:
 
 
 def _inputs(
-    model: Model, stepper: Stepper, now: Mapping[str, Value], codes: Mapping[str, int]
+    model: Model, ts: TransitionSystem, now: Mapping[str, Value], codes: Mapping[str, int]
 ) -> dict[str, Value]:
     """The inputs that the outside gives in a cycle."""
-    level = stepper.level.name
-    inputs = {str(v.name) for v in stepper.program.variables if v.kind is Kind.INPUT}
+    level = ts.level.name
+    inputs = {str(v.name) for v in ts.program.variables if v.kind is Kind.INPUT}
     given: dict[str, Value] = {}
     for name, code in codes.items():
         leaf = name.removeprefix(f"{level}:")
@@ -210,10 +217,10 @@ def _inputs(
     for one in model.copies:
         if one.name in codes:
             given |= {k: v for k, v in _copied(model, one, codes[one.name]).items() if k in inputs}
-    return given | _numbers(model, stepper, now, codes)
+    return given | _numbers(model, ts, now, codes)
 
 
-def _copied(model: Model, copy: Sunk, code: int) -> dict[str, Value]:
+def _copied(model: Model, copy: LazyCopy, code: int) -> dict[str, Value]:
     """What was copied, by its leaf; of a truth value, something that makes it so."""
     (name, *others) = dict.fromkeys(map(str, read_by(copy.value)))
     leaf = name.partition(":")[2]
@@ -228,15 +235,15 @@ def _copied(model: Model, copy: Sunk, code: int) -> dict[str, Value]:
 
 
 def _numbers(
-    model: Model, stepper: Stepper, now: Mapping[str, Value], codes: Mapping[str, int]
+    model: Model, ts: TransitionSystem, now: Mapping[str, Value], codes: Mapping[str, int]
 ) -> dict[str, Value]:
     """Numbers as they are, of what the trail says of them."""
-    level, found = stepper.level.name, dict[str, Value]()
-    above = stepper.links.above
+    level, found = ts.level.name, dict[str, Value]()
+    above = ts.links.above
     if above is not None and above.name not in model.levels:
         leaf = f"{above.order}.{NUMBER}"
         found[leaf] = (int(now[leaf]) + codes.get(f"{level}:another order", 0)) % NUMBERS
-    for below in stepper.links.below:
+    for below in ts.links.below:
         if below.name not in model.levels:
             sent = int(now[f"{below.order}.{NUMBER}"])
             found[f"{below.report}.{ECHO}"] = (sent - codes.get(f"{level}:{below.name} is late", 0)) % NUMBERS
@@ -253,90 +260,88 @@ def _numbers(
 
 
 def _copy(
-    model: Model, system: Mapping[str, Stepper], states: Mapping[str, dict[str, Value]], level: str
+    model: Model, system: Mapping[str, TransitionSystem], states: Mapping[str, dict[str, Value]], level: str
 ) -> None:
     """The buffers of the other levels of the model, whole."""
-    stepper, now = system[level], states[level]
+    ts, now = system[level], states[level]
     pairs = []
-    above = stepper.links.above
+    above = ts.links.above
     if above is not None and above.name in model.levels:
         upper = next(one for one in system[above.name].links.below if one.name == level)
         pairs.append((above.order, above.name, upper.order))
-    for below in stepper.links.below:
+    for below in ts.links.below:
         lower = system[below.name].links.above if below.name in model.levels else None
         if lower is not None:
             pairs.append((below.report, below.name, lower.report))
     for record, other, source in pairs:
-        for leaf in leaves_under(stepper.program, record):
+        for leaf in leaves_under(ts.program, record):
             now[leaf] = states[other][source + leaf.removeprefix(record)]
 
 
-def _restart(stepper: Stepper, now: dict[str, Value]) -> None:
+def _restart(ts: TransitionSystem, now: dict[str, Value]) -> None:
     """As `run.adopt` begins, with every buffer as it is initially."""
-    kinds = {str(v.name): v.type for v in stepper.program.variables}
+    kinds = {str(v.name): v.type for v in ts.program.variables}
     for leaf, member in FAILED.items():
         kind = kinds.get(leaf)
         if isinstance(kind, Enum) and member in kind.members:
             now[leaf] = kind.members.index(member)
-    above = stepper.links.above
+    above = ts.links.above
     if above is not None and SEEN in now:
         now[SEEN] = now[f"{above.order}.{NUMBER}"]
-    for variable in stepper.program.variables:
+    for variable in ts.program.variables:
         record, _, part = variable.name.partition(".")
         echo = f"{record.removeprefix(ORDER)}.{ECHOES.get(part, '')}"
         if variable.kind is Kind.OUTPUT and record.startswith(ORDER) and echo in now:
             now[variable.name] = (int(now[echo]) + 1) % NUMBERS
 
 
-def _ran(stepper: Stepper, outcome: Outcome) -> str:
+def _ran(ts: TransitionSystem, outcome: Outcome) -> str:
     """The table that ran."""
-    tables = stepper.level.tables
+    tables = ts.level.tables
     selector = getattr(tables, "selector", None)
     if selector is None:
         return str(getattr(tables, "table", ""))
     return str(dict(getattr(tables, "tables", ()))[evaluate(selector, outcome.snapshot)])
 
 
-def _same(stepper: Stepper, event: Told, outcome: Outcome) -> bool:
-    table = stepper.program.tables[event.table]
+def _same(ts: TransitionSystem, event: Explanation, outcome: Outcome) -> bool:
+    table = ts.program.tables[event.table]
     expected = event.line - 1 if event.line else len(table.lines)
-    return (
-        outcome.fault is Fault.OK and _ran(stepper, outcome) == table.name and outcome.line_index == expected
-    )
+    return outcome.fault is Fault.OK and _ran(ts, outcome) == table.name and outcome.line_index == expected
 
 
-def _did(stepper: Stepper, outcome: Outcome) -> str:
+def _did(ts: TransitionSystem, outcome: Outcome) -> str:
     what = (
         f"line `{outcome.line}`" if outcome.line is not None else outcome.fault.name.lower().replace("_", " ")
     )
-    return f"table `{_ran(stepper, outcome)}`, {what}"
+    return f"table `{_ran(ts, outcome)}`, {what}"
 
 
-def _breaks(stepper: Stepper, aim: Aim, before: Mapping[str, Value], outcome: Outcome) -> bool:
-    """Whether the last cycle does; of the contract between levels, which is no goal of one, whether it ran to its end."""
-    if aim.table and aim.table != _ran(stepper, outcome):
+def _breaks(ts: TransitionSystem, aim: Aim, before: Mapping[str, Value], outcome: Outcome) -> bool:
+    """Whether the last cycle does; of the contract between levels, which is no obligation of one, whether it ran to its end."""
+    if aim.table and aim.table != _ran(ts, outcome):
         return False
     match aim.what:
         case Sort.ASSUMPTION:
-            condition = next(one.condition for one in stepper.program.assumptions if one.name == aim.name)
+            condition = next(one.condition for one in ts.program.assumptions if one.name == aim.name)
             return aim.name in outcome.failed_assumptions or not evaluate(condition, outcome.snapshot)
         case Sort.SOME_LINE:
             return outcome.fault is Fault.NO_LINE
         case Sort.ONE_LINE:
             return outcome.fault is Fault.SEVERAL_LINES
         case Sort.NO_DEFAULT:
-            table = next(one for one in stepper.program.tables if one.name == aim.table)
+            table = next(one for one in ts.program.tables if one.name == aim.table)
             return table.default is not None and outcome.line == table.default.name
         case _ if aim.what in CONTRACT:
             return outcome.fault is Fault.OK
         case _:
-            return outcome.fault is Fault.OK and _broken(stepper, aim, before, outcome)
+            return outcome.fault is Fault.OK and _broken(ts, aim, before, outcome)
 
 
-def _broken(stepper: Stepper, aim: Aim, before: Mapping[str, Value], outcome: Outcome) -> bool:
-    """Whether the cycle that the interpreter ran breaks the goal as `compose.contract.obligations` says it."""
-    inputs = {str(v.name) for v in stepper.program.variables if v.kind is Kind.INPUT}
-    step = one_cycle(stepper, before, {name: outcome.snapshot[name] for name in inputs})
-    every = goals(stepper, stepper.cycle(stepper.anywhere()))
+def _broken(ts: TransitionSystem, aim: Aim, before: Mapping[str, Value], outcome: Outcome) -> bool:
+    """Whether the cycle that the interpreter ran breaks the obligation as `compose.contract.obligations` says it."""
+    inputs = {str(v.name) for v in ts.program.variables if v.kind is Kind.INPUT}
+    step = one_cycle(ts, before, {name: outcome.snapshot[name] for name in inputs})
+    every = obligations(ts, ts.cycle(ts.havoc()))
     found = [one for one in every if (one.sort, one.table, one.name) == (aim.what, aim.table, aim.name)]
-    return any(broken(stepper, one, step) for one in found)
+    return any(broken(ts, one, step) for one in found)

@@ -1,6 +1,7 @@
 """What the levels of a system assume of each other, matched with what was proved of them.
 
-In: steppers of all levels. Out: `Promise`s, each with the goals of the neighbour that keep it, and, for proofs, whether they do.
+In: transition systems of all levels. Out: `Promise`s, each with the obligations of the neighbour that keep it, and, for proofs, whether
+they do.
 """
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
@@ -23,7 +24,7 @@ from rcsc.compose.contract.claims import (
 )
 from rcsc.compose.contract.environment import COMMAND, ECHO, ECHOED, NUMBER
 from rcsc.compose.contract.obligations import Sort
-from rcsc.compose.contract.transition import NUMBERS, Stepper
+from rcsc.compose.contract.transition import NUMBERS, TransitionSystem
 from rcsc.compose.proof.level import LevelProof
 
 
@@ -72,12 +73,12 @@ class Agreement:
     outside: bool = False
 
 
-def agreements(made: Mapping[str, Stepper], proofs: Mapping[str, LevelProof]) -> list[Agreement]:
+def agreements(made: Mapping[str, TransitionSystem], proofs: Mapping[str, LevelProof]) -> list[Agreement]:
     """What each level assumes of each neighbour, matched with what was proved there."""
     proved = {
-        (name, goal.key)
+        (name, obligation.key)
         for name, proof in proofs.items()
-        for goal, verdict in proof.found
+        for obligation, verdict in proof.found
         if verdict in FOUND
     }
     return [
@@ -93,7 +94,7 @@ def _kept(promise: Promise, proved: Collection[Need]) -> bool:
 # --- claims --------------------------------------------------------------------------------
 
 
-def claims(made: Mapping[str, Stepper], proofs: Mapping[str, LevelProof]) -> dict[Need, Claim]:
+def claims(made: Mapping[str, TransitionSystem], proofs: Mapping[str, LevelProof]) -> dict[Need, Claim]:
     """Everything that is claimed of these levels, and what it rests on."""
     found: dict[Need, Claim] = {}
     for one in promises(made):
@@ -107,15 +108,15 @@ def claims(made: Mapping[str, Stepper], proofs: Mapping[str, LevelProof]) -> dic
     return found
 
 
-def of_level(stepper: Stepper, proof: LevelProof) -> Iterator[tuple[Key, Claim]]:
+def of_level(ts: TransitionSystem, proof: LevelProof) -> Iterator[tuple[Key, Claim]]:
     """What is claimed of one level, but for the contract."""
     name = proof.level
     runs = ((name, RUNS),)
-    yield from _of_runs(stepper, proof)
-    for goal, verdict in proof.found:
-        trusts = tuple(_of_a_restart(stepper, proof)) if goal.sort is Sort.ECHOES else ()
-        if goal.key != SAFE:
-            yield goal.key, Claim(verdict, runs, trusts)
+    yield from _of_runs(ts, proof)
+    for obligation, verdict in proof.found:
+        trusts = tuple(_of_a_restart(ts, proof)) if obligation.sort is Sort.ECHOES else ()
+        if obligation.key != SAFE:
+            yield obligation.key, Claim(verdict, runs, trusts)
     if proof.context is not None:
         for line in proof.context.unreached:
             yield (UNREACHED, *line), Claim(Verdict.PROVED, runs)
@@ -123,73 +124,77 @@ def of_level(stepper: Stepper, proof: LevelProof) -> Iterator[tuple[Key, Claim]]
             yield (AGAIN, "", ""), Claim(Verdict.PROVED, runs)
     for ending in proof.endings:
         verdict = Verdict.PROVED if ending.proved else Verdict.NOT_PROVED
-        yield (Sort.ENDS, ending.table, ""), _of_ending(stepper, ending.still, verdict)
+        yield (Sort.ENDS, ending.table, ""), _of_ending(ts, ending.still, verdict)
     if proof.endings:
         every = tuple((name, (Sort.ENDS, ending.table, "")) for ending in proof.endings)
         yield ENDING, Claim(Verdict.PROVED, every)
 
 
-def _of_a_restart(stepper: Stepper, proof: LevelProof) -> Iterator[str]:
+def _of_a_restart(ts: TransitionSystem, proof: LevelProof) -> Iterator[str]:
     """What else could end the first cycle after a restart early, so that the report that stood before is followed by an older one."""
-    if _asks(stepper):
+    if _asks(ts):
         yield "no extern procedure is refused in the first cycle after a restart"
-    stops = {str(name) for table in stepper.program.tables for name in table.stops}
-    failing = {goal.name for goal in proof.open if goal.sort is Sort.ASSUMPTION}
+    stops = {str(name) for table in ts.program.tables for name in table.stops}
+    failing = {obligation.name for obligation in proof.open if obligation.sort is Sort.ASSUMPTION}
     for name in sorted(stops & failing):
         yield f"assumption `{name}` of level `{proof.level}` does not fail in the first cycle after a restart"
 
 
-def _of_runs(stepper: Stepper, proof: LevelProof) -> Iterator[tuple[Key, Claim]]:
+def _of_runs(ts: TransitionSystem, proof: LevelProof) -> Iterator[tuple[Key, Claim]]:
     """That the level runs as its tables say, in an environment that keeps to its contract, and that its operations are safe."""
-    name, links = proof.level, stepper.links
+    name, links = proof.level, ts.links
     ends = [*([] if links.above is None else [links.above.order]), *(below.report for below in links.below)]
     needs: list[Key] = [SAFE, *((CONTRACT, "", record) for record in ends)]
-    needs += [goal.key for goal, _ in proof.found if goal.sort in {Sort.SOME_LINE, Sort.ONE_LINE}]
     needs += [
-        goal.key for goal, _ in proof.found if goal.sort is Sort.ASSUMPTION and goal.name in stepper.trusted
+        obligation.key for obligation, _ in proof.found if obligation.sort in {Sort.SOME_LINE, Sort.ONE_LINE}
     ]
-    trusts = [f"assumption `{one}` of level `{name}`{DECLARED}" for one in sorted(stepper.trusted)]
-    if stepper.trusted:
+    needs += [
+        obligation.key
+        for obligation, _ in proof.found
+        if obligation.sort is Sort.ASSUMPTION and obligation.name in ts.trusted
+    ]
+    trusts = [f"assumption `{one}` of level `{name}`{DECLARED}" for one in sorted(ts.trusted)]
+    if ts.trusted:
         trusts.append(f"level `{name}` can be as its tables declare in every state that it comes to")
     trusts += [
         f"the same question has the same answer in `{asked.into}` of level `{name}`" for asked in links.asked
     ]
     yield RUNS, Claim(Verdict.PROVED, tuple((name, key) for key in needs), tuple(trusts))
-    within = [verdict for goal, verdict in proof.found if goal.key == SAFE]
-    invariants = tuple((name, (Sort.INVARIANT, "", one)) for one in stepper.safety.invariants)
+    within = [verdict for obligation, verdict in proof.found if obligation.key == SAFE]
+    invariants = tuple((name, (Sort.INVARIANT, "", one)) for one in ts.safety.invariants)
     rests = ((name, RUNS), *invariants) if within else invariants
     yield SAFE, Claim(worst(within), rests)
 
 
-def _of_ending(stepper: Stepper, still: Iterable[str], verdict: Verdict) -> Claim:
+def _of_ending(ts: TransitionSystem, still: Iterable[str], verdict: Verdict) -> Claim:
     """That a command ends, given that what is below answers, and that what has to stand still does."""
-    name, below = stepper.level.name, stepper.links.below
+    name, below = ts.level.name, ts.links.below
     trusts = [
         f"`{one.name}` answers every order that is not replaced, and stays so" for one in below if one.outside
     ]
     trusts += [f"the values in `{one}` of level `{name}` stand still meanwhile" for one in still]
-    if _asks(stepper):
+    if _asks(ts):
         trusts.append(f"extern procedures of level `{name}` are refused only finitely often")
     needs = tuple((one.name, ENDING) for one in below if not one.outside)
     return Claim(verdict, ((name, RUNS), *needs), tuple(trusts))
 
 
-def _asks(stepper: Stepper) -> bool:
-    return any(one.extern is not None for one in stepper.program.procedures)
+def _asks(ts: TransitionSystem) -> bool:
+    return any(one.extern is not None for one in ts.program.procedures)
 
 
 # --- what levels assume of each other ------------------------------------------------------
 
 
-def promises(made: Mapping[str, Stepper]) -> Iterator[Promise]:
+def promises(made: Mapping[str, TransitionSystem]) -> Iterator[Promise]:
     """What each level assumes of each neighbour."""
-    for name, stepper in made.items():
-        yield from _of_above(name, stepper, made)
-        yield from _of_below(name, stepper, made)
+    for name, ts in made.items():
+        yield from _of_above(name, ts, made)
+        yield from _of_below(name, ts, made)
 
 
-def _of_below(name: str, stepper: Stepper, made: Mapping[str, Stepper]) -> Iterator[Promise]:
-    for below in stepper.links.below:
+def _of_below(name: str, ts: TransitionSystem, made: Mapping[str, TransitionSystem]) -> Iterator[Promise]:
+    for below in ts.links.below:
         words = f"what `{below.name}` reports under the number of the last order is about that order"
         keys: tuple[Key, ...] = (
             (Sort.NUMBERED, "", f"{below.order}.{COMMAND}"),
@@ -211,12 +216,12 @@ def _of_below(name: str, stepper: Stepper, made: Mapping[str, Stepper]) -> Itera
             f"proved of `{below.name}`: {Sort.ECHOES.value}; both begin with the same order",
             ((below.name, (Sort.ECHOES, "", lower.report)),),
             own,
-            _begin(stepper, below.order, made[below.name], lower.order),
+            _begin(ts, below.order, made[below.name], lower.order),
         )
 
 
-def _of_above(name: str, stepper: Stepper, made: Mapping[str, Stepper]) -> Iterator[Promise]:
-    above = stepper.links.above
+def _of_above(name: str, ts: TransitionSystem, made: Mapping[str, TransitionSystem]) -> Iterator[Promise]:
+    above = ts.links.above
     if above is None:
         return
     fields = ", ".join(f"`{leaf}`" for leaf in above.numbered)
@@ -242,7 +247,7 @@ def other_end(leaf: str, record: str, other: str) -> str:
     return other + leaf.removeprefix(record)
 
 
-def _begin(upper: Stepper, order: str, lower: Stepper, record: str) -> bool:
+def _begin(upper: TransitionSystem, order: str, lower: TransitionSystem, record: str) -> bool:
     """Before the first cycle the lower level's order is the upper's, and the upper sees it echoed, or none that is still to come."""
     first = {str(v.name): v.initial for v in upper.program.variables}
     other = {str(v.name): v.initial for v in lower.program.variables}

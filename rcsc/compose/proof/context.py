@@ -1,8 +1,8 @@
-"""What an invariant tells of the lines of a level's tables, besides the goals.
+"""What an invariant tells of the lines of a level's tables, besides the obligations.
 
-In: a stepper, and what was confirmed of it. Out: a `Context`:
+In: a transition system, and what was confirmed of it. Out: a `Context`:
 
-- *unreached*: lines that no reachable cycle runs, a DEFAULT line too, but where that is a goal. Dead in this system, though not in
+- *unreached*: lines that no reachable cycle runs, a DEFAULT line too, but where that is an obligation. Dead in this system, though not in
   their table.
 - *repeated*: what else a line does that gives an order and then matches again, on the same inputs, before the order is echoed.
   Section 9 asks that there be nothing: each line is to say the same until its command is echoed.
@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from rcsc.compose.contract.environment import NUMBER
-from rcsc.compose.contract.transition import Cycle, Stepper
+from rcsc.compose.contract.transition import Cycle, TransitionSystem
 from rcsc.compose.invariant.confirm import Confirmation
 from rcsc.compose.invariant.pdr import Clause
 from rcsc.lang.leaves import everything, written_by
@@ -66,20 +66,20 @@ class _From:
 
 
 def context(
-    stepper: Stepper, asked: Confirmation, clauses: Sequence[Clause], ran: Container[Line_] = frozenset()
+    ts: TransitionSystem, asked: Confirmation, clauses: Sequence[Clause], ran: Container[Line_] = frozenset()
 ) -> Context:
     """Asks all of it; lines that `ran` on walks are known to be reached."""
-    every = list(_starts(stepper, asked, clauses))
+    every = list(_starts(ts, asked, clauses))
     asked.rested_on += [one.solver for one in every]
     reached = [set(_reached(asked, one)) for one in every]
     lines = [line for line, _ in _lines(every[0].cycle)]
     unreached = tuple(line for line in lines if not any(line in found for found in reached))
     return Context(
         unreached,
-        tuple(_every_repeated(stepper, asked, every)),
-        any(_restless(stepper, asked, one) for one in every),
+        tuple(_every_repeated(ts, asked, every)),
+        any(_restless(ts, asked, one) for one in every),
         tuple(line for line in lines if line not in unreached and line not in ran),
-        bool(stepper.links.below),
+        bool(ts.links.below),
     )
 
 
@@ -93,23 +93,23 @@ def never_run(asked: Confirmation, clauses: Sequence[Clause], ran: Container[Lin
     ]
 
 
-def _starts(stepper: Stepper, asked: Confirmation, clauses: Sequence[Clause]) -> Iterator[_From]:
+def _starts(ts: TransitionSystem, asked: Confirmation, clauses: Sequence[Clause]) -> Iterator[_From]:
     """A later cycle, and each with which the level may begin."""
     for at, cycle in enumerate((asked.cycle, *asked.firsts)):
-        again = stepper.cycle(cycle.after, f" again {at}", taken=cycle.taken)
+        again = ts.cycle(cycle.after, f" again {at}", taken=cycle.taken)
         yield _From(cycle, again, asked.beginning(cycle) if at else asked.known(clauses))
 
 
-def gives_an_order(stepper: Stepper, cycle: Cycle) -> Node:
+def gives_an_order(ts: TransitionSystem, cycle: Cycle) -> Node:
     """That the cycle gives an order."""
-    numbers = [f"{below.order}.{NUMBER}" for below in stepper.links.below]
+    numbers = [f"{below.order}.{NUMBER}" for below in ts.links.below]
     return values.any_of(
         values.negation(values.equal(cycle.before[name], cycle.after[name])) for name in numbers
     )
 
 
 def _lines(cycle: Cycle) -> Iterator[tuple[Line_, Node]]:
-    """Each line, and when it runs; but for a DEFAULT that is said to be unreachable, which is a goal."""
+    """Each line, and when it runs; but for a DEFAULT that is said to be unreachable, which is an obligation."""
     for at in cycle.tables:
         for line, match in at.lines:
             if not (isinstance(line, Default) and line.unreachable):
@@ -125,9 +125,9 @@ def _reached(asked: Confirmation, start: _From) -> Iterator[Line_]:
             yield line
 
 
-def _restless(stepper: Stepper, asked: Confirmation, start: _From) -> bool:
+def _restless(ts: TransitionSystem, asked: Confirmation, start: _From) -> bool:
     """Whether an order may be given in both of two cycles on the same inputs."""
-    sent = [asked.keyed.term(gives_an_order(stepper, cycle)) for cycle in (start.cycle, start.again)]
+    sent = [asked.keyed.term(gives_an_order(ts, cycle)) for cycle in (start.cycle, start.again)]
     start.solver.add(*asked.keyed.ranges)
     return may(start.solver, *sent)
 
@@ -141,21 +141,23 @@ def may(solver: Solver, *terms: Term) -> bool:
     return answer is not Answer.UNSATISFIABLE
 
 
-def _every_repeated(stepper: Stepper, asked: Confirmation, every: Sequence[_From]) -> Iterator[Again]:
+def _every_repeated(ts: TransitionSystem, asked: Confirmation, every: Sequence[_From]) -> Iterator[Again]:
     """Line by line, the leaves that a second match may change, wherever the first begins."""
     found: dict[Line_, dict[str, None]] = {}
     for start in every:
-        for line, leaves in _repeated(stepper, asked, start):
+        for line, leaves in _repeated(ts, asked, start):
             found.setdefault(line, {}).update(dict.fromkeys(leaves))
     for where, changed in found.items():
         yield Again(*where, tuple(changed))
 
 
-def _repeated(stepper: Stepper, asked: Confirmation, start: _From) -> Iterator[tuple[Line_, tuple[str, ...]]]:
+def _repeated(
+    ts: TransitionSystem, asked: Confirmation, start: _From
+) -> Iterator[tuple[Line_, tuple[str, ...]]]:
     cycle, again, keyed = start.cycle, start.again, asked.keyed
     changed = {
         leaf: keyed.term(values.negation(values.equal(cycle.after[leaf], again.after[leaf])))
-        for leaf in _of_lines(stepper)
+        for leaf in _of_lines(ts)
     }
     lines = [
         (
@@ -165,7 +167,7 @@ def _repeated(stepper: Stepper, asked: Confirmation, start: _From) -> Iterator[t
         for one, two in zip(cycle.tables, again.tables, strict=True)
         for (line, match), (_, more) in zip(one.lines, two.lines, strict=True)
     ]
-    gives = keyed.term(gives_an_order(stepper, cycle))
+    gives = keyed.term(gives_an_order(ts, cycle))
     solver = start.solver
     solver.push()
     solver.add(*keyed.ranges, gives)
@@ -201,33 +203,33 @@ def _shown(solver: Solver, changed: dict[str, Term]) -> Iterator[str]:
         left = {leaf: term for leaf, term in left.items() if leaf not in seen}
 
 
-def _of_lines(stepper: Stepper) -> list[str]:
+def _of_lines(ts: TransitionSystem) -> list[str]:
     """States and outputs that more than the preprocess writes: a test variable is no effect of a line."""
-    before = {str(leaf) for name in stepper.level.preprocess for leaf in stepper.procedures[name].writes}
-    later = {str(leaf) for name in stepper.level.postprocess for leaf in stepper.procedures[name].writes}
-    lines = of_lines(stepper) | later
+    before = {str(leaf) for name in ts.level.preprocess for leaf in ts.procedures[name].writes}
+    later = {str(leaf) for name in ts.level.postprocess for leaf in ts.procedures[name].writes}
+    lines = of_lines(ts) | later
     return [
         str(v.name)
-        for v in stepper.program.variables
+        for v in ts.program.variables
         if v.kind is not Kind.INPUT and (v.name in lines or v.name not in before)
     ]
 
 
-def of_lines(stepper: Stepper) -> set[str]:
+def of_lines(ts: TransitionSystem) -> set[str]:
     """What some line of some table writes."""
     found = set()
-    for table in stepper.program.tables:
+    for table in ts.program.tables:
         every = [*(line.actions for line in table.lines), *([table.default.actions] if table.default else [])]
         for actions in every:
             for action in actions:
-                found |= _written(stepper, action.statement)
+                found |= _written(ts, action.statement)
     return found
 
 
-def _written(stepper: Stepper, statement: Statement) -> set[str]:
+def _written(ts: TransitionSystem, statement: Statement) -> set[str]:
     found: set[str] = set()
     for one in everything((statement,)):
         found |= set(map(str, written_by(one)))
         if isinstance(one, Call):
-            found |= set(map(str, stepper.procedures[one.procedure].writes))
+            found |= set(map(str, ts.procedures[one.procedure].writes))
     return found

@@ -1,8 +1,8 @@
 """One level proved in its environment.
 
-In: a stepper (program, level, links). Out: a `LevelProof`: for each goal whether it holds in every reachable cycle, and the invariant that
-shows it. Reachable states are never listed: the invariant holds before the first cycle, every cycle keeps it whatever the environment
-does within its contract, and every cycle that begins in it fulfils the goals.
+In: a transition system (program, level, links). Out: a `LevelProof`: for each obligation whether it holds in every reachable cycle, and
+the invariant that shows it. Reachable states are never listed: the invariant holds before the first cycle, every cycle keeps it whatever
+the environment does within its contract, and every cycle that begins in it fulfils the obligations.
 """
 
 import time
@@ -10,11 +10,11 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
 from rcsc.compose.contract.claims import FOUND
-from rcsc.compose.contract.claims import Verdict as Verdict  # noqa: PLC0414  # it is the verdict of a goal, too
+from rcsc.compose.contract.claims import Verdict as Verdict  # noqa: PLC0414  # it is the verdict of an obligation, too
 from rcsc.compose.contract.environment import COMMAND
-from rcsc.compose.contract.obligations import Goal, Sort, Unlooked, goals, unlooked
-from rcsc.compose.contract.predicates import Feature
-from rcsc.compose.contract.transition import Cycle, Stepper
+from rcsc.compose.contract.obligations import Obligation, Sort, Unstated, obligations, unstated
+from rcsc.compose.contract.predicates import Predicate
+from rcsc.compose.contract.transition import Cycle, TransitionSystem
 from rcsc.compose.invariant.confirm import Confirmation
 from rcsc.compose.invariant.pdr import Clause
 from rcsc.compose.invariant.search import LIMITS, Effort, Found, search, strengthened
@@ -36,20 +36,20 @@ class LevelProof:
     """What was found of a level.
 
     Attributes:
-        found: Each goal with its verdict.
-        features: What the clauses speak of.
+        found: Each obligation with its verdict.
+        predicates: What the clauses speak of.
         clauses: The invariant: combinations that never stand; empty where none was found.
         walked: States seen on walks; `learnt`, those that the solver added.
         seconds: Wall time of the search, for the report.
         cached: Whether an earlier run made it.
         context: What was found of its lines; None where something is not proved.
         endings: Whether its commands end, table by table.
-        unlooked: Goals that could not be stated, as a part of the level was not recognised.
+        unlooked: Obligations that could not be stated, as a part of the level was not recognised.
     """
 
     level: str
-    found: tuple[tuple[Goal, Verdict], ...]
-    features: tuple[Feature, ...]
+    found: tuple[tuple[Obligation, Verdict], ...]
+    predicates: tuple[Predicate, ...]
     clauses: tuple[Clause, ...]
     walked: int
     learnt: int
@@ -57,73 +57,75 @@ class LevelProof:
     cached: bool = field(default=False, compare=False)
     context: Context | None = None
     endings: tuple[Ending, ...] = ()
-    unlooked: tuple[Unlooked, ...] = ()
+    unstated: tuple[Unstated, ...] = ()
 
     def verdict(self, sort: Sort, table: str = "", name: str = "") -> Verdict:
-        """Of one goal.
+        """Of one obligation.
 
         Raises:
             KeyError: There is none such.
         """
-        for goal, verdict in self.found:
-            if (goal.sort, goal.table, goal.name) == (sort, table, name):
+        for obligation, verdict in self.found:
+            if (obligation.sort, obligation.table, obligation.name) == (sort, table, name):
                 return verdict
         raise KeyError(name)
 
     @property
-    def open(self) -> tuple[Goal, ...]:
-        """The goals that are not proved."""
-        return tuple(goal for goal, verdict in self.found if verdict not in FOUND)
+    def open(self) -> tuple[Obligation, ...]:
+        """The obligations that are not proved."""
+        return tuple(obligation for obligation, verdict in self.found if verdict not in FOUND)
 
 
-def essential(proof: LevelProof) -> tuple[Goal, ...]:
-    """Goals that failed; a field that is not numbered is no failure, but nobody may assume that it is; a command is."""
+def essential(proof: LevelProof) -> tuple[Obligation, ...]:
+    """Obligations that failed; a field that is not numbered is no failure, but nobody may assume that it is; a command is."""
     beside = besides(proof)
-    return tuple(goal for goal in proof.open if goal not in beside)
+    return tuple(obligation for obligation in proof.open if obligation not in beside)
 
 
-def besides(proof: LevelProof) -> tuple[Goal, ...]:
+def besides(proof: LevelProof) -> tuple[Obligation, ...]:
     """Fields of orders that change under the same number, commands apart."""
     return tuple(
-        goal for goal in proof.open if goal.sort is Sort.NUMBERED and not goal.name.endswith(f".{COMMAND}")
+        obligation
+        for obligation in proof.open
+        if obligation.sort is Sort.NUMBERED and not obligation.name.endswith(f".{COMMAND}")
     )
 
 
-def prove_level(stepper: Stepper, effort: Effort | None = None) -> LevelProof:
-    """Proves every goal of a level that can be proved with the invariants found, and looks at its lines in their context."""
+def prove_level(ts: TransitionSystem, effort: Effort | None = None) -> LevelProof:
+    """Proves every obligation of a level that can be proved with the invariants found, and looks at its lines in their context."""
     effort = effort or Effort()
     begun, cut_before = time.perf_counter(), smt.cut_short()
-    cycle, firsts = stepper.cycle(stepper.anywhere()), tuple(_firsts(stepper).values())
-    wanted = goals(stepper, cycle)
+    cycle, firsts = ts.cycle(ts.havoc()), tuple(_firsts(ts).values())
+    wanted = obligations(ts, cycle)
     seen: Context | None = None
     ends: tuple[Ending, ...] = ()
     try:
-        found = search(stepper, firsts, cycle, wanted, effort)
-        asked = _asked_anew(found.features, firsts, cycle, effort.limits)
+        found = search(ts, firsts, cycle, wanted, effort)
+        asked = _asked_anew(found.predicates, firsts, cycle, effort.limits)
         looks = effort.looks and not any(wanted[at].sort is not Sort.NUMBERED for at in found.open)
-        flow = Flow(stepper, asked, found.clauses)
+        flow = Flow(ts, asked, found.clauses)
         if looks and (others := [*flow.ways_round(), *never_run(asked, found.clauses, found.ran)]):
-            found = strengthened(stepper, firsts, cycle, found, others)
-            flow = Flow(stepper, asked, found.clauses)
+            found = strengthened(ts, firsts, cycle, found, others)
+            flow = Flow(ts, asked, found.clauses)
         _confirm(asked, found.clauses)
-        verdicts = list(_verdicts(stepper, asked, found, wanted))
+        verdicts = list(_verdicts(ts, asked, found, wanted))
         if looks:
-            seen, ends = context(stepper, asked, found.clauses, found.ran), tuple(flow.endings())
+            seen, ends = context(ts, asked, found.clauses, found.ran), tuple(flow.endings())
         _uncut(cut_before)
     except (GaveUpError, NotConfirmedError):
         found, seen, ends = Found(), None, ()
-        verdicts = [(goal, Verdict.UNDECIDED) for goal in wanted]
+        verdicts = [(obligation, Verdict.UNDECIDED) for obligation in wanted]
     return LevelProof(
-        stepper.level.name,
+        ts.level.name,
         tuple(verdicts),
-        found.features,
+        found.predicates,
         found.clauses,
         found.walked,
         found.learnt,
         time.perf_counter() - begun,
         context=seen,
         endings=ends,
-        unlooked=(*unlooked(stepper), *(Unlooked(Sort.ENDS, "", why) for why in no_answers(stepper))),
+        unstated=(*unstated(ts), *(Unstated(Sort.ENDS, "", why) for why in no_answers(ts))),
     )
 
 
@@ -138,9 +140,9 @@ def _uncut(before: int) -> None:
 
 
 def _asked_anew(
-    features: tuple[Feature, ...], firsts: tuple[Cycle, ...], cycle: Cycle, limits: Limits
+    predicates: tuple[Predicate, ...], firsts: tuple[Cycle, ...], cycle: Cycle, limits: Limits
 ) -> Confirmation:
-    return Confirmation(features, firsts, cycle, cycle.cases, Keyed(), limits)
+    return Confirmation(predicates, firsts, cycle, cycle.cases, Keyed(), limits)
 
 
 def _confirm(asked: Confirmation, clauses: Sequence[Clause]) -> None:
@@ -160,37 +162,37 @@ def _questions(asked: Confirmation, clauses: Sequence[Clause]) -> Iterable[Solve
         yield asked.step_question(clauses, case)
 
 
-def _firsts(stepper: Stepper) -> dict[str, Cycle]:
+def _firsts(ts: TransitionSystem) -> dict[str, Cycle]:
     """The cycles with which a level can begin."""
     return {
-        "first": stepper.cycle(stepper.first(), " at first"),
-        "restart": stepper.cycle(stepper.restarted(), " at restart"),
+        "first": ts.cycle(ts.initial(), " at first"),
+        "restart": ts.cycle(ts.restarted(), " at restart"),
     }
 
 
 def _verdicts(
-    stepper: Stepper, inference: Confirmation, found: Found, wanted: tuple[Goal, ...]
-) -> Iterable[tuple[Goal, Verdict]]:
-    """Asks for each goal whether a first cycle, or a cycle from the invariant, can break it."""
+    ts: TransitionSystem, inference: Confirmation, found: Found, wanted: tuple[Obligation, ...]
+) -> Iterable[tuple[Obligation, Verdict]]:
+    """Asks for each obligation whether a first cycle, or a cycle from the invariant, can break it."""
     keyed = inference.keyed
-    every = [wanted, *(goals(stepper, first) for first in inference.firsts)]
-    asked = [[keyed.term(values.negation(goal.holds)) for goal in each] for each in every]
+    every = [wanted, *(obligations(ts, first) for first in inference.firsts)]
+    asked = [[keyed.term(values.negation(obligation.holds)) for obligation in each] for each in every]
     solvers = [inference.known(found.clauses), *(inference.beginning(first) for first in inference.firsts)]
-    believed = _believed(stepper, inference, found.clauses, solvers)
-    for at, goal in enumerate(wanted):
+    believed = _believed(ts, inference, found.clauses, solvers)
+    for at, obligation in enumerate(wanted):
         if at in found.open:
-            yield goal, Verdict.NOT_PROVED
+            yield obligation, Verdict.NOT_PROVED
             continue
         answers = {_asked(solver, terms[at]) for solver, terms in zip(solvers, asked, strict=True)}
         if answers == {Answer.UNSATISFIABLE}:
-            trusted = goal.sort is Sort.ASSUMPTION and goal.name in stepper.trusted
-            yield goal, believed[goal.table] if trusted else Verdict.PROVED
+            trusted = obligation.sort is Sort.ASSUMPTION and obligation.name in ts.trusted
+            yield obligation, believed[obligation.table] if trusted else Verdict.PROVED
         else:
-            yield goal, Verdict.NOT_PROVED if Answer.SATISFIABLE in answers else Verdict.UNDECIDED
+            yield obligation, Verdict.NOT_PROVED if Answer.SATISFIABLE in answers else Verdict.UNDECIDED
 
 
 def _believed(
-    stepper: Stepper, inference: Confirmation, clauses: Sequence[Clause], solvers: Sequence[Solver]
+    ts: TransitionSystem, inference: Confirmation, clauses: Sequence[Clause], solvers: Sequence[Solver]
 ) -> dict[str, Verdict]:
     """What becomes of what each table declares: where no cycle can keep to it, all that rests on it says nothing.
 
@@ -198,7 +200,7 @@ def _believed(
     runs it can, although one would run it otherwise.
     """
     names = [str(at.table.name) for at in inference.cycle.tables]
-    if not stepper.trusted:
+    if not ts.trusted:
         return dict.fromkeys(names, Verdict.TRUSTED)
     whole = _of_possible({solver.check() for solver in solvers})
     if whole is not Verdict.TRUSTED:
@@ -240,42 +242,42 @@ def _asked(solver: Solver, term: Term) -> Answer:
     return answer
 
 
-def certificate(stepper: Stepper, proof: LevelProof, limits: Limits = LIMITS) -> dict[str, str]:
+def certificate(ts: TransitionSystem, proof: LevelProof, limits: Limits = LIMITS) -> dict[str, str]:
     """Questions in SMT-LIB, each to be answered `unsat` by any solver, that together show what was proved.
 
     `first` and `restart`: such a cycle leads into the invariant; `step TABLE`: a later cycle in which this table runs keeps
-    it; `goals first`, `goals restart`: such cycles fulfil the goals that are proved; `goals SORT`: every cycle from the
-    invariant fulfils those of one sort; `lines N`: what is said of lines in their context; `ends TABLE N`: that steps which were
+    it; `obligations first`, `obligations restart`: such cycles fulfil the obligations that are proved; `obligations SORT`: every cycle
+    from the invariant fulfils those of one sort; `lines N`: what is said of lines in their context; `ends TABLE N`: that steps which were
     not found are not taken, that what counts rises, and that nothing else goes round. If lines or endings are not as the proof
     has them when they are looked at again, one question is there that has a model.
     """
-    cycle, firsts = stepper.cycle(stepper.anywhere()), _firsts(stepper)
-    asked = _asked_anew(proof.features, tuple(firsts.values()), cycle, limits)
+    cycle, firsts = ts.cycle(ts.havoc()), _firsts(ts)
+    asked = _asked_anew(proof.predicates, tuple(firsts.values()), cycle, limits)
     clauses = proof.clauses
     found = {name: asked.first_question(clauses, first).script() for name, first in firsts.items()}
     names = [*(f"step {at.table.name}" for at in cycle.tables), "step of no table"]
     for name, case in zip(names, cycle.cases, strict=False):
         found[name] = asked.step_question(clauses, case).script()
-    proved = {goal.key for goal, verdict in proof.found if verdict in FOUND}
+    proved = {obligation.key for obligation, verdict in proof.found if verdict in FOUND}
     for name, first in firsts.items():
-        wanted = [goal for goal in goals(stepper, first) if goal.key in proved]
+        wanted = [obligation for obligation in obligations(ts, first) if obligation.key in proved]
         found[f"goals {name}"] = _none_broken(asked, asked.beginning(first), wanted)
-    every = [goal for goal in goals(stepper, cycle) if goal.key in proved]
-    for sort in dict.fromkeys(goal.sort for goal in every):
-        wanted = [goal for goal in every if goal.sort is sort]
+    every = [obligation for obligation in obligations(ts, cycle) if obligation.key in proved]
+    for sort in dict.fromkeys(obligation.sort for obligation in every):
+        wanted = [obligation for obligation in every if obligation.sort is sort]
         found[f"goals {sort.name.lower()}"] = _none_broken(asked, asked.known(clauses), wanted)
     if proof.context is not None:
-        found |= _looked_again(stepper, proof, asked)
+        found |= _looked_again(ts, proof, asked)
     return found
 
 
-def _looked_again(stepper: Stepper, proof: LevelProof, asked: Confirmation) -> dict[str, str]:
+def _looked_again(ts: TransitionSystem, proof: LevelProof, asked: Confirmation) -> dict[str, str]:
     """What `context` and `Flow.endings` rest on."""
     assert proof.context is not None
-    seen = replace(context(stepper, asked, proof.clauses), unsure=proof.context.unsure)
+    seen = replace(context(ts, asked, proof.clauses), unsure=proof.context.unsure)
     found = {f"lines {number}": text for number, text in enumerate(_refuted(asked), 1)}
     ends = []
-    for ending in Flow(stepper, asked, proof.clauses).endings():
+    for ending in Flow(ts, asked, proof.clauses).endings():
         ends.append(ending)
         found |= {f"ends {ending.table} {number}": text for number, text in enumerate(_refuted(asked), 1)}
     if (seen, tuple(ends)) != (proof.context, proof.endings):
@@ -290,7 +292,7 @@ def _refuted(asked: Confirmation) -> list[str]:
     return found
 
 
-def _none_broken(asked: Confirmation, solver: Solver, wanted: Sequence[Goal]) -> str:
-    bad = smt.any_of([asked.keyed.term(values.negation(goal.holds)) for goal in wanted])
+def _none_broken(asked: Confirmation, solver: Solver, wanted: Sequence[Obligation]) -> str:
+    bad = smt.any_of([asked.keyed.term(values.negation(obligation.holds)) for obligation in wanted])
     solver.add(*asked.keyed.ranges, bad)
     return solver.script()

@@ -1,7 +1,7 @@
 """Lines that follow one another while nothing else of a level changes, and what ends that.
 
 In: three cycles in a row, as `Turn`s: of the middle one the questions are asked. Out: the lines that stop because a counter
-rises, and those of which it is not shown that they stop. The argument is in `ends`.
+rises, and those of which it is not shown that they stop. The argument is in `termination`.
 Counters are found one after another, for what the last ones leave (Bradley, Manna and
 Sipma, "Linear ranking with reachability", 2005).
 """
@@ -44,7 +44,7 @@ class Turn:
     """One cycle of a table.
 
     Attributes:
-        before: The leaves before it; `after`, behind it.
+        before: The leaves before it; `after`, after it.
         stays: The table runs, the command stays, and so does the phase.
         orders: An order is given.
         unanswered: The command is not answered.
@@ -119,7 +119,7 @@ def inputs(program: Program) -> tuple[str, ...]:
 
 @dataclass(frozen=True, slots=True)
 class Number:
-    """A number that the level keeps, before and behind a cycle."""
+    """A number that the level keeps, before and after a cycle."""
 
     name: str
     kind: Scalar

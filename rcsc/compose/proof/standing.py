@@ -28,7 +28,7 @@ from rcsc.compose.contract.claims import UNKNOWN as UNLOOKED_AT
 from rcsc.host.cache import Cache
 
 ASSUMPTION, PROPERTY = "assumption", "property"
-"""Sorts of goals: of an assumption of a table, of a property."""
+"""Sorts of obligations: of an assumption of a table, of a property."""
 
 
 class Known(StrEnum):
@@ -54,7 +54,7 @@ class Verdicts:
 
     claims: Mapping[Key, Claim]
     open: tuple[str, ...]
-    unlooked: tuple[str, ...] = ()
+    unstated: tuple[str, ...] = ()
 
     @property
     def many(self) -> int:
@@ -77,7 +77,7 @@ def keep_verdicts(cache: Cache, content: str, verdicts: Verdicts) -> None:
                 for key, claim in verdicts.claims.items()
             ],
             "open": list(verdicts.open),
-            "unlooked": list(verdicts.unlooked),
+            "unlooked": list(verdicts.unstated),
         }
         cache.store(value, "composed verdicts", content)
     cache.store({}, "composed verdicts")
@@ -149,7 +149,7 @@ class Assumed:
 
     Attributes:
         record: In which the level takes what it is about.
-        needs: Goals of the neighbour, `own`, of the level itself; `begins`, whether the two begin in agreement.
+        needs: Obligations of the neighbour, `own`, of the level itself; `begins`, whether the two begin in agreement.
     """
 
     level: str
@@ -234,22 +234,22 @@ class Standing:
         return tuple(one for one in self.outline.assumed if self._kept(one) is Known.NOT_PROVED)
 
     def _kept(self, assumed: Assumed) -> Known:
-        found = [self._goal(level, key) for level, key in assumed.needs]
+        found = [self._obligation(level, key) for level, key in assumed.needs]
         if not assumed.begins or Known.NOT_PROVED in found:
             return Known.NOT_PROVED
         return Known.UNKNOWN if Known.UNKNOWN in found else Known.PROVED
 
-    def _goal(self, level: str, key: Key) -> Known:
-        """What was found of a goal, in its level's environment."""
+    def _obligation(self, level: str, key: Key) -> Known:
+        """What was found of an obligation, in its level's environment."""
         verdicts = self.known.get(level)
         if verdicts is None:
             return Known.UNKNOWN
         claim = verdicts.claims.get(key)
         return Known.PROVED if claim is not None and claim.verdict in FOUND else Known.NOT_PROVED
 
-    def of_goal(self, level: str, key: Key) -> Known:
-        """Whether a goal of a level is proved of the levels together."""
-        found = self._goal(level, key)
+    def of_obligation(self, level: str, key: Key) -> Known:
+        """Whether an obligation of a level is proved of the levels together."""
+        found = self._obligation(level, key)
         if found is not Known.PROVED:
             return found
         if not self._proved(level, key):
@@ -284,7 +284,7 @@ class Standing:
             return Known.NOT_PROVED
         if not self._proved(level, RUNS):
             return self._given(level, RUNS)
-        return Known.PARTLY if verdicts.unlooked else Known.PROVED
+        return Known.PARTLY if verdicts.unstated else Known.PROVED
 
     @property
     def whole(self) -> Known:
@@ -301,7 +301,7 @@ class Standing:
         if verdicts is None:
             return ()
         rests = (f"rests on {one}" for one in self.lacking(level))
-        return (*rests, *(f"not looked at: {one}" for one in verdicts.unlooked))
+        return (*rests, *(f"not looked at: {one}" for one in verdicts.unstated))
 
     def unreached(self, level: str, table: str) -> tuple[str, ...]:
         """Lines of a table that no reachable cycle of this system runs."""

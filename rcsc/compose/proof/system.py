@@ -13,8 +13,8 @@ from pathlib import Path
 
 from rcsc.compose.contract.claims import UNKNOWN, Closed, Key, Need, closed
 from rcsc.compose.contract.environment import Links, check_ends, links
-from rcsc.compose.contract.obligations import Goal, goals
-from rcsc.compose.contract.transition import Safety, Stepper
+from rcsc.compose.contract.obligations import Obligation, obligations
+from rcsc.compose.contract.transition import Safety, TransitionSystem
 from rcsc.compose.invariant.search import Effort
 from rcsc.compose.proof.assume_guarantee import Agreement, agreements, claims, other_end
 from rcsc.compose.proof.kept import keep, recall
@@ -52,7 +52,7 @@ class SystemProof:
 
     @property
     def proved(self) -> bool:
-        """Whether every goal that could be stated, and every agreement between levels, is found so."""
+        """Whether every obligation that could be stated, and every agreement between levels, is found so."""
         return all(not essential(proof) for proof in self.levels) and all(
             one.holds for one in self.agreements
         )
@@ -60,10 +60,10 @@ class SystemProof:
     @property
     def whole(self) -> bool:
         """Whether it is proved, nothing was left out, and nothing rests on what is not known."""
-        besides_ = {(proof.level, goal.key) for proof in self.levels for goal in besides(proof)}
+        besides_ = {(proof.level, obligation.key) for proof in self.levels for obligation in besides(proof)}
         return (
             self.proved
-            and not any(proof.unlooked for proof in self.levels)
+            and not any(proof.unstated for proof in self.levels)
             and all(one.proved for need, one in self.closed.items() if need not in besides_)
         )
 
@@ -72,8 +72,8 @@ class SystemProof:
         return self.closed.get((level, key), UNKNOWN)
 
 
-def steppers(path: Path) -> dict[str, Stepper]:
-    """A stepper for each level of the system described by the file, from the top down.
+def transition_systems(path: Path) -> dict[str, TransitionSystem]:
+    """A transition system for each level of the system described by the file, from the top down.
 
     Each subordinate may assume that the fields stand still which its superior is built to number: the
     fields that the superior compares with the last order. That the superior keeps them is proved with it.
@@ -84,11 +84,13 @@ def steppers(path: Path) -> dict[str, Stepper]:
     """
     system = description(path)
     read = {spec.name: checked(path, spec.program) for spec in system.levels}
-    made = steppers_of(system, {name: program for name, (program, _) in read.items()})
+    made = transition_systems_of(system, {name: program for name, (program, _) in read.items()})
     return {name: replace_safety(one, read[name][1]) for name, one in made.items()}
 
 
-def steppers_of(system: Description, programs: Mapping[str, Program]) -> dict[str, Stepper]:
+def transition_systems_of(
+    system: Description, programs: Mapping[str, Program]
+) -> dict[str, TransitionSystem]:
     """The same of programs that were read, one for each level.
 
     Raises:
@@ -103,7 +105,7 @@ def steppers_of(system: Description, programs: Mapping[str, Program]) -> dict[st
         level = next((one for one in program.levels if one.name == name), None)
         if level is None:
             raise NoProgramError(f"program `{program.name}` has no level `{name}`")
-        found[name] = Stepper(program, level, _narrowed(every[name], every, programs))
+        found[name] = TransitionSystem(program, level, _narrowed(every[name], every, programs))
     return found
 
 
@@ -152,7 +154,7 @@ def checked(path: Path, name: str) -> tuple[Program, Safety]:
     """The program of a level, and why a cycle as nodes is the executors'.
 
     It is so only where nothing leaves its range and every operation is defined: that is shown of the program by itself, where
-    it has to be given its invariants, which are goals here. An assumption that is needed for it stops the cycle where it fails.
+    it has to be given its invariants, which are obligations here. An assumption that is needed for it stops the cycle where it fails.
 
     Raises:
         NoProgramError: It is not there, does not resolve, or something in it may leave its range or not be defined.
@@ -186,9 +188,9 @@ def _safety(
     return Safety(tuple(one.name for one in program.invariants), broken)
 
 
-def replace_safety(stepper: Stepper, safety: Safety) -> Stepper:
-    """The stepper with what is known of its program."""
-    return Stepper(stepper.program, stepper.level, stepper.links, safety)
+def replace_safety(ts: TransitionSystem, safety: Safety) -> TransitionSystem:
+    """The transition system with what is known of its program."""
+    return TransitionSystem(ts.program, ts.level, ts.links, safety)
 
 
 def loaded_program(path: Path, name: str) -> tuple[Program, Loaded]:
@@ -216,12 +218,12 @@ def prove_system(path: Path, effort: Effort | None = None, jobs: int = 1) -> Sys
         BadDescription: The description says something that cannot be.
         NoProgramError: The tables of a level cannot be read.
     """
-    made = steppers(path)
-    return prove_steppers(made, effort, jobs, tuple(made))
+    made = transition_systems(path)
+    return prove_transition_systems(made, effort, jobs, tuple(made))
 
 
-def prove_steppers(
-    made: Mapping[str, Stepper],
+def prove_transition_systems(
+    made: Mapping[str, TransitionSystem],
     effort: Effort | None,
     jobs: int,
     only: tuple[str, ...],
@@ -244,7 +246,11 @@ def prove_steppers(
 
 
 def _each_unless_kept(
-    made: Mapping[str, Stepper], effort: Effort, jobs: int, only: tuple[str, ...], cache: Cache | None
+    made: Mapping[str, TransitionSystem],
+    effort: Effort,
+    jobs: int,
+    only: tuple[str, ...],
+    cache: Cache | None,
 ) -> Iterator[tuple[str, LevelProof]]:
     """Each level's proof, in order."""
     known = {name: recall(cache, made[name], effort) for name in only} if cache is not None else {}
@@ -261,7 +267,7 @@ def _each_unless_kept(
 
 
 def _each(
-    made: Mapping[str, Stepper], effort: Effort, jobs: int, only: tuple[str, ...]
+    made: Mapping[str, TransitionSystem], effort: Effort, jobs: int, only: tuple[str, ...]
 ) -> Iterator[tuple[str, LevelProof]]:
     """Each level's proof; in processes where there are several jobs."""
     if jobs == 1 or len(only) <= 1:
@@ -275,12 +281,14 @@ def _each(
             yield name, replace(proof, found=_again(made[name], proof))
 
 
-def _proved(stepper: Stepper, effort: Effort) -> LevelProof:
-    """In a process of its own: goals come back without their nodes, which are many, and are made anew."""
-    found = prove_level(stepper, effort)
-    return replace(found, found=tuple((replace(goal, holds=TRUE), verdict) for goal, verdict in found.found))
+def _proved(ts: TransitionSystem, effort: Effort) -> LevelProof:
+    """In a process of its own: obligations come back without their nodes, which are many, and are made anew."""
+    found = prove_level(ts, effort)
+    return replace(
+        found, found=tuple((replace(obligation, holds=TRUE), verdict) for obligation, verdict in found.found)
+    )
 
 
-def _again(stepper: Stepper, proof: LevelProof) -> tuple[tuple[Goal, Verdict], ...]:
-    wanted = goals(stepper, stepper.cycle(stepper.anywhere()))
-    return tuple((goal, verdict) for goal, (_, verdict) in zip(wanted, proof.found, strict=True))
+def _again(ts: TransitionSystem, proof: LevelProof) -> tuple[tuple[Obligation, Verdict], ...]:
+    wanted = obligations(ts, ts.cycle(ts.havoc()))
+    return tuple((obligation, verdict) for obligation, (_, verdict) in zip(wanted, proof.found, strict=True))

@@ -1,6 +1,6 @@
 """That every command is answered some time and stays so, given that what is below does: no deadlock, nothing that goes on for ever.
 
-In: a stepper, and what was confirmed of it. Out: an `Ending` for each table. A level is *answered* in a cycle when each
+In: a transition system, and what was confirmed of it. Out: an `Ending` for each table. A level is *answered* in a cycle when each
 subordinate echoes the last order and says of it *done* or *failed*; of the first command, PAUSE or its like, *done*. It is
 assumed that each order, if no other replaces it, is answered some time and stays so; and that is what is shown of the level: it
 is *unanswered* while it reports neither; a fourth status answers nothing. The argument, for a level that keeps one command:
@@ -26,7 +26,7 @@ from dataclasses import dataclass
 
 from rcsc.compose.contract.environment import COMMAND, ECHO, ECHOED, NUMBER, STATUS, Below
 from rcsc.compose.contract.obligations import FLAG
-from rcsc.compose.contract.transition import Cycle, Stepper, TableAt
+from rcsc.compose.contract.transition import Cycle, TableAt, TransitionSystem
 from rcsc.compose.invariant.confirm import Confirmation
 from rcsc.compose.invariant.pdr import Clause
 from rcsc.compose.proof.context import gives_an_order, may, of_lines
@@ -70,65 +70,61 @@ class Ending:
         return self.changes is not None and not self.endless
 
 
-def reports(stepper: Stepper) -> bool:
+def reports(ts: TransitionSystem) -> bool:
     """Whether the level has a superior, and all reports can say that a command is done."""
-    above = stepper.links.above
+    above = ts.links.above
     if above is None:
         return False
-    return not no_answers(stepper)
+    return not no_answers(ts)
 
 
-def no_answers(stepper: Stepper) -> tuple[str, ...]:
+def no_answers(ts: TransitionSystem) -> tuple[str, ...]:
     """Why it is not known which reports answer a command."""
-    above = stepper.links.above
+    above = ts.links.above
     if above is None:
         return ()
     found = []
-    ends = ((above.order, above.report), *((below.order, below.report) for below in stepper.links.below))
+    ends = ((above.order, above.report), *((below.order, below.report) for below in ts.links.below))
     for order, report in ends:
-        kind = stepper.kinds.get(f"{report}.{STATUS}")
+        kind = ts.kinds.get(f"{report}.{STATUS}")
         if not isinstance(kind, Enum) or DONE not in kind.members:
             found.append(f"`{report}` has no `{STATUS}` with a member `{DONE}`")
-        if not isinstance(stepper.kinds[f"{order}.{COMMAND}"], Enum):
+        if not isinstance(ts.kinds[f"{order}.{COMMAND}"], Enum):
             found.append(f"`{order}.{COMMAND}` is no enumeration")
     return tuple(found)
 
 
-def command_stays(stepper: Stepper, cycle: Cycle) -> Node:
+def command_stays(ts: TransitionSystem, cycle: Cycle) -> Node:
     """The level's command is still the same."""
-    above = stepper.links.above
+    above = ts.links.above
     assert above is not None
     number = f"{above.order}.{NUMBER}"
     return values.equal(cycle.before[number], cycle.taken[number])
 
 
-def unanswered(stepper: Stepper, cycle: Cycle) -> Node:
+def unanswered(ts: TransitionSystem, cycle: Cycle) -> Node:
     """The level's report is none that its superior waits for: *done* or *failed*; of the first command *done* alone."""
-    above = stepper.links.above
+    above = ts.links.above
     assert above is not None
     command, status = f"{above.order}.{COMMAND}", f"{above.report}.{STATUS}"
-    rests = values.equal(cycle.taken[command], values.constant(stepper.kinds[command], 0))
-    done = _says(stepper, status, cycle.after, DONE)
-    ended = values.either(
-        done, values.both(values.negation(rests), _says(stepper, status, cycle.after, FAILED))
-    )
+    rests = values.equal(cycle.taken[command], values.constant(ts.kinds[command], 0))
+    done = _says(ts, status, cycle.after, DONE)
+    ended = values.either(done, values.both(values.negation(rests), _says(ts, status, cycle.after, FAILED)))
     return values.negation(ended)
 
 
-def answered(stepper: Stepper, cycle: Cycle, below: Below) -> Node:
+def answered(ts: TransitionSystem, cycle: Cycle, below: Below) -> Node:
     """The last order is echoed, and ended: the first command by *done* alone."""
     command, status = f"{below.order}.{COMMAND}", f"{below.report}.{STATUS}"
     echoed = values.equal(cycle.taken[f"{below.report}.{ECHO}"], cycle.before[f"{below.order}.{NUMBER}"])
-    rests = values.equal(cycle.before[command], values.constant(stepper.kinds[command], 0))
-    done = _says(stepper, status, cycle.taken, DONE)
-    ended = values.either(
-        done, values.both(values.negation(rests), _says(stepper, status, cycle.taken, FAILED))
-    )
+    rests = values.equal(cycle.before[command], values.constant(ts.kinds[command], 0))
+    done = _says(ts, status, cycle.taken, DONE)
+    ended = values.either(done, values.both(values.negation(rests), _says(ts, status, cycle.taken, FAILED)))
     return values.both(echoed, ended)
 
 
-def _says(stepper: Stepper, leaf: str, leaves: Mapping[str, Node], member: str) -> Node:
-    kind = stepper.kinds[leaf]
+def _says(ts: TransitionSystem, leaf: str, leaves: Mapping[str, Node], member: str) -> Node:
+    kind = ts.kinds[leaf]
     assert isinstance(kind, Enum)
     if member not in kind.members:
         return values.FALSE
@@ -168,8 +164,8 @@ class _Phases:
 class Flow:
     """The questions of one level, from an invariant; none where it has no superior that it reports to."""
 
-    def __init__(self, stepper: Stepper, asked: Confirmation, clauses: Sequence[Clause]) -> None:
-        self.stepper, self.asked, self.clauses = stepper, asked, clauses
+    def __init__(self, ts: TransitionSystem, asked: Confirmation, clauses: Sequence[Clause]) -> None:
+        self.ts, self.asked, self.clauses = ts, asked, clauses
         self.keyed = asked.keyed
         self.rows: dict[tuple[str, ...], list[Cycle]] = {}
         self.found: dict[int, _Phases] = {}
@@ -177,7 +173,7 @@ class Flow:
     @property
     def tables(self) -> tuple[TableAt, ...]:
         """Those that are asked about."""
-        return self.asked.cycle.tables if reports(self.stepper) else ()
+        return self.asked.cycle.tables if reports(self.ts) else ()
 
     def endings(self) -> Iterator[Ending]:
         """One for each table."""
@@ -188,7 +184,7 @@ class Flow:
     def _ending(self, number: int, *, goes_round: bool) -> Ending:
         changes = self._phases(number).changes
         found = lines_that_stop(
-            self.stepper.program, self.asked, self.clauses, lambda still: self._turns(number, still)
+            self.ts.program, self.asked, self.clauses, lambda still: self._turns(number, still)
         )
         table = str(self.tables[number].table.name)
         return Ending(table, None if goes_round else changes, found.counted, found.still, found.endless)
@@ -198,7 +194,7 @@ class Flow:
         found = []
         for number, at in enumerate(self.tables):
             phases = self._phases(number)
-            taken = values.both(at.chosen, command_stays(self.stepper, self.asked.cycle))
+            taken = values.both(at.chosen, command_stays(self.ts, self.asked.cycle))
             before, after = self._ends(phases.leaves)
             found += [
                 values.negation(values.all_of((taken, *_are(before, one), *_are(after, two))))
@@ -217,7 +213,7 @@ class Flow:
                 leaf
                 for place, leaf in enumerate(phases.leaves)
                 for one, two in phases.waiting
-                if one[place] != two[place] and isinstance(self.stepper.kinds[leaf], Bool) and leaf != FLAG
+                if one[place] != two[place] and isinstance(self.ts.kinds[leaf], Bool) and leaf != FLAG
             }
             if turning:
                 phases = self._phases_by(at, tuple(leaf for leaf in phases.leaves if leaf not in turning))
@@ -226,13 +222,13 @@ class Flow:
 
     def _pending_and_flags(self) -> tuple[str, ...]:
         """Pending states, the flag of a new command, and flags that lines write."""
-        variables = self.stepper.program.variables
+        variables = self.ts.program.variables
         found = [
             str(pending(v.name))
             for v in variables
             if v.deferred_until is not None and isinstance(v.type, Bool | Enum)
         ]
-        written = of_lines(self.stepper)
+        written = of_lines(self.ts)
         flags = [
             str(v.name)
             for v in variables
@@ -241,7 +237,7 @@ class Flow:
         return (*found, *flags)
 
     def _ends(self, leaves: Sequence[str]) -> tuple[list[Node], list[Node]]:
-        """What tells phases apart, before the cycle and behind it."""
+        """What tells phases apart, before the cycle and after it."""
         cycle = self.asked.cycle
         return [cycle.before[leaf] for leaf in leaves], [cycle.after[leaf] for leaf in leaves]
 
@@ -261,7 +257,7 @@ class Flow:
                 values.any_of(values.all_of(_are(nodes, phase)) for phase in sorted(inside))
                 for nodes in self._ends(leaves)
             ]
-            waits = (command_stays(self.stepper, cycle), unanswered(self.stepper, cycle))
+            waits = (command_stays(self.ts, cycle), unanswered(self.ts, cycle))
             term = self.keyed.term(values.all_of((at.chosen, *waits, *ends)))
             solver.add(*self.keyed.ranges)
             self.asked.rested_on.append(solver)
@@ -272,9 +268,7 @@ class Flow:
         keyed, cycle = self.keyed, self.asked.cycle
         before, after = self._ends(leaves)
         stays = values.all_of(map(values.equal, before, after))
-        moves = keyed.term(
-            values.all_of((at.chosen, command_stays(self.stepper, cycle), values.negation(stays)))
-        )
+        moves = keyed.term(values.all_of((at.chosen, command_stays(self.ts, cycle), values.negation(stays))))
         nodes = (*before, *after)
         terms = [keyed.term(node) for node in nodes]
         solver = self.asked.known(self.clauses)
@@ -314,7 +308,7 @@ class Flow:
                 free = {
                     leaf: values.variable(f"{leaf}{suffix}", node.kind) for leaf, node in row[0].taken.items()
                 }
-                row.append(self.stepper.cycle(row[-1].after, suffix, taken={**free, **kept}))
+                row.append(self.ts.cycle(row[-1].after, suffix, taken={**free, **kept}))
             self.rows[still] = row
         return self.rows[still]
 
@@ -323,23 +317,23 @@ class Flow:
         leaves = self._phases(number).leaves
         same = values.all_of(values.equal(cycle.before[leaf], cycle.after[leaf]) for leaf in leaves)
         at = cycle.tables[number]
-        stays = values.all_of((at.chosen, cycle.contract, command_stays(self.stepper, cycle), same))
-        orders = gives_an_order(self.stepper, cycle)
+        stays = values.all_of((at.chosen, cycle.contract, command_stays(self.ts, cycle), same))
+        orders = gives_an_order(self.ts, cycle)
         return Turn(
             at,
             cycle.before,
             cycle.after,
             stays,
             orders,
-            unanswered(self.stepper, cycle),
-            values.all_of(answered(self.stepper, cycle, below) for below in self.stepper.links.below),
+            unanswered(self.ts, cycle),
+            values.all_of(answered(self.ts, cycle, below) for below in self.ts.links.below),
         )
 
     # --- from table to table ---
 
     def _tables_round(self) -> set[int]:
         """The tables that may follow one another round while the command stays."""
-        above, chosen = self.stepper.links.above, self.stepper.level.tables
+        above, chosen = self.ts.links.above, self.ts.level.tables
         assert above is not None
         if isinstance(chosen, OneTable):
             return set()
@@ -347,9 +341,7 @@ class Flow:
             return set()  # the same under the same number: the contract
         one, two, _ = self._cycles(())
         term = self.keyed.term
-        goes_on = [
-            term(values.both(cycle.contract, command_stays(self.stepper, cycle))) for cycle in (one, two)
-        ]
+        goes_on = [term(values.both(cycle.contract, command_stays(self.ts, cycle))) for cycle in (one, two)]
         runs = [[term(at.chosen) for at in cycle.tables] for cycle in (one, two)]
         solver = self.asked.known(self.clauses)
         self.asked.rested_on.append(solver)

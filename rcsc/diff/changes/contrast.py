@@ -14,7 +14,7 @@ from rcsc.lang.interpret import ExternError
 from rcsc.lang.model import Program
 from rcsc.lang.model import Value as Scalars
 from rcsc.symbolic import values
-from rcsc.symbolic.effect import goes_wrong_otherwise, same_calls, value_behind
+from rcsc.symbolic.effect import goes_wrong_otherwise, same_calls, value_after
 from rcsc.symbolic.values import TRUE, Node
 
 RUN, CALLS = "", "extern calls"
@@ -85,7 +85,7 @@ class Contrast:
         return " or ".join((*parts, *long))
 
     def _unequal(self, leaf: str) -> Node:
-        pair = [value_behind(doing.effect, leaf, self.versions.shared) for doing in self.pair]
+        pair = [value_after(doing.effect, leaf, self.versions.shared) for doing in self.pair]
         return self.versions.shared.one(values.negation(self.versions.shared.equal(*pair)))
 
     # --- what is left otherwise ---
@@ -117,7 +117,7 @@ class Contrast:
                 CALLS, (), names[0], names[1] if names[0] != names[1] else "with other values", ("", "")
             )
         kind = self.versions.types[leaf]
-        nodes = [value_behind(effect, leaf, self.versions.shared) for effect in effects]
+        nodes = [value_after(effect, leaf, self.versions.shared) for effect in effects]
         words = [
             (said(node, kind) or "") if leaf in effect.leaves else "unchanged"
             for effect, node in zip(effects, nodes, strict=True)
@@ -130,7 +130,7 @@ class Contrast:
 def _ended(
     versions: Versions, program: Program, doing: Doing, point: Mapping[str, Scalars]
 ) -> dict[str, Scalars] | None:
-    """The state behind a run by the reference meaning; None where it goes wrong, or would run the user's code."""
+    """The state after a run by the reference meaning; None where it goes wrong, or would run the user's code."""
     if doing.effect.calls:
         return None
     now = versions.snapshot(program, point)
@@ -154,7 +154,7 @@ def contrast(versions: Versions, region: Node, pair: tuple[Doing, Doing]) -> Con
     asked[CALLS] = values.both(good, values.negation(same_calls(one, two, versions.leaves, shared)))
     for leaf in versions.leaves:
         if leaf in one.leaves or leaf in two.leaves:
-            pair_ = [value_behind(effect, leaf, shared) for effect in (one, two)]
+            pair_ = [value_after(effect, leaf, shared) for effect in (one, two)]
             asked[leaf] = values.both(good, values.negation(shared.equal(*pair_)))
     found = {}
     for leaf, node in asked.items():

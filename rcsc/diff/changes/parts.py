@@ -113,7 +113,7 @@ def _effects(
 
 
 def levels(versions: Versions) -> Iterator[Part]:
-    """Every level that both versions have: period, which table runs when, and what runs before and behind it.
+    """Every level that both versions have: period, which table runs when, and what runs before and after it.
 
     Raises:
         UndecidedError, TooLongError, RecursionError: As `tables.table_part`.
@@ -157,7 +157,7 @@ def _selector(level: Level) -> Expr | None:
 def _sequence(
     versions: Versions, what: str, level: str, names: tuple[tuple[str, ...], tuple[str, ...]]
 ) -> Part:
-    """What runs before a level's table, or behind it, as one run."""
+    """What runs before a level's table, or after it, as one run."""
     bodies: list[list[Statement]] = [[Call(ProcedureName(name)) for name in part] for part in names]
     first, second = versions.digests
     if first.body(bodies[0]) == second.body(bodies[1]):

@@ -1,6 +1,6 @@
 """Graphs as Mermaid state diagrams (`stateDiagram-v2`): written, and read back.
 
-A transition's text is `LINE [guard] effect`, with ` by PROCEDURES` behind where procedures decide it and the word DEFAULT in place
+A transition's text is `LINE [guard] effect`, with ` by PROCEDURES` after where procedures decide it and the word DEFAULT in place
 of a guard; what is said of the graph as a whole stands in comments, `%% table: acquire`. A person may leave out all but the arrows
 and the name of the table. Composite states and notes are not read.
 """

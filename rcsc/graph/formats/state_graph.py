@@ -52,7 +52,7 @@ class StateGraph:
         assuming: Names of the assumptions.
         uses: What the table's file uses.
         columns: The table's heading row without the line's name, `a | b || procedures | command_out`; "" where it is not said.
-        lines: The lines' names in the table's order; those not named come behind.
+        lines: The lines' names in the table's order; those not named come last.
         states: Every state that is drawn, in declared order.
     """
 

@@ -250,7 +250,7 @@ def _unary(scope: Scope, body: Body, written: tree.Unary) -> Typed | None:
 
 
 def _was(scope: Scope, body: Body, written: tree.Expr, span: Span, want: Scalar | None) -> Typed | None:
-    """The same expression of the values behind the cycle before."""
+    """The same expression of the values after the cycle before."""
     if scope.no_before:
         scope.report(Code.NO_CYCLE_BEFORE, scope.no_before, span)
         return None

@@ -2,7 +2,7 @@
 
 In: a declaration. Out: a `Property`, whose one condition says all of it, or diagnostics:
 
-- `P` is itself: it holds behind every cycle;
+- `P` is itself: it holds after every cycle;
 - `P then Q` is `was P implies Q`: in linear temporal logic, always (P implies next Q);
 - `P until Q` is `was (P and not Q) implies P or Q`: always (P implies (P weakly until Q)). That Q ever holds is not said; once P
   has begun to hold it ends no sooner than in the cycle in which Q holds. Source: *unless*, Chandy and Misra, *Parallel Program Design*
@@ -36,7 +36,7 @@ _BEFORE_WORD = {
     "then": "what stands before `then` is of the cycle before as it is",
     "until": "what stands before `until` is of one cycle",
 }
-"""Why `was` cannot stand in the first condition, by the word behind it."""
+"""Why `was` cannot stand in the first condition, by the word after it."""
 _BEHIND_WORD = {"then": "", "until": "what stands behind `until` is of one cycle"}
 
 

@@ -55,7 +55,7 @@ class Statements:
     loops: set[str] = field(default_factory=set)
 
     def block(self, written: tuple[tree.Statement, ...]) -> tuple[Statement, ...]:
-        """The statements; locals declared inside are forgotten behind it."""
+        """The statements; locals declared inside are forgotten after it."""
         before = dict(self.body.visible)
         resolved = tuple(made for one in written for made in self._statement(one))
         self.body.visible = before

@@ -80,7 +80,7 @@ def declare_constant(scope: Scope, written: tree.ConstDecl) -> None:
 
 
 def declare_variable(scope: Scope, written: tree.VariableDecl) -> None:
-    """Adds a variable and its leaves; the pending leaf of a deferred one directly behind it."""
+    """Adds a variable and its leaves; the pending leaf of a deferred one directly after it."""
     kind = type_of(scope, written.type)
     if size(kind) + len(scope.leaves) > MOST_LEAVES:
         scope.report(

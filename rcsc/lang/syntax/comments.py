@@ -1,6 +1,6 @@
 """Comments of one text, handed to the nodes they stand with.
 
-A comment goes with the node that begins next, or, behind a node on its line, with that node.
+A comment goes with the node that begins next, or, after a node on its line, with that node.
 Each is handed out once; what nobody takes is the file's.
 """
 
@@ -26,7 +26,7 @@ class Comments:
         return bisect_right(self._starts, offset)
 
     def take(self, start: int) -> tuple[str, ...]:
-        """What stands before offset `start`, or behind it on the same line."""
+        """What stands before offset `start`, or after it on the same line."""
         line = self._line(start)
         count = 0
         while count < len(self._waiting):
@@ -44,7 +44,7 @@ class Comments:
 
 
 def words(comment: str) -> str:
-    """The text of a comment, without its marks and the space behind them."""
+    """The text of a comment, without its marks and the space after them."""
     return comment.lstrip("#").removeprefix(" ").rstrip()
 
 

@@ -106,7 +106,7 @@ class Unary:
 
 @dataclass(frozen=True, slots=True)
 class Was:
-    """`was a`: the value behind the cycle before; in properties only."""
+    """`was a`: the value after the cycle before; in properties only."""
 
     operand: "Expr"
     span: Span = at()
@@ -497,7 +497,7 @@ class InvariantDecl:
 class PropertyDecl:
     """`property name : expr [then|until expr]`.
 
-    `word` is "", "then" or "until"; `other` stands behind it.
+    `word` is "", "then" or "until"; `other` stands after it.
     """
 
     name: Name

@@ -36,9 +36,9 @@ class LoggedFinding:
     """A run that breaks something.
 
     Attributes:
-        level: Whose goal it is.
+        level: Whose obligation it is.
         table: That it is about; empty where it is about the whole level.
-        goal: Which, in words.
+        obligation: Which, in words.
         broken_at: The tick in which it is broken.
         restarted: Whether it begins where a restart does, and not with the initial values.
         legal: Whether the levels around do only what neighbours can that began with it.
@@ -48,7 +48,7 @@ class LoggedFinding:
 
     level: str
     table: str
-    goal: str
+    obligation: str
     broken_at: int
     restarted: bool
     legal: bool
@@ -65,7 +65,7 @@ def finding_facts(finding: LoggedFinding) -> dict[str, str]:
     return {
         "level": finding.level,
         "table": finding.table,
-        "goal": finding.goal,
+        "goal": finding.obligation,
         "broken_at": str(finding.broken_at),
         "restarted": json.dumps(finding.restarted),
         "legal": json.dumps(finding.legal),

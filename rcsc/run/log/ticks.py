@@ -29,7 +29,7 @@ class Said:
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """An order as it stands behind the cycle.
+    """An order as it stands after the cycle.
 
     Attributes:
         buffer: The level's own name of it.
@@ -166,7 +166,7 @@ def _box(log: Log, level: LoggedLevel, tick: int, wires: Mapping[str, str]) -> B
 
 @dataclass(frozen=True, slots=True)
 class _Cycle:
-    """One cycle of a level: every leaf before and behind it."""
+    """One cycle of a level: every leaf before and after it."""
 
     logged: LoggedLevel
     before: Values

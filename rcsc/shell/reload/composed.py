@@ -66,13 +66,13 @@ def together(
 
 def _prove(plant: Plant, cache: Cache) -> None:
     """Proves what no earlier run did, and keeps it."""
-    from rcsc.compose.proof.system import NoProgramError, prove_steppers, steppers
+    from rcsc.compose.proof.system import NoProgramError, prove_transition_systems, transition_systems
 
     try:
-        made = steppers(plant.path)
+        made = transition_systems(plant.path)
     except (BadDescription, NoProgramError) as error:
         raise Refused(Code.BAD_SYSTEM, str(error)) from error
-    prove_steppers(made, None, 1, tuple(made), None, cache)
+    prove_transition_systems(made, None, 1, tuple(made), None, cache)
 
 
 def _unknown(plant: Plant, level: str, made: Standing | None, edited: Sequence[str]) -> str:

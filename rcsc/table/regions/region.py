@@ -1,6 +1,6 @@
 """Regions of the input space, what is left of conditions in them, and the leaves of their tree.
 
-In: clauses over one `Universe`. Out: values that `search` makes and `certificate` writes down. A
+In: clauses over one `Universe`. Out: values that `splitting` makes and `certificate` writes down. A
 region is bounds on forms; a leaf of the tree says why exactly one line holds all over it.
 """
 

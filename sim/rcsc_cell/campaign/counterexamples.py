@@ -21,7 +21,7 @@ from rcsc_cell.campaign.rig import Rig, digest
 from rcsc_cell.campaign.runner import death
 from rcsc_cell.campaign.shrink import MOST_TRIES, shrink
 from rcsc_cell.campaign.work import SURVIVES, TRIES, Shrunk, attempt, logged, shrunk
-from rcsc_cell.campaign.worker_pool import Crashed, Crew
+from rcsc_cell.campaign.worker_pool import Crashed, WorkerPool
 from rcsc_cell.episodes.episode import Episode, Outcome, script
 
 if TYPE_CHECKING:
@@ -67,7 +67,7 @@ def choices(records: Iterable[Record]) -> tuple[Choice, ...]:
 
 
 def counterexamples(
-    rig: Rig, seed: int, wanted: Sequence[Choice], crew: Crew
+    rig: Rig, seed: int, wanted: Sequence[Choice], pool: WorkerPool
 ) -> Iterator[tuple[Choice, Shrunk]]:
     """Shrinks all at once, each in a worker; those that a worker dies of, one try a task.
 
@@ -79,37 +79,37 @@ def counterexamples(
     flying: dict[Choice, tuple[Future[Shrunk], Executor]] = {}
     for one in wanted:
         if one.property != SURVIVES:
-            future = crew.submit(shrunk, rig, digest(rig.system), seed, one.index, one.property)
-            flying[one] = future, crew.executor
+            future = pool.submit(shrunk, rig, digest(rig.system), seed, one.index, one.property)
+            flying[one] = future, pool.executor
     for one, (future, executor) in flying.items():
         try:
             yield one, future.result()
-        except crew.deaths as died:
-            crew.survive(died, executor)
+        except pool.deaths as died:
+            pool.survive(died, executor)
             careful.append(one)
     for one in careful:
-        yield one, _carefully(rig, seed, one, crew)
+        yield one, _carefully(rig, seed, one, pool)
 
 
-def _carefully(rig: Rig, seed: int, choice: Choice, crew: Crew) -> Shrunk:
+def _carefully(rig: Rig, seed: int, choice: Choice, pool: WorkerPool) -> Shrunk:
     """Shrinks from here, so that a worker may die of each try."""
 
     def fails(episode: Episode) -> bool:
-        return any(one.property == choice.property for one in _survived(rig, episode, crew).findings)
+        return any(one.property == choice.property for one in _survived(rig, episode, pool).findings)
 
     tries = TRIES.get(choice.property, MOST_TRIES)
     least = shrink(rig.episode(seed, choice.index), fails, tries)
     try:
-        return crew.call(logged, rig, least, choice.property)
+        return pool.call(logged, rig, least, choice.property)
     except Crashed:
-        found = next(one for one in _survived(rig, least, crew).findings if one.property == choice.property)
+        found = next(one for one in _survived(rig, least, pool).findings if one.property == choice.property)
         return Shrunk(least, found, b"")
 
 
-def _survived(rig: Rig, episode: Episode, crew: Crew) -> Outcome:
+def _survived(rig: Rig, episode: Episode, pool: WorkerPool) -> Outcome:
     begun_s = time.monotonic()
     try:
-        return crew.call(attempt, rig, episode)
+        return pool.call(attempt, rig, episode)
     except Crashed:
         return death(rig, time.monotonic() - begun_s)
 

@@ -1,6 +1,6 @@
-"""The runner: gives chunks of episodes to a crew, keeps what comes back in the journal, and survives workers that do not.
+"""The runner: gives chunks of episodes to a worker pool, keeps what comes back in the journal, and survives workers that do not.
 
-In: how many episodes, a crew, a journal. Out: records as they come. When a worker dies, whatever was under way is suspected, and is
+In: how many episodes, a worker pool, a journal. Out: records as they come. When a worker dies, whatever was under way is suspected, and is
 played again with nothing beside it: whole chunks first, and the episodes of one that kills again one by one. An episode
 that kills a worker by itself is recorded as `crash`, or as `hang` if it was ended for that.
 """
@@ -15,7 +15,7 @@ from typing import TypeAlias
 from rcsc_cell.campaign.journal import Journal, Record
 from rcsc_cell.campaign.rig import Rig, digest
 from rcsc_cell.campaign.work import CRASH, ENDS, HANG, SURVIVES, no_end, odd, play
-from rcsc_cell.campaign.worker_pool import Crew, WorkersGone
+from rcsc_cell.campaign.worker_pool import WorkerPool, WorkersGone
 from rcsc_cell.episodes.episode import Finding, Outcome
 from rcsc_cell.episodes.part_faults import fault_classes
 
@@ -30,7 +30,7 @@ _AHEAD = 2
 
 
 def campaign(
-    rig: Rig, seed: int, episodes: int, crew: Crew, journal: Journal, poll_s: float = 0.5
+    rig: Rig, seed: int, episodes: int, pool: WorkerPool, journal: Journal, poll_s: float = 0.5
 ) -> Iterator[Records]:
     """Plays what the journal lacks of episodes 0 to `episodes` - 1; at least every `poll_s`, what came in since.
 
@@ -41,9 +41,9 @@ def campaign(
         OSError: The journal cannot be written.
     """
     todo = [index for index in range(episodes) if index not in journal.records]
-    size = min(CHUNKS[rig.backend], max(1, len(todo) // (4 * crew.workers)))
+    size = min(CHUNKS[rig.backend], max(1, len(todo) // (4 * pool.workers)))
     chunks = deque(tuple(todo[at : at + size]) for at in range(0, len(todo), size))
-    round_ = _Round(rig, seed, crew, chunks)
+    round_ = _Round(rig, seed, pool, chunks)
     try:
         while round_.busy:
             records = round_.step(poll_s)
@@ -67,8 +67,8 @@ class _Flight:
 class _Round:
     """Chunks that wait, that are suspected, and that fly."""
 
-    def __init__(self, rig: Rig, seed: int, crew: Crew, waiting: deque[Chunk]) -> None:
-        self._rig, self._seed, self._crew = rig, seed, crew
+    def __init__(self, rig: Rig, seed: int, pool: WorkerPool, waiting: deque[Chunk]) -> None:
+        self._rig, self._seed, self._pool = rig, seed, pool
         self._digest = digest(rig.system)
         self._waiting = waiting
         self._suspects: deque[Chunk] = deque()
@@ -95,19 +95,19 @@ class _Round:
         if self._alone:
             self._since_s = time.monotonic()
             self._fly(self._suspects.popleft())
-        while not self._alone and self._waiting and len(self.flying) < _AHEAD * self._crew.workers:
+        while not self._alone and self._waiting and len(self.flying) < _AHEAD * self._pool.workers:
             self._fly(self._waiting.popleft())
 
     def _fly(self, chunk: Chunk) -> None:
-        future = self._crew.submit(play, self._rig, self._digest, self._seed, chunk)
-        self.flying[future] = _Flight(chunk, self._crew.executor)
+        future = self._pool.submit(play, self._rig, self._digest, self._seed, chunk)
+        self.flying[future] = _Flight(chunk, self._pool.executor)
 
     def _taken(self, future: Future[Records]) -> Records:
         flight = self.flying.pop(future)
         try:
             return future.result()
-        except self._crew.deaths as death:
-            self._crew.survive(death, flight.executor)
+        except self._pool.deaths as death:
+            self._pool.survive(death, flight.executor)
         if not self._alone:
             self._suspects.append(flight.chunk)
         elif len(flight.chunk) > 1:

@@ -1,6 +1,6 @@
 """Who plays: any standard executor, and how one that broke is made anew.
 
-In: processes here, or the address of a scheduler. Out: a `Crew`.
+In: processes here, or the address of a scheduler. Out: a `WorkerPool`.
 """
 
 import contextlib
@@ -31,7 +31,7 @@ class Crashed(Exception):  # noqa: N818  # likewise
 
 
 @dataclass(slots=True)
-class Crew:
+class WorkerPool:
     """An executor and what a campaign must know of it.
 
     Attributes:
@@ -88,7 +88,7 @@ class Crew:
 
 
 @contextlib.contextmanager
-def processes(workers: int) -> Iterator[Crew]:
+def processes(workers: int) -> Iterator[WorkerPool]:
     """Processes on this machine, which begin anew rather than as copies: what this process holds open stays its own.
 
     When it ends early, by an error or an interrupt, so do they.
@@ -97,18 +97,18 @@ def processes(workers: int) -> Iterator[Crew]:
     def made() -> Executor:
         return children.executor(workers, own_process)
 
-    crew = Crew(made(), workers, renew=made)
+    pool = WorkerPool(made(), workers, renew=made)
     try:
-        yield crew
+        yield pool
     except BaseException:
-        children.kill(crew.executor)
+        children.kill(pool.executor)
         raise
     finally:
-        crew.executor.shutdown(cancel_futures=True)
+        pool.executor.shutdown(cancel_futures=True)
 
 
 @contextlib.contextmanager
-def cluster(address: str) -> Iterator[Crew]:
+def cluster(address: str) -> Iterator[WorkerPool]:
     """The workers of a `dask.distributed` scheduler.
 
     Raises:
@@ -124,14 +124,14 @@ def cluster(address: str) -> Iterator[Crew]:
     except (OSError, ValueError) as error:
         raise WorkersGone(f"no scheduler answers at {address}") from error
     with client:
-        yield crew_of(client)
+        yield pool_of(client)
 
 
-def crew_of(client: "Client") -> Crew:
+def pool_of(client: "Client") -> WorkerPool:
     """The workers that a client sees now."""
     from distributed.scheduler import KilledWorker
 
     threads: dict[str, Any] = client.nthreads()
-    return Crew(
+    return WorkerPool(
         client.get_executor(pure=False), max(1, sum(threads.values())), (BrokenExecutor, KilledWorker)
     )

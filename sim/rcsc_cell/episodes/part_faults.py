@@ -12,7 +12,7 @@ from rcsc_cell.workstation.script import PARTS
 USUAL = PartSpec("")
 
 
-def odd_parts(episode: Episode) -> Iterator[str]:
+def part_faults(episode: Episode) -> Iterator[str]:
     """`missing part`, `wrong part` and `two parts` of those that are asked for at the buffer; `odd size`, `odd weight` of any."""
     here = [part.object for part in episode.parts if part.station == "buffer"]
     for wanted in _asked((*episode.rows, *(one.row for one in episode.interruptions))):
@@ -51,6 +51,6 @@ def fault_classes(episode: Episode) -> tuple[str, ...]:
         *(("restarted",) if episode.restarts else ()),
         *(("changed command",) if episode.interruptions else ()),
         *(("pushed",) if episode.pushes else ()),
-        *odd_parts(episode),
+        *part_faults(episode),
     }
     return tuple(name for name in FAULTS if name in has)

@@ -101,7 +101,7 @@ def draw(seed: int, backend: Backend = "kinematic") -> Episode:
     if random.random() < 0.2:
         return episode
     for _ in range(1 if random.random() < 0.6 else random.randint(2, 4)):
-        episode = random.choice(ODDITIES)(random, episode)
+        episode = random.choice(INJECTIONS)(random, episode)
     return episode
 
 
@@ -221,7 +221,7 @@ def _weighing(random: Random, part: PartSpec) -> tuple[PartSpec, ...]:
     return (replace(part, density_kg_m3=density, friction=friction),)
 
 
-ODDITIES: tuple[Callable[[Random, Episode], Episode], ...] = (
+INJECTIONS: tuple[Callable[[Random, Episode], Episode], ...] = (
     _switch,
     _switch,
     _switch,

@@ -22,7 +22,7 @@ class _Tick:
 
     Attributes:
         mark: What stands out about it; empty for nothing.
-        broken: Whether it is the one in which the goal is broken.
+        broken: Whether it is the one in which the obligation is broken.
         drawn: The cell; None where there is none.
     """
 

@@ -1,7 +1,7 @@
 """Statements once more, of copies: what a level would see if it looked at the same inputs again, which leaves everything as it is.
 
 In: flat statements. Out: the same over copies of the names that they write, made first. What is computed of reals keeps its value in a
-cycle (`flat`), so that it is the same when it is looked at again.
+cycle (`statements`), so that it is the same when it is looked at again.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -22,7 +22,7 @@ from rcsc.compose.promela.cycle.statements import (
 from rcsc.lang.model import Among, Apply, Expr, Read, VariableName
 
 COPIED = "again "
-"""What the name of a copy begins with, behind the level's."""
+"""What the name of a copy begins with, after the level's."""
 
 
 def again(flat: Flattener, block: Block) -> tuple[Block, Mapping[str, str]]:

@@ -1,4 +1,4 @@
-"""What is checked, by name: the goals of `compose.contract.obligations`, and the contract where both sides are in one model."""
+"""What is checked, by name: the obligations of `compose.contract.obligations`, and the contract where both sides are in one model."""
 
 from dataclasses import dataclass, field
 
@@ -16,7 +16,7 @@ class Aim:
     """One check.
 
     Attributes:
-        what: The words of `goals.Sort`, or one of the above.
+        what: The words of `obligations.Sort`, or one of the above.
         table: Whose it is; empty where it is the level's.
         name: Of the assumption, the buffer or the leaf.
     """

@@ -1,4 +1,4 @@
-"""What is checked of a cycle: the goals of `compose.contract.obligations`, said once more, of what the cycle does, not of nodes.
+"""What is checked of a cycle: the obligations of `compose.contract.obligations`, said once more, of what the cycle does, not of nodes.
 
 In: a level, flat, and its environment. Out: flat statements, which stand before the cycle, between its parts, and at its end. What the
 program itself states is said by `stated`.
@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 from rcsc.compose.contract.environment import COMMAND, ECHO, ECHOED, NUMBER, leaves_under
 from rcsc.compose.contract.obligations import FLAG, Sort
-from rcsc.compose.contract.transition import Stepper
+from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.promela.cycle.again import again
 from rcsc.compose.promela.cycle.aims import Aim, Aims
 from rcsc.compose.promela.cycle.environment import Environment, successor
@@ -37,39 +37,37 @@ class Checks:
     """The checks of one level.
 
     Attributes:
-        system: Every level's stepper.
+        system: Every level's transition system.
     """
 
     flat: Flattener
-    stepper: Stepper
+    ts: TransitionSystem
     around: Environment
-    system: Mapping[str, Stepper]
+    system: Mapping[str, TransitionSystem]
     aims: Aims
     _passed_over: list[tuple[str, Read]] = field(default_factory=list)
 
-    def goal(self, sort: Sort, holds: Expr, table: str = "", name: str = "") -> Flat:
+    def obligation(self, sort: Sort, holds: Expr, table: str = "", name: str = "") -> Flat:
         """One check."""
         return self.aims.check(Aim(self.flat.level, sort.value, table, name), holds)
 
     def remembered(self) -> Iterable[Flat]:
         """The orders and the flag before the cycle."""
         leaves = [
-            leaf
-            for below in self.stepper.links.below
-            for leaf in leaves_under(self.stepper.program, below.order)
+            leaf for below in self.ts.links.below for leaf in leaves_under(self.ts.program, below.order)
         ]
         if self._has(FLAG):
             leaves.append(FLAG)
         for leaf in leaves:
             yield Put(str(self.flat.old(leaf).name), self.flat.leaf(leaf))
         if self._flagged():
-            for table in self.stepper.program.tables:
+            for table in self.ts.program.tables:
                 if overlooking(table):
                     yield Put(str(self._overlooked(str(table.name)).name), NO)
 
     def seen(self) -> Iterable[Flat]:
         """Deferred states as the table sees them."""
-        for variable in self.stepper.program.variables:
+        for variable in self.ts.program.variables:
             if variable.deferred_until is not None:
                 seen = self.flat.new(f"{variable.name} at the table", variable.type)
                 yield Put(str(seen.name), self.flat.leaf(variable.name))
@@ -86,22 +84,22 @@ class Checks:
     def afterwards(self, look: Block) -> Iterable[Flat]:
         """What is said of a whole cycle; `look` is what the level does before its table."""
         yield from self._echoes()
-        for below in self.stepper.links.below:
+        for below in self.ts.links.below:
             yield from self._orders(below.order, below.report, below.name)
         if self._flagged():
             rises = both(self.flat.leaf(FLAG), negation(self.flat.old(FLAG)))
-            yield self.goal(Sort.ONCE, negation(both(self.same_number(), rises)), "", FLAG)
+            yield self.obligation(Sort.ONCE, negation(both(self.same_number(), rises)), "", FLAG)
         yield from self._answered(look)
-        for variable in self.stepper.program.variables:
+        for variable in self.ts.program.variables:
             if variable.deferred_until is not None:
                 now = self.flat.leaf(variable.name)
                 seen = self.flat.new(f"{variable.name} at the table", variable.type)
                 kept = either(same(now, seen), same(now, self.flat.leaf(pending(variable.name))))
-                yield self.goal(Sort.DEFERRED, kept, "", str(variable.name))
+                yield self.obligation(Sort.DEFERRED, kept, "", str(variable.name))
 
     def same_number(self) -> Expr:
         """No new order of the superior's was taken."""
-        above = self.stepper.links.above
+        above = self.ts.links.above
         assert above is not None
         return same(self.flat.leaf(f"{above.order}.{NUMBER}"), self.around.last_number(above))
 
@@ -113,39 +111,39 @@ class Checks:
         flag = self.flat.name(FLAG)
         up = read(copies.get(flag, flag), BOOL)
         for table, overlooked in self._passed_over:
-            yield Fork(((overlooked, (*once_more, self.goal(Sort.ANSWERED, up, table, FLAG))),))
+            yield Fork(((overlooked, (*once_more, self.obligation(Sort.ANSWERED, up, table, FLAG))),))
 
     def _echoes(self) -> Iterable[Flat]:
-        if (above := self.stepper.links.above) is None:
+        if (above := self.ts.links.above) is None:
             return
         number = same(self.flat.leaf(f"{above.report}.{ECHO}"), self.flat.leaf(f"{above.order}.{NUMBER}"))
         command = same(self.flat.leaf(f"{above.report}.{ECHOED}"), self.flat.leaf(f"{above.order}.{COMMAND}"))
-        yield self.goal(Sort.ECHOES, both(number, command), "", above.report)
+        yield self.obligation(Sort.ECHOES, both(number, command), "", above.report)
 
     def _orders(self, order: str, report: str, below: str) -> Iterable[Flat]:
         number, old = self.flat.leaf(f"{order}.{NUMBER}"), self.flat.old(f"{order}.{NUMBER}")
         stands = same(number, old)
         for leaf in self._relied_on(order, below):
             kept = same(self.flat.leaf(leaf), self.flat.old(leaf))
-            yield self.goal(Sort.NUMBERED, either(negation(stands), kept), "", leaf)
-        yield self.goal(Sort.NEXT_NUMBER, either(stands, same(number, successor(old))), "", order)
-        if self.stepper.links.above is not None:
+            yield self.obligation(Sort.NUMBERED, either(negation(stands), kept), "", leaf)
+        yield self.obligation(Sort.NEXT_NUMBER, either(stands, same(number, successor(old))), "", order)
+        if self.ts.links.above is not None:
             command = f"{order}.{COMMAND}"
             kept = same(self.flat.leaf(command), self.flat.old(command))
             waiting = both(self.same_number(), negation(same(self.flat.leaf(f"{report}.{ECHO}"), old)))
-            yield self.goal(Sort.WAITS, either(negation(waiting), kept), "", order)
+            yield self.obligation(Sort.WAITS, either(negation(waiting), kept), "", order)
             yield from self._paused(order)
 
     def _paused(self, order: str) -> Iterable[Flat]:
         """PAUSE, or what it is called, is the first command of each level that has a table for each."""
-        above = self.stepper.links.above
+        above = self.ts.links.above
         assert above is not None
-        if not isinstance(self.stepper.level.tables, OneTable):
+        if not isinstance(self.ts.level.tables, OneTable):
             taken, passed = (self.flat.leaf(f"{one}.{COMMAND}") for one in (above.order, order))
             is_new = negation(self.same_number())
             told = both(is_new, same(taken, Literal(0, taken.type)))
             kept = either(negation(told), same(passed, Literal(0, passed.type)))
-            yield self.goal(Sort.PAUSES, kept, "", order)
+            yield self.obligation(Sort.PAUSES, kept, "", order)
 
     def _relied_on(self, order: str, below: str) -> Iterable[str]:
         """The fields that the subordinate assumes to stand still under a number; the command always."""
@@ -158,7 +156,7 @@ class Checks:
         return self.flat.new(f"{table} passes over", BOOL)
 
     def _flagged(self) -> bool:
-        return self.stepper.links.above is not None and self._has(FLAG)
+        return self.ts.links.above is not None and self._has(FLAG)
 
     def _has(self, leaf: str) -> bool:
         return self.flat.name(leaf) in self.flat.kinds

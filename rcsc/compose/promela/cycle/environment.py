@@ -19,7 +19,7 @@ from rcsc.compose.contract.environment import (
     Below,
     leaves_under,
 )
-from rcsc.compose.contract.transition import NUMBERS, Stepper
+from rcsc.compose.contract.transition import NUMBERS, TransitionSystem
 from rcsc.compose.promela.cycle.aims import CONTRACT_ABOVE, CONTRACT_BELOW, Aim, Aims
 from rcsc.compose.promela.cycle.statements import (
     BOOL,
@@ -52,19 +52,17 @@ class Environment:
     """
 
     flat: Flattener
-    stepper: Stepper
-    inside: Mapping[str, Stepper]
+    ts: TransitionSystem
+    inside: Mapping[str, TransitionSystem]
     aims: Aims
     full: set[str] = field(default_factory=set)
     numbers: list[str] = field(default_factory=list)
 
     def taken(self) -> Iterable[Flat]:
         """Buffers of levels in the model, each read whole."""
-        links = self.stepper.links
+        links = self.ts.links
         if (above := links.above) is not None and above.name in self.inside:
-            upper = next(
-                one for one in self.inside[above.name].links.below if one.name == self.stepper.level.name
-            )
+            upper = next(one for one in self.inside[above.name].links.below if one.name == self.ts.level.name)
             yield from self._copied(above.order, f"{above.name}:{upper.order}")
         for below in links.below:
             if below.name in self.inside:
@@ -74,7 +72,7 @@ class Environment:
 
     def begin(self) -> Iterable[Flat]:
         """What the others say in this cycle."""
-        links = self.stepper.links
+        links = self.ts.links
         yield self._forget(links.free)
         if (above := links.above) is not None:
             self.numbers.append(self.flat.name(f"{above.order}.{NUMBER}"))
@@ -87,7 +85,7 @@ class Environment:
 
     def end(self) -> Iterable[Flat]:
         """What is remembered of this cycle, and whether the numbers have gone round."""
-        for below in self.stepper.links.below:
+        for below in self.ts.links.below:
             if below.name not in self.inside:
                 continue
             sent, echo = self._sent(below), self._echo(below)
@@ -96,9 +94,9 @@ class Environment:
 
     def anew(self) -> Iterable[Flat]:
         """Before a restart: every buffer may hold anything, and nothing was asked."""
-        inputs = tuple(str(v.name) for v in self.stepper.program.variables if v.kind is Kind.INPUT)
-        echoes = {f"{below.report}.{ECHO}" for below in self.stepper.links.below}
-        number = "" if self.stepper.links.above is None else f"{self.stepper.links.above.order}.{NUMBER}"
+        inputs = tuple(str(v.name) for v in self.ts.program.variables if v.kind is Kind.INPUT)
+        echoes = {f"{below.report}.{ECHO}" for below in self.ts.links.below}
+        number = "" if self.ts.links.above is None else f"{self.ts.links.above.order}.{NUMBER}"
         yield self._forget(tuple(leaf for leaf in inputs if leaf not in echoes and leaf != number))
 
     # --- outside the model ---
@@ -113,7 +111,7 @@ class Environment:
         number = self.flat.leaf(f"{above.order}.{NUMBER}")
         another = self.flat.new("another order", BOOL, lazy=True)
         numbered = self._forget(above.numbered)
-        order = leaves_under(self.stepper.program, above.order)
+        order = leaves_under(self.ts.program, above.order)
         self.full.add(self.flat.name(f"{above.order}.{COMMAND}"))
         yield Put(str(self.last_number(above).name), number)
         yield Fork(((another, (Put(str(number.name), successor(number)), numbered)),))
@@ -128,9 +126,7 @@ class Environment:
         echoed = f"{below.report}.{ECHOED}"
         self.full |= {self.flat.name(echoed), self.flat.name(f"{below.report}.{STATUS}")}
         yield self._forget(
-            leaf
-            for leaf in leaves_under(self.stepper.program, below.report)
-            if leaf != f"{below.report}.{ECHO}"
+            leaf for leaf in leaves_under(self.ts.program, below.report) if leaf != f"{below.report}.{ECHO}"
         )
         answered = (
             Put(str(echo.name), sent),
@@ -155,7 +151,7 @@ class Environment:
     # --- in the model ---
 
     def _copied(self, record: str, source: str) -> Iterable[Flat]:
-        for leaf in leaves_under(self.stepper.program, record):
+        for leaf in leaves_under(self.ts.program, record):
             yield Put(
                 self.flat.name(leaf), read(f"{source}{leaf.removeprefix(record)}", self.flat.leaf(leaf).type)
             )

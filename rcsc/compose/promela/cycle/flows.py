@@ -1,7 +1,7 @@
 """Which names hold the same data, and what that is compared with.
 
 In: flat statements. Out: `Group`s: names between which values are copied or that are compared with one another, with the constants that
-they meet. The small instance is made of this (`small`).
+they meet. The small instance is made of this (`instance`).
 """
 
 from collections.abc import Iterable, Mapping

@@ -1,7 +1,7 @@
 """What one level does in a cycle, and what is checked of it there, as flat statements.
 
-In: a level (`transition.Stepper`: program, level, links) and the levels of the same model. Out: a `Machine`. A `Draft` is the same without
-what the program itself states, which depends on what the drafts of all levels say together (`stated`).
+In: a level (`transition.TransitionSystem`: program, level, links) and the levels of the same model. Out: a `Machine`. A `Draft` is the
+same without what the program itself states, which depends on what the drafts of all levels say together (`stated`).
 """
 
 from collections.abc import Iterable, Mapping
@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 from rcsc.compose.contract.environment import COMMAND, NUMBER, STATUS
 from rcsc.compose.contract.obligations import Sort
-from rcsc.compose.contract.transition import SEEN, Stepper
+from rcsc.compose.contract.transition import SEEN, TransitionSystem
 from rcsc.compose.promela.cycle.aims import Aims
 from rcsc.compose.promela.cycle.checks import SMALL, Checks
 from rcsc.compose.promela.cycle.environment import Environment, successor
@@ -61,7 +61,7 @@ class Machine:
 
     level: str
     flat: Flattener
-    stepper: Stepper
+    ts: TransitionSystem
     take: Block
     cycle: Block
     restart: Block
@@ -86,22 +86,22 @@ class Maker:
     """Makes one `Machine`.
 
     Attributes:
-        system: Every level's stepper.
+        system: Every level's transition system.
         inside: Those of the levels in the model.
     """
 
-    stepper: Stepper
-    system: Mapping[str, Stepper]
-    inside: Mapping[str, Stepper]
+    ts: TransitionSystem
+    system: Mapping[str, TransitionSystem]
+    inside: Mapping[str, TransitionSystem]
     aims: Aims
     flat: Flattener = field(init=False)
     around: Environment = field(init=False)
     checks: Checks = field(init=False)
 
     def __post_init__(self) -> None:
-        self.flat = Flattener(self.stepper.level.name, self.stepper.program)
-        self.around = Environment(self.flat, self.stepper, self.inside, self.aims)
-        self.checks = Checks(self.flat, self.stepper, self.around, self.system, self.aims)
+        self.flat = Flattener(self.ts.level.name, self.ts.program)
+        self.around = Environment(self.flat, self.ts, self.inside, self.aims)
+        self.checks = Checks(self.flat, self.ts, self.around, self.system, self.aims)
 
     def draft(self) -> Draft:
         """The level without what its program states."""
@@ -110,9 +110,9 @@ class Maker:
         self.flat.new("many", SMALL)
         nowhere = tuple(Put(self.flat.name(one), Literal(0, SMALL)) for one in ("table", "line"))
         begun = (*nowhere, *self.checks.remembered(), *self.around.begin())
-        look = (*self._settle(), *self._modules(self.stepper.level.preprocess))
+        look = (*self._settle(), *self._modules(self.ts.level.preprocess))
         cycle = (
-            *begun, *look, *self.checks.seen(), *self._tables(), *self._modules(self.stepper.level.postprocess),
+            *begun, *look, *self.checks.seen(), *self._tables(), *self._modules(self.ts.level.postprocess),
             *self.checks.afterwards(look), *self.around.end(),
         )  # fmt: skip
         restart = () if len(self.inside) > 1 else (*self.around.anew(), *self._anew())
@@ -128,14 +128,14 @@ class Maker:
         """
         known = computed(self.flat, draft.cycle)
         stated = Stating(self.flat, self.aims, groups, numbers, known).stated()
-        own = {self.flat.name(v.name) for v in self.stepper.program.variables}
+        own = {self.flat.name(v.name) for v in self.ts.program.variables}
         cycle = (
             *stated.before, *draft.cycle, *stated.behind,
             Tell(self.flat.name("table"), self.flat.name("line")), Forget(tuple(sorted(self.flat.lazy - own))),
         )  # fmt: skip
         take = (*stated.earlier, *draft.take) if draft.take else ()
         return Machine(
-            self.stepper.level.name, self.flat, self.stepper, take,
+            self.ts.level.name, self.flat, self.ts, take,
             cycle if take else (*stated.earlier, *cycle), draft.restart,
             frozenset(self.around.full), tuple(self.around.numbers), self._ended(), stated.left_out,
         )  # fmt: skip
@@ -145,7 +145,7 @@ class Maker:
     def _settle(self) -> Iterable[Flat]:
         """All at once: every condition is looked at before any value is taken."""
         settled: list[Flat] = []
-        for variable in self.stepper.program.variables:
+        for variable in self.ts.program.variables:
             if variable.deferred_until is not None:
                 ready = self.flat.new(f"{variable.name} is ready", BOOL)
                 before, when = self.flat.condition(variable.deferred_until, "deferral")
@@ -160,16 +160,16 @@ class Maker:
             yield from self.flat.run(name)
 
     def _tables(self) -> Iterable[Flat]:
-        tables = {one.name: (at, one) for at, one in enumerate(self.stepper.program.tables)}
-        if isinstance(self.stepper.level.tables, OneTable):
-            yield from self._table(*tables[self.stepper.level.tables.table])
+        tables = {one.name: (at, one) for at, one in enumerate(self.ts.program.tables)}
+        if isinstance(self.ts.level.tables, OneTable):
+            yield from self._table(*tables[self.ts.level.tables.table])
             return
-        before, selector = self.flat.condition(self.stepper.level.tables.selector, "selector")
+        before, selector = self.flat.condition(self.ts.level.tables.selector, "selector")
         yield from before
         yield Fork(
             tuple(
                 (same(selector, Literal(value, selector.type)), tuple(self._table(*tables[name])))
-                for value, name in self.stepper.level.tables.tables
+                for value, name in self.ts.level.tables.tables
             )
         )
 
@@ -177,13 +177,13 @@ class Maker:
         """Assumptions, exactly one line, and what it runs."""
         line, many = read(self.flat.name("line"), SMALL), read(self.flat.name("many"), SMALL)
         yield Put(self.flat.name("table"), Literal(at, SMALL))
-        for assumption in self.stepper.program.assumptions:
+        for assumption in self.ts.program.assumptions:
             if assumption.name in table.assumptions:
                 before, holds = self.flat.condition(assumption.condition, "table")
                 yield from before
-                yield self.checks.goal(Sort.ASSUMPTION, holds, str(table.name), str(assumption.name))
+                yield self.checks.obligation(Sort.ASSUMPTION, holds, str(table.name), str(assumption.name))
         safe = []
-        for assumption in self.stepper.program.assumptions:
+        for assumption in self.ts.program.assumptions:
             if assumption.name in table.stops:
                 before, holds = self.flat.condition(assumption.condition, "table")
                 yield from before
@@ -204,8 +204,10 @@ class Maker:
         yield Match(tuple(conditions), str(line.name), str(many.name))
         if table.default is None or table.default.unreachable:
             sort = Sort.SOME_LINE if table.default is None else Sort.NO_DEFAULT
-            yield self.checks.goal(sort, Apply(Op.GE, (many, Literal(1, SMALL)), BOOL), str(table.name))
-        yield self.checks.goal(Sort.ONE_LINE, Apply(Op.LE, (many, Literal(1, SMALL)), BOOL), str(table.name))
+            yield self.checks.obligation(sort, Apply(Op.GE, (many, Literal(1, SMALL)), BOOL), str(table.name))
+        yield self.checks.obligation(
+            Sort.ONE_LINE, Apply(Op.LE, (many, Literal(1, SMALL)), BOOL), str(table.name)
+        )
         yield from self.checks.chosen(table, line, many)
         yield Fork(
             tuple(
@@ -236,10 +238,10 @@ class Maker:
             kind = self.flat.kinds.get(self.flat.name(leaf))
             if isinstance(kind, Enum) and member in kind.members:
                 yield Put(self.flat.name(leaf), Literal(kind.members.index(member), kind))
-        above = self.stepper.links.above
+        above = self.ts.links.above
         if above is not None and self._has(SEEN):
             yield Put(self.flat.name(SEEN), self.flat.leaf(f"{above.order}.{NUMBER}"))
-        for variable in self.stepper.program.variables:
+        for variable in self.ts.program.variables:
             record, _, part = variable.name.partition(".")
             if variable.kind is not Kind.OUTPUT or not record.startswith(ORDER):
                 continue
@@ -250,8 +252,8 @@ class Maker:
                 yield Put(self.flat.name(variable.name), successor(self.flat.leaf(echo)))
 
     def _ended(self) -> Expr:
-        above = self.stepper.links.above
-        if above is None or self.stepper.links.below or not self._has(f"{above.report}.{STATUS}"):
+        above = self.ts.links.above
+        if above is None or self.ts.links.below or not self._has(f"{above.report}.{STATUS}"):
             return NO
         status = self.flat.leaf(f"{above.report}.{STATUS}")
         assert isinstance(status.type, Enum)

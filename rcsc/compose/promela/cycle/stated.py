@@ -1,7 +1,7 @@
 """What the program itself states, its invariants and properties, as statements around the cycle.
 
 In: a level, flat, and the groups of names of the whole model. Out: `Stated`. An invariant is looked at before the cycle, with what the
-level begins with, and behind it; a property behind it, where `was x` is what `x` was when the cycle began, before anything was
+level begins with, and after it; a property after it, where `was x` is what `x` was when the cycle began, before anything was
 taken. Only leaves of which a property says `was` are remembered.
 
 A small instance has only a few values of reals, and what is computed of them is any of these; its numbers go round after few. A statement

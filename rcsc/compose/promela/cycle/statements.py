@@ -69,13 +69,13 @@ class Fork:
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """Goal number `goal` is broken where the condition does not hold.
+    """Obligation number `obligation` is broken where the condition does not hold.
 
     Attributes:
         apart: The names that it compares are to have values to differ by, where they would have only one.
     """
 
-    goal: int
+    obligation: int
     holds: Expr
     apart: bool = False
 
