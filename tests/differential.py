@@ -1,6 +1,6 @@
 """Whole cycles of drawn programs: an evaluator of its own, the interpreter, the Python and the C executor agree.
 
-`python -m tests.differential --count 100000 --seed 1` for a long run; `tests/test_fuzz.py` makes a short one in the suite.
+`python -m tests.differential --count 100000 --seed 1` for a long run; `tests/emit/test_fuzz.py` makes a short one in the suite.
 
 A program is drawn as pairs of a text and a function: what stands in the table's language, and what it means, written down here a
 second time from the manual, without anything of rcsc's. Programs are safe by construction, so that they need no proof: values are

@@ -41,9 +41,9 @@ from rcsc.lang.resolve import resolve
 from rcsc.solvers.options import Options
 from rcsc_cell.episodes.episode import Episode, FaultSpec, Interruption, Restart
 from rcsc_cell.episodes.loop import Loop
-from tests.emitted import emitted
-from tests.faults_made import LEVELS, Fault, sample
 from tests.matrix import ACQUIRE, project
+from tests.support.emitted import emitted
+from tests.support.faults_made import LEVELS, Fault, sample
 
 REPO = Path(__file__).parents[1]
 CACHE = REPO / "tables" / ".rcsc-cache" / "faults"

@@ -1,6 +1,6 @@
 """Fuzzes the whole pipeline with garbage and with mutated tables: only coded errors, no hang, bounded memory.
 
-`python -m tests.fuzz --runs 100000 --seed 1` for a long run; `tests/test_fuzz.py` makes a short one in the suite. With
+`python -m tests.fuzz --runs 100000 --seed 1` for a long run; `tests/emit/test_fuzz.py` makes a short one in the suite. With
 `--names` programs of adversarial names, types and docs are emitted, compiled by gcc and clang under the strict flags, imported and run: C,
 Python, interpreter and the evaluator of `tests.differential` agree.
 """

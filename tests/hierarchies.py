@@ -34,14 +34,14 @@ from rcsc.compose.proof.level import LevelProof, Verdict, essential, prove_level
 from rcsc.compose.proof.system import NoProgramError, transition_systems
 from rcsc.lang.interpret import Fault
 from rcsc.symbolic.values import TRUE
-from tests.hierarchies_endless import edges, endless
-from tests.hierarchies_explored import Explored, TooManyError, explored
-from tests.hierarchies_level import EARLY, Again, Key, Reading, Role, State
-from tests.hierarchies_made import ODD, Hierarchy
-from tests.hierarchies_more import SLIPS, furnished
-from tests.hierarchies_text import files, written
-from tests.hierarchies_together import Pair, broken_together
-from tests.hierarchies_world import allowed, broken, wanted
+from tests.small_hierarchies.endless import edges, endless
+from tests.small_hierarchies.explored import Explored, TooManyError, explored
+from tests.small_hierarchies.level import EARLY, Again, Key, Reading, Role, State
+from tests.small_hierarchies.made import ODD, Hierarchy
+from tests.small_hierarchies.more import SLIPS, furnished
+from tests.small_hierarchies.text import files, written
+from tests.small_hierarchies.together import Pair, broken_together
+from tests.small_hierarchies.world import allowed, broken, wanted
 
 LITTLE = Effort(walks=6, cycles=20)
 MOST_CYCLES = 7

@@ -61,10 +61,12 @@ MODULES = tuple(
     for name in names.split()
 )
 TESTS = tuple(
-    f"tests/test_{name}.py"
+    f"tests/{name}.py"
     for name in """
-    boxes operators bounds regions obligations invariants interpret proofs certify verdicts stops properties_language composed_sound
-    composed_search endings standing hierarchies compose diff
+    table/test_boxes lang/test_operators lang/test_bounds table/test_regions table/test_obligations table/test_invariants
+    lang/test_interpret table/test_proofs table/test_certify table/test_verdicts table/test_stops compose/test_properties_language
+    compose/test_composed_sound compose/test_composed_search compose/test_endings compose/test_standing compose/test_hierarchies
+    compose/test_compose diff/test_diff
     """.split()
 )
 Key = TypeVar("Key")

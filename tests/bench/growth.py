@@ -3,7 +3,7 @@
 Chains of n levels and m tables, in the shape of the shipped ones: every level has a PAUSE table and a table for each other command, each of
 which orders two commands of the level below, one after the other; states are deferred, orders numbered, DEFAULT declared unreachable.
 Printed: seconds and questions to the solvers, of a level and of the system, what is not proved (`open`), and the ratio to the row before.
-Levels are proved one by one: the questions of a system are the sum of its levels' (`tests/test_hierarchies.py`).
+Levels are proved one by one: the questions of a system are the sum of its levels' (`tests/compose/test_hierarchies.py`).
 """
 
 import argparse
@@ -22,8 +22,8 @@ from rcsc.compose.proof.level import essential, prove_level
 from rcsc.compose.proof.system import transition_systems
 from rcsc.solvers.sat import Sat
 from rcsc.solvers.smt import Solver
-from tests.hierarchies_made import BOTTOM, RIGHT, Hierarchy, Line, MadeLevel, MadeTable
-from tests.hierarchies_text import written
+from tests.small_hierarchies.made import BOTTOM, RIGHT, Hierarchy, Line, MadeLevel, MadeTable
+from tests.small_hierarchies.text import written
 
 DEEPER = tuple((20,) * levels for levels in (1, 2, 4, 7, 10))
 """Tables of each level, from the top down: the same for all, and more and more levels."""

@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 from rcsc.run.buffers import Buffers, CommonMemory
 from rcsc.run.processes.memory import SharedMemoryBuffers
-from tests.processes_outside import echo, pattern, wide
+from tests.support.processes_outside import echo, pattern, wide
 
 ROUNDS = 20_000
 TRIPS_S = 3.0

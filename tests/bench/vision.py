@@ -16,7 +16,7 @@ import numpy as np
 
 from rcsc_cell.vision.flood import Found, find
 from rcsc_cell.vision.line import Surface, measure
-from tests.scenes import SIZES, Scene, Size, anywhere, between, expected_mm, features
+from tests.support.scenes import SIZES, Scene, Size, anywhere, between, expected_mm, features
 
 POSES = 100
 FLOOD_REACH_MM, LINE_REACH_MM = 60.0, 1.0

@@ -1,7 +1,7 @@
 """The mechanism as physics: MuJoCo moves arm, fingers, jaws and parts, and parts by contact forces only.
 
 What would be cheating is not here: no weld, no pose of a part written after the first cycle, no adhesion, no gravity switched off for
-a part; and the image processing is given pictures, never a pose. tests/test_honest.py looks.
+a part; and the image processing is given pictures, never a pose. tests/cell/test_honest.py looks.
 """
 
 import copy

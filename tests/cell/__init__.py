@@ -1,0 +1,1 @@
+"""The cell: plants, vision, workstation, pictures, and what would be cheating."""

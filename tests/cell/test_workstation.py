@@ -1,0 +1,409 @@
+"""The database, the scripts, the interlocks, and the commands that use them: what is wrong is said before anything moves."""
+
+import json
+import shutil
+import sqlite3
+from pathlib import Path
+
+import pytest
+
+from rcsc.commands import run
+from rcsc.run.system import System
+from rcsc_cell.cell import reach
+from rcsc_cell.cell.mujoco_model import Body
+from rcsc_cell.cell.plant import Plant
+from rcsc_cell.cell.ready import Lying, lying, plant
+from rcsc_cell.database.ask import Database, open_database
+from rcsc_cell.database.build import BadData, build
+from rcsc_cell.workstation.interlocks import Cell, after, refusal
+from rcsc_cell.workstation.prepared import prepare
+from rcsc_cell.workstation.script import BadScript, Row, read_script
+from tests.support.cells import REPO, SYSTEM
+
+PARTS = ("null_obj", "tbox", "bbox", "flag", "hous", "close_grip", "unknown_object")
+DATA = (SYSTEM.parent / "cell.toml").read_text(encoding="utf-8")
+HEAD = "command,part,source,dest,end_at\n"
+
+
+def kinematic(database: Database) -> list[Plant]:
+    """What stands outside, without physics."""
+    return [plant(database, "kinematic")]
+
+
+@pytest.fixture
+def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A copy of tables and generated files."""
+    shutil.copytree(REPO / "tables", tmp_path / "tables", ignore=shutil.ignore_patterns(".rcsc-cache"))
+    shutil.copytree(REPO / "generated", tmp_path / "generated")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+# --- data ---
+
+WRONG_DATA = {
+    "a location that is not there": (
+        'safe = "FIX-SAFE"',
+        'safe = "NOWHERE"',
+        "no location is called `NOWHERE`",
+    ),
+    "a part that the tables do not know": ("[object.hous", "[object.horse", "no part is called `horse`"),
+    "out of reach": ("x = 198.4, y = 545.0", "x = 198.4, y = 1545.0", "mm from the base, out of reach"),
+    "too high": ("y = 545.0, z = 350.0", "y = 545.0, z = 1350.0", "mm high, out of reach"),
+    "a gripper that does not open": ("departure_mm = 90.0", "departure_mm = 20.0", "do not open wider"),
+    "too many in stock": ("stock = 10", "stock = 200", "from 0 to 99, not `200`"),
+    "vision without a view": ('vupos = "BUFFER-VUPOS"\n', "", "`vupos`"),
+    "a missing value": ("breakpoint_mm = 30.0\n", "", "breakpoint_mm"),
+    "no TOML": ("[robot]", "[robot", "not TOML"),
+}
+
+
+@pytest.mark.parametrize("name", list(WRONG_DATA))
+def test_data_that_is_not_in_order_makes_no_database(name: str, tmp_path: Path) -> None:
+    old, new, said = WRONG_DATA[name]
+    assert old in DATA
+    (tmp_path / "cell.toml").write_text(DATA.replace(old, new), encoding="utf-8")
+    with pytest.raises(BadData, match=said):
+        build(tmp_path / "cell.toml", tmp_path / "cell.sqlite", PARTS)
+    assert not (tmp_path / "cell.sqlite").exists()
+
+
+def test_a_missing_or_broken_database_is_a_coded_error(
+    project: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    (project / "broken").write_bytes(b"no database" * 100)
+    for file in ("missing", "broken"):
+        assert run(["run", "make_boxt", "--no-compile", "--database", file]) == 1
+        said = capfd.readouterr()
+        assert "error[RCS722]" in said.err
+        assert said.out == ""
+
+
+FOREIGN = {
+    "a view in place of a table": "drop table parts; create view parts as with recursive n(x) as (select 1 union all select x + 1 from n) "
+    "select 1, 1.0, 1.0, 1.0, 1.0 from n",
+    "a column that is computed": "drop table meta; "
+    "create table meta (x, digest text as (hex(zeroblob(400000000)))); insert into meta (x) values (1)",
+    "a table beside its own": "create table more (x)",
+    "a trigger": "create trigger t after insert on meta begin delete from parts; end",
+    "a column less": "alter table robot drop column pad_mm",
+    "a text for a number": "update points set x0 = 'far'",
+    "bytes for a text": "update locations set name = x'ff' where number = 1",
+    "a number for no number": "update grasps set force_n = 9e999",
+    "a number that nothing is as long as": "update objects set length_mm = 1e300",
+    "a length below 0": "update stations set length_mm = -5",
+    "text that a terminal obeys": "update locations set name = 'a' || char(27) || '[2J' where number = 1",
+    "text that turns about": "update objects set name = char(8238) || name where number = 1",
+    "text that is not UTF-8": "update trajectories set name = cast(x'ff' as text) where name = 'fast'",
+    "a part that is not described": "update parts set object = 99",
+    "a way without its points": "update places set approach_count = 1000000",
+    "no robot": "delete from robot",
+    "a fixture without its numbers": "update stations set vise = '{}' where name = 'fixture'",
+    "a fixture that is nested deep": "update stations set vise = replace(hex(zeroblob(5000)), '0', '[')",
+}
+
+
+@pytest.mark.parametrize("what", list(FOREIGN))
+def test_a_database_of_somebody_else_is_read_as_what_it_must_be(
+    what: str, project: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    build(project / "tables/cell.toml", project / "a?b%.sqlite", PARTS)
+    held = sqlite3.connect(project / "a?b%.sqlite")
+    assert run(["db", "show", "stations", "--database", "a?b%.sqlite"]) == 0
+    held.executescript(FOREIGN[what])
+    held.close()
+    for command in (["db", "show", "locations"], ["run", "make_boxt", *QUICK]):
+        capfd.readouterr()
+        assert run([*command, "--database", "a?b%.sqlite"]) == 1
+        said = capfd.readouterr()
+        assert said.err.startswith("error[RCS722]: `a?b%.sqlite` is no database of a cell: ")
+        assert (said.err.strip().isprintable(), said.out) == (True, "")
+
+
+def test_a_long_text_is_shown_short(project: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    build(project / "tables/cell.toml", project / "my.sqlite", PARTS)
+    held = sqlite3.connect(project / "my.sqlite")
+    held.executescript(
+        "update objects set name = replace(hex(zeroblob(5000)), '0', 'long' || char(9)) where number = 1"
+    )
+    held.close()
+    assert run(["db", "show", "objects", "--database", "my.sqlite"]) == 0
+    shown = capfd.readouterr().out.splitlines()
+    assert max(map(len, shown)) < 2500
+    assert {line.count("\t") for line in shown} == {shown[0].count("\t")}
+
+
+def test_a_pallet_has_a_place_for_each_sector_and_others_ignore_it(tmp_path: Path) -> None:
+    (tmp_path / "cell.toml").write_text(DATA, encoding="utf-8")
+    build(tmp_path / "cell.toml", tmp_path / "cell.sqlite", PARTS)
+    held = open_database(tmp_path / "cell.sqlite")
+    station, safe = held.locations["STATION"], held.locations["WS-SAFE"]
+    grasps = {int(held.route(station, sector)[-1]) for sector in range(4)}
+    assert len({held.point(point)[1:3] for point in grasps}) == 4
+    assert held.route(station, 4)[0] is False
+    assert held.route(safe, 3) == held.route(safe, 0)
+
+
+QUICK = ("--no-compile", "--plant", "kinematic")
+
+
+def test_db_commands(project: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    assert run(["db", "check"]) == 0
+    assert not (project / "tables/.rcsc-cache").exists(), "looking makes nothing"
+    assert run(["db", "build", "-o", "my.sqlite"]) == 0
+    assert run(["run", "make_boxt", *QUICK, "--database", "my.sqlite", "-q"]) == 0
+    assert run(["db", "show", "places"]) == 0
+    assert "location\tsector" in capfd.readouterr().out
+    assert run(["db", "show", "nothing"]) == 2
+    (project / "tables/cell.toml").write_text(DATA.replace("z = 350.0", "z = 3000.0"), encoding="utf-8")
+    assert run(["db", "check"]) == 1
+    assert "error[RCS722]: location `FIX-SAFE`" in capfd.readouterr().err
+
+
+@pytest.mark.parametrize("command", [["db", "check"], ["db", "build"], ["run", "make_boxt", *QUICK]])
+def test_a_station_turned_so_that_the_arm_cannot_follow_is_named(
+    command: list[str], project: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Every point is as near and as high as before: only the joints tell."""
+    turned = DATA.replace("y = -217.3, z = 350.0, yaw = -22.0", "y = -217.3, z = 350.0, yaw = 158.0")
+    assert turned != DATA
+    (project / "tables/cell.toml").write_text(turned, encoding="utf-8")
+    build(project / "tables/cell.toml", project / "other.sqlite", PARTS)
+    assert run(command) == 1
+    said = capfd.readouterr()
+    assert "error[RCS722]: " in said.err
+    assert "location `V-BLK1`" in said.err
+    assert "BUFFER`:" not in said.err
+    assert said.out == ""
+    if command[0] == "db":
+        assert not (project / "tables/.rcsc-cache").exists(), "nothing is written"
+
+
+@pytest.fixture
+def looks(project: Path, monkeypatch: pytest.MonkeyPatch) -> list[Database]:
+    """The databases that the arm has gone everywhere in; beside it a script of one short row."""
+    seen: list[Database] = []
+    unreachable = reach.unreachable
+
+    def look(held: Database) -> tuple[str, ...]:
+        seen.append(held)
+        return unreachable(held)
+
+    monkeypatch.setattr(reach, "unreachable", look)
+    monkeypatch.delenv("RCSC_CACHE_DIR", raising=False)
+    (project / "short.csv").write_text(HEAD + "MOVE,,,WS-SAFE,\n", encoding="utf-8")
+    return seen
+
+
+SHORT = ["run", "short.csv", *QUICK, "-q"]
+
+
+def test_the_arm_goes_everywhere_once_in_each_database(looks: list[Database], project: Path) -> None:
+    data = project / "tables/cell.toml"
+    for text in (DATA, DATA.replace("stock = 10", "stock = 9"), DATA + "# other bytes, the same cell\n"):
+        data.write_text(text, encoding="utf-8")
+        assert [run(SHORT), run(SHORT)] == [0, 0]
+    assert [9 in held.stock.values() for held in looks] == [False, True]
+
+
+def test_a_cell_in_which_the_arm_cannot_go_everywhere_is_refused_every_time(
+    looks: list[Database], project: Path
+) -> None:
+    """The first refusal leaves a database that is as new as the data: that is not what is asked."""
+    turned = DATA.replace("y = -217.3, z = 350.0, yaw = -22.0", "y = -217.3, z = 350.0, yaw = 158.0")
+    (project / "tables/cell.toml").write_text(turned, encoding="utf-8")
+    assert [run(SHORT), run(SHORT)] == [1, 1]
+    assert len(looks) == 2
+
+
+def test_a_database_that_was_made_without_a_look_is_looked_at(
+    looks: list[Database], project: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert run(["db", "show"]) == 0
+    assert not looks
+    assert [run(SHORT), len(looks)] == [0, 1]
+    # one that was brought along, and is none that anybody looked at
+    (project / "tables/other.toml").write_text(DATA.replace("z = 350.0", "z = 355.0"), encoding="utf-8")
+    build(project / "tables/other.toml", project / "other.sqlite", PARTS)
+    assert [run([*SHORT, "--database", "other.sqlite"]), len(looks)] == [0, 2]
+    assert [run([*SHORT, "--database", "other.sqlite"]), len(looks)] == [0, 2]
+    monkeypatch.setattr(reach, "RULES", ("arm.py",))  # as if they had changed
+    assert [run(SHORT), len(looks)] == [0, 3]
+
+
+def test_what_db_build_made_need_not_be_looked_at_again(looks: list[Database]) -> None:
+    assert [run(["db", "build"]), len(looks)] == [0, 1]
+    assert [run(SHORT), len(looks)] == [0, 1]
+    assert [run(["db", "check"]), len(looks)] == [0, 2]  # who asks for it gets it
+
+
+def test_what_was_gripped_with_any_grasp_can_be_let_go_of(tmp_path: Path) -> None:
+    """TASK remembers an unknown object by the number of the grasp that was tried."""
+    build(SYSTEM.parent / "cell.toml", tmp_path / "cell.sqlite", PARTS)
+    held = open_database(tmp_path / "cell.sqlite")
+    unknown = held.objects["unknown_object"]
+    tried = {grasp for part in held.objects.values() for grasp in range(10) if held.fingers(part, grasp)[0]}
+    assert tried == {0, 2, 3}
+    assert {grasp for grasp in tried if held.fingers(unknown, grasp)[0]} == tried
+
+
+# --- scripts ---
+
+
+@pytest.mark.parametrize(
+    ("row", "said"),
+    [
+        ("DANCE,,,,", "is no command"),
+        ("VISE-TURN LEFT,,,,", "nothing that a vise can do"),
+        ("MOVE,BOX (2),BUFFER,FIX-MAC1,", "is no part"),
+        ("MOVE,,,fix mac,", "is no location"),
+    ],
+)
+def test_rows_that_say_nothing_are_named(row: str, said: str, tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text(f"{HEAD}MOVE,,,WS-SAFE,\n{row}\n", encoding="utf-8")
+    with pytest.raises(BadScript, match=f"row 2: .*{said}"):
+        read_script(tmp_path / "a.csv")
+
+
+def test_scripts_that_cannot_be_run_are_coded_errors(
+    project: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    (project / "place.csv").write_text(f"{HEAD}MOVE,,,MOON,\n", encoding="utf-8")
+    (project / "columns.csv").write_text("a,b\n1,2\n", encoding="utf-8")
+    (project / "latin.csv").write_bytes(HEAD.encode() + b"MOVE,\xff,,,\n")
+    for script in ("place.csv", "columns.csv", "latin.csv", "missing"):
+        assert run(["run", script, *QUICK]) == 1
+        assert "error[RCS723]" in capfd.readouterr().err, script
+
+
+def test_the_scripts_are_fig_7() -> None:
+    printed = read_script(SYSTEM.parent / "scripts/make_boxt_printed.csv")
+    mended = read_script(SYSTEM.parent / "scripts/make_boxt.csv")
+    assert len(printed) == 25
+    assert [row.text for row in mended if row.text not in {one.text for one in printed}] == []
+    assert len(mended) == 27
+
+
+# --- interlocks ---
+
+CLOSED = Cell(right_open=False, left_open=False, fixture="tbox", robot_at="FIX-SAFE")
+REFUSED = {
+    "no part": (
+        Cell(right_open=False, left_open=False, robot_at="FIX-SAFE"),
+        Row(1, "", machine="ENGRAVE PART"),
+    ),
+    "open vise": (Cell(fixture="tbox", robot_at="FIX-SAFE"), Row(1, "", machine="ENGRAVE PART")),
+    "robot there": (
+        Cell(right_open=False, left_open=False, fixture="tbox", robot_at="FIX-MAC4"),
+        Row(1, "", machine="ENGRAVE PART"),
+    ),
+    "loose part": (CLOSED, Row(1, "", vise={"right": True})),
+    "full fixture": (
+        Cell(fixture="tbox", robot_at="WS-SAFE"),
+        Row(1, "", "move", part="bbox", source="BUFFER", dest="FIX-MAC1"),
+    ),
+    "closed vise": (
+        Cell(right_open=False),
+        Row(1, "", "move", part="bbox", source="BUFFER", dest="FIX-MAC1"),
+    ),
+    "nothing held": (Cell(), Row(1, "", "release")),
+    "nothing to take": (Cell(), Row(1, "", "acquire", part="tbox", source="FIX-MAC5")),
+    "held already": (Cell(held="tbox"), Row(1, "", "acquire", part="tbox", source="BUFFER")),
+}
+
+
+@pytest.mark.parametrize("name", list(REFUSED))
+def test_interlocks_refuse(name: str) -> None:
+    assert refusal(*REFUSED[name])
+
+
+def test_interlocks_let_the_corrected_script_pass() -> None:
+    cell = Cell()
+    for row in read_script(SYSTEM.parent / "scripts/make_boxt.csv"):
+        assert not refusal(cell, row), row
+        cell = after(cell, row)
+    assert (cell.held, cell.fixture, cell.robot_at) == ("", "", "STATION") or cell.robot_at == "WS-SAFE"
+
+
+def test_a_failed_row_stops_the_script_and_can_be_tried_again() -> None:
+    made = prepare(SYSTEM, "make_boxt", "c", kinematic)
+    outside = made.system.outside[1]
+    assert isinstance(outside, Plant)
+    outside.faults.blind = True
+    *_, last = made.steps()
+    assert (last.row.number, last.state, last.reason) == (2, "failed", "loc")
+    for _ in range(40):
+        made.system.step()
+    assert made.system.level("primitive").shown("to_robot.input_command") == "hold"
+    outside.faults.blind = False
+    made.station.resume()
+    assert [result.state for result in made.steps()] == ["done"] * 26
+
+
+def test_a_part_of_the_wrong_size_is_let_go_of_and_the_next_is_acquired() -> None:
+    def house_in_the_fixture(database: Database) -> list[Plant]:
+        frame = database.stations["fixture"].frame
+        house = Lying(4, Body((70.0, 50.0, 50.0), frame.point((0.0, 0.0, 45.0)), frame.turn))
+        return [plant(database, "kinematic", [*lying(database), house])]
+
+    rows = (
+        Row(1, "", "acquire", part="tbox", grasp=3, source="FIX-MAC5"),
+        Row(2, "", "release", end_at="FIX-SAFE"),
+        Row(3, "", "acquire", part="tbox", grasp=2, source="BUFFER"),
+    )
+    made = prepare(SYSTEM, rows, "c", house_in_the_fixture)
+    made.station.cell = Cell(fixture="tbox")  # as a script before this one left it
+    [failed] = made.steps()
+    assert (failed.state, failed.reason) == ("failed", "pic")
+    assert made.station.cell.held == "unknown_object"
+    made.station.resume()
+    made.station.begin_at(1)
+    assert [(one.state, one.reason) for one in made.steps()] == [("done", ""), ("done", "")]
+    assert made.system.level("task").shown("obj_now_in_gripper") == "tbox"
+    [*_, house] = made.system.outside[1].mechanism.parts()  # type: ignore[attr-defined]  # a plant
+    assert house.at_mm[2] == pytest.approx(395.0, abs=1.0), "it lies where it lay"
+
+
+def _shifted(world: Plant, by_mm: float) -> None:
+    """Somebody moves the first part aside."""
+    said = json.loads(json.dumps(world.state()))
+    said["mechanism"]["poses"][0]["at_mm"][0] += by_mm
+    world.restore(said)
+
+
+def test_a_part_that_was_not_picked_up_is_counted_on_the_buffer_again() -> None:
+    """Taken away as the hand comes down, which closes on nothing: the count falls by one, and rises again, once."""
+    rows = tuple(Row(at, "", "acquire", part="tbox", grasp=2, source="BUFFER") for at in (1, 2))
+    made = prepare(SYSTEM, rows, "c", kinematic)
+    world = made.system.outside[1]
+    assert isinstance(world, Plant)
+    counts: list[int] = []
+
+    def watch(system: System, _: object) -> None:
+        count = int(system.level("task").value("tbuffer_boxt"))
+        if counts[-1:] != [count]:
+            counts.append(count)
+            _shifted(world, {2: 300.0, 3: -300.0}.get(len(counts), 0.0))
+
+    made.system.watch.append(watch)
+    [failed] = made.steps()
+    assert (failed.state, failed.reason) == ("failed", "pic")
+    for _ in range(20):
+        made.system.step()
+    assert counts == [10, 9, 10]
+    made.station.resume()
+    assert [one.state for one in made.steps()] == ["done", "refused"]
+    assert counts == [10, 9, 10, 9]
+
+
+def test_a_level_whose_proof_fails_does_not_run(project: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    file = project / "tables/gripper/gripper.rcs"
+    text = file.read_text(encoding="utf-8")
+    line = next(
+        one
+        for one in text.splitlines()
+        if one.startswith("  | 6    | false       | d_state   |            |")
+    )
+    file.write_text(text.replace(line + "\n", "", 1), encoding="utf-8")
+    assert run(["run", "make_boxt"]) == 1
+    assert "error[RCS401]" in capfd.readouterr().out

@@ -1,0 +1,1 @@
+"""Commands, documents and the package as a user meets them."""

@@ -1,0 +1,412 @@
+"""The levels proved together: a small system of two levels in full, broken in many ways, and the shipped levels."""
+
+import json
+import re
+import shutil
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from random import Random
+
+import pytest
+
+from rcsc.commands import run
+from rcsc.compose.contract.obligations import Obligation, Sort, obligations
+from rcsc.compose.contract.predicates import point
+from rcsc.compose.contract.transition import Cycle, TransitionSystem
+from rcsc.compose.contract.variants import undeferred
+from rcsc.compose.contract.walk import Walk
+from rcsc.compose.counterexample.finding import of_trace, time_line
+from rcsc.compose.counterexample.trace import Trace, broken, shortest
+from rcsc.compose.invariant.cubes import Reached
+from rcsc.compose.invariant.search import Effort
+from rcsc.compose.proof.assume_guarantee import agreements
+from rcsc.compose.proof.level import LevelProof, Verdict, certificate, essential, prove_level
+from rcsc.compose.proof.system import NoProgramError, SystemProof, prove_system, transition_systems
+from rcsc.lang.interpret import Fault, cycle, initial
+from rcsc.lang.model import Kind, Real
+from rcsc.run.adopt import adopt
+from rcsc.run.description import BadDescription, description
+from rcsc.run.system import signatures
+from rcsc.solvers.smtlib import cvc5_refutes
+from rcsc.symbolic import values
+
+REPO = Path(__file__).parents[2]
+SMALL = REPO / "tests" / "data" / "composed"
+SHIPPED = REPO / "tables" / "system.toml"
+LITTLE = Effort(walks=10, cycles=80)
+
+Edit = Callable[[str], str]
+
+
+def changed(folder: Path, **edits: Edit) -> Path:
+    """The small system with some files edited."""
+    shutil.copytree(SMALL, folder, dirs_exist_ok=True)
+    for name, edit in edits.items():
+        path = folder / f"{name}.rcs"
+        before = path.read_text(encoding="utf-8")
+        after = edit(before)
+        assert after != before, f"the edit of {name} does nothing"
+        path.write_text(after, encoding="utf-8")
+    return folder / "system.toml"
+
+
+def swap(old: str, new: str) -> Edit:
+    return lambda text: text.replace(old, new)
+
+
+def without_line(start: str) -> Edit:
+    return lambda text: "\n".join(line for line in text.split("\n") if not line.strip().startswith(start))
+
+
+def obligation_of(ts: TransitionSystem, sort: Sort, table: str = "", name: str = "") -> Obligation:
+    every = obligations(ts, ts.cycle(ts.havoc()))
+    return next(one for one in every if (one.sort, one.table, one.name) == (sort, table, name))
+
+
+@pytest.fixture(scope="module")
+def small() -> SystemProof:
+    return prove_system(SMALL / "system.toml", LITTLE)
+
+
+@pytest.fixture(scope="module")
+def upper() -> tuple[TransitionSystem, LevelProof]:
+    ts = transition_systems(SMALL / "system.toml")["upper"]
+    return ts, prove_level(ts, LITTLE)
+
+
+# --- what is right is proved ---------------------------------------------------------------
+
+
+def test_everything_is_proved_of_two_levels_that_keep_to_the_protocol(small: SystemProof) -> None:
+    assert small.proved
+    assert [proof.open for proof in small.levels] == [(), ()]
+    assert small.levels[0].verdict(Sort.ASSUMPTION, "work", "in_step") is Verdict.PROVED
+
+
+def test_what_a_level_assumes_of_a_level_is_what_was_proved_of_it(small: SystemProof) -> None:
+    inside = {(one.level, one.reason.split(":")[0]) for one in small.agreements if not one.outside}
+    assert inside == {("upper", "proved of `lower`"), ("lower", "proved of `upper`")}
+    assert [one.level for one in small.agreements if one.outside] == ["upper"]  # the station
+
+
+def test_no_state_that_the_interpreter_reaches_breaks_the_invariant(
+    upper: tuple[TransitionSystem, LevelProof],
+) -> None:
+    ts, proof = upper
+    assert proof.clauses
+    for seed in range(1000, 1012):  # other walks than those that the search began with
+        walk = Walk(ts.program, ts.level, ts.links, Random(seed))  # noqa: S311  # repeatable on purpose
+        for state in walk.states(80):
+            here = Reached.of([point(ts, proof.predicates, state)], len(proof.predicates))
+            assert not any(here.shows(clause) for clause in proof.clauses)
+
+
+def test_the_proof_is_the_same_each_time(upper: tuple[TransitionSystem, LevelProof]) -> None:
+    ts, proof = upper
+    again = prove_level(ts, LITTLE)
+    assert again.clauses == proof.clauses
+
+
+# --- certificates --------------------------------------------------------------------------
+
+
+def test_another_solver_confirms_every_question(upper: tuple[TransitionSystem, LevelProof]) -> None:
+    questions = certificate(*upper)
+    assert {name.split()[0] for name in questions} == {"first", "restart", "step", "goals", "lines", "ends"}
+    assert [name for name, text in questions.items() if not cvc5_refutes(text)] == []
+
+
+def test_another_solver_refuses_an_invariant_that_is_none(upper: tuple[TransitionSystem, LevelProof]) -> None:
+    ts, proof = upper
+    predicates = [one.name for one in proof.predicates]
+    never = ((predicates.index("cur_state"), 2),)  # that the level is never under way
+    false = LevelProof(proof.level, proof.found, proof.predicates, (*proof.clauses, never), 0, 0, 0.0)
+    assert not all(cvc5_refutes(text) for text in certificate(ts, false).values())
+
+
+# --- what is wrong is found ----------------------------------------------------------------
+
+HOLD = "} else if begun and lower.inc_command_echo = to_lower.inc_command {\n    new_command := false"
+DROPPED = "} else {\n    new_command := false"
+UPPER_FAULTS: dict[str, tuple[Edit, Sort, str, str]] = {
+    "the new-command flag is not held": (swap(HOLD, DROPPED), Sort.ASSUMPTION, "work", "in_step"),
+    "any echo will do": (
+        swap("cur_state : stage = d_state deferred until lower.inc_command_echo = to_lower.inc_command",
+             "cur_state : stage = d_state deferred until lower.inc_command_echo > 0"),
+        Sort.ASSUMPTION, "work", "in_step",
+    ),
+    "a line is missing": (without_line("| 4 "), Sort.NO_DEFAULT, "work", ""),
+    "a state is written directly": (
+        swap("next cur_state := value", "cur_state := value"), Sort.DEFERRED, "", "cur_state",
+    ),
+    "orders are not numbered": (
+        swap("to_lower.input_command /= old_command", "false"), Sort.NUMBERED, "", "to_lower.input_command",
+    ),
+    "numbers are skipped": (
+        swap("(to_lower.inc_command + 1) mod", "(to_lower.inc_command + 2) mod"), Sort.NEXT_NUMBER, "", "to_lower",
+    ),
+    "every cycle is a new command": (
+        swap("if command.inc_command /= inc_command_seen {", "if begun {"), Sort.ONCE, "", "new_command",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("fault", UPPER_FAULTS)
+def test_a_fault_of_a_level_is_found_with_the_shortest_run_that_shows_it(fault: str, tmp_path: Path) -> None:
+    edit, sort, table, name = UPPER_FAULTS[fault]
+    ts = transition_systems(changed(tmp_path, upper=edit))["upper"]
+    obligation = obligation_of(ts, sort, table, name)
+    assert prove_level(ts, LITTLE).verdict(sort, table, name) is not Verdict.PROVED
+    trace = shortest(ts, obligation)
+    assert isinstance(trace, Trace)
+    assert [broken(ts, obligation, step) for step in trace.steps] == [False] * (len(trace.steps) - 1) + [True]
+    assert shortest(ts, obligation, most=len(trace.steps) - 1) is None
+
+
+def test_a_subordinate_that_echoes_another_command_breaks_what_its_superior_assumes(tmp_path: Path) -> None:
+    path = changed(
+        tmp_path, lower=swap("ref_command_echo := command.input_command", "ref_command_echo := go")
+    )
+    found = prove_system(path, LITTLE)
+    assert not found.proved
+    assert [(one.level, one.holds) for one in found.agreements if not one.outside] == [
+        ("upper", False),
+        ("lower", True),
+    ]
+
+
+def test_a_superior_that_does_not_number_breaks_what_its_subordinate_assumes(tmp_path: Path) -> None:
+    def twice(text: str) -> str:
+        text = text.replace(
+            "to_lower.input_command /= old_command", "to_lower.input_command /= old_command and begun"
+        )
+        return text.replace("module send reads ", "module send reads begun, ")
+
+    found = prove_system(changed(tmp_path, upper=twice), LITTLE)
+    assert [(one.level, one.holds) for one in found.agreements if not one.outside] == [
+        ("upper", True),
+        ("lower", False),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("level", "leaf"), [("upper", "to_lower.inc_command"), ("lower", "command.input_command")]
+)
+def test_levels_that_begin_with_different_orders_do_not_agree(
+    small: SystemProof, level: str, leaf: str
+) -> None:
+    made = transition_systems(SMALL / "system.toml")
+    proofs = {proof.level: proof for proof in small.levels}
+    assert all(one.holds for one in agreements(made, proofs))
+    program = made[level].program
+    other = tuple(replace(v, initial=1) if v.name == leaf else v for v in program.variables)
+    made[level] = made[level].of(replace(program, variables=other))
+    assert [one.level for one in agreements(made, proofs) if not one.holds] == ["upper"]
+
+
+# --- descriptions ---------------------------------------------------------------------------
+
+
+def test_an_order_without_a_report_is_refused(tmp_path: Path) -> None:
+    path = changed(tmp_path)
+    path.write_text(
+        path.read_text(encoding="utf-8").replace('"lower.report" = "upper.lower"\n', ""), encoding="utf-8"
+    )
+    with pytest.raises(BadDescription, match=r"`lower\.command` needs one buffer to `upper`"):
+        transition_systems(path)
+
+
+def test_a_level_without_tables_is_refused(tmp_path: Path) -> None:
+    path = changed(tmp_path)
+    (tmp_path / "lower.rcs").unlink()
+    with pytest.raises(NoProgramError, match="no program `lower`"):
+        transition_systems(path)
+
+
+# --- the translation ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("level", ["task", "emove", "vision", "primitive", "gripper"])
+def test_a_cycle_as_nodes_is_the_interpreter_s_cycle(level: str) -> None:
+    ts = transition_systems(SHIPPED)[level]
+    walk = Walk(ts.program, ts.level, ts.links, Random(7))  # noqa: S311  # repeatable on purpose
+    compared = 0
+    for at, state in enumerate(walk.states(240)):
+        if at % 12:
+            continue
+        made = of_constants(ts, state)
+        outcome = cycle(ts.program, ts.level, {k: v for k, v in state.items() if k in outcome_leaves(ts)})
+        assert outcome.fault is Fault.OK
+        for name, value in outcome.snapshot.items():
+            node = made.after[name]
+            if node.known and not isinstance(node.kind, Real):
+                assert node.low == int(value), name
+                compared += 1
+    assert compared > 200
+
+
+def of_constants(ts: TransitionSystem, state: dict[str, int | bool | float]) -> Cycle:
+    """One cycle from a concrete state that takes the same inputs again."""
+    nodes = {name: values.constant(kind, state[name]) for name, kind in ts.kinds.items()}
+    taken = {str(v.name): nodes[v.name] for v in ts.program.variables if v.kind.value == "input"}
+    return ts.cycle(nodes, taken=taken)
+
+
+def outcome_leaves(ts: TransitionSystem) -> set[str]:
+    return {str(v.name) for v in ts.program.variables}
+
+
+@pytest.mark.parametrize("level", ["task", "emove", "vision", "primitive", "gripper"])
+def test_a_restart_is_what_the_system_does(level: str) -> None:
+    """With every input as it is initially, `adopt` starts a level with the values that the proof takes for a restart."""
+    ts = transition_systems(SHIPPED)[level]
+    sign = signatures(description(SHIPPED))[level]
+    start = initial(ts.program)
+    leaves = [leaf.name for leaf in sign.leaves]
+    if set(leaves) != set(start):
+        pytest.fail("`generated` is not of these tables: run `rcsc compile`")
+    adopted = dict(zip(leaves, adopt(sign, tuple(start[leaf] for leaf in leaves)), strict=False))
+    for name, node in ts.restarted().items():
+        if node.known and name in adopted:
+            assert node.low == int(adopted[name]) or isinstance(node.kind, Real), name
+    free = {name for name, node in ts.restarted().items() if not node.known}
+    inputs = {str(v.name) for v in ts.program.variables if v.kind is Kind.INPUT}
+    numbers = {f"{below.order}.inc_command" for below in ts.links.below} | ({"to_camera.number"} & set(start))
+    assert free == inputs | numbers | {"inc_command_seen"}
+    assert all(adopted[name] == 1 for name in numbers)  # the one after the one that stands echoed
+
+
+# --- the shipped levels -----------------------------------------------------------------------
+
+
+PLATE = {f"to_robot.plate[{i}]" for i in range(9)}
+NOT_NUMBERED = {
+    # said beside an order, not compared with the last one: nobody may rely on them
+    "task": {"to_emove.apoint_pos_flag", "to_emove.gripped_obj_ptr"},
+    "emove": {"to_vision.expected_range_mm"},
+    "primitive": PLATE,  # poses follow one another under the number of FOLLOW
+}
+
+
+def proved_in_its_environment(level: str) -> None:
+    """Prove a shipped level, and have cvc5 confirm it."""
+    ts = transition_systems(SHIPPED)[level]
+    proof = prove_level(ts)
+    assert essential(proof) == ()
+    assert {obligation.name for obligation in proof.open} == NOT_NUMBERED.get(level, set())
+    assert {verdict for obligation, verdict in proof.found if obligation.sort is Sort.ASSUMPTION} <= {
+        Verdict.PROVED
+    }
+    assert proof.context is not None
+    assert (proof.context.unreached, proof.context.restless) == ((), False)
+    again = {(one.table, one.line, one.leaves) for one in proof.context.repeated}
+    assert again <= {("goto", "1", ("length_mm",)), ("gothru", "1", ("length_mm",))}
+    assert {one.table for one in proof.endings if not one.proved} == set()
+    questions = certificate(ts, proof)
+    # those about lines take cvc5 longest: `rcsc prove --certify` asks them
+    asked = {name: text for name, text in questions.items() if not name.startswith("lines")}
+    assert [name for name, text in asked.items() if not cvc5_refutes(text, 120_000_000)] == []
+
+
+@pytest.mark.parametrize("level", ["vision", "gripper"])
+def test_the_shipped_levels_are_proved_in_their_environment(level: str) -> None:
+    """The other three cost minutes: CI proves them by `python -m tests.compose.test_compose`, which without names proves all five."""
+    proved_in_its_environment(level)
+
+
+def test_without_deferral_the_published_argument_is_found_in_three_cycles() -> None:
+    """Section 9: the next state is taken while the level below still reports the command before."""
+    shipped = transition_systems(SHIPPED)["task"]
+    ts = shipped.of(undeferred(shipped.program))
+    obligation = obligation_of(ts, Sort.ASSUMPTION, "acquire", "in_step")
+    trace = shortest(ts, obligation)
+    assert trace is not None
+    assert len(trace.steps) == 3
+    assert trace.steps[-1].failed == ("in_step",)
+    assert "assumption `in_step` fails" in "\n".join(time_line({"task": ts}, of_trace(ts, obligation, trace)))
+
+
+def test_a_path_begins_where_the_robot_is() -> None:
+    """`here` settles when PAUSE is echoed; a command that comes in that very cycle finds `origin` answered for the place before."""
+    ts = transition_systems(SHIPPED)["emove"]
+    assert shortest(ts, obligation_of(ts, Sort.ASSUMPTION, "move_to", "in_step"), most=5) is None
+
+
+# --- the command line ----------------------------------------------------------------------
+
+
+def test_rcsc_prove_says_how_each_assumption_stands(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["prove", str(SMALL / "system.toml"), "-j", "1"]) == 0
+    said = capsys.readouterr().out
+    assert "in_step                  proved" in said
+    assert "lower assumes that while the number of `command` stays" in said
+
+
+def test_rcsc_prove_shows_the_trace_of_what_fails(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["prove", str(SMALL / "system.toml"), "--level", "upper", "--without-deferral"]) == 1
+    said = capsys.readouterr()
+    assert "monitored: not proved of the levels together" in said.out
+    assert "error[RCS751]: level `upper`, table `work`: not proved: assumption `in_step`" in said.err
+    assert "broken in cycle 3" in said.err
+    assert "work: 3" in said.err
+
+
+def test_rcsc_prove_as_json_and_certificates(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert (
+        run(
+            [
+                "prove",
+                str(SMALL / "system.toml"),
+                "--level",
+                "lower",
+                "--json",
+                "--certificate",
+                str(tmp_path),
+            ]
+        )
+        == 0
+    )
+    said = json.loads(capsys.readouterr().out)
+    assert said["proved"] is True
+    assert [level["level"] for level in said["levels"]] == ["lower"]
+    written = sorted(path.name for path in tmp_path.iterdir())
+    assert {name.removeprefix("lower_") for name in written} >= {
+        "first.smt2", "restart.smt2", "step_go.smt2", "step_pause.smt2",
+        "goals_first.smt2", "goals_restart.smt2", "goals_echoes.smt2", "goals_one_line.smt2",
+    }  # fmt: skip
+    assert all(cvc5_refutes(path.read_text(encoding="utf-8")) for path in tmp_path.iterdir())
+
+
+def test_rcsc_prove_certify_asks_cvc5(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked = ["prove", str(SMALL / "system.toml"), "--level", "lower", "--certify"]
+    assert run(asked) == 0
+    said = re.search(r"level lower: cvc5 says the same of (\d+) of (\d+) questions", capsys.readouterr().out)
+    assert said is not None
+    assert said[1] == said[2]
+    assert int(said[1]) > 10
+    monkeypatch.setattr(
+        "rcsc.solvers.smtlib.cvc5_refutes", lambda text, **_: "step" not in text and len(text) < 3000
+    )
+    assert run(asked) == 3
+    assert "error[RCS901]: level `lower`: cvc5 does not confirm" in capsys.readouterr().err
+
+
+def test_rcsc_certify_covers_a_system(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    assert run(["certify", str(SMALL / "system.toml")]) == 0
+    assert "level upper: cvc5 says the same of" in capsys.readouterr().out
+    assert run(["certify", str(SMALL / "system.toml"), "--write", str(tmp_path / "a.json")]) == 2
+    assert "rcsc prove --certificate" in capsys.readouterr().err
+
+
+def test_rcsc_prove_refuses_a_level_that_there_is_not(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["prove", str(SMALL / "system.toml"), "--level", "middle"]) == 2
+    assert "there is no level `middle`" in capsys.readouterr().err
+
+
+if __name__ == "__main__":
+    for each in sys.argv[1:] or ("task", "emove", "primitive", "vision", "gripper"):
+        proved_in_its_environment(each)

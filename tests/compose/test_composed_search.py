@@ -1,0 +1,424 @@
+"""The search under the composed proof: nodes as bits, frames, and what is asked in the context of an invariant."""
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from itertools import product
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rcsc.commands import run
+from rcsc.compose.contract.obligations import Obligation
+from rcsc.compose.contract.predicates import Predicate
+from rcsc.compose.contract.transition import Cycle, TransitionSystem
+from rcsc.compose.invariant.cubes import Masks, Pair, Reached, shown
+from rcsc.compose.invariant.search import Effort, Found, search
+from rcsc.compose.proof.context import Again
+from rcsc.compose.proof.kept import keep, recall
+from rcsc.compose.proof.level import LevelProof, Verdict, prove_level
+from rcsc.compose.proof.ranking import parts
+from rcsc.compose.proof.system import prove_transition_systems, transition_systems
+from rcsc.compose.proof.termination import Phase, longest
+from rcsc.host.cache import Cache
+from rcsc.lang.interpret import divide
+from rcsc.lang.model import Bool, Enum, Int, Op, Real, Scalar, real_key
+from rcsc.solvers.sat import Sat
+from rcsc.solvers.smt import Answer, Solver
+from rcsc.symbolic import values
+from rcsc.symbolic.bits import Bits, few, key_of_bits
+from rcsc.symbolic.keyed import Keyed
+from rcsc.symbolic.values import Node
+from tests.compose.test_compose import LITTLE, SMALL, Edit, changed, swap
+
+INT = Int(-9, 9)
+NAMES: dict[str, Scalar] = {"i": INT, "j": INT, "b": Bool(), "c": Bool()}
+
+
+def numbers(deep: int) -> st.SearchStrategy[Node]:
+    leaf = st.one_of(
+        st.sampled_from(["i", "j"]).map(lambda name: values.variable(name, INT)),
+        st.sampled_from([-9, -1, 0, 1, 8, 9]).map(lambda value: values.constant(INT, value)),
+    )
+    if not deep:
+        return leaf
+    below = numbers(deep - 1)
+    two = st.sampled_from([Op.ADD, Op.SUB, Op.MIN, Op.MAX])
+    return st.one_of(
+        leaf,
+        st.builds(lambda op, a, b: values.arithmetic(op, (a, b), Int(-999, 999)), two, below, below),
+        st.builds(
+            lambda a, k: values.arithmetic(Op.MUL, (a, values.constant(INT, k)), Int(-9999, 9999)),
+            below, st.integers(-9, 9),
+        ),
+        st.builds(lambda op, a: values.arithmetic(op, (a,), Int(-999, 999)), st.sampled_from([Op.NEG, Op.ABS]), below),
+        st.builds(values.choice, truths(deep - 1), below, below),
+    )  # fmt: skip
+
+
+def truths(deep: int) -> st.SearchStrategy[Node]:
+    leaf = st.sampled_from(["b", "c"]).map(lambda name: values.variable(name, Bool()))
+    if not deep:
+        return leaf
+    below, compared = truths(deep - 1), numbers(deep - 1)
+    return st.one_of(
+        leaf,
+        st.builds(values.both, below, below),
+        st.builds(values.negation, below),
+        st.builds(values.choice, below, below, below),
+        st.builds(values.compare, st.sampled_from([Op.EQ, Op.NE, Op.LT, Op.LE]), compared, compared),
+        st.builds(values.compare, st.sampled_from([Op.EQ, Op.LT, Op.LE]), below, below),
+    )
+
+
+MEANING: dict[str, Callable[..., int]] = {
+    Op.ADD: lambda a, b: a + b, Op.SUB: lambda a, b: a - b, Op.MUL: lambda a, b: a * b, Op.MIN: min, Op.MAX: max,
+    Op.NEG: lambda a: -a, Op.ABS: abs, Op.NOT: lambda a: 1 - a, Op.AND: lambda a, b: a & b,
+    Op.EQ: lambda a, b: int(a == b), Op.LT: lambda a, b: int(a < b), Op.LE: lambda a, b: int(a <= b),
+    Op.MOD: lambda a, b: a - b * divide(a, b),
+    "choice": lambda when, a, b: a if when else b, "narrowed": lambda a: a,
+}  # fmt: skip
+
+
+def meant(node: Node, state: dict[str, int]) -> int:
+    if node.op == "variable":
+        return state[node.name]
+    if node.op == "constant":
+        return int(node.low)
+    return MEANING[node.op](*(meant(arg, state) for arg in node.args))
+
+
+STATES = st.fixed_dictionaries({
+    "i": st.integers(-9, 9), "j": st.integers(-9, 9), "b": st.integers(0, 1), "c": st.integers(0, 1),
+})  # fmt: skip
+
+
+@given(numbers(3), truths(3), STATES)
+def test_bits_say_what_the_nodes_mean(number: Node, truth: Node, state: dict[str, int]) -> None:
+    bits = Bits()  # nothing is only compared: the numbers themselves are read from a model
+    word, literal = bits.word(number), bits.literal(truth)
+    given_ = [
+        bits.equals(bits.word(values.variable(name, kind)), kind, state[name]) for name, kind in NAMES.items()
+    ]
+    sat = Sat(bits.clauses)
+    assert sat.holds(given_)
+    assert key_of_bits([sat.value(bit) for bit in word]) == meant(number, state)
+    assert sat.value(literal) == meant(truth, state)
+    wrong = -literal if meant(truth, state) else literal
+    assert not sat.holds([*given_, wrong])
+    sat.close()
+
+
+@given(truths(3))
+def test_what_is_only_compared_holds_for_the_same_questions(truth: Node) -> None:
+    """With as few bits as `few` gives, a truth value can be had exactly if some state has it."""
+    bits = Bits.of((truth,))
+    sat = Sat([*bits.clauses, [bits.literal(truth)], *bits.clauses])
+    reads = values.variables([truth])
+    domains = [range(2) if isinstance(reads[name].kind, Bool) else range(-9, 10) for name in reads]
+    possible = any(meant(truth, dict(zip(reads, one, strict=True))) for one in product(*domains))
+    assert sat.holds([]) or not possible  # ranges are forgotten: more may be possible, never less
+    sat.close()
+
+
+def test_numbers_that_are_only_compared_get_few_bits() -> None:
+    kind = Real(-1e6, 1e6)
+    a, b, c = (values.variable(name, kind) for name in "abc")
+    same = values.all_of(
+        (values.equal(a, b), values.equal(b, c), values.equal(c, values.constant(kind, 5.0)))
+    )
+    assert {one.width for one in few((same,)).values()} == {2}
+    assert few((values.both(same, values.compare(Op.LT, a, c)),)) == {}
+    wanted = values.equal(a, c)
+    bits = Bits.of((same, wanted))
+    literals = bits.literal(same), bits.literal(wanted)
+    sat = Sat(bits.clauses)
+    assert sat.holds(literals)
+    assert not sat.holds([literals[0], -literals[1]])
+    assert sat.holds([-literals[0], -literals[1]])
+    sat.close()
+
+
+@given(st.floats(-1e9, 1e9), st.floats(-1e9, 1e9))
+def test_reals_compare_as_their_keys_do(one: float, two: float) -> None:
+    kind = Real(-1e9, 1e9)
+    a, b = values.variable("a", kind), values.variable("b", kind)
+    below, same = values.compare(Op.LT, a, b), values.equal(a, b)
+    bits = Bits.of((below, same))
+    fixed = [bits.equals(bits.word(node), kind, real_key(value)) for node, value in ((a, one), (b, two))]
+    less, equal = bits.literal(below), bits.literal(same)
+    sat = Sat(bits.clauses)
+    assert sat.holds([*fixed, less if one < two else -less])
+    assert not sat.holds([*fixed, -less if one < two else less])
+    assert not sat.holds([*fixed, -equal if one == two else equal])
+    sat.close()
+
+
+@pytest.mark.parametrize("op", [Op.ADD, Op.MUL, Op.DIV])
+def test_an_open_operation_gives_the_same_for_the_same_operands(op: Op) -> None:
+    """In another cycle, too, whose nodes are others."""
+    kind = Real(1.0, 9.0)
+
+    def made(name: str) -> Node:
+        return values.arithmetic(
+            op, (values.variable("a", kind), values.variable(name, kind)), Real(-1e3, 1e3)
+        )
+
+    for other, answer in (("b", Answer.UNSATISFIABLE), ("c", Answer.SATISFIABLE)):
+        keyed, solver = Keyed(), Solver()
+        differ = keyed.term(values.negation(values.equal(made("b"), made(other))))
+        solver.add(*keyed.ranges, differ)
+        assert solver.check() is answer
+
+
+def test_what_is_known_where_a_branch_is_taken_is_not_carried_elsewhere() -> None:
+    """Within `if r > 6` a square is at least 36; the same square elsewhere need not be."""
+    r = values.variable("r", Real(0.0, 10.0))
+    inside = values.narrowed(r, 6.0, 10.0)
+    large, any_ = (values.arithmetic(Op.MUL, (one, one), Real(0.0, 100.0)) for one in (inside, r))
+    keyed, solver = Keyed(), Solver()
+    terms = [keyed.term(values.compare(Op.LT, one, values.constant(one.kind, 50.0))) for one in (large, any_)]
+    less = values.compare(Op.LT, any_, values.constant(any_.kind, 25.0))
+    terms.append(keyed.term(less))
+    solver.add(*keyed.ranges, *terms)
+    assert solver.check() is Answer.SATISFIABLE
+
+
+def test_a_variable_that_no_clause_speaks_of_has_a_value() -> None:
+    """As a random hierarchy had one: a predicate of the first cycle that nothing there depends on."""
+    sat = Sat([[1], [-2]])
+    assert sat.holds([])
+    assert [literal for literal in (1, -1, 2, -2, 7, -7) if sat.value(literal)] == [1, -2, -7]
+    sat.close()
+
+
+def test_known_states_answer_for_cubes() -> None:
+    reached = Reached.of([(0, 1, 2), (1, 1, 0)], 3)
+    assert reached.shows(((0, 0), (2, 2)))
+    assert not reached.shows(((0, 0), (2, 0)))
+    assert reached.values(((1, 1),), 2) == {0, 2}
+    assert not reached.shows(((1, ~1),))
+    reached.add((0, 5, 0))
+    assert reached.shows(((0, 0), (2, 0)))
+    assert reached.shows(((1, ~1), (2, 0)))
+    assert not reached.shows(((1, ~1), (2, ~0)))
+    assert reached.many == 3
+
+
+SIZES = (2, 3, 70)
+PAIRS = st.one_of(*(st.tuples(st.just(at), st.integers(-size, size - 1)) for at, size in enumerate(SIZES)))
+
+
+@given(st.sets(PAIRS, max_size=5), st.sets(PAIRS, max_size=5))
+def test_a_cube_implies_what_is_implied_of_it(one: set[Pair], two: set[Pair]) -> None:
+    """As far as single pairs do; nothing else, however many values a predicate has."""
+    masks, first, second = Masks.of(SIZES), tuple(sorted(one)), tuple(sorted(two))
+    follows = all(
+        pair in one or any(at == pair[0] and 0 <= value != ~pair[1] and pair[1] < 0 for at, value in one)
+        for pair in two
+    )
+    wanted = masks.of_cube(second)
+    assert (masks.implied(first) & wanted == wanted) is follows
+
+
+def test_a_clause_is_written_in_the_words_of_the_tables() -> None:
+    chosen = (Predicate("state", Enum("stage", ("a", "b", "c", "d"))), Predicate("new", Bool()))
+    assert shown(chosen, ((0, 2), (1, 0))) == "state = c and new = false"
+    assert shown(chosen, ((0, ~1), (1, 1))) == "state /= b and new = true"
+    assert shown(chosen, ((0, ~3), (0, ~0))) == "state is none of a, d"
+
+
+# --- ways through phases -------------------------------------------------------------------
+
+
+@given(st.sets(st.tuples(st.integers(0, 4), st.integers(0, 4)), max_size=9))
+def test_the_longest_way_and_ways_round(pairs: set[tuple[int, int]]) -> None:
+    steps: set[tuple[Phase, Phase]] = {((a,), (b,)) for a, b in pairs}
+    ways = [list(way) for way in pairs]
+    reach = 1 if pairs else 0
+    for _ in range(6):  # longer than any way that does not go round
+        longer = [[*way, b] for way in ways for a, b in pairs if way[-1] == a]
+        if not longer:
+            break
+        ways, reach = longer, len(longer[0]) - 1
+    goes_round = reach > 5
+    assert longest(steps) == (None if goes_round else reach)
+    assert bool(parts(pairs)) is goes_round
+
+
+# --- in the context of a small level -------------------------------------------------------
+
+
+def proved(folder: Path, level: str, **edits: Edit) -> LevelProof:
+    path = changed(folder, **edits) if edits else SMALL / "system.toml"
+    return prove_level(transition_systems(path)[level], LITTLE)
+
+
+def test_lines_of_the_small_levels_are_all_reached_and_say_the_same_again(tmp_path: Path) -> None:
+    for level in ("upper", "lower"):
+        found = proved(tmp_path, level)
+        assert found.context is not None
+        assert (found.context.unreached, found.context.repeated, found.context.restless) == ((), (), False)
+    # `go` of the lower level waits for its input: nothing there makes that come
+    lower = {one.table: (one.changes, one.endless) for one in proved(tmp_path, "lower").endings}
+    assert lower == {"pause": (1, ()), "go": (1, ("2",))}
+    assert {one.table: one.changes for one in proved(tmp_path, "upper").endings} == {"rest": 2, "work": 3}
+
+
+def test_a_line_that_is_dead_in_its_context_is_named(tmp_path: Path) -> None:
+    """It is alive in its table: nothing there says that PAUSE is never reported while going."""
+    line = "  | 6    | false               |       |                | executing | going     ||"
+    more = "  | 6a   | false               |       | pause          | failed    | going     || go | | |\n"
+    found = proved(tmp_path, "upper", upper=swap(line, f"{more}{line}"))
+    assert found.open == ()
+    assert found.context is not None
+    assert found.context.unreached == (("work", "6a"),)
+
+
+COUNTER = "state idle : bool = true"
+
+
+def test_a_line_that_counts_when_it_matches_again_is_named(tmp_path: Path) -> None:
+    def edit(text: str) -> str:
+        text = text.replace(COUNTER, f"{COUNTER}\nstate tries : int 0 .. 9")
+        text = text.replace(
+            "procedure begin {", "procedure again {\n  tries := min(tries + 1, 9)\n}\n\nprocedure begin {"
+        )
+        return text.replace("|| begin; nextstate(going) | go ", "|| begin; again; nextstate(going) | go ")
+
+    found = proved(tmp_path, "upper", upper=edit)
+    assert found.open == ()
+    assert found.context is not None
+    assert found.context.repeated == (Again("work", "1", ("tries",)),)
+
+
+def test_a_command_that_need_not_end_is_named(tmp_path: Path) -> None:
+    """After a failure it goes on, and gives the order again for ever."""
+    found = proved(
+        tmp_path, "upper", upper=swap("| f_state   ||                         | pause       | fail       |",
+                                      "| f_state   || nextstate(d_state)      | pause       | executing  |")
+    )  # fmt: skip
+    ends = {one.table: one for one in found.endings}
+    assert ends["work"].proved  # from a failure to done: one state more, and it ends
+    assert ends["work"].changes == 4  # new, going; failed, which is to be done, and is; new no more
+    gone = "nextstate(d_state)      | pause       | done       |"
+    more = "| d_state   ||                         | pause       | done       |"
+
+    def edit(text: str) -> str:
+        text = text.replace(gone, gone.replace("done  ", "executing"))
+        return text.replace(more, "| d_state   || nextstate(going)        | go          | executing  |")
+
+    round_ = proved(tmp_path / "round", "upper", upper=edit)
+    assert [one.table for one in round_.endings if one.changes is None] == ["work"]
+
+
+DONE = "go             | done      | going     || nextstate(d_state)      | pause       | done       |"
+
+
+def test_a_level_that_waits_for_what_nobody_says_is_named(tmp_path: Path) -> None:
+    waits = "go             | done      | going     ||                         |             | executing  |"
+    found = proved(tmp_path, "upper", upper=swap(DONE, waits))
+    ends = {one.table: one for one in found.endings}
+    assert (ends["work"].endless, ends["work"].proved) == (("2",), False)
+
+
+# --- the cache -----------------------------------------------------------------------------
+
+
+@pytest.fixture
+def cache(tmp_path: Path) -> Cache:
+    return Cache(tmp_path / "cache", b"0" * 32, "tool")
+
+
+def test_a_proof_is_recalled_as_it_was_and_only_for_the_same_level(cache: Cache, tmp_path: Path) -> None:
+    upper = transition_systems(SMALL / "system.toml")["upper"]
+    proof = prove_level(upper, LITTLE)
+    assert recall(cache, upper, LITTLE) is None
+    keep(cache, upper, LITTLE, proof)
+    kept = recall(cache, upper, LITTLE)
+    assert kept is not None
+    assert kept.cached
+    assert (kept.clauses, kept.context, kept.endings) == (proof.clauses, proof.context, proof.endings)
+    assert [(obligation.key, verdict) for obligation, verdict in kept.found] == [
+        (obligation.key, verdict) for obligation, verdict in proof.found
+    ]
+    assert [one.name for one in kept.predicates] == [one.name for one in proof.predicates]
+    other = changed(tmp_path / "other", upper=swap(DONE, DONE.replace("d_state", "f_state")))
+    assert recall(cache, transition_systems(other)["upper"], LITTLE) is None
+    assert recall(cache, upper, Effort(walks=11, cycles=80)) is None
+
+
+def test_what_is_undecided_is_not_kept(cache: Cache) -> None:
+    upper = transition_systems(SMALL / "system.toml")["upper"]
+    proof = prove_level(upper, LITTLE)
+    given_up = LevelProof(
+        proof.level,
+        tuple((obligation, Verdict.UNDECIDED) for obligation, _ in proof.found),
+        (),
+        (),
+        0,
+        0,
+        0.0,
+    )
+    keep(cache, upper, LITTLE, given_up)
+    assert recall(cache, upper, LITTLE) is None
+
+
+def test_a_system_is_not_proved_twice(cache: Cache, monkeypatch: pytest.MonkeyPatch) -> None:
+    made = transition_systems(SMALL / "system.toml")
+    first = prove_transition_systems(made, LITTLE, 1, tuple(made), None, cache)
+
+    def never(*_: object) -> LevelProof:
+        raise AssertionError
+
+    monkeypatch.setattr("rcsc.compose.proof.system.prove_level", never)
+    again = prove_transition_systems(made, LITTLE, 1, tuple(made), None, cache)
+    assert [one.clauses for one in again.levels] == [one.clauses for one in first.levels]
+    assert again.agreements == first.agreements
+    assert again.proved
+    assert all(one.cached for one in again.levels)
+    with pytest.raises(AssertionError):
+        prove_transition_systems(made, LITTLE, 1, tuple(made), None, None)
+
+
+def test_levels_are_said_as_they_are_done_where_it_is_asked_for(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each before the next one is begun, and nothing of it among what was found."""
+    said: list[str] = []
+
+    def proving(ts: TransitionSystem, _: Effort) -> LevelProof:
+        said.append(capsys.readouterr().err)
+        return LevelProof(ts.level.name, (), (), (), 0, 0, 0.0)
+
+    monkeypatch.setattr("rcsc.compose.proof.system.prove_level", proving)
+    asked = ["prove", str(SMALL / "system.toml"), "--no-cache", "--jobs", "1", "--trace", "0", "--json"]
+    run([*asked, "--progress"])
+    assert said == ["", "level upper: 0 of 0 found proved, 0.0 s\n"]
+    json.loads(capsys.readouterr().out)
+    said.clear()
+    run(asked)
+    assert said == ["", ""]
+
+
+@pytest.mark.parametrize("lies", [[2], [~0], [2, ~2]])
+def test_what_z3_does_not_confirm_is_not_proved(monkeypatch: pytest.MonkeyPatch, lies: list[int]) -> None:
+    """The search lies: the level is never under way, is always done, or is in no state at all, which only the first cycle breaks."""
+
+    def lying(
+        ts: TransitionSystem,
+        firsts: Sequence[Cycle],
+        cycle: Cycle,
+        wanted: Sequence[Obligation],
+        effort: Effort,
+    ) -> Found:
+        found = search(ts, firsts, cycle, wanted, effort)
+        names = [one.name for one in found.predicates]
+        at = names.index("cur_state")
+        return replace(found, clauses=(*found.clauses, *(((at, lie),) for lie in lies)))
+
+    monkeypatch.setattr("rcsc.compose.proof.level.search", lying)
+    proof = prove_level(transition_systems(SMALL / "system.toml")["upper"], LITTLE)
+    assert {verdict for _, verdict in proof.found} == {Verdict.UNDECIDED}

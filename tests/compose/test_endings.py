@@ -1,0 +1,416 @@
+"""That commands end: what is shown to stop does, what may go on for ever is named, and by which numbers a line stops."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from rcsc.commands import run
+from rcsc.compose.counterexample.lasso import Lasso, lassos
+from rcsc.compose.counterexample.trace import NotReproducedError, Search
+from rcsc.compose.proof.context import gives_an_order
+from rcsc.compose.proof.level import certificate, prove_level
+from rcsc.compose.proof.ranking import Counted, least_power, parts
+from rcsc.compose.proof.system import transition_systems
+from rcsc.compose.proof.termination import Ending, longest
+from rcsc.lang.model import Int, Op, Real
+from rcsc.solvers import smt
+from rcsc.solvers.smt import Answer, Solver
+from rcsc.solvers.smtlib import cvc5_refutes
+from rcsc.symbolic import values
+from rcsc.symbolic.measured import Measured
+from rcsc.symbolic.values import Node
+from tests.compose.test_compose import LITTLE, SMALL, Edit, changed
+from tests.small_hierarchies.endless import Edge, edges, endless
+from tests.small_hierarchies.explored import explored
+from tests.small_hierarchies.level import Role, State
+
+HEAD = """table go {
+  | line | new_command | cur_state | there | on || procedures | status_out |
+  |------|-------------|-----------|-------|----||------------|------------|
+  | 1 | true | | | || state(going); begin | executing |
+  | 4 | false | /= going | | || | done |
+"""
+
+
+def go(lines: str, states: str = "", seen: str = "on := false", begin: str = "", work: str = "") -> Edit:
+    """The lower level with another `go`: `on` is what preprocess sees, `begin` and `work` what lines do."""
+
+    def edit(text: str) -> str:
+        before, _, after = text.partition("table go {")
+        after = after[after.index("table pause") :]
+        written = [name for name in ("c", "x") if f"state {name} :" in states]
+        names = ", ".join(["inc_command_seen", *written, *(["tick"] if "tick" in states else [])])
+        before = before.replace("state cur_state", f"state on : bool\n{states}\nstate cur_state")
+        before = before.replace(
+            "module receive reads command,", f"module receive reads command, there, on, {names},"
+        )
+        before = before.replace(
+            "writes new_command,", "writes new_command, on," + (" tick," if "tick" in states else "")
+        )
+        before = before.replace(
+            "inc_command_seen := command.inc_command\n}",
+            f"inc_command_seen := command.inc_command\n  {seen}\n}}",
+        )
+        made = f"procedure begin {{\n  {begin}\n}}\n\nprocedure work {{\n  {work}\n}}\n\n"
+        return f"{before}{made}{HEAD}{lines}}}\n\n{after}"
+
+    return edit
+
+
+def ending(folder: Path, edit: Edit) -> Ending:
+    found = prove_level(transition_systems(changed(folder, lower=edit))["lower"], LITTLE)
+    assert found.open == ()
+    return next(one for one in found.endings if one.table == "go")
+
+
+TICK = {"states": "state tick : bool", "seen": "tick := not tick\n  on := tick"}
+
+
+def test_lines_that_take_turns_for_ever_are_named(tmp_path: Path) -> None:
+    """Neither runs twice in a row."""
+    lines = (
+        "  | 2 | false | going | | true || | executing |\n  | 3 | false | going | | false || | executing |\n"
+    )
+    assert ending(tmp_path, go(lines, **TICK)).endless == ("2", "3")
+
+
+def test_a_counter_that_another_line_sets_back_is_none(tmp_path: Path) -> None:
+    lines = "  | 2 | false | going | | true || work | executing |\n  | 3 | false | going | | false || begin | executing |\n"
+    states = f"{TICK['states']}\nstate c : int 0 .. 9"
+    found = ending(tmp_path, go(lines, states, TICK["seen"], begin="c := 0", work="c := min(c + 1, 9)"))
+    assert (found.endless, found.proved) == (("2", "3"), False)
+
+
+def test_a_line_that_counts_is_shown_to_stop(tmp_path: Path) -> None:
+    lines = "  | 2 | false | going | | false || work | executing |\n  | 3 | false | going | | true || state(d_state) | done |\n"
+    counts = go(lines, "state c : int 0 .. 9", "on := c >= 9", "c := 0", "c := min(c + 1, 9)")
+    found = ending(tmp_path, counts)
+    assert (found.proved, found.counted, found.still) == (True, (Counted("2", "c"),), ())
+
+
+def test_a_counter_that_rises_only_now_and_then_is_none(tmp_path: Path) -> None:
+    counts = go(
+        WAY, "state c : int 0 .. 9", "on := c >= 9", "c := 0", "if there {\n    c := min(c + 1, 9)\n  }"
+    )
+    assert ending(tmp_path, counts).endless == ("2",)
+
+
+def test_default_may_go_on_for_ever_like_any_line(tmp_path: Path) -> None:
+    lines = (
+        "  | 3 | false | going | true | || state(d_state) | done |\n  | 5 | DEFAULT | | | || | executing |\n"
+    )
+    assert ending(tmp_path, go(lines)).endless == ("5",)
+
+
+WAY = "  | 2 | false | going | | false || work | executing |\n  | 3 | false | going | | true || state(d_state) | done |\n"
+
+
+def way(work: str, seen: str = "on := x >= 100.0", inputs: str = "") -> Edit:
+    return go(WAY, f"{inputs}\nstate x : real 0.0 .. 100.0", seen, "x := 0.0", work)
+
+
+@pytest.mark.parametrize("seen", ["on := x >= 100.0", "on := 100.0 - x <= 0.0", "on := x * 0.1 >= 9.99"])
+def test_a_way_that_grows_shorter_ends(seen: str, tmp_path: Path) -> None:
+    found = ending(tmp_path, way("x := min(100.0, x + 0.3)", seen))
+    assert (found.proved, [one.counter for one in found.counted]) == (True, ["x"])
+    least = found.counted[0].least
+    assert least is not None
+    assert 0.15 <= least <= 0.3  # the greatest power of two of the range
+
+
+def test_a_way_on_which_a_step_may_be_lost_is_not_shown_to_end(tmp_path: Path) -> None:
+    """Rounded, 1 and 1e-20 are 1; and with no speed there is no step."""
+    for at, work in enumerate(("x := min(100.0, x + 0.00000000000000000001)", "x := min(100.0, x + 0.0)")):
+        assert ending(tmp_path / str(at), way(work)).endless == ("2",)
+    speed = "input speed : real 0.0 .. 9.0\n"
+    assert ending(tmp_path / "speed", way("x := min(100.0, x + speed)", inputs=speed)).endless == ("2",)
+    faster = "x := min(100.0, x + max(0.5, speed) * 0.04)"
+    assert ending(tmp_path / "faster", way(faster, inputs=speed)).proved
+
+
+def test_what_has_to_stand_still_is_said(tmp_path: Path) -> None:
+    """The upper level gives its order again whenever an input changes, as often as that may be."""
+
+    def edit(text: str) -> str:
+        text = text.replace(
+            "state new_command", "input which : bool\nstate old_which : bool\nstate new_command"
+        )
+        text = text.replace("module send reads to_lower, old_command writes to_lower, old_command {",
+                            "module send reads to_lower, old_command, which, old_which, new_command, begun"
+                            " writes to_lower, old_command, old_which {")  # fmt: skip
+        text = text.replace("if to_lower.input_command /= old_command {",
+                            "if to_lower.input_command /= old_command or which /= old_which {")  # fmt: skip
+        return text.replace("  old_command := to_lower", "  old_which := which\n  old_command := to_lower")
+
+    found = prove_level(transition_systems(changed(tmp_path, upper=edit))["upper"], LITTLE)
+    assert found.open == ()
+    work = next(one for one in found.endings if one.table == "work")
+    assert (work.proved, work.still) == (True, ("which",))
+
+
+# --- another solver -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "edit",
+    [
+        way("x := min(100.0, x + 0.3)"),
+        go(WAY, "state c : int 0 .. 9", "on := c >= 9", "c := 0", "c := min(c + 1, 9)"),
+    ],
+)
+def test_another_solver_says_that_it_ends(edit: Edit, tmp_path: Path) -> None:
+    ts = transition_systems(changed(tmp_path, lower=edit))["lower"]
+    proof = prove_level(ts, LITTLE)
+    questions = certificate(ts, proof)
+    assert {"lines 1", "ends pause 1", "ends go 1", "ends go 2"} <= questions.keys()
+    assert [name for name, text in questions.items() if not cvc5_refutes(text)] == []
+    # what is claimed beyond what is found again is not confirmed
+    false = replace(proof, endings=tuple(replace(one, counted=()) for one in proof.endings))
+    claimed = certificate(ts, false)
+    assert [name for name, text in claimed.items() if not cvc5_refutes(text)] == [
+        "lines and endings as before"
+    ]
+
+
+def test_a_refutation_that_is_wrong_is_not_confirmed() -> None:
+    """What was asserted for good, and one of what was refuted besides: a script with a model if any of them was wrong."""
+    kind = Int(0, 9)
+    x = smt.variable("x", kind)
+    solver = Solver(remembers=True)
+    solver.add(smt.at_most(x, smt.literal(kind, 5), kind))
+    for at in (7, 8):
+        solver.push()
+        solver.add(smt.equal(x, smt.literal(kind, at), kind))
+        assert solver.check() is Answer.UNSATISFIABLE
+        solver.pop()
+    assert len(solver.refuted) == 2
+    assert cvc5_refutes(solver.refutations())
+    solver.refuted.append(smt.equal(x, smt.literal(kind, 5), kind))
+    assert not cvc5_refutes(solver.refutations())
+
+
+# --- runs that go round --------------------------------------------------------------------------
+
+
+def lasso(folder: Path, level: str, table: str, **edits: Edit) -> Lasso | NotReproducedError | None:
+    ts = transition_systems(changed(folder, **edits))[level]
+    return lassos(ts, (table,), Search(8, legal=True)).get(table)
+
+
+def test_a_line_that_waits_goes_round(tmp_path: Path) -> None:
+    """For what nobody brings: the shortest run is to take the command, and to wait; it is new no more, and to wait again."""
+    found = lasso(
+        tmp_path,
+        "lower",
+        "go",
+        lower=go(
+            "  | 2 | false | going | false | || | executing |\n  | 3 | false | going | true | || | executing |\n"
+        ),
+    )
+    assert isinstance(found, Lasso)
+    assert ([step.line for step in found.trace.steps], found.first) == (["1", "2", "2"], 3)
+
+
+def test_lines_that_take_turns_go_round_together(tmp_path: Path) -> None:
+    lines = (
+        "  | 2 | false | going | | true || | executing |\n  | 3 | false | going | | false || | executing |\n"
+    )
+    found = lasso(tmp_path, "lower", "go", lower=go(lines, **TICK))
+    assert isinstance(found, Lasso)
+    lines_run = [step.line for step in found.trace.steps]
+    assert (len(lines_run), found.first, set(lines_run[2:])) == (4, 3, {"2", "3"})
+
+
+def test_what_ends_goes_nowhere_round(tmp_path: Path) -> None:
+    counts = go(WAY, "state c : int 0 .. 3", "on := c >= 3", "c := 0", "c := min(c + 1, 3)")
+    assert lasso(tmp_path / "counts", "lower", "go", lower=counts) is None
+    # a real's way is open to the solver; the interpreter does not come round
+    real = lasso(tmp_path / "real", "lower", "go", lower=way("x := min(100.0, x + 30.0)"))
+    assert isinstance(real, NotReproducedError)
+    assert real.guessed
+
+
+def again(text: str) -> str:
+    """When the lower level is done the upper one rests, and then gives the order again."""
+    gone = "nextstate(d_state)      | pause       | done       |"
+    text = text.replace(gone, gone.replace("done  ", "executing"))
+    rests = "| d_state   ||                         | pause       | done       |"
+    return text.replace(rests, "| d_state   || nextstate(going)        | go          | executing  |")
+
+
+def test_order_after_order_goes_round(tmp_path: Path) -> None:
+    """Its numbers go on, and everything else is as before."""
+    found = lasso(tmp_path, "upper", "work", upper=again)
+    assert isinstance(found, Lasso)
+    steps = found.trace.steps[found.first - 1 :]
+    numbers = [step.after["to_lower.inc_command"] for step in steps]
+    assert len(set(numbers)) == 2
+    assert {step.line for step in steps} == {"2", "3"}
+
+
+def test_it_is_shown_drawn_and_frozen(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """By the command: a warning with a time line, a log, and a case that fails until the table is mended."""
+    path = changed(tmp_path / "round", upper=again)
+    (path.parent / "rcsc.toml").write_text('name = "round"\n', encoding="utf-8")
+    found, cases = tmp_path / "found", path.parent / "cases"
+    assert run(["prove", str(path), "--log", str(found), "--freeze", str(cases), "--no-cache"]) == 0
+    said = capsys.readouterr().err
+    assert "warning[RCS756]: level `upper`, table `work`: not shown: the command ends" in said
+    assert "goes round from cycle" in said
+    assert "so it may go on" in said
+    page, log = tmp_path / "page.html", found / "upper_work_ends.mcap"
+    assert run(["log", str(log), "--report", str(page)]) == 0
+    assert "so it may go on for ever" in page.read_text(encoding="utf-8")
+    (case,) = (one for one in cases.iterdir() if "upper_work_ends" in one.name)
+    assert run(["prove", "--case", str(case)]) == 1
+    assert "RCS753" in capsys.readouterr().err
+    path.with_name("upper.rcs").write_text(
+        (SMALL / "upper.rcs").read_text(encoding="utf-8"), encoding="utf-8"
+    )
+    assert run(["prove", "--case", str(case)]) == 0
+
+
+# --- the parts ----------------------------------------------------------------------------------
+
+
+def test_parts_are_lines_that_lead_to_each_other() -> None:
+    assert parts({(0, 1), (1, 0), (1, 2), (3, 3), (4, 5)}) == [frozenset({0, 1}), frozenset({3})]
+    assert parts(set()) == []
+
+
+@pytest.mark.parametrize("least", [0, 1, 7, 24])
+def test_the_least_power_is_found(least: int) -> None:
+    assert least_power(lambda power: power >= least) == least
+
+
+def test_no_power_is_none() -> None:
+    assert least_power(lambda _: False) is None
+
+
+def refuted(node: Node) -> bool:
+    keyed, solver = Measured(), Solver()
+    term = keyed.term(node)
+    solver.add(*keyed.ranges, term)
+    return solver.check() is Answer.UNSATISFIABLE
+
+
+REAL = Real(-1e6, 1e6)
+
+
+def arithmetic(op: Op, *args: Node) -> Node:
+    return values.arithmetic(op, args, REAL)
+
+
+def number(value: float) -> Node:
+    return values.constant(REAL, value)
+
+
+def test_sums_are_followed_as_far_as_they_are_rounded() -> None:
+    x = values.variable("x", Real(0.0, 100.0))
+    more = arithmetic(Op.ADD, x, number(0.5))
+    assert refuted(values.compare(Op.LT, more, arithmetic(Op.ADD, x, number(0.25))))
+    assert refuted(values.compare(Op.LE, more, x))
+    tiny = arithmetic(Op.ADD, x, number(1e-20))
+    assert not refuted(values.compare(Op.LE, tiny, x))  # it may be lost
+    assert refuted(values.compare(Op.LT, arithmetic(Op.SUB, x, x), number(0.0)))  # the sign is not
+
+
+def test_a_rounded_tenth_is_not_taken_for_a_tenth() -> None:
+    """In doubles 0.1 + 0.2 is more than 0.3: what is true of fractions alone must not be shown."""
+    x = values.variable("x", Real(0.0, 1.0))
+    third = arithmetic(Op.ADD, arithmetic(Op.ADD, x, number(0.1)), number(0.2))
+    assert not refuted(values.compare(Op.LT, arithmetic(Op.ADD, x, number(0.3)), third))
+
+
+def test_what_is_not_reached_forbids_nothing() -> None:
+    """Where `x` is known to be large the sum is; elsewhere it is not read, and `x` may be small."""
+    x = values.variable("x", Real(0.0, 100.0))
+    inside = arithmetic(Op.ADD, values.narrowed(x, 50.0, 100.0), number(1.0))
+    far = values.compare(Op.LE, number(50.0), x)
+    taken = values.choice(far, inside, number(0.0))
+    assert not refuted(values.both(values.compare(Op.LT, x, number(1.0)), values.compare(Op.LE, taken, x)))
+
+
+FLAGS = """table go {
+  | line | new_command | first | second | third || procedures                     | status_out |
+  | 1    | true        |       |        |       || clear                          | executing  |
+  | 2    | false       | false |        |       || first := true                  | executing  |
+  | 3    | false       | true  | false  |       || second := true                 | executing  |
+  | 4    | false       | true  | true   | false || first := not there; third := true | executing  |
+  | 5    | false       | true  | true   | true  ||                                | done       |
+}
+
+table pause {
+  | line | first || procedures                               | status_out |
+  | 1    | false || first := true; second := true; third := true | executing  |
+  | 2    | true  ||                                          | done       |
+}
+
+level lower"""
+
+
+def flagged(text: str) -> str:
+    """The lower level with flags that its lines set, one after the other, and a first command that sets all in its first cycle."""
+    before, _, after = text.partition("table go {")
+    flags = "".join(f"state {name} : bool\n" for name in ("first", "second", "third"))
+    before = before.replace("state cur_state", f"{flags}state cur_state")
+    clear = "procedure clear {\n  first := false\n  second := false\n  third := false\n}\n\n"
+    return f"{before}{clear}{FLAGS}{after.partition('level lower')[2]}"
+
+
+def test_changes_of_state_are_counted_after_the_cycle_that_takes_the_command(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As often as an enumeration of all runs finds: but not in the cycle that takes it, as the first of a run does."""
+    path = changed(tmp_path, lower=flagged)
+    one = transition_systems(path)["lower"]
+    role, seen = Role(one.program, one.level, one.links), set[State]()
+    explored(role, seen=seen)
+    names = list(role.start)
+    places = [names.index(name) for name in ("new_command", "first", "second", "third")]
+    every = edges(role, seen)  # from behind some cycle on
+    found = {end.table: end.changes for end in prove_level(one, LITTLE).endings}
+    for table in ("go", "pause"):
+        steps = {
+            (tuple(int(edge.start[at]) for at in places), tuple(int(edge.end[at]) for at in places))
+            for edge in every
+            if edge.table == table
+        }
+        assert found[table] == longest({(here, there) for here, there in steps if here != there})
+    assert run(["prove", str(path), "--level", "lower", "--no-cache"]) == 0
+    assert f"go ends, once taken, after at most {found['go']} changes of state" in capsys.readouterr().out
+
+
+# --- the enumeration that holds it ----------------------------------------------------------------
+
+
+def of_lower(folder: Path, edit: Edit) -> list[Edge]:
+    one = transition_systems(changed(folder, lower=edit))["lower"]
+    role, seen = Role(one.program, one.level, one.links), set[State]()
+    explored(role, seen=seen)
+    return edges(role, seen)
+
+
+def test_the_enumeration_sees_rounds_and_their_end(tmp_path: Path) -> None:
+    turns = (
+        "  | 2 | false | going | | true || | executing |\n  | 3 | false | going | | false || | executing |\n"
+    )
+    assert endless(of_lower(tmp_path / "turns", go(turns, **TICK)), "go", ()) == "round in quiet cycles"
+    counts = go(WAY, "state c : int 0 .. 4", "on := c >= 4", "c := 0", "c := min(c + 1, 4)")
+    assert endless(of_lower(tmp_path / "counts", counts), "go", ()) == ""
+
+
+def test_the_enumeration_sees_order_after_order_and_what_stands_still() -> None:
+    one = transition_systems(SMALL / "system.toml")["upper"]
+    assert "to_lower.inc_command" in one.kinds
+    assert gives_an_order(one, one.cycle(one.havoc())).op != "constant"
+    states: list[State] = [(0,), (1,)]
+    there, back = ("in", True), ("in", False)
+    round_ = [
+        Edge(states[0], states[1], "work", True, False, (there,)),
+        Edge(states[1], states[0], "work", False, False, (back,)),
+    ]
+    assert endless(round_, "work", ()) == "order after order"
+    assert endless(round_, "work", ("in",)) == ""
+    assert endless(round_, "rest", ()) == ""

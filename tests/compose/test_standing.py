@@ -1,0 +1,405 @@
+"""What `rcsc check` says of the levels together: only what was proved, of this very content, and nothing else."""
+
+import json
+import shutil
+from collections.abc import Callable
+from dataclasses import asdict
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import pytest
+
+from rcsc.commands import run
+from rcsc.compose.proof.standing import Known, Outline, Standing, outline_of, standing
+from rcsc.driver import outline
+from rcsc.host.cache import FOLDER, Cache
+
+SMALL = Path(__file__).parents[1] / "data" / "composed"
+KEPT = "assuming in_step (proved), kept by the levels together, system.toml"
+DECIDES = "is not known: `rcsc prove system.toml` decides it"
+DONE = "| 4    | false       | /= going  |       ||                | done       |"
+
+Said = Callable[..., str]
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The small system, stood in."""
+    monkeypatch.delenv("RCSC_CACHE_DIR", raising=False)
+    shutil.copytree(SMALL, tmp_path, dirs_exist_ok=True, ignore=shutil.ignore_patterns(".rcsc-cache"))
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def proved_here(here: Path, small_proved: Path) -> Path:
+    """The small system, stood in, after `rcsc prove`; what a test edits then is not proved yet."""
+    shutil.copytree(small_proved / FOLDER, here / FOLDER)
+    return here
+
+
+@pytest.fixture
+def check(capfd: pytest.CaptureFixture[str]) -> Said:
+    """`rcsc check` with these arguments, of `upper.rcs` where there are none; what it prints."""
+
+    def said(*args: str, status: int = 0) -> str:
+        capfd.readouterr()
+        assert run(["check", *(args or ("upper.rcs",))]) == status
+        return capfd.readouterr().out
+
+    return said
+
+
+def prove(*args: str) -> int:
+    return run(["prove", "system.toml", "--trace", "0", *args])
+
+
+def edit(name: str, *edits: tuple[str, str]) -> None:
+    path = Path(f"{name}.rcs")
+    text = path.read_text(encoding="utf-8")
+    for old, new in edits:
+        assert text.count(old) == 1, old
+        text = text.replace(old, new)
+    path.write_text(text, encoding="utf-8")
+
+
+def table(form: str, name: str = "work") -> dict[str, Any]:
+    found: dict[str, Any] = next(one for one in json.loads(form)["tables"] if one["table"] == name)
+    return found
+
+
+# --- what is proved, and of what ---------------------------------------------------------------
+
+
+@pytest.mark.usefixtures("here")
+def test_an_assumption_is_proved_where_the_levels_together_are(check: Said) -> None:
+    before = check()
+    assert "assuming in_step (monitored), " in before
+    assert before.count(DECIDES) == 1
+    assert prove() == 0
+    assert KEPT in check()
+    assert DECIDES not in check()
+    assert KEPT in check()  # from what the last check kept
+    form = check("--json", "upper.rcs")
+    assert table(form)["assumptions"] == [{"name": "in_step", "standing": "proved"}]
+    assert table(form)["together"]["proved"] == ["in_step"]
+    assert json.loads(form)["systems"] == [
+        {"system": "system.toml", "standing": "proved", "wanted": False, "missing": []}
+    ]
+    properties = json.loads(check("--sarif", "upper.rcs"))["runs"][0]["properties"]
+    assert properties["tables"][0]["assumptions"] == [{"name": "in_step", "standing": "proved"}]
+
+
+@pytest.mark.usefixtures("proved_here")
+@pytest.mark.parametrize(
+    ("name", "old", "new"),
+    [
+        ("upper", "|| nextstate(d_state)      | pause       | done       |", "|| nextstate(d_state)      | pause       | executing  |"),
+        ("lower", DONE, DONE.replace("done     ", "executing")),
+        ("system", '"upper.to_lower" = "lower.command"', '"upper.to_lower" = "hand.command"'),
+        ("words", "enum stage { d_state,", "enum stage { spare, d_state,"),
+    ],
+    ids=["a cell", "a cell of a neighbour", "the buffers", "a file that is used"],
+)  # fmt: skip
+def test_a_proof_is_of_its_content_alone(check: Said, name: str, old: str, new: str) -> None:
+    assert KEPT in check()
+    path = Path("system.toml" if name == "system" else f"{name}.rcs")
+    kept = path.read_text(encoding="utf-8")
+    assert kept.count(old) == 1
+    text = kept.replace(old, new)
+    if name == "system":
+        text = text.replace('"lower.report" = "upper.lower"', '"hand.report" = "upper.lower"')
+    path.write_text(text, encoding="utf-8")
+    changed = check()
+    assert "assuming in_step (monitored), " in changed
+    assert changed.count(DECIDES) == 1
+    path.write_text(kept, encoding="utf-8")
+    assert KEPT in check()
+
+
+@pytest.mark.usefixtures("proved_here")
+def test_words_that_mean_nothing_leave_a_proof_as_it_is(check: Said) -> None:
+    edit("lower", ("table go {", "# Another word.\n\ntable go {"))
+    assert KEPT in check()
+
+
+def test_a_proof_holds_wherever_the_files_stand(
+    here: Path, check: Said, small_proved: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("RCSC_CACHE_DIR", str(shutil.copytree(small_proved / FOLDER, here / "cache")))
+    moved = here / "moved"
+    moved.mkdir()
+    for file in ("system.toml", "upper.rcs", "lower.rcs", "words.rcs"):
+        shutil.move(here / file, moved / file)
+    assert KEPT.replace("system.toml", "moved/system.toml") in check("moved/upper.rcs")
+    assert f"kept by the levels together, {moved}/system.toml" in check(str(moved / "upper.rcs"))
+
+
+@pytest.mark.usefixtures("here")
+def test_one_level_alone_is_not_the_levels_together(check: Said) -> None:
+    assert prove("--level", "upper") == 0
+    assert DECIDES in check()
+    assert prove("--level", "lower") == 0
+    assert KEPT in check()
+
+
+@pytest.mark.usefixtures("proved_here")
+def test_no_cache_and_no_levels_say_nothing(check: Said, tmp_path: Path) -> None:
+    assert "in_step (monitored)" in check("--no-cache", "upper.rcs")
+    assert DECIDES not in check("--no-cache", "upper.rcs")
+    (tmp_path / "other").mkdir()
+    text = Path("upper.rcs").read_text(encoding="utf-8")
+    Path("other/alone.rcs").write_text(text.replace("level upper", "level alone"), encoding="utf-8")
+    shutil.copy("words.rcs", "other/words.rcs")
+    beside = check("other/alone.rcs")  # below a system that has no such level
+    assert "in_step (monitored)" in beside
+    assert "rcsc prove" not in beside
+
+
+@pytest.mark.usefixtures("proved_here")
+def test_an_unchanged_system_is_not_read_again(check: Said, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert KEPT in check()
+
+    def never(_: Path) -> None:
+        raise AssertionError
+
+    monkeypatch.setattr(outline, "_read", never)
+    assert KEPT in check()
+    edit("lower", (DONE, DONE.replace("done     ", "executing")))
+    assert run(["check", "upper.rcs"]) == 3  # it would have been
+
+
+@pytest.mark.usefixtures("here")
+def test_a_variant_of_the_tables_is_not_kept(check: Said) -> None:
+    assert prove("--first-match") == 0
+    assert KEPT not in check()
+
+
+# --- what is not proved -----------------------------------------------------------------------
+
+FAILED = next(
+    row
+    for row in (SMALL / "upper.rcs").read_text(encoding="utf-8").splitlines(keepends=True)
+    if row.startswith("  | 4 ")
+)
+HOPED = (
+    "table work assuming in_step",
+    "assume never_failed monitored : status_in /= failed\ntable work assuming in_step, never_failed",
+)
+
+
+@pytest.mark.usefixtures("proved_here")
+def test_what_was_found_not_to_be_proved_is_a_warning(check: Said) -> None:
+    edit("upper", HOPED, (FAILED, ""))
+    assert prove() == 1
+    said = check()
+    assert (
+        "warning[RCS751]: level `upper` is not proved together with its neighbours in system.toml\n"
+        "   --> upper.rcs:"
+    ) in said
+    assert "= note: not proved: table `work`: assumption `never_failed`" in said
+    assert "never_failed (monitored, not proved of the levels together)" in said
+    assert "in_step (proved)" in said
+    form = check("--json", "upper.rcs")
+    assert json.loads(form)["systems"][0]["standing"] == "not proved"
+    assert table(form)["together"]["not_proved"] == ["never_failed"]
+    assert "::warning file=upper.rcs," in check("--github", "upper.rcs")
+    assert "RCS751" not in check("lower.rcs")  # another level's
+
+
+@pytest.mark.usefixtures("proved_here")
+def test_nothing_is_proved_of_levels_that_do_not_agree(check: Said) -> None:
+    """The lower level echoes what it does not run: the proof of the upper one rests on that it does not."""
+    edit("lower", ("report.ref_command_echo := command.input_command", "report.ref_command_echo := pause"))
+    assert prove() == 1
+    said = check()
+    assert (
+        "in_step (monitored, conditional of the levels together), conditional in system.toml: rests on"
+        in said
+    )
+    assert "level `lower`: the report echoes the command that it answers `report`" in said
+    form = json.loads(check("--json", "upper.rcs"))
+    assert table(json.dumps(form))["together"]["conditional"] == ["in_step"]
+    assert form["systems"][0] | {"missing": []} == {
+        "system": "system.toml", "standing": "not proved", "wanted": False, "missing": [],
+    }  # fmt: skip
+    assert "error" not in said.splitlines()[0]
+    assert (
+        "warning[RCS752]: level `upper` assumes that what `lower` reports under the number of the last"
+        in said
+    )
+    assert "warning[RCS751]: level `lower` is not proved" in check("lower.rcs")
+
+
+@pytest.mark.usefixtures("here")
+def test_what_the_tables_declare_is_not_called_proved_and_is_named_by_what_rests_on_it(check: Said) -> None:
+    """What is assumed of an input is as true as somebody believes it, however much the levels prove from it."""
+    solo(
+        "input x : int 0 .. 9\nstate n : int 0 .. 9\nassume small assumed : x < 5\nassume kept monitored : n < 5\n"
+        "property below : n < 5\n"
+        "table t assuming small, kept {\n| line | x | n || n |\n| a | 0 .. 4 | < 5 || x |\n}"
+    )
+    assert prove() == 0
+    said = check("solo.rcs")
+    trusting = "system.toml, trusting assumption `small` of level `solo`"
+    assert f"assuming small (assumed), kept (proved), kept by the levels together, {trusting}, " in said
+    assert f"= note: proved of the levels together, {trusting}" in said
+    found = table(check("--json", "solo.rcs"), "t")
+    assert found["together"]["proved"] == ["kept"]
+    assert found["together"]["trusts"] == ["assumption `small` of level `solo`"]
+
+
+@pytest.mark.usefixtures("here")
+def test_lines_that_never_run_because_of_what_is_declared_say_so(
+    check: Said, capfd: pytest.CaptureFixture[str]
+) -> None:
+    solo(
+        "input x : int 0 .. 9\nassume small assumed : x < 5\ntable t assuming small {\n| line | x ||\n| a | < 5 ||\n| b | >= 5 ||\n}"
+    )
+    assert prove() == 0
+    trusting = "trusting assumption `small` of level `solo`"
+    assert f"lines never reached here:\n    t b: proved, {trusting}\n" in capfd.readouterr().out
+    assert f"line b never reached in system.toml, {trusting}, " in check("solo.rcs")
+
+
+@pytest.mark.usefixtures("here")
+def test_what_rests_on_what_is_not_proved_is_conditional_and_says_on_what(check: Said) -> None:
+    """Every verdict of a level whose index is safe only under an invariant that does not hold within the cycle."""
+    solo(
+        "input x : bool\nstate at : int 0 .. 9\nstate n : int 0 .. 9\nstate list : array[3] of bool\n"
+        "invariant inside : at < 3\nassume fine monitored : n < 9\nproperty stays : n < 9\n"
+        "procedure mark { list[at] := x }\nmodule spoil writes at { at := 5 }\nmodule mend writes at { at := 0 }\n"
+        "table t assuming fine {\n| line | x | n || procedures |\n| a | true | < 9 || mark |\n| b | false | < 9 || |\n}",
+        "preprocess spoil",
+        "postprocess mend",
+    )
+    assert prove() == 1
+    said = check("solo.rcs", status=1)
+    rests = "rests on every operation is defined and in range within a cycle"
+    assert (
+        f"fine (monitored, conditional of the levels together), conditional in system.toml: {rests}" in said
+    )
+    assert f"= note: conditional in system.toml: {rests}" in said
+
+
+@pytest.mark.usefixtures("here")
+def test_what_was_not_looked_at_is_named(check: Said) -> None:
+    for name in ("lower", "upper"):
+        text = Path(f"{name}.rcs").read_text(encoding="utf-8")
+        Path(f"{name}.rcs").write_text(text.replace("new_command", "fresh"), encoding="utf-8")
+    assert prove() == 0
+    said = check()
+    missing = "level `upper`: not looked at: a command number is taken up once: there is no state `new_command : bool`"
+    assert f"system.toml is proved as far as it was looked at: {missing}; " in said
+    assert " and 1 more\n" in said
+    assert DECIDES not in said
+    form = check("--json", "upper.rcs")
+    assert missing in json.loads(form)["systems"][0]["missing"]
+    schema = json.loads(resources.files("rcsc.diagnostics").joinpath("schema/report.schema.json").read_text())
+    jsonschema.validate(json.loads(form), schema, jsonschema.Draft202012Validator)
+
+
+def solo(text: str, before: str = "", after: str = "") -> None:
+    """A system of one level without neighbours."""
+    Path("system.toml").write_text(
+        'name = "one"\ngenerated = ".rcsc-cache/g"\ndata = "system.toml"\ntick_ms = 40\n[[level]]\nname = "solo"\n[buffers]\n',
+        encoding="utf-8",
+    )
+    level = f"level solo {{ period 40 [ms] {before} table t {after} }}"
+    Path("solo.rcs").write_text(f"{text}\n{level}\n", encoding="utf-8")
+
+
+# --- properties ---------------------------------------------------------------------------------
+
+
+@pytest.mark.usefixtures("proved_here")
+@pytest.mark.parametrize(
+    ("words", "proved"), [("status_report in {done, executing, failed}", True), ("begun", False)]
+)
+def test_properties_that_the_levels_keep_are_said_to_be_proved(check: Said, words: str, proved: bool) -> None:
+    edit("upper", ("level upper {", f"property stated : {words}\nlevel upper {{"))
+    note = "= note: proved of the levels together, system.toml"
+    help_ = "= help: `rcsc prove` proves what a level does"
+    before = check()
+    assert (note in before, help_ in before) == (False, True)
+    assert prove() == (0 if proved else 1)
+    said = check()
+    assert (note in said, help_ in said) == (proved, not proved)
+    assert "property `stated` is not proved here" in said
+    assert ("= note: not proved: property `stated`" in said) is not proved
+    edit("upper", (f"stated : {words}", f"stated : {words} and begun = begun"))
+    assert note not in check()
+
+
+@pytest.mark.usefixtures("proved_here")
+@pytest.mark.parametrize(
+    "edits",
+    [
+        {"words": ("record lower_report {\n  inc_command_echo : number", "record lower_report {\n  echo : number")},
+        {"words": ("record lower_order {\n  inc_command : number", "record lower_order {\n  number : number")},
+        {"system": ('"lower.report" = "upper.lower"', '"lower.report" = "upper.nothing"')},
+        {"system": ("[buffers]", "[buffers")},
+        {"lower": ("table go {", "table gone {")},
+    ],
+)  # fmt: skip
+def test_a_system_that_is_not_in_order_does_not_stop_a_check(edits: dict[str, tuple[str, str]]) -> None:
+    for name, (old, new) in edits.items():
+        path = Path("system.toml" if name == "system" else f"{name}.rcs")
+        text = path.read_text(encoding="utf-8")
+        assert text.count(old) == 1
+        path.write_text(text.replace(old, new), encoding="utf-8")
+    assert run(["check", "upper.rcs", "lower.rcs"]) in {0, 1}
+
+
+# --- lines that never run ------------------------------------------------------------------------
+
+
+def with_tries(text: str) -> str:
+    """A variable that is always 0, and a line that wants it to be: by itself the table sends the rest to DEFAULT."""
+    above, work = text.split("table work", 1)
+    work, below = work.split("}", 1)
+    cells = {"line": " tries ", "----": "---", "3   ": " 0 "}
+
+    def widened(row: str) -> str:
+        if not row.startswith("  |"):
+            return row
+        first, name, test, rest = row.split("|", 3)
+        return "|".join((first, name, test, cells.get(name[1:5], "   "), rest))
+
+    rows = "\n".join(map(widened, work.split("\n")))
+    above = above.replace(
+        "state begun", "state tries : int 0 .. 3\nproperty untried : tries = 0\nstate begun"
+    )
+    return f"{above}table work{rows}}}{below}".replace("DEFAULT unreachable", "DEFAULT")
+
+
+@pytest.mark.usefixtures("proved_here")
+def test_a_default_that_no_run_of_the_system_reaches_is_said_to_be_so(check: Said) -> None:
+    path = Path("upper.rcs")
+    path.write_text(with_tries(path.read_text(encoding="utf-8")), encoding="utf-8")
+    assert "note[RCS407]" in check()
+    assert "none of them comes" not in check()
+    assert prove() == 0
+    assert "= note: none of them comes in system.toml: proved of the levels together" in check()
+    assert "line 7 never reached in system.toml" in check()
+    assert table(check("--json", "upper.rcs"))["together"]["unreached"] == ["7"]
+
+
+# --- what follows from what -------------------------------------------------------------------
+
+
+def test_an_outline_comes_back_as_it_was(here: Path) -> None:
+    read = outline._read(here / "system.toml")
+    assert read is not None
+    made = outline.outline(read[0])
+    assert standing_of(made).of_level("upper") is Known.UNKNOWN
+    form = json.loads(json.dumps(asdict(made)))
+    assert outline_of(form) == made
+    assert [one.name for one in made.levels] == ["upper", "lower"]
+    assert {level for one in made.assumed for level, _ in one.needs} == {"upper", "lower"}
+
+
+def standing_of(made: Outline) -> Standing:
+    return standing(Cache(Path("nowhere"), b"secret", "tool"), made)

@@ -1,0 +1,1 @@
+"""Diagnostics: every form and every page."""

@@ -1,0 +1,1 @@
+"""What is generated: its text, and that interpreter, Python and C agree."""

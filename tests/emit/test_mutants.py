@@ -1,0 +1,296 @@
+"""Mutants of tables and of the C, each noticed or shown equal; what nobody can decide is a figure and no failure."""
+
+import subprocess
+import sys
+from collections import Counter
+from dataclasses import replace
+from itertools import product
+from pathlib import Path
+from random import Random
+
+import pytest
+
+from rcsc.commands import run
+from rcsc.driver.trials import proofs
+from rcsc.lang.interpret import matching_lines
+from rcsc.lang.model import Program, Table, key_bounds, value_of_key
+from rcsc.lang.project import load
+from rcsc.lang.resolve import resolve
+from rcsc.solvers.options import Options
+from rcsc.testing import suite
+from rcsc.testing.code_mutants import Decider, Noticed, code_mutants, decider, source_of
+from rcsc.testing.esbmc import EsbmcVerdict, Said
+from rcsc.testing.executors.symbols import symbols_of
+from rcsc.testing.figures import SuiteResult
+from rcsc.testing.inputs.snapshot import Missing, search_in
+from rcsc.testing.matchers.matcher import Checked, Compared, check_matcher
+from rcsc.testing.mutants import Caught, Opinion, difference, judge_table, narrower, table_mutants, wider
+from rcsc.testing.suite import SuiteOptions, run_suite
+from tests.support.emitted import emitted, program_of
+
+BOXES = proofs(Options(solver="boxes"))
+SAMPLE = 100
+"""Of the mutants of a shipped table; `rcsc test --mutants -1` judges them all."""
+
+
+def shipped(path: str, repo: Path) -> Program:
+    loaded = load([str(repo / path)])
+    program = resolve(loaded.roots[0], loaded)
+    assert isinstance(program, Program), program
+    return program
+
+
+@pytest.mark.parametrize("path", ["tables/task/acquire.rcs", "tables/examples/approach.rcs"])
+def test_no_table_mutant_survives(path: str, repo: Path) -> None:
+    program = shipped(path, repo)
+    assert BOXES.prover is not None
+    for table in program.tables:
+        judged = judge_table(search_in(program, BOXES.solver), table, BOXES.prover, SAMPLE)
+        counts = Counter(one.caught for one in judged)
+        assert counts[Caught.SURVIVED] == 0, [one for one in judged if one.caught is Caught.SURVIVED]
+        assert counts[Caught.PROVER] > len(judged) // 2
+        assert {one.change for one in judged} == {"drop", "widen", "narrow", "duplicate", "swap"}
+
+
+def test_a_prover_that_notices_nothing_lets_mutants_live(repo: Path) -> None:
+    program = shipped("tables/task/acquire.rcs", repo)
+    table = program.tables[0]
+    judged = judge_table(search_in(program), table, lambda _program, _table: Opinion(accepted=True))
+    doubled = [one for one in judged if one.change == "duplicate"]
+    assert not any(one.caught is Caught.PROVER for one in judged)
+    assert doubled  # without the prover they are told apart by a snapshot
+    assert all(one.caught is Caught.EXECUTORS for one in doubled)
+
+
+def test_a_difference_is_one_and_no_difference_is_none(repo: Path) -> None:
+    program = shipped("tables/examples/acquire_published.rcs", repo)
+    table = program.tables[0]
+    search = search_in(program)
+    for mutant in list(table_mutants(program, table))[::7]:
+        found = difference(search, table, mutant)
+        assert found is not Missing.UNKNOWN
+        if isinstance(found, Missing):
+            assert not differs_anywhere(program, table, mutant.table)
+        else:
+            assert matching_lines(table, found) != matching_lines(mutant.table, found)
+
+
+def differs_anywhere(program: Program, one: Table, other: Table) -> bool:
+    """By trying each leaf at each of its keys, from the initial state."""
+    start = {str(v.name): v.initial for v in program.variables}
+    for variable in (v for v in program.variables if v.name in one.variables):
+        low, high = key_bounds(variable.type)
+        for key in range(low, high + 1):
+            snapshot = {**start, str(variable.name): value_of_key(variable.type, key)}
+            if matching_lines(one, snapshot) != matching_lines(other, snapshot):
+                return True
+    return False
+
+
+def test_a_dead_line_may_be_dropped(repo: Path) -> None:
+    program = shipped("tables/task/acquire.rcs", repo)
+    table = program.tables[0]
+    first = table.lines[0]
+    never = replace(first, tests=tuple(None if t is None else replace(t, box=()) for t in first.tests))
+    with_dead = replace(table, lines=(never, *table.lines[1:]))
+    mutant = next(m for m in table_mutants(program, with_dead) if m.change == "drop")
+    assert difference(search_in(program), with_dead, mutant) is Missing.NONE
+
+
+def test_boxes_grow_and_shrink_by_one_key(repo: Path) -> None:
+    kind = shipped("tables/examples/approach.rcs", repo).variable("tolerance_mm").type
+    assert set(wider(((3, 5), (7, 7)), kind)) == {((2, 5), (7, 7)), ((3, 7),), ((3, 5), (7, 8))}
+    assert set(narrower(((3, 5), (7, 7)))) == {((4, 5), (7, 7)), ((3, 4), (7, 7)), ((3, 5),)}
+    assert list(narrower(((7, 7),))) == []
+    assert list(wider((key_bounds(kind),), kind)) == []
+
+
+# --- mutants of the C ----------------------------------------------------------------------
+
+CLASSED = """
+enum mode { idle, up, down }
+input now : mode
+input offset : int -40 .. 40 clamp
+input go : bool
+state ticks : int 0 .. 300
+output motor : int 0 .. 9
+procedure tick { ticks := min(ticks + 1, 300) }
+procedure again { ticks := 0 }
+table t {
+  | line | now  | go    | ticks     | offset   | when             || procedures | motor |
+  | a    | idle | false |           |          |                  ||            | 0     |
+  | b    | idle | true  | < 20      |          |                  || tick       | 1     |
+  | c    | idle | true  | 20 .. 250 |          |                  || tick       | 2     |
+  | d    | idle | true  | > 250     |          |                  || again      | 3     |
+  | e    | up   |       |           |          | abs(offset) > 5  || tick       | 4     |
+  | f    | up   |       | < 200     |          | abs(offset) <= 5 ||            | 5     |
+  | g    | up   |       | >= 200    |          | abs(offset) <= 5 || again      | 6     |
+  | h    | down |       |           | -40 .. 0 |                  || tick       | 7     |
+  | i    | down |       |           | > 0      |                  ||            | 8     |
+}
+"""
+"""A supervisor of the ordinary kind: a counter that is compared in many lines gets a table of 301 classes."""
+
+
+ENDS_OF_64_BITS = (2**64, 2**63 + 150, 2**63, 2**63 - 7, -(2**63) + 300, 2**32 + 3)
+"""Past the last values of inputs: unsigned, over the middle, signed, and low."""
+
+
+@pytest.mark.parametrize("width", [1, 7, 300])
+def test_a_matcher_is_checked_at_the_ends_of_64_bits(width: int) -> None:
+    def table(number: int, end: int) -> str:
+        odd = ", ".join(f"{n}" for n in range(end - width, end, 2))
+        return f"""
+input x{number} : int {end - width} .. {end - 1}
+table t{number} {{
+  | line | x{number} ||
+  | odd  | in {{{odd}}} ||
+  | even | DEFAULT ||
+}}
+"""
+
+    program = program_of("".join(map(table, range(len(ENDS_OF_64_BITS)), ENDS_OF_64_BITS)))
+    files = emitted(program)
+    source = next(text for name, text in files.items() if name.endswith(".c"))
+    assert ("_i64_of_u64(" in source) == (width == 300)
+    for one in program.tables:
+        assert isinstance(check_matcher(program, symbols_of(program, files), files, one), Checked), one.name
+
+
+@pytest.fixture(scope="module")
+def classed() -> tuple[Program, dict[str, str], Checked, Decider]:
+    program = program_of(CLASSED)
+    files = emitted(program)
+    checked = check_matcher(program, symbols_of(program, files), files, program.tables[0])
+    assert isinstance(checked, Checked)
+    return program, files, checked, decider(program, symbols_of(program, files), files, {"t": checked})
+
+
+def behaviour(tables: list[Compared]) -> list[int]:
+    """For every input of the tables the lines that all their masks leave; each leaf is in one table."""
+    found = [-1]
+    for one in tables:
+        keys = product(*(classes or [(0, 0), (1, 0)] for classes in one.classes))
+        masks = []
+        for classes in keys:
+            at = 0
+            for (number, _), count in zip(classes, one.counts, strict=True):
+                at = at * count + number
+            masks.append(one.entries[at] if at < len(one.entries) else 0)
+        found = [left & mask for left in found for mask in masks]
+    return found
+
+
+def test_the_check_of_the_masks_decides_every_mutant_of_a_mask_and_of_a_class(
+    classed: tuple[Program, dict[str, str], Checked, Decider],
+) -> None:
+    program, files, _, decides = classed
+    source = source_of(symbols_of(program, files), files)
+    every = [one for one in code_mutants(source, len(program.tables[0].lines)) if one.change == "mask"]
+    judged = Counter(decides.decides(one) for one in every)
+    assert "classes[301]" in source
+    assert judged[Noticed.MATCHER] > 2000
+    # what is left undecided are numbers of no mask: of the bit scan for other compilers
+    assert {one.function for one in every if not decides.knows(one)} <= {
+        f"{program.name}_bit64",
+        "case__bit64",
+    }
+    assert set(judged) <= {Noticed.MATCHER, Noticed.EQUIVALENT, None}
+
+
+def test_what_the_check_calls_equal_is_equal_for_every_input() -> None:
+    """By brute force over masks and classes that are changed at random."""
+    random, verdicts = Random(3), Counter[bool]()  # noqa: S311  # repeatable
+    for _ in range(400):
+        counts = (random.randint(1, 3), random.randint(2, 3))
+        classes = [[(random.randrange(n), 0) for _ in range(4)] for n in counts]
+        lines = [{at: random.getrandbits(3) for at in range(n)} for n in counts]
+        classes = [[(at, way[at]) for at, _ in one] for one, way in zip(classes, lines, strict=True)]
+        entries = [lines[0][a] & lines[1][b] for a, b in product(range(counts[0]), range(counts[1]))]
+        before = Compared(7, 1, entries, counts, lines, classes)
+        if random.getrandbits(1):
+            at, value = random.randrange(len(entries)), random.getrandbits(3)
+            equal = before.with_word(at, value)
+            after = replace(before, entries=[*entries[:at], value, *entries[at + 1 :]])
+        else:
+            which, at = random.randrange(2), random.randrange(4)
+            value = random.randrange(counts[which] + 1)
+            equal = before.with_class(which, at, value)
+            other = [*classes[which][:at], (value, 0), *classes[which][at + 1 :]]
+            after = replace(before, classes=[other if n == which else one for n, one in enumerate(classes)])
+        verdicts[equal] += 1
+        assert not equal or behaviour([before]) == behaviour([after])
+    assert min(verdicts.values()) > 20
+
+
+def deep(program: Program, files: dict[str, str], mutants: int = 4) -> SuiteResult:
+    options = SuiteOptions(examples=20, deep=True, esbmc_s=0.0, cortex=False, mutants=mutants)
+    return run_suite(program, files, options)
+
+
+def test_what_nobody_can_decide_is_a_figure_and_no_failure(
+    classed: tuple[Program, dict[str, str], Checked, Decider], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    program, files, _, _ = classed
+    result = deep(program, files)
+    assert result.found == ()
+    assert "mutants of the masks: " in result.text()
+    assert set(result.programs[0].code_mutants["mutants of the masks"]) <= {"the matcher check", "equivalent"}
+    for said, failed in ((Said.FAILED, False), (Said.REFUTED, True)):
+        monkeypatch.setattr(suite, "prove_function", lambda *_, said=said: EsbmcVerdict("f", said, 0, 0.0))
+        asked = SuiteOptions(examples=1, esbmc_s=1.0, cortex=False, mutants=0)
+        assert run_suite(program, files, asked).failed is failed
+
+
+def test_a_check_of_the_masks_that_calls_all_equal_is_found_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    lines = "| line | part || on |\n| a | < 2 || true |\n| b | >= 2 || false |"
+    program = program_of(f"input part : int 0 .. 3\noutput on : bool\ntable t {{\n{lines}\n}}\n")
+    monkeypatch.setattr(Compared, "with_word", lambda *_: True)
+    found = deep(program, emitted(program)).found
+    assert ["calls equal what the tests tell apart" in one.message for one in found] == [True]
+
+
+def test_without_being_asked_no_model_checker_runs_and_no_c_is_mutated(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def never(*_: object) -> None:
+        raise AssertionError
+
+    monkeypatch.setattr(suite, "prove_function", never)
+    monkeypatch.setattr(suite, "judge_code", never)
+    (tmp_path / "lift.rcs").write_text(CLASSED, encoding="utf-8")
+    for more in ((), ("--esbmc", "0")):
+        asked = ["test", "--no-cache", "--no-cortex", "--examples", "10", "--mutants", "2", *more]
+        assert run([*asked, str(tmp_path / "lift.rcs")]) == 0
+        said = capsys.readouterr().out
+        assert "matcher = table: " in said
+        assert "9 of 9 lines reached" in said
+        assert "ESBMC" not in said
+
+
+def test_a_condition_is_not_asked_where_what_stops_the_cycle_fails(tmp_path: Path) -> None:
+    """The matcher then divides by zero, and is not called: nor may the check of the masks call it."""
+    text = """
+input a : int 0 .. 9
+input b : int 0 .. 9
+output o : bool
+assume some monitored : b /= 0
+table t assuming some {
+  | line | a / b || o     |
+  | 1    | > 3   || true  |
+  | 2    | <= 3  || false |
+}
+"""
+    (tmp_path / "quotient.rcs").write_text(text, encoding="utf-8")
+    asked = [
+        "--no-cache",
+        "--no-cortex",
+        "--examples",
+        "20",
+        "--mutants",
+        "2",
+        str(tmp_path / "quotient.rcs"),
+    ]
+    start = "import sys; from rcsc.commands import run; sys.exit(run(sys.argv[1:]))"
+    ran = subprocess.run([sys.executable, "-c", start, "test", *asked], capture_output=True, check=False)
+    assert ran.returncode == 0, ran.stderr

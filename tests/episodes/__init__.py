@@ -1,0 +1,1 @@
+"""Episodes and campaigns: whatever goes wrong, the properties hold."""

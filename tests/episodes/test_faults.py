@@ -1,0 +1,155 @@
+"""Seeded faults: that they are faults, and that each of the three that are asked catches some which the others do not."""
+
+from collections.abc import Mapping
+from itertools import chain, islice
+from pathlib import Path
+
+import pytest
+
+from tests.faults import (
+    Answer,
+    Judged,
+    Kept,
+    Standing,
+    by_campaign,
+    by_check,
+    by_compose,
+    matrix,
+    resolves,
+    shipped,
+)
+from tests.support.faults_made import KINDS, LEVELS, Fault, faults, sample, tables
+
+TABLES = Path(__file__).parents[2] / "tables"
+
+
+@pytest.fixture(scope="module")
+def sound() -> Mapping[str, Standing]:
+    return shipped(["gripper"])
+
+
+def gripper(kind: str, old: str, new: str) -> Fault:
+    """The one fault of the gripper controller of this kind that makes the one of the other."""
+    return next(
+        one
+        for one in faults(TABLES, "gripper")[kind]
+        if old in one.old and (new in one.new if new else not one.new)
+    )
+
+
+def test_every_fault_is_one_change_in_one_line() -> None:
+    for level in LEVELS:
+        for kind, found in faults(TABLES, level).items():
+            for one in found[:20]:
+                before = (TABLES / one.file).read_text(encoding="utf-8").split("\n")
+                after = one.text.split("\n")
+                assert before[one.number - 1] == one.old, kind
+                assert before[: one.number - 1] == after[: one.number - 1]
+                assert before[one.number :] == after[one.number - bool(not one.new) :]
+                assert one.level == level
+                assert one.kind == kind
+
+
+def test_every_kind_is_there_and_there_are_more_than_two_hundred_in_turns() -> None:
+    every = {level: faults(TABLES, level) for level in LEVELS}
+    assert {kind for found in every.values() for kind, ones in found.items() if ones} == set(KINDS)
+    firsts = [list(islice(sample(TABLES, level, 1984), 50)) for level in LEVELS]
+    assert sum(map(len, firsts)) == 250
+    assert len({(one.file, one.text) for one in chain.from_iterable(firsts)}) > 240
+    assert {one.kind for one in firsts[-1][: len(KINDS)]} == set(KINDS)  # of TASK, which has all
+
+
+def test_a_sample_hangs_on_its_seed_alone() -> None:
+    def shown(seed: int) -> list[str]:
+        return [one.shown for one in islice(sample(TABLES, "task", seed), 40)]
+
+    assert shown(1) == shown(1) != shown(2)
+
+
+def test_a_table_is_read_with_its_head_and_its_lines() -> None:
+    lines = (TABLES / "gripper" / "gripper.rcs").read_text(encoding="utf-8").split("\n")
+    position, grasp, pause = tables(lines)
+    assert [len(position), len(grasp), len(pause)] == [8, 7, 2]
+    assert [name.strip() for name in grasp[0].actions] == ["procedures", "command_out", "status_out"]
+    assert lines[grasp[3].at] == grasp[3].text()
+
+
+def test_what_does_not_resolve_is_no_fault() -> None:
+    old = "report.ref_command_echo := command.input_command"
+    assert not resolves(gripper("a field swapped", old, "command.opening_mm"))  # a length is no command
+    assert resolves(gripper("a line dropped", "| 7    | false       | f_state", ""))
+
+
+def test_a_missing_line_is_caught_by_the_table_s_proof_and_by_the_composed_one(
+    sound: Mapping[str, Standing],
+) -> None:
+    fault = gripper("a line dropped", "| 7    | false       | f_state", "")
+    assert by_check(fault) == Answer(True, "RCS401")
+    assert by_compose(fault, sound) == Answer(True, "gripper: position: some line matches")
+
+
+def test_only_the_composed_proof_knows_that_a_command_is_taken_up_once(sound: Mapping[str, Standing]) -> None:
+    fault = gripper("a new number compared wrongly", "/= inc_command_seen", "= inc_command_seen")
+    assert by_check(fault) == Answer(False)
+    assert by_compose(fault, sound).how.startswith("gripper: a command number is taken up once")
+
+
+def test_only_the_composed_proof_knows_that_two_lines_never_meet(sound: Mapping[str, Standing]) -> None:
+    """`waited` is zero where a command is new: the table alone cannot know it."""
+    fault = gripper(
+        "a line widened", "| 5    | false       | moving    | false      | not", "| 5    | | moving"
+    )
+    assert by_check(fault).caught
+    assert not by_compose(fault, sound).caught
+
+
+def test_the_composed_proof_and_the_episodes_know_that_a_counter_must_count(
+    sound: Mapping[str, Standing],
+) -> None:
+    fault = gripper("a counter not incremented", "waited + 1", "waited + 0")
+    assert by_check(fault) == Answer(False)
+    caught = by_compose(fault, sound)
+    assert caught.caught
+    assert "gripper: grasp: the command ends" in caught.how
+    assert "gripper: position: line 5 is reached" in caught.how
+    assert by_campaign(fault) == Answer(True, "episode 3: ends in DONE or FAIL")
+
+
+def test_only_the_episodes_know_what_the_fingers_do(sound: Mapping[str, Standing]) -> None:
+    """They are told to move, and not where to."""
+    fault = gripper("an assignment dropped", "to_hand.opening_mm := command.opening_mm", "")
+    assert by_check(fault) == Answer(False)
+    assert by_compose(fault, sound) == Answer(False)
+    assert by_campaign(fault).caught
+
+
+def test_an_answer_is_asked_for_once_and_again_where_its_ground_is_another(tmp_path: Path) -> None:
+    fault = gripper("a line dropped", "| 7 ", "")
+    asked = []
+
+    def ask() -> Answer:
+        asked.append(1)
+        return Answer(True, f"asked {len(asked)} times")
+
+    kept = Kept(tmp_path)
+    assert kept.answer("check", "here", fault, ask).how == "asked 1 times"
+    assert kept.answer("check", "here", fault, ask).how == "asked 1 times"
+    assert kept.answer("check", "there", fault, ask).how == "asked 2 times"
+    assert kept.answer("compose", "here", fault, ask).how == "asked 3 times"
+
+
+def test_the_matrix_counts_who_alone_caught_what() -> None:
+    one, two = (
+        gripper("a line dropped", "| 7 ", ""),
+        gripper("a counter not incremented", "waited + 1", "waited + 0"),
+    )
+    yes, no = Answer(True), Answer(False)
+    judged = [
+        Judged(one, {"check": yes, "compose": yes}),
+        Judged(one, {"check": no, "compose": yes}),
+        Judged(two, {"check": no, "compose": no}),
+    ]
+    rows = {line[:32].strip(): line[32:].split() for line in matrix(judged, ("check", "compose"))}
+    assert rows["a line dropped"] == ["2", "1", "0", "2", "1", "0"]
+    assert rows["a counter not incremented"] == ["1", "0", "0", "0", "0", "1"]
+    assert rows["all"] == ["3", "1", "0", "2", "1", "1"]

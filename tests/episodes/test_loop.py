@@ -1,0 +1,367 @@
+"""The cell in the loop under Hypothesis: whatever is commanded and whatever goes wrong, the properties hold.
+
+`HYPOTHESIS_PROFILE=long pytest tests/episodes/test_loop.py` looks for new episodes and for longer. What does not hold is kept in
+`.rcsc-cache/loop` as an episode, a script and a log; `rcsc_cell.episodes.episode.run` gives the same again. The episode goes to
+`tests/regress`, and is run for ever.
+"""
+
+import os
+import subprocess
+import sys
+from collections import Counter
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
+
+from rcsc.run.adopt import Begun
+from rcsc.run.log.read import read
+from rcsc.run.log.replay import Replay
+from rcsc_cell.database.build import BadData
+from rcsc_cell.episodes.episode import (
+    FAULTS,
+    HARM,
+    SYSTEM,
+    Episode,
+    FaultSpec,
+    Interruption,
+    PartSpec,
+    Push,
+    Restart,
+    TransportSpec,
+    script,
+)
+from rcsc_cell.episodes.loop import Loop, run
+from rcsc_cell.episodes.part_faults import fault_classes
+from rcsc_cell.episodes.sampling import LEVELS, draw
+from rcsc_cell.episodes.strategies import episodes, faults, harms, rows
+from rcsc_cell.episodes.transport import Harmed
+from tests.support.loops import ACQUIRE, TBOX, keep
+
+HERE = Path(__file__).parents[1]
+LONG = settings.get_current_profile_name() == "long"
+CASES = sorted((HERE / "regress").glob("*.json"))
+
+# --- the properties hold ---
+
+
+@settings(max_examples=2000 if LONG else 20)
+@given(episodes())
+def test_whatever_goes_wrong_the_properties_hold(episode: Episode) -> None:
+    outcome = run(episode)
+    assert not outcome.findings, keep(episode, outcome)
+
+
+@settings(max_examples=200 if LONG else 3)
+@given(st.integers(0, 10**6))
+def test_they_hold_with_physics(seed: int) -> None:
+    episode = replace(draw(seed, "mujoco"), step_s=0.004)
+    outcome = run(episode)
+    assert not outcome.findings, keep(episode, outcome)
+
+
+class CellMachine(RuleBasedStateMachine):
+    """Somebody at the cell: gives commands, breaks things, waits, and looks."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.loop = Loop(Episode(parts=TBOX), SYSTEM)
+
+    @property
+    def tick(self) -> int:
+        return self.loop.system.tick
+
+    def cycles(self, count: int) -> None:
+        for _ in range(count):
+            self.loop.step()
+
+    @rule(row=rows(), count=st.integers(1, 120))
+    def command(self, row: str, count: int) -> None:
+        self.loop.change(row)
+        self.cycles(count)
+
+    @rule(count=st.integers(1, 200))
+    def wait(self, count: int) -> None:
+        self.cycles(count)
+
+    @rule(count=st.integers(1, 30))
+    def pause(self, count: int) -> None:
+        self.loop.change("PAUSE,,,,")
+        self.cycles(count)
+
+    @rule(fault=faults(st.just(0)), count=st.integers(1, 60))
+    def breaks(self, fault: FaultSpec, count: int) -> None:
+        last = self.tick + min(fault.last_tick, 500)
+        self.loop.inject(replace(fault, first_tick=self.tick, last_tick=last))
+        self.cycles(count)
+
+    @rule(harm=harms(st.just(0)), count=st.integers(1, 60))
+    def loses(self, harm: TransportSpec, count: int) -> None:
+        self.loop.harm(replace(harm, first_tick=self.tick, last_tick=self.tick + harm.last_tick))
+        self.cycles(count)
+
+    @rule(level=st.sampled_from(LEVELS), count=st.integers(1, 30))
+    def restarts(self, level: str, count: int) -> None:
+        self.loop.restart(level)
+        self.cycles(count)
+
+    @precondition(lambda self: self.loop.plant.mechanism.hand()[0] > 0)
+    @rule(x_mm=st.integers(-40, 40), y_mm=st.integers(-40, 40))
+    def pushes(self, x_mm: int, y_mm: int) -> None:
+        self.loop.push(0, float(x_mm), float(y_mm))
+        self.cycles(1)
+
+    @invariant()
+    def properties_hold(self) -> None:
+        if self.loop.findings:
+            raise AssertionError(keep(self.loop.episode, self.loop.outcome()))
+
+
+CellMachine.TestCase.settings = settings(
+    max_examples=300 if LONG else 12, stateful_step_count=40 if LONG else 12
+)
+TestCell = CellMachine.TestCase
+
+
+@pytest.mark.parametrize("path", CASES, ids=[path.stem for path in CASES])
+def test_what_once_did_not_hold_does(path: Path) -> None:
+    outcome = run(Episode.from_json(path.read_text(encoding="utf-8")))
+    assert outcome.findings == ()
+
+
+# --- the same again ---
+
+
+def test_an_episode_that_grew_runs_again_as_it_went() -> None:
+    """What the state machine finds is an episode."""
+    machine = CellMachine()
+    machine.command("ACQUIRE,BOXT (2),BUFFER,,", 100)
+    machine.breaks(FaultSpec("blind", 0, 50), 10)
+    machine.loses(TransportSpec("emove.report", "stale", 0, 3), 10)
+    machine.restarts("vision", 5)
+    machine.pushes(1, 2)
+    machine.pause(30)
+    then = machine.loop.outcome()
+    again = Loop(Episode.from_json(machine.loop.episode.to_json()), SYSTEM)
+    for _ in range(then.ticks):
+        again.step()
+    assert again.outcome() == then
+    machine.teardown()
+
+
+ODD = replace(
+    ACQUIRE,
+    faults=(FaultSpec("noisy", 80, 200),),
+    transport=(TransportSpec("primitive.report", "delayed", 20, 60),),
+    restarts=(Restart(40, "vision"),),
+    interruptions=(Interruption(30, "MOVE,,,FIX-SAFE,"), Interruption(80, "ACQUIRE,BOXT (2),BUFFER,,")),
+)
+"""Something of everything, and a picture in it."""
+
+
+@pytest.mark.parametrize("backend", ["kinematic", "mujoco"])
+def test_both_executors_give_the_same_log(backend: str, tmp_path: Path) -> None:
+    episode = replace(ODD, backend=backend, step_s=0.004)  # type: ignore[arg-type]  # one of both
+    outcomes = {}
+    for executor in ("c", "python"):
+        log = tmp_path / executor
+        outcomes[executor] = run(replace(episode, executor=executor), log=log)
+    assert outcomes["c"] == outcomes["python"]
+    assert (tmp_path / "c").read_bytes() == (tmp_path / "python").read_bytes()
+
+
+def test_the_digest_is_the_same_in_another_process_and_another_for_another_seed() -> None:
+    code = (
+        "import sys; from rcsc_cell.episodes.episode import Episode; from rcsc_cell.episodes.loop import run; "
+        "print(run(Episode.from_json(sys.stdin.read())).digest)"
+    )
+    ran = subprocess.run(
+        [sys.executable, "-c", code],
+        input=ODD.to_json(),
+        env={**os.environ, "PYTHONHASHSEED": "1"},
+        cwd=HERE.parent,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    here = run(ODD).digest
+    assert ran.stdout.strip() == here
+    assert run(replace(ODD, seed=7)).digest != here
+
+
+RESTARTS = {
+    "one": (Restart(40, "vision"),),
+    "before the first cycle": (Restart(0, "task"),),
+    "two in succession": (Restart(40, "emove"), Restart(41, "emove")),
+    "two before one cycle": (Restart(40, "emove"), Restart(40, "emove")),
+    "two levels at once": (Restart(40, "task"), Restart(40, "primitive")),
+    "every level, the last again": tuple(Restart(at, level) for at in (60, 61) for level in LEVELS),
+}
+
+
+@pytest.mark.parametrize("restarts", RESTARTS.values(), ids=RESTARTS)
+def test_the_log_of_an_episode_replays_exactly_whatever_is_restarted(
+    restarts: tuple[Restart, ...], tmp_path: Path
+) -> None:
+    outcome = run(replace(ODD, restarts=restarts), log=tmp_path / "log.mcap")
+    log = read(tmp_path / "log.mcap")
+    replay = Replay(log, SYSTEM.parents[1] / "generated")
+    moments = list(replay.moments())
+    assert [moment.tick for moment in moments if moment.differs] == []
+    assert len(moments) == outcome.ticks
+    began = [
+        (moment.tick, cycle.level, cycle.restarted)
+        for moment in moments
+        for cycle in moment.cycles
+        if cycle.restarted is not None
+    ]
+    assert began == [(one.tick + 1, one.level, Begun.ANEW) for one in dict.fromkeys(restarts)]
+    for level in log.levels:
+        assert len(level.restarts) == sum(one.level == level.name for one in restarts)
+
+
+# --- episodes as values ---
+
+
+@settings(max_examples=50)
+@given(episodes())
+def test_an_episode_travels_as_json(episode: Episode) -> None:
+    assert Episode.from_json(episode.to_json()) == episode
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        "[]",
+        "nothing",
+        '{"backend": "paper"}',
+        '{"faults": [{"name": "sunspots", "first_tick": 0, "last_tick": 1}]}',
+        '{"parts": [{"weight": 3}]}',
+        '{"transport": [{"buffer": "a", "kind": "eaten", "first_tick": 0, "last_tick": 1}]}',
+        '{"backend": "mujoco", "pushes": [{"tick": 0, "part": 0, "x_mm": 1, "y_mm": 1}]}',
+    ],
+)
+def test_what_is_no_episode_is_refused(said: str) -> None:
+    with pytest.raises(ValueError, match=r".+"):
+        Episode.from_json(said)
+
+
+def test_a_seed_draws_the_same_episode_and_all_of_them_draw_every_fault() -> None:
+    drawn = [draw(seed) for seed in range(1500)]
+    assert drawn == [draw(seed) for seed in range(1500)]
+    seen = Counter(name for episode in drawn for name in fault_classes(episode))
+    assert set(seen) == set(FAULTS)
+    share = sum(not fault_classes(episode) for episode in drawn) / len(drawn)
+    assert 0.1 < share < 0.4
+    assert any(len(fault_classes(episode)) > 2 for episode in drawn)
+
+
+@pytest.mark.parametrize(
+    ("rows", "end"),
+    [
+        (("DANCE,,,,",), "refused"),
+        (("MOVE,,,MOON,",), "refused"),
+        (("RELEASE,,,,",), "refused"),
+        (("TRANSFER,,,STATION(0),",), "refused"),
+        (("MOVE,,,,",), "failed:cmd"),
+        (("ACQUIRE,BOXT (2),MOON,,",), "refused"),
+        ((), "done"),
+    ],
+)
+def test_scripts_that_are_not_legal_end_so(rows: tuple[str, ...], end: str) -> None:
+    outcome = run(Episode(rows=rows))
+    assert (outcome.end, outcome.findings) == (end, ())
+
+
+def test_a_part_that_nobody_knows_is_bad_data() -> None:
+    with pytest.raises(BadData, match="no part is called `cube`"):
+        run(Episode(parts=(PartSpec("cube"),)))
+
+
+def test_an_interruption_that_says_nothing_is_refused() -> None:
+    for row in ("ENGRAVE PART,,,,", "MOVE,,,MOON,", "DANCE,,,,"):
+        assert run(Episode(interruptions=(Interruption(3, row),))).end == "refused"
+
+
+def test_a_changed_command_is_left_and_the_script_goes_on() -> None:
+    rows = ("MOVE,,,BUFFER-SAFE,", "MOVE,,,FIX-SAFE,")
+    outcome = run(Episode(rows=rows, interruptions=(Interruption(20, "MOVE,,,V-BLK2,"),)))
+    assert [(row.text, row.state) for row in outcome.rows] == [
+        ("MOVE BUFFER-SAFE", "changed"),
+        ("MOVE V-BLK2", "done"),
+        ("MOVE FIX-SAFE", "done"),
+    ]
+
+
+def test_a_script_is_what_rcsc_run_reads() -> None:
+    assert script(("MOVE,,,WS-SAFE,",)) == "command,part,source,dest,end_at\nMOVE,,,WS-SAFE,\n"
+
+
+# --- buffers that fail ---
+
+
+@settings(max_examples=100)
+@given(st.lists(harms(st.integers(0, 30)), max_size=6), st.integers(1, 60))
+def test_a_reader_never_sees_an_older_value_after_a_newer_one(
+    harmed: list[TransportSpec], count: int
+) -> None:
+    names = sorted({one.buffer for one in harmed} | {"task.report"})
+    buffers = Harmed(harmed)
+    seen: dict[str, tuple[float, ...]] = {}
+    for tick in range(count):
+        buffers.begin(tick)
+        for name in names:
+            latest = buffers.latest(name)
+            assert latest is None or seen.get(name, ()) <= latest
+            seen[name] = latest or ()
+            buffers.publish(name, (tick,))
+
+
+@pytest.mark.parametrize(
+    ("kind", "read"),
+    [
+        ("lost", [None, 0, 1, 1, 1, 1, 5, 6]),
+        ("stale", [None, 0, 1, 1, 1, 4, 5, 6]),
+        ("doubled", [None, 0, 1, 1, 3, 3, 5, 6]),
+        ("delayed", [None, 0, 1, 1, 1, 2, 5, 6]),
+    ],
+)
+def test_what_each_harm_does(kind: HARM, read: list[int | None]) -> None:
+    """In ticks 2 to 4; a value is read in the tick after the one in which it is published."""
+    buffers, seen = Harmed([TransportSpec("b", kind, 2, 4, 2)]), []
+    for tick in range(8):
+        buffers.begin(tick)
+        latest = buffers.latest("b")
+        seen.append(None if latest is None else latest[0])
+        buffers.publish("b", (tick,))
+    assert seen == read
+
+
+def test_a_value_that_was_held_arrives_though_nothing_follows() -> None:
+    buffers = Harmed([TransportSpec("b", "stale", 0, 2), TransportSpec("c", "delayed", 0, 2, 4)])
+    buffers.begin(0)
+    buffers.publish("b", (1,))
+    buffers.publish("c", (1,))
+    for tick in range(1, 4):
+        buffers.begin(tick)
+    assert buffers.latest("b") == (1,)
+    assert buffers.latest("c") is None
+    for tick in range(4, 7):
+        buffers.begin(tick)
+    assert buffers.latest("c") == (1,)
+
+
+def test_parts_lie_where_they_are_said_to() -> None:
+    spec = PartSpec("flag", "pallet", 10.0, 0.0, 0.0, (50.0, 30.0, 25.0))
+    loop = Loop(Episode(parts=(spec,), pushes=(Push(0, 0, 3.0, 4.0),)), SYSTEM)
+    [before] = loop.plant.mechanism.parts()
+    station = loop.database.stations["pallet"]
+    assert station.frame.inside(before.at_mm) == pytest.approx((10.0, 0.0, 12.5))
+    loop.step()
+    [after] = loop.plant.mechanism.parts()
+    assert tuple(b - a for a, b in zip(before.at_mm, after.at_mm, strict=True)) == pytest.approx(
+        (3.0, 4.0, 0.0)
+    )

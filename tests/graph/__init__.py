@@ -1,0 +1,1 @@
+"""State graphs, both ways."""

@@ -1,0 +1,812 @@
+"""State graphs, both ways: what is drawn is what the tables do, and what is read back is proved to do the same."""
+
+import itertools
+import random
+import re
+import shutil
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import pytest
+from click.testing import CliRunner
+
+from rcsc.commands.group import commands
+from rcsc.diagnostics.codes import Code
+from rcsc.diagnostics.diagnostic import Diagnostic
+from rcsc.diagnostics.source import Source
+from rcsc.graph.derive import Derived, derive
+from rcsc.graph.drawing import plain, svg
+from rcsc.graph.find import Found, NotFound, tables
+from rcsc.graph.formats.choice import FORMS, form_of
+from rcsc.graph.formats.reading import UnreadableError, diagnosed
+from rcsc.graph.formats.state_graph import ANY, StateGraph
+from rcsc.graph.lines import derive_lines
+from rcsc.graph.round_trip import Against, against, in_place
+from rcsc.graph.to_table import tabled
+from rcsc.lang.interpret import cycle, holds, initial, run_table
+from rcsc.lang.model import Enum, Program, Snapshot, Table, Value, key_bounds, value_of_key
+from rcsc.lang.project import load
+from rcsc.lang.resolve import compile_text
+from rcsc.relation.follow import following
+from rcsc.relation.same import Differs, Same, compare
+from rcsc.relation.steps import Steps
+from rcsc.solvers.options import Options
+
+ROOT = Path(__file__).parents[2]
+OPTIONS = Options()
+EVERY_FORM = sorted(FORMS)
+
+
+@pytest.fixture(scope="module")
+def shipped() -> dict[str, Found]:
+    """Every table of the system, by program and name."""
+    found = tables(str(ROOT / "tables"))
+    assert not isinstance(found, NotFound)
+    return {f"{one.program.name}.{one.table.name}": one for one in found if "examples" not in one.table.file}
+
+
+KEPT: dict[tuple[int, str], tuple[Found, Derived]] = {}
+"""Graphs already derived, by the identity of what was found, which is kept too."""
+
+
+def graph_of(one: Found, state: str = "") -> Derived:
+    if (id(one), state) not in KEPT:
+        made = derive(one.program, one.table, one.loaded.files[one.table.file], OPTIONS, state)
+        assert isinstance(made, Derived), made
+        KEPT[id(one), state] = one, made
+    return KEPT[id(one), state][1]
+
+
+def said(one: Found, text: str, form: str) -> Against:
+    """The verdict on the table that the graph's text says."""
+    table = tabled(FORMS[form].read(text))
+    return against(one.loaded, one.root, one.program, one.table, table, OPTIONS)
+
+
+def found_in(text: str, tmp_path: Path, name: str = "") -> Found:
+    file = tmp_path / "case.rcs"
+    file.write_text(text, encoding="utf-8")
+    made = tables(f"{file}:{name}" if name else str(file))
+    assert not isinstance(made, NotFound), made
+    return made[0]
+
+
+# --- the shipped tables --------------------------------------------------------------------
+
+
+def test_every_table_of_the_system_comes_back_from_every_form_and_is_proved_the_same(
+    shipped: dict[str, Found],
+) -> None:
+    assert len(shipped) == 24
+    for name, one in shipped.items():
+        made = graph_of(one)
+        texts = {tabled(FORMS[form].read(FORMS[form].write(made.graph))).text() for form in EVERY_FORM}
+        assert len(texts) == 1, name  # the forms hold the same, so that one proof is enough
+        verdict = said(one, FORMS["dot"].write(made.graph), "dot")
+        assert verdict.found == (), name
+
+
+def test_the_graph_of_acquire_is_fig_10(shipped: dict[str, Found]) -> None:
+    made = graph_of(shipped["task.acquire"])
+    assert [(edge.line, edge.source, edge.target) for edge in made.graph.edges] == [
+        ("0", ANY, ANY),
+        ("1", ANY, "state_4"),
+        ("2", ANY, "f_state"),
+        ("3", ANY, "f_state"),
+        ("4", ANY, "state_2"),
+        ("5", "state_4", "f_state"),
+        ("5", "state_4", "state_5"),
+        ("6", "state_2", "state_3"),
+        ("7", "state_3", "f_state"),
+        ("7", "state_3", "state_5"),
+        ("8", "state_5", "d_state"),
+        ("9", "d_state", "d_state"),
+        ("10", "state_2", "f_state"),
+        ("11", "state_4", "f_state"),
+        ("12", "state_3", "f_state"),
+        ("13", "state_5", "f_state"),
+        ("14", "f_state", "f_state"),
+        *(("15", state, state) for state in ("state_2", "state_3", "state_4", "state_5")),
+        ("16", ANY, "f_state"),
+    ]
+    by_procedure = {(edge.line, edge.target): edge.decided for edge in made.graph.edges if edge.decided}
+    assert by_procedure == {("5", "f_state"): "pickup", ("7", "f_state"): "pickup"}  # the buffer is empty
+    assert made.everywhere == "new_command = false"
+    shown = {edge.line: edge.shown for edge in made.graph.edges}
+    assert shown["5"] == "status_in = done"  # the command echoed follows from the state
+    assert shown["9"] == ""
+    assert any("line `10`: `/= f_state`" in one for one in made.lost)
+
+
+def test_the_published_acquire_leaves_its_state_past_the_deferral() -> None:
+    one = tables(str(ROOT / "tables/examples/acquire_published.rcs"))
+    assert not isinstance(one, NotFound)
+    edges = {(edge.line, edge.source, edge.target, edge.decided) for edge in graph_of(one[0]).graph.edges}
+    assert (
+        "5",
+        "state_4",
+        "f_state",
+        "pickup",
+    ) in edges  # `cur_state` is written at once, while state_5 is pending
+    assert ("5", "state_4", "state_5", "") in edges
+
+
+BREAKS = [
+    (
+        "a guard",
+        "ref_command_in = locate and status_in = done",
+        "ref_command_in = locate and status_in = failed",
+    ),
+    ("an effect", "command_out(locate)", "command_out(move_to)"),
+    ("a procedure", "procedures(begin, set_source)", "procedures(begin)"),
+    ("a state", "state_5", "state_8"),
+]
+
+
+@pytest.mark.parametrize("form", EVERY_FORM)
+@pytest.mark.parametrize(
+    ("old", "new"), [(old, new) for _, old, new in BREAKS], ids=[what for what, *_ in BREAKS]
+)
+def test_a_broken_graph_is_refuted_by_an_input(
+    shipped: dict[str, Found], form: str, old: str, new: str
+) -> None:
+    one = shipped["task.acquire"]
+    text = FORMS[form].write(graph_of(one).graph)
+    assert old in text
+    [found] = said(one, text.replace(old, new), form).found
+    assert found.code is Code.GRAPH_DIFFERS
+    assert found.witnesses[0].variables
+
+
+@pytest.mark.parametrize("form", EVERY_FORM)
+def test_a_dropped_edge_is_refuted(shipped: dict[str, Found], form: str) -> None:
+    one = shipped["primitive.goto"]
+    lines = FORMS[form].write(graph_of(one).graph).splitlines(keepends=True)
+    at = next(at for at, line in enumerate(lines) if "robot_status_in = done and there = true" in line)
+    [found] = said(one, "".join(lines[:at] + lines[at + 1 :]), form).found
+    assert found.code is Code.GRAPH_DIFFERS
+    assert "line `6`, the graph to line `10`" in found.message  # DEFAULT takes it
+
+
+def test_a_table_that_rests_on_other_assumptions_is_not_the_same(shipped: dict[str, Found]) -> None:
+    one = shipped["task.acquire"]
+    text = (
+        FORMS["mermaid"]
+        .write(graph_of(one).graph)
+        .replace("in_step, resting, acquire_states", "in_step, resting")
+    )
+    [found] = said(one, text, "mermaid").found
+    assert (found.code, "acquire_states" in found.notes[0]) == (Code.GRAPH_DIFFERS, True)
+
+
+WRITES = """
+enum mode { rest, work }
+input x : int 0 .. 9
+state cur_state : mode
+state n : int 0 .. 9
+output o : int 0 .. 9
+extern procedure ask writes n python "m:ask" c "m_ask"
+extern procedure tell reads o python "m:tell" c "m_tell"
+table m {
+  | line | cur_state | x    || procedures     | o |
+  |------|-----------|------||----------------|---|
+  | low  | rest      | < 5  || ask; tell      | 1 |
+  | high | rest      | >= 5 || cur_state := work; ask | 2 |
+  | back | work      |      || cur_state := rest; tell | 3 |
+}
+"""
+
+OTHERWISE = [
+    ("a call that writes nothing left out", "procedures(ask, tell)", "procedures(ask)"),
+    ("two calls exchanged", "procedures(ask, tell)", "procedures(tell, ask)"),
+    ("a call with another value", "procedures(tell) o(3)", "procedures(o := 5, tell) o(3)"),
+    ("a condition that is not defined everywhere", "x < 5", "x < 5 and 10 / x >= 0"),
+    ("an action that is not defined everywhere", "o(1)", "o(1 + 0 / x)"),
+    ("an action that leaves its range before another", "o(1)", "o(x + 9)"),
+    ("another first state", "[*] --> rest", "[*] --> work"),
+]
+
+
+@pytest.mark.parametrize(
+    ("old", "new"), [(old, new) for _, old, new in OTHERWISE], ids=[what for what, *_ in OTHERWISE]
+)
+def test_what_is_not_seen_in_the_variables_afterwards_is_a_difference_too(
+    tmp_path: Path, old: str, new: str
+) -> None:
+    one = found_in(WRITES, tmp_path)
+    text = FORMS["mermaid"].write(graph_of(one).graph)
+    assert old in text
+    assert said(one, text, "mermaid").found == ()
+    [found] = said(one, text.replace(old, new), "mermaid").found
+    assert found.code is Code.GRAPH_DIFFERS
+
+
+# --- steps against the interpreter -----------------------------------------------------------
+
+DOOR = """
+enum place { shut, opening, open, stuck }
+input button : bool
+input seen : int 0 .. 3
+input echo : bool
+state at : place = shut deferred until echo
+state tries : int 0 .. 2
+output motor : int 0 .. 2
+procedure go(to : place) { next at := to }
+procedure try_again {
+  if tries < 2 { tries := tries + 1 } else { next at := stuck; motor := 0 }
+}
+procedure rest { tries := 0 }
+assume seen_open assumed : at = open implies seen > 0
+table door assuming seen_open {
+  | line | at      | button | seen   || procedures        | motor |
+  |------|---------|--------|--------||-------------------|-------|
+  | 1    | shut    | true   |        || go(opening)       | 1     |
+  | 2    | shut    | false  |        ||                   |       |
+  | 3    | opening |        | 3      || rest; go(open)    |       |
+  | 4    | opening |        | < 3    || go(opening); try_again |  |
+  | 5    | open    |        |        || go(open)          | 0     |
+  | 6    | stuck   | true   | 0 .. 1 || next at := shut   |       |
+  | 7    | DEFAULT |        |        ||                   |       |
+}
+level door_level { period 40 [ms] table door }
+"""
+
+
+def inputs(program: Program, fixed: Snapshot | None = None) -> Iterator[dict[str, Value]]:
+    """Every input, those of `fixed` as they are."""
+    kinds = [
+        (str(v.name), range(key_bounds(v.type)[0], key_bounds(v.type)[1] + 1), v.type)
+        for v in program.variables
+    ]
+    free = [one for one in kinds if fixed is None or one[0] not in fixed]
+    for keys in itertools.product(*(keys for _, keys, _ in free)):
+        values = {name: value_of_key(kind, key) for (name, _, kind), key in zip(free, keys, strict=True)}
+        yield {**(fixed or {}), **values}
+
+
+def admitted(program: Program, table: Table, now: Snapshot) -> bool:
+    return all(holds(a.condition, now) for a in program.assumptions if a.name in table.assumptions)
+
+
+def test_steps_are_those_that_the_interpreter_takes(tmp_path: Path) -> None:
+    one = found_in(DOOR, tmp_path)
+    program, table = one.program, one.table
+    expected = set()
+    for now in inputs(program, {"echo": 0, "motor": 0}):
+        if now["at"] == now["at.next"] and admitted(program, table, now):
+            after = run_table(program, table, now)
+            expected.add((after.line_index, now["at"], after.snapshot["at.next"]))
+    steps = Steps(program, table, program.variable("at"), OPTIONS)
+    assert {(step.line, step.source, step.target) for step in steps.steps(steps.states())} == expected
+    assert len(expected) == 8
+
+
+def test_lines_follow_each_other_as_the_interpreter_runs_them(tmp_path: Path) -> None:
+    one = found_in(DOOR, tmp_path)
+    program, table = one.program, one.table
+    [level] = program.levels
+    expected = set()
+    for now in inputs(program, {"echo": 1, "motor": 0}):
+        if now["at"] != now["at.next"] or not admitted(program, table, now):
+            continue
+        first = cycle(program, level, now)
+        for given in inputs(
+            program, {str(v.name): first.snapshot[v.name] for v in program.variables if v.kind != "input"}
+        ):
+            settled = dict(given, at=given["at.next"]) if given["echo"] else given
+            if admitted(program, table, settled):
+                expected.add((first.line_index, cycle(program, level, given).line_index))
+    assert {(pair.line, pair.then) for pair in following(program, table, OPTIONS)} == expected
+    assert len(expected) > 12
+
+
+def test_what_an_edge_need_not_show_follows_from_the_state(tmp_path: Path) -> None:
+    one = found_in(
+        DOOR.replace("| 5    | open    |        |        |", "| 5    | open    |        | > 0    |"), tmp_path
+    )
+    edges = {edge.line: edge for edge in graph_of(one, "at").graph.edges}
+    assert (edges["5"].guard, edges["5"].shown) == ("seen > 0", "")  # the assumption says it
+    assert edges["3"].shown == "seen = 3"
+
+
+# --- the comparison --------------------------------------------------------------------------
+
+SMALL = """
+enum mode {{ a, b, c }}
+input x : int 0 .. 3
+input m : mode
+input flag : bool
+state n : int 0 .. 3
+output y : int 0 .. 3
+procedure count {{ n := min(n + 1, 3) }}
+procedure twice {{ count; count }}
+table t {{
+  | line | x | m | flag || procedures | y |
+{rows}}}
+"""
+CELLS = (["", "0", "< 2", ">= 2", "in {1, 3}", "/= 3"], ["", "a", "/= a", "in {b, c}"], ["", "true", "false"])
+DOES = (["", "count", "twice", "count; count", "n := min(n + 2, 3)"], ["", "x", "0", "3"])
+
+
+def small(rows: Sequence[tuple[str, ...]]) -> Program:
+    text = "".join(
+        f"  | {at} | {' | '.join(row[:3])} || {' | '.join(row[3:])} |\n" for at, row in enumerate(rows)
+    )
+    program = compile_text(SMALL.format(rows=text))
+    assert isinstance(program, Program), program
+    return program
+
+
+def done(program: Program, now: Snapshot) -> object:
+    """What matters of an outcome: the fault, or the values afterwards."""
+    after = run_table(program, program.tables[0], now)
+    return int(after.fault) or tuple(sorted(after.snapshot.items()))
+
+
+def test_tables_compare_as_all_their_inputs_do() -> None:
+    choose = random.Random(1)  # noqa: S311  # by seed
+    verdicts = set()
+    for _ in range(40):
+        rows = [tuple(choose.choice(side) for side in (*CELLS, *DOES)) for _ in range(choose.randint(1, 3))]
+        changed = [list(row) for row in rows]
+        column = choose.randrange(5)
+        changed[choose.randrange(len(rows))][column] = choose.choice((*CELLS, *DOES)[column])
+        one, two = small(rows), small([tuple(row) for row in changed])
+        verdict = compare((one, one.tables[0]), (two, two.tables[0]), OPTIONS)
+        differing = [now for now in inputs(one, {"y": 0}) if done(one, now) != done(two, now)]
+        assert isinstance(verdict, Differs if differing else Same), (rows, changed)
+        if isinstance(verdict, Differs):
+            witness = {**initial(one), **{str(v.name): value for v, value in verdict.witness}}
+            assert done(one, witness) != done(two, witness)
+            after = [run_table(both, both.tables[0], witness).snapshot for both in (one, two)]
+            assert all(after[0][name] != after[1][name] for name in verdict.changed)
+        verdicts.add((type(verdict), rows == [tuple(row) for row in changed]))
+    assert {(Same, False), (Differs, False)} <= verdicts  # not only tables that are the same text
+
+
+def test_actions_that_come_to_the_same_are_the_same_and_faults_are_compared() -> None:
+    rows = [("< 2", "", "", "twice", "x"), (">= 2", "a", "", "", ""), (">= 2", "/= a", "", "", "")]
+    one = small(rows)
+    for other, same in (
+        ([("< 2", "", "", "count; count", "x"), (">= 2", "", "", "", "")], True),
+        ([("< 2", "", "", "count", "x"), (">= 2", "", "", "", "")], False),
+        ([("< 2", "", "", "twice", "x"), (">= 2", "a", "", "", "")], False),  # nothing matches now
+        ([*rows, ("3", "c", "true", "", "")], False),  # two match now
+    ):
+        two = small(other)
+        verdict = compare((one, one.tables[0]), (two, two.tables[0]), OPTIONS)
+        assert isinstance(verdict, Same) is same, other
+    assert isinstance(verdict, Differs)
+    assert verdict.second == "several lines"
+    assert {v.name: value for v, value in verdict.witness} == {"x": 3, "m": 2, "flag": True}
+
+
+# --- what graphs hold ------------------------------------------------------------------------
+
+CRANE = """
+enum place { low, high }
+input width_mm : int 0 .. 110 [mm]
+input wanted_mm : int 0 .. 110 [mm]
+input force : real 0.0 .. 9.0
+state at : place deferred until width_mm > 0 [mm]
+state counts : array[2] of int 0 .. 9
+output speed : int 0 .. 20
+output stop : bool
+procedure count(which : int 0 .. 1, by : int 0 .. 2) { counts[which] := min(counts[which] + by, 9) }
+table crane {
+  | line | at   | width_mm - wanted_mm | when                    | force  || counts[1] | procedures                   | stop  | speed      |
+  |------|------|----------------------|-------------------------|--------||-----------|------------------------------|-------|------------|
+  | up   | low  | -20 [mm] .. 20 [mm]  | wanted_mm > 3 [mm] or force < 0.5 | || 0 | count(0, 2); next at := high | false | 10 / 2 + 1 |
+  | wait | low  | -20 [mm] .. 20 [mm]  | not (wanted_mm > 3 [mm] or force < 0.5) | || | count(1, 1) | true | |
+  | off  | low  | > 20 [mm]            |                         |        ||           |                              | true  | 0          |
+  | thin | low  | < -20 [mm]           |                         |        ||           | next at := low               | true  | 0          |
+  | down | high |                      |                         | >= 2.5 ||           | count(0, 1); next at := low  | false |            |
+  | stay | high |                      |                         | < 2.5  ||           | count(0, 1)                  |       |            |
+}
+"""
+
+
+@pytest.mark.parametrize("form", EVERY_FORM)
+def test_units_arrays_values_and_whole_conditions_come_back(tmp_path: Path, form: str) -> None:
+    one = found_in(CRANE, tmp_path)
+    made = graph_of(one)
+    edges = {edge.line: edge for edge in made.graph.edges}
+    assert (edges["up"].target, edges["up"].decided) == ("high", "")
+    assert "count(0, 2)" in edges["up"].effect
+    assert "next at" not in edges["up"].effect
+    assert (
+        "next at := low" in edges["thin"].effect
+    )  # it cancels what is pending: a loop alone would not say so
+    assert edges["thin"].decided == "next at := low"
+    verdict = said(one, FORMS[form].write(made.graph), form)
+    assert verdict.found == ()
+    assert FORMS[form].read(FORMS[form].write(made.graph)).columns == made.graph.columns
+
+
+@pytest.mark.parametrize("actions", ["try_again; go(open)", "go(open); try_again", "go(open); go(stuck)"])
+def test_what_writes_the_state_last_decides(tmp_path: Path, actions: str) -> None:
+    one = found_in(DOOR.replace("rest; go(open)  ", actions), tmp_path)
+    verdict = said(one, FORMS["dot"].write(graph_of(one).graph), "dot")
+    assert verdict.found == ()
+    goals = {(edge.target, edge.decided) for edge in graph_of(one).graph.edges if edge.line == "3"}
+    assert (
+        goals
+        == {
+            "try_again; go(open)": {("open", "try_again, go(open)")},
+            "go(open); try_again": {("open", ""), ("stuck", "try_again")},
+            "go(open); go(stuck)": {("stuck", "go(open), go(stuck)")},
+        }[actions]
+    )
+
+
+def test_lines_that_match_nothing_are_told(tmp_path: Path) -> None:
+    text = DOOR.replace(
+        "  | 6 ", "  | x    | open    |        | 0      ||                   |       |\n  | 6 "
+    )
+    made = graph_of(
+        found_in(
+            text.replace("| 5    | open    |        |        |", "| 5    | open    |        | > 0    |"),
+            tmp_path,
+        ),
+        "at",
+    )
+    assert "line `x` matches nothing under the assumptions and has no edge" in made.lost
+
+
+def test_a_state_is_chosen_or_asked_for(tmp_path: Path) -> None:
+    one = found_in(DOOR, tmp_path)
+    assert graph_of(one).graph.state == "at"
+    assert {edge.source for edge in graph_of(one, "tries").graph.edges} <= {ANY, "0", "1", "2"}
+    file = one.loaded.files[one.table.file]
+    for name in ("motor", "seen", "nothing", "at.next"):
+        refused = derive(one.program, one.table, file, OPTIONS, name)
+        assert isinstance(refused, Diagnostic)
+        assert refused.code is Code.GRAPH_NO_STATE
+
+
+def test_a_solver_without_time_draws_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from rcsc.solvers.smt import Answer, Solver
+
+    one = found_in(DOOR, tmp_path)
+    table = tabled(graph_of(one).graph)
+    monkeypatch.setattr(Solver, "check", lambda *_: Answer.UNKNOWN)
+    file = one.loaded.files[one.table.file]
+    for made in (
+        derive(one.program, one.table, file, OPTIONS),
+        derive_lines(one.program, one.table, file, OPTIONS),
+    ):
+        assert isinstance(made, Diagnostic)
+        assert made.code is Code.UNDECIDED
+    [found] = against(one.loaded, one.root, one.program, one.table, table, OPTIONS).found
+    assert found.code is Code.UNDECIDED
+
+
+# --- graphs drawn by hand ----------------------------------------------------------------------
+
+HAND = {
+    "mermaid": """---
+title: a door
+---
+stateDiagram-v2
+  %% table: door
+  %% state: at
+  direction LR
+  [*] --> shut
+  shut --> opening : 1 [button] motor(1)
+  shut --> shut : 2 [not button]
+  opening --> open : [seen = 3] procedures(rest)
+  opening --> opening : [seen < 3]
+  open --> open
+  stuck --> stuck
+""",
+    "dot": """// a door
+digraph door {
+  state = at; rankdir=LR
+  node [shape=circle]
+  shut -> opening [line=1, when="button", does="motor(1)"]
+  shut -> shut [line=2 when="not button"];
+  subgraph { opening -> open [when="seen = 3", does="procedures(" + "rest)"]; }
+  opening:e -> opening [when="seen < 3"]
+# again
+  open -> open; stuck -> stuck /* nothing */
+}
+""",
+    "scxml": """<scxml xmlns="http://www.w3.org/2005/07/scxml" xmlns:r="urn:rcsc:graph" version="1.0" name="door" r:state="at">
+  <!-- <transition> -->
+  <state id="shut">
+    <transition cond="button" target="opening" r:line="1" r:does="motor(1)"/>
+    <transition cond="not button" r:line="2"/>
+  </state>
+  <state id="opening">
+    <transition cond="seen = 3" target="open" r:does="procedures(rest)"/>
+    <transition cond="seen &lt; 3"/>
+  </state>
+  <state id="open"><transition target="open"/></state>
+  <state id="stuck"><transition target="stuck"/></state>
+</scxml>
+""",
+}
+
+
+@pytest.mark.parametrize("form", EVERY_FORM)
+def test_a_graph_drawn_by_hand_is_a_table(form: str) -> None:
+    made = tabled(FORMS[form_of(HAND[form])].read(HAND[form]))
+    assert (
+        made.text()
+        == """table door {
+  | line | at      | button | seen || procedures            | motor |
+  |------|---------|--------|------||-----------------------|-------|
+  | 1    | shut    | true   |      || next at := opening    | 1     |
+  | 2    | shut    | false  |      ||                       |       |
+  | 3    | opening |        | 3    || next at := open; rest |       |
+  | 4    | opening |        | < 3  ||                       |       |
+  | 5    | open    |        |      ||                       |       |
+  | 6    | stuck   |        |      ||                       |       |
+}
+"""
+    )
+    assert made.notes[0] == "an edge from `opening` has no line: it is line `3` now"
+
+
+def test_edges_of_one_name_that_say_different_things_are_lines_of_their_own() -> None:
+    text = HAND["mermaid"].replace(
+        "shut --> shut : 2 [not button]",
+        "shut --> stuck : 1 [not button]\n  opening --> stuck : 1 [button] motor(1)",
+    )
+    made = tabled(FORMS["mermaid"].read(text))
+    assert [row.name for row in made.table.rows][:3] == ["1a", "1b", "1c"]
+    assert "the edges of line `1` do not say one thing: there is a line `1c`" in made.notes
+
+
+def test_arrows_from_one_line_s_states_are_one_row() -> None:
+    text = "stateDiagram-v2\n%% table: t\na --> c : 1 [x]\nb --> c : 1 [x]\nc --> c : 2 DEFAULT\n"
+    made = tabled(FORMS["mermaid"].read(text))
+    assert "| 1    | in {a, b} | true ||" in made.text()
+    assert "| 2    | DEFAULT   |      ||" in made.text()
+
+
+def test_a_term_under_no_column_or_said_twice_goes_to_when() -> None:
+    text = 'digraph t { columns="x | s || y"; state=s; a -> b [when="x > 1 and x < 5 and (p or q) and 3 < z", does="y(1)"]; }'
+    made = tabled(FORMS["dot"].read(text)).text()
+    assert "| x   | s | when                         ||" in made
+    assert "x < 5 and (p or q) and 3 < z" in made
+
+
+BAD = [
+    ("dot", "graph g { a -- b }", 1, "`digraph`"),
+    ("dot", 'digraph t {\n a -> b [when="x = "]\n}', 2, "found the end of the text"),
+    ("dot", 'digraph t {\n a -> b [does="go(1"]\n}', 2, "not closed"),
+    ("dot", "digraph t {\n a -> b\n", 3, "the text ends"),
+    ("dot", "digraph t {\n a -> b [x\n}", 3, "expected a name"),
+    ("dot", "digraph t {\n a -> é€! b }", 2, "`!` is not DOT"),
+    ("dot", "digraph t { }", 1, "no edge"),
+    ("dot", 'digraph t {\n a -> "*" }', 2, "draw a loop"),
+    ("dot", 'digraph "a b" { a -> b }', 1, "no name of the language"),
+    ("dot", "digraph { a -> b }", 1, "which `table`"),
+    ("dot", "digraph t {\n a -> b [line=1, decided=p]; a -> c [line=1]; a -> d [line=1] }", 2, "several states"),
+    ("mermaid", "stateDiagram-v2\n%% table: t\na --> [*]\n", 3, "no end"),
+    ("mermaid", "stateDiagram-v2\n%% table: t\na --> b : 1 [x[0] = 1\n", 3, "not closed"),
+    ("mermaid", "stateDiagram-v2\n%% table: t\nstate a {\n", 3, "is not read"),
+    ("mermaid", "%% table: t\na --> b\n", 2, "stateDiagram-v2"),
+    ("mermaid", "%% table: t\n", 1, "stateDiagram-v2"),
+    ("mermaid", "stateDiagram-v2\n%% table: t\na --> b : 1 [x] && y\n", 3, "heading(actions)"),
+    ("mermaid", "stateDiagram-v2\n%% table: t\na --> b : 1 [x] | y | z\n", 3, "heading(actions)"),
+    ("mermaid", "stateDiagram-v2\n%% table: t\na --> b : 1 [x | y]\n", 3, ""),
+    ("mermaid", "stateDiagram-v2\n%% table: t\na --> b : 1 [DEFAULT]\n", 3, "no condition"),
+    ("scxml", "<scxml", 1, "not XML"),
+    ("scxml", "<a/>", 1, "`scxml`"),
+    ("scxml", '<!DOCTYPE a [<!ENTITY b "c">]>\n<a/>', 1, "document type"),
+    ("scxml", HAND["scxml"].replace('cond="seen = 3"', 'cond="seen ="'), 8, "found the end"),
+    ("scxml", HAND["scxml"].replace("</state>\n</scxml>", '<state id="x"/></state>\n</scxml>'), 1, "states of its own"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("form", "text", "line", "what"), BAD)
+def test_what_is_no_graph_is_refused_at_its_place(form: str, text: str, line: int, what: str) -> None:
+    with pytest.raises(UnreadableError) as caught:
+        tabled(FORMS[form].read(text))
+    source = Source("g", text)
+    found = diagnosed(caught.value, source)
+    assert what in found.message
+    assert source.position(found.primary.span.start).line == line
+
+
+@pytest.mark.parametrize("form", EVERY_FORM)
+def test_no_damaged_graph_is_a_bug(shipped: dict[str, Found], form: str) -> None:
+    choose = random.Random(form)  # noqa: S311  # by seed
+    text = FORMS[form].write(graph_of(shipped["vision.flood_flash"]).graph)
+    for _ in range(150):
+        begin = choose.randrange(len(text))
+        end = begin + choose.randint(0, 12)
+        broken = (
+            text[:begin]
+            + choose.choice(["", '"', "[", "]", "}", "(", "->", "<", "\n", "\\", "|", "#", "in {"])
+            + text[end:]
+        )
+        try:
+            tabled(FORMS[form].read(broken))
+        except UnreadableError as error:
+            assert error.what  # noqa: PT017  # it may as well be read
+
+
+def test_a_table_takes_the_place_of_its_namesake_or_stands_behind_the_others(
+    shipped: dict[str, Found],
+) -> None:
+    one = shipped["vision.flood_flash"]
+    file = one.loaded.files[one.table.file]
+    made = tabled(graph_of(one).graph).table
+    before, after = (
+        re.findall(r"^table (\w+)", text, re.MULTILINE)
+        for text in (one.loaded.sources[one.table.file].text, in_place(file, made))
+    )
+    assert before == after
+    assert "## FLOOD-FLASH (OBJ, EXPECTED RANGE)" in in_place(file, made)
+    other = tabled(FORMS["mermaid"].read(HAND["mermaid"])).table
+    assert in_place(file, other).rstrip().endswith("}")
+    assert in_place(file, other).index("table door") > in_place(file, other).index("level vision")
+
+
+# --- drawings --------------------------------------------------------------------------------
+
+
+def test_the_drawing_shows_every_state_and_every_line_once_an_arrow(shipped: dict[str, Found]) -> None:
+    made = graph_of(shipped["task.acquire"])
+    text = svg(made.graph, made.everywhere)
+    root = ET.fromstring(text)  # noqa: S314  # made here
+    words = [one.text or "" for one in root.iter("{http://www.w3.org/2000/svg}text")]
+    assert {*made.graph.states, "any state", "acquire"} <= set(words)
+    numbers = [
+        one.text for one in root.iter("{http://www.w3.org/2000/svg}text") if one.get("class") == "number"
+    ]
+    assert sorted(map(str, numbers)) == sorted(edge.line for edge in made.graph.edges if edge.line != "16")
+    assert "line 16 is DEFAULT, never reached; it would lead to f_state" in words
+    assert "status_in = executing" in words
+    assert text == svg(made.graph, made.everywhere)
+
+
+def test_no_label_hides_a_state_or_another_label(shipped: dict[str, Found]) -> None:
+    for name, found in shipped.items():
+        made = graph_of(found)
+        root = ET.fromstring(svg(made.graph, made.everywhere))  # noqa: S314  # made here
+        papers = [box(one, "x", "y", "width", "height") for one in root.iter() if one.get("class") == "paper"]
+        circles = [circle(one) for one in root.iter() if one.get("class") == "state"]
+        assert papers
+        assert circles
+        for one, two in itertools.combinations(papers, 2):
+            assert not overlap(one, two), name
+        for one, two in itertools.product(papers, circles):
+            assert not overlap(one, two), name
+
+
+Rectangle = tuple[float, float, float, float]
+
+
+def box(one: ET.Element, *names: str) -> Rectangle:
+    x, y, width, height = (float(one.get(name, "")) for name in names)
+    return x, y, x + width, y + height
+
+
+def circle(one: ET.Element) -> Rectangle:
+    x, y, rx, ry = (float(one.get(name, "")) for name in ("cx", "cy", "rx", "ry"))
+    return x - 0.7 * rx, y - 0.7 * ry, x + 0.7 * rx, y + 0.7 * ry  # its corners are empty
+
+
+def overlap(one: Rectangle, two: Rectangle) -> bool:
+    slack_px = 1.5
+    return (
+        one[0] + slack_px < two[2]
+        and two[0] + slack_px < one[2]
+        and one[1] + slack_px < two[3]
+        and two[1] + slack_px < one[3]
+    )
+
+
+def test_default_is_drawn_where_it_can_be_reached_and_a_choice_is_dashed(tmp_path: Path) -> None:
+    one = found_in(DOOR, tmp_path)
+    root = ET.fromstring(svg(graph_of(one).graph))  # noqa: S314  # made here
+    words = [one.text or "" for one in root.iter("{http://www.w3.org/2000/svg}text")]
+    assert "DEFAULT" in words  # in stuck, without the button or with `seen` past 1
+    assert words.count("try_again says so") == 2  # to opening again, or to stuck
+    dashed = [one for one in root.iter() if one.get("class") == "arrow dashed"]
+    assert len(dashed) == 3
+
+
+@pytest.mark.parametrize(
+    ("guard", "shown"),
+    [
+        ("new_command = true and idle = false", "new_command, not idle"),
+        ("goal.known = true and x = 1", "goal.known, x = 1"),
+        ("a = false or b = true", "not a or b"),
+        ("x + y = true_enough", "x + y = true_enough"),
+    ],
+)
+def test_guards_are_short_for_the_eye(guard: str, shown: str) -> None:
+    assert plain(guard) == shown
+
+
+def test_the_graph_of_lines_is_drawn_and_makes_no_table(shipped: dict[str, Found]) -> None:
+    one = shipped["vision.flood_flash"]
+    made = derive_lines(one.program, one.table, one.loaded.files[one.table.file], OPTIONS)
+    assert isinstance(made, Derived)
+    after = {(edge.source, edge.target) for edge in made.graph.edges}
+    assert {(ANY, "1"), ("2", "3"), ("4", "6"), ("3", "7")} <= after
+    assert not {("1", "6"), ("3", "6"), ("4", "7"), ("6", "2")} & after
+    assert "<svg" in svg(made.graph, made.everywhere)
+    for form in FORMS.values():
+        with pytest.raises(UnreadableError, match="graph of lines"):
+            tabled(form.read(form.write(made.graph)))
+
+
+# --- the commands --------------------------------------------------------------------------------
+
+
+def run(*args: str, stdin: str = "") -> tuple[int, str, str]:
+    """Exit status, standard output and standard error."""
+    done = CliRunner().invoke(commands, list(args), input=stdin, standalone_mode=False)
+    assert done.exception is None, done.exception
+    return done.return_value or 0, done.stdout, done.stderr
+
+
+ACQUIRE = str(ROOT / "tables/task/acquire.rcs")
+
+
+@pytest.mark.parametrize("form", EVERY_FORM)
+def test_graph_and_table_are_each_other_s_way_back(form: str, tmp_path: Path) -> None:
+    status, text, notes = run("graph", ACQUIRE, "--form", form)
+    assert status == 0
+    assert "acquire: the table read back from the graph does the same: proved" in notes
+    assert "note[RCS774]: acquire: not in the graph: line `10`" in notes
+    status, made, proved = run("table", "-", "--against", ACQUIRE, stdin=text)
+    assert (status, "does the same as" in proved) == (0, True)
+    assert made.startswith("use task/common\n\ntable acquire assuming in_step, resting, acquire_states {")
+    status, refuted, _ = run(
+        "table", "-", "--against", ACQUIRE, stdin=text.replace("status_in = failed", "status_in /= done")
+    )
+    assert (status, "error[RCS773]" in refuted, "the graph to several lines" in refuted) == (1, True, True)
+    status, whole, _ = run("table", "-", "--in", ACQUIRE, stdin=text)
+    assert (status, "assume acquire_states monitored" in whole) == (0, True)
+    place = tmp_path / "new.rcs"
+    place.write_text(whole, encoding="utf-8")
+    assert load([str(place)]).found[0].code is Code.FILE_NOT_FOUND  # only `task/common` is not beside it
+
+
+def test_a_folder_of_tables_is_drawn_into_a_folder(tmp_path: Path) -> None:
+    (tmp_path / "door.rcs").write_text(DOOR, encoding="utf-8")
+    (tmp_path / "plain.rcs").write_text(
+        "input a : bool\ntable p {\n| line | a ||\n| 1 | ||\n}\n", encoding="utf-8"
+    )
+    status, _, notes = run("graph", str(tmp_path), "-o", str(tmp_path / "out"))
+    assert (status, "note[RCS771]: table `p`" in notes) == (0, True)
+    assert [one.name for one in (tmp_path / "out").iterdir()] == ["door_door.svg"]
+    status, _, _ = run("graph", f"{tmp_path}/door.rcs:door", "-o", str(tmp_path / "door.gv"))
+    assert status == 0
+    assert form_of((tmp_path / "door.gv").read_text(encoding="utf-8")) == "dot"
+
+
+@pytest.mark.parametrize(
+    ("args", "code"),
+    [
+        (("graph", "no_such_table"), "RCS201"),
+        (("graph", f"{ACQUIRE}:nothing"), "RCS201"),
+        (("graph", ACQUIRE, "--state", "idle2"), "RCS771"),
+        (("graph", str(ROOT / "tables/missing.rcs")), "RCS107"),
+        (("table", ACQUIRE), "RCS772"),
+    ],
+)
+def test_what_cannot_be_done_has_a_code(args: tuple[str, ...], code: str) -> None:
+    status, out, _ = run(*args)
+    assert (status, f"error[{code}]" in out) == (1, True), out
+
+
+def test_a_drawing_needs_a_layout_program(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(shutil, "which", lambda *_, **__: None)
+    status, out, _ = run("graph", ACQUIRE)
+    assert (status, "error[RCS705]: `graphviz-pure` is not installed" in out) == (1, True)
+
+
+def test_states_are_members_in_declared_order(shipped: dict[str, Found]) -> None:
+    graph: StateGraph = graph_of(shipped["emove.locate"]).graph
+    kind = shipped["emove.locate"].program.variable("cur_state").type
+    assert isinstance(kind, Enum)
+    assert [name for name in kind.members if name in graph.states] == list(graph.states)

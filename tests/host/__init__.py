@@ -1,0 +1,1 @@
+"""Files, processes, the cache and descriptions: nothing from outside is believed."""

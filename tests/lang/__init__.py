@@ -1,0 +1,1 @@
+"""The language: text to tree, tree to model, and what a model means."""

@@ -1,0 +1,271 @@
+"""Text to tree and back: round trips, errors with a place, nothing that makes the parser raise."""
+
+from pathlib import Path
+from random import Random
+from typing import Any
+
+import lark
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rcsc.diagnostics.codes import Code
+from rcsc.diagnostics.source import Source, Span
+from rcsc.lang.syntax import tree
+from rcsc.lang.syntax.format import format_file, format_text
+from rcsc.lang.syntax.lalr import Node, Tables
+from rcsc.lang.syntax.parse import MOST_ERRORS, parse
+from rcsc.lang.syntax.spell import spell_expr
+from tests.support.strategies_syntax import expressions, files
+
+REPO = Path(__file__).parents[2]
+SHIPPED = sorted((REPO / "tables").rglob("*.rcs"))
+
+
+def errors(text: str) -> list[tuple[str, int]]:
+    """Codes and lines of the diagnostics of a text."""
+    source = Source("case.rcs", text)
+    parsed = parse(source)
+    assert not isinstance(parsed, tree.File)
+    return [(d.code.value, source.position(d.primary.span.start).line) for d in parsed]
+
+
+@settings(max_examples=120)
+@given(files())
+def test_formatted_trees_parse_to_themselves(file: tree.File) -> None:
+    text = format_file(file)
+    assert parse(Source("case.rcs", text)) == file, text
+    assert format_file(file) == text
+
+
+@settings(max_examples=200)
+@given(expressions())
+def test_expressions_keep_their_shape_without_needless_parentheses(expr: tree.Expr) -> None:
+    text = spell_expr(expr)
+    parsed = parse(Source("case.rcs", f"invariant i : {text}"))
+    assert isinstance(parsed, tree.File), text
+    [invariant] = parsed.declarations
+    assert isinstance(invariant, tree.InvariantDecl)
+    assert invariant.condition == expr, text
+
+
+@pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
+def test_shipped_tables_are_formatted_and_keep_their_comments(path: Path) -> None:
+    text = path.read_text(encoding="utf-8")
+    parsed = parse(Source(path.name, text))
+    assert isinstance(parsed, tree.File)
+    assert format_file(parsed) == text
+
+
+def test_comments_go_with_what_they_stand_by() -> None:
+    text = """# the file
+use a # same line
+## doc of x
+# about x
+input x : bool
+procedure p {
+  # before
+  y := x # behind
+  if x { # inside
+    z := 1
+  }
+}
+# the end
+"""
+    parsed = parse(Source("case.rcs", text))
+    assert isinstance(parsed, tree.File)
+    use, variable, procedure = parsed.declarations
+    assert isinstance(use, tree.Use)
+    assert use.comments == ("the file", "same line")
+    assert isinstance(variable, tree.VariableDecl)
+    assert variable.doc == ("doc of x",)
+    assert variable.comments == ("about x",)
+    assert isinstance(procedure, tree.ProcedureDecl)
+    assert [one.comments for one in procedure.body] == [("before", "behind"), ("inside",)]
+    assert parsed.trailing == ("the end",)
+
+
+def test_cell_spans_point_into_the_file() -> None:
+    text = "input x : int 0 .. 9\ntable t {\n  | line | x   ||\n  | a    | <= 4 ||\n}\n"
+    parsed = parse(Source("case.rcs", text))
+    assert isinstance(parsed, tree.File)
+    table = parsed.declarations[1]
+    assert isinstance(table, tree.TableDecl)
+    [row] = table.rows
+    start, end = row.bounds[2:4]
+    assert text[start:end] == "<= 4"
+    assert tree.absolute(Span("", 3, 4), "case.rcs", start) == Span(
+        "case.rcs", text.index("4 ||"), text.index("4 ||") + 1
+    )
+
+
+CASES = [
+    ("input x : = 3", [("RCS101", 1)]),
+    ("enum a {", [("RCS101", 1)]),
+    ("table t {\n | line | x ||\n | a | 1 | 2 ||\n}", [("RCS102", 3)]),
+    ("table t {\n | line | x |\n}", [("RCS102", 2)]),
+    ("table t {\n | line | x || || y |\n}", [("RCS102", 2)]),
+    ("table t {\n | line | x | y ||\n | a | DEFAULT | 3 ||\n}", [("RCS108", 3)]),
+    ("table t {\n | line | x ||\n | a | < ||\n | b | = = ||\n}", [("RCS101", 3), ("RCS101", 4)]),
+    ("table t {\n | name | x ||\n}", [("RCS101", 2)]),
+    ("input \u0430 : bool", [("RCS109", 1)]),
+    ("input x : bool\0", [("RCS106", 1)]),
+    *(
+        (f"input x : bool\n{where.replace('@', char)}", [("RCS114", 2)])
+        for char in "\x1b\x7f\x85\u061c\u200f\u202e\u2066"
+        for where in ("# @", "##@ x", "@input y : bool", 'use "a@.rcs"')
+    ),
+    ("# fine\ninput " + "a" * 1001 + " : bool", [("RCS115", 2)]),
+    ('extern procedure p python "a', [("RCS101", 1)]),
+    ("invariant i : " + "(" * 200 + "a" + ")" * 200, [("RCS103", 1)]),
+    ("invariant i : " + "not " * 5000 + "a", [("RCS103", 1)]),
+    ("invariant i : " + "-" * 5000 + "a", [("RCS103", 1)]),
+    ("invariant i : " + "a implies " * 5000 + "a", [("RCS103", 1)]),
+    ("procedure p { " + "if a { " * 500 + "} " * 500 + "}", [("RCS103", 1)]),
+    ("procedure p { if a {} " + "else if a {} " * 5000 + "}", [("RCS103", 1)]),
+    ("input x : = 3\n\ninput y : bool\n\nowner 3 {}\n", [("RCS101", 1), ("RCS101", 5)]),
+]
+
+
+@pytest.mark.parametrize(("text", "expected"), CASES, ids=lambda value: repr(value)[:40])
+def test_syntax_errors_have_a_code_and_a_line(text: str, expected: list[tuple[str, int]]) -> None:
+    assert errors(text) == expected
+
+
+def test_expectations_are_words_and_few() -> None:
+    parsed = parse(Source("case.rcs", "procedure p { if }"))
+    assert not isinstance(parsed, tree.File)
+    assert parsed[0].message == "expected an expression, found `}`"
+
+
+def test_at_most_twenty_errors_are_reported() -> None:
+    assert len(errors("input x : =\n" * 100)) <= MOST_ERRORS
+
+
+@pytest.mark.parametrize("ending", ["\r\n", "\n"])
+def test_line_ends_of_both_kinds(ending: str) -> None:
+    text = "input x : bool\ntable t {\n | line | x ||\n | a | true ||\n | b | false ||\n}\n".replace(
+        "\n", ending
+    )
+    assert isinstance(parse(Source("case.rcs", text)), tree.File)
+
+
+GARBAGE = st.text(
+    alphabet=st.sampled_from('|{}()[]=<>/.:;,+-*#"\n\r\t ab19_\u00e9\0') | st.characters(), max_size=200
+)
+
+
+@settings(max_examples=200)
+@given(GARBAGE)
+def test_garbage_is_a_tree_or_diagnostics_inside_the_text(text: str) -> None:
+    parsed = parse(Source("case.rcs", text))
+    if isinstance(parsed, tree.File):
+        return
+    assert parsed
+    for diagnostic in parsed:
+        assert 0 <= diagnostic.primary.span.start <= diagnostic.primary.span.end <= len(text)
+        assert diagnostic.code is not Code.INTERNAL
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "input a : int 0 .. 9\nassume x : " + " + ".join(["a"] * 5000) + " > 3\n",
+        "type t = " + "array [2] of " * 3000 + "bool\n",
+        "state a : int 0 .. 9\nprocedure p {\n" + "if a = 1 { a := 1 } else " * 2000 + "{ a := 2 }\n}\n",
+        "state a : bool\ntable t {\n| line | a ||\n|--|--||\n| x | " + "not " * 3000 + "a ||\n}\n",
+        "record r { a : bool }\nstate a : r\ninvariant t : a" + ".a" * 3000 + "\n",
+        "state a : bool\ninvariant t : " + "(" * 3000 + "a" + ")" * 3000 + "\n",
+        "state a : bool\ninvariant t : " + "a implies " * 101 + "a\n",
+    ],
+    ids=["sum", "array", "else if", "cell", "field", "brackets", "implies"],
+)
+def test_what_nests_too_deep_is_refused(text: str) -> None:
+    assert [code for code, _ in errors(text)] == ["RCS103"]
+
+
+def test_what_is_long_or_wide_but_not_deep_is_taken() -> None:
+    wide = "| x | " + " " * 200 + "a ||"
+    calls = "\n".join(["  f(-1)"] * 300)
+    text = (
+        "state a : bool\n"
+        f"table t {{\n| line | when ||\n|--|{'-' * 300}||\n{wide}\n}}\n"
+        "extern procedure f(x : int -5 .. 5)\n"
+        f"procedure p {{\n{calls}\n}}\n"
+        "invariant i : " + "a implies " * 99 + "a\n"
+    )
+    assert isinstance(parse(Source("case.rcs", text)), tree.File)
+
+
+@pytest.mark.parametrize("said", ["DEFAULT", "DEFAULT unreachable", " DEFAULT  unreachable "])
+@pytest.mark.parametrize("column", [1, 2])
+def test_default_in_another_column_is_an_error(said: str, column: int) -> None:
+    """Also where a value is called so: only the first column makes a DEFAULT line."""
+    cells = ["", "", ""]
+    cells[column] = said
+    head = "enum e { DEFAULT, other }\ninput x : e\ninput y : bool\ntable t {\n  | line | x | x | when ||\n"
+    text = f"{head}  | a | {' | '.join(cells)} ||\n}}\n"
+    assert errors(text) == [("RCS113", 6)]
+    assert not isinstance(format_text(Source("case.rcs", text)), str)
+    assert errors(
+        f"{head}  | a | DEFAULT | {said if column == 1 else ''} | {said if column == 2 else ''} ||\n}}\n"
+    ) == [("RCS108", 6)]
+
+
+def test_values_and_variables_called_like_words_stay_what_they_are() -> None:
+    text = (
+        "enum e { DEFAULT, other }\ninput when : bool\ninput DEFAULT : bool\ninput x : e\noutput procedures : bool\n\n"
+        "table t {\n  | line | (when) | x           | when      || (procedures) |\n"
+        "  |------|--------|-------------|-----------||--------------|\n"
+        "  | a    |        | = DEFAULT   | (DEFAULT) || DEFAULT      |\n"
+        "  | b    | true   | in {DEFAULT}| not DEFAULT || when       |\n}\n"
+    )
+    parsed = parse(Source("case.rcs", text))
+    assert isinstance(parsed, tree.File)
+    formatted = format_file(parsed)
+    assert parse(Source("case.rcs", formatted)) == parsed
+    [table] = [one for one in parsed.declarations if isinstance(one, tree.TableDecl)]
+    assert not any(row.default for row in table.rows)
+    assert [heading.word for heading in (*table.conditions, *table.actions)] == ["", "", "when", ""]
+
+
+def by_lark(found: Any) -> object:
+    """A tree of Lark's as plain data: names, texts and places."""
+    if isinstance(found, lark.Token):
+        return found.type, str(found), found.start_pos, found.end_pos
+    place = (-1, -1) if found.meta.empty else (found.meta.start_pos, found.meta.end_pos)
+    return str(found.data), place, [by_lark(child) for child in found.children]
+
+
+def by_tables(found: Any) -> object:
+    """A tree of ours likewise."""
+    if isinstance(found, Node):
+        return found.data, (found.start_pos, found.end_pos), [by_tables(child) for child in found.children]
+    return found.type, str(found), found.start_pos, found.end_pos
+
+
+def test_trees_are_those_of_lark_and_texts_are_refused_where_lark_refuses_them() -> None:
+    grammar = (REPO / "grammar" / "rcs.lark").read_text(encoding="utf-8")
+    starts = ["file", "cell", "when", "heading", "actions"]
+    parser = lark.Lark(grammar, parser="lalr", start=starts, propagate_positions=True)
+    tables, rng = Tables(parser), Random(20261122)  # noqa: S311  # texts to try
+    texts = [path.read_text(encoding="utf-8") for path in SHIPPED]
+    asked = [(text, "file") for text in texts]
+    for _ in range(400):  # pieces of texts, and texts with a slip
+        text = rng.choice(texts)
+        at = rng.randrange(len(text))
+        asked += [(text[at : at + rng.randrange(60)], start) for start in starts]
+        slip = rng.choice(
+            ("", "|", "(", ")", "safe ", "in ", "..", "\u00e9", "@", "#", "\n", "int", "1.5", "\0")
+        )
+        asked.append((text[max(0, at - 300) : at] + slip + text[at + rng.randrange(5) : at + 300], "file"))
+    right = 0
+    for text, start in asked:
+        try:
+            wanted = by_lark(parser.parse(text, start=start))
+        except lark.UnexpectedInput:
+            wanted = None
+        found = tables.parse(text, start)
+        assert (None if found is None else by_tables(found)) == wanted, (start, text)
+        right += found is not None
+    assert 100 < right < len(asked) - 500

@@ -1,0 +1,1 @@
+"""Systems that run: buffers, processes, logs and the shell."""

@@ -1,0 +1,935 @@
+"""The interactive shell: from outside as a user drives it, and through its session."""
+
+import os
+import pty
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from rcsc.diagnostics.codes import Code
+from rcsc.diff.changes.difference import ProgramDifference
+from rcsc.diff.compare import compare
+from rcsc.driver import TARGETS, compile_
+from rcsc.driver.settings import Settings
+from rcsc.run.description import description
+from rcsc.run.system import Kind, assemble, signatures
+from rcsc.shell.commands import HELP, Commands
+from rcsc.shell.reload.refusal import Refused
+from rcsc.shell.reload.reload import Plant
+from rcsc.shell.reload.sources import kept, laid_out
+from rcsc.shell.session import Session, silent_queries
+from rcsc.solvers.options import Options
+from rcsc_cell.cell.ready import plant
+from rcsc_cell.workstation.prepared import database_of
+
+REPO = Path(__file__).parents[2]
+SYSTEM = REPO / "tables" / "system.toml"
+RCSC = [sys.executable, "-c", "from rcsc.commands import main; main()", "shell"]
+MOVE = ["command.inc_command = 1", "command.input_command = move", "command.dest_locpt = 3"]
+DONE = "run until task.report.inc_command_echo = 1 and task.report.status_report = done"
+
+
+def alone(path: Path = SYSTEM, kind: Kind = "c") -> Commands:
+    """Levels with nothing outside and a database that knows nothing."""
+    said = description(path)
+    queries = silent_queries(said, signatures(said))
+    return Commands(Session(assemble(said, kind, queries), Plant(path, said, kind, queries)))
+
+
+def inhabited(kind: Kind = "c") -> Commands:
+    """Levels with the cell's database and plant."""
+    said = description(SYSTEM)
+    database = database_of(said, signatures(said))
+    system = assemble(said, kind, database.queries, (plant(database, "kinematic"),))
+    return Commands(Session(system, Plant(SYSTEM, said, kind, database.queries)))
+
+
+@pytest.fixture
+def shell() -> Commands:
+    return alone()
+
+
+@pytest.fixture
+def project(tmp_path: Path) -> Path:
+    """A copy of the project, to be edited; its system's description."""
+    shutil.copytree(REPO / "tables", tmp_path / "tables", ignore=shutil.ignore_patterns(".rcsc-cache"))
+    shutil.copytree(REPO / "generated", tmp_path / "generated")
+    return tmp_path / "tables" / "system.toml"
+
+
+def edit(system: Path, old: str, new: str) -> None:
+    gripper = system.parent / "gripper" / "gripper.rcs"
+    text = gripper.read_text(encoding="utf-8")
+    assert old in text
+    gripper.write_text(text.replace(old, new, 1), encoding="utf-8")
+
+
+def do(commands: Commands, *lines: str) -> list[str]:
+    """Does the lines; what the last one said."""
+    return [commands.do(line) for line in lines][-1]
+
+
+def refused(commands: Commands, line: str) -> Refused:
+    with pytest.raises(Refused) as caught:
+        commands.do(line)
+    return caught.value
+
+
+def state(commands: Commands) -> list[object]:
+    session = commands.session
+    return [session.system.tick, dict(session.memory.held), *[level.values for level in session.levels]]
+
+
+def script(text: str, *args: str, tmp_path: Path) -> subprocess.CompletedProcess[str]:
+    path = tmp_path / "script.txt"
+    path.write_text(text, encoding="utf-8")
+    return run("--script", str(path), *args)
+
+
+def run(*args: str, stdin: str = "") -> subprocess.CompletedProcess[str]:
+    return subprocess.run([*RCSC, *args], cwd=REPO, input=stdin, capture_output=True, text=True, check=False)
+
+
+# --- from outside ----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", ["c", "python"])
+def test_a_script_moves_the_robot_and_says_so(tmp_path: Path, kind: str) -> None:
+    lines = [
+        *MOVE,
+        "run to task.move.13  # the answer",
+        "expect task.status_report = done and task.current_loc = 3",
+        "",
+    ]
+    done = script("\n".join(lines), "--executor", kind, tmp_path=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.splitlines()[-1].endswith(": line task.move.13")
+
+
+def test_a_script_stops_at_the_first_command_that_fails(tmp_path: Path) -> None:
+    text = "step 2\nexpect task.idle = false\nstep 3\n"
+    done = script(text, "--alone", "--executor", "python", tmp_path=tmp_path)
+    assert done.returncode == 1
+    assert "cycle 2" in done.stdout
+    assert "cycle 5" not in done.stdout
+    assert (
+        done.stderr
+        == f"{tmp_path}/script.txt:2: error[RCS736]: `task.idle = false` does not hold: task.idle = true\n"
+    )
+
+
+def test_commands_from_a_pipe_end_with_quit() -> None:
+    done = run("--alone", stdin="step\nquit\nnonsense\n")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.startswith("cycle 1: task.pause_task.1")
+
+
+def test_wrong_usage_is_2_and_a_wrong_system_is_1(tmp_path: Path) -> None:
+    assert run("--script", "no such file").returncode == 2
+    assert run("--executor", "fortran").returncode == 2
+    bad = tmp_path / "system.toml"
+    bad.write_text("name = 1", encoding="utf-8")
+    done = run(str(bad))
+    assert done.returncode == 1
+    assert "error[RCS721]" in done.stderr
+
+
+def test_a_script_is_interrupted_between_cycles(tmp_path: Path) -> None:
+    path = tmp_path / "script.txt"
+    path.write_text("step\nrun until task.cur_state = state_8\nstep 7\n", encoding="utf-8")
+    ran = subprocess.Popen(
+        [*RCSC, "--alone", "--script", str(path), "--executor", "python"],
+        cwd=REPO, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env={**os.environ, "PYTHONUNBUFFERED": "1"},
+    )  # fmt: skip
+    assert ran.stdout is not None
+    assert ran.stdout.readline().startswith("cycle 1:")
+    ran.send_signal(signal.SIGINT)
+    out, _ = ran.communicate()
+    assert ran.returncode == 130
+    assert "cycle" not in out
+
+
+def test_on_a_terminal_it_asks_completes_and_keeps_its_history(tmp_path: Path) -> None:
+    pytest.importorskip("prompt_toolkit")
+    here, there = pty.openpty()
+    ran = subprocess.Popen(
+        [*RCSC, "--alone", "--executor", "python"], cwd=REPO, stdin=there, stdout=there, stderr=there,
+        env={**os.environ, "XDG_STATE_HOME": str(tmp_path), "TERM": "xterm", "PROMPT_TOOLKIT_NO_CPR": "1"}, start_new_session=True,
+    )  # fmt: skip
+    os.close(there)
+    try:
+        _converse(here, ran)
+        assert ran.wait() == 0
+    finally:
+        ran.kill()
+        ran.wait()
+        os.close(here)
+    assert "+inc_command_seen ?" in (tmp_path / "rcsc" / "shell-history").read_text(encoding="utf-8")
+
+
+def _converse(here: int, ran: subprocess.Popen[bytes]) -> None:
+    _until(here, "task>")
+    os.write(here, b"INC_COMMAND_S\t")
+    _until(here, "inc_command_seen")
+    os.write(here, b" ?\r")
+    _until(here, "task.inc_command_seen = 0")
+    os.write(here, b"nonsense\r")
+    _until(here, "RCS731")
+    os.write(here, b"break status_report = failed\r")
+    _until(here, "breakpoint 1: status_report = failed")
+    os.write(here, b"run\r")
+    _computes(ran.pid)
+    ran.send_signal(signal.SIGINT)
+    _until(here, "interrupted")
+    os.write(here, b"quit\r")
+
+
+def _until(terminal: int, wanted: str) -> str:
+    """Reads until that is shown, however long it takes."""
+    shown = ""
+    while wanted not in shown:
+        shown += os.read(terminal, 65536).decode(errors="replace")
+    return shown
+
+
+def _computes(pid: int) -> None:
+    """Returns when a process has computed for a quarter of a second more: what was begun is under way."""
+
+    def used_s() -> float:
+        fields = Path(f"/proc/{pid}/stat").read_text(encoding="ascii").rpartition(")")[2].split()
+        return int(fields[11]) / os.sysconf("SC_CLK_TCK")
+
+    begun_s = used_s()
+    while used_s() < begun_s + 0.25:
+        time.sleep(0.01)
+
+
+# --- variables -------------------------------------------------------------------------
+
+
+def test_a_variable_is_shown_and_set(shell: Commands) -> None:
+    assert do(shell, "cur_state ?") == ["task.cur_state = d_state", "task.cur_state.next = d_state"]
+    assert do(shell, "CUR-STATE=STATE-3") == ["task.cur_state = state_3"]
+    assert do(shell, "task.cur_state?")[0] == "task.cur_state = state_3"
+    assert do(shell, "gripper.command.opening_mm = 12.5") == ["gripper.command.opening_mm = 12.5 [mm]"]
+    assert do(shell, "level gripper", "command.opening_mm ?") == ["gripper.command.opening_mm = 12.5 [mm]"]
+    assert do(shell, "new_command = true") == ["gripper.new_command = true"]
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("cur_state = state_33", "one of d_state, f_state"),
+        ("new_command = 1", "false or true"),
+        ("tbuffer_boxt = 100", "int 0 .. 99"),
+        ("tbuffer_boxt = 1.5", "int 0 .. 99"),
+        ("tbuffer_boxt =", "int 0 .. 99"),
+        ("gripper.command.opening_mm = nan", "real 0.0 .. 200.0 [mm]"),
+        ("gripper.command.opening_mm = -0.1", "real 0.0 .. 200.0 [mm]"),
+    ],
+)
+def test_a_value_that_is_none_of_the_variables_is_refused(shell: Commands, line: str, said: str) -> None:
+    before = state(shell)
+    error = refused(shell, line)
+    assert error.code is Code.SHELL_VALUE
+    assert said in str(error)
+    assert state(shell) == before
+
+
+def test_an_unknown_name_comes_with_those_near_it(shell: Commands) -> None:
+    for line in ("cur_stat ?", "cur_stat = state_2", "task.cur_stat ?", "expect cur_stat = state_2"):
+        error = refused(shell, line)
+        assert error.code is Code.SHELL_NAME
+        assert "cur_state" in error.helps[0], line
+    assert "near it: gripper" in refused(shell, "level griper").helps[0]
+    assert "near it: remove_from_buffer_db" in refused(shell, "remove-from-buffer").helps[0]
+    assert "`cur_state ?`" in refused(shell, "cur_state").helps[0]
+    assert "its parts: command.inc_command" in refused(shell, "command = pause").helps[0]
+
+
+def test_what_is_set_stands_in_the_buffer_that_carries_it(shell: Commands) -> None:
+    do(shell, "gripper.command.input_command = position", "gripper.command.opening_mm = 50")
+    assert "input_command position, opening_mm 50.0" in do(shell, "buffers gripper.command")[0]
+    do(shell, "step gripper")
+    assert do(shell, "gripper.to_hand ?")[1] == "gripper.to_hand.opening_mm = 0.0 [mm]"
+    do(shell, "gripper.command.inc_command = 1", "step gripper")
+    assert do(shell, "gripper.to_hand ?")[:2] == [
+        "gripper.to_hand.drive = true", "gripper.to_hand.opening_mm = 50.0 [mm]"
+    ]  # fmt: skip
+    do(shell, "step 2")  # PRIMITIVE gives its own order again
+    assert do(shell, "gripper.command.input_command ?") == ["gripper.command.input_command = pause"]
+
+
+def test_what_is_set_in_a_record_of_the_databases_is_its_answer(shell: Commands) -> None:
+    do(shell, *MOVE, "dest.known = true")
+    do(shell, "step 2", "expect task.dest_spec = true", "undo 2", "step 2", "expect dest_spec = true")
+    do(shell, "command.dest_locpt = 4", "step", "expect dest_spec = false")
+    do(shell, "command.dest_locpt = 3", "step", "expect dest_spec = true")
+
+
+# --- by name ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", ["c", "python"])
+def test_the_three_parts_of_a_level_are_one_cycle_of_it(kind: Kind) -> None:
+    """The interpreter, a part at a time, leaves what the executor leaves; the line, too."""
+    commands = inhabited(kind)
+    do(commands, *MOVE)
+    for _ in range(80):
+        for level in commands.session.levels:
+            level.take(commands.session.memory)
+            level.values = level.executor.values()
+            do(commands, f"level {level.name}", "PREPROCESS", "STATE-TABLE", "POSTPROCESS")
+            by_parts = level.values
+            do(commands, "undo 3", f"{level.name}-level")
+            assert level.values == by_parts
+            do(commands, "undo")
+        do(commands, "step")
+    do(commands, "expect task.status_report = done and emove.table = pause_emove")
+
+
+def test_a_procedure_a_module_an_owner_and_a_table_run_by_name(shell: Commands) -> None:
+    assert do(shell, "FAIL")[0] == "task: procedure `fail`"
+    assert do(shell, "status_report ?") == ["task.status_report = failed"]
+    do(shell, "nextstate(state_2)", "expect cur_state.next = state_2")
+    do(shell, "task.nextstate state-4", "expect cur_state.next = state_4")
+    do(shell, "command.inc_command = 9", "receive", "expect inc_command_seen = 9 and new_command")
+    do(shell, "command.inc_command = 10", "PREPROCESS-TASK", "expect inc_command_seen = 10")
+    said = do(shell, "level gripper", "new_command = true", "GRASP")
+    assert said[0] == "gripper: table `grasp`, line 1: state(moving); drive; executing"
+    do(shell, "expect gripper.cur_state = moving and gripper.to_hand.drive")
+    assert do(shell, "gripper-level") == ["gripper alone: gripper.pause_gripper.1"]
+    assert do(shell, "gripper 2") == ["gripper alone: gripper.pause_gripper.1"]
+
+
+def test_parts_run_only_from_the_sources_that_the_executors_were_made_of(project: Path) -> None:
+    edit(project, "table position {", "procedure nothing {\n  waited := waited\n}\n\ntable position {")
+    commands = alone(project)
+    assert refused(commands, "gripper.nothing").code is Code.SHELL_RELOAD
+    do(commands, "reload gripper anyway", "gripper.nothing")
+    before = state(commands)
+    assert refused(commands, "nextstate").code is Code.SHELL_COMMAND
+    assert refused(commands, "nextstate(state_99)").code is Code.SHELL_VALUE
+    assert refused(commands, "fail 1").code is Code.SHELL_COMMAND
+    assert state(commands) == before
+
+
+def test_a_table_by_name_in_a_state_that_it_does_not_expect(shell: Commands) -> None:
+    """A line that matches runs; what it relied on is told."""
+    said = do(shell, "cur_state = state_2", "ACQUIRE")
+    assert said[0].startswith("task: table `acquire`, line 16: state_failure")
+    assert said[0].endswith("; assumptions that do not hold: in_step")
+
+
+ALONE = """
+procedure one_more {
+  waited := waited + 1
+}
+
+assume low monitored : waited < 150
+
+table counts assuming low {
+  | line | waited || procedures |
+  | all  | < 150  || one_more   |
+}
+
+level gripper {"""
+
+
+def test_a_part_that_meets_what_the_proof_excludes_is_refused_and_changes_nothing(project: Path) -> None:
+    commands = alone(project)
+    edit(project, "level gripper {", ALONE)
+    do(commands, "reload gripper", "level gripper", "waited = 149", "COUNTS", "expect waited = 150")
+    before = state(commands)
+    error = refused(commands, "one-more")
+    assert error.code is Code.SHELL_PART
+    assert "`gripper.waited` to 151" in str(error)
+    error = refused(commands, "counts")
+    assert error.code is Code.STATE_TABLE_ERROR
+    assert "no line matches; assumptions that do not hold: low" in str(error)
+    assert state(commands) == before
+
+
+# --- cycles ----------------------------------------------------------------------------
+
+
+def test_one_level_steps_alone(shell: Commands) -> None:
+    others = [level.values for level in shell.session.levels[:-1]]
+    do(shell, "gripper.command.inc_command = 4", "step gripper 3")
+    assert [level.values for level in shell.session.levels[:-1]] == others
+    assert shell.session.system.tick == 0
+    assert shell.session.memory.latest("gripper.report") is not None
+    do(shell, "expect gripper.report.inc_command_echo = 4")
+
+
+@pytest.mark.parametrize("kind", ["c", "python"])
+def test_undo_goes_back_and_what_follows_is_the_same(kind: Kind) -> None:
+    commands = inhabited(kind)
+    do(commands, *MOVE)
+    states = []
+    for _ in range(25):
+        states.append(state(commands))
+        do(commands, "step")
+    end, plate = state(commands), commands.session.system.outside[0].plate  # type: ignore[attr-defined]  # the plant's
+    do(commands, "undo 15")
+    assert state(commands) == states[10]
+    do(commands, "step 15")
+    assert state(commands) == end
+    assert commands.session.system.outside[0].plate == plate  # type: ignore[attr-defined]  # the plant's
+    do(commands, "undo 25")
+    assert state(commands) == states[0]
+    assert refused(commands, "undo").code is Code.SHELL_COMMAND
+
+
+def test_run_stops_at_lines_conditions_and_cycles() -> None:
+    commands = inhabited()
+    do(commands, *MOVE)
+    assert do(commands, "run to cycle 2") == ["cycle 2"]
+    assert refused(commands, "run to cycle 1").code is Code.SHELL_COMMAND
+    assert do(commands, "break task.move.13", "breaks") == ["1: task.move.13"]
+    do(commands, "break primitive.report.ref_command_echo = goto")
+    assert do(commands, "run 1000")[0].endswith(
+        "breakpoint 2, `primitive.report.ref_command_echo = goto` holds"
+    )
+    do(commands, "delete 2")
+    assert do(commands, "run")[0].endswith("breakpoint 1, line task.move.13")
+    tick = commands.session.system.tick
+    assert do(commands, DONE) == [f"cycle {tick}: `{DONE.removeprefix('run until ')}` holds"]
+    assert do(commands, "run 3") == [f"cycle {tick + 3}"]  # it stands at the line, it does not come to it
+    do(commands, "delete 1")
+    assert refused(commands, "delete 1").code is Code.SHELL_NAME
+    assert refused(commands, "run").code is Code.SHELL_COMMAND
+    assert refused(commands, "run to task.move.99").code is Code.SHELL_NAME
+
+
+def test_a_refused_input_is_a_state_table_error_that_can_be_undone(shell: Commands) -> None:
+    before = state(shell)
+    shell.session.memory.publish("workstation.order", (0, 77, 0, 0, 0, 0, 0, 0))
+    error = refused(shell, "step")
+    assert error.code is Code.STATE_TABLE_ERROR
+    assert "input refused: `command.input_command` = 77?" in str(error)
+    assert refused(shell, "task-level").code is Code.STATE_TABLE_ERROR
+    do(shell, "undo 2")
+    assert state(shell)[2:] == before[2:]
+
+
+def test_show_lines_levels_and_help(shell: Commands) -> None:
+    assert do(shell, "lines")[0].split() == ["task", "task.pause_task.-"]
+    do(shell, "command.inc_command = 5", "step")
+    assert do(shell, "lines")[0].split() == ["task", "task.pause_task.1"]
+    assert "task.inc_command_seen: 0 -> 5" in do(shell, "show")
+    assert len(do(shell, "show gripper")) == 25
+    do(shell, "command.input_command = acquire")
+    assert do(shell, "lines")[0].split() == ["task", "task.acquire.-"]
+    assert [line[0] for line in do(shell, "levels")] == ["*", " ", " ", " ", " "]
+    assert do(shell, "help") == HELP.splitlines()
+    assert {"task.acquire.5", "cur_state", "receive", "undo", "task-level"} <= set(shell.completions())
+
+
+# --- conditions ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "condition",
+    [
+        "task.cur_state = d_state",
+        "cur-state == D-STATE and not (new_command or task.begun)",
+        "d_state = cur_state",
+        "tbuffer_boxt >= 10 and tbuffer_boxt /= -1.5e3",
+        "task.idle or task.cur_state = state_2",
+        "not not idle = true",
+        "task.table = pause_task",
+        "gripper.command.opening_mm < .5",
+        "task.cur_state = task.cur_state.next",
+    ],
+)
+def test_conditions_that_hold(shell: Commands, condition: str) -> None:
+    assert do(shell, f"expect {condition}") == []
+    assert refused(shell, f"expect not ({condition})").code is Code.SHELL_EXPECTED
+
+
+@pytest.mark.parametrize(
+    ("condition", "code"),
+    [
+        ("", Code.SHELL_COMMAND),
+        ("task.cur_state", Code.SHELL_COMMAND),
+        ("cur_state < state_2", Code.SHELL_COMMAND),
+        ("cur_state = state_22", Code.SHELL_VALUE),
+        ("cur_state = 1", Code.SHELL_VALUE),
+        ("cur_state = status_report", Code.SHELL_COMMAND),
+        ("new_command = 1", Code.SHELL_COMMAND),
+        ("(new_command", Code.SHELL_COMMAND),
+        ("new_command)", Code.SHELL_COMMAND),
+        ("new_command and", Code.SHELL_COMMAND),
+        ("__import__('os')", Code.SHELL_COMMAND),
+        ("1 < tbuffer_boxt < 3", Code.SHELL_COMMAND),
+        ("nobody = 3", Code.SHELL_NAME),
+        ("nobody", Code.SHELL_NAME),
+        ("not " * 1000 + "idle", Code.SHELL_COMMAND),
+        ("(" * 1000, Code.SHELL_COMMAND),
+    ],
+)
+def test_conditions_that_are_none(shell: Commands, condition: str, code: Code) -> None:
+    assert refused(shell, f"expect {condition}").code is code
+
+
+# --- reload ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", ["c", "python"])
+def test_reload_takes_proved_tables_in_the_present_state(project: Path, kind: Kind) -> None:
+    commands = alone(project, kind)
+    do(commands, "gripper.command.inc_command = 3", "gripper.command.input_command = grasp")
+    do(commands, "gripper.command.force_n = 10", "step gripper")
+    do(commands, "break gripper.waited = 140", "break gripper.grasp.4")
+    edit(project, "const most_waited = 150", "const most_waited = 200")
+    edit(project, "state failure : reason", "state failure : reason\nstate tries : int 3 .. 9 = 3")
+    said = do(commands, "reload gripper")
+    assert (
+        said[-1]
+        == "level `gripper` runs its new tables from cycle 1 on: 25 variables keep their values; new: tries"
+    )
+    assert "2 tables changed; 1 as before, proved; 1 other part changed; 2 declarations changed" in said
+    assert "out of reach of the present state: whatever the inputs, the next cycle does as before" in said
+    do(commands, "expect gripper.tries = 3 and gripper.cur_state = moving", "step gripper 180")
+    do(commands, "expect gripper.waited = 180 and gripper.line = 3")
+    do(commands, "gripper.waited = 200", "level gripper", "STATE-TABLE")
+    assert [stop.text for stop in commands.session.stops.every] == ["gripper.waited = 140", "gripper.grasp.4"]
+    do(commands, "undo 182")  # the part and the cycles, then the reload itself
+    assert refused(commands, "gripper.tries ?").code is Code.SHELL_NAME
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "why"),
+    [
+        (
+            "| 2    | false       | moving    | true   | ",
+            "| 2    | false       | d_state   | true   | ",
+            "RCS40",
+        ),
+        ("state waited : int 0 .. most_waited", "state waited : bool", "RCS3"),
+        ("inc_command_seen : number", "inc_command_seen : int 0 .. 65535 [mm]", "RCS3"),
+        ("state at_opening : bool", "state at_opening : bool = true\nstate other : bool", ""),
+        ("enum gripper_state { d_state, ", "enum gripper_state { ", "RCS2"),
+        ("state at_opening : bool", "state at_opening : intt", "RCS2"),
+        ("  drive : bool\n", "  drive : bool\n  twice : bool\n", "buffer `gripper.to_hand` has another form"),
+        (
+            "## Within half",
+            "invariant counted : waited = 0 implies inc_command_seen = inc_command_seen\n## Within half",
+            "",
+        ),
+        ("state forced : bool", "state forced : int 0 .. 1", "RCS3"),
+    ],
+)
+def test_reload_refuses_and_the_old_tables_run_on(project: Path, old: str, new: str, why: str) -> None:
+    commands = alone(project)
+    do(commands, "step 2")
+    before = state(commands)
+    edit(project, old, new)
+    if not why:
+        said = do(commands, "reload gripper")
+        assert (
+            "level `gripper` runs its new tables from cycle 3 on: 25 variables keep their values" in said[-1]
+        )
+        return
+    error = refused(commands, "reload gripper")
+    assert error.code is Code.SHELL_RELOAD
+    assert why in str(error)
+    assert state(commands) == before
+    do(commands, "step", "expect gripper.line = 1")
+
+
+def test_reload_refuses_a_state_that_a_range_or_an_assumption_excludes(project: Path) -> None:
+    commands = alone(project)
+    do(commands, "step", "gripper.waited = 7")
+    edit(project, "const most_waited = 150", "const most_waited = 400")
+    do(commands, "reload gripper", "gripper.waited = 300")
+    edit(project, "const most_waited = 400", "const most_waited = 150")
+    assert "`waited` = 300 lies outside its new range 0 .. 150" in str(refused(commands, "reload gripper"))
+    do(commands, "gripper.waited = 7", "reload gripper")
+    edit(project, "table position {", "assume calm monitored : waited /= 7\ntable position assuming calm {")
+    do(commands, "reload gripper", "undo")  # it is PAUSE's table that runs next
+    do(commands, "gripper.command.input_command = position")
+    error = refused(commands, "reload gripper")
+    assert error.code is Code.SHELL_RELOAD
+    assert "assumption `calm` of table `position` does not hold of the present state: waited = 7" in str(
+        error
+    )
+    assert refused(commands, "reload gripper anyway").code is Code.SHELL_RELOAD
+    do(commands, "gripper.waited = 4", "reload gripper")
+
+
+# --- reload is gated: what changed, and whether it is met at once ---
+
+WALKER = """\
+enum place { start, middle, end }
+input go : bool
+input echo : int 0 .. 2
+state at : place = start deferred until echo = sent
+state seen : bool
+output sent : int 0 .. 2
+procedure to(where : place) { next at := where  sent := (sent + 1) mod 3 }
+procedure sense { seen := go }
+table walk {
+  | line | at     | seen  || procedures |
+  | off  | start  | true  || to(middle) |
+  | on   | middle | true  || to(end)    |
+  | back | end    |       || to(start)  |
+  | rest | /= end | false ||            |
+}
+level walker { period 40 [ms]  preprocess sense  table walk }
+"""
+ON = "|| to(end)    |", "|| to(start)  |"
+WALK = """\
+name = "small"
+generated = "generated"
+data = "cell.toml"
+tick_ms = 40
+[[level]]
+name = "walker"
+[buffers]
+"outside.go" = "walker.go"
+"outside.echo" = "walker.echo"
+"walker.sent" = "outside.order"
+"""
+OUT_OF_REACH = "out of reach of the present state: whatever the inputs, the next cycle does as before"
+WITHIN_REACH = "within reach of the present state, with some inputs: table `walk`, line `on`"
+
+
+@pytest.fixture
+def walker(tmp_path: Path) -> Path:
+    """A level with a deferred state; its source."""
+    source = tmp_path / "walker.rcs"
+    source.write_text(WALKER, encoding="utf-8")
+    (tmp_path / "system.toml").write_text(WALK, encoding="utf-8")
+    assert not compile_(
+        Settings((str(source),), Options()), tmp_path / "generated", TARGETS, only_check=False
+    ).report.failed
+    return source
+
+
+def walking(source: Path) -> Commands:
+    return alone(source.parent / "system.toml", "python")
+
+
+def write(source: Path, *edits: tuple[str, str], text: str = WALKER) -> None:
+    for old, new in edits:
+        assert text.count(old) == 1, old
+        text = text.replace(old, new)
+    source.write_text(text, encoding="utf-8")
+
+
+def test_a_reload_that_changes_nothing_says_so_and_one_that_changes_no_meaning_too(walker: Path) -> None:
+    commands = walking(walker)
+    same = ["level `walker` runs these very tables: nothing changed"]
+    assert do(commands, "reload") == same
+    assert do(commands, "diff") == same
+    assert refused(commands, "undo").code is Code.SHELL_COMMAND  # nothing was taken
+    write(walker, ("table walk {", "# a walk\ntable walk {"))
+    assert do(commands, "reload")[0] == "same meaning; 1 as before, proved"
+    assert do(commands, "reload") == same
+    write(walker, ("| back |", "| home |"))
+    said = do(commands, "reload")
+    assert "same meaning; 1 as before, proved; 1 region with another line to the same effect" in said
+    assert OUT_OF_REACH not in said  # it is not worth saying where nothing changed
+    do(commands, "at = end", "at.next = end", "step", "expect walker.line = home")
+
+
+def test_a_change_that_the_present_state_does_not_meet_is_taken_with_what_it_changes(walker: Path) -> None:
+    commands = walking(walker)
+    write(walker, ON)
+    before = state(commands)
+    shown = do(commands, "diff")
+    assert state(commands) == before
+    assert shown[-1] == "`reload walker` takes it: 6 variables keep their values"
+    said = do(commands, "reload walker")
+    assert said[:-1] == shown[:-1]
+    assert OUT_OF_REACH in said
+    assert "    line `on`: another effect  (1 of 6 inputs)" in said
+    assert "      where  at = middle, seen = true" in said
+    assert "      at.next: end -> start  [procedures]" in said
+    assert "    proved: nothing else changed" in "\n".join(said)
+    at = said.index("  level `walker`, table `walk`: 1 step from line to line newly possible")
+    assert said[at + 1] == "    on -> off"
+    do(commands, "go = true", "step", "echo = 1", "step", "echo = 2", "step", "expect at = start")
+
+
+def test_a_change_within_reach_is_taken_and_one_that_is_met_at_once_only_if_that_is_said(
+    walker: Path,
+) -> None:
+    commands = walking(walker)
+    do(commands, "go = true", "step", "expect at.next = middle")
+    write(walker, ON)
+    said = do(commands, "diff")  # the echo may come, but has not
+    assert WITHIN_REACH in said
+    assert said[-1].startswith("`reload walker` takes it")
+    do(commands, "echo = 1")
+    before = state(commands)
+    said = do(commands, "diff")
+    assert said[-1].startswith("`reload walker anyway` takes it")
+    error = refused(commands, "reload walker")
+    assert error.code is Code.SHELL_OTHERWISE
+    first, *rest = str(error).splitlines()
+    assert first == (
+        "level `walker` keeps its tables: in the present state the next cycle would do otherwise: "
+        "table `walk`, line `on` before, table `walk`, line `on` now"
+    )
+    assert rest[0] == "  at.next: end -> start"
+    assert WITHIN_REACH in rest
+    assert error.helps == ("`reload walker anyway` takes them",)
+    assert state(commands) == before
+    do(commands, "step", "expect at.next = end", "undo")
+    said = do(commands, "reload ANYWAY")
+    assert (
+        "in the present state the next cycle would do otherwise: table `walk`, line `on` before, table `walk`, line `on` now"
+        in said
+    )
+    do(commands, "step", "expect at.next = start")
+    do(commands, "undo 2", "step", "expect at.next = end")  # the cycle, then the reload
+
+
+def test_members_that_are_numbered_anew_are_the_same_states(walker: Path) -> None:
+    commands = walking(walker)
+    write(walker, ON, ("{ start, middle, end }", "{ end, start, middle }"))
+    assert OUT_OF_REACH in do(commands, "diff")
+    do(commands, "at = middle", "at.next = middle")
+    assert WITHIN_REACH in do(commands, "diff")
+    do(commands, "go = true")
+    assert refused(commands, "reload").code is Code.SHELL_OTHERWISE
+    do(commands, "go = false", "reload", "expect at = middle", "go = true", "step", "expect at.next = start")
+
+
+def test_a_state_that_the_new_table_does_not_know_is_refused_whatever_is_said(walker: Path) -> None:
+    commands = walking(walker)
+    on = "  | on   | middle | true  || to(end)    |\n"
+    lost = (
+        (on, ""),
+        (
+            "| rest | /= end | false ||            |",
+            "| rest | start  | false ||            |\n  | lost | DEFAULT | || |",
+        ),
+    )
+    write(walker, *lost)
+    do(commands, "reload", "undo")  # nothing is on its way there
+    do(commands, "go = true", "step", "go = false")
+    for line in ("reload", "reload anyway", "diff"):
+        error = refused(commands, line)
+        assert error.code is Code.SHELL_RELOAD
+        assert "`at` is to be middle, for which table `walk` has no line" in str(error)
+        assert "add a line for middle" in error.helps[0]
+    do(commands, "echo = 1", "step", "expect at = middle")
+    assert "`at` is middle, for which table `walk` has no line" in str(refused(commands, "reload anyway"))
+    write(
+        walker, (on, ""), ("place { start, middle, end }", "place { start, end }"), ("to(middle)", "to(end)")
+    )
+    assert "`at` = middle, which its new type does not have" in str(refused(commands, "reload anyway"))
+    do(commands, "undo")
+    assert "`at.next` = middle, which its new type does not have" in str(refused(commands, "reload anyway"))
+
+
+def test_a_pending_state_that_an_assumption_excludes_is_refused(walker: Path) -> None:
+    commands = walking(walker)
+    write(walker, ("table walk {", "assume early assumed : at /= middle\ntable walk assuming early {"))
+    do(commands, "go = true", "step")
+    assert "`at` is to be middle, for which table `walk` has no line" in str(refused(commands, "reload"))
+    do(commands, "echo = 1")
+    error = refused(commands, "reload")
+    assert "assumption `early` of table `walk` does not hold of the present state: at = middle" in str(error)
+    do(commands, "at = start", "at.next = start", "reload")
+
+
+def test_an_invariant_that_does_not_hold_of_the_present_state_is_refused(walker: Path) -> None:
+    text = WALKER.replace("state seen : bool", "state seen : bool\nstate count : int 0 .. 5")
+    commands = walking(walker)
+    write(walker, text=text)
+    do(commands, "reload", "count = 4")
+    write(walker, ("table walk {", "invariant few : count <= 3 or seen\ntable walk {"), text=text)
+    assert "RCS4" in str(refused(commands, "reload anyway"))  # `sense` does not keep it
+    write(walker, ("table walk {", "invariant few : count <= 3\ntable walk {"), text=text)
+    error = refused(commands, "reload anyway")
+    assert error.code is Code.SHELL_RELOAD
+    assert "invariant `few` does not hold of the present state: count = 4" in str(error)
+    do(commands, "count = 3", "reload")
+
+
+def test_what_cannot_be_compared_is_taken_only_if_that_is_said(
+    walker: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write(walker, ON)
+    commands = walking(walker)  # its executors are of the text before
+    error = refused(commands, "reload")
+    assert error.code is Code.SHELL_OTHERWISE
+    assert "the sources of what runs are not known" in str(error)
+    assert "nothing changed" not in do(commands, "reload anyway")[-1]
+    write(walker)
+    monkeypatch.setattr(
+        "rcsc.shell.reload.gate.compare",
+        lambda *args, **more: replace(compare(*args, **more), undecided=("table `walk`",)),
+    )
+    error = refused(commands, "reload")
+    assert (error.code, "the solver gave up on table `walk`" in str(error)) == (Code.SHELL_OTHERWISE, True)
+    monkeypatch.setattr("rcsc.shell.reload.gate.compare", lambda name, *_, **__: ProgramDifference(name))
+    do(commands, "at = middle", "at.next = middle", "go = true")
+    with pytest.raises(RuntimeError, match="nothing is said to differ"):
+        do(commands, "reload")
+
+
+CALLED: list[bool] = []
+
+
+def outside_world(seen: bool) -> bool:
+    """An extern procedure: what it does cannot be taken back."""
+    CALLED.append(seen)
+    return seen
+
+
+def test_what_is_admitted_of_an_input_is_met_in_any_state(walker: Path) -> None:
+    commands = walking(walker)
+    write(walker, ("input echo : int 0 .. 2", "input echo : int 0 .. 2 clamp"))
+    said = do(commands, "diff")
+    assert OUT_OF_REACH not in said
+    assert any(
+        line.startswith("within reach of the present state, with some inputs: declaration of variable `echo`")
+        for line in said
+    )
+    do(commands, "reload")
+    commands.session.memory.publish("outside.echo", (7,))
+    write(walker)
+    error = refused(commands, "reload")
+    assert error.code is Code.SHELL_OTHERWISE
+    assert "table `walk`, line `rest` before, table `walk`, input refused now" in str(error)
+
+
+def test_extern_procedures_are_not_tried_out(walker: Path) -> None:
+    extern = 'state told : bool\nextern procedure tell reads seen writes told python "tests.run.test_shell:outside_world" c "tell"\n'
+    text = WALKER.replace("procedure sense {", f"{extern}procedure sense {{").replace(
+        "preprocess sense", "preprocess sense, tell"
+    )
+    write(walker, text=text)
+    made = compile_(
+        Settings((str(walker),), Options()), walker.parent / "generated", TARGETS, only_check=False
+    )
+    assert not made.report.failed, made.report.found
+    commands = walking(walker)
+    CALLED.clear()
+    write(walker, ON, text=text)
+    error = refused(commands, "reload")
+    assert error.code is Code.SHELL_OTHERWISE
+    assert "the next cycle was not tried out, and assumptions not looked at" in str(error)
+    do(commands, "reload anyway")
+    assert CALLED == []
+    do(commands, "step")
+    assert len(CALLED) == 1
+
+
+def test_a_file_that_is_used_is_kept_too(walker: Path) -> None:
+    enum, rest = WALKER.split("\n", 1)
+    (walker.parent / "words").mkdir()
+    (walker.parent / "words" / "places.rcs").write_text(enum, encoding="utf-8")
+    write(walker, text=f"use words/places\n{rest}")
+    assert not compile_(
+        Settings((str(walker),), Options()), walker.parent / "generated", TARGETS, only_check=False
+    ).report.failed
+    commands = walking(walker)
+    (walker.parent / "words" / "places.rcs").write_text(
+        enum.replace("end }", "end, gone }"), encoding="utf-8"
+    )
+    error = refused(commands, "reload")
+    assert (error.code, "RCS401" in str(error)) == (Code.SHELL_RELOAD, True)  # a gap, in what was edited
+    do(commands, "sense")  # what runs is known by what it was made of
+    (walker.parent / "words" / "places.rcs").write_text(
+        enum.replace("start, middle", "middle, start"), encoding="utf-8"
+    )
+    assert "  enumeration `place`: start, middle, end -> middle, start, end" in do(commands, "reload")
+
+
+@pytest.mark.parametrize("kind", ["python", "c"])
+def test_what_runs_is_not_tried_out_of_a_state_in_which_its_proof_does_not_hold(
+    walker: Path, kind: Kind
+) -> None:
+    held = "state seen : bool\nstate kept : array[3] of bool\nstate i : int 0 .. 2000000000\n"
+    text = WALKER.replace("state seen : bool\n", f"{held}invariant inside : i <= 2\n")
+    text = text.replace("{ seen := go }", "{ seen := go  kept[i] := go }")
+    write(walker, text=text)
+    made = compile_(
+        Settings((str(walker),), Options()), walker.parent / "generated", TARGETS, only_check=False
+    )
+    assert not made.report.failed, made.report.found
+    commands = alone(walker.parent / "system.toml", kind)
+    do(commands, "i = 2000000000")
+    guarded = ("kept[i] := go }", "if i <= 2 { kept[i] := go } }"), ("invariant inside : i <= 2\n", "")
+    write(walker, *guarded, ON, text=text)
+    before = state(commands)
+    error = refused(commands, "reload")
+    assert error.code is Code.SHELL_OTHERWISE
+    assert "cannot go on from this state: invariant `inside` does not hold" in str(error)
+    assert state(commands) == before
+    do(commands, "reload anyway", "step")
+
+
+def test_a_part_that_has_no_whole_number_is_refused(walker: Path) -> None:
+    held = "state x : real 0.0 .. 1.0e308\nstate whole : int 0 .. 9\ninvariant small : x <= 1.0\n"
+    text = WALKER.replace("procedure sense {", f"{held}procedure sense {{")
+    text = text.replace("{ seen := go }", "{ seen := go  whole := int(min(abs(x * 10.0 - x * 10.0), 9.0)) }")
+    write(walker, text=text)
+    made = compile_(
+        Settings((str(walker),), Options()), walker.parent / "generated", TARGETS, only_check=False
+    )
+    assert not made.report.failed, made.report.found
+    commands = walking(walker)
+    do(commands, "sense", "x = 1e308")
+    before = state(commands)
+    assert refused(commands, "sense").code is Code.SHELL_PART
+    assert state(commands) == before
+
+
+USES: dict[str, tuple[str, str]] = {
+    "on its line": ("use words\n", ""),
+    "after a declaration": ("const one = 1 use words\n", ""),
+    "over two lines": ("use\n  words\n", ""),
+    "after a comment": ("use # what is said\n words\n", ""),
+}
+
+
+@pytest.mark.parametrize("case", USES)
+def test_a_used_file_is_kept_however_its_use_is_written(case: str, tmp_path: Path) -> None:
+    (tmp_path / "words.rcs").write_text("enum word { one, two }\n")
+    (tmp_path / "t.rcs").write_text(f"{USES[case][0]}input w : word\n")
+    before = kept(tmp_path / "t.rcs")
+    assert before.texts["words.rcs"] == b"enum word { one, two }\n"
+    (tmp_path / "words.rcs").write_text("enum word { two, one }\n")
+    assert kept(tmp_path / "t.rcs") != before
+
+
+def test_sources_are_laid_out_in_their_folder_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for folder in ("project/tables", "outside", "user"):
+        (tmp_path / folder).mkdir(parents=True)
+    (tmp_path / "project" / "rcsc.toml").touch()
+    (tmp_path / "project" / "tables" / "t.rcs").write_text("use near use lib/far\ninput n : bool\n")
+    (tmp_path / "project" / "tables" / "near.rcs").write_text("const one = 1\n")
+    (tmp_path / "outside" / "far.rcs").write_text("const two = 2\n")
+    (tmp_path / "project" / "tables" / "lib").symlink_to(tmp_path / "outside")
+    (tmp_path / "user" / "link").symlink_to(tmp_path / "project" / "tables")
+    monkeypatch.chdir(tmp_path / "user")
+    for source in (Path("link/t.rcs"), tmp_path / "project" / "tables" / "t.rcs"):
+        held = kept(source)
+        assert "tables/near.rcs" in held.texts
+        with laid_out(held) as there:
+            place = there.parents[1]
+            written = {
+                str(one.relative_to(place)): one.read_bytes() for one in place.rglob("*") if one.is_file()
+            }
+            assert there.read_text() == "use near use lib/far\ninput n : bool\n"
+        assert written == {name: text for name, text in held.texts.items() if not os.path.isabs(name)}
+
+
+def test_a_pipe_that_is_used_is_not_waited_for(tmp_path: Path) -> None:
+    (tmp_path / "t.rcs").write_text("use words\n")
+    os.mkfifo(tmp_path / "words.rcs")
+    assert "words.rcs" not in kept(tmp_path / "t.rcs").texts

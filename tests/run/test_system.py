@@ -1,0 +1,203 @@
+"""The whole system without physics: MAKE BOXT, PAUSE and new commands at every cycle, faults, and what is reported of them."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from rcsc.run.levels import RunningLevel
+from rcsc.run.system import System
+from rcsc_cell.cell.mujoco_model import Body
+from rcsc_cell.cell.plant import Plant
+from rcsc_cell.cell.ready import Lying, plant
+from rcsc_cell.database.ask import Database
+from rcsc_cell.database.pose import about_z
+from rcsc_cell.episodes.witness import placements
+from rcsc_cell.workstation.prepared import prepare
+from tests.support.cells import PAUSE_ENDS, SCRIPT, SYSTEM, Cell, through_script
+
+
+def world(database: Database) -> tuple[Plant]:
+    return (plant(database, "kinematic"),)
+
+
+def test_make_boxt_runs_to_the_end_and_both_executors_do_the_same() -> None:
+    traces = []
+    for kind in ("c", "python"):
+        run = prepare(SYSTEM, "make_boxt", "c" if kind == "c" else "python", world)
+        trace: list[object] = []
+
+        def watch(_: System, due: tuple[RunningLevel, ...], trace: list[object] = trace) -> None:
+            trace.append([level.values for level in due])
+
+        run.system.watch.append(watch)
+        results = list(run.steps())
+        assert [result.state for result in results] == ["done"] * 27
+        traces.append(trace)
+        made = run.system.outside[1]
+        assert isinstance(made, Plant)
+        [placed] = placements(run.station.results, run.database, made)
+        assert placed.place == "STATION(3)"
+        assert placed.error_mm < 1.0
+        assert made.mechanism.parts()[0].axis(2)[2] < -0.99  # turned over
+        assert made.mechanism.touching() == frozenset()
+        assert run.system.level("task").value("tbuffer_boxt") == 9
+    assert traces[0] == traces[1]
+
+
+def test_the_script_as_printed_is_refused_before_the_loose_part_is_machined() -> None:
+    run = prepare(SYSTEM, "make_boxt_printed", "c", world)
+    *before, last = run.steps()
+    assert {result.state for result in before} == {"done"}
+    assert (last.row.number, last.state, last.reason) == (22, "refused", "the vise is open: its right jaw")
+
+
+@pytest.fixture(scope="module")
+def probe() -> Cell:
+    """A second cell, put where another one is."""
+    return Cell()
+
+
+def test_pause_at_every_cycle_of_every_command(probe: Cell) -> None:
+    """Section 4.6: a done comes back up, and nothing moves from then on."""
+    main = Cell()
+    for _ in through_script(main):
+        probe.take_over(main)
+        probe.tell("pause")
+        assert probe.until_over(PAUSE_ENDS) == "done", main.system.tick
+        where = probe.world.plate
+        probe.system.step()
+        probe.system.step()
+        assert probe.world.plate == where
+        assert probe.failed == []
+    assert main.failed == []
+    assert main.system.tick > 700
+
+
+def test_a_new_command_at_every_cycle_of_every_command(probe: Cell) -> None:
+    """The command that comes is the one that is answered, and it ends."""
+    main = Cell()
+    for _ in through_script(main):
+        if main.system.tick % 3:
+            continue
+        probe.take_over(main)
+        if (
+            probe.do("move", dest="WS-SAFE") == "failed"
+        ):  # PICKUP was under way: the part that was counted on is not there
+            assert (probe.reason(), probe.world.mechanism.touching()) == ("nothing_gripped", frozenset())
+            probe.do("move", dest="WS-SAFE")
+        assert probe.answer == "done", (main.system.tick, probe.reason())
+        assert probe.failed == []
+        route = probe.database.route(probe.database.locations["WS-SAFE"], 0)
+        assert probe.world.plate == pytest.approx(probe.database.point(int(route[3]))[1:10])
+
+
+def test_every_command_is_answered_by_its_own_number_across_the_wrap() -> None:
+    cell = Cell()
+    cell.number = 65_534
+    for dest in ("WS-SAFE", "FIX-SAFE", "BUFFER-SAFE", "WS-SAFE"):
+        assert cell.do("move", dest=dest) == "done"
+    assert cell.number == 2
+    levels = cell.system.levels
+    level = levels[1]
+    values = list(level.values)
+    values[level.sign.index["to_primitive.inc_command"]] = 65_535
+    assert cell.failed == []
+
+
+FAULTS = {
+    "no source": ("acquire", {"obj": "tbox", "grasp": 2}, "cmd"),
+    "no destination": ("move", {}, "cmd"),
+    "nothing to release": ("release", {}, "cmd"),
+    "nothing to clear": ("clear", {"dest": "STATION"}, "cmd"),
+    "nothing to transfer": ("transfer", {"dest": "V-BLK1"}, "cmd"),
+    "no such place": ("move", {"dest": 200}, "cmd"),
+    "no such sector": ("move", {"dest": "STATION", "sector": 50}, "move"),
+    "not on the buffer": ("acquire", {"obj": "hous", "grasp": 2, "source": "BUFFER"}, "loc"),
+    "thicker than expected": ("acquire", {"obj": "bbox", "grasp": 2, "source": "BUFFER"}, "loc"),
+    "no such grasp": ("acquire", {"obj": "tbox", "grasp": 9, "source": "FIX-MAC5"}, "move"),
+    "nothing there": ("acquire", {"obj": "tbox", "grasp": 2, "source": "FIX-MAC5"}, "pic"),
+}
+
+
+@pytest.mark.parametrize("name", list(FAULTS))
+def test_what_cannot_be_done_is_reported_with_its_reason(name: str) -> None:
+    command, said, reason = FAULTS[name]
+    cell = Cell()
+    assert cell.do(command, **said) == "failed"  # type: ignore[arg-type]  # of the table above
+    assert cell.reason() == reason
+    assert cell.do("move", dest="WS-SAFE") == "done"
+    assert cell.failed == []
+
+
+def test_a_second_command_while_a_part_is_held_is_refused() -> None:
+    cell = Cell()
+    assert cell.do("acquire", obj="tbox", grasp=2, source="BUFFER") == "done"
+    assert cell.do("acquire", obj="tbox", grasp=2, source="BUFFER") == "failed"
+    assert cell.reason() == "cmd"
+    assert cell.system.level("task").value("tbuffer_boxt") == 9
+
+
+def test_a_part_of_the_wrong_size_is_an_unknown_object() -> None:
+    fixture = Cell().database.stations["fixture"].frame
+    house = Body((70.0, 50.0, 50.0), fixture.point((0.0, 0.0, 45.0)), about_z(20.0))
+    cell = Cell(parts=[Lying(4, house)])  # a house where a box top should be
+    assert cell.do("acquire", obj="tbox", grasp=2, source="FIX-MAC5") == "failed"
+    assert cell.reason() == "pic"
+    assert cell.system.level("task").shown("obj_now_in_gripper") == "unknown_object"
+
+
+def test_an_empty_buffer_fails_and_stays_failed() -> None:
+    """Fig. 9: the published procedure's failure is overwritten by the pending state."""
+    cell = Cell()
+    task = cell.system.level("task")
+    task.executor.put(task.sign.index["tbuffer_boxt"], (0,))
+    task.values = task.executor.values()
+    assert cell.do("acquire", obj="tbox", grasp=2, source="BUFFER") == "failed"
+    assert cell.reason() == "buf"
+    for _ in range(20):
+        cell.system.step()
+        assert cell.answer == "failed"
+    assert cell.system.level("emove").shown("command.input_command") == "pause"
+    assert task.value("tbuffer_boxt") == 0
+
+
+@pytest.mark.parametrize(
+    ("fault", "command", "said", "reason"),
+    [
+        ("robot_stuck", "move", {"dest": "FIX-SAFE"}, "move"),
+        ("hand_stuck", "acquire", {"obj": "tbox", "grasp": 2, "source": "FIX-MAC5"}, "move"),
+        ("blind", "acquire", {"obj": "tbox", "grasp": 2, "source": "BUFFER"}, "loc"),
+    ],
+)
+def test_a_fault_below_is_reported_upward(
+    fault: str, command: str, said: dict[str, str], reason: str
+) -> None:
+    cell = Cell()
+    setattr(cell.world.faults, fault, True)
+    assert cell.do(command, **said) == "failed"
+    assert cell.reason() == reason
+    setattr(cell.world.faults, fault, False)
+    assert cell.do("move", dest="WS-SAFE") == "done"
+    assert cell.failed == []
+
+
+def test_a_station_moves_in_the_data_and_nothing_is_compiled_again(tmp_path: Path) -> None:
+    data = (SYSTEM.parent / "cell.toml").read_text(encoding="utf-8")
+    moved = data.replace("at = { x = 560.0, y = 0.0, z = 560.0", "at = { x = 530.0, y = 40.0, z = 550.0")
+    assert moved != data
+    system = SYSTEM.read_text(encoding="utf-8").replace('"../generated"', '"generated"')
+    shutil.copytree(SYSTEM.parents[1] / "generated", tmp_path / "generated")
+    (tmp_path / "cell.toml").write_text(moved, encoding="utf-8")
+    (tmp_path / "system.toml").write_text(system, encoding="utf-8")
+    script = tmp_path / "go.csv"
+    script.write_text("command,part,source,dest,end_at\nMOVE,,,WS-SAFE,\n", encoding="utf-8")
+    run = prepare(tmp_path / "system.toml", str(script), "c", world)
+    assert [result.state for result in run.steps()] == ["done"]
+    made = run.system.outside[1]
+    assert isinstance(made, Plant)
+    assert made.plate[:3] == pytest.approx((530.0, 40.0, 715.0))
+
+
+def test_the_script_of_these_tests_has_every_command() -> None:
+    assert {command for command, _ in SCRIPT} == {"acquire", "move", "release", "transfer", "clear", "pause"}

@@ -1,0 +1,1 @@
+"""Small hierarchies drawn by seed and enumerated: the judge of `tests.hierarchies`."""

@@ -1,0 +1,226 @@
+"""What the environment of a level may do, and what is to be true of every cycle: on concrete states, in the words of `rcsc.compose`.
+
+Nothing of `rcsc.compose.contract.transition` and `obligations` is used but the names of the sorts: this is written anew, to hold them
+against it. What makes the inputs few: programs compare numbers for equality and add one (or two, in slips); so a state is the same under
+another name for each number that the superior gave, and under a shift of those that go down. Of echoes it matters whether they are of the
+last order; where a program computes with an echo (`Role.odd`), the ones near it are tried, too.
+"""
+
+from collections.abc import Iterator, Mapping
+from itertools import chain, product
+
+from rcsc.compose.contract.environment import Below
+from rcsc.compose.contract.obligations import Sort
+from rcsc.lang.interpret import Fault
+from rcsc.lang.model import OneTable, Value
+from tests.small_hierarchies.compiled import Stated
+from tests.small_hierarchies.level import EARLY, FLAG, UNDEFINED, Key, Ran, Role, looks, overlooking
+
+NUMBERS = 65536
+FAR = 30_000
+"""An echo of no order of late, as seen from the last one."""
+NEAR = (NUMBERS - 2, NUMBERS - 1, 2)
+"""Echoes that a program which computes with them may make a number of."""
+
+# --- the contract -------------------------------------------------------------------------------
+
+
+def allowed(role: Role, before: Mapping[str, Value], taken: Mapping[str, Value], but: str = "") -> bool:
+    """Whether the environment may give these inputs after this state; of the record `but` nothing is asked."""
+    above = role.links.above
+    if above is not None and above.order != but and not ordered(role, before, taken):
+        return False
+    return all(answered(below, before, taken) for below in role.links.below if below.report != but)
+
+
+def ordered(role: Role, before: Mapping[str, Value], taken: Mapping[str, Value]) -> bool:
+    """An order under the number that was taken last is the same order."""
+    above = role.links.above
+    assert above is not None
+    number = f"{above.order}.inc_command"
+    return taken[number] != before[number] or all(taken[leaf] == before[leaf] for leaf in above.numbered)
+
+
+def answered(below: Below, before: Mapping[str, Value], taken: Mapping[str, Value]) -> bool:
+    """What a subordinate reports fits the last order."""
+    sent, command = before[f"{below.order}.inc_command"], before[f"{below.order}.input_command"]
+    echo, echoed = taken[f"{below.report}.inc_command_echo"], taken[f"{below.report}.ref_command_echo"]
+    if echo == sent:
+        return echoed == command  # (1) what is reported under the last number is about the last command
+    if echo == (int(sent) + 1) % NUMBERS:
+        return False  # (2) the number after the last one is not echoed
+    return before[f"{below.report}.inc_command_echo"] != sent  # (3) what is echoed stays echoed
+
+
+def offers(
+    role: Role, before: Mapping[str, Value], but: str = "", given: Mapping[str, Value] | None = None
+) -> list[tuple[Value, ...]]:
+    """Every input that the environment may give after a state, numbers up to their names; the record `but` is given."""
+    given = given or {}
+    records = []
+    for leaves in role.taken:
+        choices = [(given[leaf],) if leaf in given else _choices(role, leaf, before) for leaf in leaves]
+        kept = (dict(zip(leaves, values, strict=True)) for values in product(*choices))
+        records.append([tuple(one.values()) for one in kept if _fits(role, before, one, but)])
+    return [tuple(chain.from_iterable(values)) for values in product(*records)]
+
+
+def _fits(role: Role, before: Mapping[str, Value], taken: Mapping[str, Value], but: str) -> bool:
+    """Whether the environment may give this record, of which alone it is asked (`allowed`)."""
+    record = next(iter(taken)).partition(".")[0]
+    above = role.links.above
+    if above is not None and record == above.order and record != but:
+        return ordered(role, before, taken)
+    reports = [below for below in role.links.below if below.report == record != but]
+    return all(answered(below, before, taken) for below in reports)
+
+
+def _choices(role: Role, leaf: str, before: Mapping[str, Value]) -> tuple[Value, ...]:
+    above = role.links.above
+    if above is not None and leaf == f"{above.order}.inc_command":
+        known = dict.fromkeys(int(before[name]) for name in given_numbers(role))
+        fresh = next(number for number in range(NUMBERS) if number not in known)
+        return (*known, fresh)
+    for below in role.links.below:
+        if leaf == f"{below.report}.inc_command_echo":
+            sent = int(before[f"{below.order}.inc_command"])
+            steps = (0, FAR, *NEAR) if role.odd else (0, FAR)
+            return tuple((sent + step) % NUMBERS for step in steps)
+    return role.domains[leaf]
+
+
+def given_numbers(role: Role) -> tuple[str, ...]:
+    """Where numbers that the superior gave are kept."""
+    above = role.links.above
+    if above is None:
+        return ()
+    return (f"{above.order}.inc_command", "inc_command_seen", f"{above.report}.inc_command_echo")
+
+
+def canonical(role: Role, state: Mapping[str, Value], but: str = "") -> dict[str, Value]:
+    """The same state with the first names for its numbers, but for those exchanged with `but`, and without inputs that nobody remembers."""
+    found = {**state, **role.forgotten}
+    names: dict[Value, int] = {}
+    for leaf in given_numbers(role):
+        if role.links.above is not None and role.links.above.name != but:
+            found[leaf] = names.setdefault(found[leaf], len(names))
+    for below in (one for one in role.links.below if one.name != but):
+        sent, echo = f"{below.order}.inc_command", f"{below.report}.inc_command_echo"
+        found[echo] = 0 if found[echo] == found[sent] else FAR
+        found[sent] = 0
+    return found
+
+
+# --- the obligations ---------------------------------------------------------------------------------
+
+
+def wanted(role: Role) -> frozenset[Key]:
+    """Every obligation of a level."""
+    found: set[Key] = set()
+    chosen = role.level.tables
+    tables = (chosen.table,) if isinstance(chosen, OneTable) else tuple(name for _, name in chosen.tables)
+    for table in (role.tables[str(name)] for name in tables):
+        name = str(table.name)
+        found |= {(Sort.ASSUMPTION, name, str(one)) for one in table.assumptions}
+        found.add((Sort.ONE_LINE, name, ""))
+        if table.default is None:
+            found.add((Sort.SOME_LINE, name, ""))
+        elif table.default.unreachable:
+            found.add((Sort.NO_DEFAULT, name, ""))
+        missed = overlooking(table) or role.asks or table.stops
+        if FLAG in role.leaves and role.links.above is not None and looks(table) and missed:
+            found.add((Sort.ANSWERED, name, FLAG))
+    if role.links.above is not None:
+        found.add((Sort.ECHOES, "", role.links.above.report))
+        found |= {(Sort.ONCE, "", FLAG)} if FLAG in role.leaves else set()
+    for below, _, fields in role.numbered:
+        found.add((Sort.NEXT_NUMBER, "", below.order))
+        found |= {(Sort.NUMBERED, "", leaf) for leaf in fields}
+        if role.links.above is not None:
+            found.add((Sort.WAITS, "", below.order))
+            found |= {(Sort.PAUSES, "", below.order)} if not isinstance(chosen, OneTable) else set()
+    found |= {(Sort.DEFERRED, "", leaf) for leaf, _ in role.deferred}
+    found |= {(Sort.INVARIANT, "", one.name) for one in role.program.invariants}
+    found |= {(Sort.PROPERTY, "", one.name) for one in role.program.properties}
+    return frozenset(found)
+
+
+def broken(role: Role, before: Mapping[str, Value], taken: Mapping[str, Value], ran: Ran) -> Iterator[Key]:
+    """The obligations that a cycle breaks; one that a fault ends publishes nothing, and breaks those of its table only."""
+    if ran.fault is UNDEFINED:
+        return  # nobody can say what it does
+    table = role.tables[ran.table]
+    yield from ((Sort.ASSUMPTION, ran.table, name) for name in ran.failed)
+    if ran.fault is Fault.SEVERAL_LINES:
+        yield Sort.ONE_LINE, ran.table, ""
+    elif ran.fault is Fault.NO_LINE:
+        yield Sort.SOME_LINE, ran.table, ""
+    else:
+        if table.default is not None and table.default.unreachable and ran.line == table.default.name:
+            yield Sort.NO_DEFAULT, ran.table, ""
+        if not ran.outlasts:
+            yield Sort.ANSWERED, ran.table, FLAG
+        yield from _broken_above(role, before, taken, ran)
+        yield from _broken_below(role, before, taken, ran.after)
+        for leaf, waiting in role.deferred:
+            if ran.after[leaf] not in {ran.middle[leaf], ran.after[waiting]}:
+                yield Sort.DEFERRED, "", leaf
+        yield from _broken_stated(role, before, ran.after)
+
+
+def _broken_stated(role: Role, before: Mapping[str, Value], after: Mapping[str, Value]) -> Iterator[Key]:
+    """Invariants hold before the cycle and after it; properties of both."""
+    stated = role.compiled.stated
+    many = len(role.program.invariants)
+    for one, condition in zip(role.program.invariants, stated[:many], strict=True):
+        if not (_true(condition, before, before) and _true(condition, after, before)):
+            yield Sort.INVARIANT, "", one.name
+    for other, condition in zip(role.program.properties, stated[many:], strict=True):
+        if not _true(condition, after, before):
+            yield Sort.PROPERTY, "", other.name
+
+
+def _true(condition: Stated, now: Mapping[str, Value], before: Mapping[str, Value]) -> bool:
+    """Whether a condition is defined, and holds."""
+    try:
+        return condition(now, before)
+    except (ArithmeticError, IndexError, ValueError):
+        return False
+
+
+def _broken_above(
+    role: Role, before: Mapping[str, Value], taken: Mapping[str, Value], ran: Ran
+) -> Iterator[Key]:
+    if (above := role.links.above) is None:
+        return
+    after = ran.after
+    number, command = f"{above.order}.inc_command", f"{above.order}.input_command"
+    said = after[f"{above.report}.inc_command_echo"], after[f"{above.report}.ref_command_echo"]
+    late = ran.fault in EARLY and all(after[leaf] == before[leaf] for leaf in role.report)
+    if said != (taken[number], taken[command]) and not late:
+        yield Sort.ECHOES, "", above.report
+    again = taken[number] == before[number]
+    if again and FLAG in before and after[FLAG] and not before[FLAG]:
+        yield Sort.ONCE, "", FLAG
+
+
+def _broken_below(
+    role: Role, before: Mapping[str, Value], taken: Mapping[str, Value], after: Mapping[str, Value]
+) -> Iterator[Key]:
+    above = role.links.above
+    for below, number, fields in role.numbered:
+        command = f"{below.order}.input_command"
+        step = (int(after[number]) - int(before[number])) % NUMBERS
+        if step == 0:
+            yield from ((Sort.NUMBERED, "", f) for f in fields if after[f] != before[f])
+        elif step != 1:
+            yield Sort.NEXT_NUMBER, "", below.order
+        if above is not None:
+            same = taken[f"{above.order}.inc_command"] == before[f"{above.order}.inc_command"]
+            open_ = taken[f"{below.report}.inc_command_echo"] != before[number]
+            if same and open_ and after[command] != before[command]:
+                yield Sort.WAITS, "", below.order
+            if (
+                not same and taken[f"{above.order}.input_command"] == 0 != after[command]
+            ):  # the first is PAUSE
+                yield Sort.PAUSES, "", below.order

@@ -1,0 +1,46 @@
+"""What tests of the loop share: which lines ran in which cycle, and counterexamples that are kept."""
+
+from pathlib import Path
+from typing import ClassVar
+
+from rcsc_cell.episodes.episode import SYSTEM, Episode, Outcome, PartSpec, script
+from rcsc_cell.episodes.loop import Loop, run
+from rcsc_cell.properties.cycle import Cycle
+
+KEPT = Path(__file__).parents[2] / ".rcsc-cache" / "loop"
+TBOX = (PartSpec("tbox", "buffer", 20.0, -30.0, 10.0),)
+ACQUIRE = Episode(parts=TBOX, rows=("ACQUIRE,BOXT (2),BUFFER,,",))
+
+
+class Trace:
+    """Not a property: what ran in each cycle."""
+
+    name: ClassVar[str] = "trace"
+    place: ClassVar[str] = "section 10"
+
+    def __init__(self, _: Cycle) -> None:
+        self.ran: list[tuple[str, ...]] = []
+
+    def watch(self, cycle: Cycle) -> str | None:
+        self.ran.append(tuple(f"{level.name} {level.table} {level.line}" for level in cycle.ran))
+        return None
+
+
+def trace(episode: Episode, system: Path = SYSTEM) -> list[tuple[str, ...]]:
+    """The lines of every cycle, level by level."""
+    loop = Loop(episode, system, properties=(Trace,))
+    loop.finish()
+    [made] = loop.properties
+    assert isinstance(made, Trace)
+    return made.ran
+
+
+def keep(episode: Episode, outcome: Outcome) -> str:
+    """Keeps what does not hold, as an episode, a script and a log; what to say of it."""
+    folder = KEPT / f"{outcome.digest[:12]}"
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "episode.json").write_text(episode.to_json(), encoding="utf-8")
+    (folder / "script.csv").write_text(script(episode.rows), encoding="utf-8")
+    run(episode, log=folder / "log.mcap")
+    said = "; ".join(f"{one.property}, cycle {one.tick}: {one.said}" for one in outcome.findings)
+    return f"{said}\nkept in {folder}; rcsc replay {folder / 'log.mcap'}\n{episode.to_json()}"

@@ -1,0 +1,524 @@
+"""What procedures, lines and conditions owe: each kind found at its line, and nothing found where all is well."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from rcsc.commands import run
+from rcsc.diagnostics.codes import Code
+from rcsc.diagnostics.diagnostic import Diagnostic
+from rcsc.diagnostics.source import Source
+from rcsc.lang.model import Int, Program
+from rcsc.lang.resolve import compile_text
+from rcsc.solvers import smt
+from rcsc.solvers.options import Options
+from rcsc.solvers.smt import Answer, Limits, Solver, Term
+from rcsc.symbolic.encode import within
+from rcsc.table.program import ProgramVerdict, prove_program
+
+VARIABLES = """
+enum colour { red, green, blue }
+input a : int 0 .. 9
+input b : int -5 .. 5
+input big : int 0 .. 9223372036854775807
+input wide : int 0 .. 18446744073709551615
+input low : int -9223372036854775808 .. 9223372036854775807
+input yes : bool
+input c : colour
+input x : real 0.0 .. 500.0
+input y : real -1.0 .. 1.0
+state n : int 0 .. 9
+state m : int -100 .. 100
+state s : int -9223372036854775808 .. 9223372036854775807
+state u : int 0 .. 18446744073709551615
+state r : real 0.0 .. 500.0
+state xs : array[4] of int 0 .. 9
+output out : int 0 .. 9
+"""
+
+
+def proved(text: str, options: Options | None = None) -> ProgramVerdict:
+    program = compile_text(text)
+    assert isinstance(program, Program), program
+    return prove_program(program, options or Options(solver="boxes"))
+
+
+def body(statements: str, options: Options | None = None) -> tuple[Diagnostic, ...]:
+    """Findings on a procedure of its own, over `VARIABLES`."""
+    return proved(f"{VARIABLES}procedure p {{\n{statements}\n}}\n", options).findings
+
+
+def codes(found: tuple[Diagnostic, ...]) -> list[str]:
+    return [one.code.value for one in found]
+
+
+RIGHT = [
+    "n := a",
+    "n := min(a + 1, 9)",
+    "if a < 9 { n := a + 1 }",
+    "if a = 0 { n := 0 } else { n := 9 / a }",
+    "if not (a = 0) { n := 9 / a }",
+    "if b /= 0 and 100 / b > 3 { n := 1 }",
+    "if b = 0 or 100 / b > 3 { n := 1 }",
+    "if b /= 0 implies 100 / b > 3 { n := 1 }",
+    "if b /= 0 { m := 100 / b }",
+    "m := -7 / 2 * 2 + -7 mod 2",
+    "if a < 4 { xs[a] := 1 }",
+    "if a < 4 { n := xs[a] }",
+    "if a in {1, 2} { xs[a] := a }",
+    "for i in 0 .. 3 { xs[i] := i }",
+    "local k : int 0 .. 9 if yes { k := 1 } else { k := 2 } n := k",
+    "local k : int 0 .. 9 case c { red { k := 1 } green, blue { k := 2 } } n := k",
+    "local k : int 0 .. 9 if yes { k := 1 } if yes { n := k }",
+    "case c { red { n := 1 } blue { n := 2 } }",
+    "for i in 0 .. 3 { local k : int 0 .. 9 := i n := k }",
+    "u := wide / 3",
+    "if wide < 100 { u := wide * 2 }",
+    "s := low / 2",
+    "if low > -9223372036854775808 { s := -low }",
+    "r := 0.75 * r + 0.25 * x",
+    "if x > 0.0 { r := min(1.0 / (x + 1.0), 500.0) }",
+    "if y > 0.5 { r := 1.0 / y }",
+    "n := int(x) mod 10",
+    "r := real(a)",
+    "n := a n := n",
+    "m := a - 100",
+    "if a >= 5 { n := a - 5 } else { n := 5 - a }",
+    "n := 0 for i in 1 .. 20 { n := min(n + i, 9) }",
+    "if a * a < 50 { n := a + 2 }",
+]
+
+
+@pytest.mark.parametrize("statements", RIGHT)
+def test_nothing_is_owed_where_all_is_well(statements: str) -> None:
+    assert codes(body(statements)) == []
+
+
+WRONG = [
+    ("n := a + 1", "RCS413"),
+    ("m := 100 / b", "RCS411"),
+    ("m := 100 mod b", "RCS411"),
+    ("if b /= 0 or 100 / b > 3 { n := 1 }", "RCS411"),
+    ("if b = 0 implies 100 / b > 3 { n := 1 }", "RCS411"),
+    ("if 100 / b > 3 and b /= 0 { n := 1 }", "RCS411"),
+    ("if x / y > 1.0 { n := 1 }", "RCS411"),
+    ("xs[a] := 1", "RCS412"),
+    ("n := xs[a]", "RCS412"),
+    ("if a <= 4 { xs[a] := 1 }", "RCS412"),
+    ("local k : int 0 .. 9 if yes { k := 1 } n := k", "RCS414"),
+    ("local k : int 0 .. 9 case c { red { k := 1 } green { k := 2 } } n := k", "RCS414"),
+    ("for i in 0 .. 1 { local k : int 0 .. 9 if i = 1 { n := k } k := 1 }", "RCS414"),
+    ("s := big * 3 / 3", "RCS410"),
+    ("s := big + big - big", "RCS410"),
+    ("s := -low", "RCS410"),
+    ("s := abs(low)", "RCS410"),
+    ("s := big / b", "RCS411"),
+    ("if b < 0 { s := low / b }", "RCS410"),
+    ("if b < 0 { s := low mod b }", "RCS410"),
+    ("s := wide - 1", "RCS410"),
+    ("u := wide + 1", "RCS410"),
+    ("r := 2.0 * x", "RCS413"),
+    ("if y > 0.0 { r := 1.0 / y }", "RCS413"),
+    ("if y > 0.0 { n := min(max(int(1.0 / y), 0), 9) }", "RCS410"),
+    ("n := 5 - a", "RCS413"),
+    ("q(a + 1)", "RCS413"),
+    ("for i in 0 .. 3 { n := n + 3 }", "RCS413"),
+    ("if a * a < 65 { n := a + 2 }", "RCS413"),
+]
+
+
+@pytest.mark.parametrize(("statements", "code"), WRONG)
+def test_each_fault_is_found_at_its_place(statements: str, code: str) -> None:
+    text = f"{VARIABLES}procedure p {{\n{statements}\n}}\nprocedure q(k : int 0 .. 9) {{ n := k }}\n"
+    found = proved(text).findings
+    assert set(codes(found)) == {code}
+    line = text.splitlines().index(statements) + 1
+    assert {Source("case.rcs", text).position(one.primary.span.start).line for one in found} == {line}
+    assert all(one.witnesses for one in found if one.code is not Code.USE_BEFORE_ASSIGNMENT)
+
+
+def test_the_witness_is_the_least_in_declared_order() -> None:
+    [found] = body("if a > 2 and c /= red { m := 30 / (a - 5) }")
+    [column] = found.witnesses
+    assert dict(zip(column.variables, column.values, strict=True)) == {"a": "5", "c": "green"}
+
+
+def test_the_least_witness_of_a_double_is_the_first_that_fails() -> None:
+    [found] = body("r := x + 0.5")
+    [column] = found.witnesses
+    assert column.variables == ("x",)
+    assert float(column.values[0]) + 0.5 > 500.0
+    assert float(column.values[0]) == 499.50000000000006
+
+
+def test_what_fails_once_is_not_reported_again_further_on() -> None:
+    assert codes(body("m := 100 / b m := 100 / b + 0 n := a + 1 m := n")) == ["RCS411", "RCS413"]
+
+
+# --- lines -------------------------------------------------------------------------------
+
+GROW = "procedure grow { n := n + 1 }"
+TABLE = """
+procedure set_out(k : int 0 .. 9) {{ out := k }}
+table t {{
+  | line | n    | a    || procedures | out |
+  | low  | < 9  |      || {low}      |     |
+  | high | >= 9 |      || {high}     | {out} |
+}}
+"""
+
+
+def table(low: str = "", high: str = "", out: str = "") -> tuple[Diagnostic, ...]:
+    grow = GROW if "grow" in low + high else ""
+    return proved(VARIABLES + grow + TABLE.format(low=low, high=high, out=out)).findings
+
+
+def test_a_line_runs_under_its_conditions() -> None:
+    assert codes(table(low="grow")) == []
+    [found] = table(low="grow", high="grow")
+    assert found.code is Code.ASSIGNED_RANGE
+    assert found.notes == ("in line `high` of table `t`",)
+    assert dict(zip(found.witnesses[0].variables, found.witnesses[0].values, strict=True)) == {"n": "9"}
+
+
+def test_the_state_carries_over_from_action_to_action() -> None:
+    [found] = table(low="grow; grow")
+    assert dict(zip(found.witnesses[0].variables, found.witnesses[0].values, strict=True)) == {"n": "8"}
+    assert codes(table(high="n := 0; grow; grow")) == []
+
+
+def test_a_default_line_runs_where_no_line_matches() -> None:
+    text = (
+        VARIABLES
+        + """
+table t {
+  | line | n       || procedures      | out |
+  | some | 0 .. 5  ||                 | 1   |
+  | rest | DEFAULT || n := n - 6      | 2   |
+}
+"""
+    )
+    assert "RCS413" not in codes(proved(text).findings)
+    assert "RCS413" in codes(proved(text.replace("n - 6", "n - 7")).findings)
+
+
+@pytest.mark.parametrize(
+    ("high", "out", "wrong"),
+    [
+        ("set_out(1)", "1", False),
+        ("set_out(1)", "2", True),
+        ("set_out(a)", "a", False),
+        ("set_out(a)", "a + 0", False),
+        ("set_out(a)", "9 - a", True),
+        ("set_out(a); set_out(3)", "", True),
+        ("n := a; set_out(n)", "a", False),
+        ("set_out(n); n := 0", "n", True),
+    ],
+)
+def test_two_actions_of_a_line_give_an_output_one_value(high: str, out: str, wrong: bool) -> None:
+    assert codes(table(high=high, out=out)) == (["RCS415"] if wrong else [])
+
+
+def test_actions_that_never_write_together_are_no_two_writers() -> None:
+    text = (
+        VARIABLES
+        + """
+procedure one { if yes { out := 1 } }
+procedure two { if not yes { out := 2 } }
+table t {
+  | line | a    || procedures |
+  | all  | >= 0 || one; two   |
+}
+"""
+    )
+    assert codes(proved(text).findings) == []
+    assert codes(proved(text.replace("not yes", "n = 0")).findings) == ["RCS415"]
+
+
+def test_assumptions_are_used_and_must_be_defined_themselves() -> None:
+    text = (
+        VARIABLES
+        + """
+assume small : a < 4
+table t assuming small {
+  | line | a    || xs[a] |
+  | all  | >= 0 || 1     |
+}
+"""
+    )
+    assert codes(proved(text).findings) == []
+    assert codes(proved(text.replace("assuming small ", "")).findings) == ["RCS412"]
+    [found] = proved(text.replace("a < 4", "9 / a > 2")).findings
+    assert found.code is Code.DIVISION_BY_ZERO
+    assert [(one.table, one.variables, one.values) for one in found.witnesses] == [("", ("a",), ("0",))]
+
+
+def test_every_condition_is_defined_whatever_the_others_say() -> None:
+    text = (
+        VARIABLES
+        + """
+table t {
+  | line | b    | 100 / b || out |
+  | pos  | > 0  | > 20    || 1   |
+  | rest | DEFAULT |      || 2   |
+}
+"""
+    )
+    found = proved(text)
+    assert codes(found.findings) == ["RCS411"]
+    assert [one.undecided for one in found.tables] == [True]
+    guarded = text.replace("| 100 / b |", "| when |").replace("> 20   ", "b > 0 and 100 / b > 20")
+    assert "RCS411" not in codes(proved(guarded).findings)
+
+
+OUTSIDE = {
+    "invariant": "invariant claim : {}\n",
+    "assumption": "assume claim assumed : {}\n",
+    "deferred value": "state later : int 0 .. 3 deferred until {}\n",
+}
+
+
+@pytest.mark.parametrize("place", OUTSIDE)
+@pytest.mark.parametrize(
+    ("condition", "code"),
+    [
+        ("9 / q > 2", "RCS411"),
+        ("xs[q - 1] < 2", "RCS412"),
+        ("s + q < 9", "RCS410"),
+        ("q = 0 or 9 / q > 2", ""),
+    ],
+)
+def test_a_condition_outside_tables_is_defined_under_the_invariants_and_an_invariant_by_itself(
+    place: str, condition: str, code: str
+) -> None:
+    text = f"{VARIABLES}state q : int 0 .. 4 = 1\n{OUTSIDE[place].format(condition)}"
+    wrong = [code] if code else []
+    assert codes(proved(text).findings) == wrong
+    assert codes(proved(text + "invariant above : q > 0 and s <= 0\n").findings) == (
+        wrong if place == "invariant" else []
+    )
+
+
+def test_extern_results_are_any_values_in_range() -> None:
+    text = (
+        VARIABLES
+        + """
+extern procedure look reads a writes n python "m:f" c "f"
+procedure p { look if n < 9 { n := n + 1 } }
+"""
+    )
+    assert codes(proved(text).findings) == []
+    [found] = proved(text.replace("if n < 9 ", "if a = 2 ")).findings
+    assert dict(zip(found.witnesses[0].variables, found.witnesses[0].values, strict=True))["a"] == "2"
+
+
+# --- what may go wrong with the prover ----------------------------------------------------
+
+
+def test_unknown_is_never_proved(monkeypatch: pytest.MonkeyPatch) -> None:
+    import z3
+
+    monkeypatch.setattr(z3.Solver, "check", lambda *_: z3.unknown)
+    found = proved(f"{VARIABLES}procedure p {{ if b /= 0 {{ m := 100 / b }} }}")
+    assert found.proved is None
+    assert codes(found.findings) == ["RCS409"]
+
+
+@pytest.mark.parametrize("error", ["z3", "memory"])
+def test_a_solver_that_breaks_proves_nothing(monkeypatch: pytest.MonkeyPatch, error: str) -> None:
+    import z3
+
+    def broken(*_: object) -> None:
+        raise z3.Z3Exception(b"out of memory") if error == "z3" else MemoryError
+
+    for method in ("check", "add"):
+        with monkeypatch.context() as patch:
+            patch.setattr(z3.Solver, method, broken)
+            found = proved(f"{VARIABLES}procedure p {{ if b /= 0 {{ m := 100 / b }} }}")
+        assert found.proved is None
+        assert codes(found.findings) == ["RCS409"]
+
+
+def test_a_time_out_is_reported_and_ends_the_asking() -> None:
+    hard = "if s * s * s + low * low = 3 * low * s and s > 1000 { m := a * a + b }"
+    found = body(hard, Options(solver="boxes", steps=1))
+    assert found
+    assert set(codes(found)) <= {"RCS409", "RCS410", "RCS413"}
+
+
+def test_what_bounds_settle_costs_no_query(monkeypatch: pytest.MonkeyPatch) -> None:
+    def asked(*_: object) -> Answer:
+        raise AssertionError
+
+    monkeypatch.setattr(Solver, "check", asked)
+    verdict = proved(
+        f"{VARIABLES}procedure p {{ if a < 9 {{ n := a + 1 }} m := 3 * a if a in {{1, 2}} {{ xs[a] := 1 }} }}"
+    )
+    assert verdict.proved is not None
+    assert verdict.tally.queries == 0
+    assert verdict.tally.by_intervals >= 4
+
+
+def test_one_query_shows_all_that_a_line_owes() -> None:
+    verdict = proved(f"{VARIABLES}procedure p {{ if b /= 0 {{ m := 100 / b  m := 50 / b  m := 20 mod b }} }}")
+    assert verdict.proved is not None
+    assert (verdict.tally.by_solver, verdict.tally.queries) == (3, 1)
+
+
+LONG = "procedure p { for i in 0 .. 99 { n := 0 } }\n"
+LINE = "table t {\n| line | a || procedures |\n| all | >= 0 || p |\n}\n"
+LEVEL = (
+    LINE.replace("p |", "|").replace("{", "{{").replace("}", "}}")
+    + "level l {{ period 40 [ms] {} table t {} }}\n"
+)
+
+
+@pytest.mark.parametrize(
+    ("text", "place", "what"),
+    [
+        (LONG, "p {", "in procedure `p`"),
+        (LONG + LINE, "all", "in line `all` of table `t`"),
+        (LONG + LEVEL.format("preprocess p", ""), "l {", "in `preprocess` of level `l`"),
+        (LONG + LEVEL.format("", "postprocess p"), "l {", "in `postprocess` of level `l`"),
+    ],
+)
+def test_runs_that_are_too_long_to_follow_are_undecided(
+    monkeypatch: pytest.MonkeyPatch, text: str, place: str, what: str
+) -> None:
+    monkeypatch.setattr("rcsc.symbolic.evaluation.MOST_STEPS", 50)
+    found = proved(VARIABLES + text)
+    assert found.proved is None
+    [one] = found.findings
+    assert one.code is Code.UNDECIDED
+    assert what in one.message
+    assert (VARIABLES + text)[one.primary.span.start :].startswith(place)
+
+
+def test_long_loops_are_followed() -> None:
+    text = "state k : int 0 .. 4096 procedure p { k := 0 for i in 1 .. 4096 { k := k + 1 } k := k - 4096 }"
+    assert proved(text).proved is not None
+    assert codes(proved(text.replace("- 4096 }", "- 4095 k := k - 2 }")).findings) == ["RCS413"]
+
+
+def test_only_the_tables_asked_for_are_proved() -> None:
+    text = VARIABLES + GROW + TABLE.format(low="", high="grow", out="")
+    program = compile_text(text)
+    assert isinstance(program, Program)
+    verdict = prove_program(program, Options(solver="boxes"), only=())
+    assert (verdict.tables, verdict.proved) == ((), None)
+    assert codes(verdict.findings) == []
+
+
+def test_processes_give_the_same_verdicts() -> None:
+    text = VARIABLES + "".join(
+        f"table t{at} {{\n  | line | a || out |\n  | l | < {at} || 1 |\n  | h | >= 3 || 2 |\n}}\n"
+        for at in (2, 3, 4)
+    )
+    one = proved(text)
+    two = proved(text, replace(Options(solver="boxes"), jobs=2))
+    assert one.findings == two.findings
+    assert [v.found for v in one.tables] == [v.found for v in two.tables]
+    assert codes(one.findings) == ["RCS401", "RCS402"]
+
+
+def test_what_the_processor_time_ended_is_undecided() -> None:
+    solver = Solver(Limits(steps=2**31, cpu_s=0.3))
+    kind = Int(2, 10**12)
+    x, y, z = (smt.variable(name, kind) for name in "xyz")
+
+    def cubed(term: Term) -> Term:
+        return smt.integer_operation("*", term, smt.integer_operation("*", term, term))
+
+    solver.add(*(within(one, kind) for one in (x, y, z)))
+    solver.add(smt.equal(smt.integer_operation("+", cubed(x), cubed(y)), cubed(z), kind))  # nobody finds one
+    before = smt.cut_short()
+    assert solver.check() is Answer.UNKNOWN
+    assert smt.cut_short() == before + 1
+    assert Solver().check() is Answer.SATISFIABLE  # the next question begins anew
+
+
+def test_a_table_of_which_a_question_was_cut_short_is_undecided(monkeypatch: pytest.MonkeyPatch) -> None:
+    ended = iter(range(100))
+    monkeypatch.setattr(smt, "cut_short", lambda: next(ended))
+    verdict = proved("input a : bool\ntable t {\n| line | a ||\n| x | true ||\n| y | false ||\n}\n")
+    assert verdict.proved is None
+    assert codes(verdict.findings) == ["RCS409"]
+
+
+# --- all questions together -------------------------------------------------------------------------
+
+
+PAIR = "input x : int 0 .. 10\ninput y : int 0 .. 10\nstate m : int 0 .. 10\n"
+LESS = "procedure p {\n  if x <= y { m := y - x }\n}\n"
+ODD = "100 / (2 * x - 2 * y + 1) > 3"
+OWED = {  # each owes what bounds alone do not settle
+    "a procedure": LESS,
+    "a line": f"{LESS}table t {{\n| line | when || procedures |\n| a | true || p |\n}}\n",
+    "a cell": f"table t {{\n| line | when ||\n| a | {ODD} ||\n| b | not ({ODD}) ||\n}}\n",
+    "an assumption": f"assume odd monitored : {ODD}\ntable t assuming odd {{\n| line | x ||\n| a | < 5 ||\n| b | >= 5 ||\n}}\n",
+    "a preprocess": "module q reads x, y writes m {\n  if x <= y { m := y - x }\n}\n"
+    "table t {\n| line | x ||\n| a | < 5 ||\n| b | >= 5 ||\n}\nlevel l {\n  period 40 [ms]\n  preprocess q\n  table t\n}\n",
+    "a table": "table t {\n| line | when ||\n| a | x * y > 50 and x * m > 7 ||\n| b | x * y <= 50 and x * m > 7 ||\n"
+    "| c | x * m <= 7 and m * y > 9 ||\n| d | x * m <= 7 and m * y <= 9 ||\n}\n",
+}
+
+
+@pytest.mark.parametrize("place", OWED)
+def test_no_question_is_asked_past_what_all_of_them_may_cost(
+    place: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = PAIR + OWED[place]
+    assert proved(text).proved is not None
+    monkeypatch.setattr("rcsc.solvers.options.TOGETHER", 0)
+    found = proved(text)
+    assert found.proved is None
+    assert set(codes(found.findings)) == {"RCS409"}
+
+
+def test_questions_that_are_decided_one_by_one_may_be_too_many_together(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    options = Options(solver="boxes", steps=20_000)
+    text = PAIR + OWED["a table"]
+    assert proved(text, options).proved is not None
+    spent: list[int] = []
+    monkeypatch.setattr("rcsc.solvers.options.TOGETHER", 1)
+    for steps in (20_000, 400):
+        found = [proved(text, replace(options, steps=steps)) for _ in range(2)]
+        assert found[0].findings == found[1].findings
+        spent.append(len(found[0].findings))
+    assert spent == [0, 1]
+    assert "together" in found[0].findings[0].message
+
+
+def test_a_budget_is_for_all_solvers_inside_it_and_for_nothing_after_it() -> None:
+    kind = Int(2, 10**6)
+    x, y = (smt.variable(name, kind) for name in "xy")
+
+    def asked() -> Answer:
+        solver = Solver(Limits(steps=1_000_000))
+        solver.add(within(x, kind), within(y, kind))
+        solver.add(smt.equal(smt.integer_operation("*", x, y), smt.literal(kind, 899), kind))
+        return solver.check()
+
+    with smt.together(10**9) as budget:
+        assert asked() is Answer.SATISFIABLE
+    few = 5 * (10**9 - budget.left)
+    for inner in (10**9, few):
+        with smt.together(few), smt.together(inner):
+            answers = [asked() for _ in range(40)]
+        many = answers.count(Answer.SATISFIABLE)
+        assert 0 < many < 40
+        assert answers == [Answer.SATISFIABLE] * many + [Answer.UNKNOWN] * (40 - many)
+    assert asked() is Answer.SATISFIABLE
+
+
+def test_the_manual_and_the_help_say_what_all_questions_together_get(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    said = f"{smt.TOGETHER} times"
+    assert run(["check", "--help"]) == 0
+    assert said in " ".join(capsys.readouterr().out.split())
+    manual = Path(__file__).parents[2] / "grammar" / "manual.md"
+    assert f"{said} the steps of one" in manual.read_text(encoding="utf-8")
