@@ -1,6 +1,6 @@
 """Whether an obligation holds: by spans, by trying every case, or by a solver that is asked in SMT-LIB.
 
-In: hypotheses and an obligation. Out: shown and how, false with a case that shows it, or open. What is settled here without a
+In: hypotheses and an obligation. Out: shown, false with a case that shows it, or open. What is settled here without a
 solver needs none of the prover's arithmetic: spans (`known`), and all values of the few variables it speaks of, where these are few.
 Cases are tried with numpy: whole numbers of 64 bits where every span fits, else Python's.
 """
@@ -46,8 +46,6 @@ Cases: TypeAlias = Mapping[Term, Any]
 class Shown:
     """It holds."""
 
-    by: str
-
 
 @dataclass(frozen=True, slots=True)
 class Fails:
@@ -83,17 +81,17 @@ class Settler:
         by_spans = known.impossible or known.span(good) == (1, 1)
         self.work += known.work - before
         if by_spans:
-            return Shown("spans")
+            return Shown()
         bad = self.terms.every((path, self.terms.negation(good)))
         if bad is self.terms.false:
-            return Shown("spans")
+            return Shown()
         tried = self._every_case(hypotheses, bad, known) or self._some_cases(hypotheses, bad)
         if tried is not None:
             return tried
         question = script([*hypotheses, bad])
         answer = Answer.UNKNOWN if self.ask is None else self.ask(question)
         if answer is Answer.NONE:
-            return Shown("solver")
+            return Shown()
         return Fails(()) if answer is Answer.SOME else Left(question)
 
     def _every_case(self, hypotheses: Sequence[Term], bad: Term, known: Known) -> Outcome | None:
@@ -113,7 +111,7 @@ class Settler:
             if found is None:
                 return None
             if not len(found):
-                return Shown("cases")  # the obligation cannot fail, or the hypotheses cannot hold
+                return Shown()  # the obligation cannot fail, or the hypotheses cannot hold
             case |= dict(_row(cases, int(found[0])))
             rest = [one for one in rest if one not in together]
             if not rest:

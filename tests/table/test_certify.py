@@ -802,7 +802,7 @@ BODIES = [
     "b := b implies i in {0, 2} n := min(j, 2) k[0] := max(i, 0)", "n := abs(i) + -i",
     "local m : int -3 .. 3 := -i n := m", "b := k[j] = 0 and b", "for q in 0 .. 2 { if k[q] < j { k[q] := q n := q } }",
     "if i > 0 { if b { n := 1 } else { n := i - 1 } } else { n := 2 }", "for q in 0 .. 3 { if q < i { n := k[q] } }",
-    "n := i", "for q in 2 .. 3 { n := q }",
+    "n := i", "local m : int 0 .. 3 := j case m { 0 { n := 1 } 1, 2 { n := 2 } 3 { k[m - 1] := 0 } }", "for q in 2 .. 3 { n := q }",
 ]  # fmt: skip
 
 

@@ -196,7 +196,14 @@ def test_an_assumption_that_contradicts_an_invariant_is_found_where_the_table_re
 
 @pytest.mark.parametrize(("one", "wrong"), [("a < 10", []), ("a < 9", ["RCS406"]), ("a * a <= 81", [])])
 def test_an_assumption_that_claims_to_be_proved_is(one: str, wrong: list[str]) -> None:
-    assert codes(proved(ASSUMING.format(standing="proved", one=one, two="a >= 0")).findings) == wrong
+    found = proved(ASSUMING.format(standing="proved", one=one, two="a >= 0")).findings
+    assert codes(found) == wrong
+    assert all(
+        dict(zip(at.variables, at.values, strict=True)) == {"a": "9"}
+        for each in found
+        for at in each.witnesses
+    )
+    assert all((each.notes, at.table) == ((), "") for each in found for at in each.witnesses)
 
 
 def test_a_monitor_is_defined_for_every_input() -> None:
