@@ -92,9 +92,8 @@ class Start:
         self.types = {str(v.name): v.type for v in program.variables}
         self.leaves = {name: self.terms.variable(name, kind) for name, kind in self.types.items()}
         self.procedures = {str(one.name): one for one in program.procedures}
-        self._conditions: dict[
-            int, tuple[Expr, Term]
-        ] = {}  # an expression is kept, so that its identity is not used again
+        # by identity; the expression is kept, so that its identity is not used again
+        self._conditions: dict[int, tuple[Expr, Term]] = {}
 
     def condition(self, expr: Expr) -> Term:
         """A condition of the program before a run; what evaluating it owes is owed elsewhere."""

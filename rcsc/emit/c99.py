@@ -223,28 +223,28 @@ class _Maker:
                 yield Field(f"{c_type(variables[later].type)} {self.names.paths[later]}", doc)
 
     def declared(self) -> Iterator[tuple[str, tuple[str, ...]]]:
-        """Each function of the user's, and the types of its parameters."""
-        for text in self._externs():
-            head, _, rest = text.partition("(")
-            words = [one.strip() for one in rest.rstrip(");").split(",")]
-            types = tuple(one.rpartition(" ")[0] + "*" * one.count("*") for one in words)
-            yield head.rpartition(" ")[2], types
-
-    def _externs(self) -> Iterator[str]:
-        kinds = {v.name: v.type for v in self.program.variables}
-        seen: set[str] = set()
+        """Each function of the user's, and the types of its parameters; a pointer's ends in a star."""
         for one in self.program.procedures:
             if one.extern is not None:
-                word = Scope().fresh
-                ins = [f"{c_type(kinds[name])} {word(parameter_word(name))}" for name in one.reads]
-                ins += [f"{wide_type(p.type)} {word(parameter_word(p.name))}" for p in one.params]
-                outs = [
-                    f"{c_type(kinds[name])} *{word(f'{parameter_word(name)}_out')}" for name in one.writes
-                ]
-                said = f"extern void {one.extern.c}({', '.join([*ins, *outs]) or 'void'});"
-                if said not in seen:
-                    yield said
-                seen.add(said)
+                yield one.extern.c, tuple(kind.replace(" ", "") for kind, _ in self._parameters(one))
+
+    def _externs(self) -> Iterator[str]:
+        declared = (
+            f"extern void {one.extern.c}({', '.join(map(''.join, self._parameters(one))) or 'void'});"
+            for one in self.program.procedures
+            if one.extern is not None
+        )
+        yield from dict.fromkeys(declared)
+
+    def _parameters(self, extern: Procedure) -> Iterator[tuple[str, str]]:
+        """Types, up to the name, and names."""
+        kinds = {v.name: v.type for v in self.program.variables}
+        word = Scope().fresh
+        yield from ((f"{c_type(kinds[name])} ", word(parameter_word(name))) for name in extern.reads)
+        yield from ((f"{wide_type(one.type)} ", word(parameter_word(one.name))) for one in extern.params)
+        yield from (
+            (f"{c_type(kinds[name])} *", word(f"{parameter_word(name)}_out")) for name in extern.writes
+        )
 
     # --- helpers ---
 

@@ -204,17 +204,23 @@ def _remove_unlocked(path: Path) -> None:
         os.close(opened)
 
 
-@contextlib.contextmanager
-def scratch(kind: str) -> Iterator[Path]:
-    """A temporary folder for work of this kind; it is gone after any end of this process."""
+def _scratch(kind: str) -> tuple[Path, int]:
+    """A temporary folder that goes when this process ends, and its lock."""
     prefix, parent = f"rcsc-{kind}-", Path(tempfile.gettempdir())
     sweep(parent, prefix)
     held = None
     while held is None:
         path = Path(tempfile.mkdtemp(prefix=prefix))
         held = lock(path)
+    hold(path)
+    return path, held
+
+
+@contextlib.contextmanager
+def scratch(kind: str) -> Iterator[Path]:
+    """A temporary folder for work of this kind; it is gone after any end of this process."""
+    path, held = _scratch(kind)
     try:
-        hold(path)
         yield path
     finally:
         shutil.rmtree(path, ignore_errors=True)
@@ -224,18 +230,14 @@ def scratch(kind: str) -> Iterator[Path]:
 
 # --- programs ---
 
-_folders: dict[int, tuple[Path, int | None]] = {}
+_folders: dict[int, tuple[Path, int]] = {}
 """Of this process, by its number: where the programs that it runs put what is temporary, and its lock."""
 
 
 def _programs_folder() -> Path:
     """The folder for what programs leave when they are killed; the keeper removes it when this process ends."""
     if os.getpid() not in _folders:
-        prefix, parent = "rcsc-programs-", Path(tempfile.gettempdir())
-        sweep(parent, prefix)
-        path = Path(tempfile.mkdtemp(prefix=prefix))
-        hold(path)
-        _folders[os.getpid()] = path, lock(path)
+        _folders[os.getpid()] = _scratch("programs")
     return _folders[os.getpid()][0]
 
 

@@ -91,6 +91,9 @@ class ExternError(Exception):
     """An extern procedure gave a value outside its declared range, for the leaf named."""
 
 
+UNDEFINED = (ArithmeticError, IndexError, ValueError)
+"""What is raised where an operation is not defined: a divisor that is zero, an index outside its array, a real without a whole number."""
+
 Answers: TypeAlias = Callable[[Procedure, list[Value]], tuple[Value, ...]]
 """What stands in for extern procedures: takes one with its reads and arguments, and gives its writes in order."""
 _ANSWERS: ContextVar[Answers | None] = ContextVar("answers", default=None)

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label, Severity
-from rcsc.lang.interpret import holds, initial
+from rcsc.lang.interpret import UNDEFINED, holds, initial
 from rcsc.lang.leaves import read_by
 from rcsc.lang.model import (
     Assumption,
@@ -60,7 +60,7 @@ def _holds(condition: Expr, snapshot: Snapshot) -> bool | None:
     """None where it is not defined, which is a finding of its own."""
     try:
         return holds(condition, snapshot)
-    except (ArithmeticError, IndexError, ValueError):
+    except UNDEFINED:
         return None
 
 

@@ -120,9 +120,8 @@ class Obligations:
     stops: dict[str, tuple[AssumptionName, ...]] = field(default_factory=dict)
     _causes: dict[tuple[Code, Span, str], Cause] = field(default_factory=dict)
     _start: dict[str, Node] = field(default_factory=dict)
-    _clean: dict[str, bool] = field(
-        default_factory=dict
-    )  # procedures that owe nothing; one that is not looked at may
+    # whether a procedure owes nothing; one that is not looked at may owe
+    _clean: dict[str, bool] = field(default_factory=dict)
     _too_long: list[Diagnostic] = field(default_factory=list)
     _asker: Asker = field(init=False)
     _procedures: dict[str, Procedure] = field(init=False)

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 from rcsc.diagnostics.codes import Code
 from rcsc.lang.interpret import (
+    UNDEFINED,
     ExternError,
     admit,
     call,
@@ -45,7 +46,6 @@ from rcsc.shell.typed_names import found, near
 STEPS = ("preprocess", "state_table", "postprocess")
 """Of a cycle; run one after the other they are one."""
 _CALL = re.compile(r"(?P<name>[\w.\-]+)\s*(?:\((?P<inside>.*)\)|(?P<after>[^()]*))$")
-UNDEFINED = (ArithmeticError, IndexError, KeyError, ValueError)  # the last is of a NaN without a whole number
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,7 +112,7 @@ def run_part(running: RunningLevel, program: Program, name: str, args: Sequence[
         raise Refused(
             Code.SHELL_PART, f"an extern procedure in `{meant}` gave no value for `{error}`"
         ) from error
-    except UNDEFINED as error:
+    except (*UNDEFINED, KeyError) as error:
         raise Refused(
             Code.SHELL_PART,
             f"`{meant}` divides by zero, leaves an array or takes the whole number of a NaN: nothing was changed",

@@ -4,7 +4,7 @@ In: a table without relational tests. Out: every overlapping pair, the dead line
 line matches, with least witnesses and maximal regions. No solver.
 
 Masks are Python integers, one bit a line. A variable's keys are cut where some line's box begins or ends;
-all keys of a class are alike. Source: `notes/performance.md`, A.3.
+all keys of a class are alike.
 """
 
 from bisect import bisect_left, bisect_right

@@ -1,6 +1,6 @@
 """Z3 asked what masks, counting and region trees have answered; two queries a table.
 
-In: a table and what was found. Out: whether Z3 agrees. Source: `notes/formal.md`, 1.2.
+In: a table and what was found. Out: whether Z3 agrees.
 """
 
 from collections.abc import Sequence

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
-from rcsc.lang.interpret import holds, matching_lines
+from rcsc.lang.interpret import UNDEFINED, holds, matching_lines
 from rcsc.lang.model import (
     AssumptionName,
     Expr,
@@ -104,7 +104,7 @@ class _Decision:
 
     @property
     def tried(self) -> tuple[Snapshot, ...]:
-        """Inputs that the assumptions allow, tried before Z3 is asked: for it doubles are slow. None where there are none."""
+        """Inputs that the assumptions allow, tried before Z3 is asked: for it doubles are slow; none in a table without them."""
         if self._tried is None:
             few = len(self.table.lines) <= _MOST_LINES_TRIED
             reals = few and any(isinstance(v.type, Real) for v in self.variables)
@@ -119,7 +119,7 @@ class _Decision:
             return False
         try:
             self.matching(snapshot)
-        except (ArithmeticError, IndexError, ValueError):
+        except UNDEFINED:
             return False
         return True
 
@@ -357,5 +357,5 @@ def _holds(condition: Expr, snapshot: Snapshot) -> bool:
     """Whether a condition is defined and true."""
     try:
         return holds(condition, snapshot)
-    except (ArithmeticError, IndexError, ValueError):
+    except UNDEFINED:
         return False

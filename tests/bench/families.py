@@ -1,7 +1,7 @@
 """Tables by seed, right by construction, as source text; each also with one overlap or one gap planted.
 
 `box`: random recursive cuts of the input space over bools, enumerations and integer ranges. `linear`: recursive cuts by
-planes `a*x + b*y <= c` over integers, atoms respelt. Source: `notes/performance.md`, A.
+planes `a*x + b*y <= c` over integers, atoms respelt.
 """
 
 import random

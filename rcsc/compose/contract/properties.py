@@ -13,7 +13,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 
 from rcsc.compose.contract.predicates import Predicate, cone, listed, predicates
 from rcsc.compose.contract.transition import Cycle, Leaves, TransitionSystem
-from rcsc.lang.interpret import holds
+from rcsc.lang.interpret import UNDEFINED, holds
 from rcsc.lang.leaves import read_by
 from rcsc.lang.meaning import spelled
 from rcsc.lang.model import (
@@ -107,7 +107,7 @@ def _held(condition: Expr, state: Mapping[str, Value], kinds: Mapping[str, Scala
     try:
         if not holds(condition, state):
             return False
-    except (ArithmeticError, IndexError, ValueError):
+    except UNDEFINED:
         return False
     leaves = {str(name): values.constant(kinds[name], state[name]) for name in read_by(condition)}
     return bool(_true(condition, leaves).low)

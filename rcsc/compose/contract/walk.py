@@ -11,7 +11,7 @@ from random import Random
 from rcsc.compose.contract.environment import COMMAND, ECHO, ECHOED, NUMBER, STATUS, Links
 from rcsc.compose.contract.given import at_random
 from rcsc.compose.contract.transition import EARLY, GHOST, NUMBERS
-from rcsc.lang.interpret import Fault, cycle, evaluate, initial
+from rcsc.lang.interpret import UNDEFINED, Fault, cycle, evaluate, initial
 from rcsc.lang.model import Enum, Level, OneTable, Program, Scalar, Value, key_bounds, value_of_key
 
 
@@ -55,8 +55,8 @@ class Walk:
             try:
                 with at_random(self.program, self.random):
                     outcome = cycle(self.program, self.level, self.now)
-            except (ArithmeticError, IndexError, ValueError):
-                return  # an operation that is not defined
+            except UNDEFINED:
+                return
             if outcome.fault not in {Fault.OK, *EARLY}:
                 return
             self.now = outcome.snapshot

@@ -208,9 +208,9 @@ class _Rerun:
     def run(self, explanation: Explanation) -> Explanation:
         """With the log of its run, and what would mend the table."""
         finding = explanation.finding
-        if (
-            finding is None or explanation.obligation.sort is Sort.SAFE
-        ):  # what is not safe no executor is to run
+        if finding is None:
+            return explanation
+        if explanation.obligation.sort is Sort.SAFE:  # what is not safe no executor is to run
             return explanation
         system = replace(self.settings.system, generated=self.folder / "generated")
         programs = {name: self.made[name].program for name in finding.levels if name not in self._ready}

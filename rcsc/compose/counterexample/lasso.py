@@ -22,7 +22,7 @@ from rcsc.compose.counterexample.trace import (
     ran_on,
 )
 from rcsc.compose.proof.termination import answered, command_stays, unanswered
-from rcsc.lang.interpret import Fault
+from rcsc.lang.interpret import UNDEFINED, Fault
 from rcsc.solvers.sat import GaveUpError
 from rcsc.symbolic import values
 from rcsc.symbolic.values import Node
@@ -104,7 +104,7 @@ def _told(ts: TransitionSystem, table: str, run: Unrolled, wrong: Node) -> Lasso
     try:
         steps = ran_on(ts, start, given)
         first = lasso_of(ts, table, steps)
-    except (ArithmeticError, IndexError, ValueError):  # an operation that is not defined
+    except UNDEFINED:
         return NotReproducedError(shown, guessed=True)
     if first is None:
         return NotReproducedError(shown, guessed=run.guessed)

@@ -19,6 +19,7 @@ from rcsc.compose.contract.properties import invariant_kept, property_kept
 from rcsc.compose.contract.transition import EARLY, GHOST, Cycle, Leaves, TransitionSystem, successor
 from rcsc.compose.counterexample.simplest import Bounded, Simplest, constant_of
 from rcsc.lang.interpret import (
+    UNDEFINED,
     ExternError,
     Fault,
     Outcome,
@@ -247,7 +248,7 @@ class Unrolled:
         start, given = self._settled(settled)
         try:
             trace = _ran(self.ts, obligation, given, start, self.search)
-        except (ArithmeticError, IndexError, ValueError):  # an operation that is not defined: `SAFE` says so
+        except UNDEFINED:  # `SAFE` says so
             return NotReproducedError(obligation.shown, guessed=True)
         if _breaks(self.ts, obligation, trace, len(given)):
             return trace

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from rcsc.diff.changes.difference import Change, Sort, Value, Where
 from rcsc.diff.changes.spell import number, said
 from rcsc.diff.changes.versions import MOST_BOXES, MOST_BOXES_ACROSS, Doing, Hit, Versions, is_across, is_hard
-from rcsc.lang.interpret import ExternError
+from rcsc.lang.interpret import UNDEFINED, ExternError
 from rcsc.lang.model import Program
 from rcsc.lang.model import Value as Scalars
 from rcsc.symbolic import values
@@ -136,7 +136,7 @@ def _ended(
     now = versions.snapshot(program, point)
     try:
         doing.run(program, now)
-    except (ArithmeticError, IndexError, ValueError, KeyError, ExternError):
+    except (*UNDEFINED, KeyError, ExternError):
         return None
     return now
 

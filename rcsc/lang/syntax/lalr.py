@@ -10,8 +10,6 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-SKIPPED = r"(?:[ \t\f\r\n]+|#[^\r\n]*)*+"
-"""What may stand before any word; the grammar's ignored terminals."""
 END = "$END"
 
 
@@ -85,7 +83,9 @@ class Tables:
         self._terminals = sorted(parser.terminals, key=_rank)
         self._words: dict[frozenset[str], _Words] = {}
         self._words_of: dict[int, _Words] = {}
-        self._skip = re.compile(SKIPPED).match
+        ignored = (one.pattern.to_regexp() for one in parser.terminals if one.name in parser.ignore_tokens)
+        self._skipped = f"(?:{'|'.join(ignored)})*+"
+        self._skip = re.compile(self._skipped).match
 
     def parse(self, text: str, start: str) -> Node | None:
         """The tree of a text by a start rule; None where it has none."""
@@ -126,7 +126,7 @@ class Tables:
         """What may stand next in a state; the same for all states that take the same terminals."""
         taken = frozenset(self._states[state])
         if taken not in self._words:
-            self._words[taken] = _words([one for one in self._terminals if one.name in taken])
+            self._words[taken] = _words(self._skipped, [one for one in self._terminals if one.name in taken])
         return self._words_of.setdefault(state, self._words[taken])
 
 
@@ -136,8 +136,8 @@ def _rank(terminal: Any) -> tuple[int, int, int, str]:
     return -terminal.priority, -pattern.max_width, -len(pattern.value), terminal.name
 
 
-def _words(terminals: Sequence[Any]) -> _Words:
-    """One expression for these terminals; a word that another of the same priority matches whole is told by its text."""
+def _words(skipped: str, terminals: Sequence[Any]) -> _Words:
+    """One expression for what is skipped and one of these terminals; a word that another of its priority matches is told by its text."""
     special: dict[str, dict[str, str]] = {}
     for wide in (one for one in terminals if one.pattern.type == "re"):
         whole = re.compile(wide.pattern.to_regexp()).fullmatch
@@ -147,7 +147,7 @@ def _words(terminals: Sequence[Any]) -> _Words:
             special[wide.name] = found
     inside = {name for found in special.values() for name in found.values()}
     parts = (f"(?P<{one.name}>{one.pattern.to_regexp()})" for one in terminals if one.name not in inside)
-    return _Words(re.compile(f"{SKIPPED}(?:{'|'.join(parts) or '(?!)'})").match, special)
+    return _Words(re.compile(f"{skipped}(?:{'|'.join(parts) or '(?!)'})").match, special)
 
 
 def _reduction(rule: Any) -> _Reduction:

@@ -2,8 +2,6 @@
 
 In: one box a form for each line, and the region's extent of each form. Out: nothing, or a part
 of the region where it is not so.
-
-Source: `notes/performance.md`, A.3 point 1.
 """
 
 from collections.abc import Mapping, Sequence

@@ -7,7 +7,7 @@ rational point is in it, its lines are boxes that can be counted, or one line ho
 Linear arithmetic is asked only where no line or several are left, or where a split leaves a
 line on both sides; a solver only where a term is not linear or rounding to integers does not end.
 
-Source: `notes/performance.md`, A.3; `linear` for what is empty, `boxleaf` for counting.
+`linear` says what is empty, `boxleaf` counts.
 """
 
 from bisect import bisect_right

@@ -22,7 +22,7 @@ from rcsc_cell.database.pose import Pose, Rotation, Vector, apply, cross, dot, m
 from rcsc_cell.vision.flood import Features, Found
 from rcsc_cell.vision.formulas import Top, perceive, perceive_surface
 from rcsc_cell.vision.line import Surface
-from rcsc_cell.vision.optics import CLEAR, NOISY, Optics
+from rcsc_cell.vision.optics import NOISY, STANDARD, Optics
 
 JAW_MM_S = 100.0
 PAD_WIDTH_MM = 24.0
@@ -259,7 +259,7 @@ class Kinematic:
         return None if below is None else perceive_surface(below, self._rng, self._optics())
 
     def _optics(self) -> Optics:
-        return NOISY if self.faults.noisy else CLEAR
+        return NOISY if self.faults.noisy else STANDARD
 
     def _tops(self) -> tuple[Top, ...]:
         """The upper faces of all parts in camera axes: x to the right is the plate's y, y up its x, and z back along the tool."""

@@ -22,7 +22,7 @@ from rcsc_cell.database.pose import Pose, Rotation, Vector
 from rcsc_cell.vision.camera import Camera
 from rcsc_cell.vision.flood import Features, Found, find
 from rcsc_cell.vision.line import Surface, measure
-from rcsc_cell.vision.optics import CLEAR, NOISY, Optics
+from rcsc_cell.vision.optics import NOISY, STANDARD, Optics
 
 STATE = mujoco.mjtState.mjSTATE_INTEGRATION
 SLIPPERY = 0.002
@@ -216,7 +216,7 @@ class Physical:
         return measure(camera.lines(self.data, self._rng), expected_mm, optics)
 
     def _camera(self) -> tuple[Camera, Optics]:
-        optics = NOISY if self.faults.noisy else CLEAR
+        optics = NOISY if self.faults.noisy else STANDARD
         if optics not in self._cameras:
             self._cameras[optics] = Camera(self.model, optics)
-        return self._cameras[optics], CLEAR
+        return self._cameras[optics], STANDARD

@@ -79,8 +79,10 @@ STANDARD = Optics()
 """The sensor of the cell."""
 
 
-CLEAR = Optics()
-NOISY = replace(CLEAR, noise=5 * CLEAR.noise, peak_px=5 * CLEAR.peak_px, aim_rad=5 * CLEAR.aim_rad)
+NOISY = replace(
+    STANDARD, noise=5 * STANDARD.noise, peak_px=5 * STANDARD.peak_px, aim_rad=5 * STANDARD.aim_rad
+)
+"""The same where the fault `noisy` is injected."""
 
 
 @dataclass(frozen=True, slots=True)
