@@ -783,6 +783,18 @@ def test_what_is_not_safe_within_a_cycle_is_shown_by_a_run_that_no_executor_does
         assert not case_breaks(read_case(case))
 
 
+def test_what_a_line_breaks_and_the_postprocess_mends_is_shown_by_its_run(tmp_path: Path) -> None:
+    """The table saw nothing wrong, and nothing is wrong after the cycle."""
+    text = within("0").replace("procedure use", "procedure away { at := 9 }\nprocedure use")
+    made = transition_systems(
+        solo(tmp_path, text.replace("| false ||            |", "| false || away       |"))
+    )
+    [safe] = [one for one in prove_level(made["solo"], LITTLE).open if one.key == SAFE]
+    trace = shortest(made["solo"], safe, 3)
+    assert trace is not None
+    assert [step.line for step in trace.steps] == ["no"]
+
+
 def test_a_fault_of_one_level_shows_in_the_verdicts_of_its_neighbours(tmp_path: Path) -> None:
     """Behind it nobody knows what the level orders."""
     path = changed(

@@ -501,7 +501,7 @@ def _broken_between(ts: TransitionSystem, obligation: Obligation, step: Step) ->
 
 
 def as_cycle(ts: TransitionSystem, step: Step) -> Cycle:
-    """A cycle as it ran, all its nodes constants; what stands within it, which no run is shown to break, as the table saw it."""
+    """A cycle as it ran, all its nodes constants."""
     before, after = _constants(ts, step.before), _constants(ts, step.after)
     taken = {name: after[name] for name in step.taken}
     half = halfway(ts, step)
@@ -516,8 +516,8 @@ def as_cycle(ts: TransitionSystem, step: Step) -> Cycle:
         values.truth(step.fault in EARLY),
         values.truth(not half.matched),
         values.truth(not half.acted),
-        settled=middle,
-        acted=middle,
+        settled=_constants(ts, half.settled),
+        acted=_constants(ts, half.done),
     )
 
 
