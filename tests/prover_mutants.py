@@ -161,6 +161,8 @@ class Campaign:
 
     def pytest_runtestloop(self, session: pytest.Session) -> bool:
         """Learns what the tests cost and reach, then runs the mutants."""
+        # What the forks would print of each test, and "no tests ran", is not said of this repository's tests.
+        session.config.pluginmanager.unregister(name="terminalreporter")
         compile_text("input a : bool\n", "warm.rcs")  # makes the parser
         gc.freeze()
         mutants, begun = self.draw(), _spent()
