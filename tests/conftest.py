@@ -6,12 +6,17 @@ new ones and for longer: `HYPOTHESIS_PROFILE=long pytest`.
 
 import os
 import shutil
+import signal
 from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
 
 from rcsc.commands import run
+
+# A shell's `&` begins a command with SIGINT ignored, which all its children inherit; tests send it to them.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 settings.register_profile(
     "ci", derandomize=True, deadline=None, print_blob=True, suppress_health_check=[HealthCheck.too_slow]
