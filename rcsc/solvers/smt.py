@@ -4,6 +4,7 @@ In: terms built by the functions here. Out: `Answer`s. A time-out, exhausted mem
 `unknown` are all `UNKNOWN`: nobody can take them for a proof.
 """
 
+import signal
 import struct
 import sys
 import time
@@ -326,6 +327,7 @@ class Solver:
             counted = self._count()
             used_s, passed_s = time.thread_time(), time.monotonic()
             answer = self._solver.check(*assuming)
+            signal.siginterrupt(signal.SIGINT, True)  # Z3 leaves it so that Ctrl-C ends no wait for a worker
             if answer != z3.unknown:
                 self._charge(counted)
                 return answer, ""

@@ -23,6 +23,7 @@ import pytest
 from rcsc import commands
 from rcsc.host import children
 from rcsc.run.processes.block import FOLDER
+from rcsc.solvers import smt
 
 IN_PROCESS = {
     "Z3": """
@@ -261,6 +262,31 @@ def test_a_lock_on_what_is_gone_is_none(tmp_path: Path, monkeypatch: pytest.Monk
     os.close(sweeping)
     waiter.join()
     assert found == [None]
+
+
+def test_ctrl_c_ends_a_wait_after_a_question() -> None:
+    """Z3 takes Ctrl-C for itself while it is asked, and gives it back changed."""
+    solver = smt.Solver()
+    solver.add(smt.truth(True))
+    assert solver.check() is smt.Answer.SATISFIABLE
+    waiting, heeded, late = threading.Lock(), threading.Event(), list[bool]()
+    waiting.acquire()
+
+    def interrupt() -> None:
+        ended = threading.main_thread().ident
+        assert ended is not None
+        time.sleep(0.2)  # until it waits; sent before, it would come in any case
+        signal.pthread_kill(ended, signal.SIGINT)
+        late.append(not heeded.wait(20))
+        waiting.release()
+
+    thread = threading.Thread(target=interrupt)
+    with pytest.raises(KeyboardInterrupt):  # noqa: PT012  # it comes while it waits
+        thread.start()
+        waiting.acquire()
+    heeded.set()
+    thread.join()
+    assert late == [False]
 
 
 # --- programs ---
