@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from rcsc.commands.shared.extras import need
 from rcsc.commands.shared.options import cores
 from rcsc.commands.shared.show import Progress, UnwritableError
 from rcsc.commands.shared.systems import SYSTEM, Stopped, compiled, stop, system_path
@@ -75,6 +76,7 @@ def campaign(  # noqa: PLR0913, PLR0917  # as many as there are options
     """
     if scheduler is not None and workers is not None:
         raise click.UsageError("--workers are processes here; with --scheduler the cluster's are taken")
+    need("cell")
     with _coded():
         rig = _rig(system_path(system), backend, executor, limit_s)
         if compiles and not compiled(rig.system, quiet=True):
@@ -90,7 +92,6 @@ def _coded() -> Iterator[None]:
     """What can go wrong with a campaign, as coded errors."""
     from rcsc.run.description import BadDescription
     from rcsc.run.executors import NotBuilt
-    from rcsc.run.log.export import MissingPackage
     from rcsc_cell.campaign.counterexamples import BadEpisode
     from rcsc_cell.campaign.journal import BadJournal
     from rcsc_cell.campaign.work import OtherTables
@@ -106,9 +107,6 @@ def _coded() -> Iterator[None]:
     except (WorkersGone, OtherTables) as error:
         said = "what is done is kept: the same command goes on from there"
         raise Stopped(Code.WORKERS_GONE, str(error), said) from error
-    except MissingPackage as error:
-        said = f"pip install 'rcsc[{error.extra}]'"
-        raise Stopped(Code.EXTRA_MISSING, f"`{error.package}` is not installed", said) from error
     except (BadDescription, BadData, NotBuilt) as error:
         stop(error)
 

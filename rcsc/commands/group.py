@@ -1,6 +1,5 @@
 """The commands: each turns arguments into a call of the driver, shows the report, gives the exit status."""
 
-import importlib.util
 import shlex
 import sys
 from pathlib import Path
@@ -16,6 +15,7 @@ from rcsc.commands.logs import log, replay
 from rcsc.commands.promela import promela
 from rcsc.commands.prove import prove
 from rcsc.commands.script import run
+from rcsc.commands.shared.extras import Commands, need
 from rcsc.commands.shared.options import PATHS, proving, showing
 from rcsc.commands.shared.show import Output, Progress, show
 from rcsc.commands.shared.systems import db
@@ -38,7 +38,7 @@ Examples:
 Exit status: 0 proved, 1 findings, 2 usage, 3 a bug in rcsc."""
 
 
-@click.group("rcsc", epilog=_EPILOG, context_settings={"help_option_names": ["-h", "--help"]})
+@click.group("rcsc", cls=Commands, epilog=_EPILOG, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, "-V", "--version", message="rcsc %(version)s")
 def commands() -> None:
     """Prove robot-control state tables, and compile the proved ones to Python and C.
@@ -262,8 +262,8 @@ def certify(
             prove, system=Path(source), confirms=True, strict=strict, no_cache=not use_cache
         )
         return found
-    if cvc5 and importlib.util.find_spec("cvc5") is None:
-        raise click.UsageError("--certify needs the extra `certify`: pip install 'rcsc[certify]'")
+    if cvc5:
+        need("certify")
     how = Checking(cvc5=cvc5, strict=strict, questions=questions)
     made = driver.certify(_settings(options, use_cache, output, (source,)), how, write, against)
     return _finish(made.report, "certify", output, made.closing)

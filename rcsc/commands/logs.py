@@ -31,7 +31,6 @@ def _told(command: Callable[..., int]) -> Callable[..., int]:
         from rcsc.run.description import BadDescription
         from rcsc.run.executors import NotBuilt
         from rcsc.run.levels import BadState
-        from rcsc.run.log.export import MissingPackage
         from rcsc.run.log.queries import BadExpression
         from rcsc.run.log.read import UnreadableLog
 
@@ -39,11 +38,6 @@ def _told(command: Callable[..., int]) -> Callable[..., int]:
             return command(file=file, **kwargs)
         except UnreadableLog as error:
             return _refuse(file, Code.LOG_UNREADABLE, str(error))
-        except MissingPackage as error:
-            return _refuse(
-                file, Code.EXTRA_MISSING, f"`{error.package}` is not installed",
-                help_=f"pip install 'rcsc[{error.extra}]'",
-            )  # fmt: skip
         except (BadDescription, NotBuilt, BadState) as error:
             return _refuse(file, Code.NOT_REPLAYED, f"the log cannot be replayed: {error}")
         except BadExpression as error:
@@ -75,7 +69,7 @@ Examples:
     "--json", "json_", type=_TO, default=None, metavar="OUT", help="Write every cycle to OUT as JSON."
 )
 @click.option("--parquet", type=_TO, default=None, metavar="OUT",
-              help="Write a row a tick to OUT as Parquet; needs the extra `log`.")  # fmt: skip
+              help="Write a row a tick to OUT as Parquet; needs the extra `parquet`.")  # fmt: skip
 @click.option("--plot", default=None, metavar="VAR[,VAR...]",
               help="Draw these, `level.leaf`, over time; needs -o and the extra `plot`.")  # fmt: skip
 @click.option("--against", default=None, metavar="VAR", help="Draw them over VAR instead.")

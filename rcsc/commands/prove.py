@@ -1,6 +1,5 @@
 """`rcsc prove`: the levels of a system proved together."""
 
-import importlib.util
 import io
 import json
 import os
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from rcsc.commands.shared.extras import need
 from rcsc.commands.shared.options import steps_option
 from rcsc.commands.shared.show import Progress, UnwritableError
 from rcsc.commands.shared.systems import Stopped, stop, system_path
@@ -97,8 +97,8 @@ def prove(  # noqa: PLR0913, PLR0917  # as many as there are options
     from rcsc.run.description import BadDescription
     from rcsc.solvers.smt import Limits
 
-    if confirms and importlib.util.find_spec("cvc5") is None:
-        raise click.UsageError("--certify needs the extra `certify`: pip install 'rcsc[certify]'")
+    for extra in (*(["certify"] if confirms else []), *(["log"] if logs else [])):
+        need(extra)
     if cases:
         return _again(cases)
     path = system_path(system)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
+from rcsc.commands.shared.extras import need
 from rcsc.commands.shared.systems import DATABASE, EXECUTOR, SYSTEM, Stopped, compiled, stop, system_path
 
 if TYPE_CHECKING:
@@ -93,6 +94,9 @@ def run(  # noqa: PLR0913, PLR0917  # as many as there are options
         raise click.UsageError(
             "--resume, --live and --report are of one process; with --processes, use --from-row"
         )
+    need("cell")
+    if live:
+        need("live")
     path = system_path(system)
     if compiles and not compiled(path, quiet):
         return 1
@@ -224,12 +228,9 @@ def _followed(witness: "Witness", asked: Asked) -> Iterator[None]:
 
 
 def _page(witness: "Witness", asked: Asked) -> "Live":
-    try:
-        from rcsc_cell.live import Live
-    except ImportError as error:
-        raise click.UsageError("--live needs the extra `live`: pip install 'rcsc[live]'") from error
     from rcsc.run.description import BadDescription
     from rcsc_cell.episodes.witness import names
+    from rcsc_cell.live import Live
 
     system = witness.run.system
     try:

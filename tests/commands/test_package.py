@@ -1,14 +1,22 @@
 """The package: the wheel is whole and works where no checkout is; README and CI say the same."""
 
+import json
 import os
 import re
 import subprocess
 import sys
 import tomllib
 import zipfile
+from importlib.metadata import packages_distributions
+from itertools import chain
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
+
+from rcsc.commands import run
+from rcsc.commands.group import commands
+from rcsc.commands.shared.extras import EXTRAS
 
 REPO = Path(__file__).parents[2]
 README = (REPO / "README.md").read_text(encoding="utf-8")
@@ -94,11 +102,124 @@ def test_ci_takes_the_test_command_from_the_readme() -> None:
     assert shown.stdout == command("test-command")
 
 
+PROJECT = tomllib.loads((REPO / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+FIXED = {"z3-solver", "lark", "mujoco-core", "numpy", "hypothesis", "jinja2"}
+
+
 def test_every_dependency_has_a_tested_range() -> None:
-    project = tomllib.loads((REPO / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    for requirement in project["dependencies"]:
+    extras = PROJECT["optional-dependencies"]
+    for requirement in (*PROJECT["dependencies"], *chain(*extras.values())):
+        if requirement.startswith("rcsc["):
+            continue
         # python-sat has never had but releases named so
-        assert re.fullmatch(r"[a-z0-9-]+>=[\d.]+(dev\d+)?,<\d+", requirement), requirement
-    assert project["requires-python"] == ">=3.11"
-    named = {re.split("[>=<]", requirement)[0] for requirement in project["dependencies"]}
-    assert {"z3-solver", "lark", "mujoco-core", "numpy", "hypothesis", "jinja2"} <= named
+        assert re.fullmatch(r"[\w-]+(>=[\d.]+(dev\d+)?(,<[\d.]+)?|==[\d.]+)", requirement), requirement
+    core = {re.split("[>=<]", requirement)[0] for requirement in PROJECT["dependencies"]}
+    assert core == {"click", "jinja2", "lark", "numpy", "python-sat", "rich", "z3-solver"}
+    named = core | {re.split("[>=<]", one)[0] for one in chain(*extras.values())}
+    assert named >= FIXED
+    assert PROJECT["requires-python"] == ">=3.11"
+
+
+def test_the_table_of_extras_is_that_of_the_project() -> None:
+    extras = PROJECT["optional-dependencies"]
+    imported = {name: wheels for name, wheels in packages_distributions().items() if not name.startswith("_")}
+
+    def brought(extra: str) -> set[str]:
+        found = set()
+        for requirement in extras[extra]:
+            name = re.split("[>=<]", requirement)[0]
+            more = re.fullmatch(r"rcsc\[(\w+)\]", name)
+            found |= brought(more[1]) if more else {one for one, wheels in imported.items() if name in wheels}
+        return found
+
+    for extra, packages in EXTRAS.items():
+        assert set(packages) <= brought(extra), extra
+        assert len(packages) == len(extras[extra]) or extra == "cell", extra
+    assert set(extras) - set(EXTRAS) == {"graph", "shell", "test"}
+
+
+WITHOUT = """
+import json, sys
+for package in {missing!r}:
+    sys.modules[package] = None
+import rcsc.commands
+statuses = [rcsc.commands.run(args) for args in {commands!r}]
+print(json.dumps([statuses, sorted(name for name in sys.modules if sys.modules[name])]))
+"""
+
+
+def without_extras(*commands: list[str], folder: Path) -> tuple[list[int], set[str], str]:
+    """Statuses of commands where only the core is installed, what they imported, and what they said of errors."""
+    missing = sorted({"hypothesis", "prompt_toolkit", *chain(*EXTRAS.values())})
+    script = WITHOUT.format(missing=missing, commands=commands)
+    ran = subprocess.run(
+        [sys.executable, "-c", script], cwd=folder, capture_output=True, text=True, check=False
+    )
+    assert ran.returncode == 0, ran.stderr
+    statuses, names = json.loads(ran.stdout.splitlines()[-1])
+    return statuses, set(names), ran.stderr
+
+
+def test_checking_compiling_and_the_hooks_import_the_core_alone_and_no_numpy(tmp_path: Path) -> None:
+    table = str(REPO / "tables" / "examples" / "approach.rcs")
+    statuses, imported, said = without_extras(
+        ["check", "--quiet", "--no-cache", table],
+        ["fmt", "--quiet", "--check", table],
+        ["compile", "--quiet", "--no-cache", table],
+        ["compile", "--quiet", "--check", table],
+        ["explain", "RCS705"],
+        folder=tmp_path,
+    )
+    assert (statuses, said) == ([0] * 5, "")
+    assert imported & {"z3", "lark", "jinja2"} == {"z3", "lark", "jinja2"}
+    assert not imported & {"numpy", "mujoco", "hypothesis", "mcap", "rcsc_cell"}
+
+
+def test_the_core_proves_levels_certifies_and_says_what_the_rest_needs(tmp_path: Path) -> None:
+    system = str(REPO / "tests" / "data" / "composed" / "system.toml")
+    later = str(REPO / "tables" / "examples" / "later" / "last_echo.toml")
+    table = str(REPO / "tables" / "examples" / "approach.rcs")
+    cell = ["--system", str(REPO / "tables" / "system.toml"), "--no-compile"]
+    (tmp_path / "any.mcap").touch()
+    statuses, imported, said = without_extras(
+        ["prove", "--no-cache", system],
+        ["prove", "--no-cache", later],  # with a finding, which executors of both kinds have to show
+        ["certify", "--no-cache", table],
+        ["prove", "--log", "found", system],
+        ["prove", "--certify", system],
+        ["certify", "--certify", table],
+        ["run", "make_boxt", *cell],
+        ["campaign", "--episodes", "1", *cell],
+        ["log", "any.mcap"],
+        ["replay", "any.mcap"],
+        folder=tmp_path,
+    )
+    assert statuses == [0, 1, 0, *[1] * 7]
+    errors = re.findall(
+        r"^error\[RCS705\]: `\w+` is not installed\n  = help: pip install 'rcsc\[(\w+)\]'$",
+        said,
+        re.MULTILINE,
+    )
+    assert errors == ["log", "certify", "certify", "cell", "cell", "log", "log"]
+    assert said.count("error[RCS705]") == len(errors)
+    assert not imported & {"mujoco", "hypothesis", "mcap"}
+
+
+def test_live_is_refused_before_anything_is_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "aiohttp", None)
+    monkeypatch.setattr("rcsc.commands.script.compiled", lambda *_: pytest.fail("it compiled"))
+    ran = CliRunner().invoke(
+        commands, ["run", "make_boxt", "--live", "--system", str(REPO / "tables/system.toml")]
+    )
+    assert (ran.exit_code, "pip install 'rcsc[live]'" in ran.output) == (1, True)
+
+
+def test_a_package_that_no_extra_brings_is_a_bug(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def broken(*_: object) -> None:
+        raise ModuleNotFoundError("No module named 'elsewhere'", name="elsewhere")
+
+    monkeypatch.setattr("rcsc.driver.check", broken)
+    assert run(["check", str(REPO / "tables" / "examples" / "approach.rcs")]) == 3
+    assert "error[RCS902]" in capsys.readouterr().err

@@ -679,8 +679,8 @@ def test_pictures(tmp_path: Path, logged: Path, monkeypatch: pytest.MonkeyPatch)
     assert across.read_bytes()[1:4] == b"PNG"
     assert run("log", logged, "--plot", "task.nothing", "-o", out).exit_code != 0
     monkeypatch.setitem(sys.modules, "matplotlib", None)
-    missing = run("log", logged, "--plot", names, "-o", out)
-    assert missing.return_value == 1
+    missing = CliRunner().invoke(commands, ["log", str(logged), "--plot", names, "-o", str(out)])
+    assert missing.exit_code == 1
     assert "RCS705" in missing.output
     assert "rcsc[plot]" in missing.output
 

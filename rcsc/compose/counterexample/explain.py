@@ -216,14 +216,13 @@ class _Rerun:
         programs = {name: self.made[name].program for name in finding.levels if name not in self._ready}
         make(programs.values(), system.generated, altered=self.settings.altered)
         self._ready |= programs.keys()
-        path = self.folder / f"{self._named(finding)}.mcap"
+        path = None if self.settings.log is None else self.folder / f"{self._named(finding)}.mcap"
         try:
             record(finding, self.made, system, path, altered=self.settings.altered)
         except ExecutorsDifferError as error:
             return replace(explanation, beside=error.beside)
-        kept = path if self.settings.log is not None else None
         in_c = not only_in_python(finding, self.made)
-        return replace(explanation, helps=helps(self.made[explanation.level], finding), log=kept, in_c=in_c)
+        return replace(explanation, helps=helps(self.made[explanation.level], finding), log=path, in_c=in_c)
 
     def _named(self, finding: Finding) -> str:
         name = file_name(finding)

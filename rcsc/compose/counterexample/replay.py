@@ -7,6 +7,7 @@ Where a program does not prove, or is looked at under another rule than the lang
 the same emitters, and every file marked (`host.files.write.UNPROVED`), which no cell runs (`run.unproved`).
 """
 
+from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -27,7 +28,6 @@ from rcsc.run.buffers import CommonMemory
 from rcsc.run.description import Description, LevelSpec, Wire
 from rcsc.run.levels import RunningLevel, running_level
 from rcsc.run.log.finding import LoggedCycle, LoggedFinding
-from rcsc.run.log.write import Recorder
 from rcsc.run.signature import Values
 from rcsc.run.system import Kind, System, executors, signatures
 from rcsc.solvers.options import Options
@@ -126,17 +126,17 @@ def record(
     finding: Finding,
     made: Mapping[str, TransitionSystem],
     system: Description,
-    path: Path,
+    path: Path | None,
     *,
     altered: bool = False,
 ) -> None:
-    """Runs a finding on the executors in `system.generated`, both kinds, and writes what they do as a log.
+    """Runs a finding on the executors in `system.generated`, both kinds, and writes what they do as a log, if it is wanted.
 
     Args:
         finding: The run.
         made: The levels in it.
         system: Their system.
-        path: Where the log goes.
+        path: Where the log goes; None for no log.
         altered: The programs are not what their tables say; the log says so.
 
     Raises:
@@ -147,11 +147,16 @@ def record(
     programs = {name: made[name].program for name in finding.levels}
     alone = part_of(system, programs)
     for kind in () if only_in_python(finding, made) else KINDS[1:]:
-        for _ in _cycles(finding, made, _begun(finding, alone, kind), kind):
-            pass
+        deque(_cycles(finding, made, _begun(finding, alone, kind), kind), maxlen=0)
     running = _begun(finding, alone, KINDS[0])
+    cycles = _cycles(finding, made, running, KINDS[0])
+    if path is None:
+        deque(cycles, maxlen=0)
+        return
+    from rcsc.run.log.write import Recorder
+
     with Recorder(running, path, _logged(finding, made, altered)) as recorder:
-        for ran in _cycles(finding, made, running, KINDS[0]):
+        for ran in cycles:
             recorder(running, ran)
 
 

@@ -20,14 +20,6 @@ from rcsc.run.signature import Value, Values
 Rows = Iterator[tuple[int, Mapping[str, Values]]]
 
 
-class MissingPackage(Exception):  # noqa: N818  # what happened, not an error of ours
-    """A package that only some people need is not installed; says which, and the extra that brings it."""
-
-    def __init__(self, package: str, extra: str) -> None:
-        super().__init__(package, extra)
-        self.package, self.extra = package, extra
-
-
 @dataclass(frozen=True, slots=True)
 class Coverage:
     """How often each line of a table ran, in the table's order."""
@@ -133,14 +125,12 @@ def write_parquet(log: Log, path: Path) -> None:
     """A column a leaf, of its own type; enumerations as dictionaries of their words.
 
     Raises:
-        MissingPackage: pyarrow is not installed.
+        ModuleNotFoundError: pyarrow is not installed.
         OSError: The file could not be written.
     """
-    try:
-        import pyarrow as pa
-        from pyarrow import parquet
-    except ImportError as error:
-        raise MissingPackage("pyarrow", "log") from error
+    import pyarrow as pa
+    from pyarrow import parquet
+
     known = named_columns(log)
     cells: dict[str, list[Value | str]] = {name: [] for name in known}
     ticks = []

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rcsc.host.files import written_whole
-from rcsc.run.log.export import MissingPackage, rows
+from rcsc.run.log.export import rows
 from rcsc.run.log.queries import BadExpression, named_columns, nearest
 from rcsc.run.log.read import Log
 from rcsc.run.log.states import Column
@@ -41,14 +41,12 @@ def plot(log: Log, names: Sequence[str], path: Path, against: str | None = None)
 
     Raises:
         BadExpression: There is no such column, or it is text.
-        MissingPackage: matplotlib is not installed.
+        ModuleNotFoundError: matplotlib is not installed.
         OSError: The file could not be written.
     """
-    try:
-        import matplotlib as mpl
-        from matplotlib.figure import Figure
-    except ImportError as error:
-        raise MissingPackage("matplotlib", "plot") from error
+    import matplotlib as mpl
+    from matplotlib.figure import Figure
+
     wanted = _series(log, [*names, *([against] if against else [])])
     drawn, over = wanted[: len(names)], wanted[len(names) :]
     with mpl.rc_context({"svg.hashsalt": "rcsc", "font.size": 8.0}):

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 from rcsc.host import children
-from rcsc.run.log.export import MissingPackage
 from rcsc_cell.campaign.work import own_process
 
 if TYPE_CHECKING:
@@ -112,13 +111,11 @@ def cluster(address: str) -> Iterator[WorkerPool]:
     """The workers of a `dask.distributed` scheduler.
 
     Raises:
-        MissingPackage: distributed is not installed.
+        ModuleNotFoundError: distributed is not installed.
         WorkersGone: No scheduler answers there.
     """
-    try:
-        from distributed import Client
-    except ImportError as error:
-        raise MissingPackage("distributed", "cluster") from error
+    from distributed import Client
+
     try:
         client = Client(address, timeout=_CONNECT_S, set_as_default=False)
     except (OSError, ValueError) as error:

@@ -1,0 +1,62 @@
+"""What the core leaves out: the packages of each extra, and the one place that says which extra to install.
+
+`pip install rcsc` brings what check, compile, fmt, prove, certify, diff and the hooks import. Everything else imports
+its packages where they are used, and a package that is not there is the coded error RCS705.
+"""
+
+from collections.abc import Mapping
+from importlib.util import find_spec
+from typing import Any
+
+import click
+
+from rcsc.commands.shared.systems import Stopped
+from rcsc.diagnostics.codes import Code
+
+EXTRAS: Mapping[str, tuple[str, ...]] = {
+    "log": ("mcap", "zstandard"),
+    "cell": ("mujoco", "mcap", "zstandard"),
+    "certify": ("cvc5",),
+    "cluster": ("distributed",),
+    "live": ("aiohttp",),
+    "parquet": ("pyarrow",),
+    "plot": ("matplotlib",),
+}
+"""What each extra of `pyproject.toml` makes importable; of two with one package the smaller comes first.
+
+The extras `graph` and `shell` are not here: without them another layout program, or a plain prompt, does.
+"""
+
+
+def need(extra: str) -> None:
+    """Stop a command before its work where that work would end at a missing package.
+
+    Raises:
+        Stopped: A package of the extra is not installed.
+    """
+    for package in EXTRAS[extra]:
+        if find_spec(package) is None:
+            raise _missing(package, extra)
+
+
+def _missing(package: str, extra: str) -> Stopped:
+    return Stopped(Code.EXTRA_MISSING, f"`{package}` is not installed", f"pip install 'rcsc[{extra}]'")
+
+
+class Commands(click.Group):
+    """Commands that say which extra to install where an import finds that one of its packages is missing."""
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run the command that `ctx` names.
+
+        Raises:
+            Stopped: A package of an extra is not installed.
+        """
+        try:
+            return super().invoke(ctx)
+        except ModuleNotFoundError as error:
+            package = (error.name or "").partition(".")[0]
+            extra = next((one for one, packages in EXTRAS.items() if package in packages), None)
+            if extra is None:
+                raise
+            raise _missing(package, extra) from error
