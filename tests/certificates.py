@@ -18,7 +18,7 @@ from itertools import islice, product
 from typing import Any
 
 from rcsc.certify import certify
-from rcsc.lang.interpret import OPERATORS, divide, initial
+from rcsc.lang.interpret import initial
 from rcsc.lang.meaning import digest
 from rcsc.lang.model import (
     COMPARISONS,
@@ -54,6 +54,7 @@ from rcsc.lang.model import (
     pending,
     value_of_key,
 )
+from rcsc.lang.operator_table import divide
 from rcsc.lang.resolve import compile_text
 from rcsc.solvers.options import Options
 from rcsc.table.program import prove_program
@@ -311,7 +312,7 @@ class _Truth:
         kinds = [kind for kind in (*(arg.type for arg in args), expr.type) if isinstance(kind, Int)]
         if op in (Op.DIV, Op.MOD):
             self.owe(given[1] != 0, "a division")
-        found = divide(int(given[0]), int(given[1])) if op is Op.DIV else OPERATORS[op](*given)
+        found = divide(int(given[0]), int(given[1])) if op is Op.DIV else op.meaning(*given)
         if kinds and isinstance(args[0].type, Int):
             low, high = (0, 2**64 - 1) if all(kind.low >= 0 for kind in kinds) else (-(2**63), 2**63 - 1)
             numbers = given if op in COMPARISONS else [*given, found]

@@ -47,7 +47,7 @@ ENOUGH = 0.95
 MODULES = tuple(
     f"rcsc/{room}{name}.py"
     for room, names in {
-        "lang/": "interpret interval_sets",
+        "lang/": "interpret interval_sets operator_table",
         "certify/": "__init__ known owed execution settle table values",
         "table/regions/": "atoms boxleaf linear region splitting",
         "table/": "boxes confirm program relational decide",

@@ -6,8 +6,9 @@ its operation works in, no division by zero, no index outside its array, no valu
 before it is assigned.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import TypeAlias
 
 from rcsc.certify.values import INT, REAL, Number, Term, Terms, ends_of, sort_of
 from rcsc.diagnostics.source import Span as Written
@@ -44,6 +45,15 @@ from rcsc.lang.model import (
 
 MOST_STEPS = 100_000
 """Statements and elements that one run follows."""
+
+PAIRS = ((True, True), (True, False), (False, True), (False, False))
+Pairs: TypeAlias = tuple[tuple[bool, bool], ...]
+TRUE_OF: Mapping[Op, Pairs] = {
+    Op.AND: ((True, True),),
+    Op.OR: ((True, True), (True, False), (False, True)),
+    Op.IMPLIES: ((True, True), (False, True), (False, False)),
+}
+"""The pairs of operands of which each operator on truth values is true."""
 
 _ARITHMETIC = {Op.ADD: "+", Op.SUB: "-", Op.MUL: "*", Op.DIV: "/", Op.MOD: "mod", Op.NEG: "neg"}
 
@@ -161,8 +171,8 @@ class Run:
                 return self._element(leaves, self.index(index, len(leaves)))
             case Among(subject=subject, values=values):
                 return self._among(self.evaluate(subject), values)
-            case Apply(op=Op.AND | Op.OR | Op.IMPLIES):
-                return self._logic(expr)
+            case Apply(op=op) if op in TRUE_OF:
+                return self._truth(TRUE_OF[op], *expr.args)
             case Apply(op=op, args=args):
                 return self._applied(expr, op, [self.evaluate(arg) for arg in args])
 
@@ -172,16 +182,24 @@ class Run:
         )
         return self.terms.some(self.terms.make("=", subject, one) for one in found)
 
-    def _logic(self, expr: Apply) -> Term:
+    def _truth(self, true_of: Pairs, first: Expr, second: Expr) -> Term:
         """The right side is looked at only where the left does not decide."""
-        left, path = self.evaluate(expr.args[0]), self.path
-        undecided = self.terms.negation(left) if expr.op is Op.OR else left
-        self.path = self.terms.every((path, undecided))
-        right = self.evaluate(expr.args[1])
+        left, path = self.evaluate(first), self.path
+        open_for = [a for a in (True, False) if ((a, True) in true_of) != ((a, False) in true_of)]
+        if len(open_for) == 1:
+            self.path = self.terms.every((path, self._either_way(left, open_for[0])))
+        right = self.evaluate(second)
         self.path = path
-        if expr.op is Op.IMPLIES:
-            return self.terms.follows(left, right)
-        return (self.terms.every if expr.op is Op.AND else self.terms.some)((left, right))
+        false_of = [pair for pair in PAIRS if pair not in true_of]
+        if len(false_of) == 1:
+            [(a, b)] = false_of
+            return self.terms.some((self._either_way(left, not a), self._either_way(right, not b)))
+        return self.terms.some(
+            self.terms.every((self._either_way(left, a), self._either_way(right, b))) for a, b in true_of
+        )
+
+    def _either_way(self, condition: Term, yes: bool) -> Term:
+        return condition if yes else self.terms.negation(condition)
 
     def index(self, expr: Expr, length: int) -> Term:
         """An index of an array of this length."""

@@ -15,7 +15,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from rcsc.certify.execution import Owed, Run, Start
+from rcsc.certify.execution import PAIRS, TRUE_OF, Owed, Run, Start
 from rcsc.certify.owed import Debt
 from rcsc.certify.settle import values_in
 from rcsc.certify.values import BOOL, INT, REAL, Term
@@ -96,25 +96,26 @@ class _Terms:
                 return All(()) if bool(value) == yes else AnyOf(())
             case Apply(op=Op.NOT, args=(part,)):
                 return self.formula(part, not yes)
-            case Apply(op=Op.IMPLIES, args=(left, right)):
-                parts = (self.formula(left, not yes), self.formula(right, yes))
-                return AnyOf(parts) if yes else All(parts)
-            case Apply(op=Op.AND | Op.OR as op, args=args):
-                both = tuple(self.formula(part, yes) for part in args)
-                return All(both) if (op is Op.AND) == yes else AnyOf(both)
+            case Apply(op=op, args=(left, right)) if op in TRUE_OF:
+                return self.truth(left, right, [pair for pair in PAIRS if (pair in TRUE_OF[op]) == yes])
             case Apply(op=op, args=(left, right)) if op in COMPARISONS and _ordered(left) and _ordered(right):
                 if isinstance(left.type, Bool) and not (_plain(left) and _plain(right)):
                     same = yes == (op is Op.EQ)
-                    cases = [(True, same), (False, not same)]
-                    return AnyOf(
-                        tuple(All((self.formula(left, a), self.formula(right, b))) for a, b in cases)
-                    )
+                    return self.truth(left, right, [(True, same), (False, not same)])
                 return self.compare(op, left, right, yes)
             case Among(subject=subject, values=values) if _ordered(subject):
                 tests = (self.compare(Op.EQ, subject, Literal(v, subject.type), yes) for v in values)
                 return AnyOf(tuple(tests)) if yes else All(tuple(tests))
             case _:
                 return ((self.name(expr), 1),), ((int(yes), int(yes)),)
+
+    def truth(self, left: Expr, right: Expr, rows: list[tuple[bool, bool]]) -> Formula:
+        """That the two have one of the pairs of values."""
+        if len(rows) == 3:
+            [(a, b)] = [pair for pair in PAIRS if pair not in rows]
+            return AnyOf((self.formula(left, not a), self.formula(right, not b)))
+        parts = tuple(All((self.formula(left, a), self.formula(right, b))) for a, b in rows)
+        return parts[0] if len(parts) == 1 else AnyOf(parts)
 
     def compare(self, op: Op, left: Expr, right: Expr, yes: bool) -> Formula:
         total: dict[str, int] = {}

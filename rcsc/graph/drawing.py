@@ -13,6 +13,7 @@ from html import escape
 
 from rcsc.graph.formats.state_graph import ANY, LINES, Edge, StateGraph
 from rcsc.graph.layout import Arrow, Box, Placed, Point, place
+from rcsc.lang.operator_table import LOGIC, Op
 
 _FONT_PX, _ROW_PX, _LETTER_PX = 11, 14, 6.62  # a letter of a monospaced font is 0.602 of its size wide
 _BADGE_PX, _GAP_PX, _EDGE_PX = 9.5, 5.0, 24.0
@@ -173,7 +174,7 @@ def plain(guard: str) -> str:
     """A guard for the eye: `not a` for `a = false`, and commas."""
     short = re.sub(r"(?<![\w.\]])([\w.\[\]]+) = true(?![\w.])", r"\1", guard)
     short = re.sub(r"(?<![\w.\]])([\w.\[\]]+) = false(?![\w.])", r"not \1", short)
-    return short if " or " in short or " implies " in short else short.replace(" and ", ", ")
+    return short if any(f" {op} " in short for op in LOGIC - {Op.AND}) else short.replace(" and ", ", ")
 
 
 def folded(text: str) -> Iterator[str]:

@@ -5,7 +5,6 @@ enough to believe: it follows the manual's "What a cycle does" word for word and
 """
 
 import importlib
-import operator
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -30,7 +29,6 @@ from rcsc.lang.model import (
     Literal,
     Local,
     OneTable,
-    Op,
     Procedure,
     Program,
     Read,
@@ -51,6 +49,7 @@ from rcsc.lang.model import (
     key_bounds,
     pending,
 )
+from rcsc.lang.operator_table import UNDECIDED, Op, is_logic
 
 
 class Fault(IntEnum):
@@ -102,46 +101,14 @@ _ANSWERS: ContextVar[Answers | None] = ContextVar("answers", default=None)
 # --- expressions ---------------------------------------------------------------------
 
 
-def divide(a: int, b: int) -> int:
-    """Quotient rounded toward zero, as in C."""
-    quotient = abs(a) // abs(b)
-    return quotient if (a < 0) == (b < 0) else -quotient
-
-
-# What each operator means, for every stage: folding and interval bounds compute with these functions, and executors, solvers
-# and reference are held against them. Reals are IEEE 754 binary64, rounded to nearest even. Comparisons with a NaN are false,
-# but `/=`, which is true. `min` and `max` keep their first operand where it is a NaN, and drop a second one. `abs` and
-# `-` act on the sign, of zeros too. `int` is undefined of a NaN or an infinity, and `/` and `mod` of a divisor that is zero.
-OPERATORS: Mapping[Op, Callable[..., Any]] = {
-    Op.NOT: operator.not_,
-    Op.NEG: operator.neg,
-    Op.EQ: operator.eq,
-    Op.NE: operator.ne,
-    Op.LT: operator.lt,
-    Op.LE: operator.le,
-    Op.GT: operator.gt,
-    Op.GE: operator.ge,
-    Op.ADD: operator.add,
-    Op.SUB: operator.sub,
-    Op.MUL: operator.mul,
-    Op.DIV: lambda a, b: a / b if isinstance(a, float) else divide(a, b),
-    Op.MOD: lambda a, b: a - b * divide(a, b),
-    Op.ABS: abs,
-    Op.MIN: lambda a, b: b if b < a else a,  # noqa: FURB136 - says which it is where a NaN is among them
-    Op.MAX: lambda a, b: b if b > a else a,  # noqa: FURB136 - as above
-    Op.TO_INT: int,
-    Op.TO_REAL: float,
-}
-
-
 def operated(op: Op, kind: Scalar, *operands: Value) -> Value:
-    """The value of an operator other than `and`, `or` and `implies`; the first operand is of type `kind`.
+    """The value of an operator that looks at all its operands; the first is of type `kind`.
 
     Raises:
         ArithmeticError, ValueError: It has none: a divisor that is zero, or a real without a whole number.
     """
     reals = isinstance(kind, Real)
-    result: Value = OPERATORS[op](*map(float, operands)) if reals else OPERATORS[op](*operands)
+    result: Value = op.meaning(*map(float, operands)) if reals else op.meaning(*operands)
     return result
 
 
@@ -171,12 +138,9 @@ def _index(expr: Expr, length: int, snapshot: Snapshot, local: Mapping[str, Valu
 
 def _applied(op: Op, args: tuple[Expr, ...], snapshot: Snapshot, local: Mapping[str, Value] | None) -> Value:
     first = evaluate(args[0], snapshot, local)
-    if op is Op.AND:
-        return bool(first) and bool(evaluate(args[1], snapshot, local))
-    if op is Op.OR:
-        return bool(first) or bool(evaluate(args[1], snapshot, local))
-    if op is Op.IMPLIES:
-        return not first or bool(evaluate(args[1], snapshot, local))
+    if is_logic(op):  # the right operand is looked at only where the left one does not decide
+        decided = bool(first) not in UNDECIDED[op]
+        return bool(op.meaning(bool(first), not decided and bool(evaluate(args[1], snapshot, local))))
     return operated(op, args[0].type, first, *(evaluate(arg, snapshot, local) for arg in args[1:]))
 
 

@@ -1,8 +1,9 @@
-"""Sets of keys as intervals: what meets, what joins, how many keys, and how far one can be grown."""
+"""Sets of keys as intervals: what meets, what joins, what is left, how many keys, and how far one can be grown."""
 
 from collections.abc import Callable, Iterable
 
 from rcsc.lang.model import Box
+from rcsc.lang.operator_table import MIRRORED, Comparison, Op
 
 
 def meet(one: Box, two: Box) -> Box:
@@ -11,20 +12,66 @@ def meet(one: Box, two: Box) -> Box:
     return tuple(sorted(part for part in parts if part[0] <= part[1]))
 
 
-def size(box: Box) -> int:
-    """How many keys it has."""
-    return sum(high - low + 1 for low, high in box)
-
-
 def joined(intervals: Iterable[tuple[int, int]]) -> Box:
-    """Intervals in their order, neighbours made one."""
+    """The keys in any of the intervals."""
     found: list[tuple[int, int]] = []
-    for low, high in intervals:
-        if found and found[-1][1] + 1 == low:
-            found[-1] = (found[-1][0], high)
+    for low, high in sorted(one for one in intervals if one[0] <= one[1]):
+        if found and low <= found[-1][1] + 1:
+            found[-1] = (found[-1][0], max(found[-1][1], high))
         else:
             found.append((low, high))
     return tuple(found)
+
+
+def complement(box: Box, low: int, high: int) -> Box:
+    """The keys from `low` to `high` that are not in the box."""
+    edges, at = list[tuple[int, int]](), low
+    for first, last in box:
+        edges.append((at, first - 1))
+        at = last + 1
+    return joined([*edges, (at, high)])
+
+
+def compared(op: Comparison, key: int, low: int, high: int) -> Box:
+    """The keys from `low` to `high` that stand in this relation to a key."""
+    below, at, above = (low, min(key - 1, high)), (max(key, low), min(key, high)), (max(key + 1, low), high)
+    match op:
+        case Op.EQ:
+            return joined([at])
+        case Op.NE:
+            return joined([below, above])
+        case Op.LT:
+            return joined([below])
+        case Op.LE:
+            return joined([below, at])
+        case Op.GT:
+            return joined([above])
+        case Op.GE:
+            return joined([at, above])
+
+
+def scaled(op: Comparison, factor: int, bound: int, low: int, high: int) -> Box:
+    """The keys x from `low` to `high` for which factor * x stands in this relation to the bound; the factor is not 0.
+
+    For 2 * x < 5, where 5 / 2 is no key, that is x <= 2.
+    """
+    op = MIRRORED[op] if factor < 0 else op
+    floor, inexact = bound // factor, bound % factor != 0
+    if inexact and op in (Op.EQ, Op.NE):
+        return () if op is Op.EQ else ((low, high),)
+    if inexact and op in (Op.LT, Op.GE):
+        op = Op.LE if op is Op.LT else Op.GT
+    return compared(op, floor, low, high)
+
+
+def holds(box: Box, key: int) -> bool:
+    """Whether the key is in the box."""
+    return any(low <= key <= high for low, high in box)
+
+
+def size(box: Box) -> int:
+    """How many keys it has."""
+    return sum(high - low + 1 for low, high in box)
 
 
 def furthest(start: int, end: int, fits: Callable[[int], bool]) -> int:

@@ -17,6 +17,9 @@ from enum import StrEnum
 from typing import NewType, TypeAlias
 
 from rcsc.diagnostics.source import Span
+from rcsc.lang.operator_table import COMPARISONS as COMPARISONS  # noqa: PLC0414 - part of the model
+from rcsc.lang.operator_table import Op as Op  # noqa: PLC0414 - as above
+from rcsc.lang.operator_table import Operator
 
 VariableName = NewType("VariableName", str)
 ProcedureName = NewType("ProcedureName", str)
@@ -235,35 +238,6 @@ class Declared:
 # binary64, round to nearest even, on reals. No implicit conversion between the two.
 
 
-class Op(StrEnum):
-    """Operators, spelled as in the source."""
-
-    NOT = "not"
-    NEG = "-x"
-    AND = "and"
-    OR = "or"
-    IMPLIES = "implies"
-    EQ = "="
-    NE = "/="
-    LT = "<"
-    LE = "<="
-    GT = ">"
-    GE = ">="
-    ADD = "+"
-    SUB = "-"
-    MUL = "*"
-    DIV = "/"
-    MOD = "mod"
-    ABS = "abs"
-    MIN = "min"
-    MAX = "max"
-    TO_INT = "int"
-    TO_REAL = "real"
-
-
-COMPARISONS = frozenset({Op.EQ, Op.NE, Op.LT, Op.LE, Op.GT, Op.GE})
-
-
 @dataclass(frozen=True, slots=True)
 class Literal:
     """A constant (enum members by index)."""
@@ -309,7 +283,7 @@ class Apply:
     decide, also for proof obligations: `n /= 0 and x / n > 2` is safe.
     """
 
-    op: Op
+    op: Operator
     args: "tuple[Expr, ...]"
     type: Scalar
     span: Span = at()

@@ -23,7 +23,6 @@ from rcsc.diagnostics.diagnostic import Diagnostic, Label
 from rcsc.diagnostics.source import Span
 from rcsc.lang.leaves import everything, read_by
 from rcsc.lang.model import (
-    COMPARISONS,
     NOWHERE,
     Action,
     Among,
@@ -50,6 +49,7 @@ from rcsc.lang.model import (
     ToLeaf,
     pending,
 )
+from rcsc.lang.operator_table import COMPARISONS, LOGIC
 from rcsc.procedures.causes import MOST_WITNESSES, Cause, diagnostic
 from rcsc.procedures.discharge import Asker, Tally, fewest
 from rcsc.solvers import smt
@@ -60,7 +60,7 @@ from rcsc.symbolic.evaluation import Evaluation, Obligation, State, TooLongError
 from rcsc.symbolic.execution import Run
 from rcsc.symbolic.values import FALSE, TRUE, Node
 
-_DEFINED = COMPARISONS | {Op.AND, Op.OR, Op.NOT, Op.IMPLIES}
+_DEFINED = COMPARISONS | LOGIC | {Op.NOT}
 
 
 def called_by_lines(program: Program) -> set[str]:

@@ -13,8 +13,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Self
 
-from rcsc.lang.model import COMPARISONS, Bool, Enum, Op, Real, Scalar, key_bounds, real_key
-from rcsc.symbolic.values import Node, parts_first
+from rcsc.lang.model import Bool, Enum, Real, Scalar, key_bounds, real_key
+from rcsc.lang.operator_table import COMPARISONS, Arithmetic, Conversion, Op, Ordering
+from rcsc.symbolic.values import Node, Shape, parts_first, wraps_once
 
 Literal = int
 """A variable, counted from 1, or its opposite, negative."""
@@ -145,8 +146,11 @@ class Bits:
     def _choice(self, when: Literal, one: Word, two: Word) -> Word:
         return tuple(self._mux(when, x, y) for x, y in _aligned(one, two))
 
+    def _difference(self, a: Word, b: Word) -> Word:
+        return self._sum(a, tuple(-x for x in b), TRUE)
+
     def _opposite(self, a: Word) -> Word:
-        return self._sum((FALSE,), tuple(-x for x in a), TRUE)
+        return self._difference((FALSE,), a)
 
     def _product(self, a: Word, factor: int) -> Word:
         found: Word = (FALSE,)
@@ -159,24 +163,32 @@ class Bits:
 
     def _made(self, node: Node) -> Word:
         parts = [self._words[part] for part in node.args]
-        if node in self._few and node.op not in ("choice", "narrowed"):
+        if node in self._few and node.op not in (Shape.CHOICE, Shape.NARROWED):
             return self._one_of_few(node, self._few[node])
         match node.op:
-            case "constant":
+            case Shape.CONSTANT:
                 return _constant(node.kind, node.low)
-            case "variable":
+            case Shape.VARIABLE:
                 return self._variable(node.name, node.kind)
-            case "choice":
+            case Shape.CHOICE:
                 return self._choice(parts[0][0], parts[1], parts[2])
-            case "narrowed":
+            case Shape.NARROWED:
                 return parts[0]
-            case _:
-                return self._operation(Op(node.op), node, parts)
+            case Op.NOT:
+                return (-parts[0][0],)
+            case Op.AND:
+                return (self.all_of(part[0] for part in parts),)
+            case _ if not all(arg.ordered for arg in node.args):
+                return self._any(node)
+            case Op.EQ | Op.LT | Op.LE as op:
+                return (self._compared(op, node, parts),)
+            case op:
+                return self._number(op, node, parts)
 
     def _one_of_few(self, node: Node, one: "Few") -> Word:
-        if node.op == "constant":
+        if node.op is Shape.CONSTANT:
             return tuple(TRUE if one.constants[node.low] >> at & 1 else FALSE for at in range(one.width))
-        if node.op != "variable":
+        if node.op is not Shape.VARIABLE:
             return tuple(self.fresh() for _ in range(one.width))
         if node.name not in self._named:
             self._named[node.name] = tuple(self.fresh() for _ in range(one.width))
@@ -196,46 +208,40 @@ class Bits:
         self.clauses.append([-self._below(constant(high), found)])
         return found
 
-    def _operation(self, op: Op, node: Node, parts: list[Word]) -> Word:
-        if op is Op.NOT:
-            return (-parts[0][0],)
-        if op is Op.AND:
-            return (self.all_of(part[0] for part in parts),)
-        if not all(arg.ordered for arg in node.args):
-            return self._any(node)
-        if op in COMPARISONS:
-            return (self._compared(op, node, parts),)
-        return self._number(op, node, parts)
-
-    def _compared(self, op: Op, node: Node, parts: list[Word]) -> Literal:
+    def _compared(self, op: Ordering, node: Node, parts: list[Word]) -> Literal:
         if isinstance(node.args[0].kind, Bool):
             parts = [(*part, FALSE) for part in parts]
-        if op is Op.EQ:
-            return self._equal(*parts)
-        return self._below(*parts) if op is Op.LT else -self._below(parts[1], parts[0])
+        match op:
+            case Op.EQ:
+                return self._equal(*parts)
+            case Op.LT:
+                return self._below(*parts)
+            case Op.LE:
+                return -self._below(parts[1], parts[0])
 
-    def _number(self, op: Op, node: Node, parts: list[Word]) -> Word:
-        a, b = parts[0], parts[-1]
-        if op is Op.NEG:
-            return self._opposite(a)
-        if op is Op.ABS:
-            return self._choice(a[-1], self._opposite(a), a)
-        if op in (Op.MIN, Op.MAX):
-            first = -self._below(b, a)
-            return self._choice(first if op is Op.MIN else -first, a, b)
-        if isinstance(node.args[0].kind, Real) or isinstance(node.kind, Real):
-            return self._any(node)
-        if op is Op.ADD:
-            return self._sum(a, b, FALSE)
-        if op is Op.SUB:
-            return self._sum(a, tuple(-x for x in b), TRUE)
-        if op is Op.MUL and any(arg.known for arg in node.args):
-            known = 0 if node.args[0].known else 1
-            return self._product(parts[1 - known], int(node.args[known].low))
-        one, two = node.args[0], node.args[-1]
-        if op is Op.MOD and two.known and one.low >= 0 and one.high < 2 * two.low:
-            return self._choice(self._below(a, b), a, self._sum(a, tuple(-x for x in b), TRUE))
-        return self._any(node)
+    def _number(self, op: Arithmetic | Conversion, node: Node, parts: list[Word]) -> Word:
+        a, b, one, two = parts[0], parts[-1], node.args[0], node.args[-1]
+        match op:
+            case Op.NEG:
+                return self._opposite(a)
+            case Op.ABS:
+                return self._choice(a[-1], self._opposite(a), a)
+            case Op.MIN:
+                return self._choice(-self._below(b, a), a, b)
+            case Op.MAX:
+                return self._choice(self._below(b, a), a, b)
+            case _ if isinstance(one.kind, Real) or isinstance(node.kind, Real):
+                return self._any(node)
+            case Op.ADD:
+                return self._sum(a, b, FALSE)
+            case Op.SUB:
+                return self._difference(a, b)
+            case Op.MUL if one.known or two.known:
+                return self._product(b, int(one.low)) if one.known else self._product(a, int(two.low))
+            case Op.MOD if wraps_once(node):
+                return self._choice(self._below(a, b), a, self._difference(a, b))
+            case Op.MUL | Op.DIV | Op.MOD | Op.TO_INT | Op.TO_REAL:
+                return self._any(node)
 
     def _any(self, node: Node) -> Word:
         """Any value within the bounds of the node."""
@@ -295,9 +301,9 @@ def few(nodes: Sequence[Node]) -> dict[Node, Few]:
             members.setdefault(classes.of(node), []).append(node)
     found: dict[Node, Few] = {}
     for one in members.values():
-        values = dict.fromkeys(node.low for node in one if node.op == "constant")
-        names = {node.name for node in one if node.op == "variable"}
-        others = sum(node.op not in ("constant", "variable", "choice", "narrowed") for node in one)
+        values = dict.fromkeys(node.low for node in one if node.op is Shape.CONSTANT)
+        names = {node.name for node in one if node.op is Shape.VARIABLE}
+        others = sum(not isinstance(node.op, Shape) for node in one)
         width = max(1, (len(values) + len(names) + others - 1).bit_length())
         shared = Few(width, {value: at for at, value in enumerate(values)})
         found |= dict.fromkeys(one, shared)
@@ -327,16 +333,16 @@ def _joined(nodes: Iterable[Node], classes: _Classes) -> set[Node]:
     named: dict[str, Node] = {}
     for node in nodes:
         match node.op:
-            case "choice":
+            case Shape.CHOICE:
                 classes.join(node, node.args[1])
                 classes.join(node, node.args[2])
-            case "narrowed":
+            case Shape.NARROWED:
                 classes.join(node, node.args[0])
-            case "variable":
+            case Shape.VARIABLE:
                 classes.join(node, named.setdefault(node.name, node))
             case Op.EQ if all(arg.ordered for arg in node.args):
                 classes.join(*node.args)
-            case "constant" | Op.NOT | Op.AND:
+            case Shape.CONSTANT | Op.NOT | Op.AND:
                 pass
             case _:
                 calculated |= _calculated(node)

@@ -4,7 +4,7 @@ In: a program's leaves and expressions. Out: terms whose values are exactly `int
 that is defined; that it is defined is proved apart (`obligations`).
 """
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from rcsc.lang.model import (
@@ -14,7 +14,6 @@ from rcsc.lang.model import (
     Expr,
     Int,
     Literal,
-    Op,
     Read,
     ReadLocal,
     Real,
@@ -26,23 +25,9 @@ from rcsc.lang.model import (
     key_of,
     value_of_key,
 )
+from rcsc.lang.operator_table import Comparison, Op, Operator, Signed, is_comparison, is_logic, truth_function
 from rcsc.solvers import smt
 from rcsc.solvers.smt import Answer, Solver, Term
-
-_ORDER: Mapping[Op, Callable[[Term, Term, Scalar], Term]] = {
-    Op.EQ: smt.equal,
-    Op.NE: lambda a, b, kind: smt.negation(smt.equal(a, b, kind)),
-    Op.LT: smt.below,
-    Op.LE: smt.at_most,
-    Op.GT: lambda a, b, kind: smt.below(b, a, kind),
-    Op.GE: lambda a, b, kind: smt.at_most(b, a, kind),
-}
-_LOGIC: Mapping[Op, Callable[[list[Term]], Term]] = {
-    Op.NOT: lambda terms: smt.negation(terms[0]),
-    Op.AND: smt.all_of,
-    Op.OR: smt.any_of,
-    Op.IMPLIES: lambda terms: smt.implication(terms[0], terms[1]),
-}
 
 
 @dataclass(slots=True)
@@ -77,13 +62,16 @@ def encode(expr: Expr, frame: Frame) -> Term:
             return operation(op, args[0].type, [encode(arg, frame) for arg in args])
 
 
-def operation(op: Op, kind: Scalar, terms: list[Term]) -> Term:
+def operation(op: Operator, kind: Scalar, terms: list[Term]) -> Term:
     """The term of an operator over operands, the first of which is of type `kind`."""
-    if op in _LOGIC:
-        return _LOGIC[op](terms)
-    if op in _ORDER:
-        return _ORDER[op](terms[0], terms[1], kind)
+    if is_logic(op):
+        whole = truth_function(op, _signed(terms[0]), _signed(terms[1]), smt.all_of, smt.any_of)
+        return whole(True)
+    if is_comparison(op):
+        return _comparison(op, terms[0], terms[1], kind)
     match op:
+        case Op.NOT:
+            return smt.negation(terms[0])
         case Op.NEG:
             return smt.minus(terms[0], kind)
         case Op.ABS:
@@ -96,9 +84,29 @@ def operation(op: Op, kind: Scalar, terms: list[Term]) -> Term:
             return smt.to_double(terms[0])
         case Op.TO_INT:
             return smt.to_integer(terms[0])
-        case _:
+        case Op.ADD | Op.SUB | Op.MUL | Op.DIV | Op.MOD:
             arithmetic = smt.double_operation if isinstance(kind, Real) else smt.integer_operation
             return arithmetic(op.value, terms[0], terms[1])
+
+
+def _signed(term: Term) -> Signed[Term]:
+    return lambda wanted: term if wanted else smt.negation(term)
+
+
+def _comparison(op: Comparison, one: Term, two: Term, kind: Scalar) -> Term:
+    match op:
+        case Op.EQ:
+            return smt.equal(one, two, kind)
+        case Op.NE:
+            return smt.negation(smt.equal(one, two, kind))
+        case Op.LT:
+            return smt.below(one, two, kind)
+        case Op.LE:
+            return smt.at_most(one, two, kind)
+        case Op.GT:
+            return smt.below(two, one, kind)
+        case Op.GE:
+            return smt.at_most(two, one, kind)
 
 
 def within(term: Term, kind: Scalar) -> Term:

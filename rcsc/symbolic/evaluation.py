@@ -12,7 +12,6 @@ from dataclasses import dataclass, field
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.source import Span
 from rcsc.lang.model import (
-    COMPARISONS,
     I64_MAX,
     I64_MIN,
     NOWHERE,
@@ -22,20 +21,20 @@ from rcsc.lang.model import (
     Expr,
     Int,
     Literal,
-    Op,
     Procedure,
     Read,
     ReadLocal,
     Scalar,
     Select,
 )
+from rcsc.lang.operator_table import UNDECIDED, Arithmetic, Logic, Op, is_comparison, is_logic
 from rcsc.symbolic import values
 from rcsc.symbolic.values import FALSE, TRUE, Fact, Node
 
 MOST_STEPS = 2_000_000
 """Statements and array elements that one run follows."""
 
-_RESULTS = {
+_RESULTS: dict[Arithmetic, str] = {
     Op.ADD: "sum",
     Op.SUB: "difference",
     Op.MUL: "product",
@@ -109,6 +108,11 @@ class State:
 def word(kinds: Iterable[Int]) -> tuple[int, int]:
     """The 64-bit type in which an operation on these is done: unsigned where none can be negative."""
     return (0, U64_MAX) if min(kind.low for kind in kinds) >= 0 else (I64_MIN, I64_MAX)
+
+
+def _word_of(expr: Apply) -> tuple[int, int]:
+    """The 64-bit type in which integer operands and result of an operation stand."""
+    return word(kind for kind in (*(arg.type for arg in expr.args), expr.type) if isinstance(kind, Int))
 
 
 @dataclass(slots=True)
@@ -206,12 +210,8 @@ class Evaluation:
                 return self._selected(leaves, self.index(index, len(leaves)))
             case Among(subject=subject, values=members):
                 return values.among(self.evaluate(subject), members)
-            case Apply(op=Op.AND | Op.OR | Op.IMPLIES):
-                return self._logic(expr)
-            case Apply(op=Op.NOT, args=(inner,)):
-                return values.negation(self.evaluate(inner))
-            case Apply(op=op, args=args):
-                return self._applied(expr, op, tuple(self.evaluate(arg) for arg in args))
+            case Apply():
+                return self._applied(expr)
 
     def leaf(self, name: str) -> Node:
         """The value of a leaf, within what is known of it here."""
@@ -254,25 +254,32 @@ class Evaluation:
             found = values.choice(here, self.leaf(leaves[at]), found)
         return found
 
-    def _logic(self, expr: Apply) -> Node:
+    def _logic(self, op: Logic, first: Expr, second: Expr) -> Node:
         """The right operand is looked at only where the left one does not decide."""
-        left = self.evaluate(expr.args[0])
-        with self.where(left, holds=expr.op is not Op.OR):
-            right = self.evaluate(expr.args[1])
-        join = {Op.AND: values.both, Op.OR: values.either, Op.IMPLIES: values.follows}
-        return join[expr.op](left, right)
+        left = self.evaluate(first)
+        if len(UNDECIDED[op]) == 2:
+            return values.logic(op, left, self.evaluate(second))
+        with self.where(left, holds=True in UNDECIDED[op]):
+            right = self.evaluate(second)
+        return values.logic(op, left, right)
 
-    def _applied(self, expr: Apply, op: Op, args: tuple[Node, ...]) -> Node:
-        kinds = [arg.type for arg in expr.args]
-        if op in (Op.DIV, Op.MOD):
-            args = self._divisor(expr, args)
-        if isinstance(kinds[0], Int) and op is not Op.TO_REAL:
-            return self._whole(expr, op, args, [kind for kind in kinds if isinstance(kind, Int)])
-        if op in COMPARISONS:
-            return values.compare(op, *args)
-        if op is Op.TO_INT and isinstance(expr.type, Int):
-            return self._truncated(expr, args[0], expr.type)
-        return values.arithmetic(op, args, expr.type)
+    def _applied(self, expr: Apply) -> Node:
+        op = expr.op
+        if is_logic(op):
+            return self._logic(op, *expr.args)
+        args = tuple(self.evaluate(arg) for arg in expr.args)
+        if is_comparison(op):
+            return values.compare(op, *self._in_words(expr, args))
+        match op:
+            case Op.NOT:
+                return values.negation(args[0])
+            case Op.TO_INT:
+                assert isinstance(expr.type, Int)
+                return self._truncated(expr, args[0], expr.type)
+            case Op.TO_REAL:
+                return values.arithmetic(op, args, expr.type)
+            case _:
+                return self._number(op, expr, args)
 
     def _divisor(self, expr: Apply, args: tuple[Node, ...]) -> tuple[Node, ...]:
         divisor = args[1]
@@ -283,23 +290,27 @@ class Evaluation:
         fact = facts.get(values.root(divisor))
         return args[0], divisor if fact is None else values.narrowed(divisor, *fact)
 
-    def _whole(self, expr: Apply, op: Op, args: tuple[Node, ...], kinds: list[Int]) -> Node:
-        """An operation on integers; operands and result share one 64-bit type."""
-        if isinstance(expr.type, Int):
-            kinds = [*kinds, expr.type]
-        ends = word(kinds)
-        message = "this value can lie outside the 64 bits in which it is used"
-        args = tuple(
-            self.owe_inside(Code.OVERFLOW, arg, ends, message, written.span)
-            for arg, written in zip(args, expr.args, strict=True)
-        )
-        if op in COMPARISONS:
-            return values.compare(op, *args)
+    def _number(self, op: Arithmetic, expr: Apply, args: tuple[Node, ...]) -> Node:
+        if op in (Op.DIV, Op.MOD):
+            args = self._divisor(expr, args)
+        if not isinstance(expr.type, Int):
+            return values.arithmetic(op, args, expr.type)
+        args, ends = self._in_words(expr, args), _word_of(expr)
         if op is Op.MOD:  # the machine divides first
             quotient = values.arithmetic(Op.DIV, args, expr.type)
             self.owe_inside(Code.OVERFLOW, quotient, ends, f"the {_RESULTS[Op.DIV]} {_LEAVES}", expr.span)
         found = values.arithmetic(op, args, expr.type)
         return self.owe_inside(Code.OVERFLOW, found, ends, f"the {_RESULTS[op]} {_LEAVES}", expr.span)
+
+    def _in_words(self, expr: Apply, args: tuple[Node, ...]) -> tuple[Node, ...]:
+        """Operands that are integers within the 64 bits that they share with each other and the result."""
+        if not isinstance(expr.args[0].type, Int):
+            return args
+        message = "this value can lie outside the 64 bits in which it is used"
+        return tuple(
+            self.owe_inside(Code.OVERFLOW, arg, _word_of(expr), message, written.span)
+            for arg, written in zip(args, expr.args, strict=True)
+        )
 
     def _truncated(self, expr: Apply, arg: Node, kind: Int) -> Node:
         """A double without its fraction, where that is in 64 bits; never so of a NaN."""

@@ -14,11 +14,12 @@ In: nodes (`symbolic.values`). Out: terms, and the ranges of the variables they 
 import math
 from dataclasses import dataclass, field
 
-from rcsc.lang.model import COMPARISONS, Bool, Enum, Int, Op, Real, Scalar, real_key
+from rcsc.lang.model import Bool, Enum, Int, Real, Scalar, real_key
+from rcsc.lang.operator_table import Arithmetic, Conversion, Op
 from rcsc.solvers import smt
 from rcsc.solvers.smt import Term
 from rcsc.symbolic import values
-from rcsc.symbolic.values import Node, parts_first
+from rcsc.symbolic.values import Node, Shape, parts_first, wraps_once
 
 KEY = Int(-(2**63), 2**63)
 """The type in which every number stands."""
@@ -89,58 +90,56 @@ class Keyed:
     def _made(self, node: Node) -> Term:
         parts = [self._terms[part] for part in node.args]
         match node.op:
-            case "constant":
+            case Shape.CONSTANT:
                 return self.literal(node.kind, node.low)
-            case "variable":
+            case Shape.VARIABLE:
                 return self.variable(node.name, node.kind)
-            case "choice":
+            case Shape.CHOICE:
                 return smt.choice(*parts)
-            case "narrowed":
+            case Shape.NARROWED:
                 return parts[0]
-            case _:
-                return self._operation(Op(node.op), node, parts)
+            case Op.NOT:
+                return smt.negation(parts[0])
+            case Op.AND:
+                return smt.all_of(parts)
+            case _ if not all(arg.ordered for arg in node.args):
+                return self.any(node)
+            case Op.EQ:
+                return smt.equal(parts[0], parts[1], sort(node.args[0].kind))
+            case Op.LT:
+                return smt.below(parts[0], parts[1], sort(node.args[0].kind))
+            case Op.LE:
+                return smt.at_most(parts[0], parts[1], sort(node.args[0].kind))
+            case op:
+                return self._number(op, node, parts)
 
-    def _operation(self, op: Op, node: Node, parts: list[Term]) -> Term:
-        if op is Op.NOT:
-            return smt.negation(parts[0])
-        if op is Op.AND:
-            return smt.all_of(parts)
-        if not all(arg.ordered for arg in node.args):
-            return self.any(node)
-        if op in COMPARISONS:
-            compare = {Op.EQ: smt.equal, Op.LT: smt.below, Op.LE: smt.at_most}[op]
-            return compare(parts[0], parts[1], sort(node.args[0].kind))
-        return self._number(op, node, parts)
-
-    def _number(self, op: Op, node: Node, parts: list[Term]) -> Term:
+    def _number(self, op: Arithmetic | Conversion, node: Node, parts: list[Term]) -> Term:
         """Arithmetic: exact where it is linear, or only orders."""
-        zero = smt.literal(KEY, 0)
-        if op is Op.NEG:
-            return smt.minus(parts[0], KEY)
-        if op is Op.ABS:
-            return smt.choice(smt.below(parts[0], zero, KEY), smt.minus(parts[0], KEY), parts[0])
-        if op in (Op.MIN, Op.MAX):
-            first = smt.at_most(parts[0], parts[1], KEY)
-            return (
-                smt.choice(first, parts[0], parts[1])
-                if op is Op.MIN
-                else smt.choice(first, parts[1], parts[0])
-            )
-        if isinstance(node.args[0].kind, Real) or isinstance(node.kind, Real):
-            return self.of_reals(op, node, parts)
-        if op in (Op.ADD, Op.SUB) or (op is Op.MUL and any(arg.known for arg in node.args)):
-            return smt.integer_operation(op.value, parts[0], parts[1])
-        if (
-            op is Op.MOD
-            and node.args[1].known
-            and node.args[0].low >= 0
-            and node.args[0].high < 2 * node.args[1].low
-        ):
-            wrapped = smt.integer_operation("-", parts[0], parts[1])
-            return smt.choice(smt.below(parts[0], parts[1], KEY), parts[0], wrapped)
-        return self.any(node)
+        one, two = node.args[0], node.args[-1]
+        match op:
+            case Op.NEG:
+                return smt.minus(parts[0], KEY)
+            case Op.ABS:
+                return smt.choice(
+                    smt.below(parts[0], smt.literal(KEY, 0), KEY), smt.minus(parts[0], KEY), parts[0]
+                )
+            case Op.MIN:
+                return smt.choice(smt.at_most(parts[0], parts[1], KEY), parts[0], parts[1])
+            case Op.MAX:
+                return smt.choice(smt.at_most(parts[0], parts[1], KEY), parts[1], parts[0])
+            case _ if isinstance(one.kind, Real) or isinstance(node.kind, Real):
+                return self.of_reals(op, node, parts)
+            case Op.ADD | Op.SUB:
+                return smt.integer_operation(op.value, parts[0], parts[1])
+            case Op.MUL if one.known or two.known:
+                return smt.integer_operation(op.value, parts[0], parts[1])
+            case Op.MOD if wraps_once(node):
+                wrapped = smt.integer_operation("-", parts[0], parts[1])
+                return smt.choice(smt.below(parts[0], parts[1], KEY), parts[0], wrapped)
+            case Op.MUL | Op.DIV | Op.MOD | Op.TO_INT | Op.TO_REAL:
+                return self.any(node)
 
-    def of_reals(self, op: Op, node: Node, parts: list[Term]) -> Term:  # noqa: ARG002 - for those who know more
+    def of_reals(self, op: Arithmetic | Conversion, node: Node, parts: list[Term]) -> Term:  # noqa: ARG002 - for those who know more
         """An operation with a real in it."""
         return self.any(node)
 

@@ -11,7 +11,8 @@ Slower than `keyed`, for the solver has to reason in fractions; asked only where
 
 import math
 
-from rcsc.lang.model import Op, Real, Scalar
+from rcsc.lang.model import Real, Scalar
+from rcsc.lang.operator_table import Arithmetic, Conversion, Op
 from rcsc.solvers import smt
 from rcsc.solvers.smt import Term
 from rcsc.symbolic.keyed import KEY, Keyed
@@ -32,7 +33,7 @@ class Measured(Keyed):
         """A constant value."""
         return smt.fraction(value) if isinstance(kind, Real) else super().literal(kind, value)
 
-    def of_reals(self, op: Op, node: Node, parts: list[Term]) -> Term:
+    def of_reals(self, op: Arithmetic | Conversion, node: Node, parts: list[Term]) -> Term:
         """Linear operations, rounded; the others are any value."""
         if op is Op.TO_REAL:
             return self._rounded(node, smt.as_number(parts[0]))

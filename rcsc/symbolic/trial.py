@@ -7,8 +7,19 @@ from collections.abc import Iterator, Mapping, Sequence
 from random import Random
 
 from rcsc.lang.interpret import operated
-from rcsc.lang.model import Bool, Op, Real, Value, Variable, key_bounds, key_of, real_key, value_of_key
-from rcsc.symbolic.values import CHOICE, CONSTANT, NARROWED, VARIABLE, Node, parts_first
+from rcsc.lang.model import (
+    Bool,
+    Op,
+    Real,
+    Scalar,
+    Value,
+    Variable,
+    key_bounds,
+    key_of,
+    real_key,
+    value_of_key,
+)
+from rcsc.symbolic.values import Node, Shape, parts_first
 from rcsc.symbolic.values import variable as variable_of
 
 SAMPLES = 400
@@ -92,21 +103,26 @@ def _all_hold(order: Sequence[Node], conditions: Sequence[Node], point: Mapping[
 def _value(node: Node, parts: list[Value | None], point: Mapping[str, Value]) -> Value | None:
     """The node's value; None where it is not defined."""
     match node.op:
-        case _ if node.op == CONSTANT:
+        case Shape.CONSTANT:
             return bool(node.low) if isinstance(node.kind, Bool) else node.low
-        case _ if node.op == VARIABLE:
+        case Shape.VARIABLE:
             return point[node.name]
-        case _ if node.op == NARROWED:
+        case Shape.NARROWED:
             return parts[0]
-        case _ if node.op == CHOICE:
+        case Shape.CHOICE:
             return None if parts[0] is None else parts[1] if parts[0] else parts[2]
         case Op.AND:
             return False if False in parts else None if None in parts else True
-    return None if None in parts else _computed(node, [part for part in parts if part is not None])
+        case op:
+            return (
+                None
+                if None in parts
+                else _computed(op, node.args[0].kind, [one for one in parts if one is not None])
+            )
 
 
-def _computed(node: Node, parts: list[Value]) -> Value | None:
+def _computed(op: Op, kind: Scalar, parts: list[Value]) -> Value | None:
     try:
-        return operated(Op(node.op), node.args[0].kind, *parts)
+        return operated(op, kind, *parts)
     except (ArithmeticError, ValueError):
         return None

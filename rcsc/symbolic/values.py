@@ -10,16 +10,38 @@ import math
 import sys
 from collections.abc import Container, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from enum import StrEnum
 
 from rcsc.lang.expressions import intervals
-from rcsc.lang.interpret import divide
-from rcsc.lang.model import COMPARISONS, Bool, Int, Op, Real, Scalar, Value, key_bounds
+from rcsc.lang.model import Bool, Int, Real, Scalar, Value, key_bounds
+from rcsc.lang.operator_table import (
+    Arithmetic,
+    Comparison,
+    Conversion,
+    Core,
+    Logic,
+    Op,
+    Ordering,
+    Signed,
+    truth_function,
+)
 from rcsc.solvers import smt
 from rcsc.solvers.smt import Term
 from rcsc.symbolic.encode import operation, within
 
 _GREATEST = int(sys.float_info.max)
-CONSTANT, VARIABLE, CHOICE, NARROWED = "constant", "variable", "choice", "narrowed"
+
+
+class Shape(StrEnum):
+    """Nodes that are no operators: a choice has a condition and two values, and what is narrowed is known to lie within bounds."""
+
+    CONSTANT = "constant"
+    VARIABLE = "variable"
+    CHOICE = "choice"
+    NARROWED = "narrowed"
+
+
+CONSTANT, VARIABLE, CHOICE, NARROWED = Shape
 
 
 @dataclass(eq=False, slots=True)
@@ -27,14 +49,14 @@ class Node:
     """One value.
 
     Attributes:
-        op: An operator of the model, or one of the four words above.
+        op: What it is made by.
         kind: Bool, Enum, Int or Real; its own bounds are those of the declaration, not of the node.
         low: Least value it can have where it is reached; likewise `high`.
         name: Of a variable.
         term: Made on demand.
     """
 
-    op: str
+    op: Shape | Core
     args: "tuple[Node, ...]"
     kind: Scalar
     low: int | float
@@ -155,12 +177,31 @@ def among(subject: Node, values: Sequence[Value]) -> Node:
     return any_of(compare(Op.EQ, subject, constant(subject.kind, value)) for value in values)
 
 
-def compare(op: Op, one: Node, two: Node) -> Node:
+def logic(op: Logic, one: Node, two: Node) -> Node:
+    """A truth function of two conditions."""
+
+    def signed(node: Node) -> Signed[Node]:
+        return lambda wanted: node if wanted else negation(node)
+
+    return truth_function(
+        op, signed(one), signed(two), lambda parts: both(*parts), lambda parts: either(*parts)
+    )(True)
+
+
+def compare(op: Comparison, one: Node, two: Node) -> Node:
     """A comparison, decided where the bounds do."""
-    if op is Op.NE:
-        return negation(compare(Op.EQ, one, two))
-    if op in (Op.GT, Op.GE):
-        return compare(Op.LT if op is Op.GT else Op.LE, two, one)
+    match op:
+        case Op.NE:
+            return negation(_ordering(Op.EQ, one, two))
+        case Op.GT:
+            return _ordering(Op.LT, two, one)
+        case Op.GE:
+            return _ordering(Op.LE, two, one)
+        case Op.EQ | Op.LT | Op.LE:
+            return _ordering(op, one, two)
+
+
+def _ordering(op: Ordering, one: Node, two: Node) -> Node:
     if one.ordered and two.ordered:
         decided = _decided(op, one, two)
         if decided is not None:
@@ -168,7 +209,7 @@ def compare(op: Op, one: Node, two: Node) -> Node:
     return Node(op, (one, two), Bool(), 0, 1)
 
 
-def _decided(op: Op, one: Node, two: Node) -> bool | None:
+def _decided(op: Ordering, one: Node, two: Node) -> bool | None:
     if op is Op.EQ:
         if one.high < two.low or two.high < one.low:
             return False
@@ -180,7 +221,7 @@ def _decided(op: Op, one: Node, two: Node) -> bool | None:
     return True if always else False if never else None
 
 
-def arithmetic(op: Op, args: tuple[Node, ...], kind: Scalar) -> Node:
+def arithmetic(op: Arithmetic | Conversion, args: tuple[Node, ...], kind: Scalar) -> Node:
     """Any operator on numbers but comparisons; `kind` is that of the result."""
     low, high = _bounds(op, args)
     found = Node(op, args, kind, low, high)
@@ -189,7 +230,7 @@ def arithmetic(op: Op, args: tuple[Node, ...], kind: Scalar) -> Node:
     return constant(kind, low)
 
 
-def _bounds(op: Op, args: tuple[Node, ...]) -> tuple[int | float, int | float]:
+def _bounds(op: Arithmetic | Conversion, args: tuple[Node, ...]) -> tuple[int | float, int | float]:
     one = args[0]
     if op is Op.TO_REAL:
         return float(one.low), float(one.high)
@@ -200,11 +241,17 @@ def _bounds(op: Op, args: tuple[Node, ...]) -> tuple[int | float, int | float]:
     else:
         kinds = tuple(Int(int(arg.low), int(arg.high)) for arg in args)
     if op is Op.MOD and all(arg.known for arg in args) and args[1].low:
-        rest = int(one.low) - int(args[1].low) * divide(int(one.low), int(args[1].low))
+        rest = op.meaning(int(one.low), int(args[1].low))
         return rest, rest
     found = intervals.apply(op, kinds, ())
     assert isinstance(found, Int | Real)
     return found.low, found.high
+
+
+def wraps_once(remainder: Node) -> bool:
+    """Whether a `mod` is of a value that is not negative and below twice its divisor: the value, or less the divisor."""
+    value, divisor = remainder.args
+    return divisor.known and value.low >= 0 and value.high < 2 * divisor.low
 
 
 def equal(one: Node, two: Node) -> Node:
@@ -231,13 +278,17 @@ def term_of(node: Node) -> Term:
 
 
 def _term(node: Node, parts: list[Term]) -> Term:
-    if node.op == CONSTANT:
-        return smt.literal(node.kind, node.low)
-    if node.op == VARIABLE:
-        return smt.variable(node.name, node.kind)
-    if node.op == CHOICE:
-        return smt.choice(*parts)
-    return parts[0] if node.op == NARROWED else operation(Op(node.op), node.args[0].kind, parts)
+    match node.op:
+        case Shape.CONSTANT:
+            return smt.literal(node.kind, node.low)
+        case Shape.VARIABLE:
+            return smt.variable(node.name, node.kind)
+        case Shape.CHOICE:
+            return smt.choice(*parts)
+        case Shape.NARROWED:
+            return parts[0]
+        case op:
+            return operation(op, node.args[0].kind, parts)
 
 
 def variables(nodes: Iterable[Node]) -> dict[str, Node]:
@@ -274,16 +325,21 @@ def learn(condition: Node, facts: dict[Node, Fact], *, holds: bool = True) -> No
     waiting = [(condition, holds)]
     while waiting:
         node, yes = waiting.pop()
-        if node.op == Op.NOT:
-            waiting.append((node.args[0], not yes))
-        elif node.op == Op.AND and yes:
-            waiting += [(part, True) for part in node.args]
-        elif node.op == Op.AND:
-            _learn_either(node, facts)
-        elif node.op in COMPARISONS:
-            _learn_compared(Op(node.op), (node.args[0], node.args[1]), facts, yes)
-        elif isinstance(node.kind, Bool):
-            _meet(facts, node, int(yes), int(yes))
+        op = node.op
+        match op:
+            case Shape():
+                if isinstance(node.kind, Bool):
+                    _meet(facts, node, int(yes), int(yes))
+            case Op.NOT:
+                waiting.append((node.args[0], not yes))
+            case Op.AND if yes:
+                waiting += [(part, True) for part in node.args]
+            case Op.AND:
+                _learn_either(node, facts)
+            case Op.EQ | Op.LT | Op.LE:
+                _learn_compared(op, (node.args[0], node.args[1]), facts, yes)
+            case _:
+                pass  # a number
 
 
 def _learn_either(node: Node, facts: dict[Node, Fact]) -> None:
@@ -301,7 +357,7 @@ def _learn_either(node: Node, facts: dict[Node, Fact]) -> None:
         _meet(facts, key, min(a, c), max(b, d))
 
 
-def _learn_compared(op: Op, sides: tuple[Node, Node], facts: dict[Node, Fact], yes: bool) -> None:
+def _learn_compared(op: Ordering, sides: tuple[Node, Node], facts: dict[Node, Fact], yes: bool) -> None:
     one, two = sides
     if not yes and not (one.ordered and two.ordered):
         return

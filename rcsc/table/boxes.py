@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from itertools import islice
 from math import prod
 
-from rcsc.lang.interval_sets import joined, meet, size
+from rcsc.lang.interval_sets import holds, joined, meet, size
 from rcsc.lang.model import Box, Program, Table, key_bounds, value_of_key
 from rcsc.table.verdict import Gap, Overlap, Region, Witness
 
@@ -127,12 +127,12 @@ class Boxes:
             yield from _intervals_meeting(stated, idle)
             return
         classes = self.classes(name)
-        inside = [_any(mask for box, mask in stated.items() if _holds(box, low)) for low in classes.starts]
+        inside = [_any(mask for box, mask in stated.items() if holds(box, low)) for low in classes.starts]
         for box in stated:
             yield (
                 box,
                 idle
-                | _any(mask for low, mask in zip(classes.starts, inside, strict=True) if _holds(box, low)),
+                | _any(mask for low, mask in zip(classes.starts, inside, strict=True) if holds(box, low)),
             )
 
     def both(self, first: int, second: int) -> Overlap:
@@ -288,8 +288,8 @@ class Search:
             self._looked_at += len(alive) + len(pieces)
             if self._looked_at > BUDGET:
                 raise BudgetError
-            inside = [at for at in alive if name not in lines[at] or _holds(lines[at][name], low)]
-            counted = [one for one in pieces if name not in one.box or _holds(one.box[name], low)]
+            inside = [at for at in alive if name not in lines[at] or holds(lines[at][name], low)]
+            counted = [one for one in pieces if name not in one.box or holds(one.box[name], low)]
             found = self._search(depth + 1, inside, lines, counted)
             if found is not None:
                 return {name: (low, high), **found}
@@ -332,7 +332,7 @@ class Search:
             region[name] = joined(
                 (low, high)
                 for low, high in zip(classes.starts, classes.ends, strict=True)
-                if not any(name not in boxes or _holds(boxes[name], low) for boxes in close)
+                if not any(name not in boxes or holds(boxes[name], low) for boxes in close)
             )
         return region
 
@@ -426,10 +426,6 @@ def bits_of(mask: int) -> Iterator[int]:
         lowest = mask & -mask
         yield lowest.bit_length() - 1
         mask ^= lowest
-
-
-def _holds(box: Box, key: int) -> bool:
-    return any(low <= key <= high for low, high in box)
 
 
 def _any(masks: Iterable[int]) -> int:

@@ -14,6 +14,7 @@ from rcsc.compose.proof.ranking import Counted, least_power, parts
 from rcsc.compose.proof.system import transition_systems
 from rcsc.compose.proof.termination import Ending, longest
 from rcsc.lang.model import Int, Op, Real
+from rcsc.lang.operator_table import Arithmetic
 from rcsc.solvers import smt
 from rcsc.solvers.smt import Answer, Solver
 from rcsc.solvers.smtlib import cvc5_refutes
@@ -298,7 +299,7 @@ def refuted(node: Node) -> bool:
 REAL = Real(-1e6, 1e6)
 
 
-def arithmetic(op: Op, *args: Node) -> Node:
+def arithmetic(op: Arithmetic, *args: Node) -> Node:
     return values.arithmetic(op, args, REAL)
 
 

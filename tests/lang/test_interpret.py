@@ -16,7 +16,6 @@ from rcsc.lang.interpret import (
     admit,
     call,
     cycle,
-    divide,
     evaluate,
     initial,
     matching_lines,
@@ -24,6 +23,7 @@ from rcsc.lang.interpret import (
     unfit,
 )
 from rcsc.lang.model import Apply, Program, Value
+from rcsc.lang.operator_table import divide
 from rcsc.lang.resolve import compile_text
 from tests import differential
 

@@ -14,12 +14,13 @@ from random import Random
 import pytest
 
 from rcsc.lang.model import Bool, Int, Op, Real, Scalar
+from rcsc.lang.operator_table import Comparison
 from rcsc.symbolic import values
 from rcsc.symbolic.evaluation import Evaluation
 from rcsc.symbolic.values import Fact, Node
 
 NAN, INF = math.nan, math.inf
-COMPARE: dict[Op, Callable[[float, float], bool]] = {
+COMPARE: dict[Comparison, Callable[[float, float], bool]] = {
     Op.EQ: operator.eq, Op.NE: operator.ne, Op.LT: operator.lt, Op.LE: operator.le, Op.GT: operator.gt, Op.GE: operator.ge,
 }  # fmt: skip
 
@@ -90,7 +91,7 @@ Condition = tuple[Node, int]
 
 
 def compared(
-    op: Op, left: tuple[Node, tuple[float, ...]], right: tuple[Node, tuple[float, ...]]
+    op: Comparison, left: tuple[Node, tuple[float, ...]], right: tuple[Node, tuple[float, ...]]
 ) -> Condition:
     holds = sum(COMPARE[op](a, b) << at for at, (a, b) in enumerate(zip(left[1], right[1], strict=True)))
     return values.compare(op, left[0], right[0]), holds

@@ -47,6 +47,7 @@ from rcsc.lang.model import (
     Value,
     real_key,
 )
+from rcsc.lang.operator_table import Arithmetic, Comparison, Core, is_comparison
 from rcsc.lang.resolve import compile_text
 from rcsc.solvers import smt
 from rcsc.solvers.options import Options
@@ -81,7 +82,17 @@ EDGES: dict[Scalar, tuple[Value, ...]] = {
     UNSIGNED: (0, 1, 2, 7, 2**53 + 1, I64_MAX, I64_MAX + 1, U64_MAX - 1, U64_MAX),
     Bool(): (False, True),
 }
-ON_REALS = (*sorted(COMPARISONS), Op.ADD, Op.SUB, Op.MUL, Op.DIV, Op.MIN, Op.MAX, Op.NEG, Op.ABS)
+ON_REALS: tuple[Comparison | Arithmetic, ...] = (
+    *sorted(COMPARISONS),
+    Op.ADD,
+    Op.SUB,
+    Op.MUL,
+    Op.DIV,
+    Op.MIN,
+    Op.MAX,
+    Op.NEG,
+    Op.ABS,
+)
 UNARY = {Op.NEG, Op.ABS, Op.TO_INT, Op.TO_REAL, Op.NOT}
 
 
@@ -129,7 +140,7 @@ def cases() -> Iterator[Case]:
         yield Case(op, REAL, Bool() if op in COMPARISONS else REAL)
     yield from (Case(Op.TO_INT, REAL, SIGNED), Case(Op.TO_INT, REAL, UNSIGNED), Case(None, REAL, Bool()))
     for kind, op in product((SIGNED, UNSIGNED), (*ON_REALS, Op.MOD)):
-        made = Bool() if op in COMPARISONS else intervals.apply(op, (kind,) * (1 if op in UNARY else 2), ())
+        made = Bool() if is_comparison(op) else intervals.apply(op, (kind,) * (1 if op in UNARY else 2), ())
         yield Case(op, kind, made)
     yield from (Case(Op.TO_REAL, kind, REAL) for kind in (SIGNED, UNSIGNED))
     yield Case(None, SIGNED, Bool())
@@ -315,7 +326,7 @@ ORDERED = (Op.LT, Op.LE, Op.EQ, Op.MIN, Op.MAX, Op.NEG, Op.ABS)
 """What the terms of composed levels say exactly of reals; of integers also sums, differences, and `mod` by constants."""
 
 
-def composed(op: Op, whole: bool) -> Iterator[tuple[Node, tuple[Value, ...], Value]]:
+def composed(op: Core, whole: bool) -> Iterator[tuple[Node, tuple[Value, ...], Value]]:
     """Operations on variables of which nothing is known, with values for them, and the result."""
     kind = Int(-(2**40), 2**40) if whole else Real(-GREATEST, GREATEST)
     edges: tuple[Value, ...] = (-(2**40), -7, -1, 0, 1, 2, 7, 2**40) if whole else FEW
@@ -339,7 +350,7 @@ composed_cases = pytest.mark.parametrize(
 
 @composed_cases
 @pytest.mark.parametrize("maker", [Keyed, Measured])
-def test_terms_of_composed_levels(maker: type[Keyed], op: Op, whole: bool) -> None:
+def test_terms_of_composed_levels(maker: type[Keyed], op: Core, whole: bool) -> None:
     terms, solver, wrong = maker(), smt.Solver(), []
     for node, operands, value in composed(op, whole):
         for arg, worth in zip(node.args, operands, strict=True):
@@ -351,7 +362,7 @@ def test_terms_of_composed_levels(maker: type[Keyed], op: Op, whole: bool) -> No
 
 
 @composed_cases
-def test_bits_of_composed_levels(op: Op, whole: bool) -> None:
+def test_bits_of_composed_levels(op: Core, whole: bool) -> None:
     rows = list(composed(op, whole))
     bits = Bits()
     words = [bits.word(node) for node, _, _ in rows]

@@ -2,14 +2,14 @@
 
 In: a program and its level. Out: a `Compiled`, whose `run` does what `Role.run` does by the interpreter's parts, and tells which inputs
 were read. It is held against these: a part of the cycles of every enumeration is run by both (`Role.confirmed`, `Role.same`). It shares the
-meaning of operators with the interpreter (`interpret.OPERATORS`), as every stage does.
+meaning of operators with the interpreter (`operator_table`), as every stage does.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
-from rcsc.lang.interpret import OPERATORS, ExternError, Fault, _admitted
+from rcsc.lang.interpret import ExternError, Fault, _admitted
 from rcsc.lang.model import (
     BEFORE,
     Among,
@@ -76,7 +76,7 @@ def compiled(program: Program, level: Level) -> Compiled:
     """The functions of a level."""
     writer = _Writer(program, level)
     space: dict[str, Any] = {
-        **{f"op_{op.name}": function for op, function in OPERATORS.items()},
+        **{f"op_{op.name}": op.meaning for op in Op},
         **{f"extern_{at}": one for at, one in enumerate(program.procedures)},
         **{f"variable_{at}": one for at, one in enumerate(program.variables)},
         "admitted": _admitted, "ExternError": ExternError, "Fault": Fault, "at": _at,

@@ -9,17 +9,16 @@ from rcsc.lang.expressions.operators import Typed, compared
 from rcsc.lang.expressions.placing import placed
 from rcsc.lang.expressions.scope import Body, Scope
 from rcsc.lang.expressions.typed import among, between, boolean, typed
+from rcsc.lang.interval_sets import compared as keys_compared
+from rcsc.lang.interval_sets import complement, joined, meet, scaled
 from rcsc.lang.leaves import read_by
 from rcsc.lang.model import (
-    COMPARISONS,
     Among,
     Apply,
     Bool,
     Box,
     Expr,
     Int,
-    Literal,
-    Op,
     Read,
     Real,
     Scalar,
@@ -31,10 +30,20 @@ from rcsc.lang.model import (
     key_of,
     value_of_key,
 )
+from rcsc.lang.operator_table import (
+    MIRRORED,
+    Comparison,
+    Logic,
+    Op,
+    Operator,
+    Signed,
+    is_comparison,
+    is_logic,
+    truth_function,
+)
 from rcsc.lang.syntax import tree
 
 _SMALL = 512
-_FLIPPED = {Op.LT: Op.GT, Op.LE: Op.GE, Op.GT: Op.LT, Op.GE: Op.LE, Op.EQ: Op.EQ, Op.NE: Op.NE}
 
 
 @dataclass(slots=True)
@@ -88,9 +97,11 @@ class Tests:
             return None
         found: Typed | None
         match written:
-            case tree.Comparison(op, value, span):
+            case tree.Comparison(written_op, value, span):
+                op: Operator = Op(written_op)
+                assert is_comparison(op)
                 other = typed(scope, body, value, subject.expr.type)
-                found = None if other is None else compared(scope, Op(op), (subject, other), span)
+                found = None if other is None else compared(scope, op, (subject, other), span)
             case tree.OneOf(members, span):
                 found = among(scope, body, subject, members, span)
             case tree.Between(low, high, span):
@@ -122,25 +133,6 @@ def _tried(condition: Expr, name: VariableName, kind: Scalar, keys: range) -> Bo
     return joined(holding)
 
 
-def joined(parts: list[tuple[int, int]]) -> Box:
-    """Sorted and merged where they touch."""
-    merged: list[tuple[int, int]] = []
-    for low, high in sorted(part for part in parts if part[0] <= part[1]):
-        if merged and low <= merged[-1][1] + 1:
-            merged[-1] = (merged[-1][0], max(merged[-1][1], high))
-        else:
-            merged.append((low, high))
-    return tuple(merged)
-
-
-def _without(box: Box, low: int, high: int) -> Box:
-    edges, at = [], low
-    for first, last in box:
-        edges.append((at, first - 1))
-        at = last + 1
-    return joined([*edges, (at, high)])
-
-
 def _box(condition: Expr, kind: Scalar, low: int, high: int) -> Box | None:
     always = fold(condition)
     if always is not None:
@@ -153,48 +145,36 @@ def _box(condition: Expr, kind: Scalar, low: int, high: int) -> Box | None:
             return joined([(key, key) for key in keys if low <= key <= high])
         case Apply(op=Op.NOT, args=(inner,)):
             box = _box(inner, kind, low, high)
-            return None if box is None else _without(box, low, high)
-        case Apply(op=Op.AND | Op.OR | Op.IMPLIES as op, args=(left, right)):
+            return None if box is None else complement(box, low, high)
+        case Apply(op=op, args=(left, right)) if is_logic(op):
             one, two = _box(left, kind, low, high), _box(right, kind, low, high)
-            return None if one is None or two is None else _joined_by(op, one, two, low, high)
-        case Apply(op=op, args=(left, right)) if op in COMPARISONS:
+            return None if one is None or two is None else _logic(op, one, two, low, high)
+        case Apply(op=op, args=(left, right)) if is_comparison(op):
             return _compared(op, left, right, kind, low, high)
         case _:
             return None
 
 
-def _joined_by(op: Op, one: Box, two: Box, low: int, high: int) -> Box:
-    if op is Op.IMPLIES:
-        one = _without(one, low, high)
-    if op is Op.AND:
-        return joined([(max(a, c), min(b, d)) for a, b in one for c, d in two])
-    return joined([*one, *two])
+def _logic(op: Logic, one: Box, two: Box, low: int, high: int) -> Box:
+    def signed(box: Box) -> Signed[Box]:
+        return lambda wanted: box if wanted else complement(box, low, high)
+
+    whole = truth_function(
+        op, signed(one), signed(two), lambda boxes: meet(*boxes), lambda boxes: joined(boxes[0] + boxes[1])
+    )
+    return whole(True)
 
 
-def _compared(op: Op, left: Expr, right: Expr, kind: Scalar, low: int, high: int) -> Box | None:
+def _compared(op: Comparison, left: Expr, right: Expr, kind: Scalar, low: int, high: int) -> Box | None:
     if fold(left) is not None:
-        left, right, op = right, left, _FLIPPED[op]
+        left, right, op = right, left, MIRRORED[op]
     value = fold(right)
     if value is None or isinstance(right.type, Bool) is not isinstance(kind, Bool):
         return None
     if isinstance(left, Read):
-        return _against(op, key_of(kind, value), low, high)
+        return keys_compared(op, key_of(kind, value), low, high)
     line = _affine(left) if isinstance(kind, Int) else None
     return None if line is None else _affine_box(op, line, int(value), low, high)
-
-
-def _against(op: Op, key: int, low: int, high: int) -> Box:
-    below, above = (low, min(key - 1, high)), (max(key + 1, low), high)
-    at = (key, key) if low <= key <= high else (1, 0)
-    parts = {
-        Op.EQ: [at],
-        Op.NE: [below, above],
-        Op.LT: [below],
-        Op.LE: [below, at],
-        Op.GT: [above],
-        Op.GE: [at, above],
-    }
-    return joined(parts[op])
 
 
 def _affine(expr: Expr) -> tuple[int, int] | None:
@@ -223,17 +203,9 @@ def _combined(op: Op, one: tuple[int, int], two: tuple[int, int]) -> tuple[int, 
     return a + sign * c, b + sign * d
 
 
-def _affine_box(op: Op, line: tuple[int, int], value: int, low: int, high: int) -> Box | None:
+def _affine_box(op: Comparison, line: tuple[int, int], value: int, low: int, high: int) -> Box:
     """Keys x with a * x + b `op` value."""
     a, rest = line[0], value - line[1]
-    if a < 0:
-        a, rest, op = -a, -rest, _FLIPPED[op]
     if a == 0:
-        always = fold(Apply(op, (Literal(0, Int(0, 0)), Literal(rest, Int(rest, rest))), Bool()))
-        return ((low, high),) if always else ()
-    floor, exact = rest // a, rest % a == 0
-    if op in (Op.EQ, Op.NE):
-        return _against(op, floor, low, high) if exact else (() if op is Op.EQ else ((low, high),))
-    if op in (Op.LE, Op.GT) or exact:
-        return _against(op, floor, low, high)
-    return _against(Op.LE if op is Op.LT else Op.GT, floor, low, high)
+        return ((low, high),) if op.meaning(0, rest) else ()
+    return scaled(op, a, rest, low, high)

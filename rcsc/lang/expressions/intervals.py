@@ -7,14 +7,14 @@ those of the extreme operands, computed in the same arithmetic.
 import math
 from itertools import product
 
-from rcsc.lang.interpret import divide
-from rcsc.lang.model import Int, Op, Real, Scalar, Unit
+from rcsc.lang.model import Int, Real, Scalar, Unit
+from rcsc.lang.operator_table import Arithmetic, Op, divide
 
 WIDEST = 2**200
 """Integer bounds stop here: a result beyond 64 bits is refused by its own proof obligation."""
 
 
-def apply(op: Op, kinds: tuple[Int | Real, ...], unit: Unit) -> Scalar:
+def apply(op: Arithmetic, kinds: tuple[Int | Real, ...], unit: Unit) -> Scalar:
     """The type of `op` over operands of these types."""
     if isinstance(kinds[0], Int):
         low, high = _integers(op, [k for k in kinds if isinstance(k, Int)])
@@ -23,7 +23,7 @@ def apply(op: Op, kinds: tuple[Int | Real, ...], unit: Unit) -> Scalar:
     return Real(*bounds, unit) if bounds else Real(-math.inf, math.inf, unit)
 
 
-def _integers(op: Op, kinds: list[Int]) -> tuple[int, int]:
+def _integers(op: Arithmetic, kinds: list[Int]) -> tuple[int, int]:
     a = kinds[0]
     if op is Op.NEG:
         return -a.high, -a.low
@@ -52,7 +52,7 @@ def _integers(op: Op, kinds: list[Int]) -> tuple[int, int]:
             return max(a.low, b.low), max(a.high, b.high)
 
 
-def _reals(op: Op, kinds: list[Real]) -> tuple[float, float] | None:
+def _reals(op: Arithmetic, kinds: list[Real]) -> tuple[float, float] | None:
     """The bounds; None where an operand may be infinite, or a divisor zero."""
     a = kinds[0]
     if not all(math.isfinite(bound) for k in kinds for bound in (k.low, k.high)):

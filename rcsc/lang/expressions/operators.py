@@ -18,11 +18,11 @@ from rcsc.lang.model import (
     Expr,
     Int,
     Literal,
-    Op,
     Real,
     Scalar,
     Unit,
 )
+from rcsc.lang.operator_table import Arithmetic, Comparison, Conversion, Op
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +63,9 @@ def same_kind(one: Scalar, two: Scalar) -> bool:
     return type(one) is type(two)
 
 
-def applied(scope: Scope, op: Op, operands: tuple[Typed, ...], unit: Unit, span: Span) -> Typed | None:
+def applied(
+    scope: Scope, op: Arithmetic, operands: tuple[Typed, ...], unit: Unit, span: Span
+) -> Typed | None:
     """The operation with its bounds; folded where all operands are constants."""
     kinds = tuple(o.expr.type for o in operands if isinstance(o.expr.type, Int | Real))
     args = tuple(o.expr for o in operands)
@@ -86,7 +88,7 @@ def applied(scope: Scope, op: Op, operands: tuple[Typed, ...], unit: Unit, span:
     return Typed(Literal(value + 0.0 if isinstance(value, float) else value, point, span), bare)
 
 
-def scaled(scope: Scope, op: Op, left: Typed, right: Typed, span: Span) -> Typed | None:
+def scaled(scope: Scope, op: Arithmetic, left: Typed, right: Typed, span: Span) -> Typed | None:
     """A product or quotient: units multiply."""
     if not one_kind(scope, left, right, span):
         return None
@@ -96,7 +98,7 @@ def scaled(scope: Scope, op: Op, left: Typed, right: Typed, span: Span) -> Typed
     return applied(scope, op, (left, right), normal(powers), span)
 
 
-def alike(scope: Scope, op: Op, operands: tuple[Typed, ...], span: Span) -> Typed | None:
+def alike(scope: Scope, op: Arithmetic, operands: tuple[Typed, ...], span: Span) -> Typed | None:
     """A sum, difference, remainder, least or greatest: units agree."""
     unit = common_unit(scope, operands, span)
     if unit is None or not one_kind(scope, operands[0], operands[-1], span):
@@ -133,7 +135,7 @@ def common_unit(scope: Scope, operands: tuple[Typed, ...], span: Span) -> Unit |
     return units[0]
 
 
-def compared(scope: Scope, op: Op, pair: tuple[Typed, Typed], span: Span) -> Typed | None:
+def compared(scope: Scope, op: Comparison, pair: tuple[Typed, Typed], span: Span) -> Typed | None:
     """A comparison of the two."""
     left, right = pair
     if not one_kind(scope, left, right, span) or common_unit(scope, pair, span) is None:
@@ -152,7 +154,7 @@ def _nearest(bound: int) -> float:
         return math.inf if bound > 0 else -math.inf
 
 
-def converted(scope: Scope, op: Op, operand: Typed, span: Span) -> Typed | None:
+def converted(scope: Scope, op: Conversion, operand: Typed, span: Span) -> Typed | None:
     """`int(x)` toward zero, or `real(n)` to the nearest double; the unit stays."""
     kind = operand.expr.type
     if op is Op.TO_REAL:

@@ -22,7 +22,6 @@ from rcsc.lang.expressions.operators import (
 from rcsc.lang.expressions.scope import Body, Scope
 from rcsc.lang.leaves import one_earlier
 from rcsc.lang.model import (
-    COMPARISONS,
     Among,
     Apply,
     Array,
@@ -31,7 +30,6 @@ from rcsc.lang.model import (
     Expr,
     Int,
     Literal,
-    Op,
     Read,
     ReadLocal,
     Real,
@@ -42,6 +40,7 @@ from rcsc.lang.model import (
     Value,
     VariableName,
 )
+from rcsc.lang.operator_table import Op, Operator, is_comparison, is_logic
 from rcsc.lang.syntax import tree
 
 DEEPEST = 200
@@ -293,14 +292,14 @@ def _may_be_member(scope: Scope, body: Body, written: tree.Expr) -> bool:
 
 
 def _binary(scope: Scope, body: Body, written: tree.Binary) -> Typed | None:
-    op = Op(written.op)
-    if op in (Op.AND, Op.OR, Op.IMPLIES):
+    op: Operator = Op(written.op)
+    if is_logic(op):
         one, two = boolean(scope, body, written.left), boolean(scope, body, written.right)
         return None if one is None or two is None else Typed(Apply(op, (one, two), Bool(), written.span))
     pair = _pair(scope, body, written.left, written.right)
     if pair is None:
         return None
-    if op in COMPARISONS:
+    if is_comparison(op):
         return compared(scope, op, pair, written.span)
     left, right = pair
     if not (_number(scope, left, written.left) and _number(scope, right, written.right)):
@@ -308,9 +307,13 @@ def _binary(scope: Scope, body: Body, written: tree.Binary) -> Typed | None:
     if op is Op.MOD and isinstance(left.expr.type, Real):
         scope.report(Code.KIND, "`mod` takes whole numbers", written.span)
         return None
-    if op in (Op.MUL, Op.DIV):
-        return scaled(scope, op, left, right, written.span)
-    return alike(scope, op, (left, right), written.span)
+    match op:
+        case Op.MUL | Op.DIV:
+            return scaled(scope, op, left, right, written.span)
+        case Op.ADD | Op.SUB | Op.MOD:
+            return alike(scope, op, (left, right), written.span)
+        case _:
+            raise ValueError(op)  # the grammar has no such operator of two operands
 
 
 def _in_set(scope: Scope, body: Body, written: tree.InSet) -> Typed | None:
@@ -385,6 +388,10 @@ def _function(scope: Scope, body: Body, written: tree.Apply) -> Typed | None:
         _number(scope, o, w) for o, w in zip(operands, written.args, strict=True)
     ):
         return None
-    if op in (Op.TO_INT, Op.TO_REAL):
-        return converted(scope, op, operands[0], written.span)
-    return alike(scope, op, operands, written.span)
+    match op:
+        case Op.TO_INT | Op.TO_REAL:
+            return converted(scope, op, operands[0], written.span)
+        case Op.ABS | Op.MIN | Op.MAX:
+            return alike(scope, op, operands, written.span)
+        case _:
+            raise ValueError(op)  # the grammar has no such function

@@ -1,9 +1,10 @@
 """Parse trees to syntax trees: one method a grammar rule, in grammar order."""
 
 from dataclasses import replace
-from typing import Any, ClassVar, Protocol
+from typing import Any, Protocol
 
 from rcsc.diagnostics.source import Span
+from rcsc.lang.operator_table import LOGIC
 from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.comments import Comments, split, words
 from rcsc.lang.syntax.lalr import Node
@@ -233,13 +234,11 @@ class Build:
 
     # --- expressions ---
 
-    _BINARY: ClassVar[dict[str, str]] = {"implies": "implies", "disjoin": "or", "conjoin": "and"}
-
     def expr(self, node: Node) -> tree.Expr:
         """Any expression."""
         rule, span, parts = node.data, self._span(node), node.children
-        if rule in self._BINARY:
-            return tree.Binary(self._BINARY[rule], self.expr(parts[0]), self.expr(parts[1]), span)
+        if rule in LOGIC:  # the rule is called as the word is
+            return tree.Binary(rule, self.expr(parts[0]), self.expr(parts[1]), span)
         if rule in ("compare", "arithmetic"):
             return tree.Binary(str(parts[1]), self.expr(parts[0]), self.expr(parts[2]), span)
         if rule in ("negate", "minus"):

@@ -2,11 +2,13 @@
 
 from collections.abc import Iterable
 
+from rcsc.lang.operator_table import LOGIC
+
 _DECLARATION = frozenset(
     "USE UNIT CONST ENUM TYPE RECORD KIND ASSUME INVARIANT PROPERTY PROCEDURE MODULE EXTERN OWNER TABLE LEVEL".split()
 )
 _EXPRESSION = frozenset("TRUE FALSE REAL LPAR FUNCTION NOT WAS".split())
-_OPERATOR = frozenset("ADD_OP MUL_OP COMPARE EQUAL AND OR IMPLIES IN DOT LSQB".split())
+_OPERATOR = frozenset("ADD_OP MUL_OP COMPARE EQUAL IN DOT LSQB".split()) | {op.upper() for op in LOGIC}
 _STATEMENT = frozenset("IF CASE FOR LOCAL NEXT".split())
 
 _WORDS = {

@@ -2,10 +2,8 @@
 
 from typing import assert_never
 
+from rcsc.lang.operator_table import IMPLICATION, NEGATION, POSTFIX, RELATION, SIGN, SUM, Op
 from rcsc.lang.syntax import tree
-
-_BINARY = {"implies": 1, "or": 2, "and": 3, "+": 6, "-": 6, "*": 7, "/": 7, "mod": 7}
-_RELATION, _NOT, _MINUS, _POSTFIX = 5, 4, 8, 9
 
 
 def spell_expr(expr: tree.Expr, least: int = 0) -> str:
@@ -18,42 +16,41 @@ def _expr(expr: tree.Expr) -> tuple[str, int]:
     """The text, and how tightly it binds."""
     match expr:
         case tree.BoolLiteral(value):
-            return ("true" if value else "false"), _POSTFIX
+            return ("true" if value else "false"), POSTFIX
         case tree.IntLiteral(text, unit) | tree.RealLiteral(text, unit):
-            return text + (f" {spell_unit(unit)}" if unit else ""), _POSTFIX
+            return text + (f" {spell_unit(unit)}" if unit else ""), POSTFIX
         case tree.Reference(name):
-            return name.text, _POSTFIX
+            return name.text, POSTFIX
         case tree.FieldOf(base, name):
-            return f"{spell_expr(base, _POSTFIX)}.{name.text}", _POSTFIX
+            return f"{spell_expr(base, POSTFIX)}.{name.text}", POSTFIX
         case tree.IndexOf(base, index):
-            return f"{spell_expr(base, _POSTFIX)}[{spell_expr(index)}]", _POSTFIX
+            return f"{spell_expr(base, POSTFIX)}[{spell_expr(index)}]", POSTFIX
         case tree.Unary("not", operand):
-            return f"not {spell_expr(operand, _NOT)}", _NOT
+            return f"not {spell_expr(operand, NEGATION)}", NEGATION
         case tree.Unary(_, operand):
-            return f"-{spell_expr(operand, _MINUS)}", _MINUS
+            return f"-{spell_expr(operand, SIGN)}", SIGN
         case tree.Was(operand):
-            return f"was {spell_expr(operand, _POSTFIX)}", _MINUS
+            return f"was {spell_expr(operand, POSTFIX)}", SIGN
         case tree.Binary(op, left, right):
             return _binary(op, left, right)
         case tree.InSet(subject, members):
-            return f"{spell_expr(subject, 6)} in {_set(members)}", _RELATION
+            return f"{spell_expr(subject, SUM)} in {_set(members)}", RELATION
         case tree.InRange(subject, low, high):
-            return f"{spell_expr(subject, 6)} in {spell_expr(low, 6)} .. {spell_expr(high, 6)}", _RELATION
+            return (
+                f"{spell_expr(subject, SUM)} in {spell_expr(low, SUM)} .. {spell_expr(high, SUM)}",
+                RELATION,
+            )
         case tree.Apply(function, args):
-            return f"{function.text}({', '.join(spell_expr(arg) for arg in args)})", _POSTFIX
+            return f"{function.text}({', '.join(spell_expr(arg) for arg in args)})", POSTFIX
         case _:
             assert_never(expr)
 
 
 def _binary(op: str, left: tree.Expr, right: tree.Expr) -> tuple[str, int]:
-    strength = _BINARY.get(op, _RELATION)
-    if op == "implies":
-        ends = spell_expr(left, 2), spell_expr(right, 1)
-    elif strength == _RELATION:
-        ends = spell_expr(left, 6), spell_expr(right, 6)
-    else:
-        ends = spell_expr(left, strength), spell_expr(right, strength + 1)
-    return f"{ends[0]} {op} {ends[1]}", strength
+    """Relations do not stand in a row; `implies` takes what follows it, the others what stands before them."""
+    strength = Op(op).strength
+    first = spell_expr(left, strength + (strength in (IMPLICATION, RELATION)))
+    return f"{first} {op} {spell_expr(right, strength + (strength != IMPLICATION))}", strength
 
 
 def _set(members: tuple[tree.Expr, ...]) -> str:
@@ -82,7 +79,7 @@ def spell_type(kind: tree.TypeExpr) -> str:
         case tree.IntType(low, high, unit) | tree.RealType(low, high, unit):
             word = "int" if isinstance(kind, tree.IntType) else "real"
             unit_text = f" {spell_unit(unit)}" if unit else ""
-            return f"{word} {spell_expr(low, 6)} .. {spell_expr(high, 6)}{unit_text}"
+            return f"{word} {spell_expr(low, SUM)} .. {spell_expr(high, SUM)}{unit_text}"
         case tree.ArrayType(length, element):
             return f"array[{spell_expr(length)}] of {spell_type(element)}"
         case _:
@@ -95,11 +92,11 @@ def spell_condition(condition: tree.Condition, whole: bool) -> str:
         case tree.Comparison(op, value):
             if whole:
                 return spell_expr(value) if _plain(value) else f"({spell_expr(value)})"
-            return spell_expr(value, 6) if op == "=" and _plain(value) else f"{op} {spell_expr(value, 6)}"
+            return spell_expr(value, SUM) if op == "=" and _plain(value) else f"{op} {spell_expr(value, SUM)}"
         case tree.OneOf(members):
             return f"in {_set(members)}"
         case tree.Between(low, high):
-            return f"{spell_expr(low, 6)} .. {spell_expr(high, 6)}"
+            return f"{spell_expr(low, SUM)} .. {spell_expr(high, SUM)}"
         case _:
             assert_never(condition)
 

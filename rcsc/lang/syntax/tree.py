@@ -114,7 +114,7 @@ class Was:
 
 @dataclass(frozen=True, slots=True)
 class Binary:
-    """`op` is one of `implies or and = /= < <= > >= + - * / mod`."""
+    """`op` is the word of an operator of two operands (`operator_table`)."""
 
     op: str
     left: "Expr"

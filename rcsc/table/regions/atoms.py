@@ -10,11 +10,12 @@ form and one bound. Two doubles compare as their keys do, which is linear as wel
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import partial
 from typing import TypeAlias
 
+from rcsc.lang.interval_sets import joined, meet, scaled
 from rcsc.lang.meaning import spelled
 from rcsc.lang.model import (
-    COMPARISONS,
     Among,
     Apply,
     Bool,
@@ -22,7 +23,6 @@ from rcsc.lang.model import (
     Expr,
     Int,
     Literal,
-    Op,
     Program,
     Read,
     Real,
@@ -31,12 +31,10 @@ from rcsc.lang.model import (
     key_bounds,
     key_of,
 )
+from rcsc.lang.operator_table import OPPOSITE, Comparison, Op, Signed, is_comparison, is_logic, truth_function
 
 Form: TypeAlias = tuple[tuple[int, int], ...]
 """Columns and their coefficients: sorted, none zero, the first positive, greatest divisor 1."""
-
-_MIRROR = {Op.LT: Op.GT, Op.GT: Op.LT, Op.LE: Op.GE, Op.GE: Op.LE, Op.EQ: Op.EQ, Op.NE: Op.NE}
-_OPPOSITE = {Op.LT: Op.GE, Op.GE: Op.LT, Op.LE: Op.GT, Op.GT: Op.LE, Op.EQ: Op.NE, Op.NE: Op.EQ}
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,30 +146,25 @@ class Universe:
                 return TRUE if bool(value) == wanted else FALSE
             case Apply(op=Op.NOT, args=(part,)):
                 return self.of(part, not wanted)
-            case Apply(op=Op.AND | Op.OR | Op.IMPLIES as op, args=(left, right)):
-                first = self.of(left, wanted != (op is Op.IMPLIES))
-                parts = (first, self.of(right, wanted))
-                return every(parts) if (op is Op.AND) == wanted else some(parts)
-            case Apply(op=op, args=(left, right)) if op in COMPARISONS:
-                return self._comparison(condition, left, right, op if wanted else _OPPOSITE[op], wanted)
+            case Apply(op=op, args=(left, right)) if is_logic(op):
+                return self._truths(op, left, right)(wanted)
+            case Apply(op=op, args=(left, right)) if is_comparison(op):
+                return self._comparison(condition, left, right, op if wanted else OPPOSITE[op], wanted)
             case Among(subject=subject, values=values):
                 keys = [key_of(subject.type, value) for value in values]
                 return self._among(condition, subject, keys, wanted)
             case _:
                 return self._truth(condition, wanted)
 
+    def _truths(self, op: Op, left: Expr, right: Expr) -> Signed[Formula]:
+        return truth_function(op, partial(self.of, left), partial(self.of, right), every, some)
+
     def _truth(self, condition: Expr, wanted: bool) -> Formula:
         return self.atom(self.single[self.column(condition)], ((int(wanted), int(wanted)),))
 
-    def _comparison(self, whole: Expr, left: Expr, right: Expr, op: Op, wanted: bool) -> Formula:
+    def _comparison(self, whole: Expr, left: Expr, right: Expr, op: Comparison, wanted: bool) -> Formula:
         if isinstance(left.type, Bool) and not (_is_plain(left) and _is_plain(right)):
-            same = some(
-                (every((self.of(left), self.of(right))), every((self.of(left, False), self.of(right, False))))
-            )
-            differ = some(
-                (every((self.of(left), self.of(right, False))), every((self.of(left, False), self.of(right))))
-            )
-            return same if op is Op.EQ else differ
+            return self._truths(op, left, right)(True)
         if not (_is_finite(left) and _is_finite(right)):
             return self._truth(whole, wanted)
         coefficients, constant = self.linear(left)
@@ -189,16 +182,15 @@ class Universe:
         ]
         return some(parts) if wanted else every(parts)
 
-    def _against(self, coefficients: dict[int, int], op: Op, bound: int) -> Formula:
+    def _against(self, coefficients: dict[int, int], op: Comparison, bound: int) -> Formula:
         """`sum of coefficients op bound`, divided through and rounded to integers."""
         terms = sorted((column, k) for column, k in coefficients.items() if k)
         if not terms:
-            return TRUE if _holds(0, op, bound) else FALSE
+            return TRUE if op.meaning(0, bound) else FALSE
         divisor = math.gcd(*(k for _, k in terms))
-        if terms[0][1] < 0:
-            divisor, op = -divisor, _MIRROR[op]
+        divisor = -divisor if terms[0][1] < 0 else divisor
         form = self.form(tuple((column, k // divisor) for column, k in terms))
-        return self.atom(form, _intervals(op, bound, divisor, self.low[form], self.high[form]))
+        return self.atom(form, scaled(op, divisor, bound, self.low[form], self.high[form]))
 
     def linear(self, expr: Expr) -> tuple[dict[int, int], int]:
         """Coefficients of columns, and a constant, that add up to the key of `expr`."""
@@ -236,10 +228,10 @@ def some(parts: Iterable[Formula]) -> Formula:
             return TRUE
         kept.update(dict.fromkeys(part.parts if isinstance(part, Some) else (part,)))
     forms = {part.form for part in kept if isinstance(part, Atom)}
-    joined: list[Formula] = [Atom(form, _union(part for part in kept if isinstance(part, Atom) and part.form == form))
+    found: list[Formula] = [Atom(form, joined(one for part in kept if isinstance(part, Atom) and part.form == form for one in part.box))
                              for form in sorted(forms)]  # fmt: skip
-    joined += [part for part in kept if not isinstance(part, Atom)]
-    return joined[0] if len(joined) == 1 else Some(tuple(joined))
+    found += [part for part in kept if not isinstance(part, Atom)]
+    return found[0] if len(found) == 1 else Some(tuple(found))
 
 
 def clauses(formulas: Iterable[Formula]) -> Clauses:
@@ -254,12 +246,6 @@ def clauses(formulas: Iterable[Formula]) -> Clauses:
             rest.append(part)
     impossible = whole == FALSE or any(not box for box in boxes.values())
     return Clauses(tuple(sorted(boxes.items())), tuple(rest), impossible)
-
-
-def meet(left: Box, right: Box) -> Box:
-    """The keys in both."""
-    found = ((max(a, c), min(b, d)) for a, b in left for c, d in right)
-    return tuple(sorted((low, high) for low, high in found if low <= high))
 
 
 def lines_of(universe: Universe, table: Table) -> list[Clauses]:
@@ -281,48 +267,6 @@ def assumptions_of(universe: Universe, program: Program, table: Table) -> list[C
     """Every assumption that the table may use, in the table's order, as clauses."""
     conditions = {assumption.name: assumption.condition for assumption in program.assumptions}
     return [clauses((universe.of(conditions[name]),)) for name in table.assumptions]
-
-
-def _union(atoms: Iterable[Atom]) -> Box:
-    joined: list[tuple[int, int]] = []
-    for low, high in sorted(interval for atom in atoms for interval in atom.box):
-        if joined and low <= joined[-1][1] + 1:
-            joined[-1] = (joined[-1][0], max(high, joined[-1][1]))
-        else:
-            joined.append((low, high))
-    return tuple(joined)
-
-
-def _intervals(op: Op, bound: int, divisor: int, low: int, high: int) -> Box:
-    """Where `divisor * form op' bound`; `op` is already mirrored for a negative divisor."""
-    quotient, remainder = divmod(bound, divisor)
-    below = quotient if remainder else quotient - 1  # greatest integer under bound / divisor
-    above = quotient + 1
-    at_most, at_least = quotient, quotient + bool(remainder)
-    match op:
-        case Op.LT:
-            return ((low, below),)
-        case Op.LE:
-            return ((low, at_most),)
-        case Op.GT:
-            return ((above, high),)
-        case Op.GE:
-            return ((at_least, high),)
-    hit = () if remainder else ((quotient, quotient),)
-    if op is Op.EQ:
-        return hit
-    return ((low, below), (above, high)) if hit else ((low, high),)
-
-
-def _holds(left: int, op: Op, right: int) -> bool:
-    return {
-        Op.EQ: left == right,
-        Op.NE: left != right,
-        Op.LT: left < right,
-        Op.LE: left <= right,
-        Op.GT: left > right,
-        Op.GE: left >= right,
-    }[op]
 
 
 def _is_plain(expr: Expr) -> bool:

@@ -9,8 +9,7 @@ Source: house style, example 6 (pin each variable, in declared order, to the lea
 
 from collections.abc import Callable, Mapping, Sequence
 
-from rcsc.lang.interval_sets import furthest
-from rcsc.lang.model import Box
+from rcsc.lang.interval_sets import complement, furthest
 from rcsc.table.regions.atoms import Atom, Clauses, Every, Formula, Some, Universe, clauses, every, some
 from rcsc.table.regions.linear import Simplex, integer_point
 from rcsc.table.regions.region import Answer, Bounds, Point
@@ -165,12 +164,6 @@ def negated(universe: Universe, formula: Formula) -> Formula:
             return some(negated(universe, part) for part in parts)
         case Some(parts):
             return every(negated(universe, part) for part in parts)
-
-
-def complement(box: Box, low: int, high: int) -> Box:
-    """What of `low .. high` is not in the box."""
-    edges = [low - 1, *(end for interval in box for end in interval), high + 1]
-    return tuple((a + 1, b - 1) for a, b in zip(edges[::2], edges[1::2], strict=True) if a + 1 <= b - 1)
 
 
 def whole(line: Clauses) -> Formula:

@@ -9,8 +9,9 @@ from dataclasses import dataclass, field
 from enum import Enum, auto
 from typing import TypeAlias
 
+from rcsc.lang.interval_sets import meet
 from rcsc.lang.model import Box, Snapshot
-from rcsc.table.regions.atoms import FALSE, Atom, Every, Formula, Some, every, meet, some
+from rcsc.table.regions.atoms import FALSE, Atom, Every, Formula, Some, every, some
 from rcsc.table.regions.linear import Multipliers, Simplex
 
 Bounds: TypeAlias = tuple[int, int]

@@ -15,7 +15,8 @@ from collections.abc import Sequence
 from itertools import combinations
 from math import prod
 
-from rcsc.table.regions.atoms import Clauses, Universe, meet
+from rcsc.lang.interval_sets import meet
+from rcsc.table.regions.atoms import Clauses, Universe
 from rcsc.table.regions.boxleaf import defect, parting
 from rcsc.table.regions.linear import Multipliers, Simplex
 from rcsc.table.regions.region import (

@@ -40,6 +40,7 @@ from rcsc.lang.model import (
     key_bounds,
     value_of_key,
 )
+from rcsc.lang.operator_table import is_logic
 from rcsc.testing.executors.symbols import Symbols
 
 INFIX = {
@@ -162,7 +163,7 @@ class Writer:
             wide = c_type(*(arg.type for arg in args))
         elif op in (Op.TO_INT, Op.TO_REAL):
             return f"(({c_type(kind)}){self.expr(args[0])})"
-        elif op in (Op.AND, Op.OR, Op.IMPLIES, Op.NOT):
+        elif is_logic(op) or op is Op.NOT:
             wide = "int32_t"
         else:
             wide = c_type(kind, *(arg.type for arg in args))

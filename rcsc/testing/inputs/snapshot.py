@@ -14,18 +14,16 @@ from random import Random
 from typing import TypeAlias
 
 from rcsc.lang.interpret import holds
+from rcsc.lang.interval_sets import compared, complement, meet
 from rcsc.lang.model import (
-    COMPARISONS,
     Among,
     Apply,
     Bool,
     Box,
     Expr,
     Literal,
-    Op,
     Program,
     Read,
-    Scalar,
     Snapshot,
     Test,
     Value,
@@ -34,6 +32,7 @@ from rcsc.lang.model import (
     key_of,
     value_of_key,
 )
+from rcsc.lang.operator_table import MIRRORED, Op, is_comparison, is_logic
 from rcsc.testing.executors.edges import companions, leaf_edges, reads
 
 
@@ -69,41 +68,6 @@ def conjunction(wanted: Sequence[Wanted]) -> Expr:
     return whole
 
 
-def complement(box: Box, kind: Scalar) -> Box:
-    """The keys of the type that are not in `box`."""
-    low, high = key_bounds(kind)
-    found: list[tuple[int, int]] = []
-    for start, end in box:
-        if low < start:
-            found.append((low, start - 1))
-        low = max(low, end + 1)
-    return (*found, (low, high)) if low <= high else tuple(found)
-
-
-def intersection(left: Box, right: Box) -> Box:
-    """The keys in both."""
-    pairs = ((max(a, c), min(b, d)) for a, b in left for c, d in right)
-    return tuple(sorted((low, high) for low, high in pairs if low <= high))
-
-
-LOGIC = frozenset({Op.AND, Op.OR, Op.NOT, Op.IMPLIES})
-FLIP = {Op.LT: Op.GT, Op.LE: Op.GE, Op.GT: Op.LT, Op.GE: Op.LE, Op.EQ: Op.EQ, Op.NE: Op.NE}
-
-
-def _compared(op: Op, key: int, kind: Scalar) -> Box:
-    low, high = key_bounds(kind)
-    ranges = {
-        Op.EQ: ((key, key),),
-        Op.LT: ((low, key - 1),),
-        Op.LE: ((low, key),),
-        Op.GT: ((key + 1, high),),
-        Op.GE: ((key, high),),
-    }
-    if op is Op.NE:
-        return complement(_compared(Op.EQ, key, kind), kind)
-    return intersection(ranges[op], ((low, high),))
-
-
 def box_of(condition: Test | Expr) -> tuple[str, Box] | None:
     """The leaf and its keys where the condition reads one leaf only, compared with constants."""
     if isinstance(condition, Test):
@@ -113,11 +77,11 @@ def box_of(condition: Test | Expr) -> tuple[str, Box] | None:
             return name, ((1, 1),)
         case Among(subject=Read(name=name, type=kind), values=values):
             keys = sorted({key_of(kind, value) for value in values})
-            return name, intersection(tuple((key, key) for key in keys), (key_bounds(kind),))
-        case Apply(op=op, args=(Read(name=name, type=kind), Literal(value=value))) if op in COMPARISONS:
-            return name, _compared(op, key_of(kind, value), kind)
-        case Apply(op=op, args=(Literal(value=value), Read(name=name, type=kind))) if op in COMPARISONS:
-            return name, _compared(FLIP[op], key_of(kind, value), kind)
+            return name, meet(tuple((key, key) for key in keys), (key_bounds(kind),))
+        case Apply(op=op, args=(Read(name=name, type=kind), Literal(value=value))) if is_comparison(op):
+            return name, compared(op, key_of(kind, value), *key_bounds(kind))
+        case Apply(op=op, args=(Literal(value=value), Read(name=name, type=kind))) if is_comparison(op):
+            return name, compared(MIRRORED[op], key_of(kind, value), *key_bounds(kind))
         case _:
             return None
 
@@ -126,7 +90,7 @@ def related_leaves(expr: Expr) -> set[str]:
     """The leaves that `expr` does not only compare with constants."""
     if box_of(expr) is not None or isinstance(expr, Literal):
         return set()
-    if isinstance(expr, Apply) and expr.op in LOGIC:
+    if isinstance(expr, Apply) and (is_logic(expr.op) or expr.op is Op.NOT):
         return {name for arg in expr.args for name in related_leaves(arg)}
     return reads(expr)
 
@@ -153,8 +117,8 @@ class Search:
                 continue
             name, box = one
             kind = self.variables[name].type
-            allowed = box if truth else complement(box, kind)
-            boxes[name] = intersection(boxes.get(name, (key_bounds(kind),)), allowed)
+            allowed = box if truth else complement(box, *key_bounds(kind))
+            boxes[name] = meet(boxes.get(name, (key_bounds(kind),)), allowed)
             if not boxes[name]:
                 return Missing.NONE
         base = self._settle(boxes, prefer)

@@ -13,8 +13,9 @@ from dataclasses import dataclass
 from itertools import product
 
 from rcsc.lang.interpret import holds, matching_lines
-from rcsc.lang.model import Apply, Expr, Line, Op, Program, Snapshot, Table, Test, pending
-from rcsc.testing.inputs.snapshot import LOGIC, Missing, Search, Wanted, conjunction, expr_of
+from rcsc.lang.model import Apply, Expr, Line, Program, Snapshot, Table, Test, pending
+from rcsc.lang.operator_table import Op, is_logic
+from rcsc.testing.inputs.snapshot import Missing, Search, Wanted, conjunction, expr_of
 from rcsc.testing.inputs.spell import words
 
 MOST_ATOMS = 8  # of one `when` cell; its truth table is enumerated
@@ -72,7 +73,7 @@ def atoms(test: Test) -> tuple[Test | Expr, ...]:
     found: dict[Expr, None] = {}
 
     def part(expr: Expr) -> None:
-        if isinstance(expr, Apply) and expr.op in LOGIC:
+        if isinstance(expr, Apply) and (is_logic(expr.op) or expr.op is Op.NOT):
             for arg in expr.args:
                 part(arg)
         else:
@@ -87,15 +88,7 @@ def _truth(expr: Expr, known: Mapping[Expr, bool]) -> bool:
     if expr in known or not isinstance(expr, Apply):
         return known[expr]
     args = [_truth(arg, known) for arg in expr.args]
-    match expr.op:
-        case Op.NOT:
-            return not args[0]
-        case Op.AND:
-            return args[0] and args[1]
-        case Op.OR:
-            return args[0] or args[1]
-        case _:
-            return not args[0] or args[1]
+    return bool(expr.op.meaning(*args))
 
 
 @dataclass(frozen=True, slots=True)

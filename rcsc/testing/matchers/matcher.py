@@ -28,12 +28,12 @@ from random import Random
 
 from rcsc.host.children import scratch
 from rcsc.host.tools import Absent, c_compiler, run_command, write_c
+from rcsc.lang.interval_sets import meet
 from rcsc.lang.model import Box, Program, Real, Table, Variable, key_bounds, real_key, value_of_key
 from rcsc.testing.executors.edges import companions, leaf_edges, may_be_matched, relational_tests
 from rcsc.testing.executors.externs import STAND_INS
 from rcsc.testing.executors.native import to_word
 from rcsc.testing.executors.symbols import Symbols
-from rcsc.testing.inputs.snapshot import intersection
 from rcsc.testing.matchers.matcher_c import self_test_c
 from rcsc.testing.matchers.matcher_text import (
     EVERY_KEY,
@@ -184,7 +184,7 @@ class _Checker:
             if stated:
                 box = stated[0]
                 for other in stated[1:]:
-                    box = intersection(box, other)
+                    box = meet(box, other)
                 yield 1 << at, box
 
     def cells_at(self, leaf: Variable, keys: Sequence[int]) -> list[int]:

@@ -8,7 +8,6 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 from rcsc.compose.promela.cycle.statements import Check, Flat, Forget, Fork, Match, Put, Tell
-from rcsc.lang.interpret import OPERATORS
 from rcsc.lang.model import (
     BEFORE,
     COMPARISONS,
@@ -65,7 +64,7 @@ class Group:
         classes: dict[tuple[bool, ...], Value] = {}
         tests = sorted(self.tests)
         for value in values:
-            classes.setdefault(tuple(bool(OPERATORS[op](value, at)) for op, at in tests), value)
+            classes.setdefault(tuple(bool(op.meaning(value, at)) for op, at in tests), value)
         return list(classes.values())
 
 

@@ -1,0 +1,139 @@
+"""The operators of the language: one row each.
+
+In: nothing. Out: `Op`, whose members say how an operator is written, how tightly it binds there, and what it means; groups of
+operators that are treated alike, as types, so that mypy names the operator that a `match` over a group forgets; and
+`truth_function`, by which stages that know conjunction, disjunction and negation know every operator on truth values.
+"""
+
+import operator
+from collections.abc import Callable
+from enum import StrEnum
+from typing import TYPE_CHECKING, Any, Literal, Self, TypeAlias, TypeVar, get_args
+
+if TYPE_CHECKING:
+    from typing_extensions import TypeIs
+
+IMPLICATION, DISJUNCTION, CONJUNCTION, NEGATION, RELATION, SUM, PRODUCT, SIGN, POSTFIX = range(1, 10)
+"""How tightly operators bind, loosest first."""
+
+
+def divide(a: int, b: int) -> int:
+    """Quotient rounded toward zero, as in C."""
+    quotient = abs(a) // abs(b)
+    return quotient if (a < 0) == (b < 0) else -quotient
+
+
+class Op(StrEnum):
+    """Operators; the value is the spelling in the source, but of the negative.
+
+    The meanings are those of every stage: folding, bounds and interpreter compute with them, and executors, solvers and reference are
+    held against them. Reals are IEEE 754 binary64, rounded to nearest even. Comparisons with a NaN are false, but `/=`, which is
+    true. `min` and `max` keep their first operand where it is a NaN, and drop a second one. `abs` and `-` act on the sign, of
+    zeros too. `int` is undefined of a NaN or an infinity, and `/` and `mod` of a divisor that is zero.
+
+    Attributes:
+        strength: How tightly it binds.
+        meaning: Its value, of operands of one kind.
+    """
+
+    strength: int
+    meaning: Callable[..., Any]
+
+    def __new__(cls, word: str, strength: int = POSTFIX, meaning: Callable[..., Any] = abs) -> Self:
+        """Makes a member of its row."""
+        one = str.__new__(cls, word)
+        one._value_, one.strength, one.meaning = word, strength, meaning
+        return one
+
+    IMPLIES = "implies", IMPLICATION, lambda a, b: not a or b
+    OR = "or", DISJUNCTION, lambda a, b: a or b
+    AND = "and", CONJUNCTION, lambda a, b: a and b
+    NOT = "not", NEGATION, operator.not_
+    EQ = "=", RELATION, operator.eq
+    NE = "/=", RELATION, operator.ne
+    LT = "<", RELATION, operator.lt
+    LE = "<=", RELATION, operator.le
+    GT = ">", RELATION, operator.gt
+    GE = ">=", RELATION, operator.ge
+    ADD = "+", SUM, operator.add
+    SUB = "-", SUM, operator.sub
+    MUL = "*", PRODUCT, operator.mul
+    DIV = "/", PRODUCT, lambda a, b: a / b if isinstance(a, float) else divide(a, b)
+    MOD = "mod", PRODUCT, lambda a, b: a - b * divide(a, b)
+    NEG = "-x", SIGN, operator.neg
+    ABS = "abs", POSTFIX, abs
+    MIN = "min", POSTFIX, lambda a, b: b if b < a else a  # noqa: FURB136 - says which it is where a NaN is among them
+    MAX = "max", POSTFIX, lambda a, b: b if b > a else a  # noqa: FURB136 - as above
+    TO_INT = "int", POSTFIX, int
+    TO_REAL = "real", POSTFIX, float
+
+
+Logic: TypeAlias = Literal[Op.AND, Op.OR, Op.IMPLIES]
+"""Truth functions of two operands. The right one is looked at only where the left one does not decide."""
+Comparison: TypeAlias = Literal[Op.EQ, Op.NE, Op.LT, Op.LE, Op.GT, Op.GE]
+Ordering: TypeAlias = Literal[Op.EQ, Op.LT, Op.LE]
+"""Comparisons by which the others can be said, of a NaN too."""
+Arithmetic: TypeAlias = Literal[Op.NEG, Op.ABS, Op.ADD, Op.SUB, Op.MUL, Op.DIV, Op.MOD, Op.MIN, Op.MAX]
+"""From numbers of one kind to a number of it."""
+Conversion: TypeAlias = Literal[Op.TO_INT, Op.TO_REAL]
+Operator: TypeAlias = Literal[Op.NOT] | Logic | Comparison | Arithmetic | Conversion
+"""Every operator: `Op` member by member, so that mypy knows what is left where a group has been dealt with."""
+Core: TypeAlias = Literal[Op.NOT, Op.AND] | Ordering | Arithmetic | Conversion
+"""What is left where the other truth functions and comparisons are said by these."""
+
+LOGIC: frozenset[Logic] = frozenset(get_args(Logic))
+COMPARISONS: frozenset[Comparison] = frozenset(get_args(Comparison))
+MIRRORED: dict[Op, Comparison] = {
+    Op.LT: Op.GT, Op.GT: Op.LT, Op.LE: Op.GE, Op.GE: Op.LE, Op.EQ: Op.EQ, Op.NE: Op.NE,
+}  # fmt: skip
+"""The comparison that is the same with its sides exchanged."""
+OPPOSITE: dict[Op, Comparison] = {
+    Op.LT: Op.GE, Op.GE: Op.LT, Op.LE: Op.GT, Op.GT: Op.LE, Op.EQ: Op.NE, Op.NE: Op.EQ,
+}  # fmt: skip
+"""The comparison that holds where another does not; of values that are ordered, which a NaN is not."""
+
+
+def is_logic(op: Operator) -> "TypeIs[Logic]":
+    """Whether it is a truth function of two operands."""
+    return op in LOGIC
+
+
+def is_comparison(op: Operator) -> "TypeIs[Comparison]":
+    """Whether it compares."""
+    return op in COMPARISONS
+
+
+PAIRS = ((True, True), (True, False), (False, True), (False, False))
+T = TypeVar("T")
+Signed: TypeAlias = Callable[[bool], T]
+"""A condition where it is to hold, or (of false) where it is not."""
+
+
+def truth_function(
+    op: Op,
+    left: Signed[T],
+    right: Signed[T],
+    every: Callable[[tuple[T, T]], T],
+    some: Callable[[tuple[T, T]], T],
+) -> Signed[T]:
+    """An operator on two truth values in negation normal form.
+
+    True of one pair of operands, it is the conjunction that holds there; false of one, the disjunction that fails there: so `a implies
+    b`, false of (true, false), is `not a or b`. Else it is two conjunctions: `a = b` is `a and b or not a and not b`.
+    """
+
+    def signed(wanted: bool) -> T:
+        rows = [row for row in PAIRS if bool(op.meaning(*row)) is wanted]
+        if len(rows) == 3:
+            [(a, b)] = set(PAIRS) - set(rows)
+            return some((left(not a), right(not b)))
+        parts = [every((left(a), right(b))) for a, b in rows]
+        return parts[0] if len(parts) == 1 else some((parts[0], parts[1]))
+
+    return signed
+
+
+UNDECIDED = {
+    op: frozenset(a for a in (False, True) if op.meaning(a, False) != op.meaning(a, True)) for op in LOGIC
+}
+"""The values of the left operand for which the right one is looked at."""
