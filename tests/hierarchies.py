@@ -156,7 +156,7 @@ def _known(made: Hierarchy, name: str, made_systems: dict[str, TransitionSystem]
     """A level's proof and its states; many hierarchies have a level in common."""
     ts = made_systems[name]
     level = next(one for one in made.levels if one.name == name)
-    role = Role(ts.program, ts.level, ts.links, dict(level.said).get("next") in ODD)
+    role = Role(ts.program, ts.level, ts.links, dict(level.said).get("next") in ODD, ts.trusted)
     text = files(made)
     words = (text[f"{name}.rcs"], text["words.rcs"], repr(ts.links))
     if words not in _KNOWN:

@@ -159,12 +159,14 @@ class Role:
 
     Attributes:
         odd: Whether its program computes with an echo, or skips numbers.
+        relied: The declared assumptions that a proof relies on; None: all that may speak of what a cycle takes.
     """
 
     program: Program
     level: Level
     links: Links
     odd: bool = False
+    relied: frozenset[str] | None = None
 
     @cached_property
     def leaves(self) -> tuple[str, ...]:
@@ -209,18 +211,23 @@ class Role:
 
     @cached_property
     def trusted(self) -> frozenset[str]:
-        """Assumptions that the tables are declared to rely on, of what a cycle takes: what it reads before the table runs."""
+        """Assumptions that the tables are declared to rely on, of what a cycle takes: what it reads before the table runs.
+
+        A leaf that the preprocess writes may have nothing to do with what is taken (`new_command := not new_command`): a proof may
+        rely on fewer, and has then to prove the others.
+        """
         early = {str(v.name) for v in self.program.variables if v.deferred_until is not None} | set(
             self.inputs
         )
         for one in self.program.procedures:
             if one.name in self.level.preprocess:
                 early |= set(map(str, one.writes))
-        return frozenset(
+        may = frozenset(
             str(one.name)
             for one in self.program.assumptions
             if one.standing is Standing.ASSUMED and early & set(map(str, read_by(one.condition)))
         )
+        return may if self.relied is None else may & self.relied
 
     @cached_property
     def asks(self) -> bool:
