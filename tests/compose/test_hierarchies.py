@@ -32,7 +32,8 @@ from tests.small_hierarchies.world import canonical, offers, wanted
 LITTLE = 12
 """Lines of the tables of a hierarchy that is quickly judged."""
 SMALL = (*(seed for seed in range(20_000, 20_030) if sum(hierarchy(seed).lines) < LITTLE), 20_044, 20_047)
-ANY = (*range(20_302, 20_305), 430_897)  # the last: a fact of what the preprocess makes of state alone is declared
+ANY = (*range(20_302, 20_305), 430_897)
+"""In the last a fact is declared of what the preprocess makes of state alone."""
 
 
 @pytest.fixture(autouse=True)
