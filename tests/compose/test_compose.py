@@ -97,7 +97,7 @@ def test_no_state_that_the_interpreter_reaches_breaks_the_invariant(
     ts, proof = upper
     assert proof.clauses
     for seed in range(1000, 1012):  # other walks than those that the search began with
-        walk = Walk(ts.program, ts.level, ts.links, Random(seed))  # noqa: S311  # repeatable on purpose
+        walk = Walk(ts, Random(seed))  # noqa: S311  # repeatable on purpose
         for state in walk.states(80):
             here = Reached.of([point(ts, proof.predicates, state)], len(proof.predicates))
             assert not any(here.shows(clause) for clause in proof.clauses)
@@ -231,7 +231,7 @@ def test_a_level_without_tables_is_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize("level", ["task", "emove", "vision", "primitive", "gripper"])
 def test_a_cycle_as_nodes_is_the_interpreter_s_cycle(level: str) -> None:
     ts = transition_systems(SHIPPED)[level]
-    walk = Walk(ts.program, ts.level, ts.links, Random(7))  # noqa: S311  # repeatable on purpose
+    walk = Walk(ts, Random(7))  # noqa: S311  # repeatable on purpose
     compared = 0
     for at, state in enumerate(walk.states(240)):
         if at % 12:

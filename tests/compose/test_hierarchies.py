@@ -93,7 +93,7 @@ def test_every_state_of_a_random_walk_is_among_those_that_are_listed(seed: int, 
         explored(role, seen=listed)
         walked = set()
         for start in range(6):
-            walk = Walk(role.program, role.level, role.links, Random(start))  # noqa: S311  # repeatable on purpose
+            walk = Walk(TransitionSystem(role.program, role.level, role.links), Random(start))  # noqa: S311  # repeatable on purpose
             walked |= {tuple(canonical(role, _bare(role, state)).values()) for state in walk.states(60)}
         assert len(walked) > 2
         assert walked <= listed

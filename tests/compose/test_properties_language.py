@@ -572,7 +572,7 @@ def test_no_walk_of_the_shipped_levels_breaks_what_they_state() -> None:
         assert len(names) >= 4
         spoken: set[Value] = set()
         for seed in (40, 41):
-            walk = Walk(ts.program, ts.level, ts.links, Random(seed))  # noqa: S311  # repeatable on purpose
+            walk = Walk(ts, Random(seed))  # noqa: S311  # repeatable on purpose
             before: dict[str, Value] = dict(initial(ts.program))
             for after in walk.states(60):
                 assert [name for name in names if not property_kept(ts, name, before, after)] == []

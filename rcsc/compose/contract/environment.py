@@ -16,13 +16,12 @@ ECHO, ECHOED, STATUS = "inc_command_echo", "ref_command_echo", "status_report"
 
 
 @dataclass(frozen=True, slots=True)
-class Below:
-    """A subordinate.
+class Neighbour:
+    """A level, or something outside the system, with which orders and reports are exchanged.
 
     Attributes:
         name: Of the level, or of what stands outside.
-        order: This level's output record that orders it.
-        report: The input record in which it reports.
+        order: The record of this level that carries orders; `report`, the one that carries reports on them.
         outside: Whether it is no level of the system.
     """
 
@@ -31,21 +30,45 @@ class Below:
     report: str
     outside: bool
 
+    @property
+    def number(self) -> str:
+        """The leaf with the number of the order."""
+        return f"{self.order}.{NUMBER}"
+
+    @property
+    def command(self) -> str:
+        """The leaf with the command that is ordered."""
+        return f"{self.order}.{COMMAND}"
+
+    @property
+    def echo(self) -> str:
+        """The leaf with the number that is reported about."""
+        return f"{self.report}.{ECHO}"
+
+    @property
+    def echoed(self) -> str:
+        """The leaf with the command that is reported about."""
+        return f"{self.report}.{ECHOED}"
+
+    @property
+    def status(self) -> str:
+        """The leaf with what is reported of it."""
+        return f"{self.report}.{STATUS}"
+
 
 @dataclass(frozen=True, slots=True)
-class Above:
-    """The superior.
+class Below(Neighbour):
+    """A subordinate: `order` is an output of this level, `report` an input."""
+
+
+@dataclass(frozen=True, slots=True)
+class Above(Neighbour):
+    """The superior: `order` is an input of this level, `report` an output.
 
     Attributes:
-        order: The input record in which it orders.
-        report: This level's output record that reports to it.
         numbered: Leaves of the order that are the same wherever the number is (not the number itself).
     """
 
-    name: str
-    order: str
-    report: str
-    outside: bool
     numbered: tuple[str, ...]
 
 

@@ -12,7 +12,7 @@ from itertools import combinations
 from typing import TypeAlias
 
 from rcsc.compose.contract.claims import SAFE
-from rcsc.compose.contract.environment import COMMAND, ECHO, ECHOED, NUMBER, Below, leaves_under
+from rcsc.compose.contract.environment import Below, leaves_under
 from rcsc.compose.contract.properties import invariants, kept_within, properties
 from rcsc.compose.contract.transition import Cycle, TableAt, TransitionSystem, successor
 from rcsc.lang.interval_sets import meet
@@ -158,8 +158,8 @@ def _upward(ts: TransitionSystem, cycle: Cycle) -> Iterator[Obligation]:
     """What the superior assumes of this level."""
     if (above := ts.links.above) is None:
         return
-    number = values.equal(cycle.after[f"{above.report}.{ECHO}"], cycle.taken[f"{above.order}.{NUMBER}"])
-    command = values.equal(cycle.after[f"{above.report}.{ECHOED}"], cycle.taken[f"{above.order}.{COMMAND}"])
+    number = values.equal(cycle.after[above.echo], cycle.taken[above.number])
+    command = values.equal(cycle.after[above.echoed], cycle.taken[above.command])
     as_before = (
         values.all_of(  # where an extern procedure is refused it may be as late as if the level had not run
             values.equal(cycle.before[leaf], cycle.after[leaf])
@@ -173,58 +173,50 @@ def _upward(ts: TransitionSystem, cycle: Cycle) -> Iterator[Obligation]:
 def _downward(ts: TransitionSystem, cycle: Cycle) -> Iterator[Obligation]:
     """What the subordinates assume of this level, and that it waits for them."""
     for below in ts.links.below:
-        number = f"{below.order}.{NUMBER}"
-        before, after = cycle.before[number], cycle.after[number]
+        before, after = cycle.before[below.number], cycle.after[below.number]
         same = values.equal(before, after)
         for leaf in leaves_under(ts.program, below.order):
-            if leaf != number:
+            if leaf != below.number:
                 kept = values.equal(cycle.before[leaf], cycle.after[leaf])
                 yield Obligation(Sort.NUMBERED, "", leaf, values.follows(same, kept))
         yield Obligation(
             Sort.NEXT_NUMBER, "", below.order, values.either(same, values.equal(after, successor(before)))
         )
         if ts.links.above is not None:
-            command = f"{below.order}.{COMMAND}"
-            kept = values.equal(cycle.before[command], cycle.after[command])
+            kept = values.equal(cycle.before[below.command], cycle.after[below.command])
             yield Obligation(Sort.WAITS, "", below.order, values.follows(_waiting(ts, cycle, below), kept))
             if not list(_no_pause(ts, below)):
                 yield Obligation(Sort.PAUSES, "", below.order, _passes_on_a_pause(ts, cycle, below))
 
 
-def _waiting(ts: TransitionSystem, cycle: Cycle, below: Below) -> Node:
-    """The command is the last one, and the order is not echoed."""
+def command_stays(ts: TransitionSystem, cycle: Cycle) -> Node:
+    """Say that the level, which has a superior, takes the order that it took in the cycle before."""
     above = ts.links.above
     assert above is not None
-    number = f"{above.order}.{NUMBER}"
-    sent = cycle.before[f"{below.order}.{NUMBER}"]
-    echo = f"{below.report}.{ECHO}"
-    return values.all_of(
-        (
-            values.equal(cycle.before[number], cycle.taken[number]),
-            values.negation(values.equal(cycle.taken[echo], sent)),
-        )
-    )
+    return values.equal(cycle.before[above.number], cycle.taken[above.number])
+
+
+def _waiting(ts: TransitionSystem, cycle: Cycle, below: Below) -> Node:
+    """The command is the last one, and the order is not echoed."""
+    echoed = values.equal(cycle.taken[below.echo], cycle.before[below.number])
+    return values.both(command_stays(ts, cycle), values.negation(echoed))
 
 
 def _passes_on_a_pause(ts: TransitionSystem, cycle: Cycle, below: Below) -> Node:
     """Where a new order is the first command, PAUSE or its like, so is the order that stands below after the cycle."""
     above = ts.links.above
     assert above is not None
-    taken, passed = f"{above.order}.{COMMAND}", f"{below.order}.{COMMAND}"
-    new = values.negation(
-        values.equal(cycle.before[f"{above.order}.{NUMBER}"], cycle.taken[f"{above.order}.{NUMBER}"])
-    )
-    paused = values.equal(cycle.taken[taken], values.constant(ts.kinds[taken], 0))
-    passes = values.equal(cycle.after[passed], values.constant(ts.kinds[passed], 0))
-    return values.follows(values.both(new, paused), passes)
+    paused = values.equal(cycle.taken[above.command], values.constant(ts.kinds[above.command], 0))
+    passes = values.equal(cycle.after[below.command], values.constant(ts.kinds[below.command], 0))
+    return values.follows(values.both(values.negation(command_stays(ts, cycle)), paused), passes)
 
 
 def _own(ts: TransitionSystem, cycle: Cycle) -> Iterator[Obligation]:
     above = ts.links.above
     if above is not None and has_flag(ts):
-        same = values.equal(cycle.before[f"{above.order}.{NUMBER}"], cycle.taken[f"{above.order}.{NUMBER}"])
         rises = values.both(cycle.after[FLAG], values.negation(cycle.before[FLAG]))
-        yield Obligation(Sort.ONCE, "", FLAG, values.follows(same, values.negation(rises)))
+        once = values.follows(command_stays(ts, cycle), values.negation(rises))
+        yield Obligation(Sort.ONCE, "", FLAG, once)
         for at in cycle.tables:
             overlooking = _overlooking(at)
             ends = bool(at.table.stops) or _asks(ts.program)
@@ -275,7 +267,7 @@ def _no_pause(ts: TransitionSystem, below: Below) -> Iterator[str]:
     assert ts.links.above is not None
     if isinstance(ts.level.tables, OneTable):
         yield "the level has one table for all commands"
-    for leaf in (f"{ts.links.above.order}.{COMMAND}", f"{below.order}.{COMMAND}"):
+    for leaf in (ts.links.above.command, below.command):
         if not isinstance(ts.kinds[leaf], Enum):
             yield f"`{leaf}` is no enumeration"
 

@@ -13,7 +13,6 @@ a state; all of it is read from the model:
 from collections.abc import Container, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 
-from rcsc.compose.contract.environment import COMMAND
 from rcsc.compose.contract.transition import GHOST, Cycle, Leaves, TransitionSystem
 from rcsc.lang.interpret import call, holds
 from rcsc.lang.leaves import everything, expressions, read_by
@@ -190,7 +189,7 @@ def _read(ts: TransitionSystem) -> set[str]:
     if not isinstance(level.tables, OneTable):
         conditions.append(level.tables.selector)
     found = {str(name) for condition in conditions for name in read_by(condition)}
-    found |= {f"{below.order}.{COMMAND}" for below in ts.links.below}
+    found |= {below.command for below in ts.links.below}
     found |= {f"{GHOST}{asked.into}" for asked in ts.links.asked}
     return found | {
         str(pending(v.name)) for v in program.variables if v.deferred_until is not None and v.name in found

@@ -7,7 +7,7 @@ selected table and postprocess, exactly as `interpret.cycle` does; what the envi
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
-from rcsc.compose.contract.environment import COMMAND, ECHO, ECHOED, NUMBER, Below, Links
+from rcsc.compose.contract.environment import COMMAND, NUMBER, Below, Links
 from rcsc.lang.interpret import Fault, evaluate
 from rcsc.lang.model import (  # fmt: skip
     Action,
@@ -163,6 +163,8 @@ class TransitionSystem:
     """Makes cycles of one level.
 
     Attributes:
+        kinds: The type of each leaf and ghost, by name.
+        inputs: The leaves that each cycle takes, in declared order.
         trusted: Assumptions that the tables are declared to rely on, of what the environment gives: part of the contract.
     """
 
@@ -172,12 +174,14 @@ class TransitionSystem:
     safety: Safety = Safety()
     procedures: dict[str, Procedure] = field(init=False)
     kinds: dict[str, Scalar] = field(init=False)
+    inputs: tuple[str, ...] = field(init=False)
     trusted: frozenset[str] = field(init=False, default=frozenset())
 
     def __post_init__(self) -> None:
         """Reads what cycles are made of."""
         self.procedures = {one.name: one for one in self.program.procedures}
         self.kinds = {str(v.name): v.type for v in self.program.variables}
+        self.inputs = tuple(str(v.name) for v in self.program.variables if v.kind is Kind.INPUT)
         for asked in self.links.asked:
             self.kinds[f"{GHOST}{asked.into}"] = Bool()
             for key in asked.keys:
@@ -216,9 +220,8 @@ class TransitionSystem:
         yet: the one after the order that stands in the buffer, which may be late; after the echo where none stands.
         """
         start = self.initial()
-        inputs = {str(v.name) for v in self.program.variables if v.kind is Kind.INPUT}
         start |= {
-            name: values.variable(f"{name} before restart", self.kinds[name]) for name in sorted(inputs)
+            name: values.variable(f"{name} before restart", self.kinds[name]) for name in sorted(self.inputs)
         }
         for name, member in FAILED.items():
             kind = self.kinds.get(name)
@@ -248,6 +251,14 @@ class TransitionSystem:
             self.safety,
         )
 
+    def table(self, name: str) -> Table:
+        """A table of the program.
+
+        Raises:
+            StopIteration: It has none of this name.
+        """
+        return next(one for one in self.program.tables if one.name == name)
+
     def table_of(self, snapshot: Snapshot) -> str:
         """The table that ran in a cycle, by what the cycle left: what selects it stays from the preprocess on (`UNSTEADY_SELECTOR`)."""
         if isinstance(self.level.tables, OneTable):
@@ -260,8 +271,7 @@ class TransitionSystem:
         What extern procedures give is named with it, too: cycles that one question is about need different suffixes.
         """
         if taken is None:
-            inputs = [v for v in self.program.variables if v.kind is Kind.INPUT]
-            taken = {str(v.name): values.variable(f"{v.name}{suffix}", v.type) for v in inputs}
+            taken = {name: values.variable(f"{name}{suffix}", self.kinds[name]) for name in self.inputs}
         run = Run(self.procedures, self.kinds, dict(before), suffix=suffix, refusals=True)
         run.state.leaves.update(taken)
         ghosts, answers = self._database(before, taken)
@@ -308,9 +318,9 @@ class TransitionSystem:
         """What holds of orders and reports, whatever the delay (`compose.__doc__`)."""
         kept = TRUE
         if (above := self.links.above) is not None:
-            number = f"{above.order}.{NUMBER}"
             same = values.all_of(values.equal(before[leaf], taken[leaf]) for leaf in above.numbered)
-            kept = values.both(kept, values.follows(values.equal(before[number], taken[number]), same))
+            again = values.equal(before[above.number], taken[above.number])
+            kept = values.both(kept, values.follows(again, same))
         for below in self.links.below:
             kept = values.both(kept, self.echo(below, before, taken))
         return kept
@@ -318,9 +328,8 @@ class TransitionSystem:
     @staticmethod
     def echo(below: Below, before: Leaves, taken: Leaves) -> Node:
         """The last order's number with another command is not echoed, nor a number not yet sent; what is echoed stays so."""
-        sent, last = before[f"{below.order}.{NUMBER}"], before[f"{below.report}.{ECHO}"]
-        echo = taken[f"{below.report}.{ECHO}"]
-        it = values.equal(taken[f"{below.report}.{ECHOED}"], before[f"{below.order}.{COMMAND}"])
+        sent, last, echo = before[below.number], before[below.echo], taken[below.echo]
+        it = values.equal(taken[below.echoed], before[below.command])
         now = values.equal(echo, sent)
         stays = values.follows(values.equal(last, sent), now)
         return values.all_of(

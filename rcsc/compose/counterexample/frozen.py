@@ -27,7 +27,7 @@ from rcsc.compose.proof.system import NoProgramError, transition_systems
 from rcsc.host.files.names import shown
 from rcsc.host.files.read import content, json_of
 from rcsc.lang.interpret import initial
-from rcsc.lang.model import Bool, Enum, Kind, Program, Real, Scalar, Value, key_bounds, key_of, spell
+from rcsc.lang.model import Bool, Enum, Program, Real, Scalar, Value, key_bounds, key_of, spell
 from rcsc.lang.project import project_root
 from rcsc.run.description import BadDescription
 from rcsc.symbolic import values
@@ -262,10 +262,9 @@ def _begun(ts: TransitionSystem, said: Mapping[str, str]) -> dict[str, Value]:
 
 
 def _taken(ts: TransitionSystem, now: Mapping[str, Value], said: Mapping[str, str]) -> dict[str, Value]:
-    inputs = {str(v.name) for v in ts.program.variables if v.kind is Kind.INPUT}
-    if wrong := sorted(said.keys() - inputs):
+    if wrong := sorted(said.keys() - set(ts.inputs)):
         raise BadCaseError(f"level `{ts.level.name}` has no input `{wrong[0]}`")
-    return {name: now[name] for name in inputs} | _values(ts, said)
+    return {name: now[name] for name in ts.inputs} | _values(ts, said)
 
 
 def _values(ts: TransitionSystem, said: Mapping[str, str]) -> dict[str, Value]:

@@ -9,8 +9,7 @@ was found: its second time has to be like the first, with numbers that are as mu
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from rcsc.compose.contract.environment import ECHO, NUMBER
-from rcsc.compose.contract.obligations import Obligation, Sort
+from rcsc.compose.contract.obligations import Obligation, Sort, command_stays
 from rcsc.compose.contract.transition import NUMBERS, Cycle, TransitionSystem
 from rcsc.compose.counterexample.trace import (
     NotReproducedError,
@@ -21,7 +20,7 @@ from rcsc.compose.counterexample.trace import (
     as_cycle,
     ran_on,
 )
-from rcsc.compose.proof.termination import answered, command_stays, unanswered
+from rcsc.compose.proof.termination import answered, unanswered
 from rcsc.lang.interpret import UNDEFINED, Fault
 from rcsc.solvers.sat import GaveUpError
 from rcsc.symbolic import values
@@ -83,10 +82,11 @@ def _comes_round(ts: TransitionSystem, table: str, cycles: Sequence[Cycle]) -> N
     same = [values.equal(first.before[leaf], last.after[leaf]) for leaf in first.before if leaf not in moving]
     due = []
     for below in ts.links.below:
-        sent, echo = f"{below.order}.{NUMBER}", f"{below.report}.{ECHO}"
-        ordered = values.negation(values.equal(first.before[sent], last.after[sent]))
+        ordered = values.negation(values.equal(first.before[below.number], last.after[below.number]))
         due.append(values.either(ordered, values.all_of(answered(ts, one, below) for one in cycles)))
-        before, after = (values.equal(leaves[echo], leaves[sent]) for leaves in (first.before, last.after))
+        before, after = (
+            values.equal(leaves[below.echo], leaves[below.number]) for leaves in (first.before, last.after)
+        )
         due.append(values.equal(before, after))
     waits = values.any_of(unanswered(ts, one) for one in cycles)
     return values.all_of((*goes, waits, *same, *due))
@@ -94,8 +94,7 @@ def _comes_round(ts: TransitionSystem, table: str, cycles: Sequence[Cycle]) -> N
 
 def _moving(ts: TransitionSystem) -> set[str]:
     """The numbers that go on: of orders, and their echoes."""
-    ends = ((f"{below.order}.{NUMBER}", f"{below.report}.{ECHO}") for below in ts.links.below)
-    return {leaf for pair in ends for leaf in pair}
+    return {leaf for below in ts.links.below for leaf in (below.number, below.echo)}
 
 
 def _told(ts: TransitionSystem, table: str, run: Unrolled, wrong: Node) -> Lasso | NotReproducedError:
@@ -133,11 +132,7 @@ def _is_lasso(ts: TransitionSystem, table: str, lasso: Sequence[Step]) -> bool:
 def _again(ts: TransitionSystem, lasso: Sequence[Step]) -> tuple[Step, ...]:
     """The lasso once more, on the same inputs; what echoes an order echoes the one as much later."""
     before, after = lasso[0].before, lasso[-1].after
-    later = {
-        f"{below.report}.{ECHO}": int(after[f"{below.order}.{NUMBER}"])
-        - int(before[f"{below.order}.{NUMBER}"])
-        for below in ts.links.below
-    }
+    later = {below.echo: int(after[below.number]) - int(before[below.number]) for below in ts.links.below}
     given = [
         (
             {

@@ -11,14 +11,14 @@ for a while sees late, skips, and sees again. Of everything else what a level's 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from rcsc.compose.contract.environment import COMMAND, NUMBER, Below, leaves_under
+from rcsc.compose.contract.environment import Below, leaves_under
 from rcsc.compose.contract.obligations import Obligation, Sort
-from rcsc.compose.contract.transition import Cycle, Leaves, TransitionSystem, successor
+from rcsc.compose.contract.transition import Cycle, Leaves, TransitionSystem
 from rcsc.compose.counterexample.finding import Finding
 from rcsc.compose.counterexample.simplest import Bounded, Simplest
-from rcsc.compose.counterexample.trace import NotReproducedError, Search, Step, one_cycle
+from rcsc.compose.counterexample.trace import NotReproducedError, Search, Step, in_order, one_cycle
 from rcsc.lang.interpret import initial
-from rcsc.lang.model import Bool, Kind, Value
+from rcsc.lang.model import Bool, Value
 from rcsc.solvers.sat import GaveUpError
 from rcsc.symbolic import values
 from rcsc.symbolic.values import Node
@@ -49,8 +49,7 @@ class _Side:
     @property
     def inputs(self) -> list[str]:
         """Inputs that do not come from the other level."""
-        program = self.ts.program
-        return [str(v.name) for v in program.variables if v.kind is Kind.INPUT and v.name not in self.takes]
+        return [name for name in self.ts.inputs if name not in self.takes]
 
 
 def broken_together(
@@ -115,7 +114,7 @@ class _Pair:
         taken |= {leaf: seen[leaf] for leaf in side.takes}
         one = side.ts.cycle(side.now, f" of {side.name} {tick}", taken=taken)
         runs = side.runs[-1]
-        kept = values.all_of((one.goes_on, one.contract, *_in_order(side.ts, side.now, taken)))
+        kept = values.all_of((one.goes_on, one.contract, in_order(side.ts, side.now, taken)))
         self._run.add(values.follows(runs, kept))
         side.taken.append(taken)
         side.cycles.append(one)
@@ -129,8 +128,8 @@ class _Pair:
         upper, lower = self.sides
         above = self.lower.links.above
         assert above is not None
-        number, taken = f"{above.order}.{NUMBER}", lower.taken[-1]
-        fields = dict.fromkeys((f"{above.order}.{COMMAND}", *above.numbered))
+        number, taken = above.number, lower.taken[-1]
+        fields = dict.fromkeys((above.command, *above.numbered))
         same = values.all_of(values.equal(before[1][leaf], taken[leaf]) for leaf in fields)
         one = values.follows(
             values.both(lower.runs[-1], values.equal(before[1][number], taken[number])), same
@@ -228,11 +227,9 @@ def _taken_again(lower: TransitionSystem, step: Step) -> bool:
     """Whether another order is taken under the number that was taken last."""
     above = lower.links.above
     assert above is not None
-    fields = (f"{above.order}.{COMMAND}", *above.numbered)
-    number = f"{above.order}.{NUMBER}"
-    return step.before[number] == step.taken[number] and any(
-        step.before[leaf] != step.taken[leaf] for leaf in fields
-    )
+    fields = (above.command, *above.numbered)
+    same = step.before[above.number] == step.taken[above.number]
+    return same and any(step.before[leaf] != step.taken[leaf] for leaf in fields)
 
 
 def _renamed(ts: TransitionSystem, record: str, other: str) -> dict[str, str]:
@@ -243,13 +240,3 @@ def _renamed(ts: TransitionSystem, record: str, other: str) -> dict[str, str]:
 def _with(ts: TransitionSystem, **links: object) -> TransitionSystem:
     """The level with a part of its environment left out, which is not assumed but there."""
     return TransitionSystem(ts.program, ts.level, replace(ts.links, **links))  # type: ignore[arg-type]  # fields of Links
-
-
-def _in_order(ts: TransitionSystem, before: Leaves, taken: Leaves) -> Iterator[Node]:
-    """Its superior's numbers come one after the other."""
-    if (above := ts.links.above) is not None:
-        number = f"{above.order}.{NUMBER}"
-        yield values.either(
-            values.equal(taken[number], before[number]),
-            values.equal(taken[number], successor(before[number])),
-        )

@@ -27,7 +27,7 @@ def helps(ts: TransitionSystem, finding: Finding) -> tuple[str, ...]:
         Sort.ASSUMPTION, Sort.SOME_LINE, Sort.ONE_LINE, Sort.NO_DEFAULT,
     }:  # fmt: skip
         return ()
-    table = next(one for one in ts.program.tables if one.name == step.table)
+    table = ts.table(step.table)
     if not boxes.applies(table):
         return ()
     return tuple(dict.fromkeys(_said(ts, table, step)))

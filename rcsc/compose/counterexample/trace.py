@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 
-from rcsc.compose.contract.environment import COMMAND, ECHO, ECHOED, NUMBER, Below
+from rcsc.compose.contract.environment import Below
 from rcsc.compose.contract.given import Answer, scripted
 from rcsc.compose.contract.obligations import Key, Obligation, Sort, obligations, pairs
 from rcsc.compose.contract.properties import invariant_kept, property_kept
@@ -36,7 +36,6 @@ from rcsc.lang.model import (
     Action,
     Default,
     Int,
-    Kind,
     Line,
     Op,
     Snapshot,
@@ -208,24 +207,20 @@ class Unrolled:
         return one
 
     def _legal(self, one: Cycle, at: int) -> Iterator[Node]:
-        above = self.ts.links.above
-        if above is not None:
-            number = f"{above.order}.{NUMBER}"
-            before, now = one.before[number], one.taken[number]
-            yield values.either(values.equal(now, before), values.equal(now, successor(before)))
+        yield in_order(self.ts, one.before, one.taken)
         for below in self.ts.links.below:
             yield from self._answers(below, one, at)
 
     def _answers(self, below: Below, one: Cycle, at: int) -> Iterator[Node]:
         """The report is of one of the orders published so far; of which, is a number that does not fall."""
         orders = self._orders.setdefault(below.order, [])
-        orders.append((one.before[f"{below.order}.{NUMBER}"], one.before[f"{below.order}.{COMMAND}"]))
+        orders.append((one.before[below.number], one.before[below.command]))
         kind = Int(0, self.search.most)
         which = values.variable(f"{below.report} echoes {at}", kind)
         yield values.compare(Op.LE, self._echoed.get(below.report, values.constant(kind, 0)), which)
         yield values.compare(Op.LT, which, values.constant(kind, len(orders)))
         self._echoed[below.report] = which
-        echo, echoed = one.taken[f"{below.report}.{ECHO}"], one.taken[f"{below.report}.{ECHOED}"]
+        echo, echoed = one.taken[below.echo], one.taken[below.echoed]
         for place, (number, command) in enumerate(orders):
             it = values.both(values.equal(echo, number), values.equal(echoed, command))
             yield values.follows(values.equal(which, values.constant(kind, place)), it)
@@ -281,7 +276,7 @@ class Unrolled:
         """What each cycle is given; an input stays as it was where it can, and so does what no condition reads."""
         found: list[Given] = []
         program = self.ts.program
-        inputs = [str(v.name) for v in program.variables if v.kind is Kind.INPUT]
+        inputs = self.ts.inputs
         before = [start[name] for name in inputs]
         for one in self.cycles:
             before = settled.settle([one.taken[name] for name in inputs], before)
@@ -314,6 +309,14 @@ class Unrolled:
             if other:
                 return tuple(other)
         return ("every leaf that the solver spoke of is the same in both",)
+
+
+def in_order(ts: TransitionSystem, before: Leaves, taken: Leaves) -> Node:
+    """Say that the superior's numbers come one after the other."""
+    if (above := ts.links.above) is None:
+        return values.TRUE
+    last, now = before[above.number], taken[above.number]
+    return values.either(values.equal(now, last), values.equal(now, successor(last)))
 
 
 # --- the run -------------------------------------------------------------------------------
@@ -411,7 +414,7 @@ def halfway(ts: TransitionSystem, step: Step) -> Halfway:
 
 def _actions(ts: TransitionSystem, step: Step) -> tuple[Action, ...]:
     """What the line that ran does."""
-    table = next(one for one in ts.program.tables if one.name == step.table)
+    table = ts.table(step.table)
     lines: list[Line | Default] = [*table.lines, *([] if table.default is None else [table.default])]
     return next((one.actions for one in lines if one.name == step.line), ())
 
@@ -438,8 +441,7 @@ def _step(
     line = "" if outcome.line is None else str(outcome.line)
     matched: tuple[str, ...] = () if outcome.line is None else (line,)
     if outcome.fault is Fault.SEVERAL_LINES:
-        table = next(one for one in ts.program.tables if one.name == chosen)
-        matched = tuple(map(str, matching_lines(table, after)))
+        matched = tuple(map(str, matching_lines(ts.table(chosen), after)))
     found = Step(
         dict(taken),
         chosen,
@@ -456,7 +458,7 @@ def _step(
 
 def _also_failed(ts: TransitionSystem, step: Step) -> tuple[str, ...]:
     """Assumptions of the table that no executor looks at, and that did not hold."""
-    table = next(one for one in ts.program.tables if one.name == step.table)
+    table = ts.table(step.table)
     others = [
         one
         for one in ts.program.assumptions
@@ -480,7 +482,7 @@ def broken(ts: TransitionSystem, obligation: Obligation, step: Step) -> bool:
         case Sort.SOME_LINE:
             return step.fault is Fault.NO_LINE
         case Sort.NO_DEFAULT:
-            table = next(one for one in ts.program.tables if one.name == obligation.table)
+            table = ts.table(obligation.table)
             return table.default is not None and step.line == table.default.name
         case Sort.INVARIANT:
             kept = invariant_kept(ts, obligation.name, step.before, step.after)

@@ -178,7 +178,7 @@ def _walked(
     least = most = many
     at = 0
     while at < most:
-        walk = Walk(ts.program, ts.level, ts.links, Random(at))  # noqa: S311  # as above
+        walk = Walk(ts, Random(at))  # noqa: S311  # as above
         if new and at % ANEW:
             walk.begin_at(new[max(random.randrange(len(new)), random.randrange(len(new)))])
         for state in walk.states(BURST):

@@ -197,7 +197,7 @@ def _of_below(name: str, ts: TransitionSystem, made: Mapping[str, TransitionSyst
     for below in ts.links.below:
         words = f"what `{below.name}` reports under the number of the last order is about that order"
         keys: tuple[Key, ...] = (
-            (Sort.NUMBERED, "", f"{below.order}.{COMMAND}"),
+            (Sort.NUMBERED, "", below.command),
             (Sort.NEXT_NUMBER, "", below.order),
         )
         own = tuple((name, key) for key in keys)

@@ -15,7 +15,6 @@ from collections.abc import Container, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from rcsc.compose.contract.environment import NUMBER
 from rcsc.compose.contract.transition import Cycle, TransitionSystem
 from rcsc.compose.invariant.confirm import Confirmation
 from rcsc.compose.invariant.pdr import Clause
@@ -102,9 +101,9 @@ def _starts(ts: TransitionSystem, asked: Confirmation, clauses: Sequence[Clause]
 
 def gives_an_order(ts: TransitionSystem, cycle: Cycle) -> Node:
     """That the cycle gives an order."""
-    numbers = [f"{below.order}.{NUMBER}" for below in ts.links.below]
     return values.any_of(
-        values.negation(values.equal(cycle.before[name], cycle.after[name])) for name in numbers
+        values.negation(values.equal(cycle.before[below.number], cycle.after[below.number]))
+        for below in ts.links.below
     )
 
 

@@ -24,9 +24,9 @@ Lines for which this is not shown are named in `endless`: they wait for what the
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from rcsc.compose.contract.environment import COMMAND, ECHO, ECHOED, NUMBER, STATUS, Below
-from rcsc.compose.contract.obligations import FLAG
-from rcsc.compose.contract.transition import Cycle, TableAt, TransitionSystem
+from rcsc.compose.contract.environment import ECHO, ECHOED, NUMBER, STATUS, Below, Neighbour
+from rcsc.compose.contract.obligations import FLAG, command_stays
+from rcsc.compose.contract.transition import Cycle, Leaves, TableAt, TransitionSystem
 from rcsc.compose.invariant.confirm import Confirmation
 from rcsc.compose.invariant.pdr import Clause
 from rcsc.compose.proof.context import gives_an_order, may, of_lines
@@ -84,43 +84,32 @@ def no_answers(ts: TransitionSystem) -> tuple[str, ...]:
     if above is None:
         return ()
     found = []
-    ends = ((above.order, above.report), *((below.order, below.report) for below in ts.links.below))
-    for order, report in ends:
-        kind = ts.kinds.get(f"{report}.{STATUS}")
+    for end in (above, *ts.links.below):
+        kind = ts.kinds.get(end.status)
         if not isinstance(kind, Enum) or DONE not in kind.members:
-            found.append(f"`{report}` has no `{STATUS}` with a member `{DONE}`")
-        if not isinstance(ts.kinds[f"{order}.{COMMAND}"], Enum):
-            found.append(f"`{order}.{COMMAND}` is no enumeration")
+            found.append(f"`{end.report}` has no `{STATUS}` with a member `{DONE}`")
+        if not isinstance(ts.kinds[end.command], Enum):
+            found.append(f"`{end.command}` is no enumeration")
     return tuple(found)
 
 
-def command_stays(ts: TransitionSystem, cycle: Cycle) -> Node:
-    """The level's command is still the same."""
-    above = ts.links.above
-    assert above is not None
-    number = f"{above.order}.{NUMBER}"
-    return values.equal(cycle.before[number], cycle.taken[number])
-
-
 def unanswered(ts: TransitionSystem, cycle: Cycle) -> Node:
-    """The level's report is none that its superior waits for: *done* or *failed*; of the first command *done* alone."""
-    above = ts.links.above
-    assert above is not None
-    command, status = f"{above.order}.{COMMAND}", f"{above.report}.{STATUS}"
-    rests = values.equal(cycle.taken[command], values.constant(ts.kinds[command], 0))
-    done = _says(ts, status, cycle.after, DONE)
-    ended = values.either(done, values.both(values.negation(rests), _says(ts, status, cycle.after, FAILED)))
-    return values.negation(ended)
+    """Say that the level's report is none that its superior waits for."""
+    assert ts.links.above is not None
+    return values.negation(_ended(ts, ts.links.above, cycle.taken, cycle.after))
 
 
 def answered(ts: TransitionSystem, cycle: Cycle, below: Below) -> Node:
-    """The last order is echoed, and ended: the first command by *done* alone."""
-    command, status = f"{below.order}.{COMMAND}", f"{below.report}.{STATUS}"
-    echoed = values.equal(cycle.taken[f"{below.report}.{ECHO}"], cycle.before[f"{below.order}.{NUMBER}"])
-    rests = values.equal(cycle.before[command], values.constant(ts.kinds[command], 0))
-    done = _says(ts, status, cycle.taken, DONE)
-    ended = values.either(done, values.both(values.negation(rests), _says(ts, status, cycle.taken, FAILED)))
-    return values.both(echoed, ended)
+    """Say that the last order is echoed, and ended."""
+    echoed = values.equal(cycle.taken[below.echo], cycle.before[below.number])
+    return values.both(echoed, _ended(ts, below, cycle.before, cycle.taken))
+
+
+def _ended(ts: TransitionSystem, end: Neighbour, ordered: Leaves, reported: Leaves) -> Node:
+    """Say that the report ends the command that is ordered: *done* or *failed*; the first command *done* alone."""
+    rests = values.equal(ordered[end.command], values.constant(ts.kinds[end.command], 0))
+    failed = _says(ts, end.status, reported, FAILED)
+    return values.either(_says(ts, end.status, reported, DONE), values.both(values.negation(rests), failed))
 
 
 def _says(ts: TransitionSystem, leaf: str, leaves: Mapping[str, Node], member: str) -> Node:
