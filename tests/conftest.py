@@ -42,7 +42,7 @@ def small_proved(repo: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-TOOLS = ("arm-none-eabi-gcc", "chromium", "clang", "cmake", "pkg-config", "qemu-system-arm", "spin")
+TOOLS = ("arm-none-eabi-gcc", "chromium", "clang", "cmake", "pkg-config", "qemu-system-arm")
 """What `needs` marks may name."""
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 

@@ -12,7 +12,6 @@ from rcsc.commands.campaign import campaign
 from rcsc.commands.diff import diff
 from rcsc.commands.graph import graph, table
 from rcsc.commands.logs import log, replay
-from rcsc.commands.promela import promela
 from rcsc.commands.prove import prove
 from rcsc.commands.script import run
 from rcsc.commands.shared.extras import Commands, need
@@ -326,5 +325,5 @@ def completion(shell: str) -> int:
     return 0
 
 
-for _command in (campaign, db, diff, graph, log, promela, prove, replay, run, shell, table):
+for _command in (campaign, db, diff, graph, log, prove, replay, run, shell, table):
     commands.add_command(_command)

@@ -31,7 +31,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
 if TYPE_CHECKING:
-    from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+    from concurrent.futures import ProcessPoolExecutor
     from multiprocessing.connection import Connection
     from multiprocessing.context import SpawnProcess
 
@@ -260,7 +260,6 @@ def run(
 
     Raises:
         OSError: It cannot be begun.
-        WorkerEndedError: The threads that run programs are being ended.
     """
     with interrupts_held():  # else Ctrl-C could come when the program runs and nobody knows it
         child = subprocess.Popen(
@@ -271,7 +270,6 @@ def run(
         group = f"group {child.pid}"
         _keeper.hold(group)
     try:
-        _may_begin()
         out, err = child.communicate(stdin, timeout_s)
         return Ran(child.returncode, out, err.decode(errors="replace"))
     except subprocess.TimeoutExpired:
@@ -297,41 +295,6 @@ def interrupts_held() -> Iterator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-_ending = threading.Event()
-"""Set while no program may begin."""
-
-
-@contextlib.contextmanager
-def searchers(jobs: int) -> "Iterator[ThreadPoolExecutor]":
-    """Threads that run programs; an interrupt kills those that run, and none begins after it."""
-    from concurrent.futures import ThreadPoolExecutor
-
-    made = ThreadPoolExecutor(jobs)
-    try:
-        yield made
-    except BaseException:
-        _ending.set()
-        kill_programs()
-        raise
-    finally:
-        made.shutdown(wait=True, cancel_futures=True)
-        _ending.clear()
-
-
-def _may_begin() -> None:
-    """Asked when a program is held: one that was not yet held when all were killed ends here."""
-    if _ending.is_set():
-        raise WorkerEndedError("no program begins any more")
-
-
-def kill_programs() -> None:
-    """Kill every program that `run` runs now, in whatever thread."""
-    for what in _keeper.held():
-        kind, _, name = what.partition(" ")
-        if kind == "group":
-            _kill_group(int(name))
 
 
 def _kill_group(group: int) -> None:

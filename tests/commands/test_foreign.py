@@ -109,7 +109,7 @@ COMMANDS = [
     "run day --resume", "run day --from-row 3", "run nothing", "run day --log kept.mcap",
     "db check", "db check --json", "db build", "db build -o made.sqlite", "db show", "db show places", "db show --database none",
     "campaign --episodes 1", "campaign --episodes 1 --workers 1", "prove", "prove --level task",
-    "prove --log found", "promela --write models", "promela --levels task --write models", "log none.mcap", "replay none.mcap", "certify .",
+    "prove --log found", "log none.mcap", "replay none.mcap", "certify .",
 ]  # fmt: skip
 STEPS = """help
 step 3

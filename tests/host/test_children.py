@@ -312,51 +312,6 @@ def test_a_program_says_what_it_did() -> None:
     assert children.run([sys.executable, "-c", "bytearray(1 << 30)"], memory_mb=512).status == 1
 
 
-def test_programs_in_other_threads_are_killed_together(tmp_path: Path) -> None:
-    found: list[int | None] = []
-    ready = [tmp_path / "first", tmp_path / "second"]
-    for path in ready:
-        os.mkfifo(path)
-
-    def one(end: Path) -> None:
-        found.append(children.run(["sh", "-c", f"echo > {end}; sleep 100000"]).status)
-
-    threads = [threading.Thread(target=one, args=(path,)) for path in ready]
-    for thread in threads:
-        thread.start()
-    for path in ready:
-        assert path.read_bytes() == b"\n"
-    children.kill_programs()
-    for thread in threads:
-        thread.join()
-    assert found == [-9, -9]
-
-
-def test_after_an_interrupt_no_program_begins(tmp_path: Path) -> None:
-    ready, begun = tmp_path / "ready", list[int]()
-    os.mkfifo(ready)
-
-    def several() -> None:
-        for at in range(1000):
-            begun.append(at)
-            children.run(["sh", "-c", f"echo > {ready}; sleep 100000"] if at == 0 else ["true"])
-
-    waiting: list[Any] = []
-
-    def interrupted() -> None:
-        with children.searchers(1) as pool:
-            waiting.append(pool.submit(several))
-            ready.read_bytes()
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        interrupted()
-    with pytest.raises(children.WorkerEndedError):
-        waiting[0].result()
-    assert begun in ([0], [0, 1])  # the second is refused, or the first still was
-    assert children.run(["true"]).status == 0  # what comes later may
-
-
 # --- workers ---
 
 

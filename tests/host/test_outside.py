@@ -713,7 +713,7 @@ def test_a_field_is_matched_to_its_end() -> None:
 # --- written whole or not at all -----------------------------------------------------------------
 
 SCRATCH = (
-    "rcsc/compose/counterexample/replay.py", "rcsc/compose/promela/spin.py", "rcsc/shell/reload/sources.py", "rcsc/run/executors.py",
+    "rcsc/compose/counterexample/replay.py", "rcsc/shell/reload/sources.py", "rcsc/run/executors.py",
     "rcsc/diff/revision.py", "rcsc/testing/executors/native.py", "rcsc/testing/cortex.py", "rcsc/testing/esbmc.py",
     "rcsc/testing/matchers/matcher.py", "rcsc/host/tools.py", "rcsc/testing/code_mutants.py", "sim/rcsc_cell/episodes/processes.py",
     "sim/rcsc_cell/episodes/setting.py",
