@@ -291,11 +291,11 @@ def _look(
     say: "Callable[[dict[str, TransitionSystem], Explanation, int], None] | None",
 ) -> "list[Explanation]":
     """What is not proved, each with its shortest trace where there is one."""
-    from rcsc.compose.counterexample.explain import Settings, explain
+    from rcsc.compose.counterexample.explain import TraceSettings, explain
     from rcsc.run.description import description
     from rcsc.run.executors import NotBuilt
 
-    settings = Settings(description(keep.system), cycles, altered=bool(keep.variants), log=keep.logs)
+    settings = TraceSettings(description(keep.system), cycles, altered=bool(keep.variants), log=keep.logs)
     found = []
     try:
         for one in explain(made, proof, settings):

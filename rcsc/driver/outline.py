@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 
 from rcsc.compose.proof.standing import (
     Assumed,
+    KnownSystem,
     LevelOutline,
     Outline,
-    Standing,
     TableOutline,
     any_kept,
     outline_of,
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from rcsc.lang.model import Program, Table
 
 
-def known(system: Path, cache: Cache) -> Standing | None:
+def known(system: Path, cache: Cache) -> KnownSystem | None:
     """What is known of a system as its files stand; None where no level was ever proved into the cache, or it is not in order."""
     made = outlined(system.parent.resolve() / system.name, cache) if any_kept(cache) else None
     return None if made is None else standing(cache, made)

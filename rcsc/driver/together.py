@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from rcsc.compose.contract.claims import UNREACHED
-from rcsc.compose.proof.standing import ASSUMPTION, PROPERTY, Assumed, Known, LevelOutline, Standing
+from rcsc.compose.proof.standing import ASSUMPTION, PROPERTY, Assumed, Known, KnownSystem, LevelOutline
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label, Severity, sort_key
 from rcsc.diagnostics.report import NOT_PROVED, InSystem, Report, SystemReport, TableReport, named, trusting
@@ -46,7 +46,7 @@ class _Place:
         default: The name of the table's DEFAULT line.
     """
 
-    standing: Standing
+    standing: KnownSystem
     level: LevelOutline
     table: str
     default: str
@@ -83,9 +83,9 @@ class _Seen:
         self.cache = cache
         self.systems: dict[str, SystemReport] = {}
         self.sources: dict[str, Source] = {}
-        self.levels: dict[tuple[str, str], tuple[Standing, LevelOutline]] = {}
+        self.levels: dict[tuple[str, str], tuple[KnownSystem, LevelOutline]] = {}
         self.idle: dict[tuple[str, str], str] = {}
-        self._standings: dict[Path, Standing | None] = {}
+        self._standings: dict[Path, KnownSystem | None] = {}
 
     def table(self, table: TableReport) -> TableReport:
         """The table, with what the nearest system that runs it makes of it."""
@@ -101,7 +101,7 @@ class _Seen:
                 return self._placed(table, name, at)
         return table
 
-    def _standing(self, system: Path) -> Standing | None:
+    def _standing(self, system: Path) -> KnownSystem | None:
         """What is known of a system; None where no level was ever proved, or it is not in order."""
         if system not in self._standings:
             self._standings[system] = known(system, cache_of(system.parent, self.cache))
@@ -128,7 +128,7 @@ class _Seen:
         together = InSystem(system, proved, by[Known.NOT_PROVED], unreached, conditional, rests, trusts)
         return replace(table, assumptions=assumptions, together=together)
 
-    def _say(self, system: str, made: Standing | None, *, wanted: bool) -> None:
+    def _say(self, system: str, made: KnownSystem | None, *, wanted: bool) -> None:
         before = self.systems.get(system)
         wanted = wanted or (before is not None and before.wanted)
         whole = Known.UNKNOWN if made is None else made.whole
@@ -184,7 +184,7 @@ class _Seen:
                 if one.level == level.name:
                     yield self._not_kept(system, level, one)
 
-    def _not_proved(self, system: str, made: Standing, level: LevelOutline) -> Diagnostic:
+    def _not_proved(self, system: str, made: KnownSystem, level: LevelOutline) -> Diagnostic:
         still = made.known[level.name].open
         more = [f"and {len(still) - MOST_OPEN} more"] if len(still) > MOST_OPEN else []
         return Diagnostic(
@@ -231,7 +231,7 @@ def _beside(system: Path, file: str) -> bool:
     return any(real == beside or real.parent == inside.parent for inside, beside in tried)
 
 
-def _places(made: Standing, table: TableReport) -> Iterator[_Place]:
+def _places(made: KnownSystem, table: TableReport) -> Iterator[_Place]:
     """The levels of a system that run a table."""
     real = os.path.realpath(table.file)
     for level in made.outline.levels:

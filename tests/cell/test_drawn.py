@@ -14,11 +14,11 @@ from hypothesis import strategies as st
 
 import rcsc_cell.pictures.finding_page
 from rcsc.commands import run
-from rcsc.compose.contract.obligations import Key, Sort
+from rcsc.compose.contract.obligations import ObligationKey, Sort
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.counterexample.finding import Finding, of_trace
 from rcsc.compose.counterexample.replay import _begun, part_of, record
-from rcsc.compose.counterexample.trace import Search, Trace, traces
+from rcsc.compose.counterexample.trace import Trace, TraceSearch, traces
 from rcsc.compose.proof.system import transition_systems
 from rcsc.host.files.names import BadName
 from rcsc.run.description import description
@@ -216,11 +216,11 @@ def found(tmp_path_factory: pytest.TempPathFactory) -> Found:
             text.replace("\nlevel ", f"\n## Not so.\nproperty not_so : {said}\n\nlevel "), encoding="utf-8"
         )
     made = dict(transition_systems(folder / "tables" / "system.toml"))
-    key: Key = (Sort.PROPERTY, "", "not_so")
+    key: ObligationKey = (Sort.PROPERTY, "", "not_so")
     findings, logs = {}, {}
     for level in FALSE:
         obligation = obligation_of(made[level], key)
-        trace = traces(made[level], [obligation], Search(most=2, legal=True))[key]
+        trace = traces(made[level], [obligation], TraceSearch(most=2, legal=True))[key]
         assert isinstance(trace, Trace)
         findings[level] = of_trace(made[level], obligation, trace)
         logs[level] = folder / f"{level}.mcap"

@@ -15,8 +15,8 @@ from rcsc.compose.contract.obligations import Obligation
 from rcsc.compose.contract.predicates import Predicate
 from rcsc.compose.contract.transition import Cycle, TransitionSystem
 from rcsc.compose.invariant.cubes import Masks, Pair, Reached, shown
-from rcsc.compose.invariant.search import Effort, Found, search
-from rcsc.compose.proof.context import Again
+from rcsc.compose.invariant.search import Effort, Invariant, search
+from rcsc.compose.proof.context import RepeatedLine
 from rcsc.compose.proof.kept import keep, recall
 from rcsc.compose.proof.level import LevelProof, Verdict, prove_level
 from rcsc.compose.proof.ranking import parts
@@ -291,7 +291,7 @@ def test_a_line_that_counts_when_it_matches_again_is_named(tmp_path: Path) -> No
     found = proved(tmp_path, "upper", upper=edit)
     assert found.open == ()
     assert found.context is not None
-    assert found.context.repeated == (Again("work", "1", ("tries",)),)
+    assert found.context.repeated == (RepeatedLine("work", "1", ("tries",)),)
 
 
 def test_a_command_that_need_not_end_is_named(tmp_path: Path) -> None:
@@ -413,7 +413,7 @@ def test_what_z3_does_not_confirm_is_not_proved(monkeypatch: pytest.MonkeyPatch,
         cycle: Cycle,
         wanted: Sequence[Obligation],
         effort: Effort,
-    ) -> Found:
+    ) -> Invariant:
         found = search(ts, firsts, cycle, wanted, effort)
         names = [one.name for one in found.predicates]
         at = names.index("cur_state")

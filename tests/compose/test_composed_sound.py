@@ -13,11 +13,11 @@ from rcsc.compose.contract.claims import CONTRACT, FOUND, RUNS, SAFE, Claim, Key
 from rcsc.compose.contract.obligations import Sort, unstated
 from rcsc.compose.contract.properties import property_kept
 from rcsc.compose.contract.transition import TransitionSystem
-from rcsc.compose.counterexample.explain import Settings, explain
+from rcsc.compose.counterexample.explain import TraceSettings, explain
 from rcsc.compose.counterexample.finding import of_trace
 from rcsc.compose.counterexample.frozen import BadCaseError, case_breaks, read_case
 from rcsc.compose.counterexample.lasso import Lasso, lassos
-from rcsc.compose.counterexample.trace import Search, one_cycle, ran, ran_on, shortest
+from rcsc.compose.counterexample.trace import TraceSearch, one_cycle, ran, ran_on, shortest
 from rcsc.compose.proof.assume_guarantee import agreements
 from rcsc.compose.proof.level import LevelProof, Verdict, prove_level
 from rcsc.compose.proof.system import NoProgramError, prove_system, transition_systems
@@ -477,7 +477,7 @@ def test_an_answer_that_does_not_stay_is_none(tmp_path: Path) -> None:
     lines = lines_run(ts, 40, command__inc_command=1, command__input_command=1)
     assert {line for _, line in lines[2:]} == {"2", "3"}
     assert ending(proof, "go").endless == ("2",)
-    found = lassos(ts, ("go",), Search(8, legal=True))["go"]
+    found = lassos(ts, ("go",), TraceSearch(8, legal=True))["go"]
     assert isinstance(found, Lasso)
     assert [step.line for step in found.trace.steps[found.first - 1 :]] in (["2", "3"], ["3", "2"])
 
@@ -570,7 +570,7 @@ def test_a_result_that_is_refused_ends_the_cycle_whatever_its_type(result: str, 
         if obligation.sort is Sort.PROPERTY
     }
     assert stated == {"together": Verdict.NOT_PROVED, "in_range": Verdict.PROVED}
-    [explanation] = explain(made, proof, Settings(description(path), 4))
+    [explanation] = explain(made, proof, TraceSettings(description(path), 4))
     assert explanation.finding is not None
     assert not explanation.beside
     assert explanation.finding.broken.fault is Fault.EXTERN
@@ -987,7 +987,7 @@ def test_what_is_assumed_of_state_alone_is_to_be_proved(tmp_path: Path) -> None:
     assert whole.of("solo", (Sort.ASSUMPTION, "t", "never")).verdict is Verdict.NOT_PROVED
     explanation = [
         one
-        for one in explain(made, whole, Settings(description(path), 4))
+        for one in explain(made, whole, TraceSettings(description(path), 4))
         if one.obligation.sort is Sort.ASSUMPTION
     ]
     assert [(one.finding is not None, one.beside) for one in explanation] == [(True, ())]

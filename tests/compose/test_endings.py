@@ -7,7 +7,7 @@ import pytest
 
 from rcsc.commands import run
 from rcsc.compose.counterexample.lasso import Lasso, lassos
-from rcsc.compose.counterexample.trace import NotReproducedError, Search
+from rcsc.compose.counterexample.trace import NotReproducedError, TraceSearch
 from rcsc.compose.proof.context import gives_an_order
 from rcsc.compose.proof.level import certificate, prove_level
 from rcsc.compose.proof.ranking import Counted, least_power, parts
@@ -196,7 +196,7 @@ def test_a_refutation_that_is_wrong_is_not_confirmed() -> None:
 
 def lasso(folder: Path, level: str, table: str, **edits: Edit) -> Lasso | NotReproducedError | None:
     ts = transition_systems(changed(folder, **edits))[level]
-    return lassos(ts, (table,), Search(8, legal=True)).get(table)
+    return lassos(ts, (table,), TraceSearch(8, legal=True)).get(table)
 
 
 def test_a_line_that_waits_goes_round(tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ import rcsc.compose.counterexample.trace
 import rcsc.lang.interpret
 from rcsc.commands import run
 from rcsc.compose.contract.environment import leaves_under
-from rcsc.compose.contract.obligations import Key, Obligation, Sort, may_meet, obligations, pairs
+from rcsc.compose.contract.obligations import Obligation, ObligationKey, Sort, may_meet, obligations, pairs
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.contract.variants import VARIANTS, defaults_reported, first_match, undeferred
 from rcsc.compose.counterexample.finding import Finding, of_trace, rows, time_line
@@ -25,10 +25,10 @@ from rcsc.compose.counterexample.pair import broken_together
 from rcsc.compose.counterexample.repair import helps, weakest_condition
 from rcsc.compose.counterexample.replay import ExecutorsDifferError, make, record
 from rcsc.compose.counterexample.trace import (
-    Found,
     NotReproducedError,
-    Search,
     Trace,
+    TraceResult,
+    TraceSearch,
     broken,
     seen_by_table,
     shortest,
@@ -54,7 +54,7 @@ LAST_ECHO = EXAMPLES / "later" / "last_echo.toml"
 FIRST_MATCH = EXAMPLES / "later" / "first_match.toml"
 SMALL = REPO / "tests" / "data" / "composed"
 CASES = sorted((REPO / "tests" / "findings").glob("*.json"))
-LEGAL = Search(most=4, legal=True)
+LEGAL = TraceSearch(most=4, legal=True)
 
 Edit = Callable[[str], str]
 
@@ -64,14 +64,14 @@ class Looked:
     """A level and the traces of its obligations."""
 
     ts: TransitionSystem
-    found: dict[Key, Found]
+    found: dict[ObligationKey, TraceResult]
 
     def trace(self, sort: Sort, table: str = "", name: str = "") -> Trace:
         found = self.found[sort, table, name]
         assert isinstance(found, Trace)
         return found
 
-    def finding(self, key: Key) -> Finding:
+    def finding(self, key: ObligationKey) -> Finding:
         return of_trace(self.ts, obligation_of(self.ts, key), self.trace(*key))
 
 
@@ -80,11 +80,11 @@ def every(ts: TransitionSystem) -> tuple[Obligation, ...]:
     return (*obligations(ts, one), *pairs(one))
 
 
-def obligation_of(ts: TransitionSystem, key: Key) -> Obligation:
+def obligation_of(ts: TransitionSystem, key: ObligationKey) -> Obligation:
     return next(obligation for obligation in every(ts) if obligation.key == key)
 
 
-def looked(ts: TransitionSystem, search: Search = LEGAL) -> Looked:
+def looked(ts: TransitionSystem, search: TraceSearch = LEGAL) -> Looked:
     return Looked(ts, traces(ts, every(ts), search))
 
 
@@ -144,7 +144,7 @@ def test_every_hazard_of_the_published_table_is_found_with_its_shortest_run(publ
 @pytest.mark.parametrize(
     "key", [key for key in HAZARDS if HAZARDS[key] > 1], ids=lambda key: f"{key[0].name} {key[2]}"
 )
-def test_no_shorter_run_shows_it(published: Looked, key: Key) -> None:
+def test_no_shorter_run_shows_it(published: Looked, key: ObligationKey) -> None:
     shorter = replace(LEGAL, most=HAZARDS[key] - 1)
     assert traces(published.ts, [obligation_of(published.ts, key)], shorter) == {}
 
@@ -208,7 +208,7 @@ def test_the_contract_leaves_room_for_more() -> None:
     ts = transition_systems(LAST_ECHO)["upper"]
     key = (Sort.NEXT_NUMBER, "", "to_lower")
     assert traces(ts, [obligation_of(ts, key)], LEGAL) == {}
-    wide = Looked(ts, traces(ts, [obligation_of(ts, key)], Search(most=4)))
+    wide = Looked(ts, traces(ts, [obligation_of(ts, key)], TraceSearch(most=4)))
     assert list(unlawful(wide, wide.trace(*key)))
 
 
@@ -241,7 +241,7 @@ def test_a_run_does_not_go_on_behind_a_fault() -> None:
         if obligation.name in names and obligation.sort is not Sort.WAITS
     ]
     assert {obligation.name for obligation in wanted} == names
-    found = traces(twice, wanted, Search(most=4))
+    found = traces(twice, wanted, TraceSearch(most=4))
     assert {key[2] for key in found} == {"start and start_again"}
 
 
@@ -260,8 +260,8 @@ def test_what_a_faulty_cycle_would_have_left_is_not_looked_at() -> None:
         for obligation in obligations_of
         if obligation.key == (Sort.NUMBERED, "", "to_lower.input_command")
     ]
-    assert traces(ts, [wanted], Search(most=3, legal=True))
-    assert traces(ts.of(changed), [wanted], Search(most=3, legal=True)) == {}
+    assert traces(ts, [wanted], TraceSearch(most=3, legal=True))
+    assert traces(ts.of(changed), [wanted], TraceSearch(most=3, legal=True)) == {}
 
 
 def test_a_pair_of_lines_is_not_broken_by_another(published: Looked) -> None:
@@ -342,7 +342,7 @@ def test_arithmetic_that_was_left_open_is_no_bug(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("key", HAZARDS, ids=lambda key: f"{key[0].name} {key[2]}")
 def test_a_finding_is_run_by_both_executors_and_its_log_replays(
-    published: Looked, made_by_force: Description, key: Key, tmp_path: Path
+    published: Looked, made_by_force: Description, key: ObligationKey, tmp_path: Path
 ) -> None:
     finding = published.finding(key)
     path = tmp_path / "finding.mcap"

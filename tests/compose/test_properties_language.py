@@ -15,11 +15,11 @@ from rcsc.commands import run
 from rcsc.compose.contract.environment import Links
 from rcsc.compose.contract.obligations import Obligation, Sort, obligations
 from rcsc.compose.contract.predicates import CLOSELY, Predicate
-from rcsc.compose.contract.properties import every_feature, property_kept
+from rcsc.compose.contract.properties import every_predicate, property_kept
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.contract.walk import Walk
 from rcsc.compose.counterexample.finding import of_trace, time_line
-from rcsc.compose.counterexample.trace import Search, Trace, broken, ran, shortest, traces
+from rcsc.compose.counterexample.trace import Trace, TraceSearch, broken, ran, shortest, traces
 from rcsc.compose.invariant.search import Effort, read
 from rcsc.compose.proof.kept import keep, recall
 from rcsc.compose.proof.level import LevelProof, Verdict, certificate, prove_level
@@ -276,7 +276,7 @@ def test_inputs_are_those_that_the_cycle_took() -> None:
     assert [step.taken for step in late.steps] == [{"i": True}]
     # before the first cycle after a restart inputs are as they stand in the buffers, and `s` as at first
     assert shortest(ts, stated(ts)["behind"]) is None
-    [restarted] = traces(ts, [stated(ts)["behind"]], Search(most=2, restarted=True)).values()
+    [restarted] = traces(ts, [stated(ts)["behind"]], TraceSearch(most=2, restarted=True)).values()
     assert isinstance(restarted, Trace)
     assert (restarted.restarted, len(restarted.steps), restarted.steps[0].before["i"]) == (True, 1, True)
 
@@ -402,7 +402,7 @@ def test_proofs_and_traces_are_what_enumeration_says(seed: int) -> None:
     assert 5 < len(true) < MANY - 5
     proof = prove_level(ts, LITTLE)
     assert {name for name, proved in verdicts(proof).items() if proved} == true
-    found = traces(ts, list(stated(ts).values()), Search(most=8))
+    found = traces(ts, list(stated(ts).values()), TraceSearch(most=8))
     assert {name: len(one.steps) for (_, _, name), one in found.items() if isinstance(one, Trace)} == least
 
 
@@ -502,7 +502,7 @@ def test_features_that_come_later_come_last(upper: TransitionSystem) -> None:
 
 def chosen(ts: TransitionSystem, closely: int = 0) -> tuple[Predicate, ...]:
     start = ts.cycle(ts.havoc())
-    return every_feature(ts, start, read(ts, start, obligations(ts, start)), closely)
+    return every_predicate(ts, start, read(ts, start, obligations(ts, start)), closely)
 
 
 # --- invariants ---------------------------------------------------------------------------------
@@ -521,7 +521,7 @@ def test_an_invariant_that_check_proves_may_be_false_after_a_restart(tmp_path: P
     assert verdicts(prove_level(ts, LITTLE)) == {"never_fails": False, "under_way": True}
     obligation = stated(ts)["never_fails"]
     assert shortest(ts, obligation) is None
-    [trace] = traces(ts, [obligation], Search(most=2, restarted=True)).values()
+    [trace] = traces(ts, [obligation], TraceSearch(most=2, restarted=True)).values()
     assert isinstance(trace, Trace)
     assert (len(trace.steps), trace.restarted) == (1, True)
     assert "invariant `never_fails` does not hold" in "\n".join(

@@ -12,7 +12,7 @@ import jsonschema
 import pytest
 
 from rcsc.commands import run
-from rcsc.compose.proof.standing import Known, Outline, Standing, outline_of, standing
+from rcsc.compose.proof.standing import Known, KnownSystem, Outline, outline_of, standing
 from rcsc.driver import outline
 from rcsc.host.cache import FOLDER, Cache
 
@@ -401,5 +401,5 @@ def test_an_outline_comes_back_as_it_was(here: Path) -> None:
     assert {level for one in made.assumed for level, _ in one.needs} == {"upper", "lower"}
 
 
-def standing_of(made: Outline) -> Standing:
+def standing_of(made: Outline) -> KnownSystem:
     return standing(Cache(Path("nowhere"), b"secret", "tool"), made)

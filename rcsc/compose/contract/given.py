@@ -24,7 +24,7 @@ from rcsc.lang.model import (
     value_of_key,
 )
 
-Answer: TypeAlias = tuple[str, tuple[Value, ...]]
+ExternAnswer: TypeAlias = tuple[str, tuple[Value, ...]]
 """An extern procedure, and the results of one call of it, in the order in which it writes them."""
 REFUSED_NOW_AND_THEN = 0.04
 
@@ -47,7 +47,7 @@ def least(kind: Scalar) -> Value:
 
 
 @contextmanager
-def scripted(program: Program, answers: Sequence[Answer]) -> Iterator[None]:
+def scripted(program: Program, answers: Sequence[ExternAnswer]) -> Iterator[None]:
     """Inside, each call has the next of the answers that are its procedure's; the least values where none is left."""
     left = list(answers)
 

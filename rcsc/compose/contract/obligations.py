@@ -50,7 +50,7 @@ class Sort(StrEnum):
     SAFE = SAFE[0]
 
 
-Key: TypeAlias = tuple[Sort, str, str]
+ObligationKey: TypeAlias = tuple[Sort, str, str]
 """What tells the obligations of a level apart: a key of a claim (`claims`)."""
 
 
@@ -87,7 +87,7 @@ class Obligation:
     lines: tuple[str, ...] = ()
 
     @property
-    def key(self) -> Key:
+    def key(self) -> ObligationKey:
         """The same for the same obligation in any cycle."""
         return self.sort, self.table, self.name
 

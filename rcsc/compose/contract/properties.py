@@ -116,7 +116,7 @@ def _held(condition: Expr, state: Mapping[str, Value], kinds: Mapping[str, Scala
 # --- as predicates -----------------------------------------------------------------------------
 
 
-def every_feature(
+def every_predicate(
     ts: TransitionSystem, cycle: Cycle, obligations: Iterable[Node], closely: int = 0
 ) -> tuple[Predicate, ...]:
     """What `predicates` chooses, and what invariants and properties speak of.
@@ -146,7 +146,7 @@ def _said(ts: TransitionSystem, inside: frozenset[str], there: set[str]) -> tupl
         for part in parts(condition):
             if len({name.startswith(BEFORE) for name in read_by(part)}) > 1:
                 continue  # it says of two cycles what no state shows
-            for one in _features_of(_of_one_cycle(part), ts.kinds):
+            for one in _predicates_of(_of_one_cycle(part), ts.kinds):
                 read = {one.leaf, *([one.other] if one.other else [])}
                 if one.condition is not None:
                     read = set(map(str, read_by(one.condition)))
@@ -168,7 +168,7 @@ def _of_one_cycle(part: Expr) -> Expr:
             return part
 
 
-def _features_of(part: Expr, kinds: Mapping[str, Scalar]) -> Iterator[Predicate]:
+def _predicates_of(part: Expr, kinds: Mapping[str, Scalar]) -> Iterator[Predicate]:
     """The predicates that one part makes; none where it is a whole made of others."""
     match part:
         case Read(name=name) if listed(kinds[name]):

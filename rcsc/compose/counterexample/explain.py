@@ -8,20 +8,20 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from rcsc.compose.contract.obligations import Key, Obligation, Sort, pairs
+from rcsc.compose.contract.obligations import Obligation, ObligationKey, Sort, pairs
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.counterexample.finding import Finding, of_trace
 from rcsc.compose.counterexample.lasso import Lasso, lassos, obligation_of
 from rcsc.compose.counterexample.pair import broken_together
 from rcsc.compose.counterexample.repair import helps
 from rcsc.compose.counterexample.replay import ExecutorsDifferError, make, only_in_python, record
-from rcsc.compose.counterexample.trace import Found, NotReproducedError, Search, traces
+from rcsc.compose.counterexample.trace import NotReproducedError, TraceResult, TraceSearch, traces
 from rcsc.compose.proof.level import LevelProof, essential
 from rcsc.compose.proof.system import SystemProof
 from rcsc.host.children import scratch
 from rcsc.run.description import Description
 
-SEARCHES = (Search(legal=True), Search(), Search(legal=True, restarted=True))
+SEARCHES = (TraceSearch(legal=True), TraceSearch(), TraceSearch(legal=True, restarted=True))
 """In the order in which they are made: what a neighbour can do that began with the level is shown first."""
 
 
@@ -63,7 +63,7 @@ class Explanation:
 
 
 @dataclass(frozen=True, slots=True)
-class Settings:
+class TraceSettings:
     """How to look for runs.
 
     Attributes:
@@ -80,7 +80,7 @@ class Settings:
 
 
 def explain(
-    made: Mapping[str, TransitionSystem], proof: SystemProof, settings: Settings
+    made: Mapping[str, TransitionSystem], proof: SystemProof, settings: TraceSettings
 ) -> Iterator[Explanation]:
     """Everything essential that is not proved, level by level.
 
@@ -100,7 +100,7 @@ def explain(
 
 
 def _level(
-    made: Mapping[str, TransitionSystem], level: str, wanted: tuple[Obligation, ...], settings: Settings
+    made: Mapping[str, TransitionSystem], level: str, wanted: tuple[Obligation, ...], settings: TraceSettings
 ) -> Iterator[Explanation]:
     if not settings.most:
         yield from (Explanation(level, obligation) for obligation in wanted)
@@ -121,9 +121,11 @@ def _level(
             yield _explanation(ts, obligation, found.get(obligation.key))
 
 
-def _found(ts: TransitionSystem, asked: list[Obligation], settings: Settings) -> dict[Key, Found]:
+def _found(
+    ts: TransitionSystem, asked: list[Obligation], settings: TraceSettings
+) -> dict[ObligationKey, TraceResult]:
     """What the searches find, one after the other, for what is still open."""
-    found: dict[Key, Found] = {}
+    found: dict[ObligationKey, TraceResult] = {}
     for search in SEARCHES:
         left = [obligation for obligation in asked if obligation.key not in found]
         if left:
@@ -132,7 +134,10 @@ def _found(ts: TransitionSystem, asked: list[Obligation], settings: Settings) ->
 
 
 def _pairs(
-    ts: TransitionSystem, obligation: Obligation, parted: list[Obligation], found: Mapping[Key, Found]
+    ts: TransitionSystem,
+    obligation: Obligation,
+    parted: list[Obligation],
+    found: Mapping[ObligationKey, TraceResult],
 ) -> Iterator[Explanation]:
     """The pairs of lines that both match in some run; the table as a whole where there is none."""
     shown = [one for one in parted if one.key in found]
@@ -143,7 +148,7 @@ def _pairs(
         yield replace(_explanation(ts, one, found[one.key]), others=others if at == len(shown) - 1 else ())
 
 
-def _explanation(ts: TransitionSystem, obligation: Obligation, found: Found | None) -> Explanation:
+def _explanation(ts: TransitionSystem, obligation: Obligation, found: TraceResult | None) -> Explanation:
     level = ts.level.name
     match found:
         case None:
@@ -155,7 +160,7 @@ def _explanation(ts: TransitionSystem, obligation: Obligation, found: Found | No
 
 
 def _together(
-    made: Mapping[str, TransitionSystem], level: str, wanted: tuple[Obligation, ...], settings: Settings
+    made: Mapping[str, TransitionSystem], level: str, wanted: tuple[Obligation, ...], settings: TraceSettings
 ) -> Iterator[Explanation]:
     """What becomes of orders that are not numbered as they should be, or not answered, with both levels as they are."""
     links = made[level].links
@@ -170,7 +175,7 @@ def _together(
     for upper, lower in ends if settings.most else []:
         if upper in made and lower in made:
             below = next(one for one in made[upper].links.below if one.name == lower)
-            search = Search(settings.most)
+            search = TraceSearch(settings.most)
             found = broken_together(made[upper], made[lower], below, search)
             if isinstance(found, Finding):
                 yield Explanation(found.level, found.obligation, found)
@@ -178,7 +183,7 @@ def _together(
                 yield Explanation(lower, wanted[0], beside=(str(found),), guessed=found.guessed)
 
 
-def _endless(ts: TransitionSystem, proof: LevelProof, settings: Settings) -> Iterator[Explanation]:
+def _endless(ts: TransitionSystem, proof: LevelProof, settings: TraceSettings) -> Iterator[Explanation]:
     """Commands that are not shown to end, each with a run after which it may go on for ever."""
     tables = [ending.table for ending in proof.endings if not ending.proved]
     found: dict[str, Lasso | NotReproducedError] = {}
@@ -200,7 +205,7 @@ class _Rerun:
     """Runs findings on executors, which are made once a level."""
 
     made: Mapping[str, TransitionSystem]
-    settings: Settings
+    settings: TraceSettings
     folder: Path
     _ready: set[str] = field(default_factory=set)
     _names: set[str] = field(default_factory=set)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 from rcsc.compose.contract.obligations import Obligation, Sort
 from rcsc.compose.contract.transition import TransitionSystem
-from rcsc.compose.counterexample.trace import Step, Trace, one_cycle
+from rcsc.compose.counterexample.trace import CycleRun, Trace, one_cycle
 from rcsc.lang.interpret import Fault
 from rcsc.lang.model import Value, key_bounds, key_of, spell
 
@@ -23,13 +23,13 @@ class Finding:
         ticks: For each tick the cycle of each level that ran in it, from the top down.
         after: Ticks after the one in which it is broken, which show what comes of it.
         restarted: Whether it begins where a restart does, and not with the initial values.
-        legal: Whether the levels around keep to more than the contract (`trace.Search.legal`).
+        legal: Whether the levels around keep to more than the contract (`TraceSearch.legal`).
         lasso: The cycle, from 1, before which all is as it is at the end, so that it may go on for ever; 0 where it is not about that.
     """
 
     level: str
     obligation: Obligation
-    ticks: tuple[Mapping[str, Step], ...]
+    ticks: tuple[Mapping[str, CycleRun], ...]
     after: int = 0
     restarted: bool = False
     legal: bool = True
@@ -41,7 +41,7 @@ class Finding:
         return len(self.ticks) - self.after
 
     @property
-    def broken(self) -> Step:
+    def broken(self) -> CycleRun:
         """The cycle that breaks it."""
         return self.ticks[self.broken_at - 1][self.level]
 
@@ -69,7 +69,7 @@ def of_trace(ts: TransitionSystem, obligation: Obligation, trace: Trace) -> Find
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class TimeLineRow:
     """One cycle of one level, in the tables' words.
 
     Attributes:
@@ -114,7 +114,7 @@ _WRONG = {
 }
 
 
-def rows(made: Mapping[str, TransitionSystem], finding: Finding) -> tuple[Row, ...]:
+def rows(made: Mapping[str, TransitionSystem], finding: Finding) -> tuple[TimeLineRow, ...]:
     """The time line, a row for each cycle of each level."""
     where = finding.broken_at, finding.level
     obligation = replace(finding.obligation, name=str(finding.lasso)) if finding.lasso else finding.obligation
@@ -125,7 +125,7 @@ def rows(made: Mapping[str, TransitionSystem], finding: Finding) -> tuple[Row, .
     )
 
 
-def _row(ts: TransitionSystem, tick: int, step: Step, broken: Obligation | None) -> Row:
+def _row(ts: TransitionSystem, tick: int, step: CycleRun, broken: Obligation | None) -> TimeLineRow:
     """One cycle; what does not change is left out."""
     kinds = ts.kinds
     changed = {
@@ -138,10 +138,10 @@ def _row(ts: TransitionSystem, tick: int, step: Step, broken: Obligation | None)
     wrong += [_FAULTS[step.fault]] if step.fault in _FAULTS else []
     wrong += [_WRONG[broken.sort].format(broken.name)] if broken is not None and broken.sort in _WRONG else []
     line = " and ".join(step.matched) or "none"
-    return Row(tick, ts.level.name, step.table, line, takes, leaves, "; ".join(wrong))
+    return TimeLineRow(tick, ts.level.name, step.table, line, takes, leaves, "; ".join(wrong))
 
 
-def _answers(ts: TransitionSystem, step: Step) -> Iterator[tuple[str, str]]:
+def _answers(ts: TransitionSystem, step: CycleRun) -> Iterator[tuple[str, str]]:
     """What extern procedures give, call by call; a value that is refused is in no type's words."""
     for procedure, given in step.answers:
         writes = next(one.writes for one in ts.program.procedures if one.name == procedure)

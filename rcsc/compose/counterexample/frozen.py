@@ -15,14 +15,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from rcsc.compose.contract.given import Answer
+from rcsc.compose.contract.given import ExternAnswer
 from rcsc.compose.contract.obligations import Obligation, Sort
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.contract.variants import VARIANTS
 from rcsc.compose.counterexample.finding import Finding
 from rcsc.compose.counterexample.lasso import lasso_of
 from rcsc.compose.counterexample.pair import broken_in, exchange
-from rcsc.compose.counterexample.trace import Step, broken, one_cycle
+from rcsc.compose.counterexample.trace import CycleRun, broken, one_cycle
 from rcsc.compose.proof.system import NoProgramError, transition_systems
 from rcsc.host.files.names import shown
 from rcsc.host.files.read import content, json_of
@@ -40,7 +40,7 @@ class BadCaseError(Exception):
 
 
 @dataclass(frozen=True, slots=True)
-class Case:
+class FrozenCase:
     """A case as it is written.
 
     Attributes:
@@ -112,7 +112,7 @@ def _not_initial(ts: TransitionSystem, start: Mapping[str, Value]) -> dict[str, 
     return {name: spell(ts.kinds[name], start[name]) for name in begun if begun[name] != start[name]}
 
 
-def _changed(ts: TransitionSystem, step: Step, exchanged: Container[str]) -> dict[str, str]:
+def _changed(ts: TransitionSystem, step: CycleRun, exchanged: Container[str]) -> dict[str, str]:
     """The inputs that change, but for those that another level of the run gives."""
     return {
         name: spell(ts.kinds[name], value)
@@ -124,7 +124,7 @@ def _changed(ts: TransitionSystem, step: Step, exchanged: Container[str]) -> dic
 # --- back ----------------------------------------------------------------------------------
 
 
-def read_case(path: Path) -> Case:
+def read_case(path: Path) -> FrozenCase:
     """Reads a case.
 
     Raises:
@@ -137,7 +137,7 @@ def read_case(path: Path) -> Case:
         about = said["goal"]
         level, table, name = _texts([about[key] for key in ("level", "table", "name")])
         sort, lines = Sort[about["what"].upper()], _texts(about["lines"])
-        return Case(
+        return FrozenCase(
             _system(path, said["system"]),
             _texts(said["variants"]),
             level,
@@ -197,7 +197,7 @@ def _system(case: Path, named: object) -> Path:
     return case.parent / named
 
 
-def case_breaks(case: Case) -> bool:
+def case_breaks(case: FrozenCase) -> bool:
     """Whether the obligation is broken in some tick; a fault ends the run.
 
     Raises:
@@ -207,7 +207,7 @@ def case_breaks(case: Case) -> bool:
     now = {name: _begun(ts, case.start.get(name, {})) for name, ts in made.items()}
     exchanged = exchange(made, tuple(made))
     given = {name: {leaf: now[name][leaf] for leaf in leaves} for name, leaves in exchanged.items()}
-    so_far: list[Step] = []
+    so_far: list[CycleRun] = []
     answers = (*case.answers, *({} for _ in case.ticks[len(case.answers) :]))
     for tick, answered in zip(case.ticks, answers, strict=False):
         steps = {}
@@ -227,7 +227,7 @@ def case_breaks(case: Case) -> bool:
     return False
 
 
-def _answer(ts: TransitionSystem, said: Any) -> Answer:
+def _answer(ts: TransitionSystem, said: Any) -> ExternAnswer:
     """One call's results, as the case has them."""
     try:
         name, results = said
@@ -240,7 +240,7 @@ def _answer(ts: TransitionSystem, said: Any) -> Answer:
     raise BadCaseError(f"level `{ts.level.name}` has no extern procedure that gives `{said}`")
 
 
-def _made(case: Case) -> dict[str, TransitionSystem]:
+def _made(case: FrozenCase) -> dict[str, TransitionSystem]:
     try:
         made = transition_systems(case.system)
         change: list[Callable[[Program], Program]] = [VARIANTS[name] for name in case.variants]
@@ -294,7 +294,7 @@ def _value(name: str, kind: Scalar, text: str) -> Value:
     raise BadCaseError(f"`{name}` cannot be `{text}`")
 
 
-def _is_broken(made: Mapping[str, TransitionSystem], case: Case, steps: list[Step]) -> bool:
+def _is_broken(made: Mapping[str, TransitionSystem], case: FrozenCase, steps: list[CycleRun]) -> bool:
     """Whether the last of the level's cycles breaks the obligation."""
     ts, step = made[case.level], steps[-1]
     if case.obligation.sort is Sort.ENDS:

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 from rcsc.compose.contract.obligations import Obligation, Sort, command_stays
 from rcsc.compose.contract.transition import NUMBERS, Cycle, TransitionSystem
 from rcsc.compose.counterexample.trace import (
+    CycleRun,
     NotReproducedError,
-    Search,
-    Step,
     Trace,
+    TraceSearch,
     Unrolled,
     as_cycle,
     ran_on,
@@ -41,7 +41,7 @@ def obligation_of(table: str) -> Obligation:
 
 
 def lassos(
-    ts: TransitionSystem, tables: Sequence[str], search: Search
+    ts: TransitionSystem, tables: Sequence[str], search: TraceSearch
 ) -> dict[str, Lasso | NotReproducedError]:
     """For each table for which there is one a lasso, the first cycle of a run being in none."""
     run = Unrolled(ts, search)
@@ -110,7 +110,7 @@ def _told(ts: TransitionSystem, table: str, run: Unrolled, wrong: Node) -> Lasso
     return Lasso(Trace(shown, steps, run.search.restarted, run.search.legal), first)
 
 
-def lasso_of(ts: TransitionSystem, table: str, steps: Sequence[Step]) -> int | None:
+def lasso_of(ts: TransitionSystem, table: str, steps: Sequence[CycleRun]) -> int | None:
     """The first cycle, from 1, of the shortest lasso with which the run ends; None where it ends with none."""
     for first in range(len(steps) - 1, 0, -1):
         lasso = steps[first:]
@@ -122,14 +122,14 @@ def lasso_of(ts: TransitionSystem, table: str, steps: Sequence[Step]) -> int | N
     return None
 
 
-def _is_lasso(ts: TransitionSystem, table: str, lasso: Sequence[Step]) -> bool:
+def _is_lasso(ts: TransitionSystem, table: str, lasso: Sequence[CycleRun]) -> bool:
     if any(step.fault is not Fault.OK or step.table != table for step in lasso):
         return False
     round_ = _comes_round(ts, table, [as_cycle(ts, step) for step in lasso])
     return round_.known and bool(round_.low)
 
 
-def _again(ts: TransitionSystem, lasso: Sequence[Step]) -> tuple[Step, ...]:
+def _again(ts: TransitionSystem, lasso: Sequence[CycleRun]) -> tuple[CycleRun, ...]:
     """The lasso once more, on the same inputs; what echoes an order echoes the one as much later."""
     before, after = lasso[0].before, lasso[-1].after
     later = {below.echo: int(after[below.number]) - int(before[below.number]) for below in ts.links.below}

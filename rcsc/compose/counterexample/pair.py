@@ -16,7 +16,7 @@ from rcsc.compose.contract.obligations import Obligation, Sort
 from rcsc.compose.contract.transition import Cycle, Leaves, TransitionSystem
 from rcsc.compose.counterexample.finding import Finding
 from rcsc.compose.counterexample.simplest import Bounded, Simplest
-from rcsc.compose.counterexample.trace import NotReproducedError, Search, Step, in_order, one_cycle
+from rcsc.compose.counterexample.trace import CycleRun, NotReproducedError, TraceSearch, in_order, one_cycle
 from rcsc.lang.interpret import initial
 from rcsc.lang.model import Bool, Value
 from rcsc.solvers.sat import GaveUpError
@@ -53,14 +53,14 @@ class _Side:
 
 
 def broken_together(
-    upper: TransitionSystem, lower: TransitionSystem, below: Below, search: Search
+    upper: TransitionSystem, lower: TransitionSystem, below: Below, search: TraceSearch
 ) -> Finding | NotReproducedError | None:
     """The shortest run of both in which one breaks what the other assumes; None where there is none, or the solver gave up.
 
     Looked for is that the lower level takes another order under the number that it took last, and that the upper one is told of its last
     order what is not so, in at most `search.most` ticks.
     """
-    pair = _Pair(upper, lower, below)
+    pair = _Together(upper, lower, below)
     try:
         for tick in range(1, search.most + 1):
             for obligation in pair.further(tick):
@@ -72,7 +72,7 @@ def broken_together(
 
 
 @dataclass(slots=True)
-class _Pair:
+class _Together:
     """Both levels, tick by tick."""
 
     upper: TransitionSystem
@@ -158,7 +158,7 @@ class _Pair:
             return NotReproducedError(obligation.shown, guessed=self._run.guessed)
         return Finding(level, replace(obligation, holds=values.FALSE), ticks)
 
-    def _ran(self, settled: Simplest) -> Iterator[dict[str, Step]]:
+    def _ran(self, settled: Simplest) -> Iterator[dict[str, CycleRun]]:
         now = {side.name: dict(initial(side.ts.program)) for side in self.sides}
         held = {leaf: now[side.name][leaf] for side in self.sides for leaf in side.takes}
         runs = [
@@ -166,7 +166,7 @@ class _Pair:
             for at in range(len(self.sides[0].runs))
         ]
         for at, which in enumerate(runs):
-            seen, steps = dict(held), dict[str, Step]()
+            seen, steps = dict(held), dict[str, CycleRun]()
             for side, running in zip(self.sides, which, strict=True):
                 free = settled.settle(
                     [side.taken[at][leaf] for leaf in side.inputs],
@@ -205,7 +205,7 @@ def exchange(
     return found
 
 
-def broken_in(ts: TransitionSystem, obligation: Obligation, step: Step) -> bool:
+def broken_in(ts: TransitionSystem, obligation: Obligation, step: CycleRun) -> bool:
     """Whether the cycle, as it ran, breaks what a level assumes of its neighbour: `SAME_ORDER` or `OF_ITS_ORDER`.
 
     Raises:
@@ -223,7 +223,7 @@ def broken_in(ts: TransitionSystem, obligation: Obligation, step: Step) -> bool:
     return holds.known and not holds.low
 
 
-def _taken_again(lower: TransitionSystem, step: Step) -> bool:
+def _taken_again(lower: TransitionSystem, step: CycleRun) -> bool:
     """Whether another order is taken under the number that was taken last."""
     above = lower.links.above
     assert above is not None

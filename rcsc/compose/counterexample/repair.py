@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from rcsc.compose.contract.obligations import Sort
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.counterexample.finding import Finding
-from rcsc.compose.counterexample.trace import Step, seen_by_table
+from rcsc.compose.counterexample.trace import CycleRun, seen_by_table
 from rcsc.lang.interpret import matching_lines
 from rcsc.lang.model import Box, Program, Scalar, Snapshot, Table, key_of
 from rcsc.table import boxes, spell
@@ -33,7 +33,7 @@ def helps(ts: TransitionSystem, finding: Finding) -> tuple[str, ...]:
     return tuple(dict.fromkeys(_said(ts, table, step)))
 
 
-def _said(ts: TransitionSystem, table: Table, step: Step) -> Iterator[str]:
+def _said(ts: TransitionSystem, table: Table, step: CycleRun) -> Iterator[str]:
     seen = seen_by_table(ts, step)
     if seen is None:
         return

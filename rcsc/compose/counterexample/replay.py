@@ -15,7 +15,7 @@ from pathlib import Path
 from rcsc.compose.contract.environment import leaves_under
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.counterexample.finding import Finding, rows
-from rcsc.compose.counterexample.trace import Step
+from rcsc.compose.counterexample.trace import CycleRun
 from rcsc.emit import emit_c, emit_python
 from rcsc.emit.ctext import c_type, wide_type
 from rcsc.emit.lower import lower, lower_by_force
@@ -247,7 +247,7 @@ def _cycles(
         yield ran
 
 
-def _take(running: System, level: RunningLevel, ts: TransitionSystem, step: Step) -> None:
+def _take(running: System, level: RunningLevel, ts: TransitionSystem, step: CycleRun) -> None:
     """Publishes what the environment gave in this cycle, and takes it."""
     for wire in running.description.wires:
         owner, _, variable = wire.target.partition(".")
@@ -257,7 +257,9 @@ def _take(running: System, level: RunningLevel, ts: TransitionSystem, step: Step
     level.take(running.buffers)
 
 
-def _beside(level: RunningLevel, step: Step, ts: TransitionSystem, kind: Kind, tick: int) -> Iterator[str]:
+def _beside(
+    level: RunningLevel, step: CycleRun, ts: TransitionSystem, kind: Kind, tick: int
+) -> Iterator[str]:
     """Where the executor left something else."""
     who = "Python" if kind == "python" else "C"
     there = f"tick {tick}, level `{level.name}`"
@@ -271,7 +273,7 @@ def _beside(level: RunningLevel, step: Step, ts: TransitionSystem, kind: Kind, t
         yield f"{there}: {said} by the interpreter, {did} by the {who} executor"
 
 
-def _traced(step: Step, monitored: Sequence[str]) -> str:
+def _traced(step: CycleRun, monitored: Sequence[str]) -> str:
     failed = [name for name in monitored if name in step.failed]
     return _said(step.line, step.fault, failed)
 

@@ -7,7 +7,7 @@ solver likes, and another one after an upgrade; what is settled here depends on 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from rcsc.compose.contract.given import Answer, least, refused
+from rcsc.compose.contract.given import ExternAnswer, least, refused
 from rcsc.compose.contract.transition import Cycle
 from rcsc.lang.model import Bool, Op, Program, Scalar, Value, key_bounds, key_of, value_of_key
 from rcsc.solvers.sat import Sat
@@ -105,7 +105,7 @@ class Simplest:
             self._least(node) if node in free else value for node, value in zip(nodes, wanted, strict=True)
         ]
 
-    def answers(self, program: Program, cycle: Cycle) -> tuple[Answer, ...]:
+    def answers(self, program: Program, cycle: Cycle) -> tuple[ExternAnswer, ...]:
         """What the extern procedures that the cycle calls give: least values, and refused ones only where it has to be."""
         for call in cycle.calls:
             self.run.literal(call.path)
@@ -114,7 +114,7 @@ class Simplest:
     def _made(self, path: Node) -> bool:
         return bool(path.low) if path.known else bool(self.settle([path], [False])[0])
 
-    def _answer(self, program: Program, call: ExternResults) -> Answer:
+    def _answer(self, program: Program, call: ExternResults) -> ExternAnswer:
         writes = next(one.writes for one in program.procedures if one.name == call.procedure)
         given = self.settle(call.results, [least(node.kind) for node in call.results])
         wrong = self.settle(call.refusals, [False] * len(call.refusals))

@@ -13,8 +13,8 @@ from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 
 from rcsc.compose.contract.environment import Below
-from rcsc.compose.contract.given import Answer, scripted
-from rcsc.compose.contract.obligations import Key, Obligation, Sort, obligations, pairs
+from rcsc.compose.contract.given import ExternAnswer, scripted
+from rcsc.compose.contract.obligations import Obligation, ObligationKey, Sort, obligations, pairs
 from rcsc.compose.contract.properties import invariant_kept, property_kept
 from rcsc.compose.contract.transition import EARLY, GHOST, Cycle, Leaves, TransitionSystem, successor
 from rcsc.compose.counterexample.simplest import Bounded, Simplest, constant_of
@@ -63,7 +63,7 @@ class NotReproducedError(Exception):
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class CycleRun:
     """One cycle.
 
     Attributes:
@@ -85,7 +85,7 @@ class Step:
     before: Mapping[str, Value]
     after: Mapping[str, Value]
     matched: tuple[str, ...] = ()
-    answers: tuple[Answer, ...] = ()
+    answers: tuple[ExternAnswer, ...] = ()
 
     @property
     def ends_the_run(self) -> bool:
@@ -93,7 +93,7 @@ class Step:
         return self.fault not in {Fault.OK, *EARLY}
 
 
-Given: TypeAlias = tuple[Mapping[str, Value], tuple[Answer, ...]]
+Given: TypeAlias = tuple[Mapping[str, Value], tuple[ExternAnswer, ...]]
 """What the environment gives in a cycle: the inputs, and the results of extern procedures."""
 
 
@@ -104,17 +104,17 @@ class Trace:
     Attributes:
         obligation: What it breaks, in words.
         restarted: Whether it begins where a restart does, and not with the initial values.
-        legal: Whether its environment did only what a neighbour that began with it can do (`Search.legal`).
+        legal: Whether its environment did only what a neighbour that began with it can do (`TraceSearch.legal`).
     """
 
     obligation: str
-    steps: tuple[Step, ...]
+    steps: tuple[CycleRun, ...]
     restarted: bool = False
     legal: bool = False
 
 
 @dataclass(frozen=True, slots=True)
-class Search:
+class TraceSearch:
     """How to look for traces.
 
     Attributes:
@@ -130,7 +130,7 @@ class Search:
     legal: bool = False
 
 
-Found: TypeAlias = Trace | NotReproducedError
+TraceResult: TypeAlias = Trace | NotReproducedError
 
 
 def shortest(
@@ -141,17 +141,19 @@ def shortest(
     Raises:
         NotReproducedError: The interpreter does not break the obligation there.
     """
-    found = traces(ts, (obligation,), Search(most, legal=legal)).get(obligation.key)
+    found = traces(ts, (obligation,), TraceSearch(most, legal=legal)).get(obligation.key)
     if isinstance(found, NotReproducedError):
         raise found
     return found
 
 
-def traces(ts: TransitionSystem, wanted: Sequence[Obligation], search: Search) -> dict[Key, Found]:
+def traces(
+    ts: TransitionSystem, wanted: Sequence[Obligation], search: TraceSearch
+) -> dict[ObligationKey, TraceResult]:
     """For each obligation for which there is one the shortest trace, all found in one search."""
     run = Unrolled(ts, search)
     waiting = {obligation.key: obligation for obligation in wanted}
-    found: dict[Key, Found] = {}
+    found: dict[ObligationKey, TraceResult] = {}
     for _ in range(search.most):
         if not waiting:
             break
@@ -181,7 +183,7 @@ class Unrolled:
     """Cycles one after the other, from the first of a run."""
 
     ts: TransitionSystem
-    search: Search
+    search: TraceSearch
     cycles: list[Cycle] = field(default_factory=list)
     _run: Bounded = field(default_factory=Bounded)
     _now: Leaves = field(init=False)
@@ -233,7 +235,7 @@ class Unrolled:
         """
         return self._run.holds([self._run.literal(wrong)])
 
-    def told(self, obligation: Obligation, wrong: Node) -> Found:
+    def told(self, obligation: Obligation, wrong: Node) -> TraceResult:
         """The simplest run that ends so, as the interpreter runs it; or that it does not break the obligation.
 
         Raises:
@@ -328,7 +330,7 @@ def replayed(ts: TransitionSystem, obligation: Obligation, inputs: Sequence[Give
     Raises:
         NotReproducedError: It does not break the obligation in its last cycle.
     """
-    trace = _ran(ts, obligation, inputs, initial(ts.program), Search())
+    trace = _ran(ts, obligation, inputs, initial(ts.program), TraceSearch())
     if not _breaks(ts, obligation, trace, len(inputs)):
         raise NotReproducedError(obligation.shown)
     return trace
@@ -339,22 +341,22 @@ def _ran(
     obligation: Obligation,
     given: Sequence[Given],
     start: Mapping[str, Value],
-    search: Search,
+    search: TraceSearch,
 ) -> Trace:
     return Trace(obligation.shown, ran_on(ts, start, given), search.restarted, search.legal)
 
 
 def ran(
     ts: TransitionSystem, start: Mapping[str, Value], inputs: Sequence[Mapping[str, Value]]
-) -> tuple[Step, ...]:
+) -> tuple[CycleRun, ...]:
     """What the interpreter does, from `start` on these inputs, up to the first fault that ends a run."""
     return ran_on(ts, start, [(taken, ()) for taken in inputs])
 
 
-def ran_on(ts: TransitionSystem, start: Mapping[str, Value], given: Sequence[Given]) -> tuple[Step, ...]:
+def ran_on(ts: TransitionSystem, start: Mapping[str, Value], given: Sequence[Given]) -> tuple[CycleRun, ...]:
     """The same with results of extern procedures."""
     now = dict(start)
-    steps: list[Step] = []
+    steps: list[CycleRun] = []
     for taken, answers in given:
         steps.append(one_cycle(ts, now, taken, answers))
         now = dict(steps[-1].after)
@@ -367,8 +369,8 @@ def one_cycle(
     ts: TransitionSystem,
     before: Mapping[str, Value],
     taken: Mapping[str, Value],
-    answers: tuple[Answer, ...] = (),
-) -> Step:
+    answers: tuple[ExternAnswer, ...] = (),
+) -> CycleRun:
     """What the interpreter does in one cycle, in which extern procedures give these answers."""
     with scripted(ts.program, answers):
         outcome = cycle(ts.program, ts.level, {**before, **taken})
@@ -393,7 +395,7 @@ class Halfway:
     acted: bool = False
 
 
-def halfway(ts: TransitionSystem, step: Step) -> Halfway:
+def halfway(ts: TransitionSystem, step: CycleRun) -> Halfway:
     """The first part of a cycle, as the interpreter runs it again."""
     program = ts.program
     now = admit(program, {**step.before, **step.taken})
@@ -412,14 +414,14 @@ def halfway(ts: TransitionSystem, step: Step) -> Halfway:
     return found
 
 
-def _actions(ts: TransitionSystem, step: Step) -> tuple[Action, ...]:
+def _actions(ts: TransitionSystem, step: CycleRun) -> tuple[Action, ...]:
     """What the line that ran does."""
     table = ts.table(step.table)
     lines: list[Line | Default] = [*table.lines, *([] if table.default is None else [table.default])]
     return next((one.actions for one in lines if one.name == step.line), ())
 
 
-def seen_by_table(ts: TransitionSystem, step: Step) -> Snapshot | None:
+def seen_by_table(ts: TransitionSystem, step: CycleRun) -> Snapshot | None:
     """Every leaf as the table saw it; None where the cycle ended before."""
     found = halfway(ts, step)
     return found.middle if found.matched else None
@@ -434,15 +436,15 @@ def _step(
     before: Mapping[str, Value],
     taken: Mapping[str, Value],
     outcome: Outcome,
-    answers: tuple[Answer, ...],
-) -> Step:
+    answers: tuple[ExternAnswer, ...],
+) -> CycleRun:
     after = outcome.snapshot
     chosen = ts.table_of(after)
     line = "" if outcome.line is None else str(outcome.line)
     matched: tuple[str, ...] = () if outcome.line is None else (line,)
     if outcome.fault is Fault.SEVERAL_LINES:
         matched = tuple(map(str, matching_lines(ts.table(chosen), after)))
-    found = Step(
+    found = CycleRun(
         dict(taken),
         chosen,
         line,
@@ -456,7 +458,7 @@ def _step(
     return replace(found, failed=(*found.failed, *_also_failed(ts, found)))
 
 
-def _also_failed(ts: TransitionSystem, step: Step) -> tuple[str, ...]:
+def _also_failed(ts: TransitionSystem, step: CycleRun) -> tuple[str, ...]:
     """Assumptions of the table that no executor looks at, and that did not hold."""
     table = ts.table(step.table)
     others = [
@@ -470,7 +472,7 @@ def _also_failed(ts: TransitionSystem, step: Step) -> tuple[str, ...]:
     return () if seen is None else tuple(str(one.name) for one in others if not holds(one.condition, seen))
 
 
-def broken(ts: TransitionSystem, obligation: Obligation, step: Step) -> bool:
+def broken(ts: TransitionSystem, obligation: Obligation, step: CycleRun) -> bool:
     """Whether the cycle, as it ran, breaks the obligation."""
     if obligation.table and obligation.table != step.table:
         return False
@@ -496,13 +498,13 @@ def broken(ts: TransitionSystem, obligation: Obligation, step: Step) -> bool:
             return _broken_between(ts, obligation, step)
 
 
-def _broken_between(ts: TransitionSystem, obligation: Obligation, step: Step) -> bool:
+def _broken_between(ts: TransitionSystem, obligation: Obligation, step: CycleRun) -> bool:
     """An obligation about what stands before and after a cycle."""
     holds = _same(obligations(ts, as_cycle(ts, step)), obligation).holds
     return holds.known and not holds.low
 
 
-def as_cycle(ts: TransitionSystem, step: Step) -> Cycle:
+def as_cycle(ts: TransitionSystem, step: CycleRun) -> Cycle:
     """A cycle as it ran, all its nodes constants."""
     before, after = _constants(ts, step.before), _constants(ts, step.after)
     taken = {name: after[name] for name in step.taken}

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from rcsc.compose.contract.predicates import Predicate
 
-Point = tuple[int, ...]
+Valuation = tuple[int, ...]
 """A value for each predicate."""
 Pair = tuple[int, int]
 """A predicate, by position, and its value; or `~value`, which is negative: that it has another."""
@@ -23,8 +23,8 @@ Cube = tuple[Pair, ...]
 
 def shown(chosen: Sequence[Predicate], clause: Cube) -> str:
     """A combination in the tables' words."""
-    by_feature = groupby(clause, key=lambda pair: pair[0])
-    return " and ".join(_said(chosen[at], [value for _, value in pairs]) for at, pairs in by_feature)
+    by_predicate = groupby(clause, key=lambda pair: pair[0])
+    return " and ".join(_said(chosen[at], [value for _, value in pairs]) for at, pairs in by_predicate)
 
 
 def _said(one: Predicate, found: Sequence[int]) -> str:
@@ -76,7 +76,7 @@ class Reached:
     _points: npt.NDArray[np.int32]
 
     @classmethod
-    def of(cls, points: Iterable[Point], width: int) -> "Reached":
+    def of(cls, points: Iterable[Valuation], width: int) -> "Reached":
         """Of these; `width` predicates each."""
         every = list(points)
         return cls(np.array(every, dtype=np.int32).reshape(len(every), width))
@@ -86,7 +86,7 @@ class Reached:
         """How many there are."""
         return len(self._points)
 
-    def add(self, point: Point) -> None:
+    def add(self, point: Valuation) -> None:
         """One more."""
         self._points = np.vstack([self._points, np.array([point], dtype=np.int32)])
 

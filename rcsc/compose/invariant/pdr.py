@@ -22,7 +22,7 @@ from heapq import heappop, heappush
 
 from rcsc.compose.contract.predicates import Predicate
 from rcsc.compose.contract.transition import Cycle
-from rcsc.compose.invariant.cubes import Cube, Masks, Pair, Point, Reached
+from rcsc.compose.invariant.cubes import Cube, Masks, Pair, Reached, Valuation
 from rcsc.lang.model import Bool
 from rcsc.solvers.sat import Sat
 from rcsc.symbolic.bits import Bits, Literal, Word, key_of_bits
@@ -76,15 +76,15 @@ class Posed:
         self._count += 1
         return self._count
 
-    def start(self) -> Point:
+    def start(self) -> Valuation:
         """The predicates before the cycle in the last model."""
         return self._point(self._starts)
 
-    def end(self) -> Point:
+    def end(self) -> Valuation:
         """The predicates after the cycle in the last model."""
         return self._point(self._ends)
 
-    def _point(self, words: Sequence[Word]) -> Point:
+    def _point(self, words: Sequence[Word]) -> Valuation:
         read = [[self.sat.value(literal) for literal in word] for word in words]
         return tuple(
             int(bits[0]) if isinstance(kind, Bool) else key_of_bits(bits)
@@ -169,7 +169,7 @@ class PDR:
             if not self._block(point, last):
                 self._leave(obligations, broken)
 
-    def _block(self, point: Point, last: int) -> bool:
+    def _block(self, point: Valuation, last: int) -> bool:
         """Excludes a state from a frame, and first what leads to it; False where it is reached after all."""
         waiting = [(last, 0, point)]
         count = 0

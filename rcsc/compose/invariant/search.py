@@ -1,6 +1,6 @@
 """Looks for the invariant of a level: first with the predicates that most levels need, then, for what is left, with more.
 
-In: a transition system, its cycles and obligations. Out: `Found`. What is found is not to be trusted before it is confirmed (`confirm`).
+In: a transition system, its cycles and obligations. Out: `Invariant`. What is found is not to be trusted before it is confirmed (`confirm`).
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -10,7 +10,7 @@ from random import Random
 from rcsc.compose.contract.environment import COMMAND
 from rcsc.compose.contract.obligations import Obligation, Sort, obligations
 from rcsc.compose.contract.predicates import CLOSELY, Predicate, compared, point
-from rcsc.compose.contract.properties import every_feature
+from rcsc.compose.contract.properties import every_predicate
 from rcsc.compose.contract.transition import Cycle, TransitionSystem
 from rcsc.compose.contract.walk import Walk
 from rcsc.compose.invariant.cubes import Reached
@@ -46,7 +46,7 @@ class Effort:
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class Invariant:
     """What a search found.
 
     Attributes:
@@ -68,7 +68,7 @@ class Found:
 
 def search(
     ts: TransitionSystem, firsts: Sequence[Cycle], cycle: Cycle, wanted: Sequence[Obligation], effort: Effort
-) -> Found:
+) -> Invariant:
     """An invariant from which as many obligations follow as can be.
 
     Raises:
@@ -77,9 +77,9 @@ def search(
     matter = [at for at, obligation in enumerate(wanted) if _matters(ts, obligation)]
     reads = read(ts, cycle, wanted)
     states, ran = _walked(ts, effort)
-    found = Found(open=frozenset(matter), states=states, ran=ran)
+    found = Invariant(open=frozenset(matter), states=states, ran=ran)
     for closely in range(CLOSELY + 1):
-        chosen = every_feature(ts, cycle, reads, closely)
+        chosen = every_predicate(ts, cycle, reads, closely)
         if closely and len(chosen) == len(found.predicates):
             break
         left = sorted(found.open)
@@ -93,9 +93,9 @@ def strengthened(
     ts: TransitionSystem,
     firsts: Sequence[Cycle],
     cycle: Cycle,
-    found: Found,
+    found: Invariant,
     wanted: Sequence[Node],
-) -> Found:
+) -> Invariant:
     """What was found, with clauses added from which as many as can be of these conditions on a later cycle follow.
 
     Raises:
@@ -113,9 +113,9 @@ def _with(  # what a search is of
     ts: TransitionSystem,
     firsts: Sequence[Cycle],
     cycle: Cycle,
-    before: Found,
+    before: Invariant,
     left: Sequence[int],
-) -> Found:
+) -> Invariant:
     """One search, from the invariant that is known already, for the obligations that are left."""
     posed = [Posed(chosen, one, _conditions(ts, one, left)) for one in (*firsts, cycle)]
     made, left_open = _searched(ts, chosen, posed, before, left)
@@ -126,9 +126,9 @@ def _searched(
     ts: TransitionSystem,
     chosen: tuple[Predicate, ...],
     posed: Sequence[Posed],
-    before: Found,
+    before: Invariant,
     left: Iterable[int],
-) -> tuple[Found, set[int]]:
+) -> tuple[Invariant, set[int]]:
     walked = dict.fromkeys(point(ts, chosen, state) for state in before.states)
     reached = Reached.of(walked, len(chosen))
     weights = [2 if one.parts else int(one.size > 2) for one in chosen]

@@ -27,7 +27,7 @@ from rcsc.symbolic.values import Node
 
 
 @dataclass(frozen=True, slots=True)
-class Again:
+class RepeatedLine:
     """A line that does more when it matches again, and to which leaves."""
 
     table: str
@@ -45,18 +45,18 @@ class Context:
     """
 
     unreached: tuple[tuple[str, str], ...]
-    repeated: tuple[Again, ...]
+    repeated: tuple[RepeatedLine, ...]
     restless: bool
     unsure: tuple[tuple[str, str], ...] = ()
     orders: bool = True
 
 
-Line_: TypeAlias = tuple[str, str]
+LineName: TypeAlias = tuple[str, str]
 """A table and a line."""
 
 
 @dataclass(frozen=True, slots=True)
-class _From:
+class _Start:
     """Where a cycle may begin: in the invariant, or as the level begins; its solver, and the same cycle again."""
 
     cycle: Cycle
@@ -65,7 +65,10 @@ class _From:
 
 
 def context(
-    ts: TransitionSystem, asked: Confirmation, clauses: Sequence[Clause], ran: Container[Line_] = frozenset()
+    ts: TransitionSystem,
+    asked: Confirmation,
+    clauses: Sequence[Clause],
+    ran: Container[LineName] = frozenset(),
 ) -> Context:
     """Asks all of it; lines that `ran` on walks are known to be reached."""
     every = list(_starts(ts, asked, clauses))
@@ -82,7 +85,7 @@ def context(
     )
 
 
-def never_run(asked: Confirmation, clauses: Sequence[Clause], ran: Container[Line_]) -> list[Node]:
+def never_run(asked: Confirmation, clauses: Sequence[Clause], ran: Container[LineName]) -> list[Node]:
     """That lines do not run, one by one, which no walk ran and which the clauses allow: what there is to be shown."""
     solver = asked.known(clauses)
     return [
@@ -92,11 +95,11 @@ def never_run(asked: Confirmation, clauses: Sequence[Clause], ran: Container[Lin
     ]
 
 
-def _starts(ts: TransitionSystem, asked: Confirmation, clauses: Sequence[Clause]) -> Iterator[_From]:
+def _starts(ts: TransitionSystem, asked: Confirmation, clauses: Sequence[Clause]) -> Iterator[_Start]:
     """A later cycle, and each with which the level may begin."""
     for at, cycle in enumerate((asked.cycle, *asked.firsts)):
         again = ts.cycle(cycle.after, f" again {at}", taken=cycle.taken)
-        yield _From(cycle, again, asked.beginning(cycle) if at else asked.known(clauses))
+        yield _Start(cycle, again, asked.beginning(cycle) if at else asked.known(clauses))
 
 
 def gives_an_order(ts: TransitionSystem, cycle: Cycle) -> Node:
@@ -107,7 +110,7 @@ def gives_an_order(ts: TransitionSystem, cycle: Cycle) -> Node:
     )
 
 
-def _lines(cycle: Cycle) -> Iterator[tuple[Line_, Node]]:
+def _lines(cycle: Cycle) -> Iterator[tuple[LineName, Node]]:
     """Each line, and when it runs; but for a DEFAULT that is said to be unreachable, which is an obligation."""
     for at in cycle.tables:
         for line, match in at.lines:
@@ -115,7 +118,7 @@ def _lines(cycle: Cycle) -> Iterator[tuple[Line_, Node]]:
                 yield (str(at.table.name), str(line.name)), values.both(at.runs, match)
 
 
-def _reached(asked: Confirmation, start: _From) -> Iterator[Line_]:
+def _reached(asked: Confirmation, start: _Start) -> Iterator[LineName]:
     """The lines of which it is not refuted that they run."""
     runs = [(line, asked.keyed.term(when)) for line, when in _lines(start.cycle)]
     start.solver.add(*asked.keyed.ranges)
@@ -124,7 +127,7 @@ def _reached(asked: Confirmation, start: _From) -> Iterator[Line_]:
             yield line
 
 
-def _restless(ts: TransitionSystem, asked: Confirmation, start: _From) -> bool:
+def _restless(ts: TransitionSystem, asked: Confirmation, start: _Start) -> bool:
     """Whether an order may be given in both of two cycles on the same inputs."""
     sent = [asked.keyed.term(gives_an_order(ts, cycle)) for cycle in (start.cycle, start.again)]
     start.solver.add(*asked.keyed.ranges)
@@ -140,19 +143,21 @@ def may(solver: Solver, *terms: Term) -> bool:
     return answer is not Answer.UNSATISFIABLE
 
 
-def _every_repeated(ts: TransitionSystem, asked: Confirmation, every: Sequence[_From]) -> Iterator[Again]:
+def _every_repeated(
+    ts: TransitionSystem, asked: Confirmation, every: Sequence[_Start]
+) -> Iterator[RepeatedLine]:
     """Line by line, the leaves that a second match may change, wherever the first begins."""
-    found: dict[Line_, dict[str, None]] = {}
+    found: dict[LineName, dict[str, None]] = {}
     for start in every:
         for line, leaves in _repeated(ts, asked, start):
             found.setdefault(line, {}).update(dict.fromkeys(leaves))
     for where, changed in found.items():
-        yield Again(*where, tuple(changed))
+        yield RepeatedLine(*where, tuple(changed))
 
 
 def _repeated(
-    ts: TransitionSystem, asked: Confirmation, start: _From
-) -> Iterator[tuple[Line_, tuple[str, ...]]]:
+    ts: TransitionSystem, asked: Confirmation, start: _Start
+) -> Iterator[tuple[LineName, tuple[str, ...]]]:
     cycle, again, keyed = start.cycle, start.again, asked.keyed
     changed = {
         leaf: keyed.term(values.negation(values.equal(cycle.after[leaf], again.after[leaf])))

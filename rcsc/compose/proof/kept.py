@@ -11,11 +11,11 @@ from typing import Any
 
 from rcsc.compose.contract.obligations import Obligation, Sort, Unstated, obligations
 from rcsc.compose.contract.predicates import CLOSELY, Predicate
-from rcsc.compose.contract.properties import every_feature
+from rcsc.compose.contract.properties import every_predicate
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.invariant.search import Effort, read
 from rcsc.compose.proof.assume_guarantee import of_level
-from rcsc.compose.proof.context import Again, Context
+from rcsc.compose.proof.context import Context, RepeatedLine
 from rcsc.compose.proof.level import LevelProof, Verdict, essential
 from rcsc.compose.proof.ranking import Counted
 from rcsc.compose.proof.standing import Verdicts, keep_verdicts
@@ -33,7 +33,7 @@ def recall(cache: Cache, ts: TransitionSystem, effort: Effort) -> LevelProof | N
     if [list(obligation.key) for obligation in wanted] != [one["goal"] for one in kept["found"]]:
         return None
     for closely in range(CLOSELY + 1):
-        chosen = every_feature(ts, cycle, read(ts, cycle, wanted), closely)
+        chosen = every_predicate(ts, cycle, read(ts, cycle, wanted), closely)
         if [one.name for one in chosen] == kept["features"]:
             verdicts = (Verdict(one["verdict"]) for one in kept["found"])
             proof = _proof(kept, tuple(zip(wanted, verdicts, strict=True)), chosen, ts)
@@ -57,7 +57,9 @@ def _context(kept: dict[str, Any] | None) -> Context | None:
     if kept is None:
         return None
     unreached = tuple((table, line) for table, line in kept["unreached"])
-    repeated = tuple(Again(one["table"], one["line"], tuple(one["leaves"])) for one in kept["repeated"])
+    repeated = tuple(
+        RepeatedLine(one["table"], one["line"], tuple(one["leaves"])) for one in kept["repeated"]
+    )
     unsure = tuple((table, line) for table, line in kept["unsure"])
     return Context(unreached, repeated, kept["restless"], unsure, kept["orders"])
 

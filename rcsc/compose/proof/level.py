@@ -17,7 +17,7 @@ from rcsc.compose.contract.predicates import Predicate
 from rcsc.compose.contract.transition import Cycle, TransitionSystem
 from rcsc.compose.invariant.confirm import Confirmation
 from rcsc.compose.invariant.pdr import Clause
-from rcsc.compose.invariant.search import LIMITS, Effort, Found, search, strengthened
+from rcsc.compose.invariant.search import LIMITS, Effort, Invariant, search, strengthened
 from rcsc.compose.proof.context import Context, context, never_run
 from rcsc.compose.proof.termination import Ending, Flow, no_answers
 from rcsc.solvers import smt
@@ -113,7 +113,7 @@ def prove_level(ts: TransitionSystem, effort: Effort | None = None) -> LevelProo
             seen, ends = context(ts, asked, found.clauses, found.ran), tuple(flow.endings())
         _uncut(cut_before)
     except (GaveUpError, NotConfirmedError):
-        found, seen, ends = Found(), None, ()
+        found, seen, ends = Invariant(), None, ()
         verdicts = [(obligation, Verdict.UNDECIDED) for obligation in wanted]
     return LevelProof(
         ts.level.name,
@@ -171,7 +171,7 @@ def _firsts(ts: TransitionSystem) -> dict[str, Cycle]:
 
 
 def _verdicts(
-    ts: TransitionSystem, inference: Confirmation, found: Found, wanted: tuple[Obligation, ...]
+    ts: TransitionSystem, inference: Confirmation, found: Invariant, wanted: tuple[Obligation, ...]
 ) -> Iterable[tuple[Obligation, Verdict]]:
     """Asks for each obligation whether a first cycle, or a cycle from the invariant, can break it."""
     keyed = inference.keyed

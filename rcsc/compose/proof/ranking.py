@@ -24,7 +24,7 @@ from rcsc.symbolic.values import Node
 
 SMALLEST = 24
 """A real counter rises each time by its range divided by at most two to this power."""
-Step = tuple[int, int]
+LinePair = tuple[int, int]
 """A line and one that may run in the next cycle."""
 Part = frozenset[int]
 """Lines each of which leads to every other one."""
@@ -88,18 +88,18 @@ def lines_that_stop(
     program: Program, asked: Confirmation, clauses: Sequence[Clause], turns: Turns
 ) -> Stopped:
     """With as few inputs as possible that stand still; reals are followed only where something is left without."""
-    first = found = _Rounds(program, asked, clauses, turns(()))
+    first = found = _Ranking(program, asked, clauses, turns(()))
     still: tuple[str, ...] = ()
     rested_on = [found.solver]
     if found.endless and any(isinstance(kind, Real) for _, kind in owned(program)):
-        first = found = _Rounds(program, asked.in_other_terms(Measured()), clauses, turns(()), first)
+        first = found = _Ranking(program, asked.in_other_terms(Measured()), clauses, turns(()), first)
         rested_on.append(found.solver)
     if found.endless:
         still = inputs(program)
-        found = _Rounds(program, asked, clauses, turns(still), first)
+        found = _Ranking(program, asked, clauses, turns(still), first)
     for name in still if not found.endless else ():
         fewer = tuple(other for other in still if other != name)
-        without = _Rounds(program, asked, clauses, turns(fewer), first)
+        without = _Ranking(program, asked, clauses, turns(fewer), first)
         if not without.endless:
             found, still = without, fewer
     if still:
@@ -118,7 +118,7 @@ def inputs(program: Program) -> tuple[str, ...]:
 
 
 @dataclass(frozen=True, slots=True)
-class Number:
+class KeptNumber:
     """A number that the level keeps, before and after a cycle."""
 
     name: str
@@ -127,7 +127,7 @@ class Number:
     after: Term
 
 
-class _Rounds:
+class _Ranking:
     """The questions about one table of a level, and the answers.
 
     Attributes:
@@ -145,7 +145,7 @@ class _Rounds:
         asked: Confirmation,
         clauses: Sequence[Clause],
         turns: tuple[Turn, Turn, Turn],
-        weaker: "_Rounds | None" = None,
+        weaker: "_Ranking | None" = None,
     ) -> None:
         _, self.turn, _ = turns
         term = asked.keyed.term
@@ -154,7 +154,7 @@ class _Rounds:
         waits = term(self.turn.unanswered)
         self.last, self.now, self.next = ([term(match) for _, match in turn.at.lines] for turn in turns)
         self.numbers = [
-            Number(name, kind, term(self.turn.before[name]), term(self.turn.after[name]))
+            KeptNumber(name, kind, term(self.turn.before[name]), term(self.turn.after[name]))
             for name, kind in owned(program)
             if isinstance(kind, Int) or isinstance(asked.keyed, Measured)
         ]
@@ -172,7 +172,7 @@ class _Rounds:
             self.always, always, self.orders, None if weaker is None else weaker.restless
         )
         silent = self.always if weaker is None else self.always & weaker.silent
-        self.silent: set[Step] = self._uncounted(self._steps(self.quiet, silent), self.quiet)
+        self.silent: set[LinePair] = self._uncounted(self._steps(self.quiet, silent), self.quiet)
         self.unanswered = self._unstopped(
             self.silent, self.quiet, waits, None if weaker is None else weaker.unanswered
         )
@@ -182,7 +182,7 @@ class _Rounds:
         """The lines that are left."""
         return self.restless | self.unanswered
 
-    def _unstopped(self, steps: set[Step], when: Term, then: Term, among: set[int] | None) -> set[int]:
+    def _unstopped(self, steps: set[LinePair], when: Term, then: Term, among: set[int] | None) -> set[int]:
         """The lines, of these if it is said, that may do so again and again on a way round."""
         return {
             line
@@ -192,9 +192,9 @@ class _Rounds:
             if (among is None or line in among) and not self._stops(line, part, when, then)
         }
 
-    def _steps(self, when: Term, among: set[Step]) -> set[Step]:
+    def _steps(self, when: Term, among: set[LinePair]) -> set[LinePair]:
         """The steps among these that may be taken."""
-        found: set[Step] = set()
+        found: set[LinePair] = set()
         terms = {step: smt.all_of([self.now[step[0]], self.next[step[1]]]) for step in among}
         while left := [step for step in sorted(among) if step not in found]:
             self.solver.push()
@@ -209,7 +209,7 @@ class _Rounds:
                 return found
         return found
 
-    def _uncounted(self, steps: set[Step], when: Term) -> set[Step]:
+    def _uncounted(self, steps: set[LinePair], when: Term) -> set[LinePair]:
         """The steps that are left without the lines that stop because a counter rises."""
         again = True
         while again:
@@ -235,7 +235,7 @@ class _Rounds:
             self.counted.append(counted)
         return rising is None or counted is not None
 
-    def _rising_once(self, runs: Term) -> list[Number] | None:
+    def _rising_once(self, runs: Term) -> list[KeptNumber] | None:
         """The numbers that rise in some cycle, to try only these; None where there is no such cycle."""
         self.solver.push()
         self.solver.add(runs)
@@ -249,7 +249,7 @@ class _Rounds:
         self.solver.pop()
         return None if answer is Answer.UNSATISFIABLE else seen
 
-    def _rising(self, line: int, part: Part, runs: Term, among: list[Number]) -> Iterator[Counted]:
+    def _rising(self, line: int, part: Part, runs: Term, among: list[KeptNumber]) -> Iterator[Counted]:
         """The numbers that always rise with the line and never fall within the part."""
         others = smt.any_of([self.now[other] for other in sorted(part)])
         name = str(self.turn.at.lines[line][0].name)
@@ -263,7 +263,7 @@ class _Rounds:
             elif not may(self.solver, runs, smt.at_most(one.after, one.before, KEY)):
                 yield Counted(name, one.name)
 
-    def _least_rise(self, runs: Term, number: Number, width: float) -> float | None:
+    def _least_rise(self, runs: Term, number: KeptNumber, width: float) -> float | None:
         """How much the real rises at least; None where that is not shown to be anything."""
 
         def rises(power: int) -> bool:
@@ -292,11 +292,11 @@ def owned(program: Program) -> list[tuple[str, Scalar]]:
     return [*((str(v.name), v.type) for v in numbers), *later]
 
 
-def _every_step(lines: int) -> list[Step]:
+def _every_step(lines: int) -> list[LinePair]:
     return [(one, two) for one in range(lines) for two in range(lines)]
 
 
-def parts(steps: set[Step]) -> list[Part]:
+def parts(steps: set[LinePair]) -> list[Part]:
     """The greatest sets of lines in which each leads to every other and to itself (Warshall's closure: the lines are few)."""
     reach = set(steps)
     lines = sorted({line for step in steps for line in step})

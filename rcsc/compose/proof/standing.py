@@ -1,6 +1,6 @@
 """What kept proofs say of the levels together, read without a solver, a search or a cycle.
 
-In: what a system is made of (`Outline`) and a cache. Out: `Standing`. A proof is filed under a digest of all that it is about (the
+In: what a system is made of (`Outline`) and a cache. Out: `KnownSystem`. A proof is filed under a digest of all that it is about (the
 program as resolved, the level, its links), so that it is never taken for one of other content. What a level assumes of a neighbour has
 to be proved of that neighbour, as it is now, before anything is called proved of the levels together.
 """
@@ -202,7 +202,7 @@ def _needs(form: list[Any]) -> tuple[Need, ...]:
 
 
 @dataclass(frozen=True, slots=True)
-class Standing:
+class KnownSystem:
     """What is known of a system of this content.
 
     Attributes:
@@ -315,7 +315,7 @@ class Standing:
         )
 
 
-def standing(cache: Cache, outline: Outline) -> Standing:
+def standing(cache: Cache, outline: Outline) -> KnownSystem:
     """What the cache knows of a system."""
     found = {one.name: verdicts_of(cache, one.content) for one in outline.levels}
-    return Standing(outline, {name: one for name, one in found.items() if one is not None})
+    return KnownSystem(outline, {name: one for name, one in found.items() if one is not None})

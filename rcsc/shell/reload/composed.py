@@ -6,7 +6,7 @@ that were proved, so that nothing is claimed while a level runs other tables tha
 
 from collections.abc import Callable, Mapping, Sequence
 
-from rcsc.compose.proof.standing import Known, Standing
+from rcsc.compose.proof.standing import Known, KnownSystem
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.report import named
 from rcsc.driver.outline import known
@@ -75,7 +75,7 @@ def _prove(plant: Plant, cache: Cache) -> None:
     prove_transition_systems(made, None, 1, tuple(made), None, cache)
 
 
-def _unknown(plant: Plant, level: str, made: Standing | None, edited: Sequence[str]) -> str:
+def _unknown(plant: Plant, level: str, made: KnownSystem | None, edited: Sequence[str]) -> str:
     if edited:
         return f"level `{edited[0]}` runs other tables than its file holds"
     if made is not None and made.broken:
