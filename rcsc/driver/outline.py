@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rcsc.compose.proof.standing import (
-    Assumed,
     KnownSystem,
     LevelOutline,
     Outline,
@@ -72,6 +71,7 @@ def _read(system: Path) -> "tuple[dict[str, TransitionSystem], dict[str, str]] |
 
 def outline(made: "Mapping[str, TransitionSystem]") -> Outline:
     """What levels are made of."""
+    from rcsc.compose.contract.obligations import run_by
     from rcsc.compose.proof.assume_guarantee import promises
     from rcsc.compose.proof.kept import content
 
@@ -82,24 +82,12 @@ def outline(made: "Mapping[str, TransitionSystem]") -> Outline:
             os.path.realpath(one.level.span.file),
             one.level.span.start,
             one.level.span.end,
-            tuple(map(_table, _run_by(one))),
+            tuple(map(_table, run_by(one))),
             tuple((each.name, os.path.realpath(each.span.file)) for each in one.program.properties),
         )
         for name, one in made.items()
     )
-    assumed = tuple(
-        Assumed(one.level, one.record, one.assumed, one.needs, one.own, one.begins) for one in promises(made)
-    )
-    return Outline(levels, assumed)
-
-
-def _run_by(ts: "TransitionSystem") -> "list[Table]":
-    """The tables that the level runs."""
-    from rcsc.lang.model import OneTable
-
-    chosen = ts.level.tables
-    names = {chosen.table} if isinstance(chosen, OneTable) else {table for _, table in chosen.tables}
-    return [one for one in ts.program.tables if one.name in names]
+    return Outline(levels, tuple(promises(made)))
 
 
 def _table(table: "Table") -> TableOutline:

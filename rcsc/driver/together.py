@@ -10,8 +10,8 @@ from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from rcsc.compose.contract.claims import UNREACHED
-from rcsc.compose.proof.standing import ASSUMPTION, PROPERTY, Assumed, Known, KnownSystem, LevelOutline
+from rcsc.compose.contract.claims import UNREACHED, Promise
+from rcsc.compose.proof.standing import ASSUMPTION, PROPERTY, Known, KnownSystem, LevelOutline
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label, Severity, sort_key
 from rcsc.diagnostics.report import NOT_PROVED, InSystem, Report, SystemReport, TableReport, named, trusting
@@ -196,8 +196,8 @@ class _Seen:
             severity=Severity.WARNING,
         )
 
-    def _not_kept(self, system: str, level: LevelOutline, what: Assumed) -> Diagnostic:
-        message = f"level `{level.name}` assumes that {what.words}, which its neighbour in {system} is not proved to keep"
+    def _not_kept(self, system: str, level: LevelOutline, what: Promise) -> Diagnostic:
+        message = f"level `{level.name}` assumes that {what.assumed}, which its neighbour in {system} is not proved to keep"
         helps = (f"`rcsc prove {system}` says of both what is proved",)
         label = self._label(system, level)
         return Diagnostic(Code.NOT_AGREED, message, label, help=helps, severity=Severity.WARNING)

@@ -61,6 +61,40 @@ class Claim:
 
 
 @dataclass(frozen=True, slots=True)
+class Promise:
+    """One thing that a level assumes of a neighbour.
+
+    Attributes:
+        level: Who assumes it.
+        record: In which the level takes what it is about.
+        assumed: In words; `reason`, whose guarantee it is.
+        needs: What must be proved of the neighbour.
+        own: What the level has to keep itself: reports are about its orders only as far as it numbers them.
+        begins: Whether both begin in agreement.
+        outside: Whether the neighbour stands outside the levels: then it is its own to keep.
+        holds: Whether it is found so of the neighbour, given what that rests on; known where proofs are.
+    """
+
+    level: str
+    record: str
+    assumed: str
+    reason: str
+    needs: tuple[Need, ...] = ()
+    own: tuple[Need, ...] = ()
+    begins: bool = True
+    outside: bool = False
+    holds: bool = False
+
+    @property
+    def claim(self) -> tuple[Need, Claim]:
+        """The claim that what the level takes in the record is as it assumes."""
+        trusts = self.reason.replace("stands outside the levels", "keeps to the protocol")
+        verdict = Verdict.PROVED if self.begins else Verdict.NOT_PROVED
+        claim = Claim(verdict, (*self.needs, *self.own), (trusts,) if self.outside else ())
+        return (self.level, (CONTRACT, "", self.record)), claim
+
+
+@dataclass(frozen=True, slots=True)
 class Closed:
     """A claim with all that it rests on.
 

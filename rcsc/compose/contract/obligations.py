@@ -219,7 +219,7 @@ def _own(ts: TransitionSystem, cycle: Cycle) -> Iterator[Obligation]:
         yield Obligation(Sort.ONCE, "", FLAG, once)
         for at in cycle.tables:
             overlooking = _overlooking(at)
-            ends = bool(at.table.stops) or _asks(ts.program)
+            ends = bool(at.table.stops) or asks(ts.program)
             if overlooking or (overlooking is not None and ends):
                 yield _answered(ts, cycle, at, overlooking)
     for variable in ts.program.variables:
@@ -297,7 +297,7 @@ def _stated(ts: TransitionSystem, cycle: Cycle) -> Iterator[Obligation]:
         yield Obligation(Sort.SAFE, "", "", kept_within(ts.program, cycle, ts.safety.invariants))
 
 
-def _asks(program: Program) -> bool:
+def asks(program: Program) -> bool:
     """Whether a cycle can end early because an extern procedure is refused."""
     return any(one.extern is not None for one in program.procedures)
 

@@ -1,11 +1,11 @@
 """What the levels of a system assume of each other, matched with what was proved of them.
 
 In: transition systems of all levels. Out: `Promise`s, each with the obligations of the neighbour that keep it, and, for proofs, whether
-they do.
+they do. Source: Misra and Chandy, "Proofs of networks of processes", 1981; the induction over cycles is in `compose.__doc__`.
 """
 
-from collections.abc import Collection, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
 
 from rcsc.compose.contract.claims import (
     AGAIN,
@@ -19,90 +19,33 @@ from rcsc.compose.contract.claims import (
     Claim,
     Key,
     Need,
+    Promise,
     Verdict,
     worst,
 )
 from rcsc.compose.contract.environment import COMMAND, ECHO, ECHOED, NUMBER
-from rcsc.compose.contract.obligations import Sort
+from rcsc.compose.contract.obligations import Sort, asks
 from rcsc.compose.contract.transition import NUMBERS, TransitionSystem
 from rcsc.compose.proof.level import LevelProof
 
 
-@dataclass(frozen=True, slots=True)
-class Promise:
-    """One thing that a level assumes of a neighbour.
-
-    Attributes:
-        level: Who assumes it.
-        assumed: In words.
-        reason: Whose guarantee it is, in words.
-        record: In which the level takes what it is about.
-        needs: What must be proved of the neighbour.
-        own: What the level has to keep itself: reports are about its orders only as far as it numbers them.
-        begins: Whether both begin in agreement.
-        outside: Whether the neighbour stands outside the levels: then it is its own to keep.
-    """
-
-    level: str
-    record: str
-    assumed: str
-    reason: str
-    needs: tuple[Need, ...] = ()
-    own: tuple[Need, ...] = ()
-    begins: bool = True
-    outside: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class Agreement:
-    """One thing that a level assumes of a neighbour, and why it may.
-
-    Attributes:
-        level: Who assumes it.
-        assumed: In words.
-        reason: Whose guarantee it is, in words.
-        record: In which it takes what that is about.
-        holds: Whether it is found so of the neighbour, given what that rests on; where it stands outside the levels it is its own to keep.
-    """
-
-    level: str
-    record: str
-    assumed: str
-    reason: str
-    holds: bool
-    outside: bool = False
-
-
-def agreements(made: Mapping[str, TransitionSystem], proofs: Mapping[str, LevelProof]) -> list[Agreement]:
-    """What each level assumes of each neighbour, matched with what was proved there."""
+def agreements(made: Mapping[str, TransitionSystem], proofs: Mapping[str, LevelProof]) -> list[Promise]:
+    """Match what each level assumes of each neighbour with what was proved there (`Promise.holds`)."""
     proved = {
         (name, obligation.key)
         for name, proof in proofs.items()
         for obligation, verdict in proof.found
         if verdict in FOUND
     }
-    return [
-        Agreement(one.level, one.record, one.assumed, one.reason, _kept(one, proved), one.outside)
-        for one in promises(made)
-    ]
-
-
-def _kept(promise: Promise, proved: Collection[Need]) -> bool:
-    return promise.begins and all(need in proved for need in promise.needs)
+    return [replace(one, holds=one.begins and proved.issuperset(one.needs)) for one in promises(made)]
 
 
 # --- claims --------------------------------------------------------------------------------
 
 
 def claims(made: Mapping[str, TransitionSystem], proofs: Mapping[str, LevelProof]) -> dict[Need, Claim]:
-    """Everything that is claimed of these levels, and what it rests on."""
-    found: dict[Need, Claim] = {}
-    for one in promises(made):
-        verdict = Verdict.PROVED if one.begins else Verdict.NOT_PROVED
-        trusts = (
-            (one.reason.replace("stands outside the levels", "keeps to the protocol"),) if one.outside else ()
-        )
-        found[one.level, (CONTRACT, "", one.record)] = Claim(verdict, (*one.needs, *one.own), trusts)
+    """Return everything that is claimed of these levels, and what it rests on."""
+    found = dict(one.claim for one in promises(made))
     for name, proof in proofs.items():
         found |= {(name, key): claim for key, claim in of_level(made[name], proof)}
     return found
@@ -132,7 +75,7 @@ def of_level(ts: TransitionSystem, proof: LevelProof) -> Iterator[tuple[Key, Cla
 
 def _of_a_restart(ts: TransitionSystem, proof: LevelProof) -> Iterator[str]:
     """What else could end the first cycle after a restart early, so that the report that stood before is followed by an older one."""
-    if _asks(ts):
+    if asks(ts.program):
         yield "no extern procedure is refused in the first cycle after a restart"
     stops = {str(name) for table in ts.program.tables for name in table.stops}
     failing = {obligation.name for obligation in proof.open if obligation.sort is Sort.ASSUMPTION}
@@ -173,14 +116,10 @@ def _of_ending(ts: TransitionSystem, still: Iterable[str], verdict: Verdict) -> 
         f"`{one.name}` answers every order that is not replaced, and stays so" for one in below if one.outside
     ]
     trusts += [f"the values in `{one}` of level `{name}` stand still meanwhile" for one in still]
-    if _asks(ts):
+    if asks(ts.program):
         trusts.append(f"extern procedures of level `{name}` are refused only finitely often")
     needs = tuple((one.name, ENDING) for one in below if not one.outside)
     return Claim(verdict, ((name, RUNS), *needs), tuple(trusts))
-
-
-def _asks(ts: TransitionSystem) -> bool:
-    return any(one.extern is not None for one in ts.program.procedures)
 
 
 # --- what levels assume of each other ------------------------------------------------------

@@ -11,7 +11,6 @@ from enum import StrEnum
 from typing import Any
 
 from rcsc.compose.contract.claims import (
-    CONTRACT,
     FOUND,
     RUNS,
     UNREACHED,
@@ -19,6 +18,7 @@ from rcsc.compose.contract.claims import (
     Closed,
     Key,
     Need,
+    Promise,
     Verdict,
     closed,
     declared,
@@ -144,28 +144,11 @@ class LevelOutline:
 
 
 @dataclass(frozen=True, slots=True)
-class Assumed:
-    """What a level assumes of a neighbour; `agreed.Promise`, shortened.
-
-    Attributes:
-        record: In which the level takes what it is about.
-        needs: Obligations of the neighbour, `own`, of the level itself; `begins`, whether the two begin in agreement.
-    """
-
-    level: str
-    record: str
-    words: str
-    needs: tuple[Need, ...]
-    own: tuple[Need, ...]
-    begins: bool
-
-
-@dataclass(frozen=True, slots=True)
 class Outline:
     """A system, as its files have it."""
 
     levels: tuple[LevelOutline, ...]
-    assumed: tuple[Assumed, ...]
+    assumed: tuple[Promise, ...]
 
 
 def outline_of(form: Mapping[str, Any]) -> Outline:
@@ -180,18 +163,8 @@ def outline_of(form: Mapping[str, Any]) -> Outline:
         )
         for one in form["levels"]
     )
-    assumed = tuple(
-        Assumed(
-            one["level"],
-            one["record"],
-            one["words"],
-            _needs(one["needs"]),
-            _needs(one["own"]),
-            one["begins"],
-        )
-        for one in form["assumed"]
-    )
-    return Outline(levels, assumed)
+    assumed = (one | {"needs": _needs(one["needs"]), "own": _needs(one["own"])} for one in form["assumed"])
+    return Outline(levels, tuple(Promise(**one) for one in assumed))
 
 
 def _needs(form: list[Any]) -> tuple[Need, ...]:
@@ -217,23 +190,18 @@ class KnownSystem:
 
     def __post_init__(self) -> None:
         """Closes the claims."""
-        claims: dict[Need, Claim] = {
-            (one.level, (CONTRACT, "", one.record)): Claim(
-                Verdict.PROVED if one.begins else Verdict.NOT_PROVED, (*one.needs, *one.own)
-            )
-            for one in self.outline.assumed
-        }
+        claims = dict(one.claim for one in self.outline.assumed)
         claims |= {
             (level, key): claim for level, kept in self.known.items() for key, claim in kept.claims.items()
         }
         object.__setattr__(self, "closed", closed(claims))
 
     @property
-    def broken(self) -> tuple[Assumed, ...]:
+    def broken(self) -> tuple[Promise, ...]:
         """What a level assumes although it is not proved of the neighbour, which was looked at."""
         return tuple(one for one in self.outline.assumed if self._kept(one) is Known.NOT_PROVED)
 
-    def _kept(self, assumed: Assumed) -> Known:
+    def _kept(self, assumed: Promise) -> Known:
         found = [self._obligation(level, key) for level, key in assumed.needs]
         if not assumed.begins or Known.NOT_PROVED in found:
             return Known.NOT_PROVED

@@ -11,12 +11,12 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
 
-from rcsc.compose.contract.claims import UNKNOWN, Closed, Key, Need, closed
+from rcsc.compose.contract.claims import UNKNOWN, Closed, Key, Need, Promise, closed
 from rcsc.compose.contract.environment import Links, check_ends, links
 from rcsc.compose.contract.obligations import Obligation, obligations
 from rcsc.compose.contract.transition import Safety, TransitionSystem
 from rcsc.compose.invariant.search import Effort
-from rcsc.compose.proof.assume_guarantee import Agreement, agreements, claims, other_end
+from rcsc.compose.proof.assume_guarantee import agreements, claims, other_end
 from rcsc.compose.proof.kept import keep, recall
 from rcsc.compose.proof.level import LevelProof, Verdict, besides, essential, prove_level
 from rcsc.diagnostics.codes import Code
@@ -46,7 +46,7 @@ class SystemProof:
     """
 
     levels: tuple[LevelProof, ...]
-    agreements: tuple[Agreement, ...]
+    agreements: tuple[Promise, ...]
     seconds: float = field(compare=False)
     closed: Mapping[Need, Closed] = field(default_factory=dict)
 
