@@ -53,7 +53,7 @@ What it rests on besides:
   listed, not proved.
 
 Rooms, in the order the data flows: `contract` (a level, its environment, and what it owes in one cycle), `invariant` (PDR, whose clauses
-Z3 confirms), `proof` (of a level, and of the system), `counterexample` (runs that show what is not proved). `promela` is another
-translation, for Spin. Trusted are `contract.transition`, `symbolic.keyed` and `symbolic.measured` (a cycle as terms), the arguments here
-and in `proof.termination`, and Z3; not the search.
+Z3 confirms), `proof` (of a level, and of the system), `counterexample` (runs that show what is not proved). Trusted are
+`contract.transition`, `symbolic.keyed` and `symbolic.measured` (a cycle as terms), the arguments here and in `proof.termination`, and
+Z3; not the search.
 """

@@ -1,1 +1,1 @@
-"""Levels together: what is proved, against the interpreter, enumeration and Spin."""
+"""Levels together: what is proved, against the interpreter and enumeration."""

@@ -17,8 +17,9 @@ from rcsc.compose.contract.predicates import point
 from rcsc.compose.contract.transition import Cycle, TransitionSystem
 from rcsc.compose.contract.variants import undeferred
 from rcsc.compose.contract.walk import Walk
+from rcsc.compose.counterexample.cycle_run import broken
 from rcsc.compose.counterexample.finding import of_trace, time_line
-from rcsc.compose.counterexample.trace import Trace, broken, shortest
+from rcsc.compose.counterexample.trace import Trace, shortest
 from rcsc.compose.invariant.cubes import Reached
 from rcsc.compose.invariant.search import Effort
 from rcsc.compose.proof.assume_guarantee import agreements

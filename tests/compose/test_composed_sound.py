@@ -13,11 +13,12 @@ from rcsc.compose.contract.claims import CONTRACT, FOUND, RUNS, SAFE, Claim, Key
 from rcsc.compose.contract.obligations import Sort, unstated
 from rcsc.compose.contract.properties import property_kept
 from rcsc.compose.contract.transition import TransitionSystem
+from rcsc.compose.counterexample.cycle_run import one_cycle, ran, ran_on
 from rcsc.compose.counterexample.explain import TraceSettings, explain
 from rcsc.compose.counterexample.finding import of_trace
 from rcsc.compose.counterexample.frozen import BadCaseError, case_breaks, read_case
 from rcsc.compose.counterexample.lasso import Lasso, lassos
-from rcsc.compose.counterexample.trace import TraceSearch, one_cycle, ran, ran_on, shortest
+from rcsc.compose.counterexample.trace import TraceSearch, shortest
 from rcsc.compose.proof.assume_guarantee import agreements
 from rcsc.compose.proof.level import LevelProof, Verdict, prove_level
 from rcsc.compose.proof.system import NoProgramError, prove_system, transition_systems

@@ -11,6 +11,7 @@ from random import Random
 
 import pytest
 
+import rcsc.compose.counterexample.cycle_run
 import rcsc.compose.counterexample.explain
 import rcsc.compose.counterexample.trace
 import rcsc.lang.interpret
@@ -19,6 +20,7 @@ from rcsc.compose.contract.environment import leaves_under
 from rcsc.compose.contract.obligations import Obligation, ObligationKey, Sort, may_meet, obligations, pairs
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.contract.variants import VARIANTS, defaults_reported, first_match, undeferred
+from rcsc.compose.counterexample.cycle_run import broken, seen_by_table
 from rcsc.compose.counterexample.finding import Finding, of_trace, rows, time_line
 from rcsc.compose.counterexample.frozen import BadCaseError, case_breaks, frozen, read_case
 from rcsc.compose.counterexample.pair import broken_together
@@ -29,8 +31,6 @@ from rcsc.compose.counterexample.trace import (
     Trace,
     TraceResult,
     TraceSearch,
-    broken,
-    seen_by_table,
     shortest,
     traces,
 )
@@ -313,7 +313,7 @@ def test_where_the_interpreter_parts_from_the_solver_is_said(monkeypatch: pytest
         outcome.snapshot["to_lower.input_command"] = 0
         return outcome
 
-    monkeypatch.setattr(rcsc.compose.counterexample.trace, "cycle", other)
+    monkeypatch.setattr(rcsc.compose.counterexample.cycle_run, "cycle", other)
     with pytest.raises(NotReproducedError) as raised:
         shortest(ts, obligation)
     assert raised.value.beside == ("cycle 2: `to_lower.input_command` = drill by the solver, rest as it ran",)

@@ -18,8 +18,9 @@ from rcsc.compose.contract.predicates import CLOSELY, Predicate
 from rcsc.compose.contract.properties import every_predicate, property_kept
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.contract.walk import Walk
+from rcsc.compose.counterexample.cycle_run import broken, ran
 from rcsc.compose.counterexample.finding import of_trace, time_line
-from rcsc.compose.counterexample.trace import Trace, TraceSearch, broken, ran, shortest, traces
+from rcsc.compose.counterexample.trace import Trace, TraceSearch, shortest, traces
 from rcsc.compose.invariant.search import Effort, read
 from rcsc.compose.proof.kept import keep, recall
 from rcsc.compose.proof.level import LevelProof, Verdict, certificate, prove_level
@@ -613,3 +614,43 @@ def test_a_grasp_that_failed_is_not_done_after_all() -> None:
     status = "report.status_report"
     said = [step.after[status] for step in ran(ts, start, inputs)]
     assert said == [member(status, one) for one in ("executing", "failed", "failed", "failed", "failed")]
+
+
+# --- the shipped properties have teeth -------------------------------------------------------
+
+FAULTS: dict[str, tuple[str, str, str, str]] = {
+    "what failed is done": (
+        "gripper", "failed_stays",
+        "| 6    | false       | f_state   |        |               ||                              | hold        | fail       |",
+        "| 6    | false       | f_state   |        |               ||                              | hold        | done       |",
+    ),
+    "the force is another": ("gripper", "keeps_its_force", "to_hand.force_n :=", "//"),
+    "PAUSE drives": (
+        "gripper", "rests_when_told",
+        "| 1    | true || state(d_state) | hold        |", "| 1    | true || state(d_state) |             |",
+    ),
+    "another flash": ("vision", "one_flash", "|| wait                     |              |", "|| wait | shoot(flood) |"),
+    "what was seen changes": (
+        "vision", "keeps_what_it_saw",
+        "| 6    | false       | d_state   |         |                |               ||                          |",
+        "| 6    | false       | d_state   |         |                |               || found                    |",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_where_a_shipped_table_breaks_a_property_it_is_not_proved(fault: str, tmp_path: Path) -> None:
+    level, name, old, new = FAULTS[fault]
+    shutil.copytree(
+        SHIPPED.parent, tmp_path, dirs_exist_ok=True, ignore=shutil.ignore_patterns(".rcsc-cache")
+    )
+    path = next(tmp_path.rglob(f"{level}.rcs"))
+    text = path.read_text(encoding="utf-8")
+    lines = [line for line in text.split("\n") if new != "//" or not line.strip().startswith(old)]
+    path.write_text("\n".join(lines).replace(old, new), encoding="utf-8")
+    assert path.read_text(encoding="utf-8") != text
+    proof = prove_level(transition_systems(tmp_path / "system.toml")[level], replace(LITTLE, looks=False))
+    assert proof.verdict(Sort.PROPERTY, "", name) is Verdict.NOT_PROVED
+    assert any(
+        verdict is Verdict.PROVED for obligation, verdict in proof.found if obligation.sort is Sort.PROPERTY
+    )

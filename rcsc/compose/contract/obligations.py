@@ -50,6 +50,24 @@ class Sort(StrEnum):
     SAFE = SAFE[0]
 
 
+BROKEN = {
+    Sort.NO_DEFAULT: "DEFAULT is reached",
+    Sort.ECHOES: "the report does not echo the command that it answers",
+    Sort.NUMBERED: "`{}` changes, its number does not",
+    Sort.NEXT_NUMBER: "the number of `{}` is not the next one",
+    Sort.WAITS: "another command replaces an order of `{}` that is not echoed",
+    Sort.ONCE: "a command number is taken up again",
+    Sort.ANSWERED: "the new command is passed over: seen once more, `{}` is down",
+    Sort.DEFERRED: "`{}` is written directly while another value is pending",
+    Sort.INVARIANT: "invariant `{}` does not hold",
+    Sort.PROPERTY: "property `{}` is broken",
+    Sort.SAFE: "within it an invariant does not hold under which its operations are safe",
+    Sort.ENDS: "all is as it was before cycle {}: so it may go on for ever",
+    Sort.SAME_ORDER: "another order under the number that was taken last: it is not seen as new",
+    Sort.OF_ITS_ORDER: "what is reported under the number of the last order is not about it",
+}
+"""How it is said, of the name of an obligation, that a cycle breaks it; where nothing stands, lines and assumptions say it themselves."""
+
 ObligationKey: TypeAlias = tuple[Sort, str, str]
 """What tells the obligations of a level apart: a key of a claim (`claims`)."""
 

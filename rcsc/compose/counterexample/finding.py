@@ -6,9 +6,10 @@ In: traces. Out: `Finding`s; rows and lines of text, in the tables' words.
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
-from rcsc.compose.contract.obligations import Obligation, Sort
+from rcsc.compose.contract.obligations import BROKEN, Obligation, Sort
 from rcsc.compose.contract.transition import TransitionSystem
-from rcsc.compose.counterexample.trace import CycleRun, Trace, one_cycle
+from rcsc.compose.counterexample.cycle_run import CycleRun, one_cycle
+from rcsc.compose.counterexample.trace import Trace
 from rcsc.lang.interpret import Fault
 from rcsc.lang.model import Value, key_bounds, key_of, spell
 
@@ -96,22 +97,6 @@ _FAULTS = {
     Fault.EXTERN: "an extern procedure is refused",
     Fault.ASSUMPTION: "the cycle ends there",
 }
-_WRONG = {
-    Sort.NO_DEFAULT: "DEFAULT is reached",
-    Sort.ECHOES: "the report does not echo the command that it answers",
-    Sort.NUMBERED: "`{}` changes, its number does not",
-    Sort.NEXT_NUMBER: "the number of `{}` is not the next one",
-    Sort.WAITS: "another command replaces an order of `{}` that is not echoed",
-    Sort.ONCE: "a command number is taken up again",
-    Sort.ANSWERED: "the new command is passed over: seen once more, `{}` is down",
-    Sort.DEFERRED: "`{}` is written directly while another value is pending",
-    Sort.INVARIANT: "invariant `{}` does not hold",
-    Sort.PROPERTY: "property `{}` is broken",
-    Sort.SAFE: "within it an invariant does not hold under which its operations are safe",
-    Sort.ENDS: "all is as it was before cycle {}: so it may go on for ever",
-    Sort.SAME_ORDER: "another order under the number that was taken last: it is not seen as new",
-    Sort.OF_ITS_ORDER: "what is reported under the number of the last order is not about it",
-}
 
 
 def rows(made: Mapping[str, TransitionSystem], finding: Finding) -> tuple[TimeLineRow, ...]:
@@ -136,7 +121,7 @@ def _row(ts: TransitionSystem, tick: int, step: CycleRun, broken: Obligation | N
     leaves = {name: said for name, said in changed.items() if name not in step.taken}
     wrong = [f"assumption `{name}` fails" for name in step.failed]
     wrong += [_FAULTS[step.fault]] if step.fault in _FAULTS else []
-    wrong += [_WRONG[broken.sort].format(broken.name)] if broken is not None and broken.sort in _WRONG else []
+    wrong += [BROKEN[broken.sort].format(broken.name)] if broken is not None and broken.sort in BROKEN else []
     line = " and ".join(step.matched) or "none"
     return TimeLineRow(tick, ts.level.name, step.table, line, takes, leaves, "; ".join(wrong))
 

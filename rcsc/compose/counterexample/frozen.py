@@ -19,10 +19,10 @@ from rcsc.compose.contract.given import ExternAnswer
 from rcsc.compose.contract.obligations import Obligation, Sort
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.contract.variants import VARIANTS
+from rcsc.compose.counterexample.cycle_run import CycleRun, broken, one_cycle
 from rcsc.compose.counterexample.finding import Finding
 from rcsc.compose.counterexample.lasso import lasso_of
-from rcsc.compose.counterexample.pair import broken_in, exchange
-from rcsc.compose.counterexample.trace import CycleRun, broken, one_cycle
+from rcsc.compose.counterexample.pair import exchange
 from rcsc.compose.proof.system import NoProgramError, transition_systems
 from rcsc.host.files.names import shown
 from rcsc.host.files.read import content, json_of
@@ -299,10 +299,6 @@ def _is_broken(made: Mapping[str, TransitionSystem], case: FrozenCase, steps: li
     ts, step = made[case.level], steps[-1]
     if case.obligation.sort is Sort.ENDS:
         return lasso_of(ts, case.obligation.table, steps) is not None
-    if case.obligation.sort in {Sort.SAME_ORDER, Sort.OF_ITS_ORDER}:
-        return broken_in(ts, case.obligation, step)
-    if case.obligation.sort is Sort.SAFE and not ts.safety.within:
-        return False  # it is so whatever a cycle does
     try:
         return broken(ts, case.obligation, step)
     except StopIteration as error:

@@ -11,15 +11,8 @@ from dataclasses import dataclass
 
 from rcsc.compose.contract.obligations import Obligation, Sort, command_stays
 from rcsc.compose.contract.transition import NUMBERS, Cycle, TransitionSystem
-from rcsc.compose.counterexample.trace import (
-    CycleRun,
-    NotReproducedError,
-    Trace,
-    TraceSearch,
-    Unrolled,
-    as_cycle,
-    ran_on,
-)
+from rcsc.compose.counterexample.cycle_run import CycleRun, as_cycle, ran_on
+from rcsc.compose.counterexample.trace import NotReproducedError, Trace, TraceSearch, Unrolled
 from rcsc.compose.proof.termination import answered, unanswered
 from rcsc.lang.interpret import UNDEFINED, Fault
 from rcsc.solvers.sat import GaveUpError

@@ -14,9 +14,10 @@ from dataclasses import dataclass, field, replace
 from rcsc.compose.contract.environment import Below, leaves_under
 from rcsc.compose.contract.obligations import Obligation, Sort
 from rcsc.compose.contract.transition import Cycle, Leaves, TransitionSystem
+from rcsc.compose.counterexample.cycle_run import CycleRun, broken, one_cycle
 from rcsc.compose.counterexample.finding import Finding
 from rcsc.compose.counterexample.simplest import Bounded, Simplest
-from rcsc.compose.counterexample.trace import CycleRun, NotReproducedError, TraceSearch, in_order, one_cycle
+from rcsc.compose.counterexample.trace import NotReproducedError, TraceSearch, in_order
 from rcsc.lang.interpret import initial
 from rcsc.lang.model import Bool, Value
 from rcsc.solvers.sat import GaveUpError
@@ -154,7 +155,7 @@ class _Together:
         ticks = tuple(self._ran(Simplest(self._run, [wrong])))
         ts = self.upper if obligation.sort is Sort.OF_ITS_ORDER else self.lower
         level = ts.level.name
-        if level not in ticks[-1] or not broken_in(ts, obligation, ticks[-1][level]):
+        if level not in ticks[-1] or not broken(ts, obligation, ticks[-1][level]):
             return NotReproducedError(obligation.shown, guessed=self._run.guessed)
         return Finding(level, replace(obligation, holds=values.FALSE), ticks)
 
@@ -203,33 +204,6 @@ def exchange(
                 found[name] |= {leaf: (below.name, source) for leaf, source in reports.items()}
                 found[below.name] |= {leaf: (name, source) for leaf, source in orders.items()}
     return found
-
-
-def broken_in(ts: TransitionSystem, obligation: Obligation, step: CycleRun) -> bool:
-    """Whether the cycle, as it ran, breaks what a level assumes of its neighbour: `SAME_ORDER` or `OF_ITS_ORDER`.
-
-    Raises:
-        StopIteration: The level has no such neighbour.
-    """
-    if obligation.sort is Sort.SAME_ORDER:
-        return _taken_again(ts, step)
-    kinds = ts.kinds
-    below = next(one for one in ts.links.below if one.report == obligation.name)
-    before, taken = (
-        {name: values.constant(kinds[name], value) for name, value in of.items()}
-        for of in (step.before, step.taken)
-    )
-    holds = TransitionSystem.echo(below, before, taken)
-    return holds.known and not holds.low
-
-
-def _taken_again(lower: TransitionSystem, step: CycleRun) -> bool:
-    """Whether another order is taken under the number that was taken last."""
-    above = lower.links.above
-    assert above is not None
-    fields = (above.command, *above.numbered)
-    same = step.before[above.number] == step.taken[above.number]
-    return same and any(step.before[leaf] != step.taken[leaf] for leaf in fields)
 
 
 def _renamed(ts: TransitionSystem, record: str, other: str) -> dict[str, str]:

@@ -8,8 +8,8 @@ from collections.abc import Iterator, Mapping
 
 from rcsc.compose.contract.obligations import Sort
 from rcsc.compose.contract.transition import TransitionSystem
+from rcsc.compose.counterexample.cycle_run import CycleRun, seen_by_table
 from rcsc.compose.counterexample.finding import Finding
-from rcsc.compose.counterexample.trace import CycleRun, seen_by_table
 from rcsc.lang.interpret import matching_lines
 from rcsc.lang.model import Box, Program, Scalar, Snapshot, Table, key_of
 from rcsc.table import boxes, spell

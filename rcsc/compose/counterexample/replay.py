@@ -14,8 +14,8 @@ from pathlib import Path
 
 from rcsc.compose.contract.environment import leaves_under
 from rcsc.compose.contract.transition import TransitionSystem
+from rcsc.compose.counterexample.cycle_run import CycleRun
 from rcsc.compose.counterexample.finding import Finding, rows
-from rcsc.compose.counterexample.trace import CycleRun
 from rcsc.emit import emit_c, emit_python
 from rcsc.emit.ctext import c_type, wide_type
 from rcsc.emit.lower import lower, lower_by_force

@@ -12,7 +12,7 @@ from rcsc.compose.contract.transition import Cycle
 from rcsc.compose.invariant.pdr import Clause
 from rcsc.lang.model import Bool
 from rcsc.solvers import smt
-from rcsc.solvers.smt import Limits, Solver, Term
+from rcsc.solvers.smt import Answer, Limits, Solver, Term
 from rcsc.symbolic import values
 from rcsc.symbolic.keyed import Keyed
 from rcsc.symbolic.values import Node
@@ -131,3 +131,17 @@ class Confirmation:
         if key not in self._ended:
             self._ended[key] = self.keyed.has(self._end(at), self.predicates[at].kind, value)
         return self._ended[key]
+
+
+def answer(solver: Solver, *terms: Term) -> Answer:
+    """Ask whether the terms can hold together with all that the solver knows, which does not learn them."""
+    solver.push()
+    solver.add(*terms)
+    found = solver.check()
+    solver.pop()
+    return found
+
+
+def may(solver: Solver, *terms: Term) -> bool:
+    """Return whether it is not refuted that the terms hold together."""
+    return answer(solver, *terms) is not Answer.UNSATISFIABLE

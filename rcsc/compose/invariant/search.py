@@ -1,6 +1,6 @@
 """Looks for the invariant of a level: first with the predicates that most levels need, then, for what is left, with more.
 
-In: a transition system, its cycles and obligations. Out: `Invariant`. What is found is not to be trusted before it is confirmed (`confirm`).
+In: a transition system, its cycles and obligations. Out: an `Invariant`, which is not to be trusted before it is confirmed (`confirm`).
 """
 
 from collections.abc import Iterable, Mapping, Sequence

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from rcsc.compose.contract.transition import Cycle, TransitionSystem
-from rcsc.compose.invariant.confirm import Confirmation
+from rcsc.compose.invariant.confirm import Confirmation, may
 from rcsc.compose.invariant.pdr import Clause
 from rcsc.lang.leaves import everything, written_by
 from rcsc.lang.model import Bool, Call, Default, Kind, Statement
@@ -132,15 +132,6 @@ def _restless(ts: TransitionSystem, asked: Confirmation, start: _Start) -> bool:
     sent = [asked.keyed.term(gives_an_order(ts, cycle)) for cycle in (start.cycle, start.again)]
     start.solver.add(*asked.keyed.ranges)
     return may(start.solver, *sent)
-
-
-def may(solver: Solver, *terms: Term) -> bool:
-    """Whether they are not refuted."""
-    solver.push()
-    solver.add(*terms)
-    answer = solver.check()
-    solver.pop()
-    return answer is not Answer.UNSATISFIABLE
 
 
 def _every_repeated(

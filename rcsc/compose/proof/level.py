@@ -15,14 +15,14 @@ from rcsc.compose.contract.environment import COMMAND
 from rcsc.compose.contract.obligations import Obligation, Sort, Unstated, obligations, unstated
 from rcsc.compose.contract.predicates import Predicate
 from rcsc.compose.contract.transition import Cycle, TransitionSystem
-from rcsc.compose.invariant.confirm import Confirmation
+from rcsc.compose.invariant.confirm import Confirmation, answer
 from rcsc.compose.invariant.pdr import Clause
 from rcsc.compose.invariant.search import LIMITS, Effort, Invariant, search, strengthened
 from rcsc.compose.proof.context import Context, context, never_run
 from rcsc.compose.proof.termination import Ending, Flow, no_answers
 from rcsc.solvers import smt
 from rcsc.solvers.sat import GaveUpError
-from rcsc.solvers.smt import Answer, Limits, Solver, Term
+from rcsc.solvers.smt import Answer, Limits, Solver
 from rcsc.symbolic import values
 from rcsc.symbolic.keyed import Keyed
 
@@ -183,7 +183,7 @@ def _verdicts(
         if at in found.open:
             yield obligation, Verdict.NOT_PROVED
             continue
-        answers = {_asked(solver, terms[at]) for solver, terms in zip(solvers, asked, strict=True)}
+        answers = {answer(solver, terms[at]) for solver, terms in zip(solvers, asked, strict=True)}
         if answers == {Answer.UNSATISFIABLE}:
             trusted = obligation.sort is Sort.ASSUMPTION and obligation.name in ts.trusted
             yield obligation, believed[obligation.table] if trusted else Verdict.PROVED
@@ -220,7 +220,7 @@ def _can_run(
 ) -> Verdict:
     """Whether a table can run in some cycle that is as declared, if it can in one that need not be."""
     chosen = [inference.keyed.term(one.tables[at].chosen) for one in (inference.cycle, *inference.firsts)]
-    answers = {_asked(solver, term) for solver, term in zip(solvers, chosen, strict=True)}
+    answers = {answer(solver, term) for solver, term in zip(solvers, chosen, strict=True)}
     if Answer.SATISFIABLE in answers:
         return Verdict.TRUSTED
     if Answer.UNKNOWN in answers:
@@ -228,18 +228,10 @@ def _can_run(
     cycle, *firsts = (replace(one, contract=one.undeclared) for one in (inference.cycle, *inference.firsts))
     free = replace(inference, cycle=cycle, firsts=firsts)
     others = [free.known(clauses), *(free.beginning(first) for first in firsts)]
-    without = {_asked(solver, term) for solver, term in zip(others, chosen, strict=True)}
+    without = {answer(solver, term) for solver, term in zip(others, chosen, strict=True)}
     if Answer.SATISFIABLE in without:
         return Verdict.NOT_PROVED
     return _of_possible(without - {Answer.UNSATISFIABLE})
-
-
-def _asked(solver: Solver, term: Term) -> Answer:
-    solver.push()
-    solver.add(term)
-    answer = solver.check()
-    solver.pop()
-    return answer
 
 
 def certificate(ts: TransitionSystem, proof: LevelProof, limits: Limits = LIMITS) -> dict[str, str]:

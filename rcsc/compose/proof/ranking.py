@@ -11,9 +11,8 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from rcsc.compose.contract.transition import Leaves, TableAt
-from rcsc.compose.invariant.confirm import Confirmation
+from rcsc.compose.invariant.confirm import Confirmation, may
 from rcsc.compose.invariant.pdr import Clause
-from rcsc.compose.proof.context import may
 from rcsc.lang.model import Bool, Int, Kind, Program, Real, Scalar, pending
 from rcsc.solvers import smt
 from rcsc.solvers.smt import Answer, Term

@@ -27,9 +27,9 @@ from dataclasses import dataclass
 from rcsc.compose.contract.environment import ECHO, ECHOED, NUMBER, STATUS, Below, Neighbour
 from rcsc.compose.contract.obligations import FLAG, command_stays
 from rcsc.compose.contract.transition import Cycle, Leaves, TableAt, TransitionSystem
-from rcsc.compose.invariant.confirm import Confirmation
+from rcsc.compose.invariant.confirm import Confirmation, may
 from rcsc.compose.invariant.pdr import Clause
-from rcsc.compose.proof.context import gives_an_order, may, of_lines
+from rcsc.compose.proof.context import gives_an_order, of_lines
 from rcsc.compose.proof.ranking import Counted, Turn, lines_that_stop, parts
 from rcsc.lang.model import Bool, Enum, Kind, OneTable, Read, pending
 from rcsc.solvers import smt

@@ -80,7 +80,7 @@ def _unknown(plant: Plant, level: str, made: KnownSystem | None, edited: Sequenc
         return f"level `{edited[0]}` runs other tables than its file holds"
     if made is not None and made.broken:
         one = made.broken[0]
-        return f"level `{one.level}` assumes that {one.words}, which its neighbour is not proved to keep"
+        return f"level `{one.level}` assumes that {one.assumed}, which its neighbour is not proved to keep"
     if made is not None and made.of_level(level) is not Known.UNKNOWN:
         return named(made.missing(level))
     return f"`rcsc prove {plant.path}` decides it"

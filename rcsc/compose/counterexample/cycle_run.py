@@ -1,0 +1,293 @@
+"""One cycle of a level as the reference interpreter runs it, and what it breaks.
+
+In: a transition system, the leaves before a cycle, what the environment gives. Out: a `CycleRun`. The interpreter is the meaning of the
+language: what the solver says of a cycle is believed only where the interpreter does it. `broken` says of a cycle that was run which
+obligation it breaks: those of matching from the interpreter's faults, all others by their own condition, evaluated on the values that
+the interpreter left.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TypeAlias, assert_never
+
+from rcsc.compose.contract.given import ExternAnswer, scripted
+from rcsc.compose.contract.obligations import Obligation, Sort, obligations
+from rcsc.compose.contract.properties import invariant_kept, property_kept
+from rcsc.compose.contract.transition import EARLY, GHOST, Cycle, Leaves, TransitionSystem
+from rcsc.lang.interpret import (
+    ExternError,
+    Fault,
+    Outcome,
+    admit,
+    call,
+    cycle,
+    execute,
+    holds,
+    matching_lines,
+    settle,
+)
+from rcsc.lang.model import Action, Default, Line, Snapshot, Standing, Value
+from rcsc.symbolic import values
+from rcsc.symbolic.values import Node
+
+
+@dataclass(frozen=True, slots=True)
+class CycleRun:
+    """One cycle.
+
+    Attributes:
+        taken: The inputs.
+        table: That ran; `line`, empty where none matched.
+        fault: What ended the cycle early.
+        failed: Assumptions of the table that did not hold, monitored or not.
+        before: Every leaf at its start, inputs as last taken.
+        after: Every leaf at its end.
+        matched: Every line that matched, DEFAULT left out.
+        answers: What each call of an extern procedure gave, in order.
+    """
+
+    taken: Mapping[str, Value]
+    table: str
+    line: str
+    fault: Fault
+    failed: tuple[str, ...]
+    before: Mapping[str, Value]
+    after: Mapping[str, Value]
+    matched: tuple[str, ...] = ()
+    answers: tuple[ExternAnswer, ...] = ()
+
+    @property
+    def ends_the_run(self) -> bool:
+        """Whether it ended in a fault that the proofs exclude; after the others (`EARLY`) the next cycle runs."""
+        return self.fault not in {Fault.OK, *EARLY}
+
+
+Given: TypeAlias = tuple[Mapping[str, Value], tuple[ExternAnswer, ...]]
+"""What the environment gives in a cycle: the inputs, and the results of extern procedures."""
+
+
+def ran(
+    ts: TransitionSystem, start: Mapping[str, Value], inputs: Sequence[Mapping[str, Value]]
+) -> tuple[CycleRun, ...]:
+    """What the interpreter does, from `start` on these inputs, up to the first fault that ends a run."""
+    return ran_on(ts, start, [(taken, ()) for taken in inputs])
+
+
+def ran_on(ts: TransitionSystem, start: Mapping[str, Value], given: Sequence[Given]) -> tuple[CycleRun, ...]:
+    """The same with results of extern procedures."""
+    now = dict(start)
+    steps: list[CycleRun] = []
+    for taken, answers in given:
+        steps.append(one_cycle(ts, now, taken, answers))
+        now = dict(steps[-1].after)
+        if steps[-1].ends_the_run:
+            break
+    return tuple(steps)
+
+
+def one_cycle(
+    ts: TransitionSystem,
+    before: Mapping[str, Value],
+    taken: Mapping[str, Value],
+    answers: tuple[ExternAnswer, ...] = (),
+) -> CycleRun:
+    """What the interpreter does in one cycle, in which extern procedures give these answers."""
+    with scripted(ts.program, answers):
+        outcome = cycle(ts.program, ts.level, {**before, **taken})
+    return _step(ts, before, taken, outcome, answers)
+
+
+@dataclass(slots=True)
+class Halfway:
+    """A cycle up to its postprocess.
+
+    Attributes:
+        middle: Every leaf as the table saw it: inputs taken, deferred values settled, preprocess run, as far as it came.
+        settled: Every leaf before the preprocess; `done`, before the postprocess, as far as it came.
+        matched: Whether it came to the table.
+        acted: Whether its line, if one ran, was done.
+    """
+
+    middle: dict[str, Value]
+    settled: dict[str, Value]
+    done: dict[str, Value]
+    matched: bool = False
+    acted: bool = False
+
+
+def halfway(ts: TransitionSystem, step: CycleRun) -> Halfway:
+    """The first part of a cycle, as the interpreter runs it again."""
+    program = ts.program
+    now = admit(program, {**step.before, **step.taken})
+    assert not isinstance(now, str)
+    settle(program, now)
+    found = Halfway(now, dict(now), now)
+    try:
+        with scripted(program, step.answers):
+            for name in ts.level.preprocess:
+                call(program, name, [], now)
+            found.matched, found.middle = True, dict(now)
+            execute(program, [action.statement for action in _actions(ts, step)], now, {})
+            found.acted = step.fault is not Fault.ASSUMPTION
+    except ExternError:
+        pass
+    return found
+
+
+def _actions(ts: TransitionSystem, step: CycleRun) -> tuple[Action, ...]:
+    """What the line that ran does."""
+    table = ts.table(step.table)
+    lines: list[Line | Default] = [*table.lines, *([] if table.default is None else [table.default])]
+    return next((one.actions for one in lines if one.name == step.line), ())
+
+
+def seen_by_table(ts: TransitionSystem, step: CycleRun) -> Snapshot | None:
+    """Every leaf as the table saw it; None where the cycle ended before."""
+    found = halfway(ts, step)
+    return found.middle if found.matched else None
+
+
+def _step(
+    ts: TransitionSystem,
+    before: Mapping[str, Value],
+    taken: Mapping[str, Value],
+    outcome: Outcome,
+    answers: tuple[ExternAnswer, ...],
+) -> CycleRun:
+    after = outcome.snapshot
+    chosen = ts.table_of(after)
+    line = "" if outcome.line is None else str(outcome.line)
+    matched: tuple[str, ...] = () if outcome.line is None else (line,)
+    if outcome.fault is Fault.SEVERAL_LINES:
+        matched = tuple(map(str, matching_lines(ts.table(chosen), after)))
+    found = CycleRun(
+        dict(taken),
+        chosen,
+        line,
+        outcome.fault,
+        outcome.failed_assumptions,
+        dict(before),
+        after,
+        matched,
+        answers,
+    )
+    return replace(found, failed=(*found.failed, *_also_failed(ts, found)))
+
+
+def _also_failed(ts: TransitionSystem, step: CycleRun) -> tuple[str, ...]:
+    """Assumptions of the table that no executor looks at, and that did not hold."""
+    table = ts.table(step.table)
+    others = [
+        one
+        for one in ts.program.assumptions
+        if one.name in table.assumptions
+        and one.standing is not Standing.MONITORED
+        and one.name not in step.failed
+    ]
+    seen = seen_by_table(ts, step) if others else None
+    return () if seen is None else tuple(str(one.name) for one in others if not holds(one.condition, seen))
+
+
+def broken(ts: TransitionSystem, obligation: Obligation, step: CycleRun) -> bool:
+    """Return whether the cycle, as it ran, breaks the obligation.
+
+    Raises:
+        StopIteration: No cycle of the level can, as the level has no such obligation.
+    """
+    if obligation.table and obligation.table != step.table:
+        return False
+    match obligation.sort:
+        case Sort.ASSUMPTION:
+            return obligation.name in step.failed
+        case Sort.ONE_LINE:
+            return step.fault is Fault.SEVERAL_LINES and set(obligation.lines) <= set(step.matched)
+        case Sort.SOME_LINE:
+            return step.fault is Fault.NO_LINE
+        case Sort.NO_DEFAULT:
+            default = ts.table(obligation.table).default
+            return default is not None and step.line == default.name
+        case Sort.INVARIANT:
+            kept = invariant_kept(ts, obligation.name, step.before, step.after)
+            return not step.ends_the_run and not kept
+        case Sort.PROPERTY:
+            kept = property_kept(ts, obligation.name, step.before, step.after)
+            return not step.ends_the_run and not kept
+        case Sort.SAFE:
+            return ts.safety.within and not step.ends_the_run and _broken_between(ts, obligation, step)
+        case Sort.SAME_ORDER:
+            return _taken_again(ts, step)
+        case Sort.OF_ITS_ORDER:
+            return _misreported(ts, obligation.name, step)
+        case (
+            Sort.ECHOES
+            | Sort.NUMBERED
+            | Sort.NEXT_NUMBER
+            | Sort.WAITS
+            | Sort.ONCE
+            | Sort.ANSWERED
+            | Sort.PAUSES
+            | Sort.DEFERRED
+            | Sort.ENDS
+            | Sort.PROTOCOL
+        ):
+            return _broken_between(ts, obligation, step)
+        case _:
+            assert_never(obligation.sort)
+
+
+def _broken_between(ts: TransitionSystem, obligation: Obligation, step: CycleRun) -> bool:
+    """Return whether what stands before and after the cycle breaks the obligation, as its condition says."""
+    every = obligations(ts, as_cycle(ts, step))
+    return _is_false(next(one for one in every if one.key == obligation.key).holds)
+
+
+def _taken_again(lower: TransitionSystem, step: CycleRun) -> bool:
+    """Return whether another order is taken under the number that was taken last."""
+    if (above := lower.links.above) is None:
+        raise StopIteration
+    fields = (above.command, *above.numbered)
+    same = step.before[above.number] == step.taken[above.number]
+    return same and any(step.before[leaf] != step.taken[leaf] for leaf in fields)
+
+
+def _misreported(upper: TransitionSystem, report: str, step: CycleRun) -> bool:
+    """Return whether the level is told of its last order in this record what is not so."""
+    below = next(one for one in upper.links.below if one.report == report)
+    before, taken = (
+        {name: values.constant(upper.kinds[name], value) for name, value in of.items()}
+        for of in (step.before, step.taken)
+    )
+    return _is_false(TransitionSystem.echo(below, before, taken))
+
+
+def _is_false(node: Node) -> bool:
+    return node.known and not node.low
+
+
+def as_cycle(ts: TransitionSystem, step: CycleRun) -> Cycle:
+    """A cycle as it ran, all its nodes constants."""
+    before, after = _constants(ts, step.before), _constants(ts, step.after)
+    taken = {name: after[name] for name in step.taken}
+    half = halfway(ts, step)
+    middle = _constants(ts, half.middle)
+    return Cycle(
+        before,
+        taken,
+        values.TRUE,
+        {**middle, **taken},
+        ts.tables(middle, matched=half.matched),
+        after,
+        values.truth(step.fault in EARLY),
+        values.truth(not half.matched),
+        values.truth(not half.acted),
+        settled=_constants(ts, half.settled),
+        acted=_constants(ts, half.done),
+    )
+
+
+def _constants(ts: TransitionSystem, state: Mapping[str, Value]) -> Leaves:
+    return {
+        name: values.constant(kind, state[name])
+        for name, kind in ts.kinds.items()
+        if not name.startswith(GHOST)
+    } | {name: values.constant(kind, 0) for name, kind in ts.kinds.items() if name.startswith(GHOST)}
