@@ -16,6 +16,7 @@ from rcsc.compose.contract.predicates import Predicate
 from rcsc.compose.contract.transition import Cycle, TransitionSystem
 from rcsc.compose.invariant.cubes import Masks, Pair, Reached, shown
 from rcsc.compose.invariant.search import Effort, Invariant, search
+from rcsc.compose.proof import level as level_proof
 from rcsc.compose.proof.context import RepeatedLine
 from rcsc.compose.proof.kept import keep, recall
 from rcsc.compose.proof.level import LevelProof, Verdict, prove_level
@@ -26,7 +27,7 @@ from rcsc.host.cache import Cache
 from rcsc.lang.model import Bool, Enum, Int, Op, Real, Scalar, real_key
 from rcsc.lang.operator_table import Arithmetic, divide
 from rcsc.solvers.sat import Sat
-from rcsc.solvers.smt import Answer, Solver
+from rcsc.solvers.smt import Answer, Limits, Solver
 from rcsc.symbolic import values
 from rcsc.symbolic.bits import Bits, few, key_of_bits
 from rcsc.symbolic.keyed import Keyed
@@ -280,18 +281,38 @@ def test_a_line_that_is_dead_in_its_context_is_named(tmp_path: Path) -> None:
 COUNTER = "state idle : bool = true"
 
 
-def test_a_line_that_counts_when_it_matches_again_is_named(tmp_path: Path) -> None:
+@pytest.mark.parametrize("before", [False, True])
+def test_a_line_that_counts_when_it_matches_again_is_named(tmp_path: Path, before: bool) -> None:
+    """Whether or not the preprocess writes the counter, too."""
+
     def edit(text: str) -> str:
         text = text.replace(COUNTER, f"{COUNTER}\nstate tries : int 0 .. 9")
         text = text.replace(
             "procedure begin {", "procedure again {\n  tries := min(tries + 1, 9)\n}\n\nprocedure begin {"
         )
+        if before:
+            text = text.replace("status_in, idle {", "status_in, idle, tries {")
+            text = text.replace("    new_command := true\n", "    new_command := true\n    tries := 0\n")
         return text.replace("|| begin; nextstate(going) | go ", "|| begin; again; nextstate(going) | go ")
 
     found = proved(tmp_path, "upper", upper=edit)
     assert found.open == ()
     assert found.context is not None
     assert found.context.repeated == (RepeatedLine("work", "1", ("tries",)),)
+
+
+@pytest.mark.parametrize(
+    ("many", "told"), [(0, {Verdict.UNDECIDED}), (1, {Verdict.PROVED, Verdict.UNDECIDED})]
+)
+def test_all_questions_about_a_level_have_a_budget_together(
+    monkeypatch: pytest.MonkeyPatch, many: int, told: set[Verdict]
+) -> None:
+    """It is proved with more; whichever question meets the end of the budget, nothing is said that is not so."""
+    monkeypatch.setattr(level_proof, "TOGETHER", many)
+    upper = transition_systems(SMALL / "system.toml")["upper"]
+    found = prove_level(upper, replace(LITTLE, limits=Limits.of(1_000_000)))
+    assert {verdict for _, verdict in found.found} <= told
+    assert found.context is None or not found.context.unreached
 
 
 def test_a_command_that_need_not_end_is_named(tmp_path: Path) -> None:

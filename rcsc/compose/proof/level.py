@@ -26,6 +26,9 @@ from rcsc.solvers.smt import Answer, Limits, Solver
 from rcsc.symbolic import values
 from rcsc.symbolic.keyed import Keyed
 
+TOGETHER = 50
+"""All questions about a level take at most as many steps as so many of them may; what is asked after that is not decided."""
+
 
 class NotConfirmedError(Exception):
     """Another solver does not say the same, or gave up: nothing may rest on what was found."""
@@ -100,18 +103,19 @@ def prove_level(ts: TransitionSystem, effort: Effort | None = None) -> LevelProo
     seen: Context | None = None
     ends: tuple[Ending, ...] = ()
     try:
-        found = search(ts, firsts, cycle, wanted, effort)
-        asked = _asked_anew(found.predicates, firsts, cycle, effort.limits)
-        looks = effort.looks and not any(wanted[at].sort is not Sort.NUMBERED for at in found.open)
-        flow = Flow(ts, asked, found.clauses)
-        if looks and (others := [*flow.ways_round(), *never_run(asked, found.clauses, found.ran)]):
-            found = strengthened(ts, firsts, cycle, found, others)
+        with smt.together(TOGETHER * effort.limits.steps):
+            found = search(ts, firsts, cycle, wanted, effort)
+            asked = _asked_anew(found.predicates, firsts, cycle, effort.limits)
+            looks = effort.looks and not any(wanted[at].sort is not Sort.NUMBERED for at in found.open)
             flow = Flow(ts, asked, found.clauses)
-        _confirm(asked, found.clauses)
-        verdicts = list(_verdicts(ts, asked, found, wanted))
-        if looks:
-            seen, ends = context(ts, asked, found.clauses, found.ran), tuple(flow.endings())
-        _uncut(cut_before)
+            if looks and (others := [*flow.ways_round(), *never_run(asked, found.clauses, found.ran)]):
+                found = strengthened(ts, firsts, cycle, found, others)
+                flow = Flow(ts, asked, found.clauses)
+            _confirm(asked, found.clauses)
+            verdicts = list(_verdicts(ts, asked, found, wanted))
+            if looks:
+                seen, ends = context(ts, asked, found.clauses, found.ran), tuple(flow.endings())
+            _uncut(cut_before)
     except (GaveUpError, NotConfirmedError):
         found, seen, ends = Invariant(), None, ()
         verdicts = [(obligation, Verdict.UNDECIDED) for obligation in wanted]
