@@ -11,8 +11,8 @@ What is proved, of each level alone in its environment (`proof.level`):
   very cycle (so that none is lost and none echoed that was not run); its orders change only together with their
   numbers, and numbers come one after the other.
 
-Besides, of its lines in their context: which are never reached, what one does that matches again (`context`), and that every
-command ends if every order is answered (`proof.termination`, `proof.ranking`).
+Context: which lines are never reached, and what a line does that matches again (`proof.context`). Termination: every command is
+eventually answered, assuming that subordinates answer theirs (`proof.termination`, `proof.ranking`).
 
 What it assumes of its environment, the contract (`transition`), in words:
 
@@ -46,9 +46,10 @@ What it rests on besides:
   beginning is proved like the first. For its neighbours it is an order that is superseded, or a report that failed;
   freshness then asks more where none stands: no order that the level gave before and that is not echoed yet may still
   be on its way, for it has the number that is now used again.
-- *Reals* and arithmetic are followed as far as `keyed` says, and `measured` where a way has to end; the rest may take any value.
-- That commands *end* rests on more than the contract: an order that is not replaced is answered some time, and stays so; and
-  where it is said, the values in an input stand still meanwhile. Of a level below the first is what is shown of it in turn.
+- *Reals* and arithmetic are followed as far as `symbolic.keyed` says, and `symbolic.measured` for termination; the rest may take
+  any value.
+- *Termination* rests on more than the contract: an order that is not replaced is eventually answered, and stays so, which is
+  shown in turn of every subordinate that is a level; and, where that is printed, the values in an input stay the same meanwhile.
 - What stands outside the levels (workstation, robot, hand, camera) keeps to the same contract by its own means; it is
   listed, not proved.
 

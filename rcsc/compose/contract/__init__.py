@@ -1,7 +1,24 @@
-"""One level, its environment, and what it owes in one cycle.
+"""What a level may assume of its environment, and what it owes.
 
-`environment` finds which buffers link which levels, `given` says what extern procedures may give. A *transition system* (`transition`) is a
-level's cycle as nodes, from any state. `obligations` are conditions on one cycle, `properties` those of the program itself;
-`claims` says what each rests on. `predicates` are what an invariant may speak of, `walk` gives states to begin with; `variants` are
-programs under other rules.
+Definitions. A *leaf* is a scalar part of a variable, such as `command.inc_command`. A *neighbour* is a level, or something outside the
+system, that gives this level orders or takes orders from it. A *transition system* turns one *cycle* of a level into nodes over the leaves
+before and after it, from one state or from any (*havoc*). The *contract* is the condition on what the environment gives in a cycle. An
+*obligation* is a condition that every reachable cycle has to fulfil; its *sort* says what it is about. A *claim* is what was found of an
+obligation, or of the contract, together with the claims that it rests on. A *predicate* is a truth value or a member of a state: what an
+invariant may speak of.
+
+Example. A level takes orders in `command` and has the state `new_command`. Of a cycle that takes the same number as the cycle before, the
+contract says that the numbered fields of the order are the same, too; obligation `ONCE` is that `new_command` does not rise in it. If the
+level raises the flag only where the command differs from the last one, the obligation follows from the contract. If it raises the flag
+whenever the command is `go`, a state with `go` and without the flag breaks it, unless an invariant excludes that state.
+
+Trusted: `environment`, `transition`, `properties`, `obligations`, `claims`. Not trusted: `predicates` and `walk` only guide the search,
+`given` and `variants` only make runs.
+
+Cost: a cycle is built by one pass over the level's statements; nodes are shared, and nothing is enumerated. There are a few obligations
+for each table, order, deferred state and statement of the program; pairs of lines come only into runs.
+
+Modules, in the order the data flows: `environment` (which buffers link which levels), `transition` (a cycle as nodes), `given` and `walk`
+(extern procedures, random runs), `predicates`, `properties` (invariants and properties that the program states), `obligations`, `claims`;
+`variants` are programs under other rules.
 """

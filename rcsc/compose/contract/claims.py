@@ -31,7 +31,7 @@ CONTRACT, UNREACHED, AGAIN = "the contract", "never reached", "does nothing when
 
 
 class Verdict(StrEnum):
-    """What was found of a claim."""
+    """What was found of a claim, given what it rests on."""
 
     PROVED = "proved"
     NOT_PROVED = (
@@ -47,7 +47,7 @@ FOUND = frozenset({Verdict.PROVED, Verdict.TRUSTED})
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """Something that is claimed of a level.
+    """A statement about a level, with what was found of it.
 
     Attributes:
         verdict: What was found of it, given what it rests on.
@@ -96,7 +96,7 @@ class Promise:
 
 @dataclass(frozen=True, slots=True)
 class Closed:
-    """A claim with all that it rests on.
+    """A claim together with everything that it rests on, directly or not.
 
     Attributes:
         verdict: What was found of it, given that.
@@ -123,7 +123,7 @@ UNKNOWN = Closed(Verdict.UNLOOKED)
 
 
 def closed(claims: Mapping[Need, Claim]) -> dict[Need, Closed]:
-    """Each claim with what it lacks and trusts: the least sets that are closed under what claims rest on."""
+    """Close claims under what they rest on: the least sets of what each lacks and trusts."""
     lacks: dict[Need, frozenset[Need]] = dict.fromkeys(claims, frozenset())
     trusts = {need: frozenset(claim.trusts) for need, claim in claims.items()}
     grows = True
@@ -148,7 +148,7 @@ def _missing(need: Need, claims: Mapping[Need, Claim]) -> frozenset[Need]:
 
 
 def worst(verdicts: Iterable[Verdict]) -> Verdict:
-    """The verdict of what holds only where all of them do."""
+    """Return the verdict of a conjunction of claims."""
     order = (Verdict.NOT_PROVED, Verdict.UNDECIDED, Verdict.UNLOOKED, Verdict.TRUSTED)
     every = set(verdicts)
     return next((one for one in order if one in every), Verdict.PROVED)
@@ -159,12 +159,12 @@ DECLARED = ", as it is declared"
 
 
 def declared(trusts: Iterable[str]) -> tuple[str, ...]:
-    """The assumptions of tables among what is trusted, in order."""
+    """Select the assumptions of tables from what is trusted, in order."""
     return tuple(sorted(one.removesuffix(DECLARED) for one in set(trusts) if one.endswith(DECLARED)))
 
 
 def spelled(need: Need, level: str, claims: Collection[Need] | None = None) -> str:
-    """A claim in words; of another level than this with its name."""
+    """Spell a claim in words, with the level's name where it is another than `level`."""
     owner, (sort, table, name) = need
     said = {
         RUNS: "the level was not looked at",

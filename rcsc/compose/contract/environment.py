@@ -74,7 +74,7 @@ class Above(Neighbour):
 
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """What the database fills: the same keys give the same answer."""
+    """A question to the database: the same keys give the same answer."""
 
     into: str
     leaves: tuple[str, ...]
@@ -83,7 +83,7 @@ class Asked:
 
 @dataclass(frozen=True, slots=True)
 class Links:
-    """One level's environment.
+    """The environment of one level.
 
     Attributes:
         free: Inputs that nothing is known of but their ranges.
@@ -99,13 +99,13 @@ class Links:
 
 
 def leaves_under(program: Program, record: str) -> tuple[str, ...]:
-    """The leaves of a record, array or scalar variable, in declared order."""
+    """List the leaves of a record, array or scalar variable, in declared order."""
     inside = (f"{record}.", f"{record}[")
     return tuple(str(v.name) for v in program.variables if v.name == record or v.name.startswith(inside))
 
 
 def links(system: Description, level: str, program: Program) -> Links:
-    """The environment of a level, with every leaf of its order taken to be numbered.
+    """Find the environment of a level; every leaf of its order is taken to be numbered.
 
     Raises:
         BadDescription: An order has no report to answer it, a report no order, or one lacks a field; there are two superiors;
@@ -162,7 +162,7 @@ def _level(program: Program, name: str) -> Level:
 
 
 def _pairs(record: str, back: list[str], names: set[str]) -> bool:
-    """Whether the record is an order or a report with all its fields, and so is what goes back."""
+    """Return whether the record and what goes back are an order and its report, with all their fields."""
     order, report = (NUMBER, COMMAND), (ECHO, ECHOED)
     for mine, other in ((order, report), (report, order)):
         if f"{record}.{mine[0]}" in names:
@@ -182,7 +182,7 @@ def _unread(
     levels: set[str],
     seen: set[str],
 ) -> tuple[str, ...]:
-    """What goes both ways between the level and a neighbour, and is not taken for an order and its report.
+    """Describe what goes both ways between the level and a neighbour without being an order and its report.
 
     Looked at are neighbours that are levels, records of which some field is one of the protocol's, and, where the level has no
     superior, every neighbour that gives a record and takes one.
@@ -215,7 +215,7 @@ def _unread(
 
 
 def _whole(level: str, names: set[str], order: str, report: str) -> None:
-    """An order with a number, and the report on it, have the other fields of the contract, too.
+    """Check that a numbered order and the report on it have the other fields of the contract.
 
     Raises:
         BadDescription: One is missing.
@@ -229,7 +229,7 @@ def _whole(level: str, names: set[str], order: str, report: str) -> None:
 
 
 def check_ends(system: Description, programs: Mapping[str, Program]) -> None:
-    """Both ends of each buffer have the same leaves, and what one level gives the other admits: what is said of one is true of both.
+    """Check that both ends of each buffer have the same leaves, and that the taker admits every value that is given.
 
     Raises:
         BadDescription: They have not, or an input is filled twice, or something else than an input.
@@ -258,7 +258,7 @@ def check_ends(system: Description, programs: Mapping[str, Program]) -> None:
 
 
 def _at_end(programs: Mapping[str, Program], end: str) -> tuple[Variable, ...]:
-    """The leaves of a buffer at one end; none where that stands outside the levels."""
+    """List the leaves of a buffer at one end; none where that end stands outside the levels."""
     if _owner(end) not in programs:
         return ()
     program = programs[_owner(end)]
@@ -269,7 +269,7 @@ def _at_end(programs: Mapping[str, Program], end: str) -> tuple[Variable, ...]:
 
 
 def _admits(taken: Scalar, given: Scalar) -> bool:
-    """Whether every value of the one type means the same in the other."""
+    """Return whether every value of the given type means the same in the type that takes it."""
     if isinstance(taken, Enum) and isinstance(given, Enum):
         return taken.members == given.members
     if (isinstance(taken, Int) and isinstance(given, Int)) or (

@@ -30,25 +30,25 @@ REFUSED_NOW_AND_THEN = 0.04
 
 
 def may_be_refused(variable: Variable) -> bool:
-    """Whether some value that a function can return is refused for the variable; a number that is no NaN may be clamped instead."""
+    """Return whether a function can return a value that is refused; numbers may be clamped, NaN never."""
     return variable.admit is not Admit.CLAMP or isinstance(variable.type, Real)
 
 
 def refused(variable: Variable) -> Value:
-    """A value that is refused for the variable: the one after its greatest, or no number."""
+    """Return a value that is refused: the one after the greatest, or NaN."""
     if isinstance(variable.type, Real):
         return math.nan
     return key_bounds(variable.type)[1] + 1
 
 
 def least(kind: Scalar) -> Value:
-    """The least value of a type."""
+    """Return the least value of a type."""
     return value_of_key(kind, key_bounds(kind)[0])
 
 
 @contextmanager
 def scripted(program: Program, answers: Sequence[ExternAnswer]) -> Iterator[None]:
-    """Inside, each call has the next of the answers that are its procedure's; the least values where none is left."""
+    """Answer each call of an extern procedure with its next scripted answer, with least values when none is left."""
     left = list(answers)
 
     def answer(procedure: Procedure, _args: list[Value]) -> tuple[Value, ...]:
@@ -63,7 +63,7 @@ def scripted(program: Program, answers: Sequence[ExternAnswer]) -> Iterator[None
 
 @contextmanager
 def at_random(program: Program, random: Random) -> Iterator[None]:
-    """Inside, each result is some value of its type, and now and then a refused one."""
+    """Answer each call of an extern procedure with random values of its types, and now and then a refused one."""
 
     def one(variable: Variable) -> Value:
         if may_be_refused(variable) and random.random() < REFUSED_NOW_AND_THEN:

@@ -74,7 +74,7 @@ ObligationKey: TypeAlias = tuple[Sort, str, str]
 
 @dataclass(frozen=True, slots=True)
 class Unstated:
-    """Obligations of a sort that cannot be stated, as a part of the level was not recognised; `missing`, what was looked for."""
+    """A sort of obligation that cannot be stated, because part of the level was not recognised."""
 
     sort: Sort
     table: str
@@ -89,7 +89,7 @@ class Unstated:
 
 @dataclass(frozen=True, slots=True)
 class Obligation:
-    """One condition.
+    """A condition that every cycle has to fulfil.
 
     Attributes:
         table: Whose it is; empty where it is the level's.
@@ -106,7 +106,7 @@ class Obligation:
 
     @property
     def key(self) -> ObligationKey:
-        """The same for the same obligation in any cycle."""
+        """Its identity, the same in every cycle."""
         return self.sort, self.table, self.name
 
     @property
@@ -120,7 +120,7 @@ class Obligation:
 
 
 def obligations(ts: TransitionSystem, cycle: Cycle) -> tuple[Obligation, ...]:
-    """All obligations of a level, its tables' first."""
+    """List all obligations of a level, those of its tables first."""
     return (
         *_tables(cycle),
         *_upward(ts, cycle),
@@ -144,7 +144,7 @@ def _tables(cycle: Cycle) -> Iterator[Obligation]:
 
 
 def pairs(cycle: Cycle) -> tuple[Obligation, ...]:
-    """That no two lines match, pair by pair: what there is to look for where `ONE_LINE` is not proved."""
+    """State pair by pair that no two lines match: what to look for where `ONE_LINE` is not proved."""
     found = []
     for at in cycle.tables:
         for one, two in may_meet(at.table):
@@ -160,7 +160,7 @@ def pairs(cycle: Cycle) -> tuple[Obligation, ...]:
 
 
 def may_meet(table: Table) -> list[tuple[int, int]]:
-    """The pairs of lines whose cells do not part them; all of them where a cell is about several leaves."""
+    """List the pairs of lines whose cells do not exclude each other; all pairs where a cell is about several leaves."""
     every = combinations(range(len(table.lines)), 2)
     if not boxes.applies(table):
         return list(every)
@@ -173,7 +173,7 @@ def may_meet(table: Table) -> list[tuple[int, int]]:
 
 
 def _upward(ts: TransitionSystem, cycle: Cycle) -> Iterator[Obligation]:
-    """What the superior assumes of this level."""
+    """State what the superior assumes of this level."""
     if (above := ts.links.above) is None:
         return
     number = values.equal(cycle.after[above.echo], cycle.taken[above.number])
@@ -189,7 +189,7 @@ def _upward(ts: TransitionSystem, cycle: Cycle) -> Iterator[Obligation]:
 
 
 def _downward(ts: TransitionSystem, cycle: Cycle) -> Iterator[Obligation]:
-    """What the subordinates assume of this level, and that it waits for them."""
+    """State what the subordinates assume of this level, and that it waits for them."""
     for below in ts.links.below:
         before, after = cycle.before[below.number], cycle.after[below.number]
         same = values.equal(before, after)
@@ -208,20 +208,20 @@ def _downward(ts: TransitionSystem, cycle: Cycle) -> Iterator[Obligation]:
 
 
 def command_stays(ts: TransitionSystem, cycle: Cycle) -> Node:
-    """Say that the level, which has a superior, takes the order that it took in the cycle before."""
+    """Return the condition that the level takes the same order as in the cycle before; it has a superior."""
     above = ts.links.above
     assert above is not None
     return values.equal(cycle.before[above.number], cycle.taken[above.number])
 
 
 def _waiting(ts: TransitionSystem, cycle: Cycle, below: Below) -> Node:
-    """The command is the last one, and the order is not echoed."""
+    """Return the condition that the command stays and the order below is not echoed."""
     echoed = values.equal(cycle.taken[below.echo], cycle.before[below.number])
     return values.both(command_stays(ts, cycle), values.negation(echoed))
 
 
 def _passes_on_a_pause(ts: TransitionSystem, cycle: Cycle, below: Below) -> Node:
-    """Where a new order is the first command, PAUSE or its like, so is the order that stands below after the cycle."""
+    """Return the condition that a new PAUSE (the first command) is ordered below by the end of the cycle."""
     above = ts.links.above
     assert above is not None
     paused = values.equal(cycle.taken[above.command], values.constant(ts.kinds[above.command], 0))
@@ -248,14 +248,14 @@ def _own(ts: TransitionSystem, cycle: Cycle) -> Iterator[Obligation]:
 
 
 def has_flag(ts: TransitionSystem) -> bool:
-    """Whether the level keeps the flag of a new command."""
+    """Return whether the level keeps the flag of a new command."""
     return any(
         v.name == FLAG and v.kind is Kind.STATE and isinstance(v.type, Bool) for v in ts.program.variables
     )
 
 
 def unstated(ts: TransitionSystem) -> tuple[Unstated, ...]:
-    """The obligations that are not looked at, and what is missing for them."""
+    """List the obligations that are not looked at, and what is missing for them."""
     return tuple(_unstated(ts))
 
 
@@ -281,7 +281,7 @@ def _unstated(ts: TransitionSystem) -> Iterator[Unstated]:
 
 
 def _no_pause(ts: TransitionSystem, below: Below) -> Iterator[str]:
-    """Why it is not known what a PAUSE is: the first command, which has a table of its own."""
+    """Say why it is not known what a PAUSE is: the first command, which has a table of its own."""
     assert ts.links.above is not None
     if isinstance(ts.level.tables, OneTable):
         yield "the level has one table for all commands"
@@ -291,14 +291,14 @@ def _no_pause(ts: TransitionSystem, below: Below) -> Iterator[str]:
 
 
 def run_by(ts: TransitionSystem) -> list[Table]:
-    """The tables that the level runs."""
+    """List the tables that the level runs."""
     chosen = ts.level.tables
     names = {chosen.table} if isinstance(chosen, OneTable) else {table for _, table in chosen.tables}
     return [one for one in ts.program.tables if one.name in names]
 
 
 def _rests(ts: TransitionSystem, table: Table) -> bool:
-    """Whether it is the table of the first command, PAUSE or its like, and of no other: it does the same whether that is new or not."""
+    """Return whether the table serves the first command (PAUSE or its like) alone: new or not, it does the same."""
     chosen = ts.level.tables
     return not isinstance(chosen, OneTable) and [
         value for value, name in chosen.tables if name == table.name
@@ -306,7 +306,7 @@ def _rests(ts: TransitionSystem, table: Table) -> bool:
 
 
 def _stated(ts: TransitionSystem, cycle: Cycle) -> Iterator[Obligation]:
-    """What the program itself states."""
+    """State what the program itself claims: invariants and properties."""
     for name, holds in invariants(ts.program, cycle):
         yield Obligation(Sort.INVARIANT, "", name, holds)
     for name, holds in properties(ts.program, cycle):
@@ -316,12 +316,12 @@ def _stated(ts: TransitionSystem, cycle: Cycle) -> Iterator[Obligation]:
 
 
 def asks(program: Program) -> bool:
-    """Whether a cycle can end early because an extern procedure is refused."""
+    """Return whether a cycle can end early because an extern procedure is refused."""
     return any(one.extern is not None for one in program.procedures)
 
 
 def _overlooking(at: TableAt) -> tuple[Node, ...] | None:
-    """When lines match that do not look for a new command; None of a table in which none does. DEFAULT never looks."""
+    """List the conditions of lines that match without looking for a new command; None where no line looks. DEFAULT never looks."""
     looks = [looks_for(FLAG, line) for line in at.table.lines]
     if not any(looks):
         return None
@@ -331,12 +331,12 @@ def _overlooking(at: TableAt) -> tuple[Node, ...] | None:
 
 
 def looks_for(leaf: str, line: Line) -> bool:
-    """Whether some cell of the line reads the leaf, alone or in an expression."""
+    """Return whether a cell of the line reads the leaf."""
     return any(test is not None and leaf in map(str, read_by(test.condition)) for test in line.tests)
 
 
 def _answered(ts: TransitionSystem, cycle: Cycle, at: TableAt, overlooking: tuple[Node, ...]) -> Obligation:
-    """Where such a line runs while the flag stands, or the cycle ends before a line is done, the flag outlasts it.
+    """State that the flag of a new command outlasts each line that does not look for it, and each cycle that ends early.
 
     If it is down as soon as the level sees the same once more, no line will answer the command, and what this line
     reports is taken for the answer.

@@ -95,7 +95,7 @@ class Predicate:
 
 
 def cone(cycle: Cycle, obligations: Iterable[Node]) -> frozenset[str]:
-    """The leaves whose values before a cycle can influence the obligations, now or in a later cycle."""
+    """Find the leaves whose values before a cycle can influence the nodes, in this cycle or a later one."""
     found: set[str] = set()
     waiting = [name for name in values.variables(obligations) if name in cycle.before]
     while waiting:
@@ -109,7 +109,7 @@ def cone(cycle: Cycle, obligations: Iterable[Node]) -> frozenset[str]:
 def predicates(
     ts: TransitionSystem, cycle: Cycle, obligations: Iterable[Node], closely: int = 0
 ) -> tuple[Predicate, ...]:
-    """The predicates in the cone of the obligations, in declared order.
+    """Choose the predicates in the cone of the obligations, in declared order.
 
     Args:
         ts: The level.
@@ -145,7 +145,7 @@ def predicates(
 
 
 def point(ts: TransitionSystem, chosen: tuple[Predicate, ...], state: Mapping[str, Value]) -> tuple[int, ...]:
-    """The predicates of a state that was run; modules are run by the interpreter."""
+    """Evaluate the predicates in a state that was reached; modules are run by the interpreter."""
     again: dict[str, dict[str, Value]] = {}
     found = []
     for one in chosen:
@@ -164,19 +164,19 @@ def point(ts: TransitionSystem, chosen: tuple[Predicate, ...], state: Mapping[st
 
 
 def listed(kind: Scalar) -> bool:
-    """Whether the values can be gone through one by one: truth values, members."""
+    """Return whether a type has few enough values to list: truth values, members."""
     return isinstance(kind, Bool | Enum)
 
 
 def _flag(program: Program, name: str) -> bool:
-    """A truth value that the level itself keeps."""
+    """Return whether the name is a truth value that the level itself keeps."""
     return any(
         v.name == name and isinstance(v.type, Bool) and v.kind is Kind.STATE for v in program.variables
     )
 
 
 def _read(ts: TransitionSystem) -> set[str]:
-    """Leaves that decide which line runs, or that the contract speaks of; with what they will be."""
+    """Collect the leaves that decide which line runs or that the contract is about, and their pending values."""
     program, level = ts.program, ts.level
     conditions = [one.condition for one in program.assumptions]
     conditions += [
@@ -197,7 +197,7 @@ def _read(ts: TransitionSystem) -> set[str]:
 
 
 def _computed(ts: TransitionSystem) -> Iterator[tuple[str, Procedure]]:
-    """Leaves that a module of the preprocess computes of inputs, flags, and what it writes itself."""
+    """Find the leaves that a preprocess module computes from inputs, flags and its own leaves."""
     variables = {str(v.name): v for v in ts.program.variables}
     for name in ts.level.preprocess:
         module = ts.procedures[name]
@@ -213,7 +213,7 @@ def _computed(ts: TransitionSystem) -> Iterator[tuple[str, Procedure]]:
 
 
 def _cells(ts: TransitionSystem, inside: Container[str]) -> Iterator[Predicate]:
-    """Conditions of cells on numbers."""
+    """Make predicates of cells that compare numbers."""
     kinds, seen = ts.kinds, set()
     for table in ts.program.tables:
         for column, tests in zip(
@@ -229,7 +229,7 @@ def _cells(ts: TransitionSystem, inside: Container[str]) -> Iterator[Predicate]:
 
 
 def _branches(ts: TransitionSystem, inside: Container[str], there: Container[str]) -> Iterator[Predicate]:
-    """What procedures decide by: truth values and members, and comparisons of numbers with a constant."""
+    """Make predicates of what procedures branch on: truth values, members, numbers compared with constants."""
     kinds, seen = ts.kinds, set()
     for condition in _decisions(ts.program):
         for name in dict.fromkeys(map(str, read_by(condition))):
@@ -246,7 +246,7 @@ def _branches(ts: TransitionSystem, inside: Container[str], there: Container[str
 
 
 def _decisions(program: Program) -> Iterator[Expr]:
-    """Conditions of two-way choices."""
+    """List the conditions of two-way choices."""
     for procedure in program.procedures:
         for one in everything(procedure.body):
             if isinstance(one, If):
@@ -254,7 +254,7 @@ def _decisions(program: Program) -> Iterator[Expr]:
 
 
 def compared(program: Program) -> Iterator[tuple[str, str]]:
-    """Pairs of leaves that some procedure, or a deferral, compares for equality."""
+    """Find pairs of leaves that a procedure or a deferral compares for equality."""
     conditions: list[Expr] = [v.deferred_until for v in program.variables if v.deferred_until is not None]
     conditions += [
         expr
@@ -272,13 +272,13 @@ def compared(program: Program) -> Iterator[tuple[str, str]]:
 
 
 def _questions(ts: TransitionSystem) -> Iterator[tuple[str, str]]:
-    """What was asked of the database, and what would be asked now."""
+    """Pair what was asked of the database with what would be asked now."""
     for asked in ts.links.asked:
         for key in asked.keys:
             yield f"{GHOST}{asked.into} {key}", key
 
 
 def _selector(ts: TransitionSystem) -> Iterator[str]:
-    """The leaves that select the table."""
+    """List the leaves that select the table."""
     if not isinstance(ts.level.tables, OneTable):
         yield from map(str, read_by(ts.level.tables.selector))

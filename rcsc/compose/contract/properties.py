@@ -45,13 +45,13 @@ _PARTIAL = frozenset({Op.DIV, Op.MOD, Op.TO_INT})
 
 
 def invariants(program: Program, cycle: Cycle) -> Iterator[tuple[str, Node]]:
-    """Each invariant by name, before the cycle and after it."""
+    """State each invariant by name: it holds before the cycle and after it."""
     for one in program.invariants:
         yield one.name, values.both(_true(one.condition, cycle.before), _true(one.condition, cycle.after))
 
 
 def kept_within(program: Program, cycle: Cycle, names: Collection[str]) -> Node:
-    """These invariants also hold within the cycle, wherever one of its procedures, conditions or lines is shown to be safe under them."""
+    """State that the invariants hold within the cycle, too, wherever operations are shown to be safe under them."""
     return values.all_of(
         _true(one.condition, leaves)
         for one in program.invariants
@@ -61,14 +61,14 @@ def kept_within(program: Program, cycle: Cycle, names: Collection[str]) -> Node:
 
 
 def properties(program: Program, cycle: Cycle) -> Iterator[tuple[str, Node]]:
-    """Each property by name."""
+    """State each property by name, over the cycle and the one before."""
     leaves = {**cycle.after, **{str(earlier(name)): node for name, node in cycle.before.items()}}
     for one in program.properties:
         yield one.name, _true(one.condition, leaves)
 
 
 def _true(condition: Expr, leaves: Leaves) -> Node:
-    """That the condition is defined, and holds."""
+    """Return the condition that an expression is defined and true."""
     run = Run({}, {}, dict(leaves))
     found = run.evaluate(condition)
     return values.all_of((*(values.follows(one.path, one.good) for one in run.obligations), found))
@@ -80,7 +80,7 @@ def _true(condition: Expr, leaves: Leaves) -> Node:
 def invariant_kept(
     ts: TransitionSystem, name: str, before: Mapping[str, Value], after: Mapping[str, Value]
 ) -> bool:
-    """Whether the invariant holds before and after a cycle that was run.
+    """Return whether the invariant holds before and after a cycle that was run.
 
     Raises:
         StopIteration: There is no such invariant.
@@ -92,7 +92,7 @@ def invariant_kept(
 def property_kept(
     ts: TransitionSystem, name: str, before: Mapping[str, Value], after: Mapping[str, Value]
 ) -> bool:
-    """Whether the property holds of a cycle that was run.
+    """Return whether the property holds of a cycle that was run.
 
     Raises:
         StopIteration: There is no such property.
@@ -103,7 +103,7 @@ def property_kept(
 
 
 def _held(condition: Expr, state: Mapping[str, Value], kinds: Mapping[str, Scalar]) -> bool:
-    """As the interpreter says; what leaves 64 bits, which it does not look at, is not defined."""
+    """Return whether the interpreter finds the condition true; what leaves 64 bits counts as undefined."""
     try:
         if not holds(condition, state):
             return False
@@ -119,7 +119,7 @@ def _held(condition: Expr, state: Mapping[str, Value], kinds: Mapping[str, Scala
 def every_predicate(
     ts: TransitionSystem, cycle: Cycle, obligations: Iterable[Node], closely: int = 0
 ) -> tuple[Predicate, ...]:
-    """What `predicates` chooses, and what invariants and properties speak of.
+    """Choose the predicates of tables and procedures, and those of invariants and properties.
 
     Those that there are at less closeness come first, in the same order, as clauses name predicates by their position.
     """
@@ -140,7 +140,7 @@ def _states(ts: TransitionSystem) -> list[Expr]:
 
 
 def _said(ts: TransitionSystem, inside: frozenset[str], there: set[str]) -> tuple[Predicate, ...]:
-    """Truth values and members, and comparisons of numbers, as far as they matter for a later cycle."""
+    """Make predicates of the parts of invariants and properties that matter for a later cycle."""
     found: dict[str, Predicate] = {}
     for condition in _states(ts):
         for part in parts(condition):
@@ -156,7 +156,7 @@ def _said(ts: TransitionSystem, inside: frozenset[str], there: set[str]) -> tupl
 
 
 def _of_one_cycle(part: Expr) -> Expr:
-    """The part without `was`."""
+    """Drop `was` from an expression."""
     match part:
         case Read(name=name):
             return Read(VariableName(name.removeprefix(BEFORE)), part.type)
@@ -169,7 +169,7 @@ def _of_one_cycle(part: Expr) -> Expr:
 
 
 def _predicates_of(part: Expr, kinds: Mapping[str, Scalar]) -> Iterator[Predicate]:
-    """The predicates that one part makes; none where it is a whole made of others."""
+    """Make the predicates of one part of an expression; none of a part that is made of others."""
     match part:
         case Read(name=name) if listed(kinds[name]):
             yield Predicate(str(name), kinds[name])
@@ -184,7 +184,7 @@ def _predicates_of(part: Expr, kinds: Mapping[str, Scalar]) -> Iterator[Predicat
 
 
 def _condition(part: Expr, kinds: Mapping[str, Scalar]) -> Iterator[Predicate]:
-    """A comparison of numbers, where it is defined of every value."""
+    """Make a predicate of a comparison of numbers, where it is defined of every value."""
     whole = all(
         not isinstance(one, Select) and not (isinstance(one, Apply) and one.op in _PARTIAL)
         for one in parts(part)

@@ -104,7 +104,7 @@ class TableAt:
 
 @dataclass(frozen=True, slots=True)
 class Cycle:
-    """One cycle.
+    """One cycle as nodes.
 
     Attributes:
         before: Every leaf as the last cycle left it, and the ghosts; inputs as last taken.
@@ -160,7 +160,7 @@ class Safety:
 
 @dataclass(slots=True)
 class TransitionSystem:
-    """Makes cycles of one level.
+    """One level as a transition system: makes its cycles as nodes.
 
     Attributes:
         kinds: The type of each leaf and ghost, by name.
@@ -189,7 +189,7 @@ class TransitionSystem:
         self.trusted = self._of_the_environment()
 
     def _of_the_environment(self) -> frozenset[str]:
-        """Assumptions with standing *assumed* that speak of what a cycle takes; what is about state alone is to be proved."""
+        """Find the *assumed* assumptions about what a cycle takes; those about state alone are to be proved."""
         wanted = {str(one.name) for one in self.program.assumptions if one.standing is Standing.ASSUMED}
         if not wanted:
             return frozenset()
@@ -202,11 +202,11 @@ class TransitionSystem:
         )
 
     def havoc(self) -> Leaves:
-        """Any values at all: the start of a step of induction."""
+        """Return an arbitrary state: the start of a step of induction."""
         return {name: values.variable(name, kind) for name, kind in self.kinds.items()}
 
     def initial(self) -> Leaves:
-        """The values before the first cycle."""
+        """Return the state before the first cycle."""
         start = {str(v.name): values.constant(v.type, v.initial) for v in self.program.variables}
         return {
             **{name: values.constant(kind, 0) for name, kind in self.kinds.items() if name.startswith(GHOST)},
@@ -214,7 +214,7 @@ class TransitionSystem:
         }
 
     def restarted(self) -> Leaves:
-        """The values before the first cycle after a restart, as `run.adopt` makes them, whatever stood in the buffers.
+        """Return the states before the first cycle after a restart, as `run.adopt` makes them, whatever stood in the buffers.
 
         A member that a state has no name for leaves it as it is initially, as there. An order has a number that no report can echo
         yet: the one after the order that stands in the buffer, which may be late; after the echo where none stands.
@@ -243,7 +243,7 @@ class TransitionSystem:
         return start
 
     def of(self, program: Program) -> "TransitionSystem":
-        """The same level with another program of the same leaves."""
+        """Return the same level with another program of the same leaves."""
         return TransitionSystem(
             program,
             next(one for one in program.levels if one.name == self.level.name),
@@ -252,7 +252,7 @@ class TransitionSystem:
         )
 
     def table(self, name: str) -> Table:
-        """A table of the program.
+        """Return a table of the program.
 
         Raises:
             StopIteration: It has none of this name.
@@ -260,13 +260,13 @@ class TransitionSystem:
         return next(one for one in self.program.tables if one.name == name)
 
     def table_of(self, snapshot: Snapshot) -> str:
-        """The table that ran in a cycle, by what the cycle left: what selects it stays from the preprocess on (`UNSTEADY_SELECTOR`)."""
+        """Return the table that ran, from the leaves that its cycle left: what selects it is steady (`UNSTEADY_SELECTOR`)."""
         if isinstance(self.level.tables, OneTable):
             return str(self.level.tables.table)
         return str(dict(self.level.tables.tables)[evaluate(self.level.tables.selector, snapshot)])
 
     def cycle(self, before: Leaves, suffix: str = " taken", taken: Leaves | None = None) -> Cycle:
-        """One cycle from `before`; the inputs it takes, if not given, are fresh variables, named with the suffix.
+        """Run one cycle symbolically from `before`; inputs that are not given are fresh variables, named with the suffix.
 
         What extern procedures give is named with it, too: cycles that one question is about need different suffixes.
         """
@@ -299,14 +299,14 @@ class TransitionSystem:
         )  # fmt: skip
 
     def tables(self, middle: Leaves, *, matched: bool) -> tuple[TableAt, ...]:
-        """Each table that may run on these leaves; none does where the cycle ends before it is matched."""
+        """Match each table that may run on these leaves; none runs where the cycle ends before matching."""
         run = Run(self.procedures, self.kinds, dict(middle), ended=values.truth(not matched))
         return tuple(self._tables(run))
 
     # --- the environment ---
 
     def _trusted(self, tables: tuple[TableAt, ...]) -> Node:
-        """What is declared to be so whenever a table runs."""
+        """Return the condition that declared assumptions hold whenever a table runs."""
         return values.all_of(
             values.follows(at.chosen, condition)
             for at in tables
@@ -315,7 +315,7 @@ class TransitionSystem:
         )
 
     def _protocol(self, before: Leaves, taken: Leaves) -> Node:
-        """What holds of orders and reports, whatever the delay (`compose.__doc__`)."""
+        """Return what holds of orders and reports, whatever the delay (`compose.__doc__`)."""
         kept = TRUE
         if (above := self.links.above) is not None:
             same = values.all_of(values.equal(before[leaf], taken[leaf]) for leaf in above.numbered)
@@ -327,7 +327,7 @@ class TransitionSystem:
 
     @staticmethod
     def echo(below: Below, before: Leaves, taken: Leaves) -> Node:
-        """The last order's number with another command is not echoed, nor a number not yet sent; what is echoed stays so."""
+        """Return the contract of a report: what echoes the last number is about the last command, and stays; the next is not echoed."""
         sent, last, echo = before[below.number], before[below.echo], taken[below.echo]
         it = values.equal(taken[below.echoed], before[below.command])
         now = values.equal(echo, sent)
@@ -337,7 +337,7 @@ class TransitionSystem:
         )
 
     def _database(self, before: Leaves, taken: Leaves) -> tuple[Leaves, Node]:
-        """What was asked, and that the same question has the same answer."""
+        """Return what was asked of the database, and the condition that the same question has the same answer."""
         ghosts: Leaves = {}
         kept = TRUE
         for asked in self.links.asked:
@@ -375,7 +375,7 @@ class TransitionSystem:
             yield TableAt(table, values.both(selected, goes_on), matches, assumptions, selected)
 
     def _choices(self, run: Run) -> Iterable[tuple[Table, Node]]:
-        """Each table that may run, once, and when it does."""
+        """List each table that may run, once, with the condition under which it does."""
         by_name = {table.name: table for table in self.program.tables}
         if isinstance(self.level.tables, OneTable):
             yield by_name[self.level.tables.table], TRUE
@@ -389,7 +389,7 @@ class TransitionSystem:
             yield by_name[name], when
 
     def _lines(self, run: Run, tables: tuple[TableAt, ...]) -> None:
-        """Runs the line that matches, the first where there are several, of the table that is chosen."""
+        """Run the first matching line of the chosen table."""
         middle = run.state
         ways: list[tuple[Node, State]] = []
         for at in tables:
@@ -411,7 +411,7 @@ class TransitionSystem:
 
 
 def _way(run: Run, middle: State, when: Node, actions: tuple[Action, ...]) -> tuple[Node, State]:
-    """What the actions of one line leave."""
+    """Run the actions of one line symbolically; return when, and the leaves they leave."""
     run.state = State(dict(middle.leaves))
     with run.where(when):
         for action in actions:
@@ -421,7 +421,7 @@ def _way(run: Run, middle: State, when: Node, actions: tuple[Action, ...]) -> tu
 
 
 def successor(number: Node) -> Node:
-    """The number after this one, of 16 bits."""
+    """Return the next number of 16 bits."""
     one, many = values.constant(number.kind, 1), values.constant(Int(0, NUMBERS), NUMBERS)
     return values.arithmetic(
         Op.MOD, (values.arithmetic(Op.ADD, (number, one), Int(0, NUMBERS)), many), number.kind

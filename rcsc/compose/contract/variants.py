@@ -14,7 +14,7 @@ TRUE = Literal(value=True, type=Bool())
 
 
 def undeferred(program: Program) -> Program:
-    """With every deferred state taken at once, not when its command is echoed: what section 9 warns of."""
+    """Take every deferred state at once, not when its command is echoed: what section 9 of Haynes et al. warns of."""
     at_once = tuple(
         replace(v, deferred_until=TRUE) if v.deferred_until is not None else v for v in program.variables
     )
@@ -22,12 +22,12 @@ def undeferred(program: Program) -> Program:
 
 
 def first_match(program: Program) -> Program:
-    """With the first of several matching lines run: each line also asks that none before it matches."""
+    """Run the first of several matching lines: each line also asks that none before it matches."""
     return replace(program, tables=tuple(map(_first_match, program.tables)))
 
 
 def defaults_reported(program: Program) -> Program:
-    """With every DEFAULT line declared unreachable, so that what falls to one is found."""
+    """Declare every DEFAULT line unreachable, to find what falls to it."""
     return replace(
         program,
         tables=tuple(
@@ -40,7 +40,7 @@ def defaults_reported(program: Program) -> Program:
 
 
 def _first_match(table: Table) -> Table:
-    """A column more: each line that can match together with an earlier one asks that none such does."""
+    """Add a column in which a line that can meet an earlier one asks that it does not match."""
     meeting = may_meet(table)
     if not meeting:
         return table

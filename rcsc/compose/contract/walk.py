@@ -17,7 +17,7 @@ from rcsc.lang.model import Enum, Value, key_bounds, value_of_key
 
 @dataclass(slots=True)
 class Walk:
-    """One walk.
+    """One random walk on the interpreter.
 
     Attributes:
         now: Every leaf.
@@ -37,12 +37,12 @@ class Walk:
         self.ghosts = {name: value_of_key(kinds[name], 0) for name in kinds if name.startswith(GHOST)}
 
     def begin_at(self, state: Mapping[str, Value]) -> None:
-        """Goes on from a state that a walk has come to."""
+        """Go on from a state that a walk has reached."""
         self.now = {leaf: state[leaf] for leaf in self.now}
         self.ghosts = {leaf: state[leaf] for leaf in self.ghosts}
 
     def states(self, cycles: int) -> Iterator[dict[str, Value]]:
-        """The state after each cycle; ends early where a cycle meets a fault, which is for the proof to find."""
+        """Yield the state after each cycle; stop at a fault, which is for the proof to find."""
         for _ in range(cycles):
             self._take()
             try:
@@ -58,7 +58,7 @@ class Walk:
             yield {**self.now, **self.ghosts}
 
     def _any(self, leaf: str) -> Value:
-        """A value; of numbers, few different ones where there are many, so that some are equal."""
+        """Draw a value; of wide ranges only a few different ones, to make some equal."""
         kind = self.ts.kinds[leaf]
         low, high = key_bounds(kind)
         if isinstance(kind, Enum) or high - low < 64:
@@ -86,7 +86,7 @@ class Walk:
             self.ghosts[f"{GHOST}{asked.into}"] = True
 
     def _order(self) -> None:
-        """Now and then another order: number and all."""
+        """Change the order now and then, number and all."""
         above = self.ts.links.above
         assert above is not None
         if self.random.random() < 0.08:
@@ -98,7 +98,7 @@ class Walk:
                     self.now[leaf] = self._any(leaf)
 
     def _report(self, below: Below) -> None:
-        """The last order echoed, or still an older one, with any status."""
+        """Report on the last order or an older one, with any status."""
         now, sent, last = self.now, self.now[below.number], self.now[below.echo]
         for leaf in now:
             if leaf.startswith(f"{below.report}."):

@@ -1,6 +1,20 @@
-"""What is not proved, shown: runs that the interpreter and the executors did.
+"""What is not proved, shown: runs that the interpreter and both executors did.
 
-`simplest` finds the simplest model, `trace` the shortest run that breaks an obligation, `lasso` one that goes round, `pair` one of two
-levels together; each becomes a `finding`. `replay` runs it by the executors and keeps a log, `frozen` keeps it as a case, `repair` says
-what would mend the table; `explain` goes through all that is open.
+Definitions. A *trace* is a run of one level, from its beginning, of which the last cycle breaks an obligation. A *lasso* is a run that
+ends as it was some cycles before, so that it may go on for ever. A *pair* is a run of two levels with the buffers between them. A
+*finding* is any of these, ready to be shown; a *frozen case* is a finding in JSON that is run again on later tables.
+
+Example. For "no two lines match" of a table, cycles are unrolled one after the other from the initial values, and a SAT solver is asked
+whether the last can break it. In the third it can. The inputs of the model are replaced by the simplest that will do, one by one; the
+interpreter runs them; only if two lines match there, too, is it a trace. Then the Python and the C executors run it, and have to leave the
+same in every cycle.
+
+Trusted: nothing but the interpreter. What it does not do is reported as a fault of rcsc, and never shown as a run.
+
+Cost: a SAT question for each obligation and cycle (at most `--trace` cycles), more for the simplest inputs, and a build of the executors
+for each level that has a finding.
+
+Modules, in the order the data flows: `simplest` (bounded runs, simplest models), `cycle_run` (one cycle by the interpreter, and what it
+breaks), `trace`, `lasso`, `pair`, `finding` (time lines), `replay` (executors, log), `frozen`, `repair` (what would mend the table),
+`explain` (all that is open).
 """

@@ -33,7 +33,7 @@ from rcsc.symbolic.values import Node
 
 @dataclass(frozen=True, slots=True)
 class CycleRun:
-    """One cycle.
+    """One cycle as the interpreter ran it.
 
     Attributes:
         taken: The inputs.
@@ -69,12 +69,12 @@ Given: TypeAlias = tuple[Mapping[str, Value], tuple[ExternAnswer, ...]]
 def ran(
     ts: TransitionSystem, start: Mapping[str, Value], inputs: Sequence[Mapping[str, Value]]
 ) -> tuple[CycleRun, ...]:
-    """What the interpreter does, from `start` on these inputs, up to the first fault that ends a run."""
+    """Run cycles from `start` on these inputs, up to the first fault that ends a run."""
     return ran_on(ts, start, [(taken, ()) for taken in inputs])
 
 
 def ran_on(ts: TransitionSystem, start: Mapping[str, Value], given: Sequence[Given]) -> tuple[CycleRun, ...]:
-    """The same with results of extern procedures."""
+    """Run cycles from `start` on inputs and results of extern procedures, up to the first fault that ends a run."""
     now = dict(start)
     steps: list[CycleRun] = []
     for taken, answers in given:
@@ -91,7 +91,7 @@ def one_cycle(
     taken: Mapping[str, Value],
     answers: tuple[ExternAnswer, ...] = (),
 ) -> CycleRun:
-    """What the interpreter does in one cycle, in which extern procedures give these answers."""
+    """Run one cycle, in which extern procedures give these answers."""
     with scripted(ts.program, answers):
         outcome = cycle(ts.program, ts.level, {**before, **taken})
     return _step(ts, before, taken, outcome, answers)
@@ -116,7 +116,7 @@ class Halfway:
 
 
 def halfway(ts: TransitionSystem, step: CycleRun) -> Halfway:
-    """The first part of a cycle, as the interpreter runs it again."""
+    """Run the first part of a cycle again, up to its postprocess."""
     program = ts.program
     now = admit(program, {**step.before, **step.taken})
     assert not isinstance(now, str)
@@ -135,14 +135,14 @@ def halfway(ts: TransitionSystem, step: CycleRun) -> Halfway:
 
 
 def _actions(ts: TransitionSystem, step: CycleRun) -> tuple[Action, ...]:
-    """What the line that ran does."""
+    """Return the actions of the line that ran."""
     table = ts.table(step.table)
     lines: list[Line | Default] = [*table.lines, *([] if table.default is None else [table.default])]
     return next((one.actions for one in lines if one.name == step.line), ())
 
 
 def seen_by_table(ts: TransitionSystem, step: CycleRun) -> Snapshot | None:
-    """Every leaf as the table saw it; None where the cycle ended before."""
+    """Return the leaves as the table saw them; None where the cycle ended before."""
     found = halfway(ts, step)
     return found.middle if found.matched else None
 
@@ -175,7 +175,7 @@ def _step(
 
 
 def _also_failed(ts: TransitionSystem, step: CycleRun) -> tuple[str, ...]:
-    """Assumptions of the table that no executor looks at, and that did not hold."""
+    """List the table's assumptions that failed and that no executor looks at."""
     table = ts.table(step.table)
     others = [
         one
@@ -265,7 +265,7 @@ def _is_false(node: Node) -> bool:
 
 
 def as_cycle(ts: TransitionSystem, step: CycleRun) -> Cycle:
-    """A cycle as it ran, all its nodes constants."""
+    """Turn a cycle that ran into one of constant nodes."""
     before, after = _constants(ts, step.before), _constants(ts, step.after)
     taken = {name: after[name] for name in step.taken}
     half = halfway(ts, step)

@@ -27,7 +27,7 @@ SEARCHES = (TraceSearch(legal=True), TraceSearch(), TraceSearch(legal=True, rest
 
 @dataclass(frozen=True, slots=True)
 class Explanation:
-    """One thing that is not proved.
+    """One thing that is not proved, and the run that shows it.
 
     Attributes:
         level: Whose obligation it is.
@@ -82,7 +82,7 @@ class TraceSettings:
 def explain(
     made: Mapping[str, TransitionSystem], proof: SystemProof, settings: TraceSettings
 ) -> Iterator[Explanation]:
-    """Everything essential that is not proved, level by level.
+    """Look at everything essential that is not proved, level by level.
 
     Raises:
         NotBuilt: The C executors could not be built.
@@ -124,7 +124,7 @@ def _level(
 def _found(
     ts: TransitionSystem, asked: list[Obligation], settings: TraceSettings
 ) -> dict[ObligationKey, TraceResult]:
-    """What the searches find, one after the other, for what is still open."""
+    """Run the searches one after the other, each for what is still open."""
     found: dict[ObligationKey, TraceResult] = {}
     for search in SEARCHES:
         left = [obligation for obligation in asked if obligation.key not in found]
@@ -139,7 +139,7 @@ def _pairs(
     parted: list[Obligation],
     found: Mapping[ObligationKey, TraceResult],
 ) -> Iterator[Explanation]:
-    """The pairs of lines that both match in some run; the table as a whole where there is none."""
+    """Explain each pair of lines that both match in some run; the table as a whole where no pair does."""
     shown = [one for one in parted if one.key in found]
     others = tuple(one.name for one in parted if one.key not in found)
     if not shown:
@@ -162,7 +162,7 @@ def _explanation(ts: TransitionSystem, obligation: Obligation, found: TraceResul
 def _together(
     made: Mapping[str, TransitionSystem], level: str, wanted: tuple[Obligation, ...], settings: TraceSettings
 ) -> Iterator[Explanation]:
-    """What becomes of orders that are not numbered as they should be, or not answered, with both levels as they are."""
+    """Show, with both levels as they are, what becomes of orders that are not numbered or not answered."""
     links = made[level].links
     records = {
         obligation.name.partition(".")[0]
@@ -184,7 +184,7 @@ def _together(
 
 
 def _endless(ts: TransitionSystem, proof: LevelProof, settings: TraceSettings) -> Iterator[Explanation]:
-    """Commands that are not shown to end, each with a run after which it may go on for ever."""
+    """Explain each command that is not shown to end by a run after which it may go on for ever."""
     tables = [ending.table for ending in proof.endings if not ending.proved]
     found: dict[str, Lasso | NotReproducedError] = {}
     for search in SEARCHES if settings.most else ():
@@ -202,7 +202,7 @@ def _endless(ts: TransitionSystem, proof: LevelProof, settings: TraceSettings) -
 
 @dataclass(slots=True)
 class _Rerun:
-    """Runs findings on executors, which are made once a level."""
+    """Runs findings on executors, which are built once a level."""
 
     made: Mapping[str, TransitionSystem]
     settings: TraceSettings
@@ -211,7 +211,7 @@ class _Rerun:
     _names: set[str] = field(default_factory=set)
 
     def run(self, explanation: Explanation) -> Explanation:
-        """With the log of its run, and what would mend the table."""
+        """Run a finding; return it with its log and what would mend the table."""
         finding = explanation.finding
         if finding is None:
             return explanation
@@ -241,7 +241,7 @@ class _Rerun:
 
 
 def file_name(finding: Finding) -> str:
-    """What its log and its case are called, without the end."""
+    """Return the name of a finding's log and case, without suffix."""
     obligation = finding.obligation
     parts = (
         finding.level,

@@ -16,7 +16,7 @@ from rcsc.lang.model import Value, key_bounds, key_of, spell
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """A run.
+    """A run that breaks an obligation.
 
     Attributes:
         level: Whose obligation it is.
@@ -52,12 +52,12 @@ class Finding:
         return tuple(dict.fromkeys(name for tick in self.ticks for name in tick))
 
     def start(self, level: str) -> Mapping[str, Value]:
-        """Every leaf of a level before its first cycle."""
+        """Return every leaf of a level before its first cycle."""
         return next(tick[level].before for tick in self.ticks if level in tick)
 
 
 def of_trace(ts: TransitionSystem, obligation: Obligation, trace: Trace) -> Finding:
-    """The run of one level; what is passed over shows in the next cycle, in which the level sees the same again."""
+    """Make a finding of one level's trace; one cycle more where a command is passed over, which shows only then."""
     steps = list(trace.steps)
     if obligation.sort is Sort.ANSWERED:
         steps.append(one_cycle(ts, steps[-1].after, steps[-1].taken, steps[-1].answers))
@@ -100,7 +100,7 @@ _FAULTS = {
 
 
 def rows(made: Mapping[str, TransitionSystem], finding: Finding) -> tuple[TimeLineRow, ...]:
-    """The time line, a row for each cycle of each level."""
+    """Return the time line: a row for each cycle of each level."""
     where = finding.broken_at, finding.level
     obligation = replace(finding.obligation, name=str(finding.lasso)) if finding.lasso else finding.obligation
     return tuple(
@@ -111,7 +111,7 @@ def rows(made: Mapping[str, TransitionSystem], finding: Finding) -> tuple[TimeLi
 
 
 def _row(ts: TransitionSystem, tick: int, step: CycleRun, broken: Obligation | None) -> TimeLineRow:
-    """One cycle; what does not change is left out."""
+    """Return the row of one cycle, without what does not change."""
     kinds = ts.kinds
     changed = {
         name: spell(kinds[name], value) for name, value in step.after.items() if step.before[name] != value
@@ -127,7 +127,7 @@ def _row(ts: TransitionSystem, tick: int, step: CycleRun, broken: Obligation | N
 
 
 def _answers(ts: TransitionSystem, step: CycleRun) -> Iterator[tuple[str, str]]:
-    """What extern procedures give, call by call; a value that is refused is in no type's words."""
+    """Spell what extern procedures give, call by call; refused values have no words of their type."""
     for procedure, given in step.answers:
         writes = next(one.writes for one in ts.program.procedures if one.name == procedure)
         for leaf, value in zip(writes, given, strict=True):
@@ -140,7 +140,7 @@ def _answers(ts: TransitionSystem, step: CycleRun) -> Iterator[tuple[str, str]]:
 
 
 def time_line(made: Mapping[str, TransitionSystem], finding: Finding) -> list[str]:
-    """The same as lines of text: of each cycle which line matched, what was taken, and what changed."""
+    """Spell the time line: for each cycle the line that matched, what was taken, and what changed."""
     lines = []
     for row in rows(made, finding):
         who = f"level `{row.level}`, " if len(finding.levels) > 1 else ""

@@ -68,7 +68,7 @@ def frozen(
     case: Path,
     variants: tuple[str, ...] = (),
 ) -> str:
-    """The text of the case that will stand at `case`."""
+    """Write the text of the case that will stand at `case`."""
     obligation = finding.obligation
     exchanged = exchange(made, finding.levels)
     document = {
@@ -103,7 +103,7 @@ def frozen(
 
 
 def _number(value: Value) -> Value | str:
-    """A result of an extern procedure, in range or not, as JSON has it: what is no number in words."""
+    """Return an extern result as JSON has it; infinities and NaN in words."""
     return value if isinstance(value, bool | int) or math.isfinite(value) else str(value)
 
 
@@ -113,7 +113,7 @@ def _not_initial(ts: TransitionSystem, start: Mapping[str, Value]) -> dict[str, 
 
 
 def _changed(ts: TransitionSystem, step: CycleRun, exchanged: Container[str]) -> dict[str, str]:
-    """The inputs that change, but for those that another level of the run gives."""
+    """Spell the inputs that change, except those that another level of the run gives."""
     return {
         name: spell(ts.kinds[name], value)
         for name, value in step.taken.items()
@@ -125,7 +125,7 @@ def _changed(ts: TransitionSystem, step: CycleRun, exchanged: Container[str]) ->
 
 
 def read_case(path: Path) -> FrozenCase:
-    """Reads a case.
+    """Read a case.
 
     Raises:
         BadCaseError: It is none.
@@ -154,14 +154,14 @@ def read_case(path: Path) -> FrozenCase:
 
 
 def _texts(said: object) -> tuple[str, ...]:
-    """A list of texts; a ValueError for anything else."""
+    """Check a list of texts; raise ValueError for anything else."""
     if not isinstance(said, list) or not all(isinstance(one, str) for one in said):
         raise ValueError("a list holds something else than texts")
     return tuple(said)
 
 
 def _leaves(said: object) -> dict[str, dict[str, str]]:
-    """For each level the texts of leaves; a ValueError for anything else."""
+    """Check the texts of leaves by level; raise ValueError for anything else."""
     if not isinstance(said, dict) or not all(isinstance(one, dict) for one in said.values()):
         raise ValueError("a tick is no table of levels")
     return {
@@ -170,7 +170,7 @@ def _leaves(said: object) -> dict[str, dict[str, str]]:
 
 
 def _answered(said: object) -> dict[str, list[tuple[str, list[Any]]]]:
-    """For each level the extern procedures that are called in a tick, with what they give; a TypeError for anything else."""
+    """Check the extern procedures called in a tick, by level, with their results; raise TypeError for anything else."""
     if not isinstance(said, dict):
         raise TypeError("the answers of a tick are no table of levels")
     found: dict[str, list[tuple[str, list[Any]]]] = {}
@@ -183,7 +183,7 @@ def _answered(said: object) -> dict[str, list[tuple[str, list[Any]]]]:
 
 
 def _system(case: Path, named: object) -> Path:
-    """The description that a case is about: in the project of the case, or in the folder where rcsc runs.
+    """Find the description that a case is about, inside its project or the current folder.
 
     Raises:
         ValueError: It leads elsewhere.
@@ -198,7 +198,7 @@ def _system(case: Path, named: object) -> Path:
 
 
 def case_breaks(case: FrozenCase) -> bool:
-    """Whether the obligation is broken in some tick; a fault ends the run.
+    """Return whether a tick of the case breaks the obligation; a fault ends the run.
 
     Raises:
         BadCaseError: The case names what the tables do not have.
@@ -228,7 +228,7 @@ def case_breaks(case: FrozenCase) -> bool:
 
 
 def _answer(ts: TransitionSystem, said: Any) -> ExternAnswer:
-    """One call's results, as the case has them."""
+    """Read the results of one call."""
     try:
         name, results = said
         procedure = next(one for one in ts.program.procedures if one.name == name and one.extern)
@@ -277,7 +277,7 @@ def _values(ts: TransitionSystem, said: Mapping[str, str]) -> dict[str, Value]:
 
 
 def _value(name: str, kind: Scalar, text: str) -> Value:
-    """The value that `spell` would write so."""
+    """Read a value as `spell` writes it."""
     try:
         value: Value
         if isinstance(kind, Bool):
@@ -295,7 +295,7 @@ def _value(name: str, kind: Scalar, text: str) -> Value:
 
 
 def _is_broken(made: Mapping[str, TransitionSystem], case: FrozenCase, steps: list[CycleRun]) -> bool:
-    """Whether the last of the level's cycles breaks the obligation."""
+    """Return whether the last of the level's cycles breaks the obligation."""
     ts, step = made[case.level], steps[-1]
     if case.obligation.sort is Sort.ENDS:
         return lasso_of(ts, case.obligation.table, steps) is not None

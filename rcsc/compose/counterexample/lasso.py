@@ -29,14 +29,14 @@ class Lasso:
 
 
 def obligation_of(table: str) -> Obligation:
-    """That the table's command ends: no obligation of one cycle."""
+    """Return the obligation that the table's command ends, which is none of one cycle."""
     return Obligation(Sort.ENDS, table, "", values.TRUE)
 
 
 def lassos(
     ts: TransitionSystem, tables: Sequence[str], search: TraceSearch
 ) -> dict[str, Lasso | NotReproducedError]:
-    """For each table for which there is one a lasso, the first cycle of a run being in none."""
+    """Find the shortest fair lasso of each table on which its command never completes; the first cycle of a run is in none."""
     run = Unrolled(ts, search)
     found: dict[str, Lasso | NotReproducedError] = {}
     for _ in range(search.most):
@@ -56,7 +56,7 @@ def lassos(
 
 
 def _comes_round(ts: TransitionSystem, table: str, cycles: Sequence[Cycle]) -> Node:
-    """That the cycles are a lasso of the table's command."""
+    """Return the condition that the cycles are a lasso of the table's command."""
     first, last = cycles[0], cycles[-1]
     number = next(at for at, one in enumerate(first.tables) if one.table.name == table)
     goes = [
@@ -86,7 +86,7 @@ def _comes_round(ts: TransitionSystem, table: str, cycles: Sequence[Cycle]) -> N
 
 
 def _moving(ts: TransitionSystem) -> set[str]:
-    """The numbers that go on: of orders, and their echoes."""
+    """Return the numbers that go on: of orders, and their echoes."""
     return {leaf for below in ts.links.below for leaf in (below.number, below.echo)}
 
 
@@ -104,7 +104,7 @@ def _told(ts: TransitionSystem, table: str, run: Unrolled, wrong: Node) -> Lasso
 
 
 def lasso_of(ts: TransitionSystem, table: str, steps: Sequence[CycleRun]) -> int | None:
-    """The first cycle, from 1, of the shortest lasso with which the run ends; None where it ends with none."""
+    """Return the first cycle, from 1, of the shortest lasso with which the run ends; None where it ends with none."""
     for first in range(len(steps) - 1, 0, -1):
         lasso = steps[first:]
         if _is_lasso(ts, table, lasso):
@@ -123,7 +123,7 @@ def _is_lasso(ts: TransitionSystem, table: str, lasso: Sequence[CycleRun]) -> bo
 
 
 def _again(ts: TransitionSystem, lasso: Sequence[CycleRun]) -> tuple[CycleRun, ...]:
-    """The lasso once more, on the same inputs; what echoes an order echoes the one as much later."""
+    """Run the lasso again on the same inputs, with echoes of as much later orders."""
     before, after = lasso[0].before, lasso[-1].after
     later = {below.echo: int(after[below.number]) - int(before[below.number]) for below in ts.links.below}
     given = [

@@ -56,7 +56,7 @@ class _Side:
 def broken_together(
     upper: TransitionSystem, lower: TransitionSystem, below: Below, search: TraceSearch
 ) -> Finding | NotReproducedError | None:
-    """The shortest run of both in which one breaks what the other assumes; None where there is none, or the solver gave up.
+    """Find the shortest run of both levels in which one breaks what the other assumes; None where none is found.
 
     Looked for is that the lower level takes another order under the number that it took last, and that the upper one is told of its last
     order what is not so, in at most `search.most` ticks.
@@ -98,7 +98,7 @@ class _Together:
         }  # nothing is published yet: each keeps what it begins with
 
     def further(self, tick: int) -> tuple[Obligation, Obligation]:
-        """One tick more; what is to hold in it."""
+        """Add a tick; return what is to hold in it."""
         before = [side.now for side in self.sides]
         for side in self.sides:
             side.runs.append(values.variable(f"{side.name} runs {tick}", Bool()))
@@ -109,7 +109,7 @@ class _Together:
         return self._obligations(before)
 
     def _cycle(self, side: _Side, seen: Leaves, tick: int) -> None:
-        """One cycle of a level, if it runs."""
+        """Add one cycle of a level, if it runs."""
         kinds = side.ts.kinds
         taken = {leaf: values.variable(f"{side.name} {leaf} {tick}", kinds[leaf]) for leaf in side.inputs}
         taken |= {leaf: seen[leaf] for leaf in side.takes}
@@ -144,7 +144,7 @@ class _Together:
     # --- the run ---
 
     def found(self, obligation: Obligation) -> Finding | NotReproducedError | None:
-        """The simplest run that breaks it in the last tick, as the interpreter runs it; None where there is none.
+        """Run the simplest run that breaks the obligation in the last tick; None where there is none.
 
         Raises:
             GaveUpError: The solver did not decide.
@@ -194,7 +194,7 @@ class _Together:
 def exchange(
     made: Mapping[str, TransitionSystem], levels: Sequence[str]
 ) -> dict[str, dict[str, tuple[str, str]]]:
-    """For each of these levels its inputs that another of them gives: which one, and how it calls them."""
+    """Map each level's inputs that another of the levels gives to that level and its name for them."""
     found: dict[str, dict[str, tuple[str, str]]] = {name: {} for name in levels}
     for name in levels:
         for below in made[name].links.below:
@@ -207,10 +207,10 @@ def exchange(
 
 
 def _renamed(ts: TransitionSystem, record: str, other: str) -> dict[str, str]:
-    """The leaves of a record, and how the other end of the buffer calls them."""
+    """Map the leaves of a record to their names at the other end of the buffer."""
     return {leaf: other + leaf.removeprefix(record) for leaf in leaves_under(ts.program, record)}
 
 
 def _with(ts: TransitionSystem, **links: object) -> TransitionSystem:
-    """The level with a part of its environment left out, which is not assumed but there."""
+    """Return the level without a part of its environment that is not assumed but present."""
     return TransitionSystem(ts.program, ts.level, replace(ts.links, **links))  # type: ignore[arg-type]  # fields of Links

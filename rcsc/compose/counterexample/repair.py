@@ -21,7 +21,7 @@ MOST_REGIONS = 3
 
 
 def helps(ts: TransitionSystem, finding: Finding) -> tuple[str, ...]:
-    """What to change in the table that the last cycle ran."""
+    """Suggest changes to the table that the last cycle ran."""
     step = finding.broken
     if finding.obligation.sort not in {
         Sort.ASSUMPTION, Sort.SOME_LINE, Sort.ONE_LINE, Sort.NO_DEFAULT,
@@ -53,7 +53,7 @@ def _said(ts: TransitionSystem, table: Table, step: CycleRun) -> Iterator[str]:
 
 
 def around(program: Program, table: Table, seen: Snapshot) -> Region:
-    """A maximal region around an input that no line matches in which none does."""
+    """Grow a maximal region, in which no line matches, around an input that none matches."""
     decided = boxes.Boxes.of(program, table)
     kinds = {str(v.name): v.type for v in program.variables}
     cell = {name: (key_of(kinds[name], seen[name]),) * 2 for name in decided.names}
@@ -62,7 +62,7 @@ def around(program: Program, table: Table, seen: Snapshot) -> Region:
 
 
 def weakest_condition(program: Program, table: Table) -> str:
-    """The condition that holds of exactly the inputs that exactly one line matches; empty where it is not small."""
+    """Return the condition of exactly the inputs that one line matches; empty where it is not small."""
     decided = boxes.Boxes.of(program, table)
     regions: list[Region] = []
     for first, second in decided.overlaps():

@@ -52,7 +52,7 @@ class ExecutorsDifferError(Exception):
 
 
 def make(programs: Iterable[Program], folder: Path, *, altered: bool) -> tuple[str, ...]:
-    """Writes the executors of these programs into a folder; the programs whose are made by force.
+    """Write the executors of these programs; return the names of those made by force.
 
     Args:
         programs: To be made.
@@ -78,7 +78,7 @@ def make(programs: Iterable[Program], folder: Path, *, altered: bool) -> tuple[s
 
 
 def told_what_externs_give(program: Program) -> Program:
-    """The program, its extern procedures in Python those of `run.answers`: the user's functions are called by no finding."""
+    """Replace the program's extern procedures by those of `run.answers`: no finding calls the user's functions."""
     return replace(
         program,
         procedures=tuple(
@@ -91,7 +91,7 @@ def told_what_externs_give(program: Program) -> Program:
 
 
 def _stand_ins(program: Program) -> Iterator[str]:
-    """The same in C, after the program's own text."""
+    """Write the stand-ins in C, after the program's own text."""
     externs = [one for one in program.procedures if one.extern is not None]
     if externs:
         yield answers.HEAD
@@ -107,7 +107,7 @@ def _stand_ins(program: Program) -> Iterator[str]:
 
 
 def only_in_python(finding: Finding, made: Mapping[str, TransitionSystem]) -> bool:
-    """Whether an extern procedure gives what no C function can: a refused value of a type that C's own does not exceed."""
+    """Return whether an extern procedure gives what no C function can: a refused value within C's own type."""
     for steps in finding.ticks:
         for name, step in steps.items():
             program = made[name].program
@@ -130,7 +130,7 @@ def record(
     *,
     altered: bool = False,
 ) -> None:
-    """Runs a finding on the executors in `system.generated`, both kinds, and writes what they do as a log, if it is wanted.
+    """Run a finding on the executors in `system.generated`, both kinds, and write what they do as a log.
 
     Args:
         finding: The run.
@@ -161,7 +161,7 @@ def record(
 
 
 def _logged(finding: Finding, made: Mapping[str, TransitionSystem], altered: bool) -> LoggedFinding:
-    """What the log says of it besides the states."""
+    """Return what the log says of the finding besides the states."""
     cycles = {
         (row.tick, row.level): LoggedCycle(
             finding.ticks[row.tick - 1][row.level].matched,
@@ -183,7 +183,7 @@ def _logged(finding: Finding, made: Mapping[str, TransitionSystem], altered: boo
 
 
 def part_of(system: Description, programs: Mapping[str, Program]) -> Description:
-    """The description of these levels alone: whatever is an input of theirs comes through a buffer.
+    """Restrict the description to these levels: each of their inputs comes through a buffer.
 
     What the database fills, and what nothing is known of, comes from `database` and `environment`.
     """
@@ -206,13 +206,13 @@ def _owner(end: str) -> str:
 
 
 def _inputs(program: Program) -> tuple[str, ...]:
-    """The input variables, records and arrays whole, in declared order."""
+    """List the input variables, records and arrays whole, in declared order."""
     names = (str(v.name) for v in program.variables if v.kind is VariableKind.INPUT)
     return tuple(dict.fromkeys(name.partition(".")[0].partition("[")[0] for name in names))
 
 
 def _begun(finding: Finding, system: Description, kind: Kind) -> System:
-    """The levels where the run begins; not `assemble`, which a cell uses and which refuses what is made by force."""
+    """Set up the levels where the run begins; without `assemble`, which refuses what is made by force."""
     signs = signatures(system)
     made = executors(system, signs, kind)
     levels = tuple(
@@ -229,7 +229,7 @@ def _begun(finding: Finding, system: Description, kind: Kind) -> System:
 def _cycles(
     finding: Finding, made: Mapping[str, TransitionSystem], running: System, kind: Kind
 ) -> Iterator[tuple[RunningLevel, ...]]:
-    """Runs tick by tick; the levels that ran in each.
+    """Run tick by tick; yield the levels that ran in each.
 
     Raises:
         ExecutorsDifferError: A level leaves something else than the interpreter left.
@@ -248,7 +248,7 @@ def _cycles(
 
 
 def _take(running: System, level: RunningLevel, ts: TransitionSystem, step: CycleRun) -> None:
-    """Publishes what the environment gave in this cycle, and takes it."""
+    """Publish and take what the environment gave in this cycle."""
     for wire in running.description.wires:
         owner, _, variable = wire.target.partition(".")
         if owner == level.name:
@@ -260,7 +260,7 @@ def _take(running: System, level: RunningLevel, ts: TransitionSystem, step: Cycl
 def _beside(
     level: RunningLevel, step: CycleRun, ts: TransitionSystem, kind: Kind, tick: int
 ) -> Iterator[str]:
-    """Where the executor left something else."""
+    """Describe where the executor left something else than the interpreter."""
     who = "Python" if kind == "python" else "C"
     there = f"tick {tick}, level `{level.name}`"
     count = len(level.sign.leaves)

@@ -24,7 +24,7 @@ class _Bits(Bits):
     __slots__ = ()
 
     def met(self, node: Node) -> bool:
-        """Whether there is a word of the node."""
+        """Return whether anything stated or asked contains the node."""
         return node in self._words
 
 
@@ -37,18 +37,18 @@ class Bounded:
     _asked: list[Node] = field(default_factory=list)
 
     def add(self, node: Node) -> None:
-        """States that it holds."""
+        """State that the node holds."""
         self._sat.add([self.literal(node)])
 
     def literal(self, node: Node) -> Literal:
-        """Of a truth value."""
+        """Return the literal of a truth value."""
         found = self._bits.literal(node)
         self._asked.append(node)
         self._hand_on()
         return found
 
     def has(self, node: Node, value: Value) -> Literal:
-        """The literal of: the node has this value."""
+        """Return the literal of: the node has this value."""
         found = self._bits.equals(self._bits.word(node), node.kind, key_of(node.kind, value))
         self._hand_on()
         return found
@@ -59,7 +59,7 @@ class Bounded:
         self._bits.clauses.clear()
 
     def holds(self, assuming: Sequence[Literal]) -> bool:
-        """Whether all that is stated, and these literals, can hold together.
+        """Return whether all that is stated can hold together with these literals.
 
         Raises:
             GaveUpError: The solver did not decide.
@@ -71,7 +71,7 @@ class Bounded:
         return self._bits.met(node)
 
     def key(self, node: Node) -> int:
-        """The key of the node's value in the last run that could be."""
+        """Return the key of the node's value in the last model."""
         bits = [self._sat.value(literal) for literal in self._bits.word(node)]
         return int(bits[0]) if isinstance(node.kind, Bool) else key_of_bits(bits)
 
@@ -96,7 +96,7 @@ class Simplest:
     given: list[Literal]
 
     def settle(self, nodes: Sequence[Node], wanted: Sequence[Value]) -> list[Value]:
-        """The values of the nodes: as many as may be as wanted, and the least that is left for each of the others."""
+        """Fix the nodes' values: as many as possible as wanted, the least possible for the others."""
         every = zip(nodes, wanted, strict=True)
         met = [(node, value) for node, value in every if self.run.met(node) and not node.known]
         kept = self._keep(met)
@@ -106,7 +106,7 @@ class Simplest:
         ]
 
     def answers(self, program: Program, cycle: Cycle) -> tuple[ExternAnswer, ...]:
-        """What the extern procedures that the cycle calls give: least values, and refused ones only where it has to be."""
+        """Fix what extern procedures give in the cycle: least values, refused ones only where necessary."""
         for call in cycle.calls:
             self.run.literal(call.path)
         return tuple(self._answer(program, call) for call in cycle.calls if self._made(call.path))
@@ -125,7 +125,7 @@ class Simplest:
         return call.procedure, tuple(results)
 
     def _keep(self, wanted: Sequence[tuple[Node, Value]]) -> set[Node]:
-        """Halves what cannot be had together; the nodes that have their value now."""
+        """Bisect what cannot be had together; return the nodes that keep their wanted value."""
         if not wanted:
             return set()
         together = [self.run.has(node, value) for node, value in wanted]
@@ -136,7 +136,7 @@ class Simplest:
         return self._keep(wanted[:middle]) | self._keep(wanted[middle:]) if middle else set()
 
     def _least(self, node: Node) -> Value:
-        """The least value that the node can have."""
+        """Return the least value that the node can have."""
         can = self.run.holds(self.given)
         assert can
         low, high = key_bounds(node.kind)[0], self.run.key(node)
@@ -159,5 +159,5 @@ class Simplest:
 
 
 def constant_of(node: Node, otherwise: Value) -> Value:
-    """The value of a node that is a constant."""
+    """Return the value of a constant node, or `otherwise`."""
     return value_of_key(node.kind, key_of(node.kind, node.low)) if node.known else otherwise

@@ -85,7 +85,7 @@ TraceResult: TypeAlias = Trace | NotReproducedError
 def shortest(
     ts: TransitionSystem, obligation: Obligation, most: int = 10, *, legal: bool = False
 ) -> Trace | None:
-    """The shortest trace of at most `most` cycles; None where there is none, or the solver gave up.
+    """Find the shortest trace of at most `most` cycles; None where there is none or the solver gave up.
 
     Raises:
         NotReproducedError: The interpreter does not break the obligation there.
@@ -99,7 +99,7 @@ def shortest(
 def traces(
     ts: TransitionSystem, wanted: Sequence[Obligation], search: TraceSearch
 ) -> dict[ObligationKey, TraceResult]:
-    """For each obligation for which there is one the shortest trace, all found in one search."""
+    """Find the shortest trace of each obligation that has one, all in one search."""
     run = Unrolled(ts, search)
     waiting = {obligation.key: obligation for obligation in wanted}
     found: dict[ObligationKey, TraceResult] = {}
@@ -121,7 +121,7 @@ def traces(
 
 
 def _wrong(obligation: Obligation, one: Cycle) -> Node:
-    """That the cycle breaks the obligation: what it leaves counts only where it does not end early."""
+    """Return the condition that the cycle breaks the obligation; what it leaves counts only where it does not end early."""
     wrong = values.negation(obligation.holds)
     early = obligation.sort in {Sort.ASSUMPTION, Sort.ONE_LINE, Sort.SOME_LINE, Sort.NO_DEFAULT}
     return wrong if early else values.both(wrong, one.goes_on)
@@ -145,7 +145,7 @@ class Unrolled:
         self._now = self._start
 
     def further(self) -> Cycle:
-        """One cycle more."""
+        """Add one cycle."""
         at = len(self.cycles) + 1
         if self.cycles:  # a fault would have ended the run
             self._run.add(self.cycles[-1].goes_on)
@@ -163,7 +163,7 @@ class Unrolled:
             yield from self._answers(below, one, at)
 
     def _answers(self, below: Below, one: Cycle, at: int) -> Iterator[Node]:
-        """The report is of one of the orders published so far; of which, is a number that does not fall."""
+        """Return the conditions that the report is of an order published so far, none older than the one before."""
         orders = self._orders.setdefault(below.order, [])
         orders.append((one.before[below.number], one.before[below.command]))
         kind = Int(0, self.search.most)
@@ -177,7 +177,7 @@ class Unrolled:
             yield values.follows(values.equal(which, values.constant(kind, place)), it)
 
     def reaches(self, wrong: Node) -> bool:
-        """Whether the last cycle can be so.
+        """Return whether the last cycle can be so.
 
         Raises:
             GaveUpError: The solver did not decide.
@@ -185,7 +185,7 @@ class Unrolled:
         return self._run.holds([self._run.literal(wrong)])
 
     def told(self, obligation: Obligation, wrong: Node) -> TraceResult:
-        """The simplest run that ends so, as the interpreter runs it; or that it does not break the obligation.
+        """Run the simplest run that ends so; return it, or that it does not break the obligation.
 
         Raises:
             GaveUpError: The solver did not decide.
@@ -202,7 +202,7 @@ class Unrolled:
         return NotReproducedError(obligation.shown, guessed=self.guessed or self._asks, beside=beside)
 
     def inputs(self, wrong: Node) -> tuple[dict[str, Value], list[Given]]:
-        """Every leaf before the simplest run that ends so, and what its cycles are given.
+        """Return every leaf before the simplest run that ends so, and what its cycles are given.
 
         Raises:
             GaveUpError: The solver did not decide.
@@ -224,7 +224,7 @@ class Unrolled:
         return start, self._simplest(settled, start)
 
     def _simplest(self, settled: Simplest, start: Mapping[str, Value]) -> list[Given]:
-        """What each cycle is given; an input stays as it was where it can, and so does what no condition reads."""
+        """Fix what each cycle is given: an input stays as it was where it can."""
         found: list[Given] = []
         program = self.ts.program
         inputs = self.ts.inputs
@@ -235,7 +235,7 @@ class Unrolled:
         return found
 
     def _begins(self, settled: Simplest) -> dict[str, Value]:
-        """Every leaf before the first cycle."""
+        """Fix every leaf before the first cycle."""
         begun = dict(initial(self.ts.program))
         if self.search.restarted:
             names = list(begun)
@@ -245,7 +245,7 @@ class Unrolled:
         return begun
 
     def _beside(self, trace: Trace) -> tuple[str, ...]:
-        """Where the solver's run and the interpreter's part: the first cycle in which they do."""
+        """Describe the first cycle in which the solver's run and the interpreter's differ."""
         for number, (one, step) in enumerate(zip(self.cycles, trace.steps, strict=False), 1):
             said = {
                 name: value_of_key(kind, self._run.key(one.after[name]))
@@ -263,7 +263,7 @@ class Unrolled:
 
 
 def in_order(ts: TransitionSystem, before: Leaves, taken: Leaves) -> Node:
-    """Say that the superior's numbers come one after the other."""
+    """Return the condition that the superior's numbers come one after the other."""
     if (above := ts.links.above) is None:
         return values.TRUE
     last, now = before[above.number], taken[above.number]
@@ -274,7 +274,7 @@ def in_order(ts: TransitionSystem, before: Leaves, taken: Leaves) -> Node:
 
 
 def replayed(ts: TransitionSystem, obligation: Obligation, inputs: Sequence[Given]) -> Trace:
-    """The run on what the environment gives, from the initial values.
+    """Run the inputs from the initial values.
 
     Raises:
         NotReproducedError: It does not break the obligation in its last cycle.

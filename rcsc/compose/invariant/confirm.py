@@ -43,7 +43,7 @@ class Confirmation:
     _ended: dict[tuple[int, int], Term] = field(default_factory=dict)
 
     def literal(self, at: int, value: int, *, after: bool) -> Term:
-        """That a predicate has a value before, or after, the cycle; of `~value`, that it has another."""
+        """Return the term that a predicate has a value before or after the cycle; for `~value`, that it has another."""
         if value < 0:
             return smt.negation(self.literal(at, ~value, after=after))
         key = after, at, value
@@ -57,27 +57,27 @@ class Confirmation:
         return self._literals[key]
 
     def node(self, at: int, *, after: bool) -> Node:
-        """A predicate before, or after, the cycle."""
+        """Return a predicate before or after the cycle."""
         if (after, at) not in self._nodes:
             leaves = self.cycle.after if after else self.cycle.before
             self._nodes[after, at] = self.predicates[at].node(leaves)
         return self._nodes[after, at]
 
     def broken(self, clause: Clause, *, after: bool) -> Term:
-        """That the combination stands."""
+        """Return the term that the clause's combination stands."""
         key = after, clause
         if key not in self._kept:
             self._kept[key] = smt.all_of([self.literal(at, value, after=after) for at, value in clause])
         return self._kept[key]
 
     def _held(self, clause: Clause) -> Term:
-        """That the combination does not stand before the cycle."""
+        """Return the term that the combination does not stand before the cycle."""
         if clause not in self._denied:
             self._denied[clause] = smt.negation(self.broken(clause, after=False))
         return self._denied[clause]
 
     def known(self, clauses: Sequence[Clause]) -> Solver:
-        """A solver in which one cycle starts where the clauses hold."""
+        """Return a solver in which one cycle starts where the clauses hold."""
         held = [self._held(clause) for clause in clauses]
         for at in range(len(self.predicates)):
             self.keyed.term(self.node(at, after=True))
@@ -89,20 +89,20 @@ class Confirmation:
         return solver
 
     def in_other_terms(self, keyed: Keyed) -> "Confirmation":
-        """The same, asked in other terms."""
+        """Return the same questions in other terms."""
         return Confirmation(
             self.predicates, self.firsts, self.cycle, self.cases, keyed, self.limits, self.rested_on
         )
 
     def step_question(self, clauses: Sequence[Clause], case: Node) -> Solver:
-        """That a cycle in this case breaks a clause: unsatisfiable, when they are an invariant."""
+        """Ask whether a cycle in this case breaks a clause: unsatisfiable if the clauses are an invariant."""
         broken = smt.any_of([self.broken(clause, after=True) for clause in clauses])
         solver = self.known(clauses)
         solver.add(self.keyed.term(case), broken)
         return solver
 
     def first_question(self, clauses: Sequence[Clause], first: Cycle) -> Solver:
-        """That a first cycle leads to where a clause is broken: unsatisfiable, when they are an invariant."""
+        """Ask whether a first cycle leads to where a clause is broken: unsatisfiable if the clauses are an invariant."""
         nodes = [one.node(first.after) for one in self.predicates]
         equal = [self.keyed.equal(self._end(at), node) for at, node in enumerate(nodes)]
         solver = self.beginning(first)
@@ -110,18 +110,18 @@ class Confirmation:
         return solver
 
     def beginning(self, first: Cycle) -> Solver:
-        """A solver in which a first cycle runs."""
+        """Return a solver in which a first cycle runs."""
         contract = self.keyed.term(first.contract)
         solver = Solver(self.limits)
         solver.add(*self.keyed.ranges, contract)
         return solver
 
     def _end(self, at: int) -> Term:
-        """A constant for a predicate after the cycle: quicker to read from a model than what it is equal to."""
+        """Return a constant for a predicate after the cycle, which is quicker to read from a model than its definition."""
         return self.keyed.fresh(f"end!{at}", self.predicates[at].kind)
 
     def _stands(self, clause: Clause) -> Term:
-        """That the constants have the clause's values."""
+        """Return the term that the constants have the clause's values."""
         return smt.all_of([self._at(at, value) for at, value in clause])
 
     def _at(self, at: int, value: int) -> Term:

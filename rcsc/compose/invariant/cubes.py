@@ -22,13 +22,13 @@ Cube = tuple[Pair, ...]
 
 
 def shown(chosen: Sequence[Predicate], clause: Cube) -> str:
-    """A combination in the tables' words."""
+    """Spell a combination in the tables' words."""
     by_predicate = groupby(clause, key=lambda pair: pair[0])
     return " and ".join(_said(chosen[at], [value for _, value in pairs]) for at, pairs in by_predicate)
 
 
 def _said(one: Predicate, found: Sequence[int]) -> str:
-    """What is said of one predicate: its value, or those that it has not."""
+    """Spell one predicate's value, or the values that it has not."""
     if found[0] >= 0:
         return f"{one.name} = {one.shown(found[0])}"
     others = [one.shown(~value) for value in reversed(found)]
@@ -58,11 +58,11 @@ class Masks:
         return made
 
     def of_cube(self, cube: Cube) -> int:
-        """The pairs of the cube."""
+        """Return the bits of the cube's pairs."""
         return sum(self._own[pair] for pair in cube)
 
     def implied(self, cube: Cube) -> int:
-        """All that hold where the cube does: that a predicate has a value, and therefore no other."""
+        """Return the bits of all pairs that follow from the cube: one value excludes the others."""
         found = 0
         for pair in cube:
             found |= self._implied[pair]
@@ -87,15 +87,15 @@ class Reached:
         return len(self._points)
 
     def add(self, point: Valuation) -> None:
-        """One more."""
+        """Add a state."""
         self._points = np.vstack([self._points, np.array([point], dtype=np.int32)])
 
     def shows(self, cube: Cube) -> bool:
-        """Whether one of them is in the cube."""
+        """Return whether a known state lies in the cube."""
         return bool(self._inside(cube).any())
 
     def values(self, cube: Cube, at: int) -> set[int]:
-        """What a predicate has in those that are in the cube."""
+        """Return the values of a predicate in the known states of the cube."""
         return set(map(int, self._points[self._inside(cube), at]))
 
     def _inside(self, cube: Cube) -> npt.NDArray[np.bool_]:

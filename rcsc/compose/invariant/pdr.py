@@ -72,16 +72,16 @@ class Posed:
         return found | {(at, ~value): -literal for (at, value), literal in found.items()}
 
     def fresh(self) -> Literal:
-        """A literal that nothing is said of yet."""
+        """Return an unused literal."""
         self._count += 1
         return self._count
 
     def start(self) -> Valuation:
-        """The predicates before the cycle in the last model."""
+        """Return the predicates before the cycle in the last model."""
         return self._point(self._starts)
 
     def end(self) -> Valuation:
-        """The predicates after the cycle in the last model."""
+        """Return the predicates after the cycle in the last model."""
         return self._point(self._ends)
 
     def _point(self, words: Sequence[Word]) -> Valuation:
@@ -94,7 +94,7 @@ class Posed:
 
 @dataclass(slots=True)
 class PDR:
-    """The search, for one level.
+    """Property directed reachability for one level.
 
     Attributes:
         firsts: The cycles with which it begins.
@@ -119,7 +119,7 @@ class PDR:
         self._masks = Masks.of(self.step.sizes)
 
     def search(self, wanted: Iterable[int]) -> tuple[list[Clause], set[int]]:
-        """An invariant, and which obligations it does not prove.
+        """Find an invariant, and the obligations that it does not prove.
 
         Args:
             wanted: The obligations looked at, by position.
@@ -145,7 +145,7 @@ class PDR:
     # --- obligations ---
 
     def _begin(self, obligations: set[int]) -> None:
-        """Obligations that a first cycle breaks are open."""
+        """Leave the obligations open that a first cycle breaks."""
         for at in sorted(obligations):
             if any(first.sat.holds([-first.holds[at]]) for first in self.firsts):
                 self._leave(obligations, [at])
@@ -156,7 +156,7 @@ class PDR:
             self._open.add(at)
 
     def _exclude(self, obligations: set[int]) -> None:
-        """Excludes every state of the last frame from which a cycle breaks an obligation, or leaves the obligation open."""
+        """Exclude every state of the last frame from which a cycle breaks an obligation, or leave the obligation open."""
         last = len(self._frames) - 1
         while True:
             switch = self.step.fresh()
@@ -170,7 +170,7 @@ class PDR:
                 self._leave(obligations, broken)
 
     def _block(self, point: Valuation, last: int) -> bool:
-        """Excludes a state from a frame, and first what leads to it; False where it is reached after all."""
+        """Exclude a state from a frame after all that leads to it; return False where it is reachable."""
         waiting = [(last, 0, point)]
         count = 0
         while waiting:
@@ -200,7 +200,7 @@ class PDR:
     # --- generalisation ---
 
     def _not_first(self, cube: Cube) -> set[Pair] | None:
-        """Pairs of the cube with which no first cycle ends; None where one ends with all of them."""
+        """Return pairs of the cube with which no first cycle ends; None where one ends with all of them."""
         kept: set[Pair] = set()
         implied = self._masks.implied(cube)
         for first, cores in zip(self.firsts, self._cores, strict=True):
@@ -216,7 +216,7 @@ class PDR:
         return kept
 
     def _not_next(self, cube: Cube, level: int) -> set[Pair] | None:
-        """Pairs of the cube to which no cycle leads from the frame outside the cube; None where one leads to all."""
+        """Return pairs of the cube to which no cycle leads from outside the cube in the frame; None where one leads to all."""
         if level == 0:
             return set()
         step, switch = self.step, self.step.fresh()
@@ -229,7 +229,7 @@ class PDR:
         return {pair for pair in cube if step.after[pair] in core}
 
     def _inductive(self, cube: Cube, level: int) -> Cube | None:
-        """Pairs of the cube that no run of at most `level` cycles ends with; None where one may end with all of them."""
+        """Return pairs of the cube that no run of at most `level` cycles ends with; None where one may end with all."""
         if self.reached.shows(cube):
             return None
         kept = self._not_first(cube)
@@ -239,7 +239,7 @@ class PDR:
         return self._less(cube, kept | core)
 
     def _general(self, cube: Cube, level: int) -> Cube:
-        """As few pairs of the cube as are excluded like it, and of those the widest."""
+        """Generalise the cube: drop pairs, then widen those that are left."""
         for pair in self._in_order(cube):
             less = tuple(one for one in cube if one != pair)
             if pair in cube and less:
@@ -250,7 +250,7 @@ class PDR:
         return cube
 
     def _wider(self, cube: Cube, pair: Pair, level: int) -> Cube | None:
-        """The cube with all values of a predicate but those that are found to be allowed; None where these are too many."""
+        """Replace a predicate's value in the cube by all but its allowed ones; None where those are too many."""
         at = pair[0]
         others = tuple(one for one in cube if one != pair)
         allowed: set[int] = set()
@@ -270,7 +270,7 @@ class PDR:
         return None
 
     def _less(self, cube: Cube, needed: set[Pair]) -> Cube:
-        """Those pairs of the cube that are needed, unless a known state is among what they say."""
+        """Keep the needed pairs of the cube, unless they contain a known state."""
         found = tuple(sorted(needed))
         return cube if not found or self.reached.shows(found) else found
 
@@ -284,7 +284,7 @@ class PDR:
         self._held.append(self.step.fresh())
 
     def _add(self, cube: Cube, level: int) -> int:
-        """Adds a clause to the last frame in which it can stand; says which."""
+        """Add a clause to the last frame in which it can stand; return which."""
         while level < len(self._frames) - 1 and self._not_next(cube, level) is not None:
             level += 1
         mask = self._masks.of_cube(cube)
@@ -297,7 +297,7 @@ class PDR:
         return level
 
     def _push(self) -> int | None:
-        """Moves clauses up; the frame that has none of its own left, if one has."""
+        """Move clauses up; return the frame that has none of its own left, if one has."""
         for level in range(1, len(self._frames) - 1):
             for cube in list(self._frames[level]):
                 if cube in self._frames[level] and self._kept(cube, level):
@@ -308,6 +308,6 @@ class PDR:
         return None
 
     def _kept(self, cube: Cube, level: int) -> bool:
-        """Whether a cycle from the frame keeps the clause."""
+        """Return whether a cycle from the frame keeps the clause."""
         step = self.step
         return not step.sat.holds([*self._held[level:], *(step.after[pair] for pair in cube)])

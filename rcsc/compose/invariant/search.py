@@ -31,7 +31,7 @@ LONGER = 4
 
 @dataclass(frozen=True, slots=True)
 class Effort:
-    """How much is spent.
+    """How much is spent on a search.
 
     Attributes:
         walks: Random walks before the search, each of `cycles` cycles; more of them where there are many tables (`A_TABLE`).
@@ -47,7 +47,7 @@ class Effort:
 
 @dataclass(frozen=True, slots=True)
 class Invariant:
-    """What a search found.
+    """What a search found: clauses, and what they do not prove.
 
     Attributes:
         predicates: What the clauses speak of.
@@ -69,7 +69,7 @@ class Invariant:
 def search(
     ts: TransitionSystem, firsts: Sequence[Cycle], cycle: Cycle, wanted: Sequence[Obligation], effort: Effort
 ) -> Invariant:
-    """An invariant from which as many obligations follow as can be.
+    """Find an invariant from which as many obligations follow as possible.
 
     Raises:
         GaveUpError: The solver did.
@@ -96,7 +96,7 @@ def strengthened(
     found: Invariant,
     wanted: Sequence[Node],
 ) -> Invariant:
-    """What was found, with clauses added from which as many as can be of these conditions on a later cycle follow.
+    """Add clauses from which as many as possible of these conditions on a later cycle follow.
 
     Raises:
         GaveUpError: The solver did.
@@ -116,7 +116,7 @@ def _with(  # what a search is of
     before: Invariant,
     left: Sequence[int],
 ) -> Invariant:
-    """One search, from the invariant that is known already, for the obligations that are left."""
+    """Search once more, from the invariant known so far, for the obligations that are left."""
     posed = [Posed(chosen, one, _conditions(ts, one, left)) for one in (*firsts, cycle)]
     made, left_open = _searched(ts, chosen, posed, before, left)
     return replace(made, open=frozenset(left_open))
@@ -141,18 +141,18 @@ def _searched(
 
 
 def read(ts: TransitionSystem, cycle: Cycle, wanted: Sequence[Obligation]) -> list[Node]:
-    """What is searched for, and what may be relied on: predicates are chosen from their cone."""
+    """Collect what is searched for and what may be relied on: predicates are chosen from its cone."""
     return [*(obligation.holds for obligation in wanted if _matters(ts, obligation)), cycle.contract]
 
 
 def _conditions(ts: TransitionSystem, cycle: Cycle, left: Iterable[int]) -> dict[int, Node]:
-    """Of these obligations, in this cycle."""
+    """Return these obligations' conditions in this cycle."""
     every = obligations(ts, cycle)
     return {at: every[at].holds for at in left}
 
 
 def _matters(ts: TransitionSystem, obligation: Obligation) -> bool:
-    """Whether it is searched for: not a field that the level does not compare with the last one, which nobody may rely on."""
+    """Return whether to search for an obligation: not for a field that the level never compares, on which nobody may rely."""
     if obligation.sort is not Sort.NUMBERED:
         return True
     return obligation.name.endswith(f".{COMMAND}") or any(
@@ -163,7 +163,7 @@ def _matters(ts: TransitionSystem, obligation: Obligation) -> bool:
 def _walked(
     ts: TransitionSystem, effort: Effort
 ) -> tuple[tuple[Mapping[str, Value], ...], frozenset[tuple[str, str]]]:
-    """States that walks reach, and the lines that ran; where assumptions are trusted no walk keeps to them.
+    """Collect states that walks reach, and the lines that ran; none where assumptions are trusted, to which no walk keeps.
 
     Most walks go on from where one came to a line for the first time, as coverage guides a fuzzer (Zalewski, "american fuzzy lop",
     2013): lines that only a long run of answers leads to are come to so.

@@ -1,6 +1,21 @@
-"""From invariants to what is proved of a level and of the whole system.
+"""From invariants to what is proved of a level, and of the whole system.
 
-`level` proves one level; `context` says which lines are never reached, `ranking` which lines follow one another and what ends that,
-`termination` that every command is answered. `assume_guarantee` matches what levels assume with what others are proved to keep,
-`system` proves all levels; `kept` takes proofs from the cache, `standing` reads verdicts from it without a solver.
+Definitions. A *level proof* is the invariant of a level with a verdict for each obligation. A line is *unreached* if no reachable cycle
+runs it. A command *ends* if it is answered, *done* or *failed*, and stays so, given that subordinates answer their orders. A *phase* is
+the part of the state that tells how far a command has come; a *ranking* is a number of the level that rises with a line and falls with
+none that follows it. A *promise* is what a level assumes of a neighbour.
+
+Example. `upper` orders `lower` and waits for its echo. `upper` is proved to number its orders one after the other, `lower` to echo the
+order that it took. Each is a promise of one that the other assumes; both begin with the same order; so both are proved of the system,
+by the induction in `compose.__doc__`. If `lower` is not proved to echo, its own verdicts stand, and those of `upper` are shown with what
+they rest on.
+
+Trusted: the arguments in `compose.__doc__` and in `termination`; that questions are put as they say (`level`, `context`, `ranking`,
+`termination`, `assume_guarantee`); Z3, or cvc5 with `--certify`, which answers the same questions from their text.
+
+Cost: linear in the number of levels, which are proved one by one; termination asks about three cycles in a row.
+A proof is kept under a digest of all that it is about, and read again at once.
+
+Modules, in the order the data flows: `context` (lines), `ranking` (what stops), `termination` (commands), `level` (all of one level),
+`assume_guarantee` (promises, claims), `kept` and `standing` (the cache), `system`.
 """

@@ -52,7 +52,7 @@ def claims(made: Mapping[str, TransitionSystem], proofs: Mapping[str, LevelProof
 
 
 def of_level(ts: TransitionSystem, proof: LevelProof) -> Iterator[tuple[Key, Claim]]:
-    """What is claimed of one level, but for the contract."""
+    """List what is claimed of one level, apart from the contract."""
     name = proof.level
     runs = ((name, RUNS),)
     yield from _of_runs(ts, proof)
@@ -74,7 +74,7 @@ def of_level(ts: TransitionSystem, proof: LevelProof) -> Iterator[tuple[Key, Cla
 
 
 def _of_a_restart(ts: TransitionSystem, proof: LevelProof) -> Iterator[str]:
-    """What else could end the first cycle after a restart early, so that the report that stood before is followed by an older one."""
+    """List what else could end the first cycle after a restart early, and so have an older report follow a newer."""
     if asks(ts.program):
         yield "no extern procedure is refused in the first cycle after a restart"
     stops = {str(name) for table in ts.program.tables for name in table.stops}
@@ -84,7 +84,7 @@ def _of_a_restart(ts: TransitionSystem, proof: LevelProof) -> Iterator[str]:
 
 
 def _of_runs(ts: TransitionSystem, proof: LevelProof) -> Iterator[tuple[Key, Claim]]:
-    """That the level runs as its tables say, in an environment that keeps to its contract, and that its operations are safe."""
+    """Claim that the level runs as its tables say in an environment that keeps to the contract, and that its operations are safe."""
     name, links = proof.level, ts.links
     ends = [*([] if links.above is None else [links.above.order]), *(below.report for below in links.below)]
     needs: list[Key] = [SAFE, *((CONTRACT, "", record) for record in ends)]
@@ -110,7 +110,7 @@ def _of_runs(ts: TransitionSystem, proof: LevelProof) -> Iterator[tuple[Key, Cla
 
 
 def _of_ending(ts: TransitionSystem, still: Iterable[str], verdict: Verdict) -> Claim:
-    """That a command ends, given that what is below answers, and that what has to stand still does."""
+    """Claim that a command ends, assuming that subordinates answer theirs and that some inputs stand still."""
     name, below = ts.level.name, ts.links.below
     trusts = [
         f"`{one.name}` answers every order that is not replaced, and stays so" for one in below if one.outside
@@ -126,7 +126,7 @@ def _of_ending(ts: TransitionSystem, still: Iterable[str], verdict: Verdict) -> 
 
 
 def promises(made: Mapping[str, TransitionSystem]) -> Iterator[Promise]:
-    """What each level assumes of each neighbour."""
+    """List what each level assumes of each neighbour."""
     for name, ts in made.items():
         yield from _of_above(name, ts, made)
         yield from _of_below(name, ts, made)
@@ -182,12 +182,12 @@ def _of_above(name: str, ts: TransitionSystem, made: Mapping[str, TransitionSyst
 
 
 def other_end(leaf: str, record: str, other: str) -> str:
-    """The same field at the other end of the buffer."""
+    """Return the name of a field at the other end of the buffer."""
     return other + leaf.removeprefix(record)
 
 
 def _begin(upper: TransitionSystem, order: str, lower: TransitionSystem, record: str) -> bool:
-    """Before the first cycle the lower level's order is the upper's, and the upper sees it echoed, or none that is still to come."""
+    """Return whether both levels begin with the same order, and with an echo of it or of an older one."""
     first = {str(v.name): v.initial for v in upper.program.variables}
     other = {str(v.name): v.initial for v in lower.program.variables}
     above = lower.links.above

@@ -28,7 +28,7 @@ from rcsc.symbolic.values import Node
 
 @dataclass(frozen=True, slots=True)
 class RepeatedLine:
-    """A line that does more when it matches again, and to which leaves."""
+    """A line that changes more leaves when it matches again."""
 
     table: str
     line: str
@@ -37,7 +37,7 @@ class RepeatedLine:
 
 @dataclass(frozen=True, slots=True)
 class Context:
-    """What was found of one level.
+    """What was found of one level's lines.
 
     Attributes:
         unreached: Tables and lines that no reachable cycle runs; `unsure`, of which that is not shown and no run was seen either.
@@ -70,7 +70,7 @@ def context(
     clauses: Sequence[Clause],
     ran: Container[LineName] = frozenset(),
 ) -> Context:
-    """Asks all of it; lines that `ran` on walks are known to be reached."""
+    """Ask all of it; lines that `ran` on walks are known to be reached."""
     every = list(_starts(ts, asked, clauses))
     asked.rested_on += [one.solver for one in every]
     reached = [set(_reached(asked, one)) for one in every]
@@ -86,7 +86,7 @@ def context(
 
 
 def never_run(asked: Confirmation, clauses: Sequence[Clause], ran: Container[LineName]) -> list[Node]:
-    """That lines do not run, one by one, which no walk ran and which the clauses allow: what there is to be shown."""
+    """List the conditions that a line never runs, for lines that no walk ran and the clauses allow."""
     solver = asked.known(clauses)
     return [
         values.negation(when)
@@ -96,14 +96,14 @@ def never_run(asked: Confirmation, clauses: Sequence[Clause], ran: Container[Lin
 
 
 def _starts(ts: TransitionSystem, asked: Confirmation, clauses: Sequence[Clause]) -> Iterator[_Start]:
-    """A later cycle, and each with which the level may begin."""
+    """Yield a later cycle, and each with which the level may begin."""
     for at, cycle in enumerate((asked.cycle, *asked.firsts)):
         again = ts.cycle(cycle.after, f" again {at}", taken=cycle.taken)
         yield _Start(cycle, again, asked.beginning(cycle) if at else asked.known(clauses))
 
 
 def gives_an_order(ts: TransitionSystem, cycle: Cycle) -> Node:
-    """That the cycle gives an order."""
+    """Return the condition that the cycle gives an order."""
     return values.any_of(
         values.negation(values.equal(cycle.before[below.number], cycle.after[below.number]))
         for below in ts.links.below
@@ -111,7 +111,7 @@ def gives_an_order(ts: TransitionSystem, cycle: Cycle) -> Node:
 
 
 def _lines(cycle: Cycle) -> Iterator[tuple[LineName, Node]]:
-    """Each line, and when it runs; but for a DEFAULT that is said to be unreachable, which is an obligation."""
+    """Yield each line with the condition that it runs; an unreachable DEFAULT is an obligation instead."""
     for at in cycle.tables:
         for line, match in at.lines:
             if not (isinstance(line, Default) and line.unreachable):
@@ -119,7 +119,7 @@ def _lines(cycle: Cycle) -> Iterator[tuple[LineName, Node]]:
 
 
 def _reached(asked: Confirmation, start: _Start) -> Iterator[LineName]:
-    """The lines of which it is not refuted that they run."""
+    """Yield the lines that are not refuted to run."""
     runs = [(line, asked.keyed.term(when)) for line, when in _lines(start.cycle)]
     start.solver.add(*asked.keyed.ranges)
     for line, term in runs:
@@ -128,7 +128,7 @@ def _reached(asked: Confirmation, start: _Start) -> Iterator[LineName]:
 
 
 def _restless(ts: TransitionSystem, asked: Confirmation, start: _Start) -> bool:
-    """Whether an order may be given in both of two cycles on the same inputs."""
+    """Return whether an order may be given in both of two cycles on the same inputs."""
     sent = [asked.keyed.term(gives_an_order(ts, cycle)) for cycle in (start.cycle, start.again)]
     start.solver.add(*asked.keyed.ranges)
     return may(start.solver, *sent)
@@ -137,7 +137,7 @@ def _restless(ts: TransitionSystem, asked: Confirmation, start: _Start) -> bool:
 def _every_repeated(
     ts: TransitionSystem, asked: Confirmation, every: Sequence[_Start]
 ) -> Iterator[RepeatedLine]:
-    """Line by line, the leaves that a second match may change, wherever the first begins."""
+    """Merge, line by line, the leaves that a second match may change, wherever the first begins."""
     found: dict[LineName, dict[str, None]] = {}
     for start in every:
         for line, leaves in _repeated(ts, asked, start):
@@ -177,7 +177,7 @@ def _repeated(
 
 
 def _shown(solver: Solver, changed: dict[str, Term]) -> Iterator[str]:
-    """The leaves of which it is not refuted that they change, a model naming several at once."""
+    """Yield the leaves that are not refuted to change; one model names several."""
     left = dict(changed)
     while left:
         solver.push()
@@ -199,7 +199,7 @@ def _shown(solver: Solver, changed: dict[str, Term]) -> Iterator[str]:
 
 
 def _of_lines(ts: TransitionSystem) -> list[str]:
-    """States and outputs that more than the preprocess writes: a test variable is no effect of a line."""
+    """List states and outputs that are not only the preprocess's: a test variable is no effect of a line."""
     before = {str(leaf) for name in ts.level.preprocess for leaf in ts.procedures[name].writes}
     later = {str(leaf) for name in ts.level.postprocess for leaf in ts.procedures[name].writes}
     lines = of_lines(ts) | later
@@ -211,7 +211,7 @@ def _of_lines(ts: TransitionSystem) -> list[str]:
 
 
 def of_lines(ts: TransitionSystem) -> set[str]:
-    """What some line of some table writes."""
+    """Collect what the lines of all tables write."""
     found = set()
     for table in ts.program.tables:
         every = [*(line.actions for line in table.lines), *([table.default.actions] if table.default else [])]

@@ -24,7 +24,7 @@ from rcsc.host.cache import Cache
 
 
 def recall(cache: Cache, ts: TransitionSystem, effort: Effort) -> LevelProof | None:
-    """The proof of the level, if it is kept."""
+    """Return the proof of the level, if it is kept."""
     kept = cache.load(*_key(ts, effort))
     if kept is None:
         return None
@@ -70,7 +70,7 @@ def _ending(kept: dict[str, Any]) -> Ending:
 
 
 def keep(cache: Cache, ts: TransitionSystem, effort: Effort, proof: LevelProof) -> None:
-    """Keeps the proof, unless something was left undecided."""
+    """Keep the proof, unless something was left undecided."""
     if any(verdict is Verdict.UNDECIDED for _, verdict in proof.found):
         return
     value = {
@@ -91,7 +91,7 @@ def keep(cache: Cache, ts: TransitionSystem, effort: Effort, proof: LevelProof) 
 
 
 def _shortened(ts: TransitionSystem, proof: LevelProof) -> Verdicts:
-    """The proof without what shows it, for those who only ask what was found."""
+    """Shorten the proof to what was found, without what shows it."""
     claims = dict(of_level(ts, proof))
     return Verdicts(claims, tuple(map(_said, essential(proof))), tuple(one.shown for one in proof.unstated))
 
@@ -105,7 +105,7 @@ def _key(ts: TransitionSystem, effort: Effort) -> tuple[str, ...]:
 
 
 def content(ts: TransitionSystem) -> str:
-    """Digest of all that a proof of the level is about: the same wherever the files stand."""
+    """Return the digest of all that a proof of the level is about, wherever the files stand."""
     tables = tuple(replace(one, file="", stops=()) for one in ts.program.tables)  # they follow from it
     program = replace(ts.program, file="", tables=tables)
     return hashlib.sha256(repr((program, ts.level.name, ts.links)).encode()).hexdigest()

@@ -36,7 +36,7 @@ class NotConfirmedError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class LevelProof:
-    """What was found of a level.
+    """What was found of one level.
 
     Attributes:
         found: Each obligation with its verdict.
@@ -63,10 +63,10 @@ class LevelProof:
     unstated: tuple[Unstated, ...] = ()
 
     def verdict(self, sort: Sort, table: str = "", name: str = "") -> Verdict:
-        """Of one obligation.
+        """Return the verdict of an obligation.
 
         Raises:
-            KeyError: There is none such.
+            KeyError: It is unknown.
         """
         for obligation, verdict in self.found:
             if (obligation.sort, obligation.table, obligation.name) == (sort, table, name):
@@ -80,13 +80,13 @@ class LevelProof:
 
 
 def essential(proof: LevelProof) -> tuple[Obligation, ...]:
-    """Obligations that failed; a field that is not numbered is no failure, but nobody may assume that it is; a command is."""
+    """List the obligations that failed; an unnumbered field is no failure (nobody may assume it), a command is."""
     beside = besides(proof)
     return tuple(obligation for obligation in proof.open if obligation not in beside)
 
 
 def besides(proof: LevelProof) -> tuple[Obligation, ...]:
-    """Fields of orders that change under the same number, commands apart."""
+    """List the order fields, commands apart, that change under the same number."""
     return tuple(
         obligation
         for obligation in proof.open
@@ -95,7 +95,7 @@ def besides(proof: LevelProof) -> tuple[Obligation, ...]:
 
 
 def prove_level(ts: TransitionSystem, effort: Effort | None = None) -> LevelProof:
-    """Proves every obligation of a level that can be proved with the invariants found, and looks at its lines in their context."""
+    """Prove a level: find an invariant, confirm it, decide each obligation, and look at the lines in context."""
     effort = effort or Effort()
     begun, cut_before = time.perf_counter(), smt.cut_short()
     cycle, firsts = ts.cycle(ts.havoc()), tuple(_firsts(ts).values())
@@ -134,7 +134,7 @@ def prove_level(ts: TransitionSystem, effort: Effort | None = None) -> LevelProo
 
 
 def _uncut(before: int) -> None:
-    """Nothing is said where the processor time ended a question: another machine might have found something else.
+    """Reject a result that processor time cut short: another machine might find something else.
 
     Raises:
         GaveUpError: It did.
@@ -150,7 +150,7 @@ def _asked_anew(
 
 
 def _confirm(asked: Confirmation, clauses: Sequence[Clause]) -> None:
-    """Asks anew, of another solver, whether the clauses are an invariant: the search is not to be trusted.
+    """Ask another solver whether the clauses are an invariant: the search is not trusted.
 
     Raises:
         NotConfirmedError: They are not, or the solver gave up.
@@ -167,7 +167,7 @@ def _questions(asked: Confirmation, clauses: Sequence[Clause]) -> Iterable[Solve
 
 
 def _firsts(ts: TransitionSystem) -> dict[str, Cycle]:
-    """The cycles with which a level can begin."""
+    """Return the cycles with which a level can begin, by name."""
     return {
         "first": ts.cycle(ts.initial(), " at first"),
         "restart": ts.cycle(ts.restarted(), " at restart"),
@@ -177,7 +177,7 @@ def _firsts(ts: TransitionSystem) -> dict[str, Cycle]:
 def _verdicts(
     ts: TransitionSystem, inference: Confirmation, found: Invariant, wanted: tuple[Obligation, ...]
 ) -> Iterable[tuple[Obligation, Verdict]]:
-    """Asks for each obligation whether a first cycle, or a cycle from the invariant, can break it."""
+    """Decide each obligation: can a first cycle, or a cycle from the invariant, break it?"""
     keyed = inference.keyed
     every = [wanted, *(obligations(ts, first) for first in inference.firsts)]
     asked = [[keyed.term(values.negation(obligation.holds)) for obligation in each] for each in every]
@@ -198,7 +198,7 @@ def _verdicts(
 def _believed(
     ts: TransitionSystem, inference: Confirmation, clauses: Sequence[Clause], solvers: Sequence[Solver]
 ) -> dict[str, Verdict]:
-    """What becomes of what each table declares: where no cycle can keep to it, all that rests on it says nothing.
+    """Return the verdict on what each table declares: nothing may rest on what no cycle can keep to.
 
     So it is where none of some sort of cycle can, a later one, the first, or that after a restart; and for a table where none that
     runs it can, although one would run it otherwise.
@@ -213,7 +213,7 @@ def _believed(
 
 
 def _of_possible(answers: set[Answer]) -> Verdict:
-    """Whether all of it is possible, as a verdict on what was declared."""
+    """Turn answers on whether all cycles are possible into a verdict on what was declared."""
     if Answer.UNSATISFIABLE in answers:
         return Verdict.NOT_PROVED
     return Verdict.UNDECIDED if Answer.UNKNOWN in answers else Verdict.TRUSTED
@@ -222,7 +222,7 @@ def _of_possible(answers: set[Answer]) -> Verdict:
 def _can_run(
     inference: Confirmation, clauses: Sequence[Clause], solvers: Sequence[Solver], at: int
 ) -> Verdict:
-    """Whether a table can run in some cycle that is as declared, if it can in one that need not be."""
+    """Decide whether a table can run in a cycle as declared, if it can in one that need not be."""
     chosen = [inference.keyed.term(one.tables[at].chosen) for one in (inference.cycle, *inference.firsts)]
     answers = {answer(solver, term) for solver, term in zip(solvers, chosen, strict=True)}
     if Answer.SATISFIABLE in answers:
@@ -239,7 +239,7 @@ def _can_run(
 
 
 def certificate(ts: TransitionSystem, proof: LevelProof, limits: Limits = LIMITS) -> dict[str, str]:
-    """Questions in SMT-LIB, each to be answered `unsat` by any solver, that together show what was proved.
+    """Write questions in SMT-LIB, each to be answered `unsat`, that together show what was proved.
 
     `first` and `restart`: such a cycle leads into the invariant; `step TABLE`: a later cycle in which this table runs keeps
     it; `obligations first`, `obligations restart`: such cycles fulfil the obligations that are proved; `obligations SORT`: every cycle
@@ -268,7 +268,7 @@ def certificate(ts: TransitionSystem, proof: LevelProof, limits: Limits = LIMITS
 
 
 def _looked_again(ts: TransitionSystem, proof: LevelProof, asked: Confirmation) -> dict[str, str]:
-    """What `context` and `Flow.endings` rest on."""
+    """Write the questions that `context` and `Flow.endings` rest on."""
     assert proof.context is not None
     seen = replace(context(ts, asked, proof.clauses), unsure=proof.context.unsure)
     found = {f"lines {number}": text for number, text in enumerate(_refuted(asked), 1)}
@@ -282,7 +282,7 @@ def _looked_again(ts: TransitionSystem, proof: LevelProof, asked: Confirmation) 
 
 
 def _refuted(asked: Confirmation) -> list[str]:
-    """What was refuted since the last time, a script for each solver."""
+    """Take the scripts of what was refuted since the last call, one a solver."""
     found = [one.refutations() for one in asked.rested_on if one.refuted]
     asked.rested_on.clear()
     return found

@@ -31,7 +31,7 @@ Part = frozenset[int]
 
 @dataclass(frozen=True, slots=True)
 class Counted:
-    """A line that stops, for each time a number of the level rises: a real by at least `least`."""
+    """A line that stops because a number of the level rises each time: a real by at least `least`."""
 
     line: str
     counter: str
@@ -66,7 +66,7 @@ class Turn:
 
 @dataclass(frozen=True, slots=True)
 class Stopped:
-    """What was found of a table.
+    """What was found of the lines of one table.
 
     Attributes:
         counted: Lines that stop because a counter rises.
@@ -86,7 +86,7 @@ Turns: TypeAlias = Callable[[tuple[str, ...]], tuple[Turn, Turn, Turn]]
 def lines_that_stop(
     program: Program, asked: Confirmation, clauses: Sequence[Clause], turns: Turns
 ) -> Stopped:
-    """With as few inputs as possible that stand still; reals are followed only where something is left without."""
+    """Show that lines stop, with as few constant inputs as possible; follow reals only where something is left without."""
     first = found = _Ranking(program, asked, clauses, turns(()))
     still: tuple[str, ...] = ()
     rested_on = [found.solver]
@@ -110,7 +110,7 @@ def lines_that_stop(
 
 
 def inputs(program: Program) -> tuple[str, ...]:
-    """The records that the level reads."""
+    """List the records that the level reads."""
     return tuple(
         dict.fromkeys(str(v.name).partition(".")[0] for v in program.variables if v.kind is Kind.INPUT)
     )
@@ -127,7 +127,7 @@ class KeptNumber:
 
 
 class _Ranking:
-    """The questions about one table of a level, and the answers.
+    """The questions about the lines of one table, and the answers.
 
     Attributes:
         open: Lines to be looked at: those that a weaker look left.
@@ -182,7 +182,7 @@ class _Ranking:
         return self.restless | self.unanswered
 
     def _unstopped(self, steps: set[LinePair], when: Term, then: Term, among: set[int] | None) -> set[int]:
-        """The lines, of these if it is said, that may do so again and again on a way round."""
+        """Return the lines, of those in `among`, that may do so again and again on a cycle of lines."""
         return {
             line
             for part in parts(steps)
@@ -192,7 +192,7 @@ class _Ranking:
         }
 
     def _steps(self, when: Term, among: set[LinePair]) -> set[LinePair]:
-        """The steps among these that may be taken."""
+        """Return the steps among these that may be taken."""
         found: set[LinePair] = set()
         terms = {step: smt.all_of([self.now[step[0]], self.next[step[1]]]) for step in among}
         while left := [step for step in sorted(among) if step not in found]:
@@ -209,7 +209,7 @@ class _Ranking:
         return found
 
     def _uncounted(self, steps: set[LinePair], when: Term) -> set[LinePair]:
-        """The steps that are left without the lines that stop because a counter rises."""
+        """Drop the steps of lines that stop because a counter rises."""
         again = True
         while again:
             again = False
@@ -221,7 +221,7 @@ class _Ranking:
         return steps
 
     def _stops(self, line: int, part: Part, when: Term, then: Term) -> bool:
-        """Whether the line runs so only finitely often while the lines of the part follow one another; says by which counter."""
+        """Return whether the line runs only finitely often while the part's lines follow one another; note the counter."""
         self.solver.push()
         for turn in (self.last, self.next):
             self.solver.add(smt.any_of([turn[other] for other in sorted(part)]))
@@ -235,7 +235,7 @@ class _Ranking:
         return rising is None or counted is not None
 
     def _rising_once(self, runs: Term) -> list[KeptNumber] | None:
-        """The numbers that rise in some cycle, to try only these; None where there is no such cycle."""
+        """Return the numbers that rise in some cycle, to try only these; None where there is no such cycle."""
         self.solver.push()
         self.solver.add(runs)
         answer = self.solver.check()
@@ -249,7 +249,7 @@ class _Ranking:
         return None if answer is Answer.UNSATISFIABLE else seen
 
     def _rising(self, line: int, part: Part, runs: Term, among: list[KeptNumber]) -> Iterator[Counted]:
-        """The numbers that always rise with the line and never fall within the part."""
+        """Yield the numbers that always rise with the line and never fall within the part."""
         others = smt.any_of([self.now[other] for other in sorted(part)])
         name = str(self.turn.at.lines[line][0].name)
         for one in among:
@@ -263,7 +263,7 @@ class _Ranking:
                 yield Counted(name, one.name)
 
     def _least_rise(self, runs: Term, number: KeptNumber, width: float) -> float | None:
-        """How much the real rises at least; None where that is not shown to be anything."""
+        """Return how much the real rises at least; None where that is not shown to be anything."""
 
         def rises(power: int) -> bool:
             risen = smt.integer_operation("+", number.before, smt.fraction(width / 2**power))
@@ -274,7 +274,7 @@ class _Ranking:
 
 
 def least_power(holds: Callable[[int], bool]) -> int | None:
-    """The least of 0 .. SMALLEST of which it holds, given that it holds of all greater ones; None where of none."""
+    """Return the least of 0 .. SMALLEST of which it holds, given that it holds of all greater ones; None where of none."""
     if not holds(SMALLEST):
         return None
     low, high = -1, SMALLEST  # holds of `high`, not of `low`
@@ -285,7 +285,7 @@ def least_power(holds: Callable[[int], bool]) -> int | None:
 
 
 def owned(program: Program) -> list[tuple[str, Scalar]]:
-    """Numbers that the level keeps, and what is pending of them."""
+    """List the numbers that the level keeps, and their pending values."""
     numbers = [v for v in program.variables if v.kind is Kind.STATE and isinstance(v.type, Int | Real)]
     later = [(str(pending(v.name)), v.type) for v in numbers if v.deferred_until is not None]
     return [*((str(v.name), v.type) for v in numbers), *later]
@@ -296,7 +296,7 @@ def _every_step(lines: int) -> list[LinePair]:
 
 
 def parts(steps: set[LinePair]) -> list[Part]:
-    """The greatest sets of lines in which each leads to every other and to itself (Warshall's closure: the lines are few)."""
+    """Return the strongly connected sets of lines (Warshall's closure: the lines are few)."""
     reach = set(steps)
     lines = sorted({line for step in steps for line in step})
     for middle in lines:

@@ -44,7 +44,7 @@ class Known(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Verdicts:
-    """What was found of one level, shortened.
+    """What was found of one level, without what shows it.
 
     Attributes:
         claims: What was found of each, given what it rests on.
@@ -63,7 +63,7 @@ class Verdicts:
 
 
 def keep_verdicts(cache: Cache, content: str, verdicts: Verdicts) -> None:
-    """Keeps what was found, unless more was proved of the same content before, with more effort."""
+    """Keep what was found, unless more was proved of the same content before, with more effort."""
     before = verdicts_of(cache, content)
     if before is None or before.many <= verdicts.many:
         value = {
@@ -84,7 +84,7 @@ def keep_verdicts(cache: Cache, content: str, verdicts: Verdicts) -> None:
 
 
 def verdicts_of(cache: Cache, content: str) -> Verdicts | None:
-    """What was found of a level of this content."""
+    """Return what was found of a level of this content."""
     kept = cache.load("composed verdicts", content)
     if kept is None:
         return None
@@ -103,7 +103,7 @@ def _key(said: list[str]) -> Key:
 
 
 def any_kept(cache: Cache) -> bool:
-    """Whether levels were ever proved into this cache."""
+    """Return whether levels were ever proved into this cache."""
     return cache.load("composed verdicts") is not None
 
 
@@ -152,7 +152,7 @@ class Outline:
 
 
 def outline_of(form: Mapping[str, Any]) -> Outline:
-    """The inverse of `dataclasses.asdict`, by way of JSON."""
+    """Invert `dataclasses.asdict`, by way of JSON."""
     levels = tuple(
         LevelOutline(
             **one
@@ -208,7 +208,7 @@ class KnownSystem:
         return Known.UNKNOWN if Known.UNKNOWN in found else Known.PROVED
 
     def _obligation(self, level: str, key: Key) -> Known:
-        """What was found of an obligation, in its level's environment."""
+        """Return what was found of an obligation in its level's environment."""
         verdicts = self.known.get(level)
         if verdicts is None:
             return Known.UNKNOWN
@@ -216,7 +216,7 @@ class KnownSystem:
         return Known.PROVED if claim is not None and claim.verdict in FOUND else Known.NOT_PROVED
 
     def of_obligation(self, level: str, key: Key) -> Known:
-        """Whether an obligation of a level is proved of the levels together."""
+        """Return what is known of an obligation over the whole chain of levels."""
         found = self._obligation(level, key)
         if found is not Known.PROVED:
             return found
@@ -225,7 +225,7 @@ class KnownSystem:
         return Known.TRUSTED if self._closed(level, key).verdict is Verdict.TRUSTED else Known.PROVED
 
     def _given(self, level: str, key: Key) -> Known:
-        """What is known of a claim that is found so, but not all that it rests on: not even that where nobody looked at it."""
+        """Return what is known of a claim that is found so while something it rests on is not: conditional, or unknown."""
         whole = all(owner in self.known for owner, _ in self._closed(level, key).lacks)
         return Known.CONDITIONAL if whole else Known.UNKNOWN
 
@@ -236,15 +236,15 @@ class KnownSystem:
         return self._closed(level, key).proved
 
     def lacking(self, level: str, key: Key = RUNS) -> tuple[str, ...]:
-        """What is not found of that on which a claim of a level rests, in words; by default, all of its claims."""
+        """Spell what is not found of all that a claim rests on; by default, what all of the level's claims rest on."""
         return tuple(spelled(need, level, self.closed) for need in self._closed(level, key).lacks)
 
     def trusting(self, level: str, key: Key) -> tuple[str, ...]:
-        """What a claim takes for granted that is written in tables, in words."""
+        """Spell the assumptions of tables that a claim takes for granted."""
         return declared(self._closed(level, key).trusts)
 
     def of_level(self, level: str) -> Known:
-        """Whether all that should be is proved of a level."""
+        """Return whether all that should be is proved of a level."""
         verdicts = self.known.get(level)
         if verdicts is None:
             return Known.UNKNOWN
@@ -264,7 +264,7 @@ class KnownSystem:
         return next((one for one in worst if one in found), Known.PROVED)
 
     def missing(self, level: str) -> tuple[str, ...]:
-        """Why a level of which nothing is found wrong is not wholly proved: what it rests on, and what was not looked at."""
+        """Say why a level without anything wrong is not wholly proved: what it rests on, and what was not looked at."""
         verdicts = self.known.get(level)
         if verdicts is None:
             return ()
@@ -272,7 +272,7 @@ class KnownSystem:
         return (*rests, *(f"not looked at: {one}" for one in verdicts.unstated))
 
     def unreached(self, level: str, table: str) -> tuple[str, ...]:
-        """Lines of a table that no reachable cycle of this system runs."""
+        """List the lines of a table that no reachable cycle of this system runs."""
         verdicts = self.known.get(level)
         if verdicts is None:
             return ()
@@ -284,6 +284,6 @@ class KnownSystem:
 
 
 def standing(cache: Cache, outline: Outline) -> KnownSystem:
-    """What the cache knows of a system."""
+    """Return what the cache knows of a system."""
     found = {one.name: verdicts_of(cache, one.content) for one in outline.levels}
     return KnownSystem(outline, {name: one for name, one in found.items() if one is not None})

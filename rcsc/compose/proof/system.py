@@ -39,7 +39,7 @@ class NoProgramError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class SystemProof:
-    """What was found of a system.
+    """What was found of a whole system.
 
     Attributes:
         closed: What follows of each claim over the whole chain; of levels that were not proved nothing is known.
@@ -73,7 +73,7 @@ class SystemProof:
 
 
 def transition_systems(path: Path) -> dict[str, TransitionSystem]:
-    """A transition system for each level of the system described by the file, from the top down.
+    """Make a transition system for each level that the file describes, from the top down.
 
     Each subordinate may assume that the fields stand still which its superior is built to number: the
     fields that the superior compares with the last order. That the superior keeps them is proved with it.
@@ -91,7 +91,7 @@ def transition_systems(path: Path) -> dict[str, TransitionSystem]:
 def transition_systems_of(
     system: Description, programs: Mapping[str, Program]
 ) -> dict[str, TransitionSystem]:
-    """The same of programs that were read, one for each level.
+    """Make the transition systems of programs that were read, one for each level.
 
     Raises:
         BadDescription: The description says something that cannot be.
@@ -110,7 +110,7 @@ def transition_systems_of(
 
 
 def _check_ranks(every: Mapping[str, Links]) -> None:
-    """No level is its own superior, at whatever distance: each would end its commands given that the other does, and neither might.
+    """Check that no level is its own superior at any distance: each would end its commands given that the other does.
 
     Raises:
         BadDescription: One is.
@@ -125,7 +125,7 @@ def _check_ranks(every: Mapping[str, Links]) -> None:
 
 
 def _narrowed(mine: Links, every: Mapping[str, Links], programs: Mapping[str, Program]) -> Links:
-    """The links, with only those fields numbered that the superior compares."""
+    """Narrow a level's numbered fields to those that its superior compares."""
     above = mine.above
     if above is None or above.outside:
         return mine
@@ -142,7 +142,7 @@ def _narrowed(mine: Links, every: Mapping[str, Links], programs: Mapping[str, Pr
 
 
 def program_of(path: Path, name: str) -> Program:
-    """The program of a level, beside the description.
+    """Return the program of a level, which stands beside the description.
 
     Raises:
         NoProgramError: It is not there, does not resolve, or something in it may leave its range or not be defined.
@@ -151,7 +151,7 @@ def program_of(path: Path, name: str) -> Program:
 
 
 def checked(path: Path, name: str) -> tuple[Program, Safety]:
-    """The program of a level, and why a cycle as nodes is the executors'.
+    """Return the program of a level, and why a cycle as nodes is what its executors do.
 
     It is so only where nothing leaves its range and every operation is defined: that is shown of the program by itself, where
     it has to be given its invariants, which are obligations here. An assumption that is needed for it stops the cycle where it fails.
@@ -174,7 +174,7 @@ def checked(path: Path, name: str) -> tuple[Program, Safety]:
 def _safety(
     program: Program, stops: Mapping[str, tuple[AssumptionName, ...]], found: Sequence[Diagnostic]
 ) -> Safety:
-    """Whether the invariants are needed: they are not where all is shown without them, under no other stopping assumptions."""
+    """Decide whether safety needs the invariants: not where all is shown without them, under no other stopping assumptions."""
     from rcsc.procedures.obligations import Obligations
     from rcsc.solvers.options import Options
 
@@ -189,12 +189,12 @@ def _safety(
 
 
 def replace_safety(ts: TransitionSystem, safety: Safety) -> TransitionSystem:
-    """The transition system with what is known of its program."""
+    """Return the transition system with what is known of its program's safety."""
     return TransitionSystem(ts.program, ts.level, ts.links, safety)
 
 
 def loaded_program(path: Path, name: str) -> tuple[Program, Loaded]:
-    """The same, with the files that it was read from.
+    """Return the program of a level, and the files that it was read from.
 
     Raises:
         NoProgramError: It is not there, or does not resolve.
@@ -212,7 +212,7 @@ def loaded_program(path: Path, name: str) -> tuple[Program, Loaded]:
 
 
 def prove_system(path: Path, effort: Effort | None = None, jobs: int = 1) -> SystemProof:
-    """Proves every level of the system described by the file.
+    """Prove every level of the system that the file describes.
 
     Raises:
         BadDescription: The description says something that cannot be.
@@ -230,7 +230,7 @@ def prove_transition_systems(
     said: Callable[[LevelProof], None] | None = None,
     cache: Cache | None = None,
 ) -> SystemProof:
-    """Proves these levels, but for those that the cache has; `said` is called with each as it is done.
+    """Prove these levels, except those in the cache; call `said` with each as it is done.
 
     Agreements are looked at only for all levels.
     """
@@ -252,7 +252,7 @@ def _each_unless_kept(
     only: tuple[str, ...],
     cache: Cache | None,
 ) -> Iterator[tuple[str, LevelProof]]:
-    """Each level's proof, in order."""
+    """Yield each level's proof, in order."""
     known = {name: recall(cache, made[name], effort) for name in only} if cache is not None else {}
     new = _each(made, effort, jobs, tuple(name for name in only if known.get(name) is None))
     for name in only:
@@ -269,7 +269,7 @@ def _each_unless_kept(
 def _each(
     made: Mapping[str, TransitionSystem], effort: Effort, jobs: int, only: tuple[str, ...]
 ) -> Iterator[tuple[str, LevelProof]]:
-    """Each level's proof; in processes where there are several jobs."""
+    """Yield each level's proof; made in processes where there are several jobs."""
     if jobs == 1 or len(only) <= 1:
         for name in only:
             yield name, prove_level(made[name], effort)
@@ -282,7 +282,7 @@ def _each(
 
 
 def _proved(ts: TransitionSystem, effort: Effort) -> LevelProof:
-    """In a process of its own: obligations come back without their nodes, which are many, and are made anew."""
+    """Prove in a process of its own; obligations return without their many nodes and are made anew."""
     found = prove_level(ts, effort)
     return replace(
         found, found=tuple((replace(obligation, holds=TRUE), verdict) for obligation, verdict in found.found)

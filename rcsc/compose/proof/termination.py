@@ -48,7 +48,7 @@ Way = tuple[Phase, Phase]
 
 @dataclass(frozen=True, slots=True)
 class Ending:
-    """What was found of one table.
+    """What was found of one table's command.
 
     Attributes:
         changes: How often the phase can change while the command lasts, after the cycle that takes it; None where it could go round,
@@ -71,7 +71,7 @@ class Ending:
 
 
 def reports(ts: TransitionSystem) -> bool:
-    """Whether the level has a superior, and all reports can say that a command is done."""
+    """Return whether the level has a superior, and all reports can say that a command is done."""
     above = ts.links.above
     if above is None:
         return False
@@ -79,7 +79,7 @@ def reports(ts: TransitionSystem) -> bool:
 
 
 def no_answers(ts: TransitionSystem) -> tuple[str, ...]:
-    """Why it is not known which reports answer a command."""
+    """Say why it is not known which reports answer a command."""
     above = ts.links.above
     if above is None:
         return ()
@@ -94,19 +94,19 @@ def no_answers(ts: TransitionSystem) -> tuple[str, ...]:
 
 
 def unanswered(ts: TransitionSystem, cycle: Cycle) -> Node:
-    """Say that the level's report is none that its superior waits for."""
+    """Return the condition that the level's report is none that its superior waits for."""
     assert ts.links.above is not None
     return values.negation(_ended(ts, ts.links.above, cycle.taken, cycle.after))
 
 
 def answered(ts: TransitionSystem, cycle: Cycle, below: Below) -> Node:
-    """Say that the last order is echoed, and ended."""
+    """Return the condition that the last order is echoed, and ended."""
     echoed = values.equal(cycle.taken[below.echo], cycle.before[below.number])
     return values.both(echoed, _ended(ts, below, cycle.before, cycle.taken))
 
 
 def _ended(ts: TransitionSystem, end: Neighbour, ordered: Leaves, reported: Leaves) -> Node:
-    """Say that the report ends the command that is ordered: *done* or *failed*; the first command *done* alone."""
+    """Return the condition that the report ends the order: *done* or *failed*; the first command *done* alone."""
     rests = values.equal(ordered[end.command], values.constant(ts.kinds[end.command], 0))
     failed = _says(ts, end.status, reported, FAILED)
     return values.either(_says(ts, end.status, reported, DONE), values.both(values.negation(rests), failed))
@@ -122,7 +122,7 @@ def _says(ts: TransitionSystem, leaf: str, leaves: Mapping[str, Node], member: s
 
 @dataclass(frozen=True, slots=True)
 class _Phases:
-    """The phases that a command of a table goes through.
+    """The phases that a command of one table goes through.
 
     Attributes:
         leaves: What tells them apart.
@@ -151,7 +151,7 @@ class _Phases:
 
 
 class Flow:
-    """The questions of one level, from an invariant; none where it has no superior that it reports to."""
+    """Termination questions of one level, asked from an invariant; none where it has no superior that it reports to."""
 
     def __init__(self, ts: TransitionSystem, asked: Confirmation, clauses: Sequence[Clause]) -> None:
         self.ts, self.asked, self.clauses = ts, asked, clauses
@@ -165,7 +165,7 @@ class Flow:
         return self.asked.cycle.tables if reports(self.ts) else ()
 
     def endings(self) -> Iterator[Ending]:
-        """One for each table."""
+        """Yield what is found of each table."""
         round_ = self._tables_round() if self.tables else set()
         for number in range(len(self.tables)):
             yield self._ending(number, goes_round=number in round_)
@@ -179,7 +179,7 @@ class Flow:
         return Ending(table, None if goes_round else changes, found.counted, found.still, found.endless)
 
     def ways_round(self) -> list[Node]:
-        """That steps between phases are not taken, one by one, of which some lead round: what there is to be shown if none does."""
+        """List the conditions that a step between phases is not taken, for steps on a cycle: what there is to show."""
         found = []
         for number, at in enumerate(self.tables):
             phases = self._phases(number)
@@ -194,7 +194,7 @@ class Flow:
     # --- from phase to phase ---
 
     def _phases(self, number: int) -> _Phases:
-        """Of a table; flags that lines set and reset while the command is unanswered tell none apart."""
+        """Phases of a table, ignoring flags that toggle while the command is pending."""
         if number not in self.found:
             at = self.asked.cycle.tables[number]
             phases = self._phases_by(at, self._pending_and_flags())
@@ -210,7 +210,7 @@ class Flow:
         return self.found[number]
 
     def _pending_and_flags(self) -> tuple[str, ...]:
-        """Pending states, the flag of a new command, and flags that lines write."""
+        """List pending states, the flag of a new command, and flags that lines write."""
         variables = self.ts.program.variables
         found = [
             str(pending(v.name))
@@ -226,7 +226,7 @@ class Flow:
         return (*found, *flags)
 
     def _ends(self, leaves: Sequence[str]) -> tuple[list[Node], list[Node]]:
-        """What tells phases apart, before the cycle and after it."""
+        """Return what tells phases apart, before the cycle and after it."""
         cycle = self.asked.cycle
         return [cycle.before[leaf] for leaf in leaves], [cycle.after[leaf] for leaf in leaves]
 
@@ -253,7 +253,7 @@ class Flow:
             yield inside, may(solver, term)
 
     def _steps(self, at: TableAt, leaves: tuple[str, ...]) -> set[Way] | None:
-        """Every change of phase in a cycle that runs the table; None where they are too many, or the solver gave up."""
+        """Return every change of phase in a cycle that runs the table; None where they are too many or the solver gave up."""
         keyed, cycle = self.keyed, self.asked.cycle
         before, after = self._ends(leaves)
         stays = values.all_of(map(values.equal, before, after))
@@ -284,12 +284,12 @@ class Flow:
     # --- three cycles in a row ---
 
     def _turns(self, number: int, still: tuple[str, ...]) -> tuple[Turn, Turn, Turn]:
-        """Of a table: three cycles in a row."""
+        """Return three cycles of a table in a row."""
         one, two, three = (self._turn(cycle, number) for cycle in self._cycles(still))
         return one, two, three
 
     def _cycles(self, still: tuple[str, ...]) -> list[Cycle]:
-        """Three in a row, from anywhere in the invariant, in which these inputs keep their values."""
+        """Return three cycles in a row, from anywhere in the invariant, in which these inputs keep their values."""
         if still not in self.rows:
             row = [self.asked.cycle]
             kept = {leaf: taken for leaf, taken in row[0].taken.items() if _stands_still(leaf, still)}
@@ -302,7 +302,7 @@ class Flow:
         return self.rows[still]
 
     def _turn(self, cycle: Cycle, number: int) -> Turn:
-        """The cycle of a table, in which the command and the phase stay."""
+        """Return the cycle of a table in which the command and the phase stay."""
         leaves = self._phases(number).leaves
         same = values.all_of(values.equal(cycle.before[leaf], cycle.after[leaf]) for leaf in leaves)
         at = cycle.tables[number]
@@ -321,7 +321,7 @@ class Flow:
     # --- from table to table ---
 
     def _tables_round(self) -> set[int]:
-        """The tables that may follow one another round while the command stays."""
+        """Return the tables that may follow one another in a cycle while the command stays."""
         above, chosen = self.ts.links.above, self.ts.level.tables
         assert above is not None
         if isinstance(chosen, OneTable):
@@ -352,13 +352,13 @@ def _are(nodes: Sequence[Node], phase: Phase) -> list[Node]:
 
 
 def _stands_still(leaf: str, still: tuple[str, ...]) -> bool:
-    """Whether it is a value, no echo or status, in one of these inputs."""
+    """Return whether the leaf is a value, no echo or status, in one of these inputs."""
     record, _, part = leaf.partition(".")
     return record in still and part not in (NUMBER, ECHO, ECHOED, STATUS)
 
 
 def longest(steps: set[Way]) -> int | None:
-    """Steps on the longest way; None where a way goes round."""
+    """Return the number of steps on the longest path; None where there is a cycle."""
     onward: dict[Phase, list[Phase]] = {}
     for one, two in sorted(steps):
         onward.setdefault(one, []).append(two)
