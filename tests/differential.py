@@ -211,6 +211,7 @@ JOIN: dict[str, Callable[[bool, bool], bool]] = {
     "and": lambda a, b: a and b,
     "or": lambda a, b: a or b,
     "implies": lambda a, b: b or not a,
+    "xor": lambda a, b: (a and not b) or (b and not a),
 }
 
 

@@ -35,7 +35,7 @@ MEMORY_MB = 2048
 OPTIONS = Options(steps=1_000_000, solver="boxes")
 
 WORDS = (
-    "table level state input output enum record array of int real bool .. | || := ( ) { } [ ] in and or not implies "
+    "table level state input output enum record array of int real bool .. | || := ( ) { } [ ] in and or xor not implies "
     '= /= <= >= < > + - * / mod 0 1 -1 18446744073709551616 1e400 0.1 "x" # ## \x00 \r ; , : when DEFAULT '
     "unreachable next case else for if local true false abs min max é \u202e \u0430 use extern python"
 ).split(" ")
@@ -158,7 +158,7 @@ STRICT = (
 )
 OURS = frozenset(
     """input state output table level procedure module owner extern enum record type unit const use assume invariant property
-    was then reads writes python c bool int real true false and or not implies in mod abs min max if else case for next
+    was then reads writes python c bool int real true false and or xor not implies in mod abs min max if else case for next
     local call array of period preprocess postprocess by reject clamp deferred until assumed monitored proved assuming when
     line procedures DEFAULT unreachable rest command_out status_out""".split()
 )

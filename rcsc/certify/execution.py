@@ -51,6 +51,7 @@ Pairs: TypeAlias = tuple[tuple[bool, bool], ...]
 TRUE_OF: Mapping[Op, Pairs] = {
     Op.AND: ((True, True),),
     Op.OR: ((True, True), (True, False), (False, True)),
+    Op.XOR: ((True, False), (False, True)),
     Op.IMPLIES: ((True, True), (False, True), (False, False)),
 }
 """The pairs of operands of which each operator on truth values is true."""

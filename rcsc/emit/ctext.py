@@ -213,6 +213,10 @@ class CText:
         return text if isinstance(kind, Bool | Real) else f"({wide_type(kind)}){text}"
 
     def _applied(self, op: Op, args: tuple[Expr, ...], kind: Scalar) -> str:
+        if (
+            op is Op.XOR
+        ):  # of truth values; an operand that is known to equal the other is no comparison, either
+            op = Op.NE
         if op in _COMPARE and (known := _decided(op, args)) is not None:
             return constant(Bool(), known)
         texts = [self.expr(arg) for arg in args]

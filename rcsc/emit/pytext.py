@@ -30,7 +30,7 @@ from rcsc.lang.model import (
 )
 
 _INFIX = {
-    Op.AND: "and", Op.OR: "or", Op.EQ: "==", Op.NE: "!=", Op.LT: "<", Op.LE: "<=", Op.GT: ">", Op.GE: ">=",
+    Op.AND: "and", Op.OR: "or", Op.XOR: "!=", Op.EQ: "==", Op.NE: "!=", Op.LT: "<", Op.LE: "<=", Op.GT: ">", Op.GE: ">=",
     Op.ADD: "+", Op.SUB: "-", Op.MUL: "*",
 }  # fmt: skip
 

@@ -13,7 +13,9 @@ from typing import TYPE_CHECKING, Any, Literal, Self, TypeAlias, TypeVar, get_ar
 if TYPE_CHECKING:
     from typing_extensions import TypeIs
 
-IMPLICATION, DISJUNCTION, CONJUNCTION, NEGATION, RELATION, SUM, PRODUCT, SIGN, POSTFIX = range(1, 10)
+IMPLICATION, DISJUNCTION, EXCLUSION, CONJUNCTION, NEGATION, RELATION, SUM, PRODUCT, SIGN, POSTFIX = range(
+    1, 11
+)
 """How tightly operators bind, loosest first."""
 
 
@@ -47,6 +49,7 @@ class Op(StrEnum):
 
     IMPLIES = "implies", IMPLICATION, lambda a, b: not a or b
     OR = "or", DISJUNCTION, lambda a, b: a or b
+    XOR = "xor", EXCLUSION, operator.ne
     AND = "and", CONJUNCTION, lambda a, b: a and b
     NOT = "not", NEGATION, operator.not_
     EQ = "=", RELATION, operator.eq
@@ -68,7 +71,7 @@ class Op(StrEnum):
     TO_REAL = "real", POSTFIX, float
 
 
-Logic: TypeAlias = Literal[Op.AND, Op.OR, Op.IMPLIES]
+Logic: TypeAlias = Literal[Op.AND, Op.OR, Op.XOR, Op.IMPLIES]
 """Truth functions of two operands. The right one is looked at only where the left one does not decide."""
 Comparison: TypeAlias = Literal[Op.EQ, Op.NE, Op.LT, Op.LE, Op.GT, Op.GE]
 Ordering: TypeAlias = Literal[Op.EQ, Op.LT, Op.LE]

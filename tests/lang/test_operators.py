@@ -47,7 +47,7 @@ from rcsc.lang.model import (
     Value,
     real_key,
 )
-from rcsc.lang.operator_table import Arithmetic, Comparison, Core, is_comparison
+from rcsc.lang.operator_table import LOGIC, Arithmetic, Comparison, Core, is_comparison
 from rcsc.lang.resolve import compile_text
 from rcsc.solvers import smt
 from rcsc.solvers.options import Options
@@ -144,7 +144,7 @@ def cases() -> Iterator[Case]:
         yield Case(op, kind, made)
     yield from (Case(Op.TO_REAL, kind, REAL) for kind in (SIGNED, UNSIGNED))
     yield Case(None, SIGNED, Bool())
-    yield from (Case(op, Bool(), Bool()) for op in (Op.NOT, Op.AND, Op.OR, Op.IMPLIES, Op.EQ, Op.NE))
+    yield from (Case(op, Bool(), Bool()) for op in (Op.NOT, *sorted(LOGIC), Op.EQ, Op.NE))
 
 
 EMPTY = program_of("input a : bool\n")

@@ -85,6 +85,24 @@ procedure p {
     assert parsed.trailing == ("the end",)
 
 
+@pytest.mark.parametrize(
+    ("written", "kept"),
+    [
+        ("a or (b xor (c and d))", "a or b xor c and d"),
+        ("((a xor b) xor c) implies d", "a xor b xor c implies d"),
+        ("a xor (b xor c)", "a xor (b xor c)"),
+        ("(a or b) xor not (c = d)", "(a or b) xor not c = d"),
+        ("(a xor b) and (a implies b)", "(a xor b) and (a implies b)"),
+    ],
+)
+def test_how_tightly_truth_functions_bind(written: str, kept: str) -> None:
+    """Without parentheses where none are needed the expression is still the same."""
+    found = [parse(Source("case.rcs", f"const c = {text}\n")) for text in (written, kept)]
+    values = [one.declarations[0].value for one in found if isinstance(one, tree.File)]  # type: ignore[union-attr]
+    assert values[0] == values[1]
+    assert spell_expr(values[0]) == kept
+
+
 def test_cell_spans_point_into_the_file() -> None:
     text = "input x : int 0 .. 9\ntable t {\n  | line | x   ||\n  | a    | <= 4 ||\n}\n"
     parsed = parse(Source("case.rcs", text))

@@ -160,6 +160,8 @@ class _Writer:
             return f"(bool({parts[0]}) or bool({parts[1]}))"
         if op is Op.IMPLIES:
             return f"(not {parts[0]} or bool({parts[1]}))"
+        if op is Op.XOR:
+            return f"(bool({parts[0]}) is not bool({parts[1]}))"
         if isinstance(args[0].type, Real):
             parts = [f"float({part})" for part in parts]
         if op in _INFIX:

@@ -87,7 +87,7 @@ def conditions(
     return st.recursive(
         leaf,
         lambda inner: st.one_of(
-            st.builds("({} {} {})".format, inner, st.sampled_from(("and", "or", "implies")), inner),
+            st.builds("({} {} {})".format, inner, st.sampled_from(("and", "or", "xor", "implies")), inner),
             st.builds("not ({})".format, inner),
         ),
         max_leaves=5,

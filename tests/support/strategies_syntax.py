@@ -47,7 +47,9 @@ LITERALS: SearchStrategy[tree.Expr] = st.one_of(
     st.builds(tree.RealLiteral, st.sampled_from(["0.5", "1e-3", "2.5E7"]), st.none() | UNITS),
 )
 REFERENCES: SearchStrategy[tree.Expr] = NAMES.map(tree.Reference)
-BINARY = st.sampled_from(["implies", "and", "or", "=", "/=", "<", "<=", ">", ">=", "+", "-", "*", "/", "mod"])
+BINARY = st.sampled_from(
+    ["implies", "and", "or", "xor", "=", "/=", "<", "<=", ">", ">=", "+", "-", "*", "/", "mod"]
+)
 
 
 def _deeper(inner: SearchStrategy[tree.Expr]) -> SearchStrategy[tree.Expr]:

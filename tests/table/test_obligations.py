@@ -254,6 +254,25 @@ table t assuming small {
     assert [(one.table, one.variables, one.values) for one in found.witnesses] == [("", ("a",), ("0",))]
 
 
+@pytest.mark.parametrize(
+    ("condition", "looked_at"),
+    [
+        ("a /= 0 and 9 / a > 2", False),
+        ("a = 0 or 9 / a > 2", False),
+        ("a /= 0 implies 9 / a > 2", False),
+        ("a /= 0 xor 9 / a > 2", True),
+    ],
+)
+def test_which_operators_look_at_both_sides(condition: str, looked_at: bool) -> None:
+    text = f"""{VARIABLES}procedure p {{ if {condition} {{ out := 1 }} }}
+table t {{
+  | line | a    || procedures |
+  | all  | >= 0 || p          |
+}}
+"""
+    assert codes(proved(text).findings) == ([Code.DIVISION_BY_ZERO.value] if looked_at else [])
+
+
 def test_every_condition_is_defined_whatever_the_others_say() -> None:
     text = (
         VARIABLES

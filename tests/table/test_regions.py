@@ -126,7 +126,7 @@ def searched(program: Program) -> tuple[Universe, Search]:
 
 
 MEANING: dict[Op, Callable[[Value, Value], Value]] = {
-    Op.AND: lambda a, b: a and b, Op.OR: lambda a, b: a or b, Op.IMPLIES: lambda a, b: b if a else True,
+    Op.AND: lambda a, b: a and b, Op.OR: lambda a, b: a or b, Op.IMPLIES: lambda a, b: b if a else True, Op.XOR: operator.xor,
     Op.EQ: operator.eq, Op.NE: operator.ne, Op.LT: operator.lt, Op.LE: operator.le,
     Op.GT: operator.gt, Op.GE: operator.ge, Op.ADD: operator.add, Op.SUB: operator.sub, Op.MUL: operator.mul,
 }  # fmt: skip
@@ -190,7 +190,7 @@ CONDITIONS = st.recursive(
         st.builds(lambda a: Apply(Op.NOT, (a,), BOOL), inner),
         st.builds(
             lambda op, a, b: Apply(op, (a, b), BOOL),
-            st.sampled_from([Op.AND, Op.OR, Op.IMPLIES]),
+            st.sampled_from([Op.AND, Op.OR, Op.XOR, Op.IMPLIES]),
             inner,
             inner,
         ),

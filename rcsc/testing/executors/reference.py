@@ -57,6 +57,7 @@ INFIX = {
     Op.MOD: "%",
     Op.AND: "&&",
     Op.OR: "||",
+    Op.XOR: "!=",
 }
 
 WIDTHS = (("int64_t", 63), ("ref_wide", 127))
