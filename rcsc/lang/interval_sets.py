@@ -1,4 +1,4 @@
-"""Sets of keys as intervals: what meets, what joins, what is left, how many keys, and how far one can be grown."""
+"""Sets of keys as intervals: what meets, joins, and is left; how many keys; how far one can be grown; the least there is."""
 
 from collections.abc import Callable, Iterable
 
@@ -89,3 +89,24 @@ def furthest(start: int, end: int, fits: Callable[[int], bool]) -> int:
         else:
             high = middle - 1
     return low
+
+
+def lowest(low: int, known: int, up_to: Callable[[int, int], int | None]) -> int:
+    """The least value, of which one is known.
+
+    Args:
+        low: It is no less.
+        known: A value that there is.
+        up_to: Finds a value from a least one up to a limit, or None where there is none; the one known where nobody can tell.
+    """
+    limit = low  # where most are
+    while low < known:
+        found = up_to(low, limit)
+        if found is None:
+            low = limit + 1
+        elif found < known:
+            known = found
+        else:
+            break
+        limit = (low + known) // 2
+    return known

@@ -1,12 +1,12 @@
-"""The leaves that expressions and statements read and write."""
+"""Walks over expressions and statements: their parts, the same with other parts, and the leaves that they read and write."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
+from typing import assert_never
 
 from rcsc.lang.model import (
     Among,
     Apply,
-    Arm,
     Assign,
     Call,
     Case,
@@ -21,41 +21,55 @@ from rcsc.lang.model import (
     Statement,
     ToElement,
     ToLeaf,
+    ToLocal,
     VariableName,
     earlier,
 )
 
 
+def parts(expr: Expr) -> Iterator[Expr]:
+    """The expression and all below it, wholes before parts."""
+    yield expr
+    match expr:
+        case Apply(args=args):
+            for part in args:
+                yield from parts(part)
+        case Among(subject=part) | Select(index=part):
+            yield from parts(part)
+        case Literal() | Read() | ReadLocal():
+            return
+        case _:
+            assert_never(expr)
+
+
+def rebuilt(expr: Expr, change: Callable[[Expr], Expr]) -> Expr:
+    """The expression with each of its operands changed; one that has none as it is."""
+    match expr:
+        case Apply(args=args):
+            return replace(expr, args=tuple(map(change, args)))
+        case Among(subject=subject):
+            return replace(expr, subject=change(subject))
+        case Select(index=index):
+            return replace(expr, index=change(index))
+        case Literal() | Read() | ReadLocal():
+            return expr
+
+
 def read_by(expr: Expr) -> Iterator[VariableName]:
     """Leaves that the expression reads, with repetition."""
-    match expr:
-        case Read(name=name):
-            yield name
-        case Select(leaves=leaves, index=index):
-            yield from leaves
-            yield from read_by(index)
-        case Apply(args=args):
-            for arg in args:
-                yield from read_by(arg)
-        case Among(subject=subject):
-            yield from read_by(subject)
-        case Literal() | ReadLocal():
-            return
+    for part in parts(expr):
+        if isinstance(part, Read):
+            yield part.name
+        elif isinstance(part, Select):
+            yield from part.leaves
 
 
 def one_earlier(expr: Expr) -> Expr:
     """The same expression of the values after the cycle before (`model.earlier`)."""
-    match expr:
-        case Read(name=name):
-            return replace(expr, name=earlier(name))
-        case Select(leaves=leaves, index=index):
-            return replace(expr, leaves=tuple(map(earlier, leaves)), index=one_earlier(index))
-        case Apply(args=args):
-            return replace(expr, args=tuple(map(one_earlier, args)))
-        case Among(subject=subject):
-            return replace(expr, subject=one_earlier(subject))
-        case Literal() | ReadLocal():
-            return expr
+    if isinstance(expr, Read):
+        return replace(expr, name=earlier(expr.name))
+    found = rebuilt(expr, one_earlier)
+    return replace(found, leaves=tuple(map(earlier, found.leaves))) if isinstance(found, Select) else found
 
 
 def expressions(statement: Statement) -> Iterator[Expr]:
@@ -76,6 +90,8 @@ def expressions(statement: Statement) -> Iterator[Expr]:
             yield from args
         case For():
             return
+        case _:
+            assert_never(statement)
 
 
 def blocks(statement: Statement) -> Iterator[tuple[Statement, ...]]:
@@ -86,16 +102,14 @@ def blocks(statement: Statement) -> Iterator[tuple[Statement, ...]]:
             yield orelse
         case Case(arms=arms, orelse=orelse):
             for arm in arms:
-                yield _body(arm)
+                yield arm.body
             yield orelse
         case For(body=body):
             yield body
-        case _:
+        case Assign() | Local() | Call():
             return
-
-
-def _body(arm: Arm) -> tuple[Statement, ...]:
-    return arm.body
+        case _:
+            assert_never(statement)
 
 
 def everything(body: Iterable[Statement]) -> Iterator[Statement]:
@@ -110,6 +124,10 @@ def written_by(statement: Statement) -> tuple[VariableName, ...]:
     """Leaves that the statement itself may write."""
     if not isinstance(statement, Assign):
         return ()
-    if isinstance(statement.place, ToLeaf):
-        return (statement.place.name,)
-    return statement.place.leaves if isinstance(statement.place, ToElement) else ()
+    match statement.place:
+        case ToLeaf(name=name):
+            return (name,)
+        case ToElement(leaves=leaves):
+            return leaves
+        case ToLocal():
+            return ()

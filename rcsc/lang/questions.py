@@ -11,6 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import reduce
 from itertools import combinations
 
+from rcsc.lang.leaves import parts
 from rcsc.lang.meaning import spelled
 from rcsc.lang.model import (
     Among,
@@ -24,7 +25,6 @@ from rcsc.lang.model import (
     Program,
     Read,
     Real,
-    Select,
     Table,
     key_bounds,
     real_of_key,
@@ -83,17 +83,6 @@ def disjunction(conditions: Iterable[Expr]) -> Expr:
 def negation(condition: Expr) -> Expr:
     """Its opposite."""
     return Apply(Op.NOT, (condition,), Bool())
-
-
-def parts(expr: Expr) -> Iterator[Expr]:
-    """The expression and all below it."""
-    yield expr
-    match expr:
-        case Apply(args=args):
-            for part in args:
-                yield from parts(part)
-        case Among(subject=inner) | Select(index=inner):
-            yield from parts(inner)
 
 
 def _conditions(program: Program, table: Table) -> Iterator[Expr]:

@@ -7,11 +7,11 @@ from collections.abc import Iterator
 
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label, Severity
-from rcsc.lang.interpret import UNDEFINED, holds, initial
+from rcsc.lang.expressions.folding import fold
+from rcsc.lang.interpret import initial
 from rcsc.lang.leaves import read_by
 from rcsc.lang.model import (
     Assumption,
-    Expr,
     Invariant,
     Kind,
     Program,
@@ -30,12 +30,12 @@ def at_first(program: Program) -> Iterator[Diagnostic]:
     """Invariants, and assumptions about states and outputs alone, that the initial values break."""
     start = initial(program)
     for invariant in program.invariants:
-        if _holds(invariant.condition, start) is False:
+        if fold(invariant.condition, start) is False:
             message = f"the initial values do not satisfy invariant `{invariant.name}`"
             yield Diagnostic(Code.INVARIANT_INITIAL, message, Label(invariant.span))
     inputs = {variable.name for variable in program.variables if variable.kind is Kind.INPUT}
     for assumption in program.assumptions:
-        if inputs.isdisjoint(read_by(assumption.condition)) and _holds(assumption.condition, start) is False:
+        if inputs.isdisjoint(read_by(assumption.condition)) and fold(assumption.condition, start) is False:
             message = f"assumption `{assumption.name}` does not hold of the initial values"
             helps = ("give a variable another initial value, or weaken the assumption",)
             label = Label(assumption.span)
@@ -56,14 +56,6 @@ def properties_elsewhere(program: Program) -> Iterator[Diagnostic]:
         yield Diagnostic(Code.PROPERTY_ELSEWHERE, message, label, help=helps, severity=Severity.NOTE)
 
 
-def _holds(condition: Expr, snapshot: Snapshot) -> bool | None:
-    """None where it is not defined, which is a finding of its own."""
-    try:
-        return holds(condition, snapshot)
-    except UNDEFINED:
-        return None
-
-
 def assumptions_satisfiable(program: Program, table: Table, options: Options) -> Snapshot | Answer:
     """Values that satisfy all assumptions of the table and all invariants, or that there are none, or that Z3 does not know.
 
@@ -71,7 +63,7 @@ def assumptions_satisfiable(program: Program, table: Table, options: Options) ->
     """
     conditions = [one.condition for one in assumed_of(program, table)]
     for trial in _trials(program):
-        if all(_holds(one, trial) for one in conditions):
+        if all(fold(one, trial) for one in conditions):
             return trial
     from rcsc.solvers.smt import Solver
     from rcsc.symbolic.encode import declared, encode

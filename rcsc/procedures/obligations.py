@@ -21,11 +21,10 @@ from typing import TypeAlias
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label
 from rcsc.diagnostics.source import Span
-from rcsc.lang.leaves import everything, read_by
+from rcsc.lang.leaves import everything, parts, read_by
 from rcsc.lang.model import (
     NOWHERE,
     Action,
-    Among,
     Apply,
     Assign,
     Assumption,
@@ -471,12 +470,7 @@ def _name_of(line: Line | Default) -> Span:
 
 def _computes(expr: Expr) -> bool:
     """Whether evaluating the condition can owe anything: more than comparisons of leaves and constants."""
-    match expr:
-        case Select():
-            return True
-        case Among(subject=subject):
-            return _computes(subject)
-        case Apply(op=op, args=args):
-            return op not in _DEFINED or any(_computes(arg) for arg in args)
-        case _:
-            return False
+    return any(
+        isinstance(part, Select) or (isinstance(part, Apply) and part.op not in _DEFINED)
+        for part in parts(expr)
+    )

@@ -6,7 +6,9 @@ that is defined; that it is defined is proved apart (`obligations`).
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from functools import partial
 
+from rcsc.lang.interval_sets import lowest
 from rcsc.lang.model import (
     Among,
     Apply,
@@ -140,21 +142,18 @@ def least_witness(solver: Solver, variables: Iterable[Variable], frame: Frame) -
     if solver.check() is not Answer.SATISFIABLE:
         return None
     last = _model(solver, shown, frame)
+
+    def up_to(variable: Variable, _low: int, limit: int) -> int | None:
+        nonlocal last
+        answer = solver.check(at_most_key(frame.leaves[variable.name], variable.type, limit))
+        if answer is Answer.SATISFIABLE:
+            last = _model(solver, shown, frame)
+        return None if answer is Answer.UNSATISFIABLE else last[variable.name]
+
     for variable in shown:
         term, kind = frame.leaves[variable.name], variable.type
-        low, high = key_bounds(kind)[0], last[variable.name]
-        middle = low  # most are at their least
-        while low < high:
-            answer = solver.check(at_most_key(term, kind, middle))
-            if answer is Answer.SATISFIABLE:
-                last = _model(solver, shown, frame)
-                high = last[variable.name]
-            elif answer is Answer.UNSATISFIABLE:
-                low = middle + 1
-            else:
-                break
-            middle = (low + high) // 2
-        solver.add(smt.equal(term, smt.literal(kind, value_of_key(kind, high)), kind))
+        key = lowest(key_bounds(kind)[0], last[variable.name], partial(up_to, variable))
+        solver.add(smt.equal(term, smt.literal(kind, value_of_key(kind, key)), kind))
     return {variable.name: value_of_key(variable.type, last[variable.name]) for variable in shown}
 
 

@@ -4,9 +4,11 @@ In: conditions. Out: values for which all hold, or nothing, which proves nothing
 """
 
 from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from random import Random
 
 from rcsc.lang.interpret import operated
+from rcsc.lang.interval_sets import lowest
 from rcsc.lang.model import (
     Bool,
     Op,
@@ -79,17 +81,18 @@ def _lowered(
     order: Sequence[Node], conditions: Sequence[Node], variables: Sequence[Node], point: Point
 ) -> Point:
     """Each variable in turn as low as bisection finds, the others as they are."""
+
+    def up_to(variable: Node, _low: int, limit: int) -> int | None:
+        nonlocal point
+        trial = {**point, variable.name: value_of_key(variable.kind, limit)}
+        if not _all_hold(order, conditions, trial):
+            return None
+        point = trial
+        return limit
+
     for variable in variables:
         kind = variable.kind
-        low, high = key_bounds(kind)[0], key_of(kind, point[variable.name])
-        middle = low
-        while low < high:
-            trial = {**point, variable.name: value_of_key(kind, middle)}
-            if _all_hold(order, conditions, trial):
-                point, high = trial, middle
-            else:
-                low = middle + 1
-            middle = (low + high) // 2
+        lowest(key_bounds(kind)[0], key_of(kind, point[variable.name]), partial(up_to, variable))
     return point
 
 

@@ -9,10 +9,10 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
-from rcsc.lang.interpret import UNDEFINED, holds, matching_lines
+from rcsc.lang.expressions.folding import fold
+from rcsc.lang.interpret import UNDEFINED, matching_lines
 from rcsc.lang.model import (
     AssumptionName,
-    Expr,
     Program,
     Read,
     Real,
@@ -115,7 +115,7 @@ class _Decision:
     def allowed(self, snapshot: Snapshot) -> bool:
         """Whether the table's assumptions hold, and every condition of its lines is defined."""
         names = self.table.assumptions
-        if not all(_holds(one.condition, snapshot) for one in self.program.assumptions if one.name in names):
+        if not all(fold(one.condition, snapshot) for one in self.program.assumptions if one.name in names):
             return False
         try:
             self.matching(snapshot)
@@ -219,7 +219,7 @@ class _Decision:
         }
         conditions = question(self.program, self.table, self.table.assumptions, bounds, asked.candidates)
         for snapshot in self.tried:
-            if all(_holds(one, snapshot) for one in conditions):
+            if all(fold(one, snapshot) for one in conditions):
                 return snapshot
         z3 = self.asked
         answer = z3.holds(*(encode(condition, z3.frame) for condition in conditions))
@@ -351,11 +351,3 @@ class _Decision:
     def _extent(self, column: int) -> Bounds:
         found = self.universe.columns[column]
         return found.low, found.high
-
-
-def _holds(condition: Expr, snapshot: Snapshot) -> bool:
-    """Whether a condition is defined and true."""
-    try:
-        return holds(condition, snapshot)
-    except UNDEFINED:
-        return False

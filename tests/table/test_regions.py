@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rcsc.lang.leaves import parts
 from rcsc.lang.model import (
     Among,
     Apply,
@@ -41,7 +42,6 @@ from rcsc.lang.model import (
     key_bounds,
     value_of_key,
 )
-from rcsc.lang.questions import parts
 from rcsc.table.regions.atoms import Universe, assumptions_of, lines_of
 from rcsc.table.regions.least import find, least, negated, whole, widest
 from rcsc.table.regions.linear import Simplex

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 
 from rcsc.compose.contract.transition import GHOST, Cycle, Leaves, TransitionSystem
 from rcsc.lang.interpret import call, holds
-from rcsc.lang.leaves import everything, expressions, read_by
+from rcsc.lang.leaves import everything, expressions, parts, read_by
 from rcsc.lang.meaning import spelled
 from rcsc.lang.model import (  # fmt: skip
     COMPARISONS,
@@ -38,7 +38,6 @@ from rcsc.lang.model import (  # fmt: skip
     pending,
     spell,
 )
-from rcsc.lang.questions import parts
 from rcsc.symbolic import values
 from rcsc.symbolic.execution import Run
 from rcsc.symbolic.values import Node

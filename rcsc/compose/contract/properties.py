@@ -14,7 +14,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from rcsc.compose.contract.predicates import Predicate, cone, listed, predicates
 from rcsc.compose.contract.transition import Cycle, Leaves, TransitionSystem
 from rcsc.lang.interpret import UNDEFINED, holds
-from rcsc.lang.leaves import read_by
+from rcsc.lang.leaves import parts, read_by
 from rcsc.lang.meaning import spelled
 from rcsc.lang.model import (
     BEFORE,
@@ -32,7 +32,6 @@ from rcsc.lang.model import (
     VariableName,
     earlier,
 )
-from rcsc.lang.questions import parts
 from rcsc.symbolic import values
 from rcsc.symbolic.execution import Run
 from rcsc.symbolic.values import Node

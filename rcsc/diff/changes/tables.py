@@ -14,11 +14,12 @@ from rcsc.diff.changes.versions import Doing, Versions, is_hard
 from rcsc.lang.interpret import execute, matching_lines
 from rcsc.lang.leaves import everything, written_by
 from rcsc.lang.model import Action, Bool, Call, Program, Statement, Table, Value
+from rcsc.relation.same import NO_LINE, SEVERAL_LINES
 from rcsc.symbolic import values
 from rcsc.symbolic.effect import Meaning, several
 from rcsc.symbolic.values import TRUE, Node
 
-NONE, SEVERAL, UNDEFINED = "no line", "several lines", "a condition that is undefined"
+UNDEFINED = "a condition that is undefined"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -215,11 +216,11 @@ class _Comparison:
         seen = matching_lines(table, now)
         default = table.default
         if len(seen) > 1:
-            name = SEVERAL
+            name = SEVERAL_LINES
         elif seen:
             name = str(seen[0])
         else:
-            name = NONE if default is None else str(default.name)
+            name = NO_LINE if default is None else str(default.name)
         if name != out.name:
             raise RuntimeError(f"table {table.name}: {change.witness} meets {name}, not {out.name}")
 
@@ -248,10 +249,10 @@ def _outcomes(table: Table, meaning: Meaning) -> Iterable[Outcome]:
     nothing = one(values.both(fine, values.negation(values.any_of(lines))))
     default = table.default
     if default is None:
-        yield Outcome(NONE, NONE, nothing)
+        yield Outcome(NO_LINE, NO_LINE, nothing)
     else:
         yield Outcome(str(default.name), f"DEFAULT `{default.name}`", nothing, TRUE, default.actions)
-    yield Outcome(SEVERAL, SEVERAL, one(values.both(fine, many)))
+    yield Outcome(SEVERAL_LINES, SEVERAL_LINES, one(values.both(fine, many)))
     yield Outcome(UNDEFINED, UNDEFINED, one(values.negation(fine)))
 
 

@@ -7,17 +7,12 @@ line that has the text gets it with spans of its own, so that a finding points i
 from dataclasses import replace
 
 from rcsc.diagnostics.source import Span
+from rcsc.lang.leaves import rebuilt
 from rcsc.lang.model import (
-    Among,
-    Apply,
     Assign,
     Call,
     Expr,
-    Literal,
     Place,
-    Read,
-    ReadLocal,
-    Select,
     Statement,
     ToElement,
 )
@@ -29,19 +24,7 @@ def placed(expr: Expr, cell: Span) -> Expr:
     if expr.span.file:
         return expr
     span = tree.absolute(expr.span, cell.file, cell.start)
-    match expr:
-        case Literal(value=value, type=kind):
-            return Literal(value, kind, span)
-        case Read(name=name, type=kind):
-            return Read(name, kind, span)
-        case ReadLocal(name=local, type=kind):
-            return ReadLocal(local, kind, span)
-        case Select(leaves=leaves, index=index, type=kind):
-            return Select(leaves, placed(index, cell), kind, span)
-        case Apply(op=op, args=args, type=kind):
-            return Apply(op, tuple(placed(arg, cell) for arg in args), kind, span)
-        case Among(subject=subject, values=values, type=kind):
-            return Among(placed(subject, cell), values, kind, span)
+    return replace(rebuilt(expr, lambda part: placed(part, cell)), span=span)
 
 
 def placed_statement(statement: Statement, cell: Span) -> Statement:

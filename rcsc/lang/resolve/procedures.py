@@ -8,10 +8,8 @@ from rcsc.diagnostics.source import Span
 from rcsc.lang.expressions.scope import Body, Scope, root_of
 from rcsc.lang.expressions.typed import path_of
 from rcsc.lang.expressions.types import scalar_of
-from rcsc.lang.leaves import everything, expressions, read_by, written_by
+from rcsc.lang.leaves import everything, expressions, parts, read_by, written_by
 from rcsc.lang.model import (
-    Among,
-    Apply,
     Call,
     Expr,
     Kind,
@@ -180,19 +178,9 @@ def _check_declared(
 
 
 def _reading(expr: Expr) -> Iterator[tuple[tuple[VariableName, ...], Span]]:
-    match expr:
-        case Read(name=name, span=span):
-            yield (name,), span
-        case Select(leaves=leaves, index=index, span=span):
-            yield leaves, span
-            yield from _reading(index)
-        case Apply(args=args):
-            for arg in args:
-                yield from _reading(arg)
-        case Among(subject=subject):
-            yield from _reading(subject)
-        case _:
-            return
+    for part in parts(expr):
+        if isinstance(part, Read | Select):
+            yield (part.name,) if isinstance(part, Read) else part.leaves, part.span
 
 
 def _undeclared(scope: Scope, verb: str, extra: set[VariableName], span: Span) -> None:

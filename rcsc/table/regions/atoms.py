@@ -14,6 +14,7 @@ from functools import partial
 from typing import TypeAlias
 
 from rcsc.lang.interval_sets import joined, meet, scaled
+from rcsc.lang.leaves import parts
 from rcsc.lang.meaning import spelled
 from rcsc.lang.model import (
     Among,
@@ -282,21 +283,7 @@ def _is_finite(expr: Expr) -> bool:
 
 def _reads(condition: Expr, name: str) -> Read:
     """The read of leaf `name` in `condition`."""
-    match condition:
-        case Read(name=found) if found == name:
-            return condition
-        case Apply(args=args):
-            inner: tuple[Expr, ...] = args
-        case Among(subject=subject):
-            inner = (subject,)
-        case _:
-            inner = ()
-    for part in inner:
-        try:
-            return _reads(part, name)
-        except LookupError:
-            continue
-    raise LookupError(name)
+    return next(part for part in parts(condition) if isinstance(part, Read) and part.name == name)
 
 
 def _scaled(sum_: tuple[dict[int, int], int], factor: int) -> tuple[dict[int, int], int]:

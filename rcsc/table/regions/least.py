@@ -8,8 +8,9 @@ Source: house style, example 6 (pin each variable, in declared order, to the lea
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 
-from rcsc.lang.interval_sets import complement, furthest
+from rcsc.lang.interval_sets import complement, furthest, lowest
 from rcsc.table.regions.atoms import Atom, Clauses, Every, Formula, Some, Universe, clauses, every, some
 from rcsc.table.regions.linear import Simplex, integer_point
 from rcsc.table.regions.region import Answer, Bounds, Point
@@ -98,22 +99,23 @@ def _completed(universe: Universe, bounds: Mapping[int, Bounds], at: Mapping[int
 def least(universe: Universe, parts: Sequence[Formula], columns: Sequence[int]) -> Point | Answer:
     """The least point at which all parts hold: first in the first of `columns`, and so on."""
     best = find(universe, parts)
-    pinned = list(parts)
+    pinned, undecided = list(parts), False
+
+    def up_to(column: int, low: int, limit: int) -> int | None:
+        nonlocal best, undecided
+        trial = find(universe, [*pinned, universe.atom(universe.single[column], ((low, limit),))])
+        undecided = trial is Answer.UNKNOWN
+        best = best if isinstance(trial, Answer) else trial
+        return None if trial is Answer.NONE or isinstance(best, Answer) else best[column]
+
     for column in columns:
         if isinstance(best, Answer):
             return best
         form = universe.single[column]
-        low, high = universe.low[form], best[column]
-        while low < high:
-            middle = low if high == best[column] and low == universe.low[form] else (low + high) // 2
-            trial = find(universe, [*pinned, universe.atom(form, ((low, middle),))])
-            if trial is Answer.UNKNOWN:
-                return trial
-            if isinstance(trial, Answer):
-                low = middle + 1
-            else:
-                best, high = trial, trial[column]
-        pinned.append(universe.atom(form, ((low, low),)))
+        key = lowest(universe.low[form], best[column], partial(up_to, column))
+        if undecided:
+            return Answer.UNKNOWN
+        pinned.append(universe.atom(form, ((key, key),)))
     return best
 
 

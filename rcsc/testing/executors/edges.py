@@ -7,9 +7,9 @@ from collections.abc import Iterable, Iterator, Mapping
 from math import inf, nan
 
 from rcsc.lang.interpret import holds
+from rcsc.lang.leaves import parts, read_by
 from rcsc.lang.model import (
     Among,
-    Apply,
     Assign,
     Bool,
     Call,
@@ -22,10 +22,8 @@ from rcsc.lang.model import (
     Literal,
     Local,
     Program,
-    Read,
     Real,
     Scalar,
-    Select,
     Snapshot,
     Statement,
     Table,
@@ -42,30 +40,9 @@ from rcsc.lang.model import (
 MOST_COMPANIONS = 8
 
 
-def parts(expr: Expr) -> Iterator[Expr]:
-    """`expr` and every expression inside it."""
-    yield expr
-    match expr:
-        case Apply(args=args):
-            for arg in args:
-                yield from parts(arg)
-        case Select(index=index):
-            yield from parts(index)
-        case Among(subject=subject):
-            yield from parts(subject)
-        case _:
-            pass
-
-
 def reads(expr: Expr) -> set[str]:
     """Every leaf that `expr` may read."""
-    found: set[str] = set()
-    for part in parts(expr):
-        if isinstance(part, Read):
-            found.add(part.name)
-        elif isinstance(part, Select):
-            found.update(part.leaves)
-    return found
+    return set(read_by(expr))
 
 
 def expressions(body: Iterable[Statement]) -> Iterator[Expr]:
