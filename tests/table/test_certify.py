@@ -65,6 +65,15 @@ table t assuming near {
   | 5    | false | x - y > 5 and x <= y + 10 ||
 }
 """
+EQUAL = """
+input x : int -5 .. 5
+input y : int -5 .. 5
+table t {
+  | line | when                ||
+  | 1    | (x < 3) = (y < x)   ||
+  | 2    | (x < 3) /= (y < x)  ||
+}
+"""
 WRONG = [  # a change of a cell, and whether the table then has a gap or an overlap
     (BOXES, "| 0 .. 4 |", "| 0 .. 3 |"),
     (BOXES, "| 0 .. 4 |", "| 0 .. 5 |"),
@@ -79,6 +88,8 @@ WRONG = [  # a change of a cell, and whether the table then has a gap or an over
     (RELATED, "x <= y + 10", "x <= y + 9"),
     (RELATED, "x - y <= 10", "x - y <= 11"),
     (RELATED, "x - y <= 5 ", "x - y <= 6 "),
+    (EQUAL, "(x < 3) /= (y < x)", "y >= x"),
+    (EQUAL, "(x < 3) /= (y < x)", "x >= 3"),
 ]
 
 
@@ -90,7 +101,7 @@ def certificate_of(program: Program) -> dict[str, Any]:
     return made
 
 
-@pytest.mark.parametrize("text", [BOXES, RELATED], ids=["boxes", "related"])
+@pytest.mark.parametrize("text", [BOXES, RELATED, EQUAL], ids=["boxes", "related", "equal"])
 def test_a_certificate_holds_and_says_what_it_rests_on(text: str) -> None:
     program = program_of(text)
     found = certify(program, certificate_of(program))
@@ -572,7 +583,7 @@ TOLD = [
     "a /= -7", "c >= a and a >= 5", "x < y", "not (x < y)", "not (y * y - y * y < 1.0)",
     "y * y - y * y < 1.0 or a > 3", "not (y * y - y * y >= 0.0)", "x / z > 1.0", "x = z",
     "not (x <= 0.0) and x < 1.0", "a > 3 implies c = 7", "(a < 0) = (x < 0.0)", "min(a, c) > 2",
-    "max(x, y * y - y * y) < 2.0",
+    "max(x, y * y - y * y) < 2.0", "a > 5 or a < 3",
 ]  # fmt: skip
 
 
@@ -663,6 +674,8 @@ def test_a_region_with_one_point_is_not_empty() -> None:
     for condition, last, right in (
         ("x - y >= 0", ["l", 1], True),
         ("x - y >= 0 and not (x = 0 and y = 0)", empty, False),
+        ("x - y >= 0 and not (x = 0 and y = 0)", ["e", [[0, 0.5]]], False),
+        ("x - y >= 0 and not (x = 0 and y = 0)", ["e", [[-1, 1]]], False),
     ):
         program = program_of(f"{head}| one | {condition} ||\n}}\n")
         tree = [["s", 0, -1], ["l", 0], ["s", 1, 0], ["s", 2, -1], ["l", 1], last, ["l", 1]]
@@ -678,6 +691,15 @@ def test_a_condition_of_one_leaf_that_is_undefined_for_some_value_is_certified()
     )
     certificate = certificate_of(program)
     assert certificate["tables"][0]["columns"] != ["a"]
+    assert certify(program, certificate).whole
+
+
+def test_a_condition_of_one_leaf_that_is_defined_is_tried_at_every_value() -> None:
+    program = program_of(
+        "input a : int -9 .. 5\ntable t {\n| line | a * a ||\n| one | < 30 ||\n| two | >= 30 ||\n}\n"
+    )
+    certificate = certificate_of(program)
+    assert certificate["tables"][0]["columns"] == ["a"]
     assert certify(program, certificate).whole
 
 

@@ -106,6 +106,7 @@ WRONG = [
     ("xs[a] := 1", "RCS412"),
     ("n := xs[a]", "RCS412"),
     ("if a <= 4 { xs[a] := 1 }", "RCS412"),
+    ("for i in 1 .. 3 { xs[i] := 1 } xs[0] := 0 if a < 4 { n := 9 / xs[a] }", "RCS411"),
     ("local k : int 0 .. 9 if yes { k := 1 } n := k", "RCS414"),
     ("local k : int 0 .. 9 case c { red { k := 1 } green { k := 2 } } n := k", "RCS414"),
     ("for i in 0 .. 1 { local k : int 0 .. 9 if i = 1 { n := k } k := 1 }", "RCS414"),
