@@ -1,8 +1,10 @@
-"""The README's picture: what `rcsc check` says of two examples, as SVG: `python -m tests.picture` writes it."""
+"""The README's pictures, as SVG: `python -m tests.picture` makes them from what the commands print and draw."""
 
 import contextlib
 import io
 import re
+import tempfile
+from functools import cache
 from pathlib import Path
 
 from click.testing import CliRunner
@@ -13,20 +15,27 @@ from rich.text import Text
 from rcsc.commands.group import commands
 
 REPO = Path(__file__).parents[1]
-PICTURE = REPO / "tests" / "pictures" / "first_minute.svg"
-COMMANDS = (
-    ("check", "--color", "always", "--no-cache", "tables/examples/grip.rcs"),
-    ("run", "make_boxt"),
-)
+PICTURES = REPO / "tests" / "pictures"
+CHECK = ("check", "--color", "always", "--no-cache", "tables/examples/grip.rcs")
+RUN = ("run", "make_boxt", "--report", "boxt.html")
 WIDTH = 132
+FRAMES = (1, 23, 40)
+"""Which pictures of the report's filmstrip are shown."""
+FRAME_PX, CAPTION_PX = (360, 260), 26
 
 
-def said(command: tuple[str, ...]) -> str:
-    """What the command prints, without what differs from run to run."""
-    out = CliRunner().invoke(commands, list(command), color=True).output
-    return re.sub(
-        r", [\d.]+ m?s\b(?! of)| in [\d.]+ s: \d+ times as fast as the clock| in [\d.]+ s(?=;)", "", out
-    )
+@cache
+def printed(command: tuple[str, ...], report: str = "boxt.html") -> tuple[str, str]:
+    """What the command prints, without what differs from run to run, and the page that it writes, if it writes one."""
+    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(REPO):
+        page = Path(folder, report)
+        said = CliRunner().invoke(
+            commands, [str(page) if word == report else word for word in command], color=True
+        )
+        text = said.output.replace(str(page), report)
+        drawn = page.read_text(encoding="utf-8") if page.exists() else ""
+    varying = r", [\d.]+ m?s\b(?! of)| in [\d.]+ s: \d+ times as fast as the clock| in [\d.]+ s(?=;)"
+    return re.sub(varying, "", text), drawn
 
 
 def masked(text: str) -> str:
@@ -37,13 +46,12 @@ def masked(text: str) -> str:
     return re.sub(r'textLength="[\d.]+"', "", text)
 
 
-def drawn() -> str:
-    """The picture."""
+def finding() -> str:
+    """What `rcsc check` says of a table with a gap."""
     console = Console(record=True, width=WIDTH, file=io.StringIO(), force_terminal=True)
-    for command in COMMANDS:
-        shown = " ".join(word for word in command if word not in ("--color", "always", "--no-cache", "-q"))
-        console.print(Text(f"$ rcsc {shown}", style="bold"))
-        console.print(Text.from_ansi(said(command)), no_wrap=True, crop=True)
+    shown = " ".join(word for word in CHECK if word not in ("--color", "always", "--no-cache"))
+    console.print(Text(f"$ rcsc {shown}", style="bold"))
+    console.print(Text.from_ansi(printed(CHECK)[0]), no_wrap=True, crop=True)
     svg = console.export_svg(title="rcsc", theme=MONOKAI, unique_id="rcsc")
     svg = svg.replace(
         "<svg ", '<svg xml:space="preserve" ', 1
@@ -51,11 +59,34 @@ def drawn() -> str:
     return re.sub(r"@font-face \{.*?\}\s*", "", svg, flags=re.DOTALL)  # nothing is fetched to show it
 
 
+def robot() -> str:
+    """Three moments of the run, as its report draws them."""
+    film = re.findall(
+        r"<figure.*?(<svg.*?</svg>)\s*</a>\s*<figcaption>(.*?)</figcaption>", printed(RUN)[1], re.DOTALL
+    )
+    width, height = FRAME_PX
+    parts = []
+    for place, number in enumerate(FRAMES):
+        svg, caption = film[number]
+        left = place * (width + 10)
+        parts += [
+            re.sub(
+                r'width="\d+" height="\d+"', f'x="{left}" width="{width}" height="{height}"', svg, count=1
+            ),
+            f'<text x="{left}" y="{height + 18}" font-family="sans-serif" font-size="11" fill="#667">{caption}</text>',
+        ]
+    size = f"{len(FRAMES) * (width + 10) - 10} {height + CAPTION_PX}"
+    return "\n".join([f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {size}">', *parts, "</svg>", ""])
+
+
+PICTURE_OF = {"first_minute.svg": finding, "make_boxt.svg": robot}
+
+
 def main() -> None:
-    """Writes the picture."""
-    PICTURE.parent.mkdir(exist_ok=True)
-    with contextlib.chdir(REPO):
-        PICTURE.write_text(drawn(), encoding="utf-8")
+    """Writes the pictures."""
+    PICTURES.mkdir(exist_ok=True)
+    for name, draw in PICTURE_OF.items():
+        (PICTURES / name).write_text(draw(), encoding="utf-8")
 
 
 if __name__ == "__main__":

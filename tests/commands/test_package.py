@@ -91,7 +91,7 @@ def command(marker: str) -> str:
 
 def test_ci_takes_the_test_command_from_the_readme() -> None:
     assert "pytest" in command("test-command")
-    assert "rcsc check" in command("main-command")
+    assert "rcsc run" in command("main-command")
     script = (REPO / ".ci" / "run").read_text(encoding="utf-8")
     assert "readme_command test-command" in script
     assert "pytest" not in script
