@@ -1,3 +1,37 @@
-"""rcsc: proves robot-control state tables and emits their executors."""
+"""rcsc: proves robot-control state tables and emits their executors.
+
+A *table* has lines. In every cycle exactly one line must match the inputs, and its actions run. `rcsc` proves that
+for every input in the declared ranges, or shows the least input for which it is false:
+
+>>> from rcsc.lang.resolve import compile_text
+>>> from rcsc.solvers.options import Options
+>>> from rcsc.table.program import prove_program
+>>> program = compile_text('''
+... input width_mm : int 0 .. 110 [mm]
+... output order : bool
+... table grip {
+...   | line | width_mm || order |
+...   |------|----------||-------|
+...   | held | 20 .. 40 || true  |
+...   | wide | > 40     || false |
+... }''')
+>>> [one.message for one in prove_program(program, Options()).findings]
+['no line of table `grip` matches 20 of 111 (18 %) of the inputs']
+
+The rooms, in the order in which data flows; each imports only from those before it:
+
+- `diagnostics` says what is wrong, `host` is the machine: files, processes, the cache;
+- `lang` makes a program of text and says what it means; `solvers` and `symbolic` turn that into questions;
+- `procedures` and `table` prove one program; `relation` compares lines and tables; `certify` checks a proof anew,
+  with no code of theirs;
+- `emit` writes C and Python of what is proved; `run` runs them, with logs; `testing` holds them against the tables;
+- `diff` and `graph` show what changed and what leads where; `compose` proves levels together, for any delay;
+- `driver` is the pipeline on one screen; `shell` and `commands` are what people type.
+
+Trusted: `lang` for what a text means, `emit` for the executors, and either `certify` or the prover (the README has
+the list with lines). What it costs: tables whose tests look at one variable each are decided without a solver; the
+rest is budgeted in steps of the solver, so that a verdict does not depend on the machine, and what is over the budget
+is undecided and never proved.
+"""
 
 __version__ = "0.1.0"

@@ -8,10 +8,29 @@ expressions), and a solver for what the report says that it answered.
 1. `rcsc.lang.meaning.digest` binds the certificate to the whole program, and to which assumptions stop a cycle. The prover's options are
    not bound: nothing that is checked depends on them.
 2. What is owed is derived from the program (`owed`, by symbolic runs, `execution`), never read from the certificate. The certificate only
-helps:
-   a tree of regions for each table (`table`), and an input at which its assumptions hold together.
+   helps: a tree of regions for each table (`table`), and an input at which its assumptions hold together.
 3. Each obligation is settled by the spans of its terms (`values`, `known`), by trying every case (`settle`), or by a solver that is
    given the question in SMT-LIB; else it is listed as not checked.
+
+>>> from rcsc.lang.resolve import compile_text
+>>> from rcsc.solvers.options import Options
+>>> from rcsc.table.program import prove_program
+>>> program = compile_text('''
+... input wide : bool
+... output order : bool
+... table grip {
+...   | line | wide  || order |
+...   |------|-------||-------|
+...   | held | false || true  |
+...   | over | true  || false |
+... }''')
+>>> certificate = prove_program(program, Options()).certificate
+>>> certify(program, certificate).checked
+('table `grip`: exactly one line matches',)
+>>> certify(program, certificate | {"meaning": "of another program"}).problems
+('it is of another program',)
+
+What it costs: a walk of each tree, and of the cases that are tried; what is too large to try is listed, never passed over.
 
 Not claimed, and so not checked: that no line is dead, and what `rcsc prove` shows of levels together, properties included.
 

@@ -1,7 +1,23 @@
 """The command line: arguments in, text and an exit status out.
 
-Exit statuses: 0 proved, 1 findings, 2 usage, 3 a bug in rcsc, 130 interrupted. Only here does anything
-print or end the process. Nothing heavy is imported before a command needs it.
+Exit statuses: 0 proved, 1 findings, 2 usage, 3 a bug in rcsc, 130 interrupted. Only here does anything print or end
+the process. Nothing heavy is imported before a command needs it, so that `rcsc --help` is quick, and a package of an
+extra that is missing is one coded error (`shared/extras`).
+
+>>> from rcsc.commands import run
+>>> run(["explain", "RCS9"])  # a usage error, told on standard error
+2
+
+A command is one module: its options, one call that gives a report, and how the report is shown where the common forms
+do not do. To add one, write the module, enter it in `group`, and add a row to `rcsc/README.md`; a test compares the
+two. User errors are diagnostics in a report, a full disk is RCS502, a worker that died RCS904, and everything else
+that is raised is a bug, RCS902.
+
+Trusted: that the status is that of the report. What it costs: a process and the imports of one command.
+
+Modules, in the order the data flows: `group` has the commands about files of tables (check, compile, fmt, test,
+certify, explain, new) and gathers the others: `diff`, `graph`, `prove`, `script` (`rcsc run`), `logs`,
+`campaign`, `shell`, `scaffold` (`rcsc new`); `shared` is what they have in common.
 """
 
 import contextlib

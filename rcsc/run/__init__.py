@@ -1,4 +1,25 @@
 """The robot control system at run time: generated executors, the buffers between them, and the cycle.
 
-In: generated files and the description of the system. Out: levels that run, one control tick at a time.
+In: generated files and the description of the system, `system.toml`. Out: levels that run, one control *tick* at a
+time. A *buffer* keeps the latest value that was published under its name; nobody waits for anybody. In a tick each
+level that is due takes the latest values, runs one cycle, and publishes its outputs; a *feed* fills an input from the
+database before that.
+
+>>> from rcsc.run.buffers import CommonMemory
+>>> buffers = CommonMemory()
+>>> buffers.latest("task.to_emove") is None
+True
+>>> for number in (1, 2):
+...     buffers.publish("task.to_emove", {"inc_command": number})
+>>> buffers.latest("task.to_emove")
+{'inc_command': 2}
+
+The compiler is not needed here: a program is known by the symbol file beside its executor (`signature`). C and Python
+executors are behind one interface and leave the same bytes. Trusted: `system.toml`, the generated folder and what
+extern procedures do; logs and symbol files may come from anybody and are read within bounds. A tick copies each
+level's state; it does not depend on the number of lines.
+
+Source: Haynes et al. 1984, sections 8 and 9. Modules, in the order the data flows: `description`, `signature`,
+`executors` (`unproved` keeps forced ones out), `answers` (what externs give in a finding's run), `buffers`, `levels`,
+`adopt` (starting again), `system`; rooms `log` and `processes`.
 """

@@ -1,7 +1,34 @@
 """One table: exactly one line matches every input, or a least input at which that fails.
 
-`decide` chooses: `boxes` decides tables whose tests look at one leaf each, by masks and counting; `relational` the others, by trees of
-`regions`. `confirm` asks Z3 the same. The `verdict` is data, with a `certificate` that `rcsc.certify` checks anew; `cover` says where a
-condition holds; `spell` gives sets of keys as cells, `repair` proves what would mend a table, `diagnose` makes diagnostics. `program`
-proves a whole program: its tables, and what its procedures owe.
+A *gap* is an input that no line matches, an *overlap* one that two lines match; a *dead* line matches none. A
+*witness* is the least such input in declared order, and a *region* the largest box around it that was found. Where
+every test looks at one leaf, lines are boxes, and two things decide exactly-one without a solver: the boxes are
+disjoint in pairs, and their sizes add up to the size of the input space. Here 41 and 70 keys of 111:
+
+>>> from rcsc.lang.resolve import compile_text
+>>> from rcsc.solvers.options import Options
+>>> from rcsc.table.decide import prove_table
+>>> program = compile_text('''
+... input width_mm : int 0 .. 110 [mm]
+... output order : bool
+... table grip {
+...   | line | width_mm || order |
+...   |------|----------||-------|
+...   | held | 0 .. 40  || true  |
+...   | wide | > 40     || false |
+... }''')
+>>> verdict = prove_table(program, program.tables[0], Options())
+>>> (verdict.found, verdict.backing.method, verdict.backing.confirmed_by_z3)
+((), 'boxes', True)
+
+Tests across variables, and assumptions, take a tree of regions (`regions`), and Z3 for what is not linear. Trusted,
+without `rcsc certify`: `boxes`, `relational`, `regions` and what they rest on; by default Z3 confirms every table
+that is cheap enough, and a disagreement is a bug in rcsc.
+
+What it costs: pairs of lines and classes of keys for boxes, a budget in steps for the rest; what is over it is
+undecided, and fails.
+
+Modules, in the order the data flows: `program` (a whole program), `decide` (which way), `boxes`, `relational`,
+`confirm` (Z3), `cover` (where a condition holds), `verdict` (findings as data), `certificate` (which `rcsc.certify`
+checks anew), `spell` (keys as cells), `repair` (proved before shown), `diagnose`.
 """

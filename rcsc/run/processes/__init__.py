@@ -1,5 +1,23 @@
 """A system as processes: one a level, one for each thing that stands outside.
 
-`block` is shared memory that is cleared away, `memory` the buffers in it, `serve` runs one level or one thing outside, `supervisor` begins
-them, watches their pulse and stops them.
+The paper ran its levels on several processors over common memory. Here each level is a process, the buffers are one
+block of shared memory, and one process watches them all. A level's state and the buffers that it gives are committed
+together: into a second slot, then by one word that names it. A writer that is killed in between leaves the old slot;
+a reader that meets a writer sees by the slot's stamp and checksum that it has to try again:
+
+    rcsc run make_boxt --processes
+
+A level that dies is begun again from its last checkpoint, or anew: then what stands in its buffers is old, and it
+gives PAUSE first. A level whose *pulse* stops is taken for hung and replaced. Nothing is left in shared memory or on
+disk when the run ends, also after a kill: a keeper process sees to it.
+
+>>> from rcsc.run.processes import memory
+>>> memory.__doc__.splitlines()[0]
+'Common memory of several processes: one block of shared memory for a whole system.'
+
+Trusted: that a store of a machine word is seen whole. What it costs: a copy of each region in and out, which `python
+-m tests.bench.transport` measures.
+
+Modules, in the order the data flows: `block` is shared memory that is cleared away, `memory` the buffers in it,
+`serve` runs one level or one thing outside, `supervisor` begins them, watches their pulse and stops them.
 """

@@ -1,5 +1,22 @@
 """What the executors are run on.
 
-`snapshot` finds an input in which conditions hold or fail, `vectors` makes MC/DC vectors of them (`spell` words their conditions, `export`
-writes them for users), `sampling` draws inputs by seed, leaning on edges.
+Inputs are drawn by seed and lean on edges, or are looked for: an *MC/DC vector* is a pair of inputs that differ in
+the outcome of one condition of a line and in whether the line matches, which shows that the condition matters. The
+search takes the condition's sides apart and finds an input for each by the same region trees that decide a table,
+without a solver.
+
+    rcsc test --vectors vectors.json tables/task/acquire.rcs
+
+writes them for other test benches, each with the line, the condition in words, and the two inputs.
+
+>>> from rcsc.testing.inputs import vectors
+>>> "MC/DC" in vectors.__doc__
+True
+
+Nothing here is trusted: an input that leads nowhere costs a test, and what no vector was found for is a figure of the
+report.
+
+Modules, in the order the data flows: `snapshot` finds an input in which conditions hold or fail, `vectors` makes
+MC/DC vectors of them (`spell` words their conditions, `export` writes them for users), `sampling` draws inputs by
+seed.
 """

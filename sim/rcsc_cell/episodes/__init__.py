@@ -1,6 +1,20 @@
 """Episodes: one run of the cell with whatever is odd about it.
 
-An `episode` is a value; `sampling` draws one by seed, `part_faults` names what is odd in it. `setting` makes
-what a run needs, `operator` interrupts its script, `transport` harms its buffers, `loop` runs it and watches its properties. `witness`
-watches a run for page and report, `processes` runs what stands outside in a process of its own.
+An *episode* is a value: parts and where they lie, the rows of a script, and what goes wrong (a fault switched on,
+buffers that lose or delay, a level that starts again, somebody who gives another command, a push). It is drawn by a
+seed, and the same seed gives the same episode and, run again, the same log:
+
+>>> from rcsc_cell.episodes.sampling import draw
+>>> draw(7) == draw(7), draw(7) == draw(8)
+(True, False)
+
+Small values are nominal, so that what fails shrinks to a nominal run with the one odd thing that matters. Every
+property watches every cycle.
+
+Nothing here is trusted for a proof. What it costs: without physics a twentieth of what it costs with physics.
+
+Modules, in the order the data flows: an `episode` is a value; `sampling` draws one by seed, `part_faults` names what
+is odd in it. `setting` makes what a run needs, `operator` interrupts its script, `transport` harms its buffers,
+`loop` runs it and watches its properties. `witness` watches a run for page and report, `processes` runs what stands
+outside in a process of its own.
 """

@@ -1,0 +1,34 @@
+"""Every room teaches: its `__init__` names its modules, and the example in it does what it shows."""
+
+import doctest
+import importlib
+import re
+from pathlib import Path
+
+import pytest
+
+REPO = Path(__file__).parents[1]
+ROOMS = sorted(
+    str(path.parent.relative_to(base)).replace("/", ".")
+    for base, package in ((REPO, "rcsc"), (REPO / "sim", "rcsc_cell"))
+    for path in (base / package).rglob("__init__.py")
+)
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_a_room_teaches_what_is_in_it(room: str) -> None:
+    module = importlib.import_module(room)
+    assert module.__doc__ is not None
+    assert module.__file__ is not None
+    files = {path.stem for path in Path(module.__file__).parent.glob("*.py")} - {"__init__"}
+    named = set(re.findall(r"`(?:\w+/)?(\w+)(?:\.py)?`", module.__doc__))
+    assert not files - named, "modules that the room does not name"
+    lines = len(module.__doc__.splitlines())
+    assert (4 if ".compose" in room else 14) <= lines <= 62, lines
+    found = doctest.testmod(module, optionflags=doctest.ELLIPSIS)
+    assert found.failed == 0
+
+
+def test_most_rooms_show_an_example() -> None:
+    shown = [room for room in ROOMS if ">>>" in (importlib.import_module(room).__doc__ or "")]
+    assert len(shown) >= 20
