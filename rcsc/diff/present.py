@@ -22,7 +22,6 @@ from rcsc.lang.model import (
     Snapshot,
     Table,
     Value,
-    pending,
     value_of_key,
 )
 from rcsc.relation.follow import loosened
@@ -122,32 +121,14 @@ class _Cycle:
         }
         run = Run({str(p.name): p for p in program.procedures}, self.kinds, start)
         self.inputs = self._leaves(run)
-        self._settle(run)
+        run.settle(program)
         self.settled = self._leaves(run)
         run.execute(Call(ProcedureName(name)) for name in level.preprocess)
         self.seen = self._leaves(run)
-        self.chosen = {} if isinstance(level.tables, OneTable) else self._chosen(run)
+        self.chosen = run.choices(level)
 
     def _leaves(self, run: Run) -> dict[str, Node]:
         return {name: run.leaf(name) for name in self.kinds}
-
-    def _settle(self, run: Run) -> None:
-        """Source: `rcsc.lang.interpret.settle`."""
-        deferred = [v for v in self.program.variables if v.deferred_until is not None]
-        due = [run.evaluate(v.deferred_until) for v in deferred if v.deferred_until is not None]
-        later = [run.leaf(pending(v.name)) for v in deferred]
-        for variable, when, value in zip(deferred, due, later, strict=True):
-            run.write(variable.name, value, when)
-
-    def _chosen(self, run: Run) -> dict[str, Node]:
-        """When each table is the one that runs."""
-        assert not isinstance(self.level.tables, OneTable)
-        selector = run.evaluate(self.level.tables.selector)
-        found: dict[str, Node] = {}
-        for value, name in self.level.tables.tables:
-            here = values.equal(selector, values.constant(selector.kind, value))
-            found[name] = values.either(found[name], here) if name in found else here
-        return found
 
     def reached(self, part: Part, change: Change) -> bool:
         """Whether some inputs lead into the region; in doubt they do."""

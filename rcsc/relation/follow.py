@@ -173,11 +173,7 @@ class _Cycles:
         for one in self.program.variables:
             if one.kind is Kind.INPUT:
                 run.state.leaves[one.name] = values.variable(f"{one.name}'{self.cycle}", one.type)
-        deferred = [v for v in self.program.variables if v.deferred_until is not None]
-        due = [run.evaluate(v.deferred_until) for v in deferred if v.deferred_until is not None]
-        later = [run.leaf(pending(v.name)) for v in deferred]
-        for variable, when, value in zip(deferred, due, later, strict=True):
-            run.write(variable.name, value, when)
+        run.settle(self.program)
         self._procedures(run, () if self.level is None else self.level[0].preprocess)
 
     def _procedures(self, run: Run, names: Sequence[str]) -> None:

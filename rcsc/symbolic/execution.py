@@ -18,14 +18,18 @@ from rcsc.lang.model import (
     For,
     If,
     Int,
+    Level,
     Local,
+    OneTable,
     Place,
     Procedure,
+    Program,
     Real,
     Scalar,
     Statement,
     ToElement,
     ToLeaf,
+    pending,
     spell,
 )
 from rcsc.symbolic import values
@@ -58,6 +62,25 @@ class Run(Evaluation):
                         self.execute(inner)
                 case Call(procedure=name, args=args):
                     self.call(self.procedures[name], [(arg.span, self.evaluate(arg)) for arg in args])
+
+    def settle(self, program: Program) -> None:
+        """Write each pending value whose condition holds, all conditions evaluated before (`lang.interpret.settle`)."""
+        deferred = [(one, one.deferred_until) for one in program.variables if one.deferred_until is not None]
+        ready = [self.evaluate(until) for _, until in deferred]
+        later = [self.leaf(pending(one.name)) for one, _ in deferred]
+        for (one, _), when, value in zip(deferred, ready, later, strict=True):
+            self.write(one.name, value, when)
+
+    def choices(self, level: Level) -> dict[str, Node]:
+        """Return the condition under which each table of the level runs, now that what selects it is computed."""
+        if isinstance(level.tables, OneTable):
+            return {str(level.tables.table): TRUE}
+        selector = self.evaluate(level.tables.selector)
+        found: dict[str, Node] = {}
+        for value, name in level.tables.tables:
+            here = values.equal(selector, values.constant(selector.kind, value))
+            found[str(name)] = values.either(found.get(str(name), FALSE), here)
+        return found
 
     def _stored(self, kind: Scalar, value: Node, what: str, span: Span) -> Node:
         """The value as kept in a place of this type."""

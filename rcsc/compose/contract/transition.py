@@ -27,8 +27,6 @@ from rcsc.lang.model import (  # fmt: skip
     Snapshot,
     Standing,
     Table,
-    TableName,
-    pending,
 )
 from rcsc.run.adopt import ECHOES, FAILED, ORDER
 from rcsc.symbolic import values
@@ -276,7 +274,7 @@ class TransitionSystem:
         run.state.leaves.update(taken)
         ghosts, answers = self._database(before, taken)
         contract = undeclared = values.both(self._protocol(before, taken), answers)
-        self._settle(run)
+        run.settle(self.program)
         settled = {**before, **run.state.leaves}
         run.execute(Call(self.procedures[name].name) for name in self.level.preprocess)
         middle = {**before, **run.state.leaves}
@@ -353,16 +351,10 @@ class TransitionSystem:
 
     # --- the level ---
 
-    def _settle(self, run: Run) -> None:
-        deferred = [v for v in self.program.variables if v.deferred_until is not None]
-        ready = [run.evaluate(v.deferred_until) for v in deferred if v.deferred_until is not None]
-        later = [run.leaf(pending(v.name)) for v in deferred]
-        for variable, when, value in zip(deferred, ready, later, strict=True):
-            run.write(variable.name, value, when)
-
     def _tables(self, run: Run) -> Iterable[TableAt]:
         goes_on = values.negation(run.ended)
-        for table, selected in self._choices(run):
+        for name, selected in run.choices(self.level).items():
+            table = self.table(name)
             assumptions = {
                 str(one.name): run.evaluate(one.condition)
                 for one in self.program.assumptions
@@ -373,20 +365,6 @@ class TransitionSystem:
                 for line in table.lines
             )
             yield TableAt(table, values.both(selected, goes_on), matches, assumptions, selected)
-
-    def _choices(self, run: Run) -> Iterable[tuple[Table, Node]]:
-        """List each table that may run, once, with the condition under which it does."""
-        by_name = {table.name: table for table in self.program.tables}
-        if isinstance(self.level.tables, OneTable):
-            yield by_name[self.level.tables.table], TRUE
-            return
-        selector = run.evaluate(self.level.tables.selector)
-        chosen: dict[TableName, Node] = {}
-        for value, name in self.level.tables.tables:
-            here = values.equal(selector, values.constant(selector.kind, value))
-            chosen[name] = values.either(chosen.get(name, FALSE), here)
-        for name, when in chosen.items():
-            yield by_name[name], when
 
     def _lines(self, run: Run, tables: tuple[TableAt, ...]) -> None:
         """Run the first matching line of the chosen table."""
