@@ -10,7 +10,7 @@ import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -434,6 +434,32 @@ def test_lines_are_bits_and_every_line_of_the_tables_is_known() -> None:
 
 # --- shrinking ---
 
+EVERYTHING = Episode(
+    parts=(PartSpec("tbox", size_mm=(1.0, 2.0, 3.0)),), rows=("MOVE,,,WS-SAFE,",), faults=(FaultSpec("slips", 3, 4),),
+    transport=(TransportSpec("task.report", "lost", 3, 4),), restarts=(Restart(3, "task"),),
+    interruptions=(Interruption(3, "MOVE,,,WS-SAFE,"),), pushes=(Push(3, 0, 1.0, 1.0),),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("name", [one.name for one in fields(Episode) if isinstance(one.default, tuple)])
+def test_every_list_of_an_episode_loses_what_is_not_needed(name: str) -> None:
+    lists = {
+        one.name: getattr(EVERYTHING, one.name) for one in fields(Episode) if isinstance(one.default, tuple)
+    }
+    assert all(lists.values())
+    least = shrink(
+        Episode(**{what: held * 3 for what, held in lists.items()}), lambda one: bool(getattr(one, name))
+    )
+    assert {what: len(getattr(least, what)) for what in lists} == dict.fromkeys(lists, 0) | {name: 1}
+
+
+def test_a_push_comes_to_what_is_usual() -> None:
+    episode = Episode(pushes=(Push(900, 0, 60.3, 12.5), Push(70, 0, 1.0, 1.0)))
+    assert shrink(episode, lambda one: any(push.x_mm >= 60 for push in one.pushes)).pushes == (
+        Push(0, 0, 60.0, 0.0),
+    )
+
+
 PARTS = [PartSpec("tbox", x_mm=float(at)) for at in range(6)]
 SWITCHES = [
     FaultSpec(name, at, at + 5)
@@ -589,13 +615,6 @@ def test_a_file_without_an_episode_is_refused(tmp_path: Path) -> None:
             again(tmp_path)
     with pytest.raises(BadEpisode, match="cannot be read"):
         again(tmp_path / "none.json")
-
-
-EVERYTHING = Episode(
-    parts=(PartSpec("tbox", size_mm=(1.0, 2.0, 3.0)),), rows=("MOVE,,,WS-SAFE,",), faults=(FaultSpec("slips", 3, 4),),
-    transport=(TransportSpec("task.report", "lost", 3, 4),), restarts=(Restart(3, "task"),),
-    interruptions=(Interruption(3, "MOVE,,,WS-SAFE,"),), pushes=(Push(3, 0, 1.0, 1.0),),
-)  # fmt: skip
 
 
 def _changed(value: Any) -> Iterator[Any]:

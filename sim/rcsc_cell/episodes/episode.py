@@ -165,15 +165,7 @@ class Episode:
     def _numbers(self) -> Iterator[tuple[str, float]]:
         """Every number in it, by the name of its field."""
         yield from (("seed", self.seed), ("step_s", self.step_s))
-        lists: tuple[tuple[object, ...], ...] = (
-            self.parts,
-            self.faults,
-            self.transport,
-            self.restarts,
-            self.interruptions,
-            self.pushes,
-        )
-        for one in chain.from_iterable(lists):
+        for one in chain.from_iterable(getattr(self, name) for name in LISTS):
             for name in REACH:
                 value = getattr(one, name, ())
                 yield from ((name, number) for number in (value if isinstance(value, tuple) else (value,)))
@@ -194,6 +186,10 @@ class Episode:
             raise ValueError("no episode: no table of names and values")  # noqa: TRY004  # what was read, not what was called
         made: Episode = read(cls, {**plain(Episode()), **said})
         return made
+
+
+LISTS = ("interruptions", "pushes", "rows", "faults", "transport", "restarts", "parts")
+"""Fields of an episode that hold any number of things, those first that a smaller episode can best do without."""
 
 
 @dataclass(frozen=True, slots=True)
