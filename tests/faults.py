@@ -26,13 +26,13 @@ from itertools import islice
 from multiprocessing import get_context
 from pathlib import Path
 
-from rcsc import driver
 from rcsc.compose.contract.obligations import Obligation, Sort
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.invariant.search import Effort
 from rcsc.compose.proof.level import LevelProof, prove_level
 from rcsc.compose.proof.system import NoProgramError, transition_systems
 from rcsc.diagnostics.diagnostic import Severity
+from rcsc.driver.check import check
 from rcsc.driver.settings import Settings
 from rcsc.emit.write import write
 from rcsc.lang.model import Program
@@ -125,7 +125,7 @@ def by_check(fault: Fault) -> Answer:
     with tempfile.TemporaryDirectory(prefix="rcsc-fault-") as name:
         tables_with(fault, Path(name))
         root = str(Path(name) / fault.level / f"{fault.level}.rcs")
-        report = driver.check(Settings((root,), Options(solver="boxes"), use_cache=False))
+        report = check(Settings((root,), Options(solver="boxes"), use_cache=False))
         codes = Counter(one.code.value for one in report.found if one.severity is Severity.ERROR)
         return Answer(report.failed, ", ".join(codes) if report.failed else "")
 

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from rcsc import driver
+from rcsc.driver.compile import TARGETS, compile_
 from rcsc.driver.settings import Settings
 from rcsc.emit.write import write
 from rcsc.lang.model import Program
@@ -179,9 +179,7 @@ def seed(bug: Bug, folder: Path) -> bool:
     name = bug.file.split("/")[1]
     root = str(folder / "tables" / name / f"{name}.rcs")
     generated = folder / "generated"
-    made = driver.compile_(
-        Settings((root,), Options(solver="boxes")), generated, ("python", "c"), only_check=False
-    )
+    made = compile_(Settings((root,), Options(solver="boxes")), generated, TARGETS, only_check=False)
     if made.report.failed:
         loaded = load([root])
         program = resolve(loaded.roots[0], loaded)

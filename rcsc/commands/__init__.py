@@ -1,30 +1,40 @@
 """The command line: arguments in, text and an exit status out.
 
 Exit statuses: 0 proved, 1 findings, 2 usage, 3 a bug in rcsc, 130 interrupted. Only here does anything print or end
-the process. Nothing heavy is imported before a command needs it, so that `rcsc --help` is quick, and a package of an
-extra that is missing is one coded error (`shared/extras`).
+the process. A command's module is imported when the
+command line has named it, and not before, so that `rcsc --help` is quick; a package of an extra that is missing is one
+coded error (`shared/extras`).
 
 >>> from rcsc.commands import run
 >>> run(["explain", "RCS9"])  # a usage error, told on standard error
 2
 
 A command is one module: its options, one call that gives a report, and how the report is shown where the common forms
-do not do. To add one, write the module, enter it in `group`, and add a row to `rcsc/README.md`; a test compares the
-two. User errors are diagnostics in a report, a full disk is RCS502, a worker that died RCS904, and everything else
-that is raised is a bug, RCS902.
+do not do. To add one, write the module, enter it in `group` with a summary, and add a row to `rcsc/README.md`; a test
+compares the two. User errors are diagnostics in a report, or know their code (`rcsc.diagnostics.coded`) and end the
+command; a full disk is RCS502, a worker that died RCS904, and everything else that is raised is a bug, RCS902.
 
 Trusted: that the status is that of the report. What it costs: a process and the imports of one command.
 
-Modules, in the order the data flows: `group` has the commands about files of tables (check, compile, fmt, test,
-certify, explain, new) and gathers the others: `diff`, `graph`, `prove`, `script` (`rcsc run`), `logs`,
-`campaign`, `shell`, `scaffold` (`rcsc new`); `shared` is what they have in common.
+Modules, in the order the data flows: `group` names every command and imports it; `tables` has those about files of
+tables, `systems` those about systems of levels; `explain`, `new` and `completion` are about neither; `shared` is what
+commands have in common.
 """
 
 import contextlib
 import errno
 import os
 import sys
+import traceback
 from collections.abc import Sequence
+
+import click
+
+from rcsc import __version__
+from rcsc.commands.group import commands
+from rcsc.commands.shared.show import UnwritableError
+from rcsc.diagnostics.printable import escape
+from rcsc.host.children import WorkerEndedError, leave
 
 PROVED, FINDINGS, USAGE, BUG, INTERRUPTED = 0, 1, 2, 3, 130
 
@@ -38,19 +48,12 @@ def main() -> None:
         status = status or _unwritable("standard output", error.strerror)
         _forget_stdout()
     if status == INTERRUPTED:
-        from rcsc.host.children import leave
-
         leave(status)
     sys.exit(status)
 
 
 def run(args: Sequence[str]) -> int:
     """Run `rcsc` with `args`; the exit status."""
-    import click
-
-    from rcsc.commands.group import commands
-    from rcsc.commands.shared.show import UnwritableError
-
     try:
         status = commands.main(list(args), prog_name="rcsc", standalone_mode=False)
     except click.ClickException as error:
@@ -78,8 +81,6 @@ _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS)
 
 def _unwritable(place: str, why: str | None) -> int:
     """A full disk, or one that is read only."""
-    import click
-
     with contextlib.suppress(OSError):  # it may be the disk that this goes to
         click.echo(
             f"error[RCS502]: {place} cannot be written: {why or 'no reason given'}\n"
@@ -95,13 +96,6 @@ def _forget_stdout() -> None:
 
 
 def _bug(error: Exception) -> int:
-    import traceback
-
-    import click
-
-    from rcsc import __version__
-    from rcsc.diagnostics.printable import escape
-    from rcsc.host.children import WorkerEndedError
 
     if isinstance(error, WorkerEndedError):
         click.echo(

@@ -2,22 +2,23 @@
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from rcsc import certify as checker
+from rcsc.certify import Answer, Certified
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label, Severity
 from rcsc.diagnostics.report import Report
 from rcsc.diagnostics.source import Span
-from rcsc.driver.settings import Made
+from rcsc.driver.pipeline import proved, read
+from rcsc.driver.settings import Made, Settings
 from rcsc.host.files import write_atomically
 from rcsc.host.files.read import Malformed, content, json_of
+from rcsc.lang.model import Program, ProvedProgram
 from rcsc.lang.project import Loaded
-
-if TYPE_CHECKING:
-    from rcsc.certify import Answer, Certified
-    from rcsc.lang.model import Program, ProvedProgram
+from rcsc.lang.resolve import resolve
+from rcsc.solvers.smtlib import cvc5_says
 
 MOST_PROBLEMS = 10
 
@@ -37,7 +38,27 @@ class Checking:
     questions: Path | None = None
 
 
-def kept(path: Path) -> Mapping[str, object] | Diagnostic:
+def certify(settings: Settings, how: Checking, write: Path | None, against: Path | None) -> Made:
+    """Check a certificate, made now or kept, by the checker alone.
+
+    Nothing is proved where a kept one is checked: then what the checker leaves has nobody's word, and is an error.
+    """
+    if against is not None:
+        return _reviewed(read(settings), _kept(against), replace(how, strict=True))
+    made = proved(settings)
+    report = made.report()
+    [proof] = made.proofs or (None,)
+    if report.failed or proof is None or proof.certificate is None:
+        return Made(report, "nothing is certified: not everything is proved")
+    found = _keep(proof.certificate, write) if write is not None else ()
+    reviewed = _reviewed(made.loaded, proof.certificate, how, proof.proved)
+    report = made.report((*found, *reviewed.report.found))
+    return Made(
+        replace(report, tables=()), reviewed.closing
+    )  # the verdicts are the prover's, not the checker's
+
+
+def _kept(path: Path) -> Mapping[str, object] | Diagnostic:
     """The certificate in a file; anything else there is a diagnostic."""
     try:
         value = json_of(content(path), plain=False)
@@ -50,7 +71,7 @@ def kept(path: Path) -> Mapping[str, object] | Diagnostic:
     return value
 
 
-def keep(certificate: Mapping[str, object], path: Path) -> tuple[Diagnostic, ...]:
+def _keep(certificate: Mapping[str, object], path: Path) -> tuple[Diagnostic, ...]:
     """Write a certificate; why it could not be written."""
     text = json.dumps(certificate, separators=(",", ":"), sort_keys=True) + "\n"
     try:
@@ -60,27 +81,23 @@ def keep(certificate: Mapping[str, object], path: Path) -> tuple[Diagnostic, ...
     return ()
 
 
-def reviewed(
+def _reviewed(
     loaded: Loaded,
     certificate: Mapping[str, object] | Diagnostic,
     how: Checking,
-    proved: "ProvedProgram | None" = None,
+    proved: ProvedProgram | None = None,
 ) -> Made:
     """The report on a certificate of the first root: what is wrong with it, what was checked and what was not.
 
     The certificate must name the stopping assumptions of what was `proved`, from which executors are made.
     """
-    from rcsc.certify import certify
-    from rcsc.lang.model import Program
-    from rcsc.lang.resolve import resolve
-
     if isinstance(certificate, Diagnostic):
         return Made(Report((certificate,)), "not certified")
     program = resolve(loaded.roots[0], loaded) if loaded.roots else loaded.found
     if not isinstance(program, Program):
         return Made(Report(program, (), loaded.sources), "not certified")
     stops = None if proved is None else {str(one.name): one.stops for one in proved.program.tables}
-    outcome = certify(program, certificate, _cvc5 if how.cvc5 else None, stops)
+    outcome = checker.certify(program, certificate, _cvc5 if how.cvc5 else None, stops)
     found = [
         _refused(program.file, f"the certificate is refused: {one}")
         for one in outcome.problems[:MOST_PROBLEMS]
@@ -95,7 +112,7 @@ def reviewed(
     return Made(Report(tuple(found), (), loaded.sources), _closing(program, outcome))
 
 
-def _closing(program: "Program", outcome: "Certified") -> str:
+def _closing(program: Program, outcome: Certified) -> str:
     """How much was checked, and what that rests on."""
     if outcome.problems:
         return "not certified"
@@ -107,7 +124,7 @@ def _closing(program: "Program", outcome: "Certified") -> str:
     return f"{said}; for the others, named above, there is only the prover's word{resting}"
 
 
-def _kept_questions(outcome: "Certified", folder: Path) -> list[Diagnostic]:
+def _kept_questions(outcome: Certified, folder: Path) -> list[Diagnostic]:
     """Writes what is left, one file a question; why a file could not be written."""
     for number, one in enumerate(outcome.unchecked, start=1):
         path = folder / f"{number:03}.smt2"
@@ -120,11 +137,8 @@ def _kept_questions(outcome: "Certified", folder: Path) -> list[Diagnostic]:
     return []
 
 
-def _cvc5(question: str) -> "Answer":
+def _cvc5(question: str) -> Answer:
     """cvc5's answer, which has no part in the proof."""
-    from rcsc.certify import Answer
-    from rcsc.solvers.smtlib import cvc5_says
-
     return {"unsat": Answer.NONE, "sat": Answer.SOME}.get(cvc5_says(question), Answer.UNKNOWN)
 
 

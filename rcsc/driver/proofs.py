@@ -19,9 +19,11 @@ from rcsc.host.cache import Cache
 from rcsc.lang.meaning import digest
 from rcsc.lang.model import Program, Standing, Table
 from rcsc.lang.project import Loaded
+from rcsc.procedures.invariants import properties_elsewhere
 from rcsc.procedures.obligations import called_by_lines
 from rcsc.solvers.options import Options
 from rcsc.table.certificate import must_cover
+from rcsc.table.program import prove_program
 from rcsc.table.verdict import DeadLine, Gap, SolversDisagree, TableVerdict, Undecided
 
 WORTH_A_PROCESS = 20_000
@@ -30,9 +32,6 @@ WORTH_A_PROCESS = 20_000
 
 def prove(root: str, program: Program, loaded: Loaded, options: Options, cache: Cache | None) -> Proof:
     """Prove a program's tables, procedures and invariants; with a cache only what is not known."""
-    from rcsc.procedures.invariants import properties_elsewhere
-    from rcsc.table.program import prove_program
-
     cells = sum(len(table.lines) * len(table.columns) for table in program.tables)
     options = options if cells >= WORTH_A_PROCESS else replace(options, jobs=1)
     if cache is None:

@@ -14,6 +14,8 @@ from rcsc.diagnostics.source import Source, Span
 from rcsc.host.files import write_atomically
 from rcsc.lang.project import load
 from rcsc.lang.syntax import tree
+from rcsc.lang.syntax.format import format_file
+from rcsc.lang.syntax.parse import parse
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,9 +64,6 @@ def _text(name: str, before: tree.File) -> str:
     Raises:
         RuntimeError: It does not; that is a bug.
     """
-    from rcsc.lang.syntax.format import format_file
-    from rcsc.lang.syntax.parse import parse
-
     text = format_file(before)
     if parse(Source(name, text)) != before:
         raise RuntimeError(f"formatting would change what {name} says")

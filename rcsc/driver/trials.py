@@ -9,10 +9,17 @@ from pathlib import Path
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label
 from rcsc.diagnostics.source import Span
-from rcsc.driver.settings import Effort
+from rcsc.driver.compile import TARGETS, emitted, planned
+from rcsc.driver.pipeline import proved
+from rcsc.driver.settings import Effort, Made, Settings
 from rcsc.host.files import write_atomically
 from rcsc.lang.model import Expr, Program, Snapshot, Table
 from rcsc.solvers.options import Options
+from rcsc.solvers.smt import Answer, Solver
+from rcsc.symbolic.encode import declared, encode
+from rcsc.table.certificate import must_cover
+from rcsc.table.decide import prove_table
+from rcsc.table.verdict import Gap
 from rcsc.testing.inputs.export import vectors_csv, vectors_json
 from rcsc.testing.inputs.snapshot import Missing, search_in
 from rcsc.testing.inputs.vectors import vectors_of
@@ -20,7 +27,26 @@ from rcsc.testing.mutants import Opinion
 from rcsc.testing.suite import Proofs, SuiteOptions, run_suite
 
 
-def try_out(
+def test(settings: Settings, effort: Effort) -> Made:
+    """Prove every table, then test its executors against its meaning, and write vectors if asked."""
+    made = proved(settings)
+    report = made.report()
+    if report.failed:
+        return Made(report, "nothing was tested: not everything is proved")
+    found: list[Diagnostic] = []
+    figures = []
+    for _, program in made.executable:
+        files = emitted(planned(program), TARGETS)
+        one, text = _try_out(program.program, files, settings.options, effort, settings.progress)
+        found += one
+        figures.append(text)
+    if effort.vectors is not None:
+        found += _write_vectors([one.program for _, one in made.executable], settings.options, effort.vectors)
+    settings.progress("")
+    return Made(made.report(tuple(found)), "\n".join(figures))
+
+
+def _try_out(
     program: Program,
     files: Mapping[str, str],
     options: Options,
@@ -41,7 +67,7 @@ def try_out(
     return result.found, result.text()
 
 
-def write_vectors(programs: Sequence[Program], options: Options, file: Path) -> tuple[Diagnostic, ...]:
+def _write_vectors(programs: Sequence[Program], options: Options, file: Path) -> tuple[Diagnostic, ...]:
     """Write the vectors of the programs' tables, as CSV where the name ends so, else as JSON."""
     spell = vectors_csv if file.suffix == ".csv" else vectors_json
     texts = []
@@ -63,11 +89,6 @@ def _unwritten(file: Path, why: str) -> Diagnostic:
 
 def proofs(options: Options) -> Proofs:
     """The prover and its solver, as far as the suite needs them."""
-    from rcsc.solvers.smt import Answer, Solver
-    from rcsc.symbolic.encode import declared, encode
-    from rcsc.table.certificate import must_cover
-    from rcsc.table.decide import prove_table
-    from rcsc.table.verdict import Gap
 
     def prover(program: Program, table: Table) -> Opinion:
         verdict = prove_table(program, table, options)

@@ -9,26 +9,24 @@ import os
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rcsc.diagnostics.codes import Code
+from rcsc.diagnostics.jsonform import diagnostic_from_json, diagnostic_to_json, table_from_json, table_to_json
 from rcsc.diagnostics.report import Report
 from rcsc.diagnostics.source import Source
 from rcsc.host.cache import Cache
 from rcsc.host.files.read import Malformed, content
 from rcsc.lang.project import MOST_BYTES, PROJECT_FILE, Loaded, listed, project_root
-
-if TYPE_CHECKING:
-    from rcsc.solvers.options import Options
+from rcsc.lang.syntax import tree
+from rcsc.solvers.options import Options
 
 _PASSING = {Code.UNDECIDED, Code.FILE_NOT_FOUND, Code.FILE_CYCLE}
 """Findings that may go away though no file that was read changes; as do all of 1xx and 9xx."""
 
 
-def recall(cache: Cache, paths: tuple[str, ...], options: "Options") -> Report | None:
+def recall(cache: Cache, paths: tuple[str, ...], options: Options) -> Report | None:
     """The report of the same check, if nothing that it depends on has changed."""
-    from rcsc.diagnostics.jsonform import diagnostic_from_json, table_from_json
-
     kept = cache.load(*_key(paths, options))
     if kept is None or kept["roots"] != list(listed(paths)):
         return None
@@ -42,12 +40,8 @@ def recall(cache: Cache, paths: tuple[str, ...], options: "Options") -> Report |
     return Report(found, tables, sources)
 
 
-def remember(
-    cache: Cache, paths: tuple[str, ...], options: "Options", loaded: Loaded, report: Report
-) -> None:
+def remember(cache: Cache, paths: tuple[str, ...], options: Options, loaded: Loaded, report: Report) -> None:
     """Keep the report, unless it may change though no file does."""
-    from rcsc.diagnostics.jsonform import diagnostic_to_json, table_to_json
-
     if any(one.code in _PASSING or one.code.value[3] in "19" for one in report.found):
         return
     looked_at = digests(loaded)
@@ -88,7 +82,7 @@ def digest_at(name: str) -> str:
     return _seen(name)[0]
 
 
-def _key(paths: tuple[str, ...], options: "Options") -> tuple[str, ...]:
+def _key(paths: tuple[str, ...], options: Options) -> tuple[str, ...]:
     stated = asdict(options)
     stated.pop("jobs", None)  # how many at once changes nothing
     return ("check", os.getcwd(), *paths, "--", *(f"{name}={value}" for name, value in stated.items()))
@@ -108,7 +102,6 @@ def _looked_at(loaded: Loaded) -> list[str]:
 
 
 def _uses(loaded: Loaded) -> list[tuple[str, str]]:
-    from rcsc.lang.syntax import tree
 
     return [
         (os.path.dirname(name), f"{one.path}.rcs")

@@ -12,6 +12,7 @@ from math import isfinite
 from pathlib import Path
 from typing import Any, TypeAlias, assert_never
 
+from rcsc.diagnostics.coded import CodedError
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label
 from rcsc.diagnostics.source import Source, Span
@@ -24,7 +25,7 @@ MOST_FAULTS = 100
 """Faults shown of one file; the last says how many more there are."""
 
 
-class BadFile(Exception):  # noqa: N818  # what happened, not an error of ours
+class BadFile(CodedError):  # noqa: N818  # what happened, not an error of ours
     """A description says something that cannot be.
 
     Attributes:
@@ -36,6 +37,8 @@ class BadFile(Exception):  # noqa: N818  # what happened, not an error of ours
         self, text: str = "", found: Sequence[Diagnostic] = (), sources: Mapping[str, Source] | None = None
     ) -> None:
         self.found, self.sources = tuple(found), dict(sources or {})
+        if self.found:
+            self.code = self.found[0].code
         super().__init__(text or "; ".join(self._line(one) for one in found))
 
     def __reduce__(self) -> tuple[Any, ...]:

@@ -17,6 +17,7 @@ from operator import attrgetter
 from pathlib import Path
 from typing import Protocol
 
+from rcsc.diagnostics.coded import CodedError
 from rcsc.host import children
 from rcsc.host.files.names import BadName
 from rcsc.host.files.read import Malformed, content
@@ -26,7 +27,7 @@ FLAGS = ("-std=c99", "-O1", "-ffp-contract=off", "-fPIC", "-shared")
 """A cycle takes microseconds; more optimization would only be waited for at each start."""
 
 
-class NotBuilt(Exception):  # noqa: N818  # what happened, not an error of ours
+class NotBuilt(CodedError):  # noqa: N818  # what happened, not an error of ours
     """The C executors could not be built here; says why."""
 
 

@@ -7,6 +7,8 @@ import struct
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from rcsc.diagnostics.coded import CodedError
+from rcsc.diagnostics.codes import Code
 from rcsc.run.buffers import Buffers
 from rcsc.run.description import BadDescription, Description, Feed, LevelSpec
 from rcsc.run.executors import Executor
@@ -44,8 +46,10 @@ class Fill:
     form: str
 
 
-class StateTableError(Exception):
+class StateTableError(CodedError):
     """A level met a fault that the proofs exclude, or was refused an input or a state; says which, where and when."""
+
+    code = Code.STATE_TABLE_ERROR
 
 
 class BadState(StateTableError):  # noqa: N818  # what was refused, not an error of ours

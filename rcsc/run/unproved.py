@@ -5,6 +5,7 @@ In: a description. Out: the generated files that bear the mark (`host.files.writ
 
 from pathlib import Path
 
+from rcsc.diagnostics.codes import Code
 from rcsc.host.files.read import content
 from rcsc.host.files.write import UNPROVED
 from rcsc.run.description import BadDescription, Description
@@ -13,6 +14,9 @@ from rcsc.run.signature import generated_files
 
 class UnprovedExecutors(BadDescription):
     """A generated file bears the mark; says which."""
+
+    code = Code.EXECUTORS_NOT_PROVED
+    helps = ("mend the tables, then `rcsc compile`",)
 
 
 def marked(system: Description) -> tuple[Path, ...]:

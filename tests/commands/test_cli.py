@@ -15,7 +15,7 @@ from urllib.parse import unquote_to_bytes
 import jsonschema
 import pytest
 
-from rcsc import commands, driver
+from rcsc import commands
 from rcsc.commands import run
 
 REPO = Path(__file__).parents[2]
@@ -133,7 +133,7 @@ def test_3_a_bug_is_reported_short_and_with_a_trace_on_request(
     def broken(_settings: object) -> None:
         raise ValueError("bad \x1b[31m things")
 
-    monkeypatch.setattr(driver, "check", broken)
+    monkeypatch.setattr("rcsc.commands.tables.check.check", broken)
     ran = rcsc("check")
     assert ran.status == 3
     assert ran.err.startswith("error[RCS902]: a bug in rcsc")
@@ -148,7 +148,7 @@ def test_130_interrupted(rcsc: Rcsc, monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupted(_settings: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(driver, "check", interrupted)
+    monkeypatch.setattr("rcsc.commands.tables.check.check", interrupted)
     ran = rcsc("check")
     assert ran.status == 130
     assert "interrupted" in ran.err
@@ -157,9 +157,9 @@ def test_130_interrupted(rcsc: Rcsc, monkeypatch: pytest.MonkeyPatch) -> None:
 def test_ctrl_c_ends_a_long_run_and_leaves_nothing(folder: Path) -> None:
     write("slow.rcs")
     script = (
-        "import time, rcsc.driver as d, rcsc.commands as c, sys\n"
+        "import time, rcsc.driver.pipeline as d, rcsc.commands as c, sys\n"
         "def slow(*a, **k):\n    print('ready', flush=True); time.sleep(60)\n"
-        "d._load = slow\nsys.exit(c.run(['compile', 'slow.rcs']))"
+        "d.read = slow\nsys.exit(c.run(['compile', 'slow.rcs']))"
     )
     child = subprocess.Popen(
         [sys.executable, "-c", script], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
@@ -176,10 +176,10 @@ def test_ctrl_c_ends_a_long_run_and_leaves_nothing(folder: Path) -> None:
 @pytest.mark.usefixtures("folder")
 def test_who_is_interrupted_does_not_wait_for_the_interpreter() -> None:
     script = (
-        "import atexit, rcsc.driver as d, rcsc.commands as c, sys\n"
+        "import atexit, rcsc.driver.pipeline as d, rcsc.commands as c, sys\n"
         "atexit.register(print, 'cleared up')\n"
         "def interrupted(*a, **k):\n    print('begun'); raise KeyboardInterrupt\n"
-        "d._load = interrupted\nsys.argv[1:] = ['compile', 'slow.rcs']\nc.main()"
+        "d.read = interrupted\nsys.argv[1:] = ['compile', 'slow.rcs']\nc.main()"
     )
     write("slow.rcs")
     ran = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
@@ -573,7 +573,7 @@ table t assuming small {
 
 @pytest.mark.usefixtures("folder")
 def test_certify_of_a_system_drops_no_option(rcsc: Rcsc, monkeypatch: pytest.MonkeyPatch) -> None:
-    from rcsc.commands.prove import prove
+    from rcsc.commands.systems.prove import command as prove
 
     given: dict[str, object] = {}
 

@@ -207,7 +207,7 @@ def test_the_core_proves_levels_certifies_and_says_what_the_rest_needs(tmp_path:
 
 def test_live_is_refused_before_anything_is_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "aiohttp", None)
-    monkeypatch.setattr("rcsc.commands.script.compiled", lambda *_: pytest.fail("it compiled"))
+    monkeypatch.setattr("rcsc.commands.systems.run.compiled", lambda *_: pytest.fail("it compiled"))
     ran = CliRunner().invoke(
         commands, ["run", "make_boxt", "--live", "--system", str(REPO / "tables/system.toml")]
     )
@@ -220,6 +220,6 @@ def test_a_package_that_no_extra_brings_is_a_bug(
     def broken(*_: object) -> None:
         raise ModuleNotFoundError("No module named 'elsewhere'", name="elsewhere")
 
-    monkeypatch.setattr("rcsc.driver.check", broken)
+    monkeypatch.setattr("rcsc.commands.tables.check.check", broken)
     assert run(["check", str(REPO / "tables" / "examples" / "approach.rcs")]) == 3
     assert "error[RCS902]" in capsys.readouterr().err

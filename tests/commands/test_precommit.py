@@ -12,7 +12,7 @@ from pathlib import Path
 import click
 import pytest
 
-from rcsc.commands.group import commands
+from rcsc.commands.group import imported
 
 REPO = Path(__file__).parents[2]
 
@@ -39,7 +39,7 @@ def test_pre_commit_accepts_the_file(command: str, file: str) -> None:
 @pytest.mark.parametrize("entry", entries(".pre-commit-hooks.yaml") + entries(".pre-commit-config.yaml"))
 def test_every_entry_is_a_command_with_options_that_it_has(entry: str) -> None:
     _, name, *rest = shlex.split(entry)
-    command = commands.commands[name]
+    command = imported(name)
     with click.Context(command, info_name=name) as context:
         command.parse_args(context, rest)
 

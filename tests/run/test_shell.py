@@ -15,7 +15,7 @@ import pytest
 from rcsc.diagnostics.codes import Code
 from rcsc.diff.changes.difference import ProgramDifference
 from rcsc.diff.compare import compare
-from rcsc.driver import TARGETS, compile_
+from rcsc.driver.compile import TARGETS, compile_
 from rcsc.driver.settings import Settings
 from rcsc.run.description import description
 from rcsc.run.system import Kind, assemble, signatures

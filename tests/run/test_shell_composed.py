@@ -7,7 +7,7 @@ import pytest
 
 from rcsc.commands import run
 from rcsc.diagnostics.codes import Code
-from rcsc.driver import TARGETS, compile_
+from rcsc.driver.compile import TARGETS, compile_
 from rcsc.driver.settings import Settings
 from rcsc.shell.commands import HELP
 from rcsc.shell.reload import composed

@@ -15,7 +15,7 @@ from rcsc.commands.shared.show import backing
 from rcsc.compose.contract.environment import Links
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.diagnostics.jsonform import table_from_json, table_to_json
-from rcsc.driver import TARGETS, compile_
+from rcsc.driver.compile import TARGETS, compile_
 from rcsc.driver.settings import Settings
 from rcsc.emit import emit_c, emit_python
 from rcsc.emit.lower import lower

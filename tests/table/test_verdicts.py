@@ -14,7 +14,7 @@ from rcsc.diagnostics.diagnostic import Severity
 from rcsc.diagnostics.jsonform import report_to_json
 from rcsc.diagnostics.report import NOT_PROVED, Report, TableReport, Verdict, merged, resting
 from rcsc.diagnostics.sarif import sarif
-from rcsc.driver import check
+from rcsc.driver.check import check
 from rcsc.driver.settings import Settings
 from rcsc.lang.interpret import holds, matching_lines
 from rcsc.lang.model import Program, Value

@@ -4,8 +4,8 @@ Options that mean the same have one definition (`options`), and so has what is s
 asked for: text, a line a finding, JSON, SARIF or GitHub's annotations, on standard output or into a file that is
 written whole.
 
-A command about a system finds `system.toml` here or in `tables/` and turns what is wrong with it into a coded error
-(`systems`). A command that needs an extra says so before its work:
+A command about a system finds `system.toml` here or in `tables/` (`systems`); what is wrong with it knows its code, and
+one place ends the command with that (`rcsc.commands.group`). A command that needs an extra says so before its work:
 
 >>> from rcsc.commands.shared.extras import EXTRAS
 >>> EXTRAS["log"]
@@ -14,7 +14,7 @@ A command about a system finds `system.toml` here or in `tables/` and turns what
 Nothing here is trusted for a verdict, but for `proved`, which says in words what `rcsc prove` found, and `show`,
 which says what backs each table.
 
-Modules: `options` has the common options, `extras` the packages that the core leaves out, `systems` what commands
-about a system need and `rcsc db`, `show` puts a report out, `proved` what `rcsc prove` says, `pages` what `rcsc
-explain` prints, `drawn` finds the cell that a log is drawn in.
+Modules: `options` has the common options, `extras` the packages that the core leaves out, `stopped` how a command ends
+that cannot go on, `systems` what commands about a system need, `graphs` what `rcsc graph` and `rcsc table` do, `logs`
+what `rcsc log` and `rcsc replay` do, `show` puts a report out, `proved` says what `rcsc prove` found.
 """

@@ -6,11 +6,8 @@ its packages where they are used, and a package that is not there is the coded e
 
 from collections.abc import Mapping
 from importlib.util import find_spec
-from typing import Any
 
-import click
-
-from rcsc.commands.shared.systems import Stopped
+from rcsc.commands.shared.stopped import Stopped
 from rcsc.diagnostics.codes import Code
 
 EXTRAS: Mapping[str, tuple[str, ...]] = {
@@ -43,20 +40,8 @@ def _missing(package: str, extra: str) -> Stopped:
     return Stopped(Code.EXTRA_MISSING, f"`{package}` is not installed", f"pip install 'rcsc[{extra}]'")
 
 
-class Commands(click.Group):
-    """Commands that say which extra to install where an import finds that one of its packages is missing."""
-
-    def invoke(self, ctx: click.Context) -> Any:
-        """Run the command that `ctx` names.
-
-        Raises:
-            Stopped: A package of an extra is not installed.
-        """
-        try:
-            return super().invoke(ctx)
-        except ModuleNotFoundError as error:
-            package = (error.name or "").partition(".")[0]
-            extra = next((one for one, packages in EXTRAS.items() if package in packages), None)
-            if extra is None:
-                raise
-            raise _missing(package, extra) from error
+def lacking(error: ModuleNotFoundError) -> Stopped | None:
+    """Which extra to install, where an import finds that one of its packages is missing."""
+    package = (error.name or "").partition(".")[0]
+    extra = next((one for one, packages in EXTRAS.items() if package in packages), None)
+    return None if extra is None else _missing(package, extra)

@@ -1,6 +1,7 @@
 """Options that several commands share."""
 
 import os
+import sys
 from collections.abc import Callable
 from functools import wraps
 from pathlib import Path
@@ -8,7 +9,9 @@ from typing import Any, Literal
 
 import click
 
-from rcsc.commands.shared.show import Color, Form, Output
+from rcsc.commands.shared.show import Color, Form, Output, Progress
+from rcsc.driver.settings import Settings
+from rcsc.solvers.options import Options
 
 Command = Callable[..., int]
 
@@ -81,7 +84,6 @@ def proving(command: Command) -> Command:
         no_cache: bool,
         **kwargs: Any,
     ) -> int:
-        from rcsc.solvers.options import Options
 
         options = Options(
             steps=steps,
@@ -132,3 +134,14 @@ def showing(command: Command) -> Command:
         return command(*args, output=output, **kwargs)
 
     return wrapped
+
+
+def settings_of(options: Options, use_cache: bool, output: Output, paths: tuple[str, ...]) -> Settings:
+    """What the driver works on: these paths, or else this folder."""
+    progress = Progress(wanted=not output.quiet)
+    return Settings(paths or (".",), options, piped(paths), use_cache=use_cache, progress=progress)
+
+
+def piped(paths: tuple[str, ...]) -> bytes | None:
+    """What `-` stands for, if it is one of the paths."""
+    return sys.stdin.buffer.read() if "-" in paths else None

@@ -1,23 +1,22 @@
 """What `rcsc prove` says of lines in their context, of how commands end, and of the system as a whole."""
 
-from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict
+from typing import Any
 
+from rcsc.compose.contract.claims import AGAIN, RUNS, UNREACHED, Key, Need, declared, spelled
+from rcsc.compose.contract.obligations import Sort
+from rcsc.compose.contract.transition import TransitionSystem
+from rcsc.compose.proof.context import Context
+from rcsc.compose.proof.level import LevelProof, certificate
+from rcsc.compose.proof.ranking import Counted
+from rcsc.compose.proof.system import SystemProof
+from rcsc.compose.proof.termination import Ending
 from rcsc.diagnostics import report
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from rcsc.compose.contract.claims import Key, Need
-    from rcsc.compose.contract.transition import TransitionSystem
-    from rcsc.compose.proof.context import Context
-    from rcsc.compose.proof.level import LevelProof
-    from rcsc.compose.proof.ranking import Counted
-    from rcsc.compose.proof.system import SystemProof
-    from rcsc.compose.proof.termination import Ending
+from rcsc.solvers.smtlib import CVC5_STEPS, cvc5_refutes
 
 
-def standing(whole: "SystemProof", level: str, key: "Key") -> str:
+def standing(whole: SystemProof, level: str, key: Key) -> str:
     """The verdict of a claim: `proved`, what it rests on that is not proved, or why it is not found itself."""
     found = whole.of(level, key)
     if found.proved:
@@ -27,31 +26,24 @@ def standing(whole: "SystemProof", level: str, key: "Key") -> str:
     return found.verdict.value if not found.found else f"rests on {named(whole, level, found.lacks)}"
 
 
-def trusting(whole: "SystemProof", level: str, keys: "Sequence[Key]") -> str:
+def trusting(whole: SystemProof, level: str, keys: Sequence[Key]) -> str:
     """The assumptions that these verdicts trust, as the tables declare them; empty for none."""
-    from rcsc.compose.contract.claims import declared
-
     return report.trusting(declared(one for key in keys for one in whole.of(level, key).trusts))
 
 
-def named(whole: "SystemProof", level: str, needs: "Sequence[Need]") -> str:
+def named(whole: SystemProof, level: str, needs: Sequence[Need]) -> str:
     """Claims in words."""
-    from rcsc.compose.contract.claims import spelled
-
     return report.named([spelled(need, level, whole.closed) for need in needs])
 
 
-def not_looked_at(proof: "LevelProof") -> Iterator[str]:
+def not_looked_at(proof: LevelProof) -> Iterator[str]:
     """Obligations that could not be stated."""
     for one in proof.unstated:
         yield f"not looked at: {one.shown}"
 
 
-def in_context(whole: "SystemProof", proof: "LevelProof") -> Iterator[str]:
+def in_context(whole: SystemProof, proof: LevelProof) -> Iterator[str]:
     """Of one level, line by line."""
-    from rcsc.compose.contract.claims import UNREACHED
-    from rcsc.compose.contract.obligations import Sort
-
     seen = proof.context
     if seen is None:
         yield "not looked at, as something is not proved: lines never reached, what lines do when they match again, whether commands end"
@@ -74,10 +66,8 @@ def in_context(whole: "SystemProof", proof: "LevelProof") -> Iterator[str]:
             yield f"  {one.table} {_ends(one)}{only}"
 
 
-def _again(whole: "SystemProof", level: str, seen: "Context") -> Iterator[str]:
+def _again(whole: SystemProof, level: str, seen: Context) -> Iterator[str]:
     """What lines do that match again; of a level that gives no orders there is nothing to say."""
-    from rcsc.compose.contract.claims import AGAIN
-
     again = "; ".join(f"{one.table} {one.line}: {', '.join(one.leaves)}" for one in seen.repeated)
     rests = "" if seen.repeated or seen.restless else standing(whole, level, (AGAIN, "", ""))
     only = f" ({rests})" if rests not in {"", "proved"} else ""
@@ -86,7 +76,7 @@ def _again(whole: "SystemProof", level: str, seen: "Context") -> Iterator[str]:
         yield "order after order may be given on inputs that stay the same"
 
 
-def trusted(whole: "SystemProof") -> Iterator[str]:
+def trusted(whole: SystemProof) -> Iterator[str]:
     """What is taken for granted that no level is responsible for."""
     every = sorted({one for found in whole.closed.values() for one in found.trusts})
     if every:
@@ -94,7 +84,7 @@ def trusted(whole: "SystemProof") -> Iterator[str]:
         yield from (f"  {one}" for one in every)
 
 
-def left_out(whole: "SystemProof") -> Iterator[str]:
+def left_out(whole: SystemProof) -> Iterator[str]:
     """That it is not wholly proved, and why, where no finding says so."""
     if whole.whole or not whole.proved:
         return
@@ -109,7 +99,7 @@ def left_out(whole: "SystemProof") -> Iterator[str]:
     yield f"not wholly proved: {', '.join(one for one in said if one)}"
 
 
-def _ends(one: "Ending") -> str:
+def _ends(one: Ending) -> str:
     if one.changes is None:
         return "is not shown to end: its states may go round"
     changes = "one change" if one.changes == 1 else f"{one.changes} changes"
@@ -124,15 +114,13 @@ def _ends(one: "Ending") -> str:
     return said
 
 
-def _counted(one: "Counted") -> str:
+def _counted(one: Counted) -> str:
     by = "" if one.least is None else f" by at least {one.least:.2g}"
     return f"line `{one.line}` runs as long as `{one.counter}` rises{by}"
 
 
-def assumptions(proof: "SystemProof") -> str:
+def assumptions(proof: SystemProof) -> str:
     """How many there are, and how they stand."""
-    from rcsc.compose.contract.obligations import Sort
-
     found = [
         proof.of(one.level, obligation.key)
         for one in proof.levels
@@ -150,10 +138,8 @@ def assumptions(proof: "SystemProof") -> str:
     )
 
 
-def reaction(made: "Mapping[str, TransitionSystem]", proof: "SystemProof") -> Iterator[str]:
+def reaction(made: Mapping[str, TransitionSystem], proof: SystemProof) -> Iterator[str]:
     """The way of a PAUSE from the top down, as far as it is proved that it is passed on at once."""
-    from rcsc.compose.contract.obligations import Sort
-
     passes = {
         (one.level, obligation.name)
         for one in proof.levels
@@ -177,15 +163,12 @@ def reaction(made: "Mapping[str, TransitionSystem]", proof: "SystemProof") -> It
             yield f"a PAUSE of `{top}` is ordered {said} cycles of levels, besides what buffers take"
 
 
-def confirmed(ts: "TransitionSystem", proof: "LevelProof") -> "dict[str, bool]":
+def confirmed(ts: TransitionSystem, proof: LevelProof) -> dict[str, bool]:
     """Each question of the certificate, and whether cvc5 refutes it within two minutes."""
-    from rcsc.compose.proof.level import certificate
-    from rcsc.solvers.smtlib import CVC5_STEPS, cvc5_refutes
-
     return {name: cvc5_refutes(text, steps=6 * CVC5_STEPS) for name, text in certificate(ts, proof).items()}
 
 
-def claim(whole: "SystemProof", level: str, key: "Key") -> dict[str, Any]:
+def claim(whole: SystemProof, level: str, key: Key) -> dict[str, Any]:
     """A verdict, what it rests on that is not found, and what it trusts."""
     found = whole.of(level, key)
     return {
@@ -198,13 +181,8 @@ def claim(whole: "SystemProof", level: str, key: "Key") -> dict[str, Any]:
     }
 
 
-def as_json(whole: "SystemProof", proof: "LevelProof") -> dict[str, Any]:
+def as_json(whole: SystemProof, proof: LevelProof) -> dict[str, Any]:
     """Context and endings of one level."""
-    from dataclasses import asdict
-
-    from rcsc.compose.contract.claims import AGAIN, RUNS
-    from rcsc.compose.contract.obligations import Sort
-
     again = (
         {} if proof.context is None else asdict(proof.context) | claim(whole, proof.level, (AGAIN, "", ""))
     )

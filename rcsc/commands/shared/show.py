@@ -5,6 +5,7 @@ import os
 import sys
 from collections import Counter
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import StrEnum
 from itertools import groupby
@@ -13,6 +14,8 @@ from pathlib import Path
 import click
 
 from rcsc.diagnostics.diagnostic import Severity
+from rcsc.diagnostics.github import annotations
+from rcsc.diagnostics.jsonform import report_to_json
 from rcsc.diagnostics.printable import escape, pad, width
 from rcsc.diagnostics.render import OF_SEVERITY, Piece, Row, Style, full, one_line, paint, plain
 from rcsc.diagnostics.report import (
@@ -25,6 +28,7 @@ from rcsc.diagnostics.report import (
     named,
     trusting,
 )
+from rcsc.diagnostics.sarif import sarif
 from rcsc.host.files import write_atomically
 
 
@@ -81,28 +85,50 @@ def show(report: Report, command: str, output: Output, closing: str = "") -> Non
         UnwritableError: The file, or standard output, could not be written.
         BrokenPipeError: Whoever read standard output has gone.
     """
-    text = _FORMS[output.form](report, command, output, closing)
-    try:
-        if output.file is None:
+    put(_FORMS[output.form](report, command, output, closing), output.file)
+
+
+def put(text: str, file: Path | None) -> None:
+    """Write a text to a file, whole or not at all, or to standard output.
+
+    Raises:
+        UnwritableError: Neither could be written.
+        BrokenPipeError: Whoever read standard output has gone.
+    """
+    with writing(file or "standard output"):
+        if file is None:
             click.echo(text, nl=False, color=True)
         else:
-            write_atomically(output.file, text.encode())
+            write_atomically(file, text.encode())
+
+
+@contextmanager
+def writing(place: Path | str) -> Iterator[None]:
+    """Says where something is written, should that fail.
+
+    Raises:
+        UnwritableError: What stands inside could not write.
+    """
+    try:
+        yield
     except BrokenPipeError:
         raise
     except OSError as error:
-        raise UnwritableError(
-            str(output.file or "standard output"), error.strerror or "no reason given"
-        ) from error
+        raise UnwritableError(str(place), error.strerror or "no reason given") from error
+
+
+def finish(report: Report, command: str, output: Output, closing: str = "") -> int:
+    """Shows the report; the exit status."""
+    show(report, command, output, closing)
+    return 1 if report.failed else 0
 
 
 def _json(report: Report, command: str, _output: Output, _closing: str) -> str:
-    from rcsc.diagnostics.jsonform import report_to_json
 
     return json_text(report_to_json(report, command))
 
 
 def _sarif(report: Report, _command: str, _output: Output, _closing: str) -> str:
-    from rcsc.diagnostics.sarif import sarif
 
     return json_text(sarif(report))
 
@@ -114,7 +140,6 @@ def json_text(value: object) -> str:
 
 
 def _github(report: Report, _command: str, _output: Output, _closing: str) -> str:
-    from rcsc.diagnostics.github import annotations
 
     return annotations(report)
 
@@ -124,7 +149,7 @@ def _lines(report: Report, _command: str, _output: Output, _closing: str) -> str
 
 
 def _text(report: Report, _command: str, output: Output, closing: str) -> str:
-    coloured = _coloured(output)
+    coloured = wants_color(output.color, output.file)
     columns = os.get_terminal_size(1).columns if output.file is None and _is_terminal(1) else 200
     rows: list[Row] = []
     for diagnostic in report.found:
@@ -152,12 +177,15 @@ def _is_terminal(handle: int) -> bool:
         return False
 
 
-def _coloured(output: Output) -> bool:
-    """Source: no-color.org for `NO_COLOR`; `--color` wins over it."""
-    if output.color is not Color.AUTO:
-        return output.color is Color.ALWAYS
+def wants_color(color: Color, file: Path | None) -> bool:
+    """Whether a text for standard output, or for a file, is coloured.
+
+    Source: no-color.org for `NO_COLOR`; `--color` wins over it.
+    """
+    if color is not Color.AUTO:
+        return color is Color.ALWAYS
     plain_terminal = os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb"
-    return not plain_terminal and output.file is None and _is_terminal(1)
+    return not plain_terminal and file is None and _is_terminal(1)
 
 
 def summary(report: Report) -> Iterator[Row]:

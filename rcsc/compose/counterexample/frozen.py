@@ -24,6 +24,8 @@ from rcsc.compose.counterexample.finding import Finding
 from rcsc.compose.counterexample.lasso import lasso_of
 from rcsc.compose.counterexample.pair import exchange
 from rcsc.compose.proof.system import NoProgramError, transition_systems
+from rcsc.diagnostics.coded import CodedError
+from rcsc.diagnostics.codes import Code
 from rcsc.host.files.names import shown
 from rcsc.host.files.read import content, json_of
 from rcsc.lang.interpret import initial
@@ -35,8 +37,10 @@ from rcsc.symbolic import values
 FORMAT = 1
 
 
-class BadCaseError(Exception):
+class BadCaseError(CodedError):
     """A case cannot be read, or names what the tables do not have; says what."""
+
+    code = Code.BAD_CASE
 
 
 @dataclass(frozen=True, slots=True)

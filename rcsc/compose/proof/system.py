@@ -19,6 +19,7 @@ from rcsc.compose.invariant.search import Effort
 from rcsc.compose.proof.assume_guarantee import agreements, claims, other_end
 from rcsc.compose.proof.kept import keep, recall
 from rcsc.compose.proof.level import LevelProof, Verdict, besides, essential, prove_level
+from rcsc.diagnostics.coded import CodedError
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic
 from rcsc.host import children
@@ -33,7 +34,7 @@ SHOWN_HERE = frozenset({Code.ASSUMPTION_NOT_PROVED, Code.INVARIANT_BROKEN, Code.
 """What is proved of the levels, or is no fault of a cycle as it runs."""
 
 
-class NoProgramError(Exception):
+class NoProgramError(CodedError):
     """A level's tables cannot be read, or are not in order; says which."""
 
 

@@ -12,7 +12,7 @@ from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Severity
 from rcsc.diagnostics.render import one_line
 from rcsc.diagnostics.report import Report
-from rcsc.driver import TARGETS, compile_
+from rcsc.driver.compile import TARGETS, compile_
 from rcsc.driver.settings import Settings
 from rcsc.host.children import scratch
 from rcsc.lang.interpret import holds

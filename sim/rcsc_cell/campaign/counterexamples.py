@@ -11,6 +11,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rcsc.diagnostics.coded import CodedError
+from rcsc.diagnostics.codes import Code
 from rcsc.host.files import write_atomically
 from rcsc.host.files.names import shown
 from rcsc.host.files.read import json_of, text
@@ -35,8 +37,10 @@ MOST_CHARACTERS = 120
 """Of a property, in the name of a folder."""
 
 
-class BadEpisode(Exception):  # noqa: N818  # what happened, not an error of ours
+class BadEpisode(CodedError):  # noqa: N818  # what happened, not an error of ours
     """The file holds no episode; says why."""
+
+    code = Code.BAD_EPISODE
 
 
 @dataclass(frozen=True, slots=True)

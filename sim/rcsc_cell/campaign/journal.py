@@ -15,6 +15,8 @@ from types import TracebackType
 from typing import Any, BinaryIO, Self
 
 from rcsc import __version__
+from rcsc.diagnostics.coded import CodedError
+from rcsc.diagnostics.codes import Code
 from rcsc.host.files.plain import read
 from rcsc.host.files.read import json_of
 from rcsc_cell.campaign.rig import Rig, digest
@@ -39,8 +41,11 @@ _OTHERS = {
 }
 
 
-class BadJournal(Exception):  # noqa: N818  # what happened, not an error of ours
+class BadJournal(CodedError):  # noqa: N818  # what happened, not an error of ours
     """The file is not this campaign's journal; says why. It was not changed."""
+
+    code = Code.BAD_JOURNAL
+    helps = ("name another file with --journal",)
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,6 +16,8 @@ from functools import partial
 from pathlib import Path
 from types import FrameType
 
+from rcsc.diagnostics.coded import CodedError
+from rcsc.diagnostics.codes import Code
 from rcsc.host.children import scratch
 from rcsc.run.description import BadDescription
 from rcsc.run.executors import NotBuilt
@@ -34,8 +36,11 @@ TRIES = {SURVIVES: 60, ENDS: 12}
 """How often a shrinking may try where each try is dear: it costs a process, or the whole limit."""
 
 
-class OtherTables(Exception):  # noqa: N818  # what happened, not an error of ours
+class OtherTables(CodedError):  # noqa: N818  # what happened, not an error of ours
     """A worker has other tables, data or programs than the campaign."""
+
+    code = Code.WORKERS_GONE
+    helps = ("what is done is kept: the same command goes on from there",)
 
 
 class _OutOfTime(BaseException):

@@ -9,6 +9,8 @@ from concurrent.futures import BrokenExecutor, Executor, Future
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
+from rcsc.diagnostics.coded import CodedError
+from rcsc.diagnostics.codes import Code
 from rcsc.host import children
 from rcsc_cell.campaign.work import own_process
 
@@ -21,8 +23,11 @@ R = TypeVar("R")
 _CONNECT_S = 10
 
 
-class WorkersGone(Exception):  # noqa: N818  # what happened, not an error of ours
+class WorkersGone(CodedError):  # noqa: N818  # what happened, not an error of ours
     """Nobody is left to play, or nobody was found; what is done is kept."""
+
+    code = Code.WORKERS_GONE
+    helps = ("what is done is kept: the same command goes on from there",)
 
 
 class Crashed(Exception):  # noqa: N818  # likewise

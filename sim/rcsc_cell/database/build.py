@@ -77,6 +77,8 @@ DEPTH_MM, CLEARANCE_MM = 12.0, 4.0
 class BadData(BadFile):
     """The data says something that cannot be; `problems` has every such thing."""
 
+    code = Code.BAD_DATA
+
     def __init__(
         self,
         problems: Sequence[str] = (),
@@ -85,6 +87,11 @@ class BadData(BadFile):
     ) -> None:
         self.problems = tuple(problems) or tuple(one.message for one in found)
         super().__init__("; ".join(problems), found, sources)
+
+    @property
+    def shown(self) -> str:
+        """Each problem."""
+        return "\n".join(self.problems)
 
 
 LENGTH, SIZE, ROOM = Number(-10_000, 10_000), Number(0, 10_000), Number(0.001, 10_000)

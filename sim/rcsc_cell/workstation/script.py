@@ -9,6 +9,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
+from rcsc.diagnostics.coded import CodedError
+from rcsc.diagnostics.codes import Code
 from rcsc.host.files.read import MIB, Malformed, rows_of, text
 
 COLUMNS = ("command", "part", "source", "dest", "end_at")
@@ -18,8 +20,10 @@ PARTS = {"BOXT": "tbox", "BOXB": "bbox", "FLAG": "flag", "HOUS": "hous", "CLOSE-
 """Parts as Fig. 7 calls them, and as the tables do."""
 
 
-class BadScript(Exception):  # noqa: N818  # what happened, not an error of ours
+class BadScript(CodedError):  # noqa: N818  # what happened, not an error of ours
     """The script cannot be read; says every row that is wrong."""
+
+    code = Code.BAD_SCRIPT
 
 
 @dataclass(frozen=True, slots=True)

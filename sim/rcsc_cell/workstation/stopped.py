@@ -13,6 +13,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal, Protocol, runtime_checkable
 
+from rcsc.diagnostics.coded import CodedError
 from rcsc.diagnostics.codes import Code
 from rcsc.host.files import write_atomically
 from rcsc.host.files.names import shown
@@ -33,8 +34,10 @@ LATEST_TICK = 2**40
 """Ticks count up from where the stopped run was; a log has 64 bits for nanoseconds."""
 
 
-class NotResumed(Exception):  # noqa: N818  # what happened, not an error of ours
+class NotResumed(CodedError):  # noqa: N818  # what happened, not an error of ours
     """There is nothing to go on from; says why. Nothing has moved."""
+
+    helps = ("`--from-row N` begins anew at row N",)
 
     def __init__(self, code: Code, message: str) -> None:
         super().__init__(message)

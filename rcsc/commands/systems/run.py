@@ -12,13 +12,26 @@ from typing import TYPE_CHECKING, Any, Literal
 import click
 
 from rcsc.commands.shared.extras import need
-from rcsc.commands.shared.systems import DATABASE, EXECUTOR, SYSTEM, Stopped, compiled, stop, system_path
+from rcsc.commands.shared.stopped import Stopped
+from rcsc.commands.shared.systems import DATABASE, EXECUTOR, SYSTEM, compiled, system_path
+from rcsc.diagnostics.codes import Code
+from rcsc.host.cache import open_cache
+from rcsc.host.children import scratch
+from rcsc.host.files.read import content, json_of
+from rcsc.run.description import BadDescription, description
+from rcsc.run.log.write import Recorder
+from rcsc.run.processes.serve import Factory
+from rcsc.run.processes.supervisor import Supervisor, run_processes
+from rcsc_cell.cell.reach import checked
+from rcsc_cell.cell.ready import Backend, plant
+from rcsc_cell.episodes.witness import Timed, Witness, names
+from rcsc_cell.pictures.report import report
+from rcsc_cell.workstation.prepared import Run, prepare
+from rcsc_cell.workstation.script import BadScript
+from rcsc_cell.workstation.stopped import forget, go_on, keep
 
 if TYPE_CHECKING:
-    from rcsc_cell.cell.ready import Backend
-    from rcsc_cell.episodes.witness import Witness
     from rcsc_cell.live import Live
-    from rcsc_cell.workstation.prepared import Run
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +42,7 @@ class Asked:
     path: Path
     kind: Literal["c", "python"]
     database: Path | None
-    backend: "Backend"
+    backend: Backend
     seed: int
     log: Path | None
     report: Path | None
@@ -40,7 +53,7 @@ class Asked:
 
 
 @click.command(
-    short_help="Run a workstation's script in the simulated cell.",
+    "run",
     epilog="""\b
 Examples:
   rcsc run make_boxt                     Fig. 7, corrected, to the end
@@ -78,8 +91,8 @@ Examples:
 @click.option("--resume", "resumes", is_flag=True,
               help="Go on from the row that stopped the last run, with everything as it stood then.")  # fmt: skip
 @click.option("-q", "--quiet", is_flag=True, help="Only what stops the script.")
-def run(  # noqa: PLR0913, PLR0917  # as many as there are options
-    script: str, system: Path | None, executor: str, database: Path | None, backend: "Backend", seed: int,
+def command(  # noqa: PLR0913, PLR0917  # as many as there are options
+    script: str, system: Path | None, executor: str, database: Path | None, backend: Backend, seed: int,
     log: Path | None, report: Path | None, live: bool, compiles: bool, processes: bool, rate: float,
     from_row: int | None, resumes: bool, quiet: bool,
 ) -> int:  # fmt: skip
@@ -94,7 +107,6 @@ def run(  # noqa: PLR0913, PLR0917  # as many as there are options
         raise click.UsageError(
             "--resume, --live and --report are of one process; with --processes, use --from-row"
         )
-    need("cell")
     if live:
         need("live")
     path = system_path(system)
@@ -103,18 +115,9 @@ def run(  # noqa: PLR0913, PLR0917  # as many as there are options
     kind: Literal["c", "python"] = "c" if executor == "c" else "python"
     again = _command(script, system, database, executor, backend)
     asked = Asked(script, path, kind, database, backend, seed, log, report, live, rate, quiet, again)
-    from rcsc.diagnostics.codes import Code
-    from rcsc.run.description import BadDescription
-    from rcsc.run.executors import NotBuilt
-    from rcsc.run.system import StateTableError
-    from rcsc_cell.database.build import BadData
-    from rcsc_cell.workstation.script import BadScript
-    from rcsc_cell.workstation.stopped import NotResumed
 
     try:
         return _run(asked, processes, from_row, resumes)
-    except (BadDescription, BadData, BadScript, NotBuilt, NotResumed, StateTableError) as error:
-        stop(error)
     except ChildProcessError as error:
         raise Stopped(Code.PROCESS_LOST, str(error), "what levels say as they end stands above") from error
 
@@ -126,12 +129,6 @@ def _run(asked: Asked, processes: bool, from_row: int | None, resumes: bool) -> 
         BadDescription, BadData, BadScript, NotBuilt, NotResumed: Something is not in order; nothing has moved.
         StateTableError: A level met a fault that the proofs exclude.
     """
-    from rcsc.host.cache import open_cache
-    from rcsc_cell.cell.reach import checked
-    from rcsc_cell.cell.ready import plant
-    from rcsc_cell.episodes.witness import Timed, Witness
-    from rcsc_cell.workstation.prepared import prepare
-
     timed: list[Timed] = []
 
     def outside(database: Any) -> list[Timed]:
@@ -152,16 +149,13 @@ def _run(asked: Asked, processes: bool, from_row: int | None, resumes: bool) -> 
     return _closing(witness, asked, seconds, log)
 
 
-def _place(made: "Run", from_row: int | None, resumes: bool) -> None:
+def _place(made: Run, from_row: int | None, resumes: bool) -> None:
     """Puts the run where it is to begin.
 
     Raises:
         BadScript: There is no such row.
         NotResumed: There is nothing to go on from.
     """
-    from rcsc_cell.workstation.script import BadScript
-    from rcsc_cell.workstation.stopped import forget, go_on
-
     rows = len(made.station.rows)
     if from_row is not None and from_row > rows:
         raise BadScript(f"the script has {rows} rows, and none is {from_row}")
@@ -187,11 +181,8 @@ def _command(script: str, system: Path | None, database: Path | None, executor: 
 
 
 @contextlib.contextmanager
-def _recorded(made: "Run", asked: Asked) -> Iterator[Path]:
+def _recorded(made: Run, asked: Asked) -> Iterator[Path]:
     """Writes the log; its path."""
-    from rcsc.run.description import BadDescription
-    from rcsc.run.log.write import Recorder
-
     path = (
         asked.log
         or made.system.description.database.parent / ".rcsc-cache" / f"{made.system.description.name}.mcap"
@@ -209,7 +200,7 @@ def _recorded(made: "Run", asked: Asked) -> Iterator[Path]:
 
 
 @contextlib.contextmanager
-def _followed(witness: "Witness", asked: Asked) -> Iterator[None]:
+def _followed(witness: Witness, asked: Asked) -> Iterator[None]:
     """Opens the page, where one was asked for, and keeps the clock's pace for whoever looks."""
     if not asked.live:
         yield
@@ -227,10 +218,8 @@ def _followed(witness: "Witness", asked: Asked) -> Iterator[None]:
         live.stop()
 
 
-def _page(witness: "Witness", asked: Asked) -> "Live":
-    from rcsc.run.description import BadDescription
-    from rcsc_cell.episodes.witness import names
-    from rcsc_cell.live import Live
+def _page(witness: Witness, asked: Asked) -> "Live":
+    from rcsc_cell.live import Live  # of an extra
 
     system = witness.run.system
     try:
@@ -252,7 +241,7 @@ class _Pace:
         time.sleep(max(0.0, self._next - time.monotonic()))
 
 
-def _watch(made: "Run", asked: Asked) -> float:
+def _watch(made: Run, asked: Asked) -> float:
     """Runs to the end, and says what becomes of each row; the seconds that it took."""
     begun = time.perf_counter()
     for result in made.steps():
@@ -267,11 +256,8 @@ def _say(number: int, text: str, state: str, ticks: int) -> None:
     sys.stdout.flush()
 
 
-def _apart(made: "Run", asked: Asked) -> int:
+def _apart(made: Run, asked: Asked) -> int:
     """The same with a process for each level."""
-    from rcsc.diagnostics.codes import Code
-    from rcsc.host.children import scratch
-
     with scratch("run") as folder:
         rows = _rows_apart(asked, made.station.at, folder / "results")
     if not asked.quiet:
@@ -288,11 +274,6 @@ def _apart(made: "Run", asked: Asked) -> int:
 
 def _rows_apart(asked: Asked, first: int, results: Path) -> list[list[Any]]:
     """Runs the processes to the end: of each row its number, text, state, reason and ticks; `results` is where they travel."""
-    from rcsc.host.files.read import content, json_of
-    from rcsc.run.description import description
-    from rcsc.run.processes.serve import Factory
-    from rcsc.run.processes.supervisor import Supervisor, run_processes
-
     held = str(asked.database.resolve()) if asked.database else ""
     place = str(asked.path.resolve())
     outside = Factory(
@@ -326,9 +307,7 @@ def _rows_apart(asked: Asked, first: int, results: Path) -> list[list[Any]]:
 # --- when it is over ---
 
 
-def _write_report(path: Path, witness: "Witness", asked: Asked, seconds: float) -> None:
-    from rcsc.run.description import BadDescription
-    from rcsc_cell.pictures.report import report
+def _write_report(path: Path, witness: Witness, asked: Asked, seconds: float) -> None:
 
     try:
         report(path, witness.story(asked.script, seconds))
@@ -336,8 +315,7 @@ def _write_report(path: Path, witness: "Witness", asked: Asked, seconds: float) 
         raise BadDescription(f"the report {path} cannot be written: {error.strerror}") from error
 
 
-def _closing(witness: "Witness", asked: Asked, seconds: float, log: Path) -> int:
-    from rcsc.diagnostics.codes import Code
+def _closing(witness: Witness, asked: Asked, seconds: float, log: Path) -> int:
 
     made = witness.run
     again = _kept(made, asked)
@@ -359,7 +337,7 @@ def _closing(witness: "Witness", asked: Asked, seconds: float, log: Path) -> int
     return 0
 
 
-def _figures(witness: "Witness", seconds: float) -> Iterator[str]:
+def _figures(witness: Witness, seconds: float) -> Iterator[str]:
     """Where parts lie, how near the joints came to their limits, and how long it took."""
     system = witness.run.system
     for one in witness.placed():
@@ -374,10 +352,8 @@ def _figures(witness: "Witness", seconds: float) -> Iterator[str]:
     )
 
 
-def _kept(made: "Run", asked: Asked) -> str:
+def _kept(made: Run, asked: Asked) -> str:
     """Keeps a run that stopped, forgets one that came to its end; what to do about it."""
-    from rcsc_cell.workstation.stopped import forget, keep
-
     if made.station.stopped is None:
         if made.station.over:
             forget(made.system.description)

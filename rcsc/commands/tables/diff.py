@@ -1,30 +1,30 @@
 """`rcsc diff`: what changed between two versions of the tables, and the proof that nothing else did."""
 
-import os
-import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
 from rcsc.commands.shared.options import steps_option
-from rcsc.commands.shared.show import Color, Output, Progress, UnwritableError, json_text, show
+from rcsc.commands.shared.show import Color, Output, Progress, json_text, put, show, wants_color
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label
+from rcsc.diagnostics.render import paint, plain
 from rcsc.diagnostics.report import Report
 from rcsc.diagnostics.source import Span
-
-if TYPE_CHECKING:
-    from rcsc.diff.changes.difference import Difference
-    from rcsc.diff.sides import Given, Side
-    from rcsc.solvers.options import Options
+from rcsc.diff.changes.difference import Difference
+from rcsc.diff.compare import difference
+from rcsc.diff.jsonform import to_json
+from rcsc.diff.revision import NotComparedError
+from rcsc.diff.sides import Given, Side, given, read, revisions
+from rcsc.diff.text import markdown, rows
+from rcsc.solvers.options import Options
 
 SAME, CHANGED, ERROR = 0, 1, 2
 
 
 @click.command(
-    short_help="Show what changed in meaning, and prove that nothing else did.",
+    "diff",
     epilog="""\b
 Examples:
   rcsc diff old.rcs new.rcs                  two files
@@ -61,7 +61,7 @@ Exit status: 0 same meaning, 1 changed, 2 usage, an error, or not decided.""",
 @click.option("--follow", is_flag=True,
               help="For a changed table also: which line can match in the cycle after which, what is new and what is gone.")  # fmt: skip
 @click.option("-q", "--quiet", is_flag=True, help="Only what changed, no summary and no progress.")
-def diff(  # noqa: PLR0913, PLR0917  # as many as there are options
+def command(  # noqa: PLR0913, PLR0917  # as many as there are options
     paths: tuple[str, ...], revision: str | None, form: str, file: Path | None, color: str, steps: int,
     memory: int, follow: bool, quiet: bool,
 ) -> int:  # fmt: skip
@@ -71,9 +71,6 @@ def diff(  # noqa: PLR0913, PLR0917  # as many as there are options
     status leave behind, whatever their text. Lines that are only renamed, split or renumbered are shown apart and change nothing.
     For a level the steps of its state graph are compared: which are new, which are gone.
     """
-    from rcsc.diff.revision import NotComparedError
-    from rcsc.solvers.options import Options
-
     asked = _asked(paths, revision)
     options = Options(steps=steps, memory_mb=memory)
     progress = Progress(wanted=not quiet)
@@ -85,7 +82,7 @@ def diff(  # noqa: PLR0913, PLR0917  # as many as there are options
         progress("")
     if isinstance(found, int):
         return found
-    _write(_text(found, form, quiet, _wants_color(color, file)), file)
+    put(_text(found, form, quiet, wants_color(Color(color), file)), file)
     if found.undecided:
         left = ", ".join(what for program in found.programs for what in program.undecided)
         return _refuse(
@@ -94,8 +91,7 @@ def diff(  # noqa: PLR0913, PLR0917  # as many as there are options
     return CHANGED if found.changed else SAME
 
 
-def _asked(paths: tuple[str, ...], revision: str | None) -> "tuple[Given, Given]":
-    from rcsc.diff.sides import given, revisions
+def _asked(paths: tuple[str, ...], revision: str | None) -> tuple[Given, Given]:
 
     if revision is not None:
         return revisions(revision, paths)
@@ -105,12 +101,9 @@ def _asked(paths: tuple[str, ...], revision: str | None) -> "tuple[Given, Given]
 
 
 def _found(
-    asked: "tuple[Given, Given]", options: "Options", progress: Callable[[str], None], follow: bool
-) -> "Difference | int":
+    asked: tuple[Given, Given], options: Options, progress: Callable[[str], None], follow: bool
+) -> Difference | int:
     """The difference, or the status where a side has errors."""
-    from rcsc.diff.compare import difference
-    from rcsc.diff.sides import read
-
     sides = []
     for one in asked:
         progress(f"reading {one.name}")
@@ -120,7 +113,7 @@ def _found(
     return difference(sides[0], sides[1], options, progress, follow=follow)
 
 
-def _wrong(sides: "list[Side]") -> int:
+def _wrong(sides: list[Side]) -> int:
     """Shows what keeps the sides from being compared."""
     every = dict.fromkeys(one for side in sides for one in side.found)
     sources = {name: source for side in sides for name, source in side.sources.items()}
@@ -133,35 +126,10 @@ def _refuse(code: Code, message: str, *helps: str) -> int:
     return ERROR
 
 
-def _text(found: "Difference", form: str, quiet: bool, color: bool) -> str:
-    from rcsc.diagnostics.render import paint, plain
-    from rcsc.diff.jsonform import to_json
-    from rcsc.diff.text import markdown, rows
+def _text(found: Difference, form: str, quiet: bool, color: bool) -> str:
 
     if form == "json":
         return json_text(to_json(found))
     if form == "markdown":
         return markdown(found)
     return (paint if color else plain)(rows(found, quiet=quiet))
-
-
-def _wants_color(color: str, file: Path | None) -> bool:
-    """Source: no-color.org for `NO_COLOR`; `--color` wins over it."""
-    if color != "auto":
-        return color == "always"
-    plain_terminal = os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb"
-    return not plain_terminal and file is None and sys.stdout.isatty()
-
-
-def _write(text: str, file: Path | None) -> None:
-    from rcsc.host.files import write_atomically
-
-    try:
-        if file is None:
-            click.echo(text, nl=False, color=True)
-        else:
-            write_atomically(file, text.encode())
-    except BrokenPipeError:
-        raise
-    except OSError as error:
-        raise UnwritableError(str(file or "standard output"), error.strerror or "no reason given") from error

@@ -1,9 +1,29 @@
-"""What `rcsc explain` prints."""
+"""`rcsc explain`: what a code means."""
 
 from textwrap import fill
 
+import click
+
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.explanations import Explanation, explain, explanations
+
+
+@click.command(
+    "explain",
+    epilog="\b\nExamples:\n  rcsc explain           list the codes\n  rcsc explain RCS402",
+)
+@click.argument("code", required=False)
+def command(code: str | None) -> int:
+    """Say what a finding's CODE means, with an example; without CODE list them all."""
+    if code is None:
+        click.echo(_listing(), nl=False)
+        return 0
+    wanted = code.upper() if code.upper().startswith("RCS") else f"RCS{code}"
+    if wanted not in {one.value for one in Code}:
+        raise click.BadParameter(f"there is no {wanted}; `rcsc explain` lists the codes", param_hint="CODE")
+    click.echo(_page(Code(wanted)), nl=False)
+    return 0
+
 
 _STAGES = {
     "1": "syntax and files",
@@ -17,7 +37,7 @@ _STAGES = {
 }
 
 
-def explanation(code: Code) -> str:
+def _page(code: Code) -> str:
     """One code's page."""
     found = explain(code)
     paragraphs = "\n\n".join(fill(one, 90) for one in found.text.split("\n\n"))
@@ -34,7 +54,7 @@ def _indented(text: str) -> str:
     return "".join(f"    {line}\n" if line else "\n" for line in text.splitlines())
 
 
-def listing() -> str:
+def _listing() -> str:
     """Every code with its title, by stage."""
     lines: list[str] = []
     stage = ""

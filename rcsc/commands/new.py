@@ -1,12 +1,32 @@
-"""The small project that `rcsc new` makes: it checks, compiles and passes its tests as it stands."""
+"""`rcsc new`: a small project, which checks, compiles and passes its tests as it stands."""
 
 import re
+import shlex
 from pathlib import Path
 
+import click
+
+from rcsc.commands.shared.options import showing
+from rcsc.commands.shared.show import Output, finish
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label
+from rcsc.diagnostics.report import Report
 from rcsc.diagnostics.source import Span
 from rcsc.host.files import write_atomically
+
+
+@click.command("new", epilog="\b\nExample:\n  rcsc new gripper && cd gripper && rcsc check")
+@click.argument("folder", type=click.Path(path_type=Path), metavar="DIR")
+@showing
+def command(folder: Path, output: Output) -> int:
+    """Make a small project in DIR, new or empty, that checks, compiles and passes its tests."""
+    made = _scaffold(folder)
+    if not isinstance(made, tuple):
+        return finish(Report((made,)), "new", output)
+    place = shlex.quote(f"./{folder}" if str(folder).startswith("-") else str(folder))
+    closing = f"made {len(made)} files in {folder}; now: cd {place} && rcsc check"
+    return finish(Report(()), "new", output, closing)
+
 
 _PROJECT = """\
 # The root of a project of rcsc tables. `use NAME` looks beside the file, then here.
@@ -79,7 +99,7 @@ _FILES = {
 }
 
 
-def scaffold(folder: Path) -> tuple[Path, ...] | Diagnostic:
+def _scaffold(folder: Path) -> tuple[Path, ...] | Diagnostic:
     """Make the project in `folder`, new or empty; what was written, or why not."""
     name = re.sub(r"\W", "_", folder.resolve().name, flags=re.ASCII) or "robot"
     try:

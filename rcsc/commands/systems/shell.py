@@ -1,27 +1,28 @@
 """`rcsc shell`: a system under somebody's hands."""
 
+import importlib.util
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
-from rcsc.commands.shared.systems import EXECUTOR, stop, system_path
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from rcsc.run.description import Description
-    from rcsc.run.signature import Signature
-    from rcsc.run.system import Kind
-    from rcsc.shell.commands import Commands
-    from rcsc.shell.reload.refusal import Refused
+from rcsc.commands.shared.systems import EXECUTOR, system_path
+from rcsc.run.description import BadDescription, Description, description
+from rcsc.run.signature import Signature
+from rcsc.run.system import Kind, Outside, assemble, signatures
+from rcsc.shell.commands import Commands
+from rcsc.shell.reload.refusal import Refused
+from rcsc.shell.reload.reload import Plant
+from rcsc.shell.session import Session, silent_queries
+from rcsc.shell.terminal import converse, follow
+from rcsc_cell.cell.ready import plant
+from rcsc_cell.workstation.prepared import database_of, needs_cell
 
 
 @click.command(
-    short_help="Run, step and change a system by hand.",
+    "shell",
     epilog="""\b
 Examples:
   rcsc shell                          tables/system.toml, with stand-ins for robot, hand and camera
@@ -44,13 +45,12 @@ In the shell:
 @click.argument(
     "system", required=False, type=click.Path(exists=True, dir_okay=False, path_type=Path), metavar="[SYSTEM]"
 )
-def shell(script: Path | None, executor: str, alone: bool, system: Path | None) -> int:
+def command(script: Path | None, executor: str, alone: bool, system: Path | None) -> int:
     """Run any module, procedure, owner, table or level of SYSTEM by name; look at and set any variable; step, run, undo.
 
     SYSTEM is a system's description; without it, system.toml here or in tables/. Generated executors run, as they are.
     """
     commands = _commands(system_path(system), "c" if executor == "c" else "python", alone)
-    from rcsc.shell.terminal import converse, follow
 
     if script is None and sys.stdin.isatty() and sys.stdout.isatty() and _has_prompt():
         return converse(commands, click.echo, _complain)
@@ -58,37 +58,22 @@ def shell(script: Path | None, executor: str, alone: bool, system: Path | None) 
         return follow(commands, lines, name, click.echo, _complain)
 
 
-def _commands(path: Path, kind: "Kind", alone: bool) -> "Commands":
-    from rcsc.run.description import BadDescription, description
-    from rcsc.run.executors import NotBuilt
-    from rcsc.run.system import Outside, assemble, signatures
-    from rcsc.shell.commands import Commands
-    from rcsc.shell.reload.reload import Plant
-    from rcsc.shell.session import Session, silent_queries
-    from rcsc_cell.cell.ready import plant
-    from rcsc_cell.database.build import BadData
-    from rcsc_cell.workstation.prepared import database_of
+def _commands(path: Path, kind: Kind, alone: bool) -> Commands:
 
-    try:
-        said = description(path)
-        signs = signatures(said)
-        outside: tuple[Outside, ...] = ()
-        if alone or not _is_cell(said, signs):
-            queries = silent_queries(said, signs)
-        else:
-            database = database_of(said, signs)
-            queries, outside = database.queries, (plant(database, "kinematic"),)
-        system = assemble(said, kind, queries, outside)
-        return Commands(Session(system, Plant(path, said, kind, queries)))
-    except (BadDescription, BadData, NotBuilt) as error:
-        stop(error)
+    said = description(path)
+    signs = signatures(said)
+    outside: tuple[Outside, ...] = ()
+    if alone or not _is_cell(said, signs):
+        queries = silent_queries(said, signs)
+    else:
+        database = database_of(said, signs)
+        queries, outside = database.queries, (plant(database, "kinematic"),)
+    system = assemble(said, kind, queries, outside)
+    return Commands(Session(system, Plant(path, said, kind, queries)))
 
 
-def _is_cell(system: "Description", signs: "Mapping[str, Signature]") -> bool:
+def _is_cell(system: Description, signs: Mapping[str, Signature]) -> bool:
     """Whether robot, hand and camera can stand beside the system, and its database be asked."""
-    from rcsc.run.description import BadDescription
-    from rcsc_cell.workstation.prepared import needs_cell
-
     try:
         needs_cell(system, signs)
     except BadDescription:
@@ -97,7 +82,6 @@ def _is_cell(system: "Description", signs: "Mapping[str, Signature]") -> bool:
 
 
 def _has_prompt() -> bool:
-    import importlib.util
 
     return importlib.util.find_spec("prompt_toolkit") is not None
 
@@ -115,7 +99,7 @@ def _lines(script: Path | None) -> Iterator[tuple[Iterator[str], str]]:
     yield iter(text.splitlines()), str(script)
 
 
-def _complain(where: str, refused: "Refused") -> None:
+def _complain(where: str, refused: Refused) -> None:
     """A refusal, as every error is shown."""
     first, *rest = str(refused).splitlines() or [""]
     click.echo(f"{where}error[{refused.code.value}]: {first}", err=True)

@@ -3,16 +3,54 @@
 import io
 import json
 import os
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
+from rich import box
+from rich.console import Console
+from rich.table import Table
 
 from rcsc.commands.shared.extras import need
 from rcsc.commands.shared.options import steps_option
+from rcsc.commands.shared.proved import (
+    as_json,
+    assumptions,
+    claim,
+    confirmed,
+    in_context,
+    left_out,
+    named,
+    not_looked_at,
+    reaction,
+    standing,
+    trusted,
+    trusting,
+)
 from rcsc.commands.shared.show import Progress, UnwritableError
-from rcsc.commands.shared.systems import Stopped, stop, system_path
+from rcsc.commands.shared.systems import system_path
+from rcsc.compose.contract.claims import CONTRACT, SAFE
+from rcsc.compose.contract.obligations import Sort
+from rcsc.compose.contract.transition import TransitionSystem
+from rcsc.compose.contract.variants import VARIANTS
+from rcsc.compose.counterexample.explain import Explanation, TraceSettings, explain, file_name
+from rcsc.compose.counterexample.finding import Finding, rows
+from rcsc.compose.counterexample.frozen import case_breaks, frozen, read_case
+from rcsc.compose.invariant.cubes import shown
+from rcsc.compose.invariant.search import Effort
+from rcsc.compose.proof.level import LevelProof, besides, certificate
+from rcsc.compose.proof.system import (
+    SystemProof,
+    prove_transition_systems,
+    transition_systems,
+)
+from rcsc.diagnostics.codes import Code
+from rcsc.host.cache import open_cache
+from rcsc.host.files import write_atomically
+from rcsc.run.description import description
+from rcsc.solvers.smt import Limits
 
 _WIDTH = 118
 """Columns of a time line."""
@@ -23,20 +61,9 @@ _HARD = "\ue000"
 _WORTH_PROCESSES = 40
 """Lines of the levels' tables from which several processes are quicker than one: each takes a second to begin."""
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
-
-    from rich.table import Table
-
-    from rcsc.compose.contract.transition import TransitionSystem
-    from rcsc.compose.counterexample.explain import Explanation
-    from rcsc.compose.counterexample.finding import Finding
-    from rcsc.compose.proof.level import LevelProof
-    from rcsc.compose.proof.system import SystemProof
-
 
 @click.command(
-    short_help="Prove the levels of a system together, for any delay.",
+    "prove",
     epilog="""\b
 Examples:
   rcsc prove                                   the system in system.toml, here or in tables/
@@ -78,7 +105,7 @@ Examples:
               help="Exit status 1 also where something was not looked at, or rests on what is not proved.")  # fmt: skip
 @click.option("--invariants", is_flag=True, help="Print the invariant of each level, too.")
 @click.option("--json", "as_json", is_flag=True, help="The result as JSON.")
-def prove(  # noqa: PLR0913, PLR0917  # as many as there are options
+def command(  # noqa: PLR0913, PLR0917  # as many as there are options
     system: Path | None, only: tuple[str, ...], steps: int, jobs: int | None, cycles: int, logs: Path | None,
     freeze: Path | None, cases: tuple[Path, ...], without_deferral: bool, first_match: bool, without_default: bool,
     certificate: Path | None, confirms: bool, no_cache: bool, progress: bool, strict: bool, invariants: bool, as_json: bool,
@@ -89,25 +116,12 @@ def prove(  # noqa: PLR0913, PLR0917  # as many as there are options
     answer of the database. What it assumes of a neighbour is proved of that neighbour. Printed: each
     assumption with its new standing, what is guaranteed between levels, and for what fails the shortest run that shows it.
     """
-    from rcsc.compose.contract.variants import VARIANTS
-    from rcsc.compose.invariant.search import Effort
-    from rcsc.compose.proof.system import NoProgramError, prove_transition_systems, transition_systems
-    from rcsc.diagnostics.codes import Code
-    from rcsc.host.cache import open_cache
-    from rcsc.run.description import BadDescription
-    from rcsc.solvers.smt import Limits
-
     for extra in (*(["certify"] if confirms else []), *(["log"] if logs else [])):
         need(extra)
     if cases:
         return _again(cases)
     path = system_path(system)
-    try:
-        made = transition_systems(path)
-    except NoProgramError as error:
-        raise Stopped(Code.BAD_SYSTEM, str(error)) from error
-    except BadDescription as error:
-        stop(error)
+    made = transition_systems(path)
     unknown = [name for name in only if name not in made]
     if unknown:
         raise click.UsageError(f"there is no level `{unknown[0]}`; there are {', '.join(made)}")
@@ -146,7 +160,7 @@ def prove(  # noqa: PLR0913, PLR0917  # as many as there are options
     return 0 if proof.whole or (proof.proved and not strict) else 1
 
 
-def _jobs(levels: "Iterable[TransitionSystem]") -> int:
+def _jobs(levels: Iterable[TransitionSystem]) -> int:
     """How many levels to prove at once where nobody says."""
     lines = sum(len(table.lines) for one in levels for table in one.program.tables)
     return min(2, os.cpu_count() or 1) if lines >= _WORTH_PROCESSES else 1
@@ -155,12 +169,12 @@ def _jobs(levels: "Iterable[TransitionSystem]") -> int:
 class _Said:
     """Says each level on standard error as it is done, and on a terminal those that are still to come."""
 
-    def __init__(self, names: "Sequence[str]", *, wanted: bool) -> None:
+    def __init__(self, names: Sequence[str], *, wanted: bool) -> None:
         self._left = list(names)
         self._line = Progress()
         self._wanted = wanted or self._line.shown
 
-    def __enter__(self) -> "Callable[[LevelProof], None]":
+    def __enter__(self) -> Callable[[LevelProof], None]:
         self._doing()
         return self._done
 
@@ -170,7 +184,7 @@ class _Said:
     def _doing(self) -> None:
         self._line(f"proving {', '.join(self._left)}" if self._left else "")
 
-    def _done(self, proof: "LevelProof") -> None:
+    def _done(self, proof: LevelProof) -> None:
         self._line("")
         found = f"{len(proof.found) - len(proof.open)} of {len(proof.found)} found proved"
         if self._wanted:
@@ -179,11 +193,8 @@ class _Said:
         self._doing()
 
 
-def _refused(made: "dict[str, TransitionSystem]", proof: "SystemProof", *, quiet: bool) -> list[str]:
+def _refused(made: dict[str, TransitionSystem], proof: SystemProof, *, quiet: bool) -> list[str]:
     """Questions that cvc5 does not answer as Z3 did; says how many there were."""
-    from rcsc.commands.shared.proved import confirmed
-    from rcsc.diagnostics.codes import Code
-
     refused = []
     for one in proof.levels:
         answers = confirmed(made[one.level], one)
@@ -199,12 +210,8 @@ def _refused(made: "dict[str, TransitionSystem]", proof: "SystemProof", *, quiet
     return refused
 
 
-def _say_level(whole: "SystemProof", proof: "LevelProof") -> None:
+def _say_level(whole: SystemProof, proof: LevelProof) -> None:
     """One level: its assumptions first, then what else is proved of it, each with what it rests on that is not."""
-    from rcsc.commands.shared.proved import in_context, not_looked_at, standing, trusting
-    from rcsc.compose.contract.obligations import Sort
-    from rcsc.compose.proof.level import besides
-
     found_before = ", by an earlier run" if proof.cached else ""
     click.echo(click.style(f"level {proof.level}", bold=True) + f"  {proof.seconds:.1f} s{found_before}")
     for sort in Sort:
@@ -242,8 +249,7 @@ def _say_level(whole: "SystemProof", proof: "LevelProof") -> None:
         click.echo(f"  {line}")
 
 
-def _say_invariants(proof: "SystemProof") -> None:
-    from rcsc.compose.invariant.cubes import shown
+def _say_invariants(proof: SystemProof) -> None:
 
     for one in proof.levels:
         click.echo(f"invariant of level {one.level}: never")
@@ -251,17 +257,14 @@ def _say_invariants(proof: "SystemProof") -> None:
             click.echo(f"  {shown(one.predicates, clause)}")
 
 
-def _say_whole(made: "dict[str, TransitionSystem]", proof: "SystemProof") -> None:
-    from rcsc.commands.shared.proved import assumptions, left_out, reaction, trusted
+def _say_whole(made: dict[str, TransitionSystem], proof: SystemProof) -> None:
 
     for line in (*reaction(made, proof), assumptions(proof), *trusted(proof), *left_out(proof)):
         click.echo(line)
     click.echo(f"{proof.seconds:.1f} s in all")
 
 
-def _say_agreements(proof: "SystemProof") -> None:
-    from rcsc.commands.shared.proved import named
-    from rcsc.compose.contract.claims import CONTRACT
+def _say_agreements(proof: SystemProof) -> None:
 
     if proof.agreements:
         click.echo("between the levels")
@@ -284,17 +287,13 @@ class _Keep:
 
 
 def _look(
-    made: "dict[str, TransitionSystem]",
-    proof: "SystemProof",
+    made: dict[str, TransitionSystem],
+    proof: SystemProof,
     cycles: int,
     keep: _Keep,
-    say: "Callable[[dict[str, TransitionSystem], Explanation, int], None] | None",
-) -> "list[Explanation]":
+    say: Callable[[dict[str, TransitionSystem], Explanation, int], None] | None,
+) -> list[Explanation]:
     """What is not proved, each with its shortest trace where there is one."""
-    from rcsc.compose.counterexample.explain import TraceSettings, explain
-    from rcsc.run.description import description
-    from rcsc.run.executors import NotBuilt
-
     settings = TraceSettings(description(keep.system), cycles, altered=bool(keep.variants), log=keep.logs)
     found = []
     try:
@@ -308,16 +307,10 @@ def _look(
         raise UnwritableError(
             str(error.filename or keep.logs), error.strerror or "no reason given"
         ) from error
-    except NotBuilt as error:
-        stop(error)
     return found
 
 
-def _freeze(made: "dict[str, TransitionSystem]", finding: "Finding", folder: Path, keep: _Keep) -> None:
-    from rcsc.compose.counterexample.explain import file_name
-    from rcsc.compose.counterexample.frozen import frozen
-    from rcsc.host.files import write_atomically
-    from rcsc.run.description import description
+def _freeze(made: dict[str, TransitionSystem], finding: Finding, folder: Path, keep: _Keep) -> None:
 
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"{description(keep.system).name}_{file_name(finding)}.json"
@@ -326,16 +319,10 @@ def _freeze(made: "dict[str, TransitionSystem]", finding: "Finding", folder: Pat
 
 def _again(cases: tuple[Path, ...]) -> int:
     """Runs frozen cases."""
-    from rcsc.compose.counterexample.frozen import BadCaseError, case_breaks, read_case
-    from rcsc.diagnostics.codes import Code
-
     wrong = 0
     for path in cases:
-        try:
-            case = read_case(path)
-            breaks = case_breaks(case)
-        except BadCaseError as error:
-            raise Stopped(Code.BAD_CASE, str(error)) from error
+        case = read_case(path)
+        breaks = case_breaks(case)
         said = f"level `{case.level}`: {case.obligation.shown}: {'broken' if breaks else 'kept'}"
         if breaks is case.expects_broken:
             click.echo(f"{path}: {said}")
@@ -345,11 +332,8 @@ def _again(cases: tuple[Path, ...]) -> int:
     return 1 if wrong else 0
 
 
-def _say_told(made: "dict[str, TransitionSystem]", explanation: "Explanation", cycles: int) -> None:
+def _say_told(made: dict[str, TransitionSystem], explanation: Explanation, cycles: int) -> None:
     """One thing that is not proved; runs of as many cycles were looked for."""
-    from rcsc.compose.contract.claims import SAFE
-    from rcsc.diagnostics.codes import Code
-
     where = f"level `{explanation.level}`" + (
         f", table `{explanation.obligation.table}`" if explanation.obligation.table else ""
     )
@@ -398,10 +382,8 @@ def _say_told(made: "dict[str, TransitionSystem]", explanation: "Explanation", c
         click.echo(f"  = picture: rcsc log {explanation.log} --report {page}", err=True)
 
 
-def _stated(made: "dict[str, TransitionSystem]", explanation: "Explanation") -> str:
+def _stated(made: dict[str, TransitionSystem], explanation: Explanation) -> str:
     """What a property says, as it is written; empty for what is none."""
-    from rcsc.compose.contract.obligations import Sort
-
     if explanation.obligation.sort is not Sort.PROPERTY:
         return ""
     return next(
@@ -411,12 +393,8 @@ def _stated(made: "dict[str, TransitionSystem]", explanation: "Explanation") -> 
     )
 
 
-def _say_finding(made: "dict[str, TransitionSystem]", finding: "Finding", *, in_c: bool) -> None:
+def _say_finding(made: dict[str, TransitionSystem], finding: Finding, *, in_c: bool) -> None:
     """The time line."""
-    from rich.console import Console
-
-    from rcsc.compose.contract.claims import SAFE
-
     begins = ", after a restart" if finding.restarted else ""
     legal = "" if finding.legal else "; numbers have gone round, or a neighbour was restarted"
     run_by = "as the interpreter, the Python and the C executors run it"
@@ -438,13 +416,8 @@ def _say_finding(made: "dict[str, TransitionSystem]", finding: "Finding", *, in_
         )
 
 
-def _time_line(made: "dict[str, TransitionSystem]", finding: "Finding") -> "Table":
+def _time_line(made: dict[str, TransitionSystem], finding: Finding) -> Table:
     """A row a cycle: the line that matched, the inputs that changed, what else changed, and what went wrong."""
-    from rich import box
-    from rich.table import Table
-
-    from rcsc.compose.counterexample.finding import rows
-
     several = len(finding.levels) > 1
     table = Table(box=box.ASCII2, show_lines=True, pad_edge=False)
     for heading in ("cycle", *(("level",) if several else ()), "table: line", "takes", "leaves"):
@@ -464,8 +437,7 @@ def _unbroken(text: str) -> str:
     return text.replace(" ", _HARD) if len(text) <= _LONG else text
 
 
-def _say_not_agreed(proof: "SystemProof") -> None:
-    from rcsc.diagnostics.codes import Code
+def _say_not_agreed(proof: SystemProof) -> None:
 
     for one in proof.agreements:
         if not one.holds:
@@ -474,9 +446,7 @@ def _say_not_agreed(proof: "SystemProof") -> None:
             )
 
 
-def _write(folder: Path, made: "dict[str, TransitionSystem]", proof: "SystemProof") -> None:
-    from rcsc.compose.proof.level import certificate
-    from rcsc.host.files import write_atomically
+def _write(folder: Path, made: dict[str, TransitionSystem], proof: SystemProof) -> None:
 
     folder.mkdir(parents=True, exist_ok=True)
     for one in proof.levels:
@@ -485,9 +455,8 @@ def _write(folder: Path, made: "dict[str, TransitionSystem]", proof: "SystemProo
 
 
 def _as_json(
-    proof: "SystemProof", made: "dict[str, TransitionSystem]", explanation: "list[Explanation]"
+    proof: SystemProof, made: dict[str, TransitionSystem], explanation: list[Explanation]
 ) -> dict[str, Any]:
-    from rcsc.commands.shared.proved import as_json, claim
 
     return {
         "proved": proof.proved,
@@ -527,10 +496,7 @@ def _as_json(
     }
 
 
-def _told_as_json(made: "dict[str, TransitionSystem]", explanation: "Explanation") -> dict[str, Any]:
-    from dataclasses import asdict
-
-    from rcsc.compose.counterexample.finding import rows
+def _told_as_json(made: dict[str, TransitionSystem], explanation: Explanation) -> dict[str, Any]:
 
     found = explanation.finding
     return {

@@ -3,23 +3,29 @@
 import json
 import sys
 import time
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 import click
 
-from rcsc.commands.shared.extras import need
 from rcsc.commands.shared.options import cores
-from rcsc.commands.shared.show import Progress, UnwritableError
-from rcsc.commands.shared.systems import SYSTEM, Stopped, compiled, stop, system_path
+from rcsc.commands.shared.show import Progress, put, writing
+from rcsc.commands.shared.systems import SYSTEM, compiled, system_path
 from rcsc.diagnostics.codes import Code
-
-if TYPE_CHECKING:
-    from rcsc_cell.campaign.journal import Journal, Record
-    from rcsc_cell.campaign.rig import Rig
-    from rcsc_cell.campaign.worker_pool import WorkerPool
+from rcsc_cell.campaign.counterexamples import (
+    MOST,
+    again,
+    choices,
+    counterexamples,
+    is_saved,
+    save,
+)
+from rcsc_cell.campaign.journal import Journal, Record, header, journal_path
+from rcsc_cell.campaign.rig import Rig, known_lines
+from rcsc_cell.campaign.runner import campaign as play
+from rcsc_cell.campaign.summary import as_json, as_text, summary
+from rcsc_cell.campaign.worker_pool import WorkerPool, cluster, processes
+from rcsc_cell.episodes.episode import FAULTS
 
 _TO = click.Path(dir_okay=False, path_type=Path)
 _TERMINAL_S, _PLAIN_S = 1.0, 10.0
@@ -27,7 +33,7 @@ _TERMINAL_S, _PLAIN_S = 1.0, 10.0
 
 
 @click.command(
-    short_help="Run many episodes of the cell, with faults; shrink what breaks a property.",
+    "campaign",
     epilog="""\b
 Examples:
   rcsc campaign --episodes 1000 --seed 7         a thousand episodes without physics; again: goes on, or adds
@@ -63,7 +69,7 @@ Exit status: 0 every property held, 1 one did not, 2 usage, 3 a bug in rcsc.""",
               help="Run a saved episode, and nothing else; 1 if a property does not hold.")  # fmt: skip
 @click.option("--compile/--no-compile", "compiles", default=True, show_default=True,
               help="Prove and compile what changed before anything moves.")  # fmt: skip
-def campaign(  # noqa: PLR0913, PLR0917  # as many as there are options
+def command(  # noqa: PLR0913, PLR0917  # as many as there are options
     episodes: int, workers: int | None, seed: int, backend: str, executor: str | None, system: Path | None,
     journal: Path | None, save: Path, json_: Path | None, limit_s: float, scheduler: str | None, again: Path | None,
     compiles: bool,
@@ -76,43 +82,16 @@ def campaign(  # noqa: PLR0913, PLR0917  # as many as there are options
     """
     if scheduler is not None and workers is not None:
         raise click.UsageError("--workers are processes here; with --scheduler the cluster's are taken")
-    need("cell")
-    with _coded():
-        rig = _rig(system_path(system), backend, executor, limit_s)
-        if compiles and not compiled(rig.system, quiet=True):
-            return 1
-        if again is not None:
-            return _again(again, rig, executor)
-        pool = _pool(scheduler, workers or cores())
-        return _campaign(rig, seed, episodes, pool, _journal(rig, seed, journal), save, json_)
+    rig = _rig(system_path(system), backend, executor, limit_s)
+    if compiles and not compiled(rig.system, quiet=True):
+        return 1
+    if again is not None:
+        return _again(again, rig, executor)
+    pool = _pool(scheduler, workers or cores())
+    return _campaign(rig, seed, episodes, pool, _journal(rig, seed, journal), save, json_)
 
 
-@contextmanager
-def _coded() -> Iterator[None]:
-    """What can go wrong with a campaign, as coded errors."""
-    from rcsc.run.description import BadDescription
-    from rcsc.run.executors import NotBuilt
-    from rcsc_cell.campaign.counterexamples import BadEpisode
-    from rcsc_cell.campaign.journal import BadJournal
-    from rcsc_cell.campaign.work import OtherTables
-    from rcsc_cell.campaign.worker_pool import WorkersGone
-    from rcsc_cell.database.build import BadData
-
-    try:
-        yield
-    except BadJournal as error:
-        raise Stopped(Code.BAD_JOURNAL, str(error), "name another file with --journal") from error
-    except BadEpisode as error:
-        raise Stopped(Code.BAD_EPISODE, str(error)) from error
-    except (WorkersGone, OtherTables) as error:
-        said = "what is done is kept: the same command goes on from there"
-        raise Stopped(Code.WORKERS_GONE, str(error), said) from error
-    except (BadDescription, BadData, NotBuilt) as error:
-        stop(error)
-
-
-def _rig(path: Path, backend: str, executor: str | None, limit_s: float) -> "Rig":
-    from rcsc_cell.campaign.rig import Rig
+def _rig(path: Path, backend: str, executor: str | None, limit_s: float) -> Rig:
 
     return Rig(
         "mujoco" if backend == "mujoco" else "kinematic",
@@ -122,29 +101,23 @@ def _rig(path: Path, backend: str, executor: str | None, limit_s: float) -> "Rig
     )
 
 
-def _pool(scheduler: str | None, workers: int) -> AbstractContextManager["WorkerPool"]:
-    from rcsc_cell.campaign.worker_pool import cluster, processes
+def _pool(scheduler: str | None, workers: int) -> AbstractContextManager[WorkerPool]:
 
     return processes(workers) if scheduler is None else cluster(scheduler)
 
 
-def _journal(rig: "Rig", seed: int, path: Path | None) -> "Journal":
-    from rcsc_cell.campaign.journal import Journal, header, journal_path
+def _journal(rig: Rig, seed: int, path: Path | None) -> Journal:
 
     place = path or journal_path(rig, seed, rig.system.parent / ".rcsc-cache")
-    try:
+    with writing(place):
         return Journal(place, header(rig, seed))
-    except OSError as error:
-        raise UnwritableError(str(place), error.strerror or "no reason given") from error
 
 
 def _campaign(  # as many as there are options
-    rig: "Rig", seed: int, episodes: int, hired: AbstractContextManager["WorkerPool"], journal: "Journal", save: Path,
+    rig: Rig, seed: int, episodes: int, hired: AbstractContextManager[WorkerPool], journal: Journal, save: Path,
     json_: Path | None,
 ) -> int:  # fmt: skip
     """Plays, sums up, and saves counterexamples."""
-    from rcsc_cell.campaign.runner import campaign as play
-
     with journal, hired as pool:
         said = _Told(episodes, [one for at, one in journal.records.items() if at < episodes])
         try:
@@ -168,7 +141,7 @@ def _campaign(  # as many as there are options
 class _Told:
     """Progress, now and then on standard error."""
 
-    def __init__(self, wanted: int, known: list["Record"]) -> None:
+    def __init__(self, wanted: int, known: list[Record]) -> None:
         self._wanted, self._known, self._done = wanted, len(known), len(known)
         self._findings = sum(bool(one.findings) for one in known)
         self._progress = Progress()
@@ -186,7 +159,7 @@ class _Told:
         """Since the campaign began or went on."""
         return time.monotonic() - self._begun
 
-    def __call__(self, records: tuple["Record", ...]) -> None:
+    def __call__(self, records: tuple[Record, ...]) -> None:
         """Takes what came in."""
         self._done += len(records)
         self._findings += sum(bool(one.findings) for one in records)
@@ -194,10 +167,10 @@ class _Told:
         now = time.monotonic()
         if now - self._last >= (_TERMINAL_S if self._terminal else _PLAIN_S):
             self._last = now
-            say: Callable[[str], Any] = (
-                self._progress if self._terminal else lambda line: click.echo(line, err=True)
-            )
-            say(self._line())
+            if self._terminal:
+                self._progress(self._line())
+            else:
+                click.echo(self._line(), err=True)
 
     def _line(self) -> str:
         rate = self.here / max(self.seconds, 1e-9)
@@ -215,11 +188,7 @@ def _clock(seconds: float) -> str:
     return f"{hours}:{minutes:02}:{rest:02}" if hours else f"{minutes}:{rest:02}"
 
 
-def _sum_up(rig: "Rig", records: list["Record"], said: _Told, json_: Path | None) -> None:
-    from rcsc.host.files import write_atomically
-    from rcsc_cell.campaign.rig import known_lines
-    from rcsc_cell.campaign.summary import as_json, as_text, summary
-    from rcsc_cell.episodes.episode import FAULTS
+def _sum_up(rig: Rig, records: list[Record], said: _Told, json_: Path | None) -> None:
 
     found = summary(records, known_lines(rig.system), tuple(FAULTS))
     seconds = max(said.seconds, 1e-9)
@@ -231,29 +200,20 @@ def _sum_up(rig: "Rig", records: list["Record"], said: _Told, json_: Path | None
     if json_ is None:
         return
     clock = {"played_now": said.here, "seconds": round(seconds, 3), "episodes_a_second": said.here / seconds}
-    try:
-        write_atomically(json_, (json.dumps(as_json(found) | clock, indent=1) + "\n").encode())
-    except OSError as error:
-        raise UnwritableError(str(json_), error.strerror or "no reason given") from error
+    put(json.dumps(as_json(found) | clock, indent=1) + "\n", json_)
     click.echo(f"wrote {json_}")
 
 
-def _save(rig: "Rig", seed: int, records: list["Record"], pool: "WorkerPool", folder: Path) -> None:
+def _save(rig: Rig, seed: int, records: list[Record], pool: WorkerPool, folder: Path) -> None:
     """Shrinks and saves what is not saved already, and says what to type."""
-    from rcsc_cell.campaign.counterexamples import MOST, choices, counterexamples, is_saved, save
-
     chosen = choices(records)
     wanted = [one for one in chosen[:MOST] if not is_saved(folder, rig, seed, one)]
     for one in chosen[:MOST]:
         if one not in wanted:
             click.echo(f"saved before: {folder / one.name(seed)}")
     for one, made in counterexamples(rig, seed, wanted, pool):
-        try:
+        with writing(folder / one.name(seed)):
             place = save(folder, rig, seed, one, made)
-        except OSError as error:
-            raise UnwritableError(
-                str(folder / one.name(seed)), error.strerror or "no reason given"
-            ) from error
         _tell(f"episode {one.index}", made.found.property, made.found.tick, made.found.said)
         click.echo(f"  = help: rcsc campaign --again {place}", err=True)
         if made.log:
@@ -269,8 +229,7 @@ def _tell(where: str, name: str, tick: int, said: str) -> None:
     )
 
 
-def _again(path: Path, rig: "Rig", executor: str | None) -> int:
-    from rcsc_cell.campaign.counterexamples import again
+def _again(path: Path, rig: Rig, executor: str | None) -> int:
 
     outcome = again(path, rig, None if executor is None else rig.executor)
     for number, text, state, reason, ticks in outcome.rows:

@@ -1,0 +1,58 @@
+"""What `rcsc graph` and `rcsc table` share: a table by its name, what was wrong, and where the text goes."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import click
+
+from rcsc.commands.shared.options import steps_option
+from rcsc.commands.shared.show import Output, show, writing
+from rcsc.diagnostics.diagnostic import Diagnostic, sort_key
+from rcsc.diagnostics.report import Report
+from rcsc.diagnostics.source import Source
+from rcsc.graph.find import Found, NotFound, tables
+from rcsc.host.files import write_atomically
+
+ENDINGS = {"svg": ".svg", "dot": ".dot", "mermaid": ".mmd", "scxml": ".scxml"}
+STEPS = steps_option(20)
+OUT = click.option("-o", "--output", "out", type=click.Path(path_type=Path), default=None, metavar="FILE",
+                    help="Write to FILE instead of standard output.")  # fmt: skip
+
+
+class WrongError(Exception):
+    """What is wrong, to be shown; the texts that it points into."""
+
+    def __init__(self, found: tuple[Diagnostic, ...], sources: Mapping[str, Source] | None = None) -> None:
+        super().__init__(found)
+        self.found, self.sources = found, sources or {}
+
+    def shown(self, command: str) -> int:
+        """Shows it; the exit status."""
+        show(
+            Report(tuple(sorted(set(self.found), key=sort_key)), sources=self.sources),
+            command,
+            Output(quiet=True),
+        )
+        return 1
+
+
+def found_tables(named: str, *, running: bool = False) -> list[Found]:
+    """The tables that are named.
+
+    Raises:
+        WrongError: There are none, or their files are not in order.
+    """
+    found = tables(named, running=running)
+    if isinstance(found, NotFound):
+        raise WrongError(found.found, found.sources)
+    return found
+
+
+def written(text: str, out: Path | None) -> None:
+    """To a file, whole or not at all, or to standard output."""
+    if out is None:
+        click.echo(text, nl=False)
+        return
+    with writing(out):
+        out.parent.mkdir(parents=True, exist_ok=True)
+        write_atomically(out, text.encode())

@@ -1,0 +1,45 @@
+"""How a command ends that cannot go on: the code, what is wrong, what helps, and exit status 1."""
+
+import click
+
+from rcsc.diagnostics.coded import CodedError
+from rcsc.diagnostics.codes import Code
+from rcsc.diagnostics.render import full, plain
+from rcsc.host.described import BadFile
+
+
+class Stopped(click.ClickException):  # what happened
+    """A coded error of a run; exit status 1."""
+
+    status = 1
+
+    def __init__(self, code: Code, message: str, *helps: str) -> None:
+        super().__init__(message)
+        self.code, self.helps = code, helps
+
+    def show(self, file: object = None) -> None:  # noqa: ARG002  # click's signature
+        """The error, as every other is shown."""
+        for line in self.message.splitlines():
+            click.echo(f"error[{self.code.value}]: {line}", err=True)
+        for one in self.helps:
+            click.echo(f"  = help: {one}", err=True)
+
+
+class StoppedByFile(Stopped):
+    """The faults of a description or a data file, each with its place."""
+
+    def __init__(self, error: BadFile) -> None:
+        super().__init__(error.code, str(error))
+        self.found, self.sources = error.found, error.sources
+
+    def show(self, file: object = None) -> None:  # noqa: ARG002  # click's signature
+        """Each fault, with the line it stands in."""
+        for one in self.found:
+            click.echo(plain(full(one, self.sources)), err=True)
+
+
+def stopped(error: CodedError) -> Stopped:
+    """The end of a command that met the error."""
+    if isinstance(error, BadFile) and error.found:
+        return StoppedByFile(error)
+    return Stopped(error.code, error.shown, *error.helps)

@@ -1,0 +1,128 @@
+"""`rcsc db`: the cell's database."""
+
+from pathlib import Path
+
+import click
+
+from rcsc.commands.shared.options import showing
+from rcsc.commands.shared.show import Form, Output
+from rcsc.commands.shared.show import show as show_report
+from rcsc.commands.shared.systems import DATABASE, SYSTEM, system_path
+from rcsc.diagnostics.coded import CodedError
+from rcsc.diagnostics.diagnostic import Diagnostic, Label
+from rcsc.diagnostics.printable import escape
+from rcsc.diagnostics.report import Report
+from rcsc.diagnostics.source import Span
+from rcsc.host.cache import open_cache
+from rcsc.host.children import scratch
+from rcsc.host.described import BadFile
+from rcsc.run.description import description
+from rcsc.run.system import signatures
+from rcsc_cell.cell.reach import checked
+from rcsc_cell.database.ask import open_database, tables_of
+from rcsc_cell.database.build import build as build_database
+from rcsc_cell.workstation.prepared import database_of, database_path, limits_of, needs_data, parts_of
+
+
+@click.group(
+    "db",
+    epilog="""\b
+Examples:
+  rcsc db check           every reference resolves, every pose is within reach
+  rcsc db show places     a table of it""",
+)
+def command() -> None:
+    """Build, check and show the cell's database.
+
+    Where things are, how parts are gripped and how the robot moves is data: when it changes nothing is compiled again.
+    """
+
+
+@command.command(short_help="Make the database of the data file.")
+@SYSTEM
+@click.option("-o", "--output", type=click.Path(dir_okay=False, path_type=Path), default=None, metavar="FILE",
+              help="Where it goes.")  # fmt: skip
+def build(system: Path | None, output: Path | None) -> int:
+    """Make the database; nothing is written when the data is not in order."""
+    click.echo(f"database made of the data: {_built(system, output, writes=True)}")
+    return 0
+
+
+@command.command(short_help="Check the data: every reference resolves, every pose is within reach.")
+@SYSTEM
+@showing
+def check(system: Path | None, output: Output) -> int:
+    """Check the description and the data file; every fault is named, with its line."""
+    try:
+        _built(system, None, writes=False)
+        report = _report(None)
+    except CodedError as error:
+        if output.form is Form.TEXT and output.file is None:
+            raise
+        report = _report(error)
+    if output.form is Form.TEXT and output.file is None:
+        click.echo("the data is in order")
+    else:
+        show_report(report, "db check", output)
+    return 1 if report.failed else 0
+
+
+def _report(error: CodedError | None) -> Report:
+    """What is wrong, for a form that a program reads."""
+    if error is None:
+        return Report(())
+    if isinstance(error, BadFile) and error.found:
+        return Report(error.found, sources=error.sources)
+    found = (
+        Diagnostic(error.code, line, Label(Span("", 0, 0)), help=error.helps)
+        for line in error.shown.splitlines()
+    )
+    return Report(tuple(found))
+
+
+def _built(system: Path | None, output: Path | None, *, writes: bool) -> Path:
+    """Makes the database where it harms nobody, has the arm go everywhere in it, and only then writes it; where to."""
+    path = system_path(system)
+    said = description(path)
+    signs = signatures(said)
+    needs_data(said)
+    parts, limits = parts_of(signs), limits_of(said, signs)
+    target = output or database_path(said)
+    with scratch("db") as folder:
+        tried = folder / "cell.sqlite"
+        build_database(said.database, tried, parts, limits)
+        checked(open_database(tried), open_cache(path.parent) if writes else None)
+    if writes:
+        build_database(said.database, target, parts, limits)
+    return target
+
+
+@command.command(short_help="Show what the database says.")
+@SYSTEM
+@DATABASE
+@click.argument("table", required=False, metavar="[TABLE]")
+def show(system: Path | None, database: Path | None, table: str | None) -> int:
+    """Show a TABLE of the database, or how many rows each has."""
+    said = description(system_path(system))
+    database_of(said, signatures(said), database)
+    held = tables_of(database or database_path(said))
+    if table is None:
+        for name in sorted(held):
+            click.echo(f"{name:14}{len(held[name].rows):6} rows")
+        return 0
+    if table not in held:
+        raise click.BadParameter(f"choose from {', '.join(sorted(held))}", param_hint="TABLE")
+    click.echo("\t".join(held[table].columns))
+    for row in held[table].rows:
+        click.echo("\t".join(_shown(value) for value in row))
+    return 0
+
+
+MOST_SHOWN = 400
+"""Characters of a value that `db show` prints."""
+
+
+def _shown(value: object) -> str:
+
+    text = "" if value is None else str(value)
+    return escape(text[:MOST_SHOWN]) + ("..." if len(text) > MOST_SHOWN else "")

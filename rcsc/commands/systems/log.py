@@ -1,0 +1,200 @@
+"""`rcsc log`: what a recorded run did."""
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+import click
+
+from rcsc.commands.shared.logs import FILE, SHOWN, refuse, told
+from rcsc.commands.shared.show import writing
+from rcsc.commands.shared.systems import NoSystem, system_path
+from rcsc.diagnostics.codes import Code
+from rcsc.host.files import write_atomically
+from rcsc.run.description import BadDescription, description
+from rcsc.run.log import export
+from rcsc.run.log.export import coverage
+from rcsc.run.log.plot import plot as draw
+from rcsc.run.log.read import Log, LoggedLevel, read
+from rcsc.run.log.records import Seal
+from rcsc.run.log.states import begun_in_words, fault_in_words
+from rcsc.run.system import signatures
+from rcsc_cell.database.build import BadData
+from rcsc_cell.pictures.finding_page import trace
+from rcsc_cell.pictures.scene import Cell, cell, same_system
+from rcsc_cell.workstation.prepared import database_of
+
+_TO = click.Path(dir_okay=False, path_type=Path)
+
+
+@click.command(
+    "log",
+    epilog="""\b
+Examples:
+  rcsc log run.mcap                                ticks, levels, and how often each line ran
+  rcsc log run.mcap --csv run.csv --json run.json  every cycle, in the tables' words
+  rcsc log run.mcap --plot task.cur_state,primitive.travelled_mm -o run.svg
+  rcsc log run.mcap --plot primitive.robot.plate[1] --against primitive.robot.plate[0] -o path.svg
+  rcsc log found/task_waits_to_emove.mcap --report waits.html   what `rcsc prove --log found` found, cycle by cycle""",
+)
+@FILE
+@click.option("--csv", type=_TO, default=None, metavar="OUT", help="Write a row a tick to OUT.")
+@click.option(
+    "--json", "json_", type=_TO, default=None, metavar="OUT", help="Write every cycle to OUT as JSON."
+)
+@click.option("--parquet", type=_TO, default=None, metavar="OUT",
+              help="Write a row a tick to OUT as Parquet; needs the extra `parquet`.")  # fmt: skip
+@click.option("--plot", default=None, metavar="VAR[,VAR...]",
+              help="Draw these, `level.leaf`, over time; needs -o and the extra `plot`.")  # fmt: skip
+@click.option("--against", default=None, metavar="VAR", help="Draw them over VAR instead.")
+@click.option("-o", "--output", type=_TO, default=None, metavar="PICTURE", help="Where: .svg, .png or .pdf.")
+@click.option("--report", type=_TO, default=None, metavar="PAGE",
+              help="Write a page about a finding of `rcsc prove --log`: its levels and the cell, cycle by cycle.")  # fmt: skip
+@click.option("--system", type=click.Path(exists=True, dir_okay=False, path_type=Path), default=None, metavar="FILE",
+              help="For --report: the system whose cell is drawn; else system.toml here or in tables/, if it is the log's.")  # fmt: skip
+@told
+def command(  # noqa: PLR0913  # as many as there are options
+    *, file: Path, csv: Path | None, json_: Path | None, parquet: Path | None, plot: str | None,
+    against: str | None, output: Path | None, report: Path | None, system: Path | None,
+) -> int:  # fmt: skip
+    """Say what the run recorded in FILE did: its ticks, its levels, and which lines of which tables ran.
+
+    A log that was cut off, by a kill or a full disk, is read as far as it goes; one that has changed, as far as it is what was recorded.
+    """
+    _check_plot(plot, against, output)
+    if system is not None and report is None:
+        raise click.UsageError("--system needs --report")
+    found = read(file)
+    if report is not None and found.finding is None:
+        return refuse(
+            file, Code.NO_FINDING, "the log keeps no finding of `rcsc prove`, of which a page could be made",
+            help_="`rcsc run SCRIPT --report PAGE` makes one of a run in the cell; `--plot` draws values of its log",
+        )  # fmt: skip
+    exported = _exported(found, csv, json_, parquet)
+    if plot is not None and output is not None:
+        _written(output, lambda: draw(found, [one.strip() for one in plot.split(",")], output, against))
+        exported.append(output)
+    if report is not None:
+        _report(report, found, system)
+        exported.append(report)
+    for path in exported:
+        click.echo(f"wrote {path}")
+    if not exported:
+        _summary(found)
+    return _changed(file, found)
+
+
+def _changed(file: Path, found: Log) -> int:
+    """What is no longer as it was recorded; a log that a kill has cut is read as far as it goes."""
+    if found.checked.seal is not Seal.CHANGED:
+        return 0
+    return refuse(file, Code.LOG_NOT_WHOLE, f"the log is {found.checked.said}")
+
+
+def _check_plot(plot: str | None, against: str | None, output: Path | None) -> None:
+    if (plot is None) != (output is None):
+        raise click.UsageError("--plot and -o go together")
+    if against is not None and plot is None:
+        raise click.UsageError("--against needs --plot")
+    if output is not None and output.suffix not in {".svg", ".png", ".pdf"}:
+        raise click.BadParameter("choose .svg, .png or .pdf", param_hint="-o")
+
+
+def _exported(found: Log, csv: Path | None, json_: Path | None, parquet: Path | None) -> list[Path]:
+    """Writes what was asked for; where."""
+    written = []
+    for path, text in ((csv, export.csv_text), (json_, export.json_text)):
+        if path is not None:
+            content = text(found).encode()
+            _written(path, partial(write_atomically, path, content))
+            written.append(path)
+    if parquet is not None:
+        _written(parquet, lambda: export.write_parquet(found, parquet))
+        written.append(parquet)
+    return written
+
+
+def _written(path: Path, write: Callable[[], object]) -> None:
+    with writing(path):
+        write()
+
+
+def _report(path: Path, found: Log, system: Path | None) -> None:
+    """Draws a finding."""
+    finding = found.finding
+    assert finding is not None
+    cell, why_not = _cell_of(found, system)
+    if cell is None:
+        click.echo(f"no cell is drawn: {why_not}")
+    _written(path, lambda: trace(path, found, finding, cell, why_not))
+
+
+def _summary(found: Log) -> None:
+
+    count = len(found.ticks)
+    seconds = count * found.tick_ms / 1000
+    click.echo(f"{found.facts['name']}: {count} ticks of {found.tick_ms} ms, {seconds:g} s")
+    click.echo(found.checked.said)
+    if (shown := found.finding) is not None:
+        where = f"level `{shown.level}`" + (f", table `{shown.table}`" if shown.table else "")
+        click.echo(f"a finding, broken in cycle {shown.broken_at}: {where}: {shown.obligation}")
+    for level in found.levels:
+        _summed(level)
+        for table in coverage(found):
+            if table.level == level.name:
+                ran = len(table.lines) - len(table.never)
+                click.echo(f"  table {table.table}: {ran} of {len(table.lines)} lines ran")
+                often = ", ".join(f"{line}: {times}" for line, times in table.lines.items() if times)
+                click.echo(f"    ran    {often or 'none'}")
+                if table.never:
+                    click.echo(f"    never  {', '.join(table.never)}")
+
+
+def _summed(level: LoggedLevel) -> None:
+    """How many cycles, how they ended, and how often the level was started again."""
+    values = level.track.layout.unpack(level.track.packed[-1])
+    fault = fault_in_words(level.sign, level.level, values)
+    click.echo(
+        f"level {level.name}: {len(level.track.ticks) - 1} cycles{f'; the last: {fault}' if fault else ''}"
+    )
+    for one in level.restarts[:SHOWN]:
+        click.echo(f"  started again before cycle {one.tick}: {begun_in_words(one.begun)}")
+    if len(level.restarts) > SHOWN:
+        click.echo(f"  and {len(level.restarts) - SHOWN} times more")
+
+
+def _cell_of(log: Log, given: Path | None) -> tuple[Cell | None, str]:
+    """The cell, or none and why, a sentence.
+
+    Args:
+        log: To be drawn.
+        given: The description that was named; what is wrong with it stops the command.
+    """
+    try:
+        return _cell(log, system_path(given)), ""
+    except NoSystem as error:
+        return None, f"{error}; `--system` names one."
+    except (BadData, BadDescription) as error:
+        if given is not None:
+            raise
+        return None, f"{error}; `--system` names another system."
+
+
+def _cell(log: Log, path: Path) -> Cell:
+    """The cell of a description.
+
+    Raises:
+        BadDescription: It is of another system, or of none that is compiled.
+        BadData: The system has no cell.
+    """
+    system = description(path)
+    if not same_system(log, system):
+        raise BadDescription(f"the log is of system `{log.facts['name']}`, and `{path}` of `{system.name}`")
+    try:
+        signs = signatures(system)
+    except BadDescription as error:
+        raise BadDescription(f"the tables of `{path}` are not compiled") from error
+    try:
+        return cell(log, system, database_of(system, signs))
+    except (KeyError, StopIteration) as error:
+        raise BadData((f"`{path}` has no level `task` that names parts",)) from error

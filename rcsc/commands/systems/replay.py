@@ -1,0 +1,113 @@
+"""`rcsc replay`: whether a recorded run would do it again."""
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from rcsc.commands.shared.logs import FILE, SHOWN, refuse, told
+from rcsc.diagnostics.codes import Code
+from rcsc.run.log.queries import predicate
+from rcsc.run.log.read import Log, read
+from rcsc.run.log.replay import Cycle, Moment, Replay, find
+from rcsc.run.log.states import TRACED, begun_in_words, fault_in_words, words
+
+
+@click.command(
+    "replay",
+    epilog="""\b
+Examples:
+  rcsc replay run.mcap                          every cycle leaves what it left
+  rcsc replay run.mcap --executor python        with the Python executors
+  rcsc replay run.mcap --generated edited       what would other tables have done?
+  rcsc replay run.mcap --at 120 --show task     one cycle, and a level's whole state
+  rcsc replay run.mcap --find "task.cur_state == state_3 and not task.idle" """,
+)
+@FILE
+@click.option("--executor", type=click.Choice(["c", "python"]), default="c", show_default=True,
+              help="What runs the levels.")  # fmt: skip
+@click.option("--generated", type=click.Path(file_okay=False, path_type=Path), default=Path("generated"),
+              show_default=True, metavar="FOLDER",
+              help="The executors; another folder than the run's own asks what its tables would have done.")  # fmt: skip
+@click.option("--at", type=int, default=None, metavar="CYCLE", help="Run this cycle alone, and show it.")
+@click.option("--find", "find_", default=None, metavar="EXPR",
+              help="Go to the first cycle, from --at on, in which EXPR holds, and show it.")  # fmt: skip
+@click.option("--show", "level", default=None, metavar="LEVEL", help="Show this level's whole state, too.")
+@told
+def command(
+    *, file: Path, executor: str, generated: Path, at: int | None, find_: str | None, level: str | None
+) -> int:
+    """Run the run recorded in FILE again, each cycle from the recorded state with the recorded inputs.
+
+    Every leaf must be what it was, bit for bit; the first that is not is named. A log that is not whole is replayed as far as it goes,
+    and the exit status is 1.
+    """
+    found = read(file)
+    tick = _wanted(found, at, find_)
+    if level is not None and level not in {one.name for one in found.levels}:
+        raise click.BadParameter(f"there is no level `{level}` in this log", param_hint="--show")
+    again = Replay(found, generated, "python" if executor == "python" else "c")
+    if tick == 0:
+        click.echo(f"`{find_}` holds in no cycle")
+        return 1
+    moment = again.first_difference() if tick is None else again.go(tick)
+    if moment is not None and (tick is not None or level is not None):
+        _show_moment(again, moment, level)
+    if moment is not None and moment.differs:
+        return _differs(file, again, moment)
+    if tick is None:
+        lacking = again.lacking
+        differs = "nothing that these tables have differs" if lacking else "nothing differs"
+        click.echo(f"{len(found.ticks)} ticks replayed: {differs}; {found.checked.said}")
+        if lacking:
+            more = f", and {len(lacking) - SHOWN} more" if len(lacking) > SHOWN else ""
+            click.echo(f"not in these tables, and so not compared: {', '.join(lacking[:SHOWN])}{more}")
+    if not found.complete:
+        return refuse(file, Code.LOG_NOT_WHOLE, f"the log is {found.checked.said}")
+    return 0
+
+
+def _wanted(found: Log, at: int | None, find_: str | None) -> int | None:
+    """The tick that is asked for; None for all, 0 for one that there is not."""
+    if at is not None and at not in found.ticks:
+        raise click.BadParameter(f"the log holds cycles {found.first + 1} to {found.last}", param_hint="--at")
+    return at if find_ is None else find(found, predicate(find_, found), at) or 0
+
+
+def _show_moment(again: Replay, moment: Moment, level: str | None) -> None:
+
+    click.echo(f"cycle {moment.tick}, {moment.tick * again.log.tick_ms} ms")
+    for cycle in moment.cycles:
+        if cycle.restarted is not None:
+            click.echo(f"  {cycle.level}: started again, {begun_in_words(cycle.restarted)}")
+        logged = again.log.level(cycle.level)
+        fault = fault_in_words(logged.sign, logged.level, cycle.recorded)
+        click.echo(f"  {cycle.level}: {fault or cycle.line_then}")
+        if cycle.level == level:
+            for name, said in words(logged.sign, logged.level, cycle.recorded).items():
+                click.echo(f"    {name} = {said}")
+
+
+def _differs(file: Path, again: Replay, moment: Moment) -> int:
+    first = next(cycle for cycle in moment.cycles if cycle.differences)
+    leaf = _leading(first)
+    said = f"`{leaf.name}` was `{leaf.then}` and is `{leaf.now}`"
+    where = f"cycle {moment.tick}, level `{first.level}`"
+    notes = tuple(note for cycle in moment.cycles if cycle.differences for note in _notes(cycle))
+    if again.unchanged:
+        return refuse(file, Code.REPLAY_DIFFERS, f"the replay differs in {where}: {said}", notes=notes)
+    return refuse(
+        file, Code.TABLES_DECIDE_OTHERWISE, f"these tables decide otherwise in {where}: {said}", notes=notes
+    )
+
+
+def _leading(cycle: Cycle) -> Any:
+    """The difference that is named: a leaf's, where there is one."""
+    return next((one for one in cycle.differences if one.name not in TRACED), cycle.differences[0])
+
+
+def _notes(cycle: Cycle) -> tuple[str, ...]:
+    lines = f"{cycle.level}: {cycle.line_then} matched then, {cycle.line_now} now"
+    shown = [f"{cycle.level}.{one.name}: {one.then} then, {one.now} now" for one in cycle.differences[:SHOWN]]
+    more = len(cycle.differences) - SHOWN
+    return (lines, *shown, *([f"and {more} more of {cycle.level}'s"] if more > 0 else []))

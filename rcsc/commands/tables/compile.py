@@ -1,0 +1,51 @@
+"""`rcsc compile`: the executors of proved tables."""
+
+from pathlib import Path
+
+import click
+
+from rcsc.commands.shared.options import PATHS, proving, settings_of, showing
+from rcsc.commands.shared.show import Output, finish
+from rcsc.driver.compile import compile_
+from rcsc.solvers.options import Options
+
+
+@click.command(
+    "compile",
+    epilog="""\b
+Examples:
+  rcsc compile tables                  write generated/python and generated/c
+  rcsc compile tables --check          write nothing; 1 if generated/ is not fresh
+  rcsc compile grip.rcs --target c     C alone
+  rcsc compile grip.rcs --out build    to another folder""",
+)
+@PATHS
+@click.option("--out", type=click.Path(path_type=Path), default=Path("generated"), show_default=True,
+              metavar="FOLDER", help="Where the executors go, in FOLDER/python and FOLDER/c.")  # fmt: skip
+@click.option("--target", default="python,c", show_default=True, metavar="LIST",
+              help="What to write, by commas: python, c.")  # fmt: skip
+@click.option("--check", "only_check", is_flag=True, help="Write nothing; say whether the files are fresh.")
+@click.option("--defensive", is_flag=True,
+              help="Executors that check their whole state, ranges and invariants, in every cycle.")  # fmt: skip
+@proving
+@showing
+def command(  # noqa: PLR0913, PLR0917  # as many as there are options
+    paths: tuple[str, ...], out: Path, target: str, only_check: bool, defensive: bool,
+    options: Options, use_cache: bool, output: Output,
+) -> int:  # fmt: skip
+    """Prove the tables, then write their Python and C executors.
+
+    Nothing is written unless everything is proved. Files are replaced whole: a kill leaves the old ones. The
+    same tables give the same bytes on every machine, so the files belong in version control.
+    """
+    targets = tuple(one.strip() for one in target.split(",") if one.strip())
+    if not targets or not set(targets) <= {"python", "c"}:
+        raise click.BadParameter("choose from python and c", param_hint="--target")
+    made = compile_(
+        settings_of(options, use_cache, output, paths),
+        out,
+        targets,
+        only_check=only_check,
+        defensive=defensive,
+    )
+    return finish(made.report, "compile", output, made.closing)

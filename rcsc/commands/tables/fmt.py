@@ -1,0 +1,39 @@
+"""`rcsc fmt`: tables aligned."""
+
+import sys
+
+import click
+
+from rcsc.commands.shared.options import PATHS, piped, showing
+from rcsc.commands.shared.show import Output, finish
+from rcsc.driver.reformat import reformat
+
+
+@click.command(
+    "fmt",
+    epilog="""\b
+Examples:
+  rcsc fmt                 align every table below this folder
+  rcsc fmt --check         change nothing; 1 if something would change
+  rcsc fmt --diff a.rcs    show what would change
+  rcsc fmt - < a.rcs       from standard input to standard output""",
+)
+@PATHS
+@click.option("--check", "only_check", is_flag=True, help="Change nothing; 1 if a file would change.")
+@click.option("--diff", is_flag=True, help="Change nothing; show what would change.")
+@showing
+def command(paths: tuple[str, ...], only_check: bool, diff: bool, output: Output) -> int:
+    """Align tables and lay out the rest, always in the same way.
+
+    What a file says stays the same, comments included; that is checked before a file is replaced.
+    """
+    write = not (only_check or diff)
+    made = reformat(paths or (".",), piped(paths), write=write)
+    if diff:
+        click.echo(made.diff, nl=False)
+        return 1 if made.report.failed else 0
+    if write and "-" in made.texts and not made.report.failed:
+        sys.stdout.buffer.write(made.texts["-"].encode())
+        return 0
+    files = f"{made.changed} of {len(made.texts)} files"
+    return finish(made.report, "fmt", output, f"{files} {'changed' if write else 'would change'}")

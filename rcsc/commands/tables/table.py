@@ -1,0 +1,92 @@
+"""`rcsc table`: the table of a state graph."""
+
+import sys
+from pathlib import Path
+
+import click
+
+from rcsc.commands.shared.graphs import ENDINGS, OUT, STEPS, WrongError, found_tables, written
+from rcsc.diagnostics.codes import Code
+from rcsc.diagnostics.diagnostic import Diagnostic, Label
+from rcsc.diagnostics.source import Source, Span
+from rcsc.graph.formats.choice import FORMS, form_of
+from rcsc.graph.formats.reading import MOST_BYTES, UnreadableError, diagnosed
+from rcsc.graph.round_trip import against, in_place
+from rcsc.graph.to_table import Tabled, tabled
+from rcsc.host.files.read import Malformed, content, decoded, piped, plain
+from rcsc.lang.project import load
+from rcsc.solvers.options import Options
+
+
+@click.command(
+    "table",
+    epilog="""\b
+Examples:
+  rcsc table acquire.dot                                    the table, with what it uses
+  rcsc table acquire.mmd --against tables/task/acquire.rcs  and prove that it does the same as that one
+  rcsc table m.scxml --in tables/task/move.rcs -o new.rcs   the file, with this table in place of its own""",
+)
+@click.argument("drawn", metavar="GRAPH", type=click.Path(exists=True, dir_okay=False, allow_dash=True))
+@click.option("--form", type=click.Choice([one for one in ENDINGS if one != "svg"]), default=None,
+              help="dot, mermaid or scxml; else by how the text begins.")  # fmt: skip
+@click.option("--against", "other", default=None, metavar="TABLE",
+              help="Prove that the graph does what this table does (a name, FILE or FILE:NAME); else 1, and an input.")  # fmt: skip
+@click.option("--in", "place", type=click.Path(exists=True, dir_okay=False), default=None, metavar="FILE",
+              help="Write all of FILE.rcs, with the table in place of the one of its name.")  # fmt: skip
+@OUT
+@STEPS
+def command(
+    drawn: str, form: str | None, other: str | None, place: str | None, out: Path | None, steps: int
+) -> int:
+    """Make the table that GRAPH says, in DOT, Mermaid or SCXML as `rcsc graph` writes them, or `-`.
+
+    Arrows of one name, guard and effect are one line. A graph drawn by hand needs the table's name, and on each arrow what it takes; lines
+    without a name get one. The table is not proved by this: run `rcsc check` on it.
+    """
+    try:
+        made = _tabled(drawn, form)
+        if other is not None:
+            _prove(made, other, Options(steps=steps))
+        written(made.text() if place is None else _placed(made, place), out)
+    except WrongError as error:
+        return error.shown("table")
+    for note in made.notes:
+        click.echo(f"note[{Code.GRAPH_LOSES.value}]: {note}", err=True)
+    return 0
+
+
+def _tabled(drawn: str, form: str | None) -> Tabled:
+
+    try:
+        raw = piped(sys.stdin.buffer, MOST_BYTES) if drawn == "-" else content(Path(drawn), MOST_BYTES)
+        source = Source(drawn, plain(decoded(raw)))
+    except (OSError, Malformed) as error:
+        place = Label(Span(drawn, 0, 0))
+        why = f"it {error}" if isinstance(error, Malformed) else error.strerror
+        raise WrongError(
+            (Diagnostic(Code.GRAPH_UNREADABLE, f"the graph cannot be read: {why}", place),)
+        ) from error
+    try:
+        return tabled(FORMS[form or form_of(source.text)].read(source.text))
+    except UnreadableError as error:
+        raise WrongError((diagnosed(error, source),), {drawn: source}) from error
+
+
+def _prove(made: Tabled, named: str, options: Options) -> None:
+
+    name = made.table.name.text
+    found = found_tables(f"{named}:{name}" if named.endswith(".rcs") else named)
+    one = next((one for one in found if one.table.name == name), found[0])
+    verdict = against(one.loaded, one.root, one.program, one.table, made, options)
+    if verdict.found:
+        raise WrongError(verdict.found, {**one.loaded.sources, **(verdict.sources or {})})
+    where = f"{one.table.file}:{one.table.name}"
+    click.echo(f"{name}: does the same as {where}: proved, {verdict.questions} questions", err=True)
+
+
+def _placed(made: Tabled, file: str) -> str:
+
+    loaded = load([file])
+    if loaded.found:
+        raise WrongError(loaded.found, loaded.sources)
+    return in_place(loaded.files[loaded.roots[0]], made.table)

@@ -1,0 +1,85 @@
+"""`rcsc compile`: the executors of every proved program."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from rcsc.diagnostics.codes import Code
+from rcsc.diagnostics.diagnostic import Diagnostic, Label
+from rcsc.diagnostics.source import Span
+from rcsc.driver.pipeline import Proved, proved
+from rcsc.driver.settings import Made, Settings
+from rcsc.emit import emit_c, emit_python
+from rcsc.emit.c99 import outward
+from rcsc.emit.lower import lower
+from rcsc.emit.plan import Plan
+from rcsc.emit.write import stale, write
+from rcsc.lang.model import ProvedProgram
+from rcsc.lang.project import project_root
+
+TARGETS = ("python", "c")
+
+
+def compile_(
+    settings: Settings, out: Path, targets: tuple[str, ...], *, only_check: bool, defensive: bool = False
+) -> Made:
+    """Prove every table anew, then write the executors, or say whether they are fresh."""
+    made = proved(settings)
+    report = made.report()
+    if report.failed:
+        return Made(report, "nothing was written")
+    files, clashes = _executors(made, targets, defensive=defensive)
+    found = clashes or (stale if only_check else write)(files, str(out))
+    report = made.report(found)
+    if report.failed:
+        return Made(report, "" if only_check else "nothing was written")
+    return Made(report, f"{len(files)} files {'are fresh' if only_check else 'written'} in {out}")
+
+
+def _executors(
+    made: Proved, targets: tuple[str, ...], *, defensive: bool
+) -> tuple[dict[str, str], tuple[Diagnostic, ...]]:
+    """The generated files of every program that declares a table or a level, by path under the folder."""
+    files: dict[str, str] = {}
+    found = []
+    paths: dict[str, str] = {}
+    names: dict[str, tuple[str, str]] = {}
+    for root, program in made.executable:
+        plan = planned(program, defensive=defensive)
+        emitted_ = emitted(plan, targets)
+        taken = next((path for path in emitted_ if paths.get(path.casefold(), root) != root), None)
+        if taken is not None:
+            found.append(_same_file(taken, root, paths[taken.casefold()]))
+            continue
+        paths |= {path.casefold(): root for path in emitted_}
+        if "c" in targets:
+            found += _same_names(plan, root, names)
+        files |= emitted_
+    return files, tuple(found)
+
+
+def _same_names(plan: Plan, root: str, names: dict[str, tuple[str, str]]) -> Iterator[Diagnostic]:
+    """The first name in C that this program shares with another, or gives to two things; `names` has who has which, and gets its own."""
+    for name, what in outward(plan):
+        other, said = names.setdefault(name, (root, what))
+        if said != what:
+            message = f"`{name}` would be two things in C: {said} in `{other}`, and {what} in `{root}`"
+            helps = ("rename one of the programs, or the table, level or type",)
+            yield Diagnostic(Code.NAME_COLLISION, message, Label(Span(root, 0, 0)), help=helps)
+            return
+
+
+def emitted(plan: Plan, targets: tuple[str, ...]) -> dict[str, str]:
+    """The files of a program, by path under the folder."""
+    return (emit_python(plan) if "python" in targets else {}) | (emit_c(plan) if "c" in targets else {})
+
+
+def planned(proved: ProvedProgram, *, defensive: bool = False) -> Plan:
+    """How the executors of a proved program are laid out."""
+    return lower(proved, project_root(proved.program.file), defensive=defensive)
+
+
+def _same_file(path: str, root: str, other: str) -> Diagnostic:
+    message = f"`{root}` and `{other}` would both be compiled to `{path}`"
+    return Diagnostic(
+        Code.NAME_COLLISION, message, Label(Span(root, 0, 0)), help=("rename one of the files",)
+    )

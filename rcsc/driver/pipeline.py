@@ -1,0 +1,64 @@
+"""What all commands that prove begin with: the files read, each root resolved and proved."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from rcsc.diagnostics.diagnostic import Diagnostic, sort_key
+from rcsc.diagnostics.report import Report, merged
+from rcsc.driver.proofs import prove
+from rcsc.driver.settings import Proof, Settings
+from rcsc.host.cache import Cache
+from rcsc.lang.model import Program, ProvedProgram
+from rcsc.lang.project import Loaded, load
+from rcsc.lang.resolve import resolve
+
+
+@dataclass(frozen=True, slots=True)
+class Proved:
+    """The files, and what became of each root."""
+
+    loaded: Loaded
+    proofs: tuple[Proof, ...]
+
+    def report(self, found: tuple[Diagnostic, ...] = ()) -> Report:
+        """Everything found, each once, and each table once, with the worst verdict of all programs that it is in."""
+        every = {*self.loaded.found, *found, *(one for proof in self.proofs for one in proof.found)}
+        tables = merged(table for proof in self.proofs for table in proof.tables)
+        return Report(tuple(sorted(every, key=sort_key)), tables, self.loaded.sources)
+
+    @property
+    def executable(self) -> tuple[tuple[str, ProvedProgram], ...]:
+        """The proved programs that declare a table or a level, each with its root file."""
+        programs = ((proof.root, proof.proved) for proof in self.proofs)
+        return tuple(
+            (root, proved) for root, proved in programs if proved is not None and _runs(proved.program)
+        )
+
+
+def proved(settings: Settings, cache: Cache | None = None) -> Proved:
+    """Read, resolve and prove; with a cache only what it does not know."""
+    loaded = read(settings)
+    return Proved(loaded, tuple(_proofs(loaded, settings, cache)))
+
+
+def read(settings: Settings) -> Loaded:
+    """The files, and all that they use."""
+    settings.progress("reading")
+    return load(settings.paths, settings.stdin)
+
+
+def _proofs(loaded: "Loaded", settings: Settings, cache: Cache | None) -> Iterator[Proof]:
+    """Resolve and prove each root; findings of its files where it cannot be resolved."""
+    for root in loaded.roots:
+        settings.progress(f"proving {root}")
+        program = resolve(root, loaded)
+        if isinstance(program, Program):
+            yield prove(root, program, loaded, settings.options, cache)
+        else:
+            yield Proof(root, program)
+    settings.progress("")
+
+
+def _runs(program: Program) -> bool:
+    own_levels = any(level.span.file == program.file for level in program.levels)
+    return own_levels or bool(program.own_tables)
