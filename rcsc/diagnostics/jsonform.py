@@ -1,16 +1,14 @@
-"""Diagnostics and reports as JSON values, and back; `schema/report.schema.json` is the contract.
+"""Diagnostics and reports as JSON values; `schema/report.schema.json` is the contract.
 
-The same form is what the cache keeps. Offsets count characters from 0; lines and columns count from 1.
+Offsets count characters from 0; lines and columns count from 1.
 """
 
-from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
 from rcsc import __version__
-from rcsc.diagnostics.codes import Code
-from rcsc.diagnostics.diagnostic import Diagnostic, Label, MatchedLine, Severity, WitnessColumn
-from rcsc.diagnostics.report import InSystem, Report, SystemReport, TableReport, Verdict
+from rcsc.diagnostics.diagnostic import Diagnostic, Label, Severity, WitnessColumn
+from rcsc.diagnostics.report import InSystem, Report, SystemReport, TableReport
 from rcsc.diagnostics.source import Source, Sources, Span
 
 FORM = 1
@@ -59,29 +57,6 @@ def _listed(known: InSystem | SystemReport) -> Json:
     return {name: list(one) if isinstance(one, tuple) else one for name, one in asdict(known).items()}
 
 
-def _together(form: Mapping[str, Any]) -> InSystem:
-    listed = {name: tuple(one) for name, one in form.items() if name != "system"}
-    return InSystem(form["system"], **listed)
-
-
-def table_from_json(form: Mapping[str, Any], *, cached: bool) -> TableReport:
-    """The inverse of `table_to_json`, but for `cached`."""
-    return TableReport(
-        form["table"],
-        form["file"],
-        Verdict(form["verdict"]),
-        int(form["lines"]),
-        form["method"],
-        bool(form["confirmed_by_z3"]),
-        tuple((one["name"], one["standing"]) for one in form["assumptions"]),
-        float(form["proof_ms"]),
-        cached,
-        None if form["together"] is None else _together(form["together"]),
-        tuple(form["stops"]),
-        tuple(form["tells"]),
-    )
-
-
 def diagnostic_to_json(diagnostic: Diagnostic, sources: Sources) -> Json:
     """One diagnostic, with its places as offsets and as lines and columns."""
     return {
@@ -97,31 +72,8 @@ def diagnostic_to_json(diagnostic: Diagnostic, sources: Sources) -> Json:
     }
 
 
-def diagnostic_from_json(form: Mapping[str, Any]) -> Diagnostic:
-    """The inverse of `diagnostic_to_json`.
-
-    Raises:
-        KeyError, TypeError, ValueError: `form` is not of this form.
-    """
-    return Diagnostic(
-        Code(form["code"]),
-        form["message"],
-        _label_from_json(form["primary"]),
-        tuple(_label_from_json(label) for label in form["related"]),
-        tuple(form["notes"]),
-        tuple(form["help"]),
-        tuple(_witness_from_json(witness) for witness in form["witnesses"]),
-        int(form["more"]),
-        Severity(form["severity"]),
-    )
-
-
 def _label_to_json(label: Label, sources: Sources) -> Json:
     return {"place": _span_to_json(label.span, sources), "message": label.message}
-
-
-def _label_from_json(form: Mapping[str, Any]) -> Label:
-    return Label(_span_from_json(form["place"]), form["message"])
 
 
 def _span_to_json(span: Span, sources: Sources) -> Json:
@@ -136,10 +88,6 @@ def _span_to_json(span: Span, sources: Sources) -> Json:
 def _position_to_json(source: Source, offset: int) -> Json:
     position = source.position(offset) if offset <= len(source.text) else source.position(0)
     return {"offset": offset, "line": position.line, "column": position.column}
-
-
-def _span_from_json(form: Mapping[str, Any]) -> Span:
-    return Span(form["file"], int(form["start"]["offset"]), int(form["end"]["offset"]))
 
 
 def _witness_to_json(witness: WitnessColumn, sources: Sources) -> Json:
@@ -157,20 +105,3 @@ def _witness_to_json(witness: WitnessColumn, sources: Sources) -> Json:
         ],
         "region": list(witness.region),
     }
-
-
-def _witness_from_json(form: Mapping[str, Any]) -> WitnessColumn:
-    return WitnessColumn(
-        form["table"],
-        tuple(one["variable"] for one in form["input"]),
-        tuple(one["value"] for one in form["input"]),
-        tuple(
-            MatchedLine(
-                line["name"],
-                tuple(line["cells"]),
-                None if line["place"] is None else _span_from_json(line["place"]),
-            )
-            for line in form["lines"]
-        ),
-        tuple(form["region"]),
-    )

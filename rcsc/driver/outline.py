@@ -5,7 +5,7 @@ In: a system's description and the cache. Out: an `Outline` and what is known of
 """
 
 import os
-from dataclasses import asdict
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,7 +15,6 @@ from rcsc.compose.proof.standing import (
     Outline,
     TableOutline,
     any_kept,
-    outline_of,
     standing,
 )
 from rcsc.driver.unchanged import as_before, digest_at, digests
@@ -35,17 +34,25 @@ def known(system: Path, cache: Cache) -> KnownSystem | None:
     return None if made is None else standing(cache, made)
 
 
+@dataclass(frozen=True, slots=True)
+class _Outlined:
+    """An outline, and what stood at every place that was looked at for it."""
+
+    outline: Outline
+    looked_at: dict[str, str]
+
+
 def outlined(system: Path, cache: Cache) -> Outline | None:
     """The system's outline; `system` is absolute."""
-    kept = cache.load("outline", str(system))
-    if kept is not None and as_before(kept["looked_at"]) is not None:
-        return outline_of(kept["outline"])
+    kept = cache.load(_Outlined, str(system))
+    if kept is not None and as_before(kept.looked_at) is not None:
+        return kept.outline
     read = _read(system)
     if read is None:
         return None
     made, looked_at = read
     found = outline(made)
-    cache.store({"outline": asdict(found), "looked_at": looked_at}, "outline", str(system))
+    cache.store(_Outlined(found, looked_at), str(system))
     return found
 
 

@@ -11,7 +11,6 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from rcsc.diagnostics.diagnostic import Diagnostic, Label, Severity, sort_key
-from rcsc.diagnostics.jsonform import diagnostic_from_json, diagnostic_to_json, table_from_json, table_to_json
 from rcsc.diagnostics.report import TableReport, Verdict, resting
 from rcsc.diagnostics.source import Span
 from rcsc.driver.settings import Proof
@@ -61,6 +60,11 @@ class _Kept:
     notes: tuple[Diagnostic, ...]
 
 
+@dataclass(frozen=True, slots=True)
+class _Rest:
+    """That nothing is wrong in a program but for its tables."""
+
+
 def _proof(
     root: str,
     program: Program,
@@ -90,16 +94,16 @@ class _Memory:
 
     def rest(self) -> bool:
         """Whether all but the tables is known to be right."""
-        return self.cache.load("rest", self.common) is not None
+        return self.cache.load(_Rest, self.common) is not None
 
     def table(self, table: Table) -> _Kept | None:
         """What is known of the table."""
-        kept = self.cache.load(*self._key(table))
+        kept = self.cache.load(_Kept, *self._key(table))
         if kept is None:
             return None
         place = _extent(table)
-        notes = (_moved(diagnostic_from_json(one), place.start, place.file) for one in kept["notes"])
-        return _Kept(table_from_json(kept["report"] | {"file": table.file}, cached=True), tuple(notes))
+        notes = tuple(_moved(one, place.start, place.file) for one in kept.notes)
+        return _Kept(replace(kept.report, file=table.file, cached=True), notes)
 
     def keep(self, found: Sequence[Diagnostic], verdicts: Sequence[TableVerdict]) -> None:
         """Keep the tables just proved, and that the rest is right if nothing was said of it."""
@@ -111,16 +115,16 @@ class _Memory:
             rest -= set(notes)
             report = table_report(verdict, self.program)
             if report.verdict is Verdict.PROVED and touching == notes:
-                forms = [diagnostic_to_json(_moved(one, -place.start, ""), {}) for one in notes]
-                self.cache.store({"report": table_to_json(report), "notes": forms}, *self._key(verdict.table))
+                moved = tuple(_moved(one, -place.start, "") for one in notes)
+                self.cache.store(_Kept(report, moved), *self._key(verdict.table))
         if not rest:
-            self.cache.store({}, "rest", self.common)
+            self.cache.store(_Rest(), self.common)
 
     def _key(self, table: Table) -> tuple[str, ...]:
         place = _extent(table)
         text = self.loaded.sources[place.file].slice(place)
         own = next(one for one in self.program.tables if one.name == table.name)
-        return ("table", self.common, digest(own), text)
+        return (self.common, digest(own), text)
 
 
 def _extent(table: Table) -> Span:

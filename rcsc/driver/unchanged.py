@@ -7,13 +7,12 @@ file by content, and every place where a file would have been found first is sti
 import hashlib
 import os
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from rcsc.diagnostics.codes import Code
-from rcsc.diagnostics.jsonform import diagnostic_from_json, diagnostic_to_json, table_from_json, table_to_json
-from rcsc.diagnostics.report import Report
+from rcsc.diagnostics.diagnostic import Diagnostic
+from rcsc.diagnostics.report import Report, TableReport
 from rcsc.diagnostics.source import Source
 from rcsc.host.cache import Cache
 from rcsc.host.files.read import Malformed, content
@@ -25,19 +24,32 @@ _PASSING = {Code.UNDECIDED, Code.FILE_NOT_FOUND, Code.FILE_CYCLE}
 """Findings that may go away though no file that was read changes; as do all of 1xx and 9xx."""
 
 
+@dataclass(frozen=True, slots=True)
+class _Checked:
+    """What a check found.
+
+    Attributes:
+        roots: The files that were given.
+        looked_at: What stood at every place that was looked at (`digests`).
+    """
+
+    roots: tuple[str, ...]
+    looked_at: dict[str, str]
+    found: tuple[Diagnostic, ...]
+    tables: tuple[TableReport, ...]
+
+
 def recall(cache: Cache, paths: tuple[str, ...], options: Options) -> Report | None:
     """The report of the same check, if nothing that it depends on has changed."""
-    kept = cache.load(*_key(paths, options))
-    if kept is None or kept["roots"] != list(listed(paths)):
+    kept = cache.load(_Checked, *_key(paths, options))
+    if kept is None or kept.roots != tuple(listed(paths)):
         return None
-    texts = as_before(kept["looked_at"])
+    texts = as_before(kept.looked_at)
     if texts is None:
         return None
-    found = tuple(diagnostic_from_json(one) for one in kept["found"])
-    tables = tuple(table_from_json(one, cached=True) for one in kept["tables"])
-    named = {name for name in texts if name.endswith(".rcs")} if found else set()
+    named = {name for name in texts if name.endswith(".rcs")} if kept.found else set()
     sources = {name: Source(name, texts[name].decode("utf-8-sig")) for name in sorted(named)}
-    return Report(found, tables, sources)
+    return Report(kept.found, tuple(replace(one, cached=True) for one in kept.tables), sources)
 
 
 def remember(cache: Cache, paths: tuple[str, ...], options: Options, loaded: Loaded, report: Report) -> None:
@@ -47,13 +59,8 @@ def remember(cache: Cache, paths: tuple[str, ...], options: Options, loaded: Loa
     looked_at = digests(loaded)
     if looked_at is None:
         return
-    value: dict[str, Any] = {
-        "roots": list(loaded.given),
-        "looked_at": looked_at,
-        "found": [diagnostic_to_json(one, report.sources) for one in report.found],
-        "tables": [table_to_json(one) for one in report.tables],
-    }
-    cache.store(value, *_key(paths, options))
+    checked = _Checked(tuple(loaded.given), looked_at, report.found, report.tables)
+    cache.store(checked, *_key(paths, options))
 
 
 def digests(loaded: Loaded) -> dict[str, str] | None:
@@ -85,7 +92,7 @@ def digest_at(name: str) -> str:
 def _key(paths: tuple[str, ...], options: Options) -> tuple[str, ...]:
     stated = asdict(options)
     stated.pop("jobs", None)  # how many at once changes nothing
-    return ("check", os.getcwd(), *paths, "--", *(f"{name}={value}" for name, value in stated.items()))
+    return (os.getcwd(), *paths, "--", *(f"{name}={value}" for name, value in stated.items()))
 
 
 def _looked_at(loaded: Loaded) -> list[str]:

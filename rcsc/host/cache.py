@@ -1,7 +1,7 @@
 """What earlier runs proved, kept in files that are believed only when nothing about them is in doubt.
 
-In: a key, which is a digest of all that a result depends on, and a JSON value. Out: the same value, or
-nothing. An entry carries a keyed digest (HMAC-SHA-256) over its key and its content; the secret is the user's
+In: a key, which is a digest of all that a result depends on, and a result, a dataclass (`host.files.plain`). Out: the same result,
+or nothing. An entry carries a keyed digest (HMAC-SHA-256) over its key and its content; the secret is the user's
 own, outside any project. So an entry that is damaged, cut short, moved to another key or brought along with
 somebody else's project is not believed. A cache that cannot be read or written is no error: it is no cache.
 """
@@ -12,14 +12,15 @@ import json
 import os
 import secrets
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import TypeVar
 
 from rcsc import __version__
 from rcsc.host.files import write_atomically
+from rcsc.host.files.plain import plain, read
 from rcsc.host.files.read import Malformed, content, json_of
 
 FOLDER = ".rcsc-cache"
@@ -30,7 +31,7 @@ _PROVERS = {
 """Packages that a proof goes through, and what they are called where they are installed."""
 _TAG = "Signature: 8a477f597d28d172789f06886806bc55\n# Made by rcsc; see https://bford.info/cachedir/\n"
 
-Json = dict[str, Any]
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,22 +48,29 @@ class Cache:
     secret: bytes
     tool: str
 
-    def load(self, *parts: str) -> Json | None:
-        """What was stored under the same parts; None where there is nothing to be believed."""
-        key = self._key(parts)
+    def memo(self, kind: type[T], parts: Sequence[str], make: Callable[[], T | None]) -> T | None:
+        """What was stored under the same parts; else what is made now, and kept unless it is None."""
+        result = self.load(kind, *parts)
+        if result is None and (result := make()) is not None:
+            self.store(result, *parts)
+        return result
+
+    def load(self, kind: type[T], *parts: str) -> T | None:
+        """The result of this kind that was stored under the same parts; None where there is nothing to be believed."""
+        key = self._key(kind, parts)
         try:
             seal, _, kept = content(self._path(key)).partition(b"\n")
             if not hmac.compare_digest(seal, self._seal(key, kept)):
                 return None
-            value = json_of(kept, plain=False)
-        except (OSError, Malformed):
+            result: T = read(kind, json_of(kept, plain=False))
+        except (OSError, ValueError):
             return None
-        return value if isinstance(value, dict) else None
+        return result
 
-    def store(self, value: Json, *parts: str) -> None:
-        """Keep `value` under `parts`: the whole entry or nothing."""
-        key = self._key(parts)
-        said = json.dumps(value, separators=(",", ":"), sort_keys=True).encode()
+    def store(self, result: object, *parts: str) -> None:
+        """Keep a result, a dataclass, under its kind and `parts`: the whole entry or nothing."""
+        key = self._key(type(result), parts)
+        said = json.dumps(plain(result), separators=(",", ":"), sort_keys=True).encode()
         path = self._path(key)
         try:
             self._prepare(path.parent)
@@ -71,8 +79,9 @@ class Cache:
         except OSError:
             return
 
-    def _key(self, parts: tuple[str, ...]) -> str:
-        return hashlib.sha256(json.dumps([self.tool, *parts]).encode()).hexdigest()
+    def _key(self, kind: type, parts: tuple[str, ...]) -> str:
+        said = [self.tool, kind.__module__, kind.__qualname__, *parts]
+        return hashlib.sha256(json.dumps(said).encode()).hexdigest()
 
     def _seal(self, key: str, kept: bytes) -> bytes:
         return hmac.new(self.secret, key.encode() + b"\n" + kept, "sha256").hexdigest().encode()

@@ -3,7 +3,6 @@
 import json
 import shutil
 from collections.abc import Callable
-from dataclasses import asdict
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -12,9 +11,10 @@ import jsonschema
 import pytest
 
 from rcsc.commands import run
-from rcsc.compose.proof.standing import Known, KnownSystem, Outline, outline_of, standing
+from rcsc.compose.proof.standing import Known, KnownSystem, Outline, standing
 from rcsc.driver import outline
 from rcsc.host.cache import FOLDER, Cache
+from rcsc.host.files.plain import plain, read
 
 SMALL = Path(__file__).parents[1] / "data" / "composed"
 KEPT = "assuming in_step (proved), kept by the levels together, system.toml"
@@ -391,12 +391,11 @@ def test_a_default_that_no_run_of_the_system_reaches_is_said_to_be_so(check: Sai
 
 
 def test_an_outline_comes_back_as_it_was(here: Path) -> None:
-    read = outline._read(here / "system.toml")
-    assert read is not None
-    made = outline.outline(read[0])
+    found = outline._read(here / "system.toml")
+    assert found is not None
+    made = outline.outline(found[0])
     assert standing_of(made).of_level("upper") is Known.UNKNOWN
-    form = json.loads(json.dumps(asdict(made)))
-    assert outline_of(form) == made
+    assert read(Outline, json.loads(json.dumps(plain(made)))) == made
     assert [one.name for one in made.levels] == ["upper", "lower"]
     assert {level for one in made.assumed for level, _ in one.needs} == {"upper", "lower"}
 

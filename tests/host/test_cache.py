@@ -3,6 +3,7 @@
 import os
 import re
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
@@ -13,10 +14,24 @@ from rcsc.host.cache import Cache, digest_of_tool, open_cache
 from rcsc.host.files import write_atomically
 
 
+@dataclass(frozen=True)
+class Table:
+    verdict: str = ""
+    lines: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True)
+class Level:
+    verdict: str = ""
+
+
+PROVED = Table("proved", (1, 2))
+
+
 @pytest.fixture
 def kept(tmp_path: Path) -> Cache:
     cache = Cache(tmp_path / "cache", b"secret" * 6, "tool")
-    cache.store({"verdict": "proved"}, "table", "one")
+    cache.store(PROVED, "one")
     return cache
 
 
@@ -26,9 +41,26 @@ def entry(cache: Cache) -> Path:
 
 
 def test_what_was_stored_comes_back_and_nothing_else(kept: Cache) -> None:
-    assert kept.load("table", "one") == {"verdict": "proved"}
-    assert kept.load("table", "two") is None
-    assert kept.load("tableone") is None
+    assert kept.load(Table, "one") == PROVED
+    assert kept.load(Table, "two") is None
+    assert kept.load(Level, "one") is None
+    assert kept.load(Table) is None
+
+
+def test_what_is_made_is_kept_and_made_once(kept: Cache) -> None:
+    made = iter([None, Table("proved")])
+    assert kept.memo(Table, ["two"], lambda: next(made)) is None
+    for _ in range(2):
+        assert kept.memo(Table, ["two"], lambda: next(made)) == Table("proved")
+    assert kept.memo(Table, ["one"], lambda: pytest.fail("it is kept")) == PROVED
+
+
+def test_an_entry_that_is_none_of_its_kind_is_not_believed(
+    kept: Cache, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(cache_module, "plain", lambda _: {"verdict": "proved", "lines": "12"})
+    kept.store(PROVED, "two")
+    assert kept.load(Table, "two") is None
 
 
 DAMAGE: list[Callable[[bytes], bytes]] = [
@@ -46,33 +78,33 @@ DAMAGE: list[Callable[[bytes], bytes]] = [
 def test_a_damaged_entry_is_not_believed(kept: Cache, damage: Callable[[bytes], bytes]) -> None:
     path = entry(kept)
     path.write_bytes(damage(path.read_bytes()))
-    assert kept.load("table", "one") is None
+    assert kept.load(Table, "one") is None
 
 
 def test_a_foreign_entry_is_not_believed(kept: Cache, tmp_path: Path) -> None:
     other = Cache(tmp_path / "other", b"another" * 5, kept.tool)
-    other.store({"verdict": "proved", "by": "somebody"}, "table", "one")
+    other.store(Table("proved by somebody"), "one")
     entry(kept).write_bytes(entry(other).read_bytes())
-    assert kept.load("table", "one") is None
+    assert kept.load(Table, "one") is None
 
 
 def test_an_entry_moved_to_another_key_is_not_believed(kept: Cache) -> None:
     before = entry(kept)
-    kept.store({"verdict": "refuted"}, "table", "two")
+    kept.store(Table("refuted"), "two")
     [after] = [path for path in kept.folder.glob("??/*.json") if path != before]
     after.write_bytes(before.read_bytes())
-    assert kept.load("table", "two") is None
+    assert kept.load(Table, "two") is None
 
 
 def test_another_state_of_rcsc_has_entries_of_its_own(kept: Cache) -> None:
-    assert Cache(kept.folder, kept.secret, "newer tool").load("table", "one") is None
+    assert Cache(kept.folder, kept.secret, "newer tool").load(Table, "one") is None
 
 
 def test_a_cache_that_cannot_be_written_is_no_error(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("in the way")
     cache = Cache(tmp_path / "file" / "cache", b"secret", "tool")
-    cache.store({"a": 1}, "key")
-    assert cache.load("key") is None
+    cache.store(PROVED, "key")
+    assert cache.load(Table, "key") is None
 
 
 def test_the_secret_is_the_users_own_and_stays(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -106,10 +138,10 @@ def test_the_older_half_goes_when_there_are_too_many(kept: Cache, monkeypatch: p
     monkeypatch.setattr(cache_module, "MOST_ENTRIES", 4)
     os.utime(entry(kept), (1, 1))
     for number in range(4):
-        kept.store({"n": number}, str(number))
+        kept.store(Table(lines=(number,)), str(number))
     assert len(list(kept.folder.glob("??/*.json"))) == 3
-    assert kept.load("table", "one") is None
-    assert kept.load("3") == {"n": 3}
+    assert kept.load(Table, "one") is None
+    assert kept.load(Table, "3") == Table(lines=(3,))
 
 
 def test_a_file_is_written_whole_or_not_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

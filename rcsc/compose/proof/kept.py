@@ -6,87 +6,70 @@ is kept: another run may decide it. What was found is kept once more without the
 """
 
 import hashlib
-from dataclasses import asdict, replace
-from typing import Any
+from dataclasses import dataclass, replace
 
-from rcsc.compose.contract.obligations import Obligation, Sort, Unstated, obligations
-from rcsc.compose.contract.predicates import CLOSELY, Predicate
+from rcsc.compose.contract.claims import Key
+from rcsc.compose.contract.obligations import Obligation, Unstated, obligations
+from rcsc.compose.contract.predicates import CLOSELY
 from rcsc.compose.contract.properties import every_predicate
 from rcsc.compose.contract.transition import TransitionSystem
+from rcsc.compose.invariant.pdr import Clause
 from rcsc.compose.invariant.search import Effort, read
 from rcsc.compose.proof.assume_guarantee import of_level
-from rcsc.compose.proof.context import Context, RepeatedLine
+from rcsc.compose.proof.context import Context
 from rcsc.compose.proof.level import LevelProof, Verdict, essential
-from rcsc.compose.proof.ranking import Counted
 from rcsc.compose.proof.standing import Verdicts, keep_verdicts
 from rcsc.compose.proof.termination import Ending
 from rcsc.host.cache import Cache
 
 
+@dataclass(frozen=True, slots=True)
+class _Kept:
+    """A proof as it is kept: obligations by what tells them apart, predicates by name; the transition system gives both anew."""
+
+    found: tuple[tuple[Key, Verdict], ...]
+    predicates: tuple[str, ...]
+    clauses: tuple[Clause, ...]
+    walked: int
+    learnt: int
+    seconds: float
+    context: Context | None
+    endings: tuple[Ending, ...]
+    unstated: tuple[Unstated, ...]
+
+
 def recall(cache: Cache, ts: TransitionSystem, effort: Effort) -> LevelProof | None:
     """Return the proof of the level, if it is kept."""
-    kept = cache.load(*_key(ts, effort))
+    kept = cache.load(_Kept, *_key(ts, effort))
     if kept is None:
         return None
     cycle = ts.cycle(ts.havoc())
     wanted = obligations(ts, cycle)
-    if [list(obligation.key) for obligation in wanted] != [one["goal"] for one in kept["found"]]:
+    if [obligation.key for obligation in wanted] != [key for key, _ in kept.found]:
         return None
     for closely in range(CLOSELY + 1):
         chosen = every_predicate(ts, cycle, read(ts, cycle, wanted), closely)
-        if [one.name for one in chosen] == kept["features"]:
-            verdicts = (Verdict(one["verdict"]) for one in kept["found"])
-            proof = _proof(kept, tuple(zip(wanted, verdicts, strict=True)), chosen, ts)
+        if tuple(one.name for one in chosen) == kept.predicates:
+            found = tuple((goal, verdict) for goal, (_, verdict) in zip(wanted, kept.found, strict=True))
+            proof = LevelProof(
+                ts.level.name, found, chosen, kept.clauses, kept.walked, kept.learnt, kept.seconds, cached=True,
+                context=kept.context, endings=kept.endings, unstated=kept.unstated,
+            )  # fmt: skip
             keep_verdicts(cache, content(ts), _shortened(ts, proof))  # they may have been pruned
             return proof
     return None
-
-
-def _proof(
-    kept: dict[str, Any], found: tuple[Any, ...], chosen: tuple[Predicate, ...], ts: TransitionSystem
-) -> LevelProof:
-    clauses = tuple(tuple((at, value) for at, value in clause) for clause in kept["clauses"])
-    return LevelProof(
-        ts.level.name, found, chosen, clauses, kept["walked"], kept["learnt"], kept["seconds"], cached=True,
-        context=_context(kept["context"]), endings=tuple(_ending(one) for one in kept["endings"]),
-        unstated=tuple(Unstated(Sort(sort), table, missing) for sort, table, missing in kept["unlooked"]),
-    )  # fmt: skip
-
-
-def _context(kept: dict[str, Any] | None) -> Context | None:
-    if kept is None:
-        return None
-    unreached = tuple((table, line) for table, line in kept["unreached"])
-    repeated = tuple(
-        RepeatedLine(one["table"], one["line"], tuple(one["leaves"])) for one in kept["repeated"]
-    )
-    unsure = tuple((table, line) for table, line in kept["unsure"])
-    return Context(unreached, repeated, kept["restless"], unsure, kept["orders"])
-
-
-def _ending(kept: dict[str, Any]) -> Ending:
-    counted = tuple(Counted(**one) for one in kept["counted"])
-    return Ending(kept["table"], kept["changes"], counted, tuple(kept["still"]), tuple(kept["endless"]))
 
 
 def keep(cache: Cache, ts: TransitionSystem, effort: Effort, proof: LevelProof) -> None:
     """Keep the proof, unless something was left undecided."""
     if any(verdict is Verdict.UNDECIDED for _, verdict in proof.found):
         return
-    value = {
-        "found": [
-            {"goal": list(obligation.key), "verdict": verdict.value} for obligation, verdict in proof.found
-        ],
-        "features": [one.name for one in proof.predicates],
-        "clauses": proof.clauses,
-        "walked": proof.walked,
-        "learnt": proof.learnt,
-        "seconds": proof.seconds,
-        "context": None if proof.context is None else asdict(proof.context),
-        "endings": [asdict(one) for one in proof.endings],
-        "unlooked": [[one.sort, one.table, one.missing] for one in proof.unstated],
-    }
-    cache.store(value, *_key(ts, effort))
+    kept = _Kept(
+        tuple((obligation.key, verdict) for obligation, verdict in proof.found),
+        tuple(one.name for one in proof.predicates), proof.clauses, proof.walked, proof.learnt, proof.seconds,
+        proof.context, proof.endings, proof.unstated,
+    )  # fmt: skip
+    cache.store(kept, *_key(ts, effort))
     keep_verdicts(cache, content(ts), _shortened(ts, proof))
 
 
@@ -101,7 +84,7 @@ def _said(obligation: Obligation) -> str:
 
 
 def _key(ts: TransitionSystem, effort: Effort) -> tuple[str, ...]:
-    return "composed", content(ts), hashlib.sha256(repr(effort).encode()).hexdigest()
+    return content(ts), hashlib.sha256(repr(effort).encode()).hexdigest()
 
 
 def content(ts: TransitionSystem) -> str:

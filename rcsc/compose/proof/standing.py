@@ -8,7 +8,6 @@ to be proved of that neighbour, as it is now, before anything is called proved o
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Any
 
 from rcsc.compose.contract.claims import (
     FOUND,
@@ -62,49 +61,37 @@ class Verdicts:
         return sum(claim.verdict in FOUND for claim in self.claims.values())
 
 
+@dataclass(frozen=True, slots=True)
+class _Filed:
+    """Verdicts as they are kept."""
+
+    claims: tuple[tuple[Key, Claim], ...]
+    open: tuple[str, ...]
+    unstated: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class _AnyLevel:
+    """That levels were proved at all."""
+
+
 def keep_verdicts(cache: Cache, content: str, verdicts: Verdicts) -> None:
     """Keep what was found, unless more was proved of the same content before, with more effort."""
     before = verdicts_of(cache, content)
     if before is None or before.many <= verdicts.many:
-        value = {
-            "claims": [
-                [
-                    list(key),
-                    claim.verdict,
-                    [[level, list(need)] for level, need in claim.rests_on],
-                    list(claim.trusts),
-                ]
-                for key, claim in verdicts.claims.items()
-            ],
-            "open": list(verdicts.open),
-            "unlooked": list(verdicts.unstated),
-        }
-        cache.store(value, "composed verdicts", content)
-    cache.store({}, "composed verdicts")
+        cache.store(_Filed(tuple(verdicts.claims.items()), verdicts.open, verdicts.unstated), content)
+    cache.store(_AnyLevel())
 
 
 def verdicts_of(cache: Cache, content: str) -> Verdicts | None:
     """Return what was found of a level of this content."""
-    kept = cache.load("composed verdicts", content)
-    if kept is None:
-        return None
-    claims = {
-        _key(key): Claim(
-            Verdict(verdict), tuple((level, _key(need)) for level, need in rests_on), tuple(trusts)
-        )
-        for key, verdict, rests_on, trusts in kept["claims"]
-    }
-    return Verdicts(claims, tuple(kept["open"]), tuple(kept["unlooked"]))
-
-
-def _key(said: list[str]) -> Key:
-    sort, table, name = said
-    return sort, table, name
+    kept = cache.load(_Filed, content)
+    return None if kept is None else Verdicts(dict(kept.claims), kept.open, kept.unstated)
 
 
 def any_kept(cache: Cache) -> bool:
     """Return whether levels were ever proved into this cache."""
-    return cache.load("composed verdicts") is not None
+    return cache.load(_AnyLevel) is not None
 
 
 # --- what a system is made of ----------------------------------------------------------------
@@ -149,26 +136,6 @@ class Outline:
 
     levels: tuple[LevelOutline, ...]
     assumed: tuple[Promise, ...]
-
-
-def outline_of(form: Mapping[str, Any]) -> Outline:
-    """Invert `dataclasses.asdict`, by way of JSON."""
-    levels = tuple(
-        LevelOutline(
-            **one
-            | {
-                "tables": tuple(TableOutline(**table) for table in one["tables"]),
-                "properties": tuple((name, file) for name, file in one["properties"]),
-            }
-        )
-        for one in form["levels"]
-    )
-    assumed = (one | {"needs": _needs(one["needs"]), "own": _needs(one["own"])} for one in form["assumed"])
-    return Outline(levels, tuple(Promise(**one) for one in assumed))
-
-
-def _needs(form: list[Any]) -> tuple[Need, ...]:
-    return tuple((level, _key(key)) for level, key in form)
 
 
 # --- what is known of it -----------------------------------------------------------------------

@@ -1,13 +1,15 @@
 """Values kept as plain ones, which JSON keeps exactly, and read back by their declared types.
 
-In: dataclasses whose fields are plain values, literals, tuples, lists, dictionaries by text, and dataclasses of these. Out: the same after
-`plain` and `read`; what no such value was written as is refused. `Kept` has `state` and `restore` of
+In: dataclasses whose fields are plain values, words of a `StrEnum`, literals, tuples, lists, dictionaries by text, and dataclasses of
+these. Out: the same after `plain` and `read`; what no such value was written as is refused. `Kept` has `state` and `restore` of
 `rcsc_cell.workstation.stopped.Restorable`.
 """
 
 import types
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, is_dataclass
+from enum import StrEnum
+from functools import cache
 from math import isfinite
 from typing import Any, ClassVar, Literal, Union, cast, get_args, get_origin, get_type_hints
 
@@ -99,6 +101,8 @@ def read(kind: Any, said: Any) -> Any:
         return tuple(read(one, item) for one, item in zip(each, items, strict=True))
     if origin is not None and isinstance(said, dict) and issubclass(origin, Mapping):
         return {key: read(args[1], one) for key, one in said.items()}
+    if isinstance(kind, type) and issubclass(kind, StrEnum):
+        return kind(_text(said))
     if type(said) is kind or (kind is float and type(said) is int):
         return _bounded(said)
     raise ValueError(f"{_shown(said)} is no {getattr(kind, '__name__', kind)}")
@@ -160,8 +164,17 @@ def _any(kinds: Sequence[Any], said: Any) -> Any:
     raise ValueError(f"{_shown(said)} is none of its types")
 
 
+def _text(said: Any) -> str:
+    if not isinstance(said, str):
+        raise ValueError(f"{_shown(said)} is no text")  # noqa: TRY004  # what was read, not what was called
+    return said
+
+
+_hints = cache(get_type_hints)
+
+
 def _made(kind: type, said: Any) -> Any:
-    hints = get_type_hints(kind)
+    hints = _hints(kind)
     if not isinstance(said, dict) or set(said) != set(_names(kind)):
         raise ValueError(f"not the values of a {kind.__name__}")
     given = {name: read(hints[name], one) for name, one in said.items()}

@@ -5,6 +5,7 @@ In: a database. Out: what is wrong, by point; nothing where all is well.
 
 import hashlib
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
@@ -38,6 +39,11 @@ def unreachable(database: Database) -> tuple[str, ...]:
     return tuple(_problems(database, start))
 
 
+@dataclass(frozen=True, slots=True)
+class Passed:
+    """That the arm could go everywhere in a database."""
+
+
 def checked(database: Database, cache: Cache | None = None) -> None:
     """Has the arm go everywhere in the database, before anything moves.
 
@@ -48,14 +54,16 @@ def checked(database: Database, cache: Cache | None = None) -> None:
     Raises:
         BadData: It cannot be somewhere.
     """
-    seen = _digest(database)
-    if cache is not None and cache.load("reach", seen) is not None:
-        return
-    problems = unreachable(database)
-    if problems:
-        raise BadData(problems)
-    if cache is not None:
-        cache.store({}, "reach", seen)
+
+    def passed() -> Passed:
+        if problems := unreachable(database):
+            raise BadData(problems)
+        return Passed()
+
+    if cache is None:
+        passed()
+    else:
+        cache.memo(Passed, [_digest(database)], passed)
 
 
 def _digest(database: Database) -> str:
