@@ -1,9 +1,8 @@
 """The command line: arguments in, text and an exit status out.
 
 Exit statuses: 0 proved, 1 findings, 2 usage, 3 a bug in rcsc, 130 interrupted. Only here does anything print or end
-the process. A command's module is imported when the
-command line has named it, and not before, so that `rcsc --help` is quick; a package of an extra that is missing is one
-coded error (`shared/extras`).
+the process. A command's module is imported when the command line has named it, and not before, so that `rcsc --help`
+is quick; a package of an extra that is missing is one coded error (`shared/extras`).
 
 >>> from rcsc.commands import run
 >>> run(["explain", "RCS9"])  # a usage error, told on standard error
