@@ -74,6 +74,15 @@ table t {
   | 2    | (x < 3) /= (y < x)  ||
 }
 """
+SUMS = """
+input x : int -5 .. 5
+input y : int -5 .. 5
+table t {
+  | line | when                       ||
+  | 1    | x + y + 3 in {1, 4}        ||
+  | 2    | x + y /= -2 and x + y /= 1 ||
+}
+"""
 WRONG = [  # a change of a cell, and whether the table then has a gap or an overlap
     (BOXES, "| 0 .. 4 |", "| 0 .. 3 |"),
     (BOXES, "| 0 .. 4 |", "| 0 .. 5 |"),
@@ -88,6 +97,7 @@ WRONG = [  # a change of a cell, and whether the table then has a gap or an over
     (RELATED, "x <= y + 10", "x <= y + 9"),
     (RELATED, "x - y <= 10", "x - y <= 11"),
     (RELATED, "x - y <= 5 ", "x - y <= 6 "),
+    (SUMS, "{1, 4}", "{1, 5}"),
     (EQUAL, "(x < 3) /= (y < x)", "y >= x"),
     (EQUAL, "(x < 3) /= (y < x)", "x >= 3"),
 ]
@@ -101,7 +111,7 @@ def certificate_of(program: Program) -> dict[str, Any]:
     return made
 
 
-@pytest.mark.parametrize("text", [BOXES, RELATED, EQUAL], ids=["boxes", "related", "equal"])
+@pytest.mark.parametrize("text", [BOXES, RELATED, EQUAL, SUMS], ids=["boxes", "related", "equal", "sums"])
 def test_a_certificate_holds_and_says_what_it_rests_on(text: str) -> None:
     program = program_of(text)
     found = certify(program, certificate_of(program))
