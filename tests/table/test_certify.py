@@ -694,6 +694,24 @@ def test_a_region_with_one_point_is_not_empty() -> None:
         assert right or "['e'" in found.problems[0]
 
 
+@pytest.mark.parametrize(("more", "right"), [("", True), (" and (y > 0 or x < -2)", False)])
+def test_only_boxes_are_counted(more: str, right: bool) -> None:
+    program = program_of(
+        "input x : int -5 .. 5\ninput y : int -5 .. 5\n"
+        f"table t {{\n| line | when ||\n| one | x >= 0 ||\n| two | x < 0{more} ||\n}}\n"
+    )
+    entry = {
+        "table": "t",
+        "assumptions": [],
+        "stops": [],
+        "columns": ["x", "y"],
+        "forms": [],
+        "tree": [["b", 11, None]],
+    }
+    made = {"format": "rcsc-certificate", "version": 2, "program": "case", "tables": [entry]}
+    assert certify(program, signed(program, made)).whole is right
+
+
 def test_a_condition_of_one_leaf_that_is_undefined_for_some_value_is_certified() -> None:
     program = program_of(
         "input a : int 0 .. 9\nassume some monitored : a /= 0\n"
