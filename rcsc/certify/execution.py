@@ -6,9 +6,9 @@ its operation works in, no division by zero, no index outside its array, no valu
 before it is assigned.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import TypeAlias
+from typing import TypeAlias, assert_never
 
 from rcsc.certify.values import INT, REAL, Number, Term, Terms, ends_of, sort_of
 from rcsc.diagnostics.source import Span as Written
@@ -29,7 +29,6 @@ from rcsc.lang.model import (
     Int,
     Literal,
     Local,
-    Op,
     Place,
     Procedure,
     Program,
@@ -41,22 +40,28 @@ from rcsc.lang.model import (
     Statement,
     ToElement,
     ToLeaf,
+    ToLocal,
 )
+from rcsc.lang.operator_table import Logic, Op, Strict, is_logic
 
 MOST_STEPS = 100_000
 """Statements and elements that one run follows."""
 
 PAIRS = ((True, True), (True, False), (False, True), (False, False))
 Pairs: TypeAlias = tuple[tuple[bool, bool], ...]
-TRUE_OF: Mapping[Op, Pairs] = {
-    Op.AND: ((True, True),),
-    Op.OR: ((True, True), (True, False), (False, True)),
-    Op.XOR: ((True, False), (False, True)),
-    Op.IMPLIES: ((True, True), (False, True), (False, False)),
-}
-"""The pairs of operands of which each operator on truth values is true."""
 
-_ARITHMETIC = {Op.ADD: "+", Op.SUB: "-", Op.MUL: "*", Op.DIV: "/", Op.MOD: "mod", Op.NEG: "neg"}
+
+def true_of(op: Logic) -> Pairs:
+    """The pairs of operands of which an operator on truth values is true."""
+    match op:
+        case Op.AND:
+            return ((True, True),)
+        case Op.OR:
+            return ((True, True), (True, False), (False, True))
+        case Op.XOR:
+            return ((True, False), (False, True))
+        case Op.IMPLIES:
+            return ((True, True), (False, True), (False, False))
 
 
 class TooLongError(Exception):
@@ -172,9 +177,10 @@ class Run:
                 return self._element(leaves, self.index(index, len(leaves)))
             case Among(subject=subject, values=values):
                 return self._among(self.evaluate(subject), values)
-            case Apply(op=op) if op in TRUE_OF:
-                return self._truth(TRUE_OF[op], *expr.args)
-            case Apply(op=op, args=args):
+            case Apply(args=args):
+                op = expr.op
+                if is_logic(op):
+                    return self._truth(true_of(op), *args)
                 return self._applied(expr, op, [self.evaluate(arg) for arg in args])
 
     def _among(self, subject: Term, values: Iterable[object]) -> Term:
@@ -183,20 +189,20 @@ class Run:
         )
         return self.terms.some(self.terms.make("=", subject, one) for one in found)
 
-    def _truth(self, true_of: Pairs, first: Expr, second: Expr) -> Term:
+    def _truth(self, true: Pairs, first: Expr, second: Expr) -> Term:
         """The right side is looked at only where the left does not decide."""
         left, path = self.evaluate(first), self.path
-        open_for = [a for a in (True, False) if ((a, True) in true_of) != ((a, False) in true_of)]
+        open_for = [a for a in (True, False) if ((a, True) in true) != ((a, False) in true)]
         if len(open_for) == 1:
             self.path = self.terms.every((path, self._either_way(left, open_for[0])))
         right = self.evaluate(second)
         self.path = path
-        false_of = [pair for pair in PAIRS if pair not in true_of]
+        false_of = [pair for pair in PAIRS if pair not in true]
         if len(false_of) == 1:
             [(a, b)] = false_of
             return self.terms.some((self._either_way(left, not a), self._either_way(right, not b)))
         return self.terms.some(
-            self.terms.every((self._either_way(left, a), self._either_way(right, b))) for a, b in true_of
+            self.terms.every((self._either_way(left, a), self._either_way(right, b))) for a, b in true
         )
 
     def _either_way(self, condition: Term, yes: bool) -> Term:
@@ -218,7 +224,7 @@ class Run:
             found = self.terms.choice(here, self.leaf(name), found)
         return found
 
-    def _applied(self, expr: Apply, op: Op, args: list[Term]) -> Term:
+    def _applied(self, expr: Apply, op: Strict, args: list[Term]) -> Term:
         kinds = [kind for kind in (*(arg.type for arg in expr.args), expr.type) if isinstance(kind, Int)]
         whole = isinstance(expr.args[0].type, Int) and op is not Op.TO_REAL
         if op in (Op.DIV, Op.MOD):
@@ -256,24 +262,34 @@ class Run:
         self.owe("the whole number stays in its 64 bits", fits, written)
         return make("int", value)
 
-    def _operation(self, op: Op, args: list[Term]) -> Term:
+    def _operation(self, op: Strict, args: list[Term]) -> Term:
         """One operator; `a min b` is b where b < a, else a, and `a max b` is b where b > a."""
         make, terms = self.terms.make, self.terms
-        if op is Op.NOT:
-            return terms.negation(args[0])
-        if op in (Op.EQ, Op.NE):
-            same = make("=", *args)
-            return same if op is Op.EQ else terms.negation(same)
-        if op in (Op.LT, Op.LE):
-            return make("<" if op is Op.LT else "<=", *args)
-        if op in (Op.GT, Op.GE):
-            return make("<" if op is Op.GT else "<=", args[1], args[0])
-        if op in (Op.MIN, Op.MAX):
-            takes = make("<", args[1], args[0]) if op is Op.MIN else make("<", args[0], args[1])
-            return terms.choice(takes, args[1], args[0])
-        if op is Op.ABS and args[0].sort == INT:
-            return terms.choice(make("<", args[0], terms.constant(INT, 0)), make("neg", args[0]), args[0])
-        return make("abs" if op is Op.ABS else "real" if op is Op.TO_REAL else _ARITHMETIC[op], *args)
+        match op:
+            case Op.NOT:
+                return terms.negation(args[0])
+            case Op.EQ | Op.LT | Op.LE | Op.ADD | Op.SUB | Op.MUL | Op.DIV | Op.MOD:
+                return make(op.value, *args)
+            case Op.NE:
+                return terms.negation(make("=", *args))
+            case Op.GT:
+                return make("<", args[1], args[0])
+            case Op.GE:
+                return make("<=", args[1], args[0])
+            case Op.MIN:
+                return terms.choice(make("<", args[1], args[0]), args[1], args[0])
+            case Op.MAX:
+                return terms.choice(make("<", args[0], args[1]), args[1], args[0])
+            case Op.ABS if args[0].sort == INT:
+                return terms.choice(make("<", args[0], terms.constant(INT, 0)), make("neg", args[0]), args[0])
+            case Op.ABS:
+                return make("abs", *args)
+            case Op.NEG:
+                return make("neg", *args)
+            case Op.TO_INT:
+                return make("int", *args)
+            case Op.TO_REAL:
+                return make("real", *args)
 
     # --- statements ---
 
@@ -301,6 +317,8 @@ class Run:
                 case Call(procedure=name, args=args):
                     given_ = [(self.evaluate(arg), arg.span) for arg in args]
                     self.call(self.start.procedures[name], given_)
+                case _:
+                    assert_never(statement)
 
     def _stored(self, kind: Scalar, value: Term, what: str, written: Written) -> Term:
         """The value as a place of this type keeps it."""
@@ -316,17 +334,19 @@ class Run:
 
     def _assign(self, place: Place, value: Expr) -> None:
         found = self.evaluate(value)
-        if isinstance(place, ToLeaf):
-            self.write(place.name, self._stored(place.type, found, place.name, value.span), self.terms.true)
-        elif isinstance(place, ToElement):
-            stored = self._stored(place.type, found, place.leaves[0], value.span)
-            at = self.index(place.index, len(place.leaves))
-            self._step(len(place.leaves))
-            for number, name in enumerate(place.leaves):
-                here = self.terms.make("=", at, self.terms.constant(INT, number))
-                self.write(name, stored, here)
-        else:
-            self._set_local(place.name, self._stored(place.type, found, place.name, value.span))
+        match place:
+            case ToLeaf(name=name, type=kind):
+                self.write(name, self._stored(kind, found, name, value.span), self.terms.true)
+            case ToLocal(name=name, type=kind):
+                self._set_local(name, self._stored(kind, found, name, value.span))
+            case ToElement(leaves=leaves, index=index, type=kind):
+                stored = self._stored(kind, found, leaves[0], value.span)
+                at = self.index(index, len(leaves))
+                self._step(len(leaves))
+                for number, leaf in enumerate(leaves):
+                    self.write(leaf, stored, self.terms.make("=", at, self.terms.constant(INT, number)))
+            case _:
+                assert_never(place)
 
     def write(self, leaf: str, value: Term, when: Term) -> None:
         """Writes a leaf where `when` holds."""

@@ -15,14 +15,13 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from rcsc.certify.execution import PAIRS, TRUE_OF, Owed, Run, Start
+from rcsc.certify.execution import PAIRS, Owed, Run, Start, true_of
 from rcsc.certify.owed import Debt
 from rcsc.certify.settle import values_in
 from rcsc.certify.values import BOOL, INT, REAL, Term
 from rcsc.lang.leaves import read_by
 from rcsc.lang.meaning import spelled
 from rcsc.lang.model import (
-    COMPARISONS,
     Among,
     Apply,
     Bool,
@@ -30,7 +29,6 @@ from rcsc.lang.model import (
     Expr,
     Int,
     Literal,
-    Op,
     Program,
     Read,
     Real,
@@ -39,6 +37,7 @@ from rcsc.lang.model import (
     key_of,
     real_of_key,
 )
+from rcsc.lang.operator_table import Comparison, Op, is_comparison, is_logic
 
 Form: TypeAlias = tuple[tuple[str, int], ...]
 """Terms by name and their coefficients; sorted by name, the first positive, no common divisor."""
@@ -46,6 +45,10 @@ Bounds: TypeAlias = dict[Form, tuple[int, int]]
 Atom: TypeAlias = tuple[Form, Box]
 Formula: TypeAlias = "Atom | All | AnyOf"
 
+_TURNED: Mapping[Op, Comparison] = {
+    Op.LT: Op.GT, Op.GT: Op.LT, Op.LE: Op.GE, Op.GE: Op.LE, Op.EQ: Op.EQ, Op.NE: Op.NE,
+}  # fmt: skip
+"""The comparison with its sides exchanged."""
 SMALL = 512
 """Keys of one leaf up to which a condition that is not linear is tried for each; as in `resolve`."""
 MOST_PAIRED = 128
@@ -96,9 +99,9 @@ class _Terms:
                 return All(()) if bool(value) == yes else AnyOf(())
             case Apply(op=Op.NOT, args=(part,)):
                 return self.formula(part, not yes)
-            case Apply(op=op, args=(left, right)) if op in TRUE_OF:
-                return self.truth(left, right, [pair for pair in PAIRS if (pair in TRUE_OF[op]) == yes])
-            case Apply(op=op, args=(left, right)) if op in COMPARISONS and _ordered(left) and _ordered(right):
+            case Apply(op=op, args=(left, right)) if is_logic(op):
+                return self.truth(left, right, [pair for pair in PAIRS if (pair in true_of(op)) == yes])
+            case Apply(op=op, args=(left, right)) if is_comparison(op) and _ordered(left) and _ordered(right):
                 if isinstance(left.type, Bool) and not (_plain(left) and _plain(right)):
                     same = yes == (op is Op.EQ)
                     return self.truth(left, right, [(True, same), (False, not same)])
@@ -117,7 +120,7 @@ class _Terms:
         parts = tuple(All((self.formula(left, a), self.formula(right, b))) for a, b in rows)
         return parts[0] if len(parts) == 1 else AnyOf(parts)
 
-    def compare(self, op: Op, left: Expr, right: Expr, yes: bool) -> Formula:
+    def compare(self, op: Comparison, left: Expr, right: Expr, yes: bool) -> Formula:
         total: dict[str, int] = {}
         constant = self.add(total, left, 1) + self.add(total, right, -1)
         terms = sorted((name, k) for name, k in total.items() if k)
@@ -125,7 +128,7 @@ class _Terms:
         form = tuple((name, k // g) for name, k in terms)  # left - right = g * form + constant
         low, high = self.span(form)
         if g < 0:
-            op = {Op.LT: Op.GT, Op.GT: Op.LT, Op.LE: Op.GE, Op.GE: Op.LE}.get(op, op)
+            op = _TURNED[op]
         if not form:
             low = high = constant
         first, last = (0, 0) if not form else (-(constant // g), -constant // g)  # where it is >= 0, <= 0

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, replace
 from enum import IntEnum
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, assert_never
 
 from rcsc.lang.model import (
     Action,
@@ -183,6 +183,8 @@ def execute(
                     execute(program, inner, snapshot, local)
             case Call(procedure=name, args=args):
                 call(program, name, [_stored(evaluate(arg, snapshot, local)) for arg in args], snapshot)
+            case _:
+                assert_never(statement)
 
 
 def _stored(value: Value) -> Value:
@@ -200,6 +202,8 @@ def _assign(
             local[name] = value
         case ToElement(leaves=leaves, index=index):
             snapshot[leaves[_index(index, len(leaves), snapshot, local)]] = value
+        case _:
+            assert_never(place)
 
 
 def call(program: Program, name: str, args: list[Value], snapshot: dict[str, Value]) -> None:

@@ -19,6 +19,8 @@ from rcsc.lang.model import (
     Literal,
     Program,
     Read,
+    ReadLocal,
+    Select,
     Standing,
     Table,
 )
@@ -35,7 +37,7 @@ def spelled(term: Expr) -> str:
             return f"({op.value} {' '.join(map(spelled, args))})"
         case Among(subject=subject, values=values):
             return f"(in {spelled(subject)} {' '.join(map(repr, values))})"
-        case _:
+        case ReadLocal() | Select():
             return f"({type(term).__name__} {term!r})"
 
 

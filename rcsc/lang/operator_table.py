@@ -79,8 +79,11 @@ Ordering: TypeAlias = Literal[Op.EQ, Op.LT, Op.LE]
 Arithmetic: TypeAlias = Literal[Op.NEG, Op.ABS, Op.ADD, Op.SUB, Op.MUL, Op.DIV, Op.MOD, Op.MIN, Op.MAX]
 """From numbers of one kind to a number of it."""
 Conversion: TypeAlias = Literal[Op.TO_INT, Op.TO_REAL]
-Operator: TypeAlias = Literal[Op.NOT] | Logic | Comparison | Arithmetic | Conversion
+Strict: TypeAlias = Literal[Op.NOT] | Comparison | Arithmetic | Conversion
+"""Those that always look at all their operands."""
+Operator: TypeAlias = Logic | Strict
 """Every operator: `Op` member by member, so that mypy knows what is left where a group has been dealt with."""
+
 Core: TypeAlias = Literal[Op.NOT, Op.AND] | Ordering | Arithmetic | Conversion
 """What is left where the other truth functions and comparisons are said by these."""
 

@@ -6,6 +6,7 @@ In: statements and a state. Out: the state after them, and what they owe (`evalu
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import assert_never
 
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.source import Span
@@ -29,6 +30,7 @@ from rcsc.lang.model import (
     Statement,
     ToElement,
     ToLeaf,
+    ToLocal,
     pending,
     spell,
 )
@@ -62,6 +64,8 @@ class Run(Evaluation):
                         self.execute(inner)
                 case Call(procedure=name, args=args):
                     self.call(self.procedures[name], [(arg.span, self.evaluate(arg)) for arg in args])
+                case _:
+                    assert_never(statement)
 
     def settle(self, program: Program) -> None:
         """Write each pending value whose condition holds, all conditions evaluated before (`lang.interpret.settle`)."""
@@ -92,14 +96,17 @@ class Run(Evaluation):
 
     def _assign(self, place: Place, value: Expr) -> None:
         found = self.evaluate(value)
-        if isinstance(place, ToElement):
-            what = place.leaves[0].rpartition("[")[0] or place.leaves[0]
-            self._set_element(place, self._stored(place.type, found, what, value.span))
-        elif isinstance(place, ToLeaf):
-            self.write(place.name, self._stored(place.type, found, place.name, value.span), TRUE)
-        else:
-            self.state.local[place.name] = self._stored(place.type, found, place.name, value.span)
-            self.state.assigned.pop(place.name, None)
+        match place:
+            case ToElement(leaves=leaves, type=kind):
+                what = leaves[0].rpartition("[")[0] or leaves[0]
+                self._set_element(place, self._stored(kind, found, what, value.span))
+            case ToLeaf(name=name, type=kind):
+                self.write(name, self._stored(kind, found, name, value.span), TRUE)
+            case ToLocal(name=name, type=kind):
+                self.state.local[name] = self._stored(kind, found, name, value.span)
+                self.state.assigned.pop(name, None)
+            case _:
+                assert_never(place)
 
     def write(self, leaf: str, value: Node, when: Node) -> None:
         """Writes a leaf, where `when` holds."""

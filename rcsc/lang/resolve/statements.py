@@ -1,6 +1,7 @@
 """Statements: places found, values and arguments checked, locals renamed apart."""
 
 from dataclasses import dataclass, field
+from typing import assert_never
 
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.source import Span
@@ -328,6 +329,8 @@ def cost(body: tuple[Statement, ...], known: dict[str, int]) -> int:
                 total += max(0, high - low + 1) * cost(inner, known)
             case Call(procedure=name):
                 total += known.get(name, 0)
-            case _:
+            case Assign() | Local():
                 pass
+            case _:
+                assert_never(one)
     return total
