@@ -6,8 +6,12 @@ In: a declaration. Out: a `Property`, whose one condition says all of it, or dia
 - `P then Q` is `was P implies Q`: in linear temporal logic, always (P implies next Q);
 - `P until Q` is `was (P and not Q) implies P or Q`: always (P implies (P weakly until Q)). That Q ever holds is not said; once P
   has begun to hold it ends no sooner than in the cycle in which Q holds. Source: *unless*, Chandy and Misra, *Parallel Program Design*
-  (1988), chapter 3.
+  (1988), chapter 3;
+- `P from Q` is `P implies was P or Q`: once P does not hold it begins no sooner than in the cycle in which Q holds.
 """
+
+from collections.abc import Callable
+from dataclasses import dataclass
 
 from rcsc.diagnostics.codes import Code
 from rcsc.lang.expressions.scope import Body, Scope
@@ -19,25 +23,19 @@ from rcsc.lang.syntax.spell import spell_expr
 
 
 def made_property(scope: Scope, one: tree.PropertyDecl) -> Property | None:
-    """The property; None after an error."""
-    first = _condition(scope, one.condition, _BEFORE_WORD[one.word])
-    other = None if one.other is None else _condition(scope, one.other, _BEHIND_WORD[one.word])
-    if first is None or (one.other is not None and other is None):
-        return None
+    """Resolve a property; None after an error."""
     text = spell_expr(one.condition)
-    if one.other is not None and other is not None:
+    if one.other is None:
+        condition = _condition(scope, one.condition, "")
+    else:
+        form = _FORMS[one.word]
         text += f" {one.word} {spell_expr(one.other)}"
-        first = _then(first, other) if one.word == "then" else _until(first, other)
-    return Property(one.name.text, first, text, " ".join(one.doc), one.name.span)
-
-
-_BEFORE_WORD = {
-    "": "",
-    "then": "what stands before `then` is of the cycle before as it is",
-    "until": "what stands before `until` is of one cycle",
-}
-"""Why `was` cannot stand in the first condition, by the word after it."""
-_BEHIND_WORD = {"then": "", "until": "what stands behind `until` is of one cycle"}
+        first = _condition(scope, one.condition, form.first_of_one_cycle)
+        other = _condition(scope, one.other, form.other_of_one_cycle)
+        condition = None if first is None or other is None else form.condition(first, other)
+    if condition is None:
+        return None
+    return Property(one.name.text, condition, text, " ".join(one.doc), one.name.span)
 
 
 def _condition(scope: Scope, written: tree.Expr, why_no_before: str) -> Expr | None:
@@ -58,6 +56,35 @@ def _then(first: Expr, other: Expr) -> Expr:
 def _until(first: Expr, other: Expr) -> Expr:
     before = _apply(Op.AND, first, Apply(Op.NOT, (other,), Bool()))
     return _apply(Op.IMPLIES, one_earlier(before), _apply(Op.OR, first, other))
+
+
+def _from(first: Expr, other: Expr) -> Expr:
+    return _apply(Op.IMPLIES, first, _apply(Op.OR, one_earlier(first), other))
+
+
+@dataclass(frozen=True, slots=True)
+class _Form:
+    """A word between two conditions.
+
+    Attributes:
+        condition: What the two say together, of a cycle and the one before.
+        first_of_one_cycle: Why `was` cannot stand in the first condition; empty where it can. Likewise `other_of_one_cycle`.
+    """
+
+    condition: Callable[[Expr, Expr], Expr]
+    first_of_one_cycle: str
+    other_of_one_cycle: str
+
+
+_FORMS = {
+    "then": _Form(_then, "what stands before `then` is of the cycle before as it is", ""),
+    "until": _Form(
+        _until, "what stands before `until` is of one cycle", "what stands behind `until` is of one cycle"
+    ),
+    "from": _Form(
+        _from, "what stands before `from` is of one cycle", "what stands after `from` is of one cycle"
+    ),
+}
 
 
 def _apply(op: Op, one: Expr, two: Expr) -> Expr:

@@ -495,9 +495,9 @@ class InvariantDecl:
 
 @dataclass(frozen=True, slots=True)
 class PropertyDecl:
-    """`property name : expr [then|until expr]`.
+    """`property name : expr [then|until|from expr]`.
 
-    `word` is "", "then" or "until"; `other` stands after it.
+    `word` is "" or the word between the two; `other` stands after it.
     """
 
     name: Name
