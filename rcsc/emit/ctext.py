@@ -1,57 +1,47 @@
-"""Types, constants, expressions and statements in C99.
+"""Types, constants, expressions and statements as a tree of C99.
 
 Integers are computed in `int64_t`, or in `uint64_t` where the bounds of operands and result need it and none is negative; that all of
 them fit there was proved (`symbolic.execution.word`). Doubles are IEEE binary64 (`FLT_EVAL_METHOD` 0); what is stored has no -0.0.
 """
 
 import math
-import re
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Literal, assert_never
 
-from rcsc.emit.identifiers import Names
-from rcsc.lang.model import (
-    I64_MAX,
-    I64_MIN,
-    U64_MAX,
-    Among,
-    Apply,
-    Assign,
-    Bool,
-    Call,
-    Case,
-    Enum,
-    Expr,
-    For,
-    If,
-    Int,
-    Literal,
-    Local,
-    Op,
-    Procedure,
-    Read,
-    ReadLocal,
-    Real,
-    Scalar,
-    Select,
-    Statement,
-    ToElement,
-    ToLeaf,
-    Value,
+from rcsc.emit.text import FAULTLESS, Text, constant, local
+from rcsc.emit.tree import (
+    Body,
+    Branch,
+    Cast,
+    Code,
+    Constant,
+    Frame,
+    Infix,
+    Invoke,
+    Let,
+    Line,
+    Name,
+    Place,
+    Prefix,
+    Round,
+    Set,
+    Stmt,
+    infix,
+    when,
 )
+from rcsc.lang import model
+from rcsc.lang.leaves import everything
+from rcsc.lang.model import I64_MAX, I64_MIN, Bool, Enum, Expr, Int, Op, Real, Scalar, Value
+from rcsc.lang.operator_table import Arithmetic, Comparison, Operator, is_comparison
 
 _INFIX = {
     Op.AND: "&&", Op.OR: "||", Op.EQ: "==", Op.NE: "!=", Op.LT: "<", Op.LE: "<=", Op.GT: ">", Op.GE: ">=",
     Op.ADD: "+", Op.SUB: "-", Op.MUL: "*", Op.DIV: "/", Op.MOD: "%",
 }  # fmt: skip
-_HELPER = {"int64_t": "i64", "uint64_t": "u64", "double": "f64"}
-_SHORT = _HELPER | {
-    f"{sign}int{bits}_t": f"{sign or 'i'}{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)
-}
-"""How a type is called in the name of a conversion."""
-_PLAIN = re.compile(r"(?:\(u?int\d+_t\))?(?:s->[\w.\[\]]+|v_\w+)|\(?-?U?INT64_C\(\d+\)\)?|[\d.e+-]+")
-"""What may be cast as it stands: a variable, or a constant."""
-_COMPARE = frozenset({Op.EQ, Op.NE, Op.LT, Op.LE, Op.GT, Op.GE})
+SHORT = {"f64": "double"} | {f"{s or 'i'}{n}": f"{s}int{n}_t" for s in ("", "u") for n in (8, 16, 32, 64)}
+"""How a type is called in the name of a helper."""
+_CALLED = {kind: short for short, kind in SHORT.items()}
 
 
 def c_type(kind: Scalar) -> str:
@@ -79,38 +69,6 @@ def wide_type(kind: Scalar) -> str:
     return "int64_t" if isinstance(kind, Enum) else c_type(kind)
 
 
-def constant(kind: Scalar, value: Value) -> str:
-    """A constant in the wide type of its kind."""
-    match kind:
-        case Bool():
-            return "true" if value else "false"
-        case Real():
-            text = repr(abs(float(value)))
-            text = text if any(c in text for c in ".e") else f"{text}.0"
-            return f"(-{text})" if float(value) < 0 else text
-        case Enum():
-            return f"INT64_C({int(value)})"
-        case Int():
-            return integer(int(value))
-
-
-def integer(value: int) -> str:
-    """An integer constant of 64 bits."""
-    if value > I64_MAX:
-        return f"UINT64_C({value})"
-    if value == I64_MIN:
-        return f"(-INT64_C({I64_MAX}) - INT64_C(1))"
-    return f"INT64_C({value})" if value >= 0 else f"(-INT64_C({-value}))"
-
-
-def element_path(paths: list[str], index: str) -> str:
-    """The place of an array element by a computed index, from the places of all its elements, at least two."""
-    first, second = paths[0], paths[1]
-    at = next(i for i, (a, b) in enumerate(zip(first, second, strict=False)) if a != b)
-    head = first[: first.rindex("[", 0, at + 1)]
-    return head + f"[{index}]" + re.sub(r"^\[\d+\]", "", first[len(head) :])
-
-
 def type_bounds(name: str) -> tuple[int, int]:
     """Least and greatest value of an integer type of C, or of `bool`."""
     if name == "bool":
@@ -121,14 +79,16 @@ def type_bounds(name: str) -> tuple[int, int]:
 
 def _c_bounds(expr: Expr) -> tuple[Value, Value]:
     """What the C type of an expression can hold: a constant only itself, a double anything."""
-    if isinstance(expr, Literal):
+    if isinstance(expr, model.Literal):
         return expr.value, expr.value
     if isinstance(expr.type, Real):
         return -math.inf, math.inf
-    return type_bounds(c_type(expr.type) if isinstance(expr, Read | Select) else wide_type(expr.type))
+    return type_bounds(
+        c_type(expr.type) if isinstance(expr, model.Read | model.Select) else wide_type(expr.type)
+    )
 
 
-def _decided(op: Op, args: tuple[Expr, ...]) -> bool | None:
+def _decided(op: Comparison, args: tuple[Expr, ...]) -> bool | None:
     """What a comparison always gives by the C types of its operands: compilers refuse it as a comparison."""
     first, second = args
     if isinstance(first.type, Real):
@@ -141,17 +101,14 @@ def _decided(op: Op, args: tuple[Expr, ...]) -> bool | None:
             known = True if high < least else False if low >= most else None
         case Op.LE | Op.GT:
             known = True if high <= least else False if low > most else None
-        case _:
+        case Op.EQ | Op.NE:
             known = False if high < least or most < low else None
+        case _:
+            assert_never(op)
     return (not known if op in (Op.GE, Op.GT, Op.NE) else known) if known is not None else None
 
 
-def _one(kind: str) -> str:
-    """The 1 that a counter of this type goes up by."""
-    return "UINT64_C(1)" if kind == "uint64_t" else "INT64_C(1)"
-
-
-def _shared(kinds: tuple[Scalar, ...]) -> str:
+def _shared(kinds: Sequence[Scalar]) -> str:
     """The type in which an operation on these is done: signed as soon as one of them can be negative."""
     if any(isinstance(kind, Int) and kind.low < 0 for kind in kinds):
         return "int64_t"
@@ -159,254 +116,200 @@ def _shared(kinds: tuple[Scalar, ...]) -> str:
     return "uint64_t" if "uint64_t" in wide else wide[0]
 
 
-@dataclass(slots=True)
-class CText:
-    """Spells for one program.
+def _plain(code: Code) -> bool:
+    """Whether it may be cast as it stands: a variable, or a constant that is one token."""
+    match code:
+        case Constant(value=value, type=kind):
+            return value != I64_MIN and (kind != "double" or value >= 0)
+        case Place(steps=steps):
+            return all(isinstance(step, str | Name) for step in steps)
+        case Cast(type=kind, operand=operand):
+            return kind != "double" and isinstance(operand, Name | Place) and _plain(operand)
+        case _:
+            return isinstance(code, Name)
+
+
+def _widened(kind: Scalar, code: Code) -> Code:
+    return code if isinstance(kind, Bool | Real) else Cast(wide_type(kind), code)
+
+
+@dataclass
+class CText(Text):
+    """C99.
 
     Attributes:
-        state: How the struct is reached: `s->`.
         failing: Procedures after which a fault may stand.
-        parameters: Types of each procedure's parameters.
-        helpers: Helper functions that were used.
-        reals: Whether an expression was a real.
     """
 
-    names: Names
     failing: frozenset[str] = frozenset()
-    parameters: Mapping[str, tuple[Scalar, ...]] = field(default_factory=dict)
-    state: str = "s->"
-    helpers: set[str] = field(default_factory=set)
-    reals: bool = False
     _nested: int = 0
 
-    def place(self, leaf: str) -> str:
+    def place(self, leaf: str) -> Place:
         """A leaf."""
-        return self.state + self.names.paths[leaf]
+        return Place(self.names.paths[leaf])
 
-    def element(self, leaves: Sequence[str], index: Expr) -> str:
-        """An array element by a computed index, which is not spelled where it can only be 0."""
-        paths = [self.names.paths[leaf] for leaf in leaves]
-        return self.state + (paths[0] if len(paths) == 1 else element_path(paths, self.expr(index)))
+    def function(self, procedure: str) -> str:
+        """The function of a procedure."""
+        return f"{self.names.program}_do_{self.names.procedures[procedure]}"
 
-    def expr(self, expr: Expr) -> str:
-        """An expression in the wide type of its kind, parenthesised where needed."""
-        self.reals = self.reals or isinstance(expr.type, Real)
+    def expr(self, expr: Expr) -> Code:
+        """An expression in the wide type of its kind."""
         match expr:
-            case Literal(value=value, type=kind):
+            case model.Literal(value=value, type=kind):
                 return constant(kind, value)
-            case Read(name=name, type=kind):
-                return self._widened(kind, self.place(name))
-            case ReadLocal(name=name):
-                return f"v_{name}"
-            case Select(leaves=leaves, index=index, type=kind):
-                return self._widened(kind, self.element(leaves, index))
-            case Among(subject=subject, values=values):
+            case model.Read(name=name, type=kind):
+                return _widened(kind, self._element((name,), kind))
+            case model.ReadLocal(name=name, type=kind):
+                return Name(local(name).text, wide_type(kind))
+            case model.Select(leaves=leaves, index=index, type=kind):
+                return _widened(kind, self._element(leaves, kind, index))
+            case model.Among(subject=subject, values=values):
                 kind, (low, high) = subject.type, _c_bounds(subject)
-                able = [constant(kind, v) for v in values if isinstance(kind, Real) or low <= v <= high]
-                text = self.expr(subject) if able else ""
-                return "(" + (" || ".join(f"({text} == {value})" for value in able) or "false") + ")"
-            case Apply(op=op, args=args, type=kind):
+                able = [value for value in values if isinstance(kind, Real) or low <= value <= high]
+                return Round(self.among(self.expr(subject), kind, able))
+            case model.Apply(op=op, args=args, type=kind):
                 return self._applied(op, args, kind)
+            case _:
+                assert_never(expr)
 
-    @staticmethod
-    def _widened(kind: Scalar, text: str) -> str:
-        return text if isinstance(kind, Bool | Real) else f"({wide_type(kind)}){text}"
+    def _element(self, leaves: Sequence[str], kind: Scalar, index: Expr | None = None) -> Place:
+        """An array element by a computed index, which is left out where it can only be 0."""
+        steps: tuple[str | Code, ...] = self.names.paths[leaves[0]]
+        if index is not None and len(leaves) > 1:
+            pairs = zip(steps, self.names.paths[leaves[1]], strict=True)
+            at = next(at for at, (one, other) in enumerate(pairs) if one != other)
+            steps = (*steps[:at], self.expr(index), *steps[at + 1 :])
+        return Place(steps, c_type(kind))
 
-    def _applied(self, op: Op, args: tuple[Expr, ...], kind: Scalar) -> str:
-        if (
-            op is Op.XOR
-        ):  # of truth values; an operand that is known to equal the other is no comparison, either
+    def among(self, subject: Code, kind: Scalar, values: Sequence[Value]) -> Code:
+        """Whether it is one of the values."""
+        equal = tuple(infix("==", subject, constant(kind, value)) for value in values)
+        return Infix("||", equal) if equal else constant(Bool(), value=False)
+
+    def _applied(self, op: Operator, args: tuple[Expr, ...], kind: Scalar) -> Code:
+        """In the one type that the prover shows operands and result to fit in."""
+        if op is Op.XOR:  # of truth values; one that is known to equal the other is no comparison, either
             op = Op.NE
-        if op in _COMPARE and (known := _decided(op, args)) is not None:
+        if is_comparison(op) and (known := _decided(op, args)) is not None:
             return constant(Bool(), known)
-        texts = [self.expr(arg) for arg in args]
-        if op is Op.NOT:
-            return f"(!{texts[0]})"
-        if op is Op.IMPLIES:
-            return f"((!{texts[0]}) || {texts[1]})"
-        if op in (Op.TO_INT, Op.TO_REAL):
-            return self.converted(texts[0], wide_type(args[0].type), wide_type(kind))
-        if op in (Op.ABS, Op.MIN, Op.MAX):
-            return self._helper(op, args, texts, kind)
-        if isinstance(args[0].type, Int) and (op in _COMPARE or isinstance(kind, Int)):
-            return self._integers(op, args, texts, kind)
-        if op is Op.NEG:
-            return f"(-{texts[0]})"
-        if op in _COMPARE and isinstance(args[0].type, Bool):
-            return f"({texts[0]} {_INFIX[op]} {texts[1]})"
-        return f"({texts[0]} {_INFIX[op]} {texts[1]})"
-
-    def _integers(self, op: Op, args: tuple[Expr, ...], texts: list[str], kind: Scalar) -> str:
-        """In the one 64-bit type that the prover shows operands and result to fit in."""
+        given = [(self.expr(arg), wide_type(arg.type)) for arg in args]
+        if op is Op.TO_INT or op is Op.TO_REAL:
+            return self.converted(*given[0], wide_type(kind))
         shared = _shared((*(arg.type for arg in args), kind))
-        cast = self._cast(args, texts, shared)
-        if op is Op.NEG:
-            return f"(-{cast[0]})"
-        found = f"({cast[0]} {_INFIX[op]} {cast[1]})"
-        return found if op in _COMPARE else self.converted(found, shared, wide_type(kind))
+        found = self._operation(op, tuple(self.converted(*one, shared) for one in given), shared)
+        return found if is_comparison(op) else self.converted(found, shared, wide_type(kind))
 
-    def _helper(self, op: Op, args: tuple[Expr, ...], texts: list[str], kind: Scalar) -> str:
-        shared = _shared((*(arg.type for arg in args), kind))
-        name = f"{op.value}_{_HELPER[shared]}"
-        self.helpers.add(name)
-        found = f"{self.names.program}_{name}({', '.join(self._cast(args, texts, shared))})"
-        return self.converted(found, shared, wide_type(kind))
+    def _operation(
+        self,
+        op: Literal[Op.NOT, Op.AND, Op.OR, Op.IMPLIES] | Comparison | Arithmetic,
+        args: tuple[Code, ...],
+        shared: str,
+    ) -> Code:
+        match op:
+            case Op.NOT:
+                return Round(Prefix("!", args[0]))
+            case Op.NEG:
+                return Round(Prefix("-", args[0]))
+            case Op.IMPLIES:
+                return Round(infix("||", Prefix("!", args[0]), args[1]))
+            case Op.ABS | Op.MIN | Op.MAX:
+                return self._helper(f"{op.value}_{_CALLED[shared]}", args, shared)
+            case (
+                Op.AND | Op.OR | Op.EQ | Op.NE | Op.LT | Op.LE | Op.GT | Op.GE
+                | Op.ADD | Op.SUB | Op.MUL | Op.DIV | Op.MOD
+            ):  # fmt: skip
+                return Round(Infix(_INFIX[op], args))
+            case _:
+                assert_never(op)
 
-    def _cast(self, args: tuple[Expr, ...], texts: list[str], shared: str) -> list[str]:
-        pairs = zip(args, texts, strict=True)
-        return [self.converted(text, wide_type(arg.type), shared) for arg, text in pairs]
+    def _helper(self, name: str, args: tuple[Code, ...], kind: str) -> Code:
+        return Invoke(f"{self.names.program}_{name}", args, kind, helper=name)
 
-    def converted(self, text: str, source: str, target: str) -> str:
+    def converted(self, code: Code, source: str, target: str) -> Code:
         """A value of C type `source` as one of `target`; it was proved to fit.
 
         What an operation made is converted by a function of its own: MISRA C 10.8 forbids a cast there.
         """
         if source == target:
-            return text
-        if _PLAIN.fullmatch(text):
-            return f"({target}){text}"
-        name = f"{_SHORT[target]}_of_{_SHORT[source]}"
-        self.helpers.add(name)
-        return f"{self.names.program}_{name}({text})"
+            return code
+        if _plain(code):
+            return Cast(target, code)
+        return self._helper(f"{_CALLED[target]}_of_{_CALLED[source]}", (code,), target)
 
-    def stored(self, kind: Scalar, value: Expr, target: str) -> str:
-        """A value for a place of C type `target`."""
-        text = self.expr(value)
+    def stored(self, kind: Scalar, value: Expr, *, leaf: bool = False) -> Code:
+        """A value for a leaf, or for a local, in the type that it is kept in."""
+        code = self.expr(value)
         if isinstance(kind, Real):
-            return f"{text} + 0.0"
-        return text if isinstance(kind, Bool) else self.converted(text, wide_type(value.type), target)
+            return infix("+", code, constant(kind, 0))
+        return self.converted(code, wide_type(value.type), c_type(kind) if leaf else wide_type(kind))
 
     # --- statements ---
 
-    def block(self, body: tuple[Statement, ...], indent: int) -> Iterator[str]:
-        """Lines of C; after a call that may fail the rest is guarded."""
-        pad = "    " * indent
-        for at, statement in enumerate(body):
-            yield from self._statement(statement, indent)
-            if self._may_fail(statement) and at + 1 < len(body):
-                yield f"{pad}if (s->fault == 0) {{"
-                yield from self.block(body[at + 1 :], indent + 1)
-                yield f"{pad}}}"
+    def block(self, body: Sequence[model.Statement]) -> Body:
+        """Statements; after a call that may fail the rest is guarded."""
+        done: list[Stmt] = []
+        for at, statement in enumerate(body, 1):
+            done += self.statement(statement)
+            if at < len(body) and self._may_fail(statement):
+                return (*done, when(FAULTLESS, *self.block(body[at:])))
+        return tuple(done)
+
+    def _may_fail(self, statement: model.Statement) -> bool:
+        calls = (one for one in everything((statement,)) if isinstance(one, model.Call))
+        return any(one.procedure in self.failing for one in calls)
+
+    def guard(self, loop: model.For) -> tuple[Code, ...]:
+        """What must hold in a loop that it goes on."""
+        return (FAULTLESS,) if self._may_fail(loop) else ()
+
+    def statement(self, statement: model.Statement) -> Iterator[Stmt]:
+        """A statement; a local begins as zero, and is an integer of 64 bits."""
+        match statement:
+            case model.Local(name=name, type=kind, value=None):
+                yield Set(local(name), constant(kind, 0))
+            case model.For(low=low, high=high) if low > high:
                 return
-
-    def _may_fail(self, statement: Statement) -> bool:
-        match statement:
-            case Call(procedure=name):
-                return name in self.failing
-            case If(then=then, orelse=orelse):
-                return any(self._may_fail(one) for one in (*then, *orelse))
-            case Case(arms=arms, orelse=orelse):
-                inner = [one for arm in arms for one in arm.body]
-                return any(self._may_fail(one) for one in (*inner, *orelse))
-            case For(body=body):
-                return any(self._may_fail(one) for one in body)
             case _:
-                return False
+                yield from super().statement(statement)
 
-    def _statement(self, statement: Statement, indent: int) -> Iterator[str]:
-        pad = "    " * indent
-        match statement:
-            case Assign():
-                yield pad + self._assign(statement)
-            case Local(name=name, type=kind, value=value):
-                start = constant(kind, 0) if value is None else self.stored(kind, value, wide_type(kind))
-                yield f"{pad}v_{name} = {start};"
-            case If(condition=condition, then=then, orelse=orelse):
-                yield f"{pad}if ({self._asked(condition)}) {{"
-                yield from self.block(then, indent + 1)
-                if orelse:
-                    yield f"{pad}}} else {{"
-                    yield from self.block(orelse, indent + 1)
-                yield f"{pad}}}"
-            case Case():
-                yield from self._case(statement, indent)
-            case For():
-                yield from self._for(statement, indent)
-            case Call(procedure=name, args=args):
-                yield pad + self.call(name, args)
-
-    def _asked(self, condition: Expr) -> str:
+    def asked(self, condition: Expr) -> Code:
         """A condition as it stands in the parentheses of an `if`: `(a == b)` in them looks like a mistyped assignment."""
-        text = self.expr(condition)
-        equal = isinstance(condition, Apply) and condition.op is Op.EQ
-        return text[1:-1] if equal and text.startswith("(") and text[1] not in "(!" else text
+        match self.expr(condition):
+            case Round(Infix(op="==", operands=(Name() | Place() | Invoke() as one, other))):
+                return infix("==", one, other)
+            case Round(Infix(op="==", operands=(Constant(value=value) as one, other))) if value >= 0:
+                return infix("==", one, other)
+            case code:
+                return code
 
-    def _for(self, loop: For, indent: int) -> Iterator[str]:
-        """A loop; one to the last value of its type ends without counting past it."""
-        if loop.low > loop.high:
-            return
-        pad, v = "    " * indent, f"v_{loop.name}"
-        begin = f"{v} = {integer(loop.low)}"
-        guard = " && (s->fault == 0)" if self._may_fail(loop) else ""
-        kind = wide_type(Int(loop.low, loop.high))
-        step = f"{v} = {v} + {_one(kind)}"
-        if loop.high < (U64_MAX if kind == "uint64_t" else I64_MAX):
-            yield f"{pad}for ({begin}; ({v} <= {integer(loop.high)}){guard}; {step}) {{"
-            yield from self.block(loop.body, indent + 1)
-            yield f"{pad}}}"
-            return
-        inner, more = pad + "    ", f"more_{loop.name}"
-        yield f"{pad}{{"
-        yield f"{inner}bool {more} = true;"
-        yield f"{inner}{begin};"
-        yield f"{inner}while ({more}{guard}) {{"
-        yield from self.block(loop.body, indent + 2)
-        yield f"{inner}    {more} = {v} < {integer(loop.high)};"
-        yield f"{inner}    if ({more}) {{"
-        yield f"{inner}        {step};"
-        yield f"{inner}    }}"
-        yield f"{inner}}}"
-        yield f"{pad}}}"
+    def assigned(self, place: model.Place, value: Expr) -> Stmt:
+        """An assignment."""
+        given = self.stored(place.type, value, leaf=not isinstance(place, model.ToLocal))
+        target: Code
+        match place:
+            case model.ToLeaf(name=name, type=kind):
+                target = self._element((name,), kind)
+            case model.ToElement(leaves=leaves, index=index, type=kind):
+                target = self._element(leaves, kind, index)
+            case model.ToLocal(name=name, type=kind):
+                target = Name(local(name).text, wide_type(kind))
+        return Set(target, given) if given != target else Line("/* keeps its value */")
 
-    def call(self, name: str, args: tuple[Expr, ...] = ()) -> str:
-        """A call of a procedure."""
-        kinds = self.parameters.get(name, tuple(arg.type for arg in args))
-        pairs = zip(kinds, args, strict=True)
-        given = ["s", *(self.stored(kind, arg, wide_type(kind)) for kind, arg in pairs)]
-        return f"{self.names.program}_do_{self.names.procedures[name]}({', '.join(given)});"
-
-    def _assign(self, statement: Assign) -> str:
-        place, value = statement.place, statement.value
-        if isinstance(place, ToLeaf):
-            target, kind = self.place(place.name), c_type(place.type)
-        elif isinstance(place, ToElement):
-            target, kind = self.element(place.leaves, place.index), c_type(place.type)
-        else:
-            target, kind = f"v_{place.name}", wide_type(place.type)
-        given = self.stored(place.type, value, kind)
-        return f"{target} = {given};" if given != target else "/* keeps its value */"
-
-    def _case(self, statement: Case, indent: int) -> Iterator[str]:
-        pad, subject = "    " * indent, statement.subject
-        if not statement.arms:
-            yield from self.block(statement.orelse, indent)
-            return
+    def case(self, statement: model.Case) -> Body:
+        """A block with the value in it, and a chain of `if`."""
         self._nested += 1
-        name = "subject" if self._nested == 1 else f"subject_{self._nested}"
-        word = "if"
-        yield f"{pad}{{"
-        inner = pad + "    "
-        yield f"{inner}const {wide_type(subject.type)} {name} = {self.expr(subject)};"
-        for arm in statement.arms:
-            tests = " || ".join(f"({name} == {constant(subject.type, v)})" for v in arm.values) or "false"
-            yield f"{inner}{word} ({tests}) {{"
-            yield from self.block(arm.body, indent + 2)
-            word = "} else if"
-        yield f"{inner}}} else {{"
-        yield from self.block(statement.orelse, indent + 2)
-        if not statement.orelse:
-            yield f"{inner}    /* nothing */"
-        yield f"{inner}}}"
-        yield f"{pad}}}"
+        subject = Name("subject" if self._nested == 1 else f"subject_{self._nested}")
+        let = Let(f"const {wide_type(statement.subject.type)}", subject.text, self.expr(statement.subject))
+        arms = self.arms(subject, statement)
+        orelse = self.block(statement.orelse) if statement.orelse else (Line("/* nothing */"),)
         self._nested -= 1
+        return (Frame("{", (let, Branch(arms, orelse)), "}"),)
 
 
-def locals_of(procedure: Procedure) -> Iterator[tuple[str, Scalar]]:
+def locals_of(procedure: model.Procedure) -> Iterator[tuple[str, Scalar]]:
     """Locals and loop variables, declared at the top of the function."""
-    from rcsc.lang.leaves import everything
-
     for statement in everything(procedure.body):
-        if isinstance(statement, Local):
+        if isinstance(statement, model.Local):
             yield statement.name, statement.type
-        elif isinstance(statement, For):
+        elif isinstance(statement, model.For):
             yield statement.name, Int(statement.low, statement.high)

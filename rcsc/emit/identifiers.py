@@ -135,7 +135,7 @@ class Names:
         file: What the symbol file is called: the program's name as it is.
         program: In front of all C names, and the other files' name.
         attributes: Of each leaf, in Python.
-        paths: Of each leaf, in the C struct.
+        paths: Of each leaf, in the C struct, member by member and index by index.
         roots: Of each declared variable, in the C struct.
         members: Of each record, what its struct calls each field.
         tables, levels, procedures, records, enums: The stem of each.
@@ -149,7 +149,7 @@ class Names:
     file: str
     program: str
     attributes: dict[str, str]
-    paths: dict[str, str]
+    paths: dict[str, tuple[str, ...]]
     roots: dict[str, str]
     members: dict[str, dict[str, str]]
     tables: dict[str, str]
@@ -286,27 +286,29 @@ def _class_members(program: Program) -> dict[str, tuple[str, ...]]:
 
 def _paths(
     program: Program, members: dict[str, dict[str, str]], failed: tuple[str, ...]
-) -> tuple[dict[str, str], dict[str, str]]:
+) -> tuple[dict[str, str], dict[str, tuple[str, ...]]]:
     """What the struct calls each declared variable, and the place of each leaf; the pending leaf of `x` is `x_next`."""
     taken = Scope({*TRACE, *failed})
     roots = taken.all((d.name, _unlike(c_word(d.name), taken)) for d in program.declared)
     variables = {str(v.name) for v in program.variables}
-    paths: dict[str, str] = {}
+    paths: dict[str, tuple[str, ...]] = {}
     for one in program.declared:
-        paths.update(zip(map(str, one.leaves), _places(roots[one.name], one.type, members), strict=True))
+        paths.update(zip(map(str, one.leaves), _places((roots[one.name],), one.type, members), strict=True))
         for leaf in one.leaves:
             if pending(leaf) in variables:
-                paths[pending(leaf)] = taken.fresh(f"{paths[leaf]}_next")
+                paths[pending(leaf)] = (taken.fresh(f"{''.join(paths[leaf])}_next"),)
     return roots, {str(v.name): paths[v.name] for v in program.variables}
 
 
-def _places(path: str, kind: Type, members: dict[str, dict[str, str]]) -> Iterator[str]:
+def _places(
+    path: tuple[str, ...], kind: Type, members: dict[str, dict[str, str]]
+) -> Iterator[tuple[str, ...]]:
     match kind:
         case Array(length, element):
             for at in range(length):
-                yield from _places(f"{path}[{at}]", element, members)
+                yield from _places((*path, f"[{at}]"), element, members)
         case Record(name=record, fields=fields):
             for one in fields:
-                yield from _places(f"{path}.{members[record][one.name]}", one.type, members)
+                yield from _places((*path, f".{members[record][one.name]}"), one.type, members)
         case _:
             yield path

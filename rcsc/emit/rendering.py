@@ -1,14 +1,17 @@
 """The templates; the only importer of Jinja2."""
 
+from collections.abc import Mapping
 from functools import cache
 
 import jinja2
+
+from rcsc.emit.tree import IN_C, IN_PYTHON
 
 
 @cache
 def environment() -> jinja2.Environment:
     """Strict: a template that misspells an attribute fails."""
-    return jinja2.Environment(
+    found = jinja2.Environment(
         loader=jinja2.PackageLoader("rcsc.emit"),
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
@@ -16,8 +19,10 @@ def environment() -> jinja2.Environment:
         keep_trailing_newline=True,
         autoescape=False,  # noqa: S701 - the output is C and Python, not HTML
     )
+    found.filters |= {"c": IN_C.lines, "python": IN_PYTHON.lines}
+    return found
 
 
-def render(template: str, plan: object) -> str:
-    """The template laid out with one frozen value, called `plan`."""
-    return environment().get_template(template).render(plan=plan)
+def render(template: str, view: Mapping[str, object]) -> str:
+    """The template laid out with these values."""
+    return environment().get_template(template).render(view)

@@ -27,7 +27,7 @@ def symbols(plan: Plan, names: Names) -> str:
             {
                 "name": v.name,
                 "kind": v.kind.value,
-                "path": names.paths[v.name],
+                "path": "".join(names.paths[v.name]),
                 "c_type": c_type(v.type),
                 "attribute": names.attributes[v.name],
                 **_described(v),

@@ -18,6 +18,7 @@ from rcsc.emit import emit_c, emit_python
 from rcsc.emit.ctext import CText
 from rcsc.emit.identifiers import names_of
 from rcsc.emit.lower import lower
+from rcsc.emit.tree import IN_C
 from rcsc.lang.model import Box, Program, ProvedProgram, Value, key_bounds, seal_of_proof, value_of_key
 from rcsc.lang.project import load
 from rcsc.lang.resolve import compile_text, resolve
@@ -58,7 +59,10 @@ def scan_c(program: Program, name: str) -> str:
     text = CText(names_of(program))
     rows = []
     for at, line in enumerate(program.tables[0].lines):
-        tests = " && ".join(text.expr(test.condition) for test in line.tests if test is not None) or "true"
+        tests = (
+            " && ".join(IN_C.code(text.expr(test.condition)) for test in line.tests if test is not None)
+            or "true"
+        )
         rows.append(f"    if ({tests}) {{ line = {at}; found++; }}")
     none = len(program.tables[0].lines) if program.tables[0].default else -1
     tail = f"    return found == 1 ? line : found == 0 ? {none} : -2;"
@@ -73,7 +77,8 @@ def driver_c(program: Program, name: str, function: str, samples: list[dict[str,
     """Calls both on every input and compares them."""
     names = names_of(program)
     sets = "\n".join(
-        "    " + " ".join(f"s[{at}].{names.paths[leaf]} = {int(value)};" for leaf, value in sample.items())
+        "    "
+        + " ".join(f"s[{at}].{''.join(names.paths[leaf])} = {int(value)};" for leaf, value in sample.items())
         for at, sample in enumerate(samples)
     )
     return (
@@ -159,7 +164,8 @@ def batch_ns(folder: Path, program: Program, name: str, samples: list[dict[str, 
     """Nanoseconds a row of the batch entry, over a million rows."""
     names = names_of(program)
     sets = "\n".join(
-        "    " + " ".join(f"s[{at}].{names.paths[leaf]} = {int(value)};" for leaf, value in sample.items())
+        "    "
+        + " ".join(f"s[{at}].{''.join(names.paths[leaf])} = {int(value)};" for leaf, value in sample.items())
         for at, sample in enumerate(samples)
     )
     table = names.tables[program.tables[0].name]

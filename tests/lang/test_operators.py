@@ -23,7 +23,8 @@ from rcsc.diff.changes.spell import said
 from rcsc.emit.c99 import helper
 from rcsc.emit.ctext import CText, wide_type
 from rcsc.emit.identifiers import names_of
-from rcsc.emit.pytext import PyText
+from rcsc.emit.text import PyText
+from rcsc.emit.tree import IN_C, IN_PYTHON, Invoke, read
 from rcsc.host.tools import c_compiler, run_command
 from rcsc.lang.expressions import intervals
 from rcsc.lang.expressions.folding import fold
@@ -430,7 +431,9 @@ def python_names() -> dict[str, Any]:
 
 @over_cases
 def test_python(case: Case) -> None:
-    spelled = compile(PyText(names_of(program_of(SMALL))).expr(case.locals()), "expression", "eval")
+    spelled = compile(
+        IN_PYTHON.code(PyText(names_of(program_of(SMALL))).expr(case.locals())), "expression", "eval"
+    )
     given = (dict(zip(("v_a", "v_b"), operands, strict=False)) for operands, _ in ROWS[case])
     found = (eval(spelled, python_names(), one) for one in given)  # noqa: S307 - our own text
     assert different(case, found) == []
@@ -441,11 +444,11 @@ def c_program() -> str:
     program = program_of(SMALL)
     texts = emitted(program)
     text, writer = CText(names_of(program)), Writer(program, symbols_of(program, texts))
-    functions, calls = [], []
+    functions, calls, used = [], [], set[str]()
     for at, case in enumerate(CASES):
         spelled, reference = text.expr(case.locals()), writer.expr(case.locals())
-        wide = text.converted(spelled, wide_type(case.made), c_word(case.made))
-        for who, body, types in (("c", wide, wide_type), ("r", reference, c_type)):
+        used |= {one.helper for one in read(spelled) if isinstance(one, Invoke)} - {""}
+        for who, body, types in (("c", IN_C.code(spelled), wide_type), ("r", reference, c_type)):
             params = ", ".join(f"{types(case.kind)} v_{name}" for name in ("a", "b")[: case.many])
             functions.append(f"static {c_word(case.made)} {who}_{at}({params}) {{ return {body}; }}")
         rows = ", ".join(
@@ -458,8 +461,8 @@ def c_program() -> str:
             f"for (int i = 0; i < {len(ROWS[case])}; i++) {{ show_{c_word(case.made)}(c_{at}({given}), r_{at}({given})); }}"
         )
     helpers = [
-        f"static {one.head} {{\n" + "\n".join(one.lines) + "\n}"
-        for one in (helper(text.names.program, name) for name in sorted(text.helpers))
+        f"static {one.head} {{\n" + "\n".join(IN_C.lines(one.body)) + "\n}"
+        for one in (helper(text.names.program, name) for name in sorted(used))
     ]
     extremes = [EXTREMES.format(T=name) for name in ("int32_t", "int64_t", "ref_wide", "double")]
     head = ["#include <stdio.h>\n#include <stdint.h>\n#include <stdbool.h>\n#include <string.h>", SHOW]

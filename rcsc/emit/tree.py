@@ -1,0 +1,418 @@
+"""A small tree of code: expressions and statements that C and Python share, and how each language spells them.
+
+`ctext`, `c99`, `pytext` and `python` build it; what is asked of code (names that are read, helpers that are called, reals, what may be
+cast) is asked of the tree. What only one language has stands in a `Frame` or a `Line`. A template prints blocks by the filters `c` and
+`python`.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import ClassVar, TypeAlias, assert_never
+
+from rcsc.lang.model import I64_MAX, I64_MIN, U64_MAX, Value
+
+# --- expressions ---------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Name:
+    """A variable of the code, or a word that stands for a value."""
+
+    text: str
+    type: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Constant:
+    """A number or a truth; `type` says how C spells it: `bool`, `double`, or an integer type."""
+
+    value: Value
+    type: str = "int32_t"
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """A member of the state, step by step: a piece of its path as it is spelled, or a computed index."""
+
+    steps: tuple["str | Code", ...]
+    type: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Prefix:
+    """An operator before its operand."""
+
+    op: str
+    operand: "Code"
+
+
+@dataclass(frozen=True, slots=True)
+class Infix:
+    """An operator between its operands, of which there is at least one."""
+
+    op: str
+    operands: tuple["Code", ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Invoke:
+    """A call of a function.
+
+    Attributes:
+        type: What it gives, where that is asked for.
+        helper: Which of the file's small functions it is, if it is one: what makes the file define it.
+    """
+
+    function: str
+    args: tuple["Code", ...] = ()
+    type: str = ""
+    helper: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Cast:
+    """A value as one of another type."""
+
+    type: str
+    operand: "Code"
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """One of two values."""
+
+    condition: "Code"
+    yes: "Code"
+    no: "Code"
+
+
+@dataclass(frozen=True, slots=True)
+class Element:
+    """An element."""
+
+    of: "Code"
+    at: "Code"
+
+
+@dataclass(frozen=True, slots=True)
+class Items:
+    """Values together: a tuple in Python, an initialiser in C."""
+
+    items: tuple["Code", ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Round:
+    """In parentheses, whether they are needed or not; those that are needed stand anyway."""
+
+    inner: "Code"
+
+
+Code: TypeAlias = Name | Constant | Place | Prefix | Infix | Invoke | Cast | Choice | Element | Items | Round
+
+# --- statements ----------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Set:
+    """An assignment."""
+
+    place: Code
+    value: Code
+
+
+@dataclass(frozen=True, slots=True)
+class Let:
+    """A variable of the function: its type in C, its name, its value."""
+
+    type: str
+    name: str
+    value: Code | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Do:
+    """A call for what it does."""
+
+    call: Code
+
+
+@dataclass(frozen=True, slots=True)
+class Leave:
+    """`return`, or another word that ends the function with a value."""
+
+    value: Code
+    word: str = "return"
+
+
+@dataclass(frozen=True, slots=True)
+class Branch:
+    """The first arm whose condition holds, else `orelse`, where there is one."""
+
+    arms: tuple[tuple[Code, "Body"], ...]
+    orelse: "Body | None" = None
+
+
+@dataclass(frozen=True, slots=True)
+class Loop:
+    """`name` from `low` to `high`, both included, while `guard` holds (in C; Python leaves by an exception)."""
+
+    name: str
+    low: int
+    high: int
+    body: "Body"
+    guard: tuple[Code, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """What only one of the languages has: a line, a block inside, perhaps a line after it."""
+
+    head: str
+    body: "Body"
+    tail: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """A line as it stands: a comment, a row of data."""
+
+    text: str
+
+
+Stmt: TypeAlias = Set | Let | Do | Leave | Branch | Loop | Frame | Line
+Body: TypeAlias = tuple[Stmt, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Function:
+    """A function: what is said of it, its head, its body."""
+
+    doc: str
+    head: str
+    body: Body
+
+
+def infix(op: str, *operands: Code) -> Infix:
+    """An operation on these."""
+    return Infix(op, operands)
+
+
+def when(condition: Code, *body: Stmt) -> Branch:
+    """What is done only where the condition holds."""
+    return Branch(((condition, body),))
+
+
+def read(node: object) -> Iterator[Code]:
+    """Every expression in a tree, but for variables that are only set."""
+    if isinstance(node, tuple):
+        for one in node:
+            yield from read(one)
+    elif isinstance(node, Set) and isinstance(node.place, Name):
+        yield from read(node.value)
+    elif isinstance(node, Code | Stmt | Function):
+        if isinstance(node, Code):
+            yield node
+        if isinstance(node, Loop):
+            yield Name(node.name)
+        for part in node.__slots__:
+            yield from read(getattr(node, part))
+
+
+# --- spelling ------------------------------------------------------------------------
+
+
+class Language(ABC):
+    """Spells code.
+
+    Attributes:
+        state: What a member of the state begins with.
+        levels: How closely an operator binds, a prefix under its text and `x`; 0 for those not named.
+        chained: Operators whose first operand needs no parentheses where it binds as closely.
+        end: What a plain statement ends with.
+        heads: The lines of `if`, of `else if`, of `else`, and what closes them all.
+    """
+
+    state: str
+    levels: ClassVar[Mapping[str, int]]
+    chained = ""
+    end = ""
+    heads: tuple[str, str, str, str]
+
+    def code(self, one: Code) -> str:
+        """An expression."""
+        match one:
+            case Name(text=text):
+                return text
+            case Constant():
+                return self.constant(one)
+            case Place(steps=steps):
+                return self.state + "".join(s if isinstance(s, str) else f"[{self.code(s)}]" for s in steps)
+            case Prefix(op=op, operand=operand):
+                return op + self.operand(operand, self.levels.get(f"{op}x", 0))
+            case Infix(op=op, operands=operands):
+                level, chained = self.levels.get(op, 0), op in self.chained
+                parts = (self.operand(x, level - (chained and not at)) for at, x in enumerate(operands))
+                return f" {op} ".join(parts)
+            case Invoke(function=function, args=args):
+                return f"{function}({', '.join(map(self.code, args))})"
+            case Cast() | Choice() | Items():
+                return self.own(one)
+            case Element(of=of, at=at):
+                return f"{self.code(of)}[{self.code(at)}]"
+            case Round(inner=inner):
+                return f"({self.code(inner)})"
+            case _:
+                assert_never(one)
+
+    def operand(self, one: Code, level: int) -> str:
+        """An operand of an operator of this level, in parentheses where it binds no closer."""
+        match one:
+            case Infix(op=op):
+                loose = self.levels.get(op, 0) <= level
+            case Prefix(op=op):
+                loose = self.levels.get(f"{op}x", 0) <= level
+            case _:
+                loose = isinstance(one, Choice)
+        return f"({self.code(one)})" if loose else self.code(one)
+
+    def lines(self, body: Body, indent: int = 1) -> Iterator[str]:
+        """Statements, a line each."""
+        pad = "    " * indent
+        for one in body:
+            match one:
+                case Set(place=place, value=value):
+                    yield f"{pad}{self.code(place)} = {self.code(value)}{self.end}"
+                case Do(call=call):
+                    yield f"{pad}{self.code(call)}{self.end}"
+                case Leave(value=value, word=word):
+                    yield f"{pad}{word} {self.code(value)}{self.end}"
+                case Branch(arms=arms, orelse=orelse):
+                    for at, (condition, inner) in enumerate(arms):
+                        yield pad + self.heads[at > 0].format(self.code(condition))
+                        yield from self.lines(inner, indent + 1)
+                    if orelse is not None:
+                        yield pad + self.heads[2]
+                        yield from self.lines(orelse, indent + 1)
+                    yield from (pad + close for close in self.heads[3:] if close)
+                case Frame(head=head, body=inner, tail=tail):
+                    yield pad + head
+                    yield from self.lines(inner, indent + 1)
+                    yield from (pad + text for text in (tail,) if text)
+                case Line(text=text):
+                    yield pad + text
+                case Let() | Loop():
+                    yield from self.lines(self.framed(one), indent)
+                case _:
+                    assert_never(one)
+
+    @abstractmethod
+    def constant(self, one: Constant) -> str:
+        """A number or a truth."""
+
+    @abstractmethod
+    def own(self, one: Cast | Choice | Items) -> str:
+        """An expression that each language spells in its own way."""
+
+    @abstractmethod
+    def framed(self, one: Let | Loop) -> Body:
+        """A statement that each language spells in its own way, by simpler ones."""
+
+
+class C(Language):
+    """C99: every operation inside another is in parentheses, but for a product in a sum."""
+
+    state, end = "s->", ";"
+    levels = MappingProxyType({"*": 1})
+    heads = ("if ({}) {{", "}} else if ({}) {{", "} else {", "}")
+
+    def constant(self, one: Constant) -> str:
+        """By its type; the least of `int64_t` has no spelling of its own."""
+        value = one.value
+        match one.type:
+            case "bool":
+                return "true" if value else "false"
+            case "double":
+                text = repr(abs(float(value)))
+                text = text if any(c in text for c in ".e") else f"{text}.0"
+                return f"(-{text})" if value < 0 else text
+            case "int64_t" | "uint64_t":
+                if value == I64_MIN:
+                    return f"(-INT64_C({I64_MAX}) - INT64_C(1))"
+                word = "UINT64_C" if value > I64_MAX or one.type == "uint64_t" else "INT64_C"
+                return f"{word}({value:d})" if value >= 0 else f"(-{word}({-value:d}))"
+            case _:
+                return f"{value:d}{'u' if one.type == 'uint32_t' else ''}"
+
+    def own(self, one: Cast | Choice | Items) -> str:
+        """As ISO C99, 6.5.4, 6.5.15 and 6.7.8."""
+        match one:
+            case Cast(type=name, operand=operand):
+                return f"({name}){self.operand(operand, -1 if isinstance(operand, Prefix) else 1)}"
+            case Choice(condition=condition, yes=yes, no=no):
+                return f"{self.operand(condition, 1)} ? {self.operand(yes, 1)} : {self.operand(no, 1)}"
+            case Items(items=items):
+                return f"{{ {', '.join(map(self.code, items))} }}"
+
+    def framed(self, one: Let | Loop) -> Body:
+        """Declarations; a loop to the last value of its type ends without counting past it."""
+        match one:
+            case Let(type=kind, name=name, value=value):
+                return (Line(f"{kind} {name}{'' if value is None else f' = {self.code(value)}'};"),)
+            case Loop(name=name, guard=guard):
+                count, high = Name(name), Constant(one.high, "int64_t")
+                begin = Set(count, Constant(one.low, "int64_t"))
+                wide = one.low >= 0 and one.high > I64_MAX
+                step = Set(count, infix("+", count, Constant(1, "uint64_t" if wide else "int64_t")))
+        if one.high < (U64_MAX if wide else I64_MAX):
+            first, then = self.lines((begin, step), 0)
+            goes = self.code(infix("&&", infix("<=", count, high), *guard))
+            return (Frame(f"for ({first} {goes}; {then.rstrip(';')}) {{", one.body, "}"),)
+        more = Name(f"more_{name.removeprefix('v_')}")
+        inner = (*one.body, Set(more, infix("<", count, high)), when(more, step))
+        again = Frame(f"while ({self.code(infix('&&', more, *guard))}) {{", inner, "}")
+        return (Frame("{", (Let("bool", more.text, Constant(1, "bool")), begin, again), "}"),)
+
+
+class Python(Language):
+    """Python 3: parentheses only where they are needed."""
+
+    state = "s."
+    levels = MappingProxyType({
+        "or": 1, "and": 2, "not x": 3, "in": 4, "==": 4, "!=": 4, "<": 4, "<=": 4, ">": 4, ">=": 4,
+        "&": 5, "+": 6, "-": 6, "*": 7, "/": 7, "-x": 8,
+    })  # fmt: skip
+    chained = "+-"
+    heads = ("if {}:", "elif {}:", "else:", "")
+
+    def constant(self, one: Constant) -> str:
+        """A number has no type of C."""
+        kind = {"bool": bool, "double": float}.get(one.type, int)
+        return repr(kind(one.value))
+
+    def own(self, one: Cast | Choice | Items) -> str:
+        """A conversion, a conditional expression, a tuple."""
+        match one:
+            case Cast(type=name, operand=operand):
+                return f"{name}({self.code(operand)})"
+            case Choice(condition=condition, yes=yes, no=no):
+                return f"{self.operand(yes, 0)} if {self.operand(condition, 0)} else {self.operand(no, 0)}"
+            case Items(items=items):
+                return f"({', '.join(map(self.code, items))},)"
+
+    def lines(self, body: Body, indent: int = 1) -> Iterator[str]:
+        """Statements, a line each; `pass` for nothing."""
+        yield from list(super().lines(body, indent)) or ["    " * indent + "pass"]
+
+    def framed(self, one: Let | Loop) -> Body:
+        """Nothing is declared."""
+        match one:
+            case Let(name=name, value=value):
+                return (Set(Name(name), value),) if value is not None else ()
+            case Loop(name=name, low=low, high=high, body=body):
+                return (Frame(f"for {name} in range({low}, {high + 1}):", body),)
+
+
+IN_C, IN_PYTHON = C(), Python()
