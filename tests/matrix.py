@@ -11,8 +11,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from rcsc.driver.compile import TARGETS, compile_
+from rcsc.driver.compile import compile_
 from rcsc.driver.settings import Settings
+from rcsc.emit import TARGETS
 from rcsc.emit.write import write
 from rcsc.lang.model import Program
 from rcsc.lang.project import load

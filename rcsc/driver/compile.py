@@ -1,6 +1,6 @@
 """`rcsc compile`: the executors of every proved program."""
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from pathlib import Path
 
 from rcsc.diagnostics.codes import Code
@@ -8,19 +8,16 @@ from rcsc.diagnostics.diagnostic import Diagnostic, Label
 from rcsc.diagnostics.source import Span
 from rcsc.driver.pipeline import Proved, proved
 from rcsc.driver.settings import Made, Settings
-from rcsc.emit import emit_c, emit_python
-from rcsc.emit.c99 import outward
+from rcsc.emit import TARGETS, Target, emitted
 from rcsc.emit.lower import lower
 from rcsc.emit.plan import Plan
 from rcsc.emit.write import stale, write
 from rcsc.lang.model import ProvedProgram
 from rcsc.lang.project import project_root
 
-TARGETS = ("python", "c")
-
 
 def compile_(
-    settings: Settings, out: Path, targets: tuple[str, ...], *, only_check: bool, defensive: bool = False
+    settings: Settings, out: Path, targets: Collection[str], *, only_check: bool, defensive: bool = False
 ) -> Made:
     """Prove every table anew, then write the executors, or say whether they are fresh."""
     made = proved(settings)
@@ -36,13 +33,13 @@ def compile_(
 
 
 def _executors(
-    made: Proved, targets: tuple[str, ...], *, defensive: bool
+    made: Proved, targets: Collection[str], *, defensive: bool
 ) -> tuple[dict[str, str], tuple[Diagnostic, ...]]:
     """The generated files of every program that declares a table or a level, by path under the folder."""
     files: dict[str, str] = {}
     found = []
     paths: dict[str, str] = {}
-    names: dict[str, tuple[str, str]] = {}
+    names: dict[str, dict[str, tuple[str, str]]] = {}
     for root, program in made.executable:
         plan = planned(program, defensive=defensive)
         emitted_ = emitted(plan, targets)
@@ -51,26 +48,25 @@ def _executors(
             found.append(_same_file(taken, root, paths[taken.casefold()]))
             continue
         paths |= {path.casefold(): root for path in emitted_}
-        if "c" in targets:
-            found += _same_names(plan, root, names)
+        for name in targets:
+            found += _same_names(TARGETS[name], plan, root, names.setdefault(name, {}))
         files |= emitted_
     return files, tuple(found)
 
 
-def _same_names(plan: Plan, root: str, names: dict[str, tuple[str, str]]) -> Iterator[Diagnostic]:
-    """The first name in C that this program shares with another, or gives to two things; `names` has who has which, and gets its own."""
-    for name, what in outward(plan):
+def _same_names(
+    target: Target, plan: Plan, root: str, names: dict[str, tuple[str, str]]
+) -> Iterator[Diagnostic]:
+    """The first name that this program shares with another, or gives to two things; `names` has who has which, and gets its own."""
+    for name, what in target.outward(plan):
         other, said = names.setdefault(name, (root, what))
         if said != what:
-            message = f"`{name}` would be two things in C: {said} in `{other}`, and {what} in `{root}`"
+            message = (
+                f"`{name}` would be two things in {target.title}: {said} in `{other}`, and {what} in `{root}`"
+            )
             helps = ("rename one of the programs, or the table, level or type",)
             yield Diagnostic(Code.NAME_COLLISION, message, Label(Span(root, 0, 0)), help=helps)
             return
-
-
-def emitted(plan: Plan, targets: tuple[str, ...]) -> dict[str, str]:
-    """The files of a program, by path under the folder."""
-    return (emit_python(plan) if "python" in targets else {}) | (emit_c(plan) if "c" in targets else {})
 
 
 def planned(proved: ProvedProgram, *, defensive: bool = False) -> Plan:

@@ -9,9 +9,10 @@ from pathlib import Path
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label
 from rcsc.diagnostics.source import Span
-from rcsc.driver.compile import TARGETS, emitted, planned
+from rcsc.driver.compile import planned
 from rcsc.driver.pipeline import proved
 from rcsc.driver.settings import Effort, Made, Settings
+from rcsc.emit import emitted
 from rcsc.host.files import write_atomically
 from rcsc.lang.model import Expr, Program, Snapshot, Table
 from rcsc.solvers.options import Options
@@ -36,7 +37,7 @@ def test(settings: Settings, effort: Effort) -> Made:
     found: list[Diagnostic] = []
     figures = []
     for _, program in made.executable:
-        files = emitted(planned(program), TARGETS)
+        files = emitted(planned(program))
         one, text = _try_out(program.program, files, settings.options, effort, settings.progress)
         found += one
         figures.append(text)

@@ -1,4 +1,4 @@
-"""A proved program to files in C and Python.
+"""A proved program to files in each target's language.
 
 A *plan* is the shape of the executors in no language. Each leaf that a table tests has *classes*: values that no line
 tells apart. A *mask* has one bit a line; each class of each leaf has one. Matching joins one mask a leaf by AND, and
@@ -26,12 +26,46 @@ Nothing is emitted that was not proved: `lower` takes what only the prover makes
 bytes on every machine: no time, version or absolute path is in them. Trusted: all of it, for what the executors do;
 `rcsc test` holds them against the interpreter, and with `--deep` has the C proved.
 
-Modules, in the order the data flows: `lower` makes a `plan`; `identifiers` spells every name; `ctext` and `pytext`
-spell expressions and statements, `c99` and `python` whole files by the templates of `rendering`, `symbols` the symbol
-file; `write` writes them or says whether they are fresh.
+Modules, in the order the data flows: `lower` makes a `plan`; `identifiers` spells every name; `tree` is a small tree
+of code, which C and Python share, and its spelling in each; `text` and `ctext` make it of expressions and statements,
+`c99` and `python` of whole files, by the templates of `rendering`; `symbols` makes the symbol file; `write` writes
+them or says whether they are fresh. `TARGETS` names the languages: another one is a module, and its line here.
 """
 
-from rcsc.emit.c99 import emit_c
+from collections.abc import Callable, Collection, Iterable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+from rcsc.emit.c99 import emit_c, outward
+from rcsc.emit.plan import Plan
 from rcsc.emit.python import emit_python
 
-__all__ = ["emit_c", "emit_python"]
+__all__ = ["TARGETS", "Target", "emit_c", "emit_python", "emitted"]
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """A language that executors are written in.
+
+    Attributes:
+        title: What it is called in messages.
+        emit: The files of a plan, by path below the generated folder.
+        outward: Each name that programs share which are linked together, and what it is.
+    """
+
+    title: str
+    emit: Callable[[Plan], dict[str, str]]
+    outward: Callable[[Plan], Iterable[tuple[str, str]]] = lambda _: ()
+
+
+TARGETS: Mapping[str, Target] = MappingProxyType(
+    {"python": Target("Python", emit_python), "c": Target("C", emit_c, outward)}
+)
+"""By the name that `--target` takes."""
+
+
+def emitted(plan: Plan, targets: Collection[str] = TARGETS.keys()) -> dict[str, str]:
+    """The files of a plan in some languages, by path below the generated folder."""
+    return {
+        path: text for name in TARGETS if name in targets for path, text in TARGETS[name].emit(plan).items()
+    }

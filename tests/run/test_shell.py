@@ -15,8 +15,9 @@ import pytest
 from rcsc.diagnostics.codes import Code
 from rcsc.diff.changes.difference import ProgramDifference
 from rcsc.diff.compare import compare
-from rcsc.driver.compile import TARGETS, compile_
+from rcsc.driver.compile import compile_
 from rcsc.driver.settings import Settings
+from rcsc.emit import TARGETS
 from rcsc.run.description import description
 from rcsc.run.system import Kind, assemble, signatures
 from rcsc.shell.commands import HELP, Commands

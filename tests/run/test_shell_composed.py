@@ -7,8 +7,9 @@ import pytest
 
 from rcsc.commands import run
 from rcsc.diagnostics.codes import Code
-from rcsc.driver.compile import TARGETS, compile_
+from rcsc.driver.compile import compile_
 from rcsc.driver.settings import Settings
+from rcsc.emit import TARGETS
 from rcsc.shell.commands import HELP
 from rcsc.shell.reload import composed
 from rcsc.solvers.options import Options

@@ -16,9 +16,9 @@ from rcsc.compose.contract.environment import Links
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.diagnostics.jsonform import table_to_json
 from rcsc.diagnostics.report import TableReport
-from rcsc.driver.compile import TARGETS, compile_
+from rcsc.driver.compile import compile_
 from rcsc.driver.settings import Settings
-from rcsc.emit import emit_c, emit_python
+from rcsc.emit import TARGETS, emit_c, emit_python
 from rcsc.emit.lower import lower
 from rcsc.emit.write import write
 from rcsc.host.files.plain import plain, read

@@ -6,8 +6,9 @@ import click
 
 from rcsc.commands.shared.show import Output, show
 from rcsc.diagnostics.coded import CodedError
-from rcsc.driver.compile import TARGETS, compile_
+from rcsc.driver.compile import compile_
 from rcsc.driver.settings import Settings
+from rcsc.emit import TARGETS
 from rcsc.run.description import description
 from rcsc.solvers.options import Options
 

@@ -7,6 +7,7 @@ import click
 from rcsc.commands.shared.options import PATHS, proving, settings_of, showing
 from rcsc.commands.shared.show import Output, finish
 from rcsc.driver.compile import compile_
+from rcsc.emit import TARGETS
 from rcsc.solvers.options import Options
 
 
@@ -22,8 +23,8 @@ Examples:
 @PATHS
 @click.option("--out", type=click.Path(path_type=Path), default=Path("generated"), show_default=True,
               metavar="FOLDER", help="Where the executors go, in FOLDER/python and FOLDER/c.")  # fmt: skip
-@click.option("--target", default="python,c", show_default=True, metavar="LIST",
-              help="What to write, by commas: python, c.")  # fmt: skip
+@click.option("--target", default=",".join(TARGETS), show_default=True, metavar="LIST",
+              help=f"What to write, by commas: {', '.join(TARGETS)}.")  # fmt: skip
 @click.option("--check", "only_check", is_flag=True, help="Write nothing; say whether the files are fresh.")
 @click.option("--defensive", is_flag=True,
               help="Executors that check their whole state, ranges and invariants, in every cycle.")  # fmt: skip
@@ -39,8 +40,8 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
     same tables give the same bytes on every machine, so the files belong in version control.
     """
     targets = tuple(one.strip() for one in target.split(",") if one.strip())
-    if not targets or not set(targets) <= {"python", "c"}:
-        raise click.BadParameter("choose from python and c", param_hint="--target")
+    if not targets or not set(targets) <= TARGETS.keys():
+        raise click.BadParameter(f"choose from {' and '.join(TARGETS)}", param_hint="--target")
     made = compile_(
         settings_of(options, use_cache, output, paths),
         out,

@@ -16,7 +16,7 @@ from rcsc.compose.contract.environment import leaves_under
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.counterexample.cycle_run import CycleRun
 from rcsc.compose.counterexample.finding import Finding, rows
-from rcsc.emit import emit_c, emit_python
+from rcsc.emit import emitted
 from rcsc.emit.ctext import c_type, wide_type
 from rcsc.emit.lower import lower, lower_by_force
 from rcsc.lang.interpret import Fault
@@ -69,7 +69,7 @@ def make(programs: Iterable[Program], folder: Path, *, altered: bool) -> tuple[s
         plan = lower_by_force(program, root) if proved is None else lower(proved, root)
         if proved is None:
             forced.append(program.name)
-        for name, text in (emit_python(plan) | emit_c(plan)).items():
+        for name, text in emitted(plan).items():
             path = folder / name
             path.parent.mkdir(parents=True, exist_ok=True)
             said = text + "".join(_stand_ins(program)) if path.suffix == ".c" else text

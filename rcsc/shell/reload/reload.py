@@ -12,8 +12,9 @@ from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Severity
 from rcsc.diagnostics.render import one_line
 from rcsc.diagnostics.report import Report
-from rcsc.driver.compile import TARGETS, compile_
+from rcsc.driver.compile import compile_
 from rcsc.driver.settings import Settings
+from rcsc.emit import TARGETS
 from rcsc.host.children import scratch
 from rcsc.lang.interpret import holds
 from rcsc.lang.model import Program, Value
