@@ -221,6 +221,20 @@ def test_two_actions_of_a_line_give_an_output_one_value(high: str, out: str, wro
     assert codes(table(high=high, out=out)) == (["RCS415"] if wrong else [])
 
 
+EACH = " or ".join(f"xs[{at}] * b <= 3 and a = {at}" for at in range(4))
+
+
+@pytest.mark.parametrize(
+    ("second", "wrong"), [(EACH, []), (EACH.replace("a = 2", "a > 2"), ["RCS401", "RCS402"])]
+)
+def test_the_solver_reads_an_array_at_a_changing_place(second: str, wrong: list[str]) -> None:
+    program = (
+        "input a : int 0 .. 3\ninput b : int -5 .. 5\nstate xs : array[4] of int 0 .. 9\n"
+        f"table t {{\n| line | when ||\n| one | xs[a] * b > 3 ||\n| two | {second} ||\n}}\n"
+    )
+    assert codes(proved(program, Options()).findings) == wrong
+
+
 def test_actions_that_never_write_together_are_no_two_writers() -> None:
     text = (
         VARIABLES
