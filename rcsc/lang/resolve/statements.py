@@ -68,7 +68,7 @@ class Statements:
                 return self.assign(written.place, written.value, written.deferred, written.span)
             case tree.Local():
                 return self._local(written)
-            case tree.If(condition, then, orelse, span):
+            case tree.If(condition, then, orelse, span=span):
                 test = boolean(self.scope, self.body, condition)
                 first, second = self.block(then), self.block(orelse)
                 return () if test is None else (If(test, first, second, span),)

@@ -19,6 +19,21 @@ def at() -> Span:
 # --- names, units, expressions -------------------------------------------------------
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Commented:
+    """What has comments above it, or behind it in its line."""
+
+    span: Span = at()
+    comments: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Documented(Commented):
+    """A declaration, with the doc lines above it."""
+
+    doc: tuple[str, ...] = ()
+
+
 @dataclass(frozen=True, slots=True)
 class Name:
     """An identifier as written."""
@@ -220,79 +235,65 @@ TypeExpr: TypeAlias = BoolType | NamedType | IntType | RealType | ArrayType
 
 
 @dataclass(frozen=True, slots=True)
-class Assign:
+class Assign(Commented):
     """`place := value`, or `next place := value` for a deferred variable."""
 
     place: Expr  # Reference, FieldOf or IndexOf
     value: Expr
     deferred: bool = False
-    span: Span = at()
-    comments: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
-class Local:
+class Local(Commented):
     """`local name : type` or `local name : type := value`."""
 
     name: Name
     type: TypeExpr
     value: Expr | None = None
-    span: Span = at()
-    comments: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
-class If:
+class If(Commented):
     """`if c { ... } else if d { ... } else { ... }`; `else if` nests in `orelse`."""
 
     condition: Expr
     then: "tuple[Statement, ...]"
     orelse: "tuple[Statement, ...]" = ()
-    span: Span = at()
-    comments: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
-class Arm:
+class Arm(Commented):
     """`a, b { ... }` in a case."""
 
     values: tuple[Expr, ...]
     body: "tuple[Statement, ...]"
-    span: Span = at()
-    comments: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
-class Case:
+class Case(Commented):
     """`case subject { a, b { ... } else { ... } }`."""
 
     subject: Expr
     arms: tuple[Arm, ...]
     orelse: "tuple[Statement, ...] | None" = None
-    span: Span = at()
-    comments: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
-class For:
+class For(Commented):
     """`for i in LOW .. HIGH { ... }`; the bounds are constants."""
 
     name: Name
     low: Expr
     high: Expr
     body: "tuple[Statement, ...]"
-    span: Span = at()
-    comments: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
-class Call:
+class Call(Commented):
     """`name` or `name(a, b)` as a statement or in an action cell."""
 
     name: Name
     args: tuple[Expr, ...] = ()
-    span: Span = at()
-    comments: tuple[str, ...] = ()
 
 
 Statement: TypeAlias = Assign | Local | If | Case | For | Call
@@ -377,81 +378,61 @@ class Heading:
 
 
 @dataclass(frozen=True, slots=True)
-class Use:
+class Use(Commented):
     """`use types` or `use task/vars`: makes the names of that file visible."""
 
     path: str
-    span: Span = at()
-    comments: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
-class UnitDecl:
+class UnitDecl(Documented):
     """`unit lb`."""
 
     name: Name
-    span: Span = at()
-    comments: tuple[str, ...] = ()
-    doc: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
-class ConstDecl:
+class ConstDecl(Documented):
     """`const max_width = 110 [mm]`."""
 
     name: Name
     value: Expr
-    span: Span = at()
-    comments: tuple[str, ...] = ()
-    doc: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
-class EnumDecl:
+class EnumDecl(Documented):
     """`enum status { executing, done, failed }`."""
 
     name: Name
     members: tuple[Name, ...]
-    span: Span = at()
-    comments: tuple[str, ...] = ()
-    doc: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
-class TypeDecl:
+class TypeDecl(Documented):
     """`type width = int 0 .. 110 [mm]`."""
 
     name: Name
     type: TypeExpr
-    span: Span = at()
-    comments: tuple[str, ...] = ()
-    doc: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
-class FieldDecl:
+class FieldDecl(Documented):
     """`name : type` in a record."""
 
     name: Name
     type: TypeExpr
-    span: Span = at()
-    comments: tuple[str, ...] = ()
-    doc: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
-class RecordDecl:
+class RecordDecl(Documented):
     """`record emove_status { echo : number ... }`."""
 
     name: Name
     fields: tuple[FieldDecl, ...]
-    span: Span = at()
-    comments: tuple[str, ...] = ()
-    doc: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
-class VariableDecl:
+class VariableDecl(Documented):
     """`input|state|output name : type = initial [safe value] [clamp|reject] [deferred until expr]`.
 
     `admit` is "", "clamp" or "reject" and only for inputs, `safe` only for outputs. A missing initial value means
@@ -465,36 +446,27 @@ class VariableDecl:
     admit: str = ""
     deferred_until: Expr | None = None
     safe: Expr | None = None
-    span: Span = at()
-    comments: tuple[str, ...] = ()
-    doc: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
-class AssumeDecl:
+class AssumeDecl(Documented):
     """`assume name [assumed|monitored|proved] : expr`; "" is `assumed`."""
 
     name: Name
     condition: Expr
     state: str = ""
-    span: Span = at()
-    comments: tuple[str, ...] = ()
-    doc: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
-class InvariantDecl:
+class InvariantDecl(Documented):
     """`invariant name : expr`."""
 
     name: Name
     condition: Expr
-    span: Span = at()
-    comments: tuple[str, ...] = ()
-    doc: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
-class PropertyDecl:
+class PropertyDecl(Documented):
     """`property name : expr [then|until|from expr]`.
 
     `word` is "" or the word between the two; `other` stands after it.
@@ -504,9 +476,6 @@ class PropertyDecl:
     condition: Expr
     word: str = ""
     other: Expr | None = None
-    span: Span = at()
-    comments: tuple[str, ...] = ()
-    doc: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -519,7 +488,7 @@ class Parameter:
 
 
 @dataclass(frozen=True, slots=True)
-class ProcedureDecl:
+class ProcedureDecl(Documented):
     """`procedure name(params) { ... }`, or `module name reads a writes b { ... }`.
 
     A module declares what it reads and writes, and the declaration is checked. An
@@ -535,24 +504,18 @@ class ProcedureDecl:
     python: str = ""
     c: str = ""
     body: tuple[Statement, ...] = ()
-    span: Span = at()
-    comments: tuple[str, ...] = ()
-    doc: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
-class OwnerDecl:
+class OwnerDecl(Documented):
     """`owner name { module_a, module_b, other_owner }`: run in the order listed."""
 
     name: Name
     members: tuple[Name, ...]
-    span: Span = at()
-    comments: tuple[str, ...] = ()
-    doc: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
-class TableDecl:
+class TableDecl(Documented):
     """`table name assuming a, b { rows }`."""
 
     name: Name
@@ -560,9 +523,6 @@ class TableDecl:
     conditions: tuple[Heading, ...]
     actions: tuple[Heading, ...]
     rows: tuple[Row, ...]
-    span: Span = at()
-    comments: tuple[str, ...] = ()
-    doc: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -575,7 +535,7 @@ class Dispatch:
 
 
 @dataclass(frozen=True, slots=True)
-class LevelDecl:
+class LevelDecl(Documented):
     """A control level: preprocess, state table, postprocess; one cycle a period.
 
     `level name { period 40 [ms] preprocess a, b table t postprocess c }`, or with one
@@ -589,9 +549,6 @@ class LevelDecl:
     selector: Expr | None
     dispatch: tuple[Dispatch, ...]
     postprocess: tuple[Name, ...]
-    span: Span = at()
-    comments: tuple[str, ...] = ()
-    doc: tuple[str, ...] = ()
 
 
 Declaration: TypeAlias = (
