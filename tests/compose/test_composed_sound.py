@@ -10,6 +10,7 @@ import pytest
 
 from rcsc.commands import run
 from rcsc.compose.contract.claims import CONTRACT, FOUND, RUNS, SAFE, Claim, Key, closed
+from rcsc.compose.contract.environment import links
 from rcsc.compose.contract.obligations import Sort, unstated
 from rcsc.compose.contract.properties import property_kept
 from rcsc.compose.contract.transition import TransitionSystem
@@ -21,7 +22,7 @@ from rcsc.compose.counterexample.lasso import Lasso, lassos
 from rcsc.compose.counterexample.trace import TraceSearch, shortest
 from rcsc.compose.proof.assume_guarantee import agreements
 from rcsc.compose.proof.level import LevelProof, Verdict, prove_level
-from rcsc.compose.proof.system import NoProgramError, prove_system, transition_systems
+from rcsc.compose.proof.system import NoProgramError, loaded_program, prove_system, transition_systems
 from rcsc.compose.proof.termination import Ending
 from rcsc.lang.interpret import Fault, initial
 from rcsc.lang.model import Value
@@ -1085,6 +1086,15 @@ def test_a_table_of_several_commands_is_one_goal(tmp_path: Path) -> None:
     )
     keys = [obligation.key for obligation, _ in prove_level(transition_systems(path)["lower"], LITTLE).found]
     assert len(keys) == len(set(keys))
+
+
+def test_a_neighbour_outside_need_not_speak_of_orders() -> None:
+    """The gripper drives the hand and senses it; nothing of that is an order that was not recognised."""
+    path = Path(__file__).parents[2] / "tables" / "system.toml"
+    program, _ = loaded_program(path, "gripper")
+    found = links(description(path), "gripper", program)
+    assert [one.name for one in program.variables if one.name.startswith("to_hand.")]
+    assert found.unread == ()
 
 
 # --- what is shown -----------------------------------------------------------------------------------

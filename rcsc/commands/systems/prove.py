@@ -77,7 +77,7 @@ Examples:
     "system", required=False, type=click.Path(exists=True, dir_okay=False, path_type=Path), metavar="[SYSTEM]"
 )
 @click.option("--level", "only", multiple=True, metavar="NAME", help="Only this level (repeatable).")
-@steps_option(80)
+@steps_option(80, " All questions about one level get 50 times as many together.")
 @click.option("--jobs", "-j", type=click.IntRange(min=1), default=None, show_default="2, or 1 for small levels",
               help="Levels proved at once.")  # fmt: skip
 @click.option("--trace", "cycles", type=click.IntRange(min=0, max=40), default=8, show_default=True, metavar="N",
