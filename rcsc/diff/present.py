@@ -16,7 +16,6 @@ from rcsc.lang.model import (
     Enum,
     Kind,
     Level,
-    OneTable,
     ProcedureName,
     Program,
     Snapshot,
@@ -66,7 +65,7 @@ def within_reach(
         now: Values of all leaves, in the numbers of that version; those of inputs are not looked at.
         options: Limits of the solver.
     """
-    own = [level.tables.table] if isinstance(level.tables, OneTable) else [t for _, t in level.tables.tables]
+    own = level.tables.names
     declared = tuple(_declared(found))
     parts = [
         part

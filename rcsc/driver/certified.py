@@ -12,7 +12,7 @@ from rcsc.diagnostics.diagnostic import Diagnostic, Label, Severity
 from rcsc.diagnostics.report import Report
 from rcsc.diagnostics.source import Span
 from rcsc.driver.pipeline import proved, read
-from rcsc.driver.settings import Made, Settings
+from rcsc.driver.settings import Conclusion, Settings
 from rcsc.host.files import write_atomically
 from rcsc.host.files.read import Malformed, content, json_of
 from rcsc.lang.model import Program, ProvedProgram
@@ -38,7 +38,7 @@ class Checking:
     questions: Path | None = None
 
 
-def certify(settings: Settings, how: Checking, write: Path | None, against: Path | None) -> Made:
+def certify(settings: Settings, how: Checking, write: Path | None, against: Path | None) -> Conclusion:
     """Check a certificate, made now or kept, by the checker alone.
 
     Nothing is proved where a kept one is checked: then what the checker leaves has nobody's word, and is an error.
@@ -49,11 +49,11 @@ def certify(settings: Settings, how: Checking, write: Path | None, against: Path
     report = made.report()
     [proof] = made.proofs or (None,)
     if report.failed or proof is None or proof.certificate is None:
-        return Made(report, "nothing is certified: not everything is proved")
+        return Conclusion(report, "nothing is certified: not everything is proved")
     found = _keep(proof.certificate, write) if write is not None else ()
     reviewed = _reviewed(made.loaded, proof.certificate, how, proof.proved)
     report = made.report((*found, *reviewed.report.found))
-    return Made(
+    return Conclusion(
         replace(report, tables=()), reviewed.closing
     )  # the verdicts are the prover's, not the checker's
 
@@ -86,16 +86,16 @@ def _reviewed(
     certificate: Mapping[str, object] | Diagnostic,
     how: Checking,
     proved: ProvedProgram | None = None,
-) -> Made:
+) -> Conclusion:
     """The report on a certificate of the first root: what is wrong with it, what was checked and what was not.
 
     The certificate must name the stopping assumptions of what was `proved`, from which executors are made.
     """
     if isinstance(certificate, Diagnostic):
-        return Made(Report((certificate,)), "not certified")
+        return Conclusion(Report((certificate,)), "not certified")
     program = resolve(loaded.roots[0], loaded) if loaded.roots else loaded.found
     if not isinstance(program, Program):
-        return Made(Report(program, (), loaded.sources), "not certified")
+        return Conclusion(Report(program, (), loaded.sources), "not certified")
     stops = None if proved is None else {str(one.name): one.stops for one in proved.program.tables}
     outcome = checker.certify(program, certificate, _cvc5 if how.cvc5 else None, stops)
     found = [
@@ -109,7 +109,7 @@ def _reviewed(
         Diagnostic(Code.NOT_CHECKED, f"not checked: {one.name}", Label(one.written), severity=severity)
         for one in outcome.unchecked
     ]
-    return Made(Report(tuple(found), (), loaded.sources), _closing(program, outcome))
+    return Conclusion(Report(tuple(found), (), loaded.sources), _closing(program, outcome))
 
 
 def _closing(program: Program, outcome: Certified) -> str:

@@ -7,7 +7,7 @@ from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label
 from rcsc.diagnostics.source import Span
 from rcsc.driver.pipeline import Proved, proved
-from rcsc.driver.settings import Made, Settings
+from rcsc.driver.settings import Conclusion, Settings
 from rcsc.emit import TARGETS, Target, emitted
 from rcsc.emit.lower import lower
 from rcsc.emit.plan import Plan
@@ -18,18 +18,18 @@ from rcsc.lang.project import project_root
 
 def compile_(
     settings: Settings, out: Path, targets: Collection[str], *, only_check: bool, defensive: bool = False
-) -> Made:
+) -> Conclusion:
     """Prove every table anew, then write the executors, or say whether they are fresh."""
     made = proved(settings)
     report = made.report()
     if report.failed:
-        return Made(report, "nothing was written")
+        return Conclusion(report, "nothing was written")
     files, clashes = _executors(made, targets, defensive=defensive)
     found = clashes or (stale if only_check else write)(files, str(out))
     report = made.report(found)
     if report.failed:
-        return Made(report, "" if only_check else "nothing was written")
-    return Made(report, f"{len(files)} files {'are fresh' if only_check else 'written'} in {out}")
+        return Conclusion(report, "" if only_check else "nothing was written")
+    return Conclusion(report, f"{len(files)} files {'are fresh' if only_check else 'written'} in {out}")
 
 
 def _executors(

@@ -36,7 +36,7 @@ class Settings:
 
 
 @dataclass(frozen=True, slots=True)
-class Made:
+class Conclusion:
     """A report, and a closing line for people."""
 
     report: Report

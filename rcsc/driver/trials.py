@@ -11,7 +11,7 @@ from rcsc.diagnostics.diagnostic import Diagnostic, Label
 from rcsc.diagnostics.source import Span
 from rcsc.driver.compile import planned
 from rcsc.driver.pipeline import proved
-from rcsc.driver.settings import Effort, Made, Settings
+from rcsc.driver.settings import Conclusion, Effort, Settings
 from rcsc.emit import emitted
 from rcsc.host.files import write_atomically
 from rcsc.lang.model import Expr, Program, Snapshot, Table
@@ -28,12 +28,12 @@ from rcsc.testing.mutants import Opinion
 from rcsc.testing.suite import Proofs, SuiteOptions, run_suite
 
 
-def test(settings: Settings, effort: Effort) -> Made:
+def test(settings: Settings, effort: Effort) -> Conclusion:
     """Prove every table, then test its executors against its meaning, and write vectors if asked."""
     made = proved(settings)
     report = made.report()
     if report.failed:
-        return Made(report, "nothing was tested: not everything is proved")
+        return Conclusion(report, "nothing was tested: not everything is proved")
     found: list[Diagnostic] = []
     figures = []
     for _, program in made.executable:
@@ -44,7 +44,7 @@ def test(settings: Settings, effort: Effort) -> Made:
     if effort.vectors is not None:
         found += _write_vectors([one.program for _, one in made.executable], settings.options, effort.vectors)
     settings.progress("")
-    return Made(made.report(tuple(found)), "\n".join(figures))
+    return Conclusion(made.report(tuple(found)), "\n".join(figures))
 
 
 def _try_out(

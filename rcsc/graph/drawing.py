@@ -12,7 +12,7 @@ from functools import partial
 from html import escape
 
 from rcsc.graph.formats.state_graph import ANY, LINES, Edge, StateGraph
-from rcsc.graph.layout import Arrow, Box, Placed, Point, place
+from rcsc.graph.layout import Arrow, LayoutBox, Placed, Point, place
 from rcsc.lang.operator_table import LOGIC, Op
 
 _FONT_PX, _ROW_PX, _LETTER_PX = 11, 14, 6.62  # a letter of a monospaced font is 0.602 of its size wide
@@ -39,7 +39,7 @@ _STYLE = """
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class ArrowLine:
     """One line of the table on an arrow; without a name it has no badge."""
 
     line: str
@@ -74,7 +74,7 @@ class Sheaf:
 
     source: str
     target: str
-    rows: tuple[Row, ...]
+    rows: tuple[ArrowLine, ...]
     dashed: bool
 
 
@@ -157,7 +157,7 @@ def _notes(graph: StateGraph, everywhere: str) -> tuple[str, ...]:
     return tuple(notes)
 
 
-def _row(edge: Edge) -> Row:
+def _row(edge: Edge) -> ArrowLine:
     text = edge.default or plain(edge.shown)
     decided = f"where {edge.decided} says so" if edge.line else f"({edge.decided})"
     shown = (*folded(text), *(folded(decided) if edge.decided else ()))
@@ -167,7 +167,7 @@ def _row(edge: Edge) -> Row:
         edge.effect,
         edge.default,
     ]
-    return Row(edge.line, shown, "\n".join(part for part in whole if part))
+    return ArrowLine(edge.line, shown, "\n".join(part for part in whole if part))
 
 
 def plain(guard: str) -> str:
@@ -213,11 +213,11 @@ def _head(picture: Picture) -> Iterator[str]:
         yield f'<text class="quiet" x="{_EDGE_PX}" y="{_EDGE_PX + 26 + 16 * at}">{escape(note)}</text>'
 
 
-def _box(name: str, shown: str) -> Box:
+def _box(name: str, shown: str) -> LayoutBox:
     if name == "":
-        return Box(name, 9, 9)
+        return LayoutBox(name, 9, 9)
     size = max(34.0, len(shown) * _LETTER_PX + 20)
-    return Box(name, size, size)
+    return LayoutBox(name, size, size)
 
 
 def _arrow(sheaf: Sheaf) -> Arrow:
@@ -231,7 +231,7 @@ def _arrow(sheaf: Sheaf) -> Arrow:
     )
 
 
-def _sheet(picture: Picture, placed: Placed, boxes: list[Box], origin: Point) -> Iterator[str]:
+def _sheet(picture: Picture, placed: Placed, boxes: list[LayoutBox], origin: Point) -> Iterator[str]:
     yield f'<g transform="translate({origin[0]:.0f} {origin[1]:.0f})">'
     for sheaf, (points, tip) in zip(picture.sheaves, placed.curves, strict=True):
         yield from _curve(points, tip, dashed=sheaf.dashed)
@@ -254,7 +254,7 @@ def _curve(points: tuple[Point, ...], tip: Point, *, dashed: bool) -> Iterator[s
     yield f'<path class="tip" d="M {" L ".join(f"{p:.1f} {q:.1f}" for p, q in corners)} Z"/>'
 
 
-def _node(box: Box, centre: Point, shown: str) -> Iterator[str]:
+def _node(box: LayoutBox, centre: Point, shown: str) -> Iterator[str]:
     x, y = centre
     if not shown:
         yield f'<circle class="tip" cx="{x:g}" cy="{y:g}" r="{box.width_px / 2:g}"/>'

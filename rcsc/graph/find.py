@@ -5,20 +5,20 @@ runs it, or what is wrong.
 """
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from difflib import get_close_matches
 
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label
 from rcsc.diagnostics.source import Source, Span
-from rcsc.lang.model import OneTable, Program, Table
+from rcsc.lang.model import Program, Table
 from rcsc.lang.project import Loaded, load, project_root
 from rcsc.lang.resolve import resolve
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class FoundTable:
     """A table and where it stands.
 
     Attributes:
@@ -43,7 +43,7 @@ class NotFound:
     sources: dict[str, Source]
 
 
-def tables(named: str, *, running: bool = False) -> list[Found] | NotFound:
+def tables(named: str, *, running: bool = False) -> list[FoundTable] | NotFound:
     """The tables that are meant, in order of file and place; each once.
 
     Args:
@@ -66,7 +66,7 @@ def tables(named: str, *, running: bool = False) -> list[Found] | NotFound:
         own = [table for table in program.tables if not name or table.name == name]
     if not own:
         return _nothing(f"`{file}` has no table{f' `{name}`' if name else ''}", file)
-    found = [Found(loaded, loaded.roots[0], program, table) for table in own]
+    found = [FoundTable(loaded, loaded.roots[0], program, table) for table in own]
     return [_in_level(one) if running and not _run_here(one) else one for one in found]
 
 
@@ -88,11 +88,11 @@ def _programs(loaded: Loaded) -> Iterator[tuple[str, Program]]:
     yield from sorted(made, key=lambda one: not one[1].levels)
 
 
-def _every(loaded: Loaded) -> list[Found] | NotFound:
-    made: dict[tuple[str, str], Found] = {}
+def _every(loaded: Loaded) -> list[FoundTable] | NotFound:
+    made: dict[tuple[str, str], FoundTable] = {}
     for root, program in _programs(loaded):
         for table in program.tables:
-            made.setdefault((table.file, table.name), Found(loaded, root, program, table))
+            made.setdefault((table.file, table.name), FoundTable(loaded, root, program, table))
     if not made:
         return (
             NotFound(loaded.found, dict(loaded.sources))
@@ -102,7 +102,7 @@ def _every(loaded: Loaded) -> list[Found] | NotFound:
     return [made[key] for key in sorted(made)]
 
 
-def _by_name(name: str, loaded: Loaded) -> list[Found] | NotFound:
+def _by_name(name: str, loaded: Loaded) -> list[FoundTable] | NotFound:
     every = _every(loaded)
     if isinstance(every, NotFound):
         return every
@@ -122,17 +122,11 @@ def _nothing(message: str, file: str, *helps: str) -> NotFound:
     return NotFound((Diagnostic(Code.UNKNOWN_NAME, message, Label(Span(file, 0, 0)), help=helps),), {})
 
 
-def _run_here(one: Found) -> bool:
-    return any(one.table.name in _tables_of(level.tables) for level in one.program.levels)
+def _run_here(one: FoundTable) -> bool:
+    return any(one.table.name in level.tables.names for level in one.program.levels)
 
 
-def _tables_of(tables: object) -> Sequence[str]:
-    if isinstance(tables, OneTable):
-        return (tables.table,)
-    return tuple(name for _, name in getattr(tables, "tables", ()))
-
-
-def _in_level(one: Found) -> Found:
+def _in_level(one: FoundTable) -> FoundTable:
     """The same table in a program of its project that has the level which runs it; as it was where there is none."""
     root = project_root(one.table.file)
     every = _every(load([root])) if os.path.isfile(os.path.join(root, "rcsc.toml")) else []

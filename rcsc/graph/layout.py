@@ -26,7 +26,7 @@ class NoLayoutError(Exception):
 
 
 @dataclass(frozen=True, slots=True)
-class Box:
+class LayoutBox:
     """Something to be placed: a circle or a rectangle, `width_px` by `height_px`."""
 
     name: str
@@ -62,7 +62,7 @@ class Placed:
     labels: tuple[Point | None, ...]
 
 
-def place(boxes: Sequence[Box], arrows: Sequence[Arrow]) -> Placed:
+def place(boxes: Sequence[LayoutBox], arrows: Sequence[Arrow]) -> Placed:
     """The layout of the boxes and arrows, in ranks from top to bottom.
 
     Raises:
@@ -94,7 +94,7 @@ def _curve(text: str, point: Any) -> tuple[tuple[Point, ...], Point]:
     return points, point(tips[0]) if tips else points[-1]
 
 
-def _text(boxes: Sequence[Box], arrows: Sequence[Arrow]) -> str:
+def _text(boxes: Sequence[LayoutBox], arrows: Sequence[Arrow]) -> str:
     lines = ["digraph g {", "  rankdir=TB; nodesep=0.45; ranksep=0.5; edge [arrowsize=0.9];"]
     number = {box.name: at for at, box in enumerate(boxes)}
     for at, box in enumerate(boxes):

@@ -617,6 +617,11 @@ class OneTable:
 
     table: TableName
 
+    @property
+    def names(self) -> tuple[TableName, ...]:
+        """What it runs."""
+        return (self.table,)
+
 
 @dataclass(frozen=True, slots=True)
 class TableByCommand:
@@ -624,6 +629,11 @@ class TableByCommand:
 
     selector: Expr
     tables: tuple[tuple[Value, TableName], ...]
+
+    @property
+    def names(self) -> tuple[TableName, ...]:
+        """What it runs, each once, in order of commands."""
+        return tuple(dict.fromkeys(name for _, name in self.tables))
 
 
 @dataclass(frozen=True, slots=True)

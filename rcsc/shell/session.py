@@ -22,12 +22,12 @@ from rcsc.shell.queries import Question, question
 from rcsc.shell.reload.composed import held_by, together
 from rcsc.shell.reload.gate import Judged, Running, judge
 from rcsc.shell.reload.refusal import Refused
-from rcsc.shell.reload.reload import Plant, Reloaded, program_of, reload
+from rcsc.shell.reload.reload import Origin, Reloaded, program_of, reload
 from rcsc.shell.stops import Stops, reached, stands
 from rcsc.shell.typed_names import NamedLine
 
 if TYPE_CHECKING:
-    from rcsc.shell.reload.sources import Kept
+    from rcsc.shell.reload.sources import KeptSources
 
 MOST_CYCLES = 100_000
 """After which `run` gives up: more than an hour of control time."""
@@ -42,7 +42,7 @@ class Session:
         interrupted: Set, and cleared again, from outside: cycles end after the present one.
     """
 
-    def __init__(self, system: System, plant: Plant) -> None:
+    def __init__(self, system: System, plant: Origin) -> None:
         self.system, self.plant = system, plant
         buffers = {wire.source: system.buffers.latest(wire.source) for wire in system.description.wires}
         self.memory = history.Memory({name: held for name, held in buffers.items() if held is not None})
@@ -56,7 +56,7 @@ class Session:
         self._programs: dict[int, tuple[RunningLevel, Program]] = {}
         # What runs is known by its executors' digest, and what it means by its sources, from before anybody edits them.
         digests = fingerprints(system.description)
-        self._made: dict[int, tuple[RunningLevel, str, Kept | None]] = {
+        self._made: dict[int, tuple[RunningLevel, str, KeptSources | None]] = {
             id(level): (level, digests[spec.program], held_by(self.plant, spec))
             for level in system.levels
             for spec in (self.spec(level.name),)

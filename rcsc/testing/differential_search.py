@@ -6,7 +6,7 @@ In: executors, a target, how many examples. Out: a disagreement, or None. The ex
 from collections.abc import Callable, Iterator
 from random import Random
 
-from rcsc.lang.model import OneTable, Program, Table
+from rcsc.lang.model import Program, Table
 from rcsc.testing.agree import Compared, Disagreement, Executors, keeps_invariants, run_lines, run_session
 from rcsc.testing.executors.sessions import Session
 from rcsc.testing.executors.targets import Target
@@ -22,9 +22,8 @@ def table_of(program: Program, target: Target) -> Table | None:
     """The table whose lines the inputs should aim at."""
     if target.kind != "cycle":
         return program.tables[target.number]
-    tables = program.levels[target.number].tables
-    names = [tables.table] if isinstance(tables, OneTable) else [name for _, name in tables.tables]
-    return next((table for table in program.tables if table.name == names[0]), None)
+    first = program.levels[target.number].tables.names[0]
+    return next((table for table in program.tables if table.name == first), None)
 
 
 def search_sessions(

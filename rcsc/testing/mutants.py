@@ -32,7 +32,7 @@ from rcsc.lang.model import (
     spell,
     value_of_key,
 )
-from rcsc.testing.inputs.snapshot import Missing, Search, Wanted
+from rcsc.testing.inputs.snapshot import InputSearch, Missing, Wanted
 from rcsc.testing.inputs.vectors import given_in
 
 
@@ -213,7 +213,7 @@ def _holds(line: Line) -> list[Wanted]:
     return [(test, True) for test in line.tests if test is not None]
 
 
-def difference(search: Search, table: Table, mutant: TableMutant) -> Snapshot | Missing:
+def difference(search: InputSearch, table: Table, mutant: TableMutant) -> Snapshot | Missing:
     """A snapshot that a changed line matches in one of the two tables only; NONE if there is none."""
     given = list(given_in(search.program, table))
     answer = Missing.NONE
@@ -226,7 +226,9 @@ def difference(search: Search, table: Table, mutant: TableMutant) -> Snapshot | 
     return answer
 
 
-def _only(search: Search, given: list[Wanted], here: Line | None, there: Line | None) -> Snapshot | Missing:
+def _only(
+    search: InputSearch, given: list[Wanted], here: Line | None, there: Line | None
+) -> Snapshot | Missing:
     """A snapshot that matches `here` and not `there`."""
     if here is None:
         return Missing.NONE
@@ -242,7 +244,7 @@ def _only(search: Search, given: list[Wanted], here: Line | None, there: Line | 
     return answer
 
 
-def judge(search: Search, table: Table, mutant: TableMutant, before: Opinion, prover: Prover) -> Judged:
+def judge(search: InputSearch, table: Table, mutant: TableMutant, before: Opinion, prover: Prover) -> Judged:
     """What becomes of one mutant.
 
     Args:
@@ -269,7 +271,7 @@ def judge(search: Search, table: Table, mutant: TableMutant, before: Opinion, pr
 
 
 def judge_table(
-    search: Search, table: Table, prover: Prover, sample: int | None = None, seed: int = 1984
+    search: InputSearch, table: Table, prover: Prover, sample: int | None = None, seed: int = 1984
 ) -> tuple[Judged, ...]:
     """Judges the table's mutants: all of them, or a sample by seed.
 

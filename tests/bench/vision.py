@@ -14,7 +14,7 @@ from typing import ParamSpec, TypeVar
 
 import numpy as np
 
-from rcsc_cell.vision.flood import Found, find
+from rcsc_cell.vision.flood import FoundPart, find
 from rcsc_cell.vision.line import Surface, measure
 from tests.support.scenes import SIZES, Scene, Size, anywhere, between, expected_mm, features
 
@@ -62,7 +62,7 @@ def flood(size: Size, poses: int = POSES, seed: int = 1) -> Errors:
     return errors
 
 
-def note_found(errors: Errors, scene: Scene, found: Found) -> None:
+def note_found(errors: Errors, scene: Scene, found: FoundPart) -> None:
     true = scene.truth(0)
     errors.place_mm.append(hypot(found.x_mm - true.middle_mm[0], found.y_mm - true.middle_mm[1]))
     errors.roll_deg.append(degrees(between(found.roll_rad, true.roll_rad)))

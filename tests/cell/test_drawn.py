@@ -32,7 +32,7 @@ from rcsc_cell.cell.reach import home
 from rcsc_cell.database.ask import Database
 from rcsc_cell.database.pose import nine, pose_of
 from rcsc_cell.pictures.page import quoted
-from rcsc_cell.pictures.scene import Cell, cell, same_system
+from rcsc_cell.pictures.scene import DrawnCell, cell, same_system
 from rcsc_cell.pictures.stick import Scene, pads, stick
 from rcsc_cell.pictures.things import NAMED, Block, Mark
 from rcsc_cell.pictures.views import ALONE, TOP
@@ -234,7 +234,7 @@ def database() -> Database:
     return database_of(system, signatures(system))
 
 
-def drawn_in(database: Database, log: Log) -> Cell:
+def drawn_in(database: Database, log: Log) -> DrawnCell:
     return cell(log, description(SHIPPED), database)
 
 

@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 from rcsc_cell.cell.arm import LIMITS_DEG, plate, skeleton
 from rcsc_cell.database.pose import nine
 from rcsc_cell.pictures.plot import plot, ticks
-from rcsc_cell.pictures.report import Figure, Frame, Matched, Placement, Row, Story, page, report
+from rcsc_cell.pictures.report import Figure, Frame, Matched, Placement, ReportRow, Story, page, report
 from rcsc_cell.pictures.solid import OVERVIEW, View, solid
 from rcsc_cell.pictures.stick import Scene, pads, stick
 from rcsc_cell.pictures.things import Outline
@@ -364,7 +364,7 @@ def story() -> Story:
     model, data = cell('<geom type="box" size=".1 .1 .1"/>')
     return Story(
         "MAKE <BOXT>",
-        (Row(1, "MOVE A & B", "done", 15), Row(2, "PAUSE", "failed", 7, "the part <slipped>")),
+        (ReportRow(1, "MOVE A & B", "done", 15), ReportRow(2, "PAUSE", "failed", 7, "the part <slipped>")),
         (
             Frame(0, "as it <began>", solid(model, data)),
             Frame(22, "the end", stick(nine(plate(HOME)), 80.0, HOME)),
@@ -398,7 +398,7 @@ def test_the_report_says_everything_and_is_escaped() -> None:
     assert "<b>gripper</b>: 1 of 1 lines ran" in text
     assert re.search(r'class="never"><td>lost</td><td class="n">never', text)
     assert page(story()) == text
-    done = page(replace(story(), rows=(Row(1, "MOVE", "done", 15),)))
+    done = page(replace(story(), rows=(ReportRow(1, "MOVE", "done", 15),)))
     assert "every row done" in done
     assert "stopped" not in done
 

@@ -25,7 +25,7 @@ from rcsc_cell.cell.ready import lying, plant
 from rcsc_cell.database.ask import Database
 from rcsc_cell.episodes.processes import outside as outside_of_processes
 from rcsc_cell.episodes.witness import Timed
-from rcsc_cell.workstation.interlocks import Cell
+from rcsc_cell.workstation.interlocks import CellState
 from rcsc_cell.workstation.orders import (
     DONE,
     EXECUTING,
@@ -35,7 +35,7 @@ from rcsc_cell.workstation.orders import (
     VISE_REPORT,
 )
 from rcsc_cell.workstation.prepared import Run, prepare
-from rcsc_cell.workstation.script import Row
+from rcsc_cell.workstation.script import ScriptRow
 from rcsc_cell.workstation.station import ANSWER_TICKS, PAUSE_TICKS, Workstation, workstation
 from rcsc_cell.workstation.stopped import NotResumed, go_on, keep, stopped_path
 from tests.support.cells import REPO, SYSTEM
@@ -68,7 +68,7 @@ def plant_of(made: Run) -> Plant:
     return timed.inner
 
 
-def begun(rows: tuple[Row, ...] | str = "go.csv") -> Run:
+def begun(rows: tuple[ScriptRow, ...] | str = "go.csv") -> Run:
     """A run of the project's script."""
     return prepare(Path("tables/system.toml"), rows, "python", outside)
 
@@ -104,7 +104,7 @@ def rcsc(*args: str) -> "subprocess.CompletedProcess[str]":
 def test_a_vise_that_does_not_close_stops_the_script_where_it_is() -> None:
     made = stopped_at_vise()
     assert made.station.results[-1].reason == "the right jaw did not close: it stands at 20.0 mm"
-    assert made.station.cell == Cell(robot_at="FIX-SAFE")
+    assert made.station.cell == CellState(robot_at="FIX-SAFE")
     assert made.station.at_rest
     assert made.system.level("task").shown("command.input_command") == "pause"
     assert made.system.level("task").shown("report.status_report") == "done"
@@ -135,9 +135,12 @@ def test_no_vise_at_all_is_a_failure_and_no_waiting_for_ever() -> None:
 
 def machining() -> Run:
     """The vise closes and the machine works; a part is taken to be there."""
-    rows = (Row(1, "", vise={"right": False, "left": False}), Row(2, "", machine="MACHINE DOVETAIL"))
+    rows = (
+        ScriptRow(1, "", vise={"right": False, "left": False}),
+        ScriptRow(2, "", machine="MACHINE DOVETAIL"),
+    )
     made = begun(rows)
-    made.station.cell = Cell(fixture="tbox", robot_at="FIX-SAFE")
+    made.station.cell = CellState(fixture="tbox", robot_at="FIX-SAFE")
     return made
 
 
@@ -160,13 +163,13 @@ def test_the_machine_works_on_a_clamped_part_only() -> None:
 class Below:
     """Buffers as the levels below leave them; a test says what they answer."""
 
-    def __init__(self, rows: tuple[Row, ...]) -> None:
+    def __init__(self, rows: tuple[ScriptRow, ...]) -> None:
         self.station = self.made(rows)
         self.held: dict[str, Values] = {}
         self.tick = 0
 
     @staticmethod
-    def made(rows: tuple[Row, ...]) -> Workstation:
+    def made(rows: tuple[ScriptRow, ...]) -> Workstation:
         """A workstation."""
         places = {"BUFFER": 3, "FIX-MAC1": 5, "WS-SAFE": 7}
         safe = {"FIX-MAC1": "WS-SAFE"}
@@ -202,7 +205,7 @@ class Below:
         )
 
 
-GO = Row(1, "MOVE", "move", dest="WS-SAFE")
+GO = ScriptRow(1, "MOVE", "move", dest="WS-SAFE")
 
 
 def test_after_a_failure_nothing_is_sent_before_task_has_paused() -> None:
@@ -272,9 +275,9 @@ LEFT = {
 def test_a_row_that_failed_on_its_way_goes_on_with_what_is_left(name: str) -> None:
     """By another workstation, which knows only what the first has said of its state."""
     robot, said, source, tries, (command, from_, to) = LEFT[name]
-    row = Row(1, "", robot, dest="FIX-MAC1", **said)  # type: ignore[arg-type]  # by name
+    row = ScriptRow(1, "", robot, dest="FIX-MAC1", **said)  # type: ignore[arg-type]  # by name
     cell = Below((row,))
-    cell.station.cell = Cell(held="" if source else "tbox")
+    cell.station.cell = CellState(held="" if source else "tbox")
     cell.step()
     for held, failure in tries:
         cell.answer("failed" if failure else "executing", failure or "none", held)
@@ -299,8 +302,8 @@ def test_a_part_put_into_the_fixture_by_a_row_that_failed_is_there(
 ) -> None:
     """Before the row is tried again, and after: the interlocks look at it."""
     robot, said, held = put
-    cell = Below((Row(1, "", robot, dest="FIX-MAC1", **said),))  # type: ignore[arg-type]  # by name
-    cell.station.cell = Cell(held=held, robot_at="WS-SAFE")
+    cell = Below((ScriptRow(1, "", robot, dest="FIX-MAC1", **said),))  # type: ignore[arg-type]  # by name
+    cell.station.cell = CellState(held=held, robot_at="WS-SAFE")
     cell.step()
     cell.answer("executing", held="tbox")
     cell.step()
@@ -319,7 +322,7 @@ def test_a_part_put_into_the_fixture_by_a_row_that_failed_is_there(
 
 def test_a_row_is_not_tried_again_with_something_else_in_the_gripper() -> None:
     """TASK would refuse it with `cmd`; the workstation says what is there, and it may be let go of."""
-    cell = Below((Row(1, "", "transfer", dest="FIX-MAC1", **TAKES), Row(2, "", "release")))  # type: ignore[arg-type]  # by name
+    cell = Below((ScriptRow(1, "", "transfer", dest="FIX-MAC1", **TAKES), ScriptRow(2, "", "release")))  # type: ignore[arg-type]  # by name
     cell.step()
     cell.answer("failed", "pic", "unknown_object")
     cell.step()
@@ -337,7 +340,7 @@ def test_a_row_is_not_tried_again_with_something_else_in_the_gripper() -> None:
 
 def test_a_row_that_was_not_tried_is_sent_as_it_is() -> None:
     """Whatever TASK holds: that it holds something is for TASK to refuse."""
-    cell = Below((GO, Row(2, "", "move", dest="FIX-MAC1", **TAKES)))  # type: ignore[arg-type]  # by name
+    cell = Below((GO, ScriptRow(2, "", "move", dest="FIX-MAC1", **TAKES)))  # type: ignore[arg-type]  # by name
     cell.step()
     cell.answer("done", held="tbox")
     cell.step(2)
@@ -345,7 +348,7 @@ def test_a_row_that_was_not_tried_is_sent_as_it_is() -> None:
 
 
 def test_what_is_left_may_fail_again() -> None:
-    cell = Below((Row(1, "", "transfer", dest="FIX-MAC1", end_at="WS-SAFE", **TAKES),))  # type: ignore[arg-type]  # by name
+    cell = Below((ScriptRow(1, "", "transfer", dest="FIX-MAC1", end_at="WS-SAFE", **TAKES),))  # type: ignore[arg-type]  # by name
     cell.step()
     for _ in range(3):
         cell.answer("executing", held="tbox")
@@ -364,7 +367,7 @@ def test_what_is_left_may_fail_again() -> None:
 
 
 def test_numbers_go_on_from_what_stands_in_the_buffers_and_wrap() -> None:
-    vise = Row(1, "", vise={"right": True})
+    vise = ScriptRow(1, "", vise={"right": True})
     for standing, echo, expected in ((None, 65535, 0), ((12, True, True), 11, 13), (None, 41, 42)):
         cell = Below((vise,))
         cell.held[VISE_REPORT] = (echo, DONE, 20.0, 20.0)
@@ -379,8 +382,8 @@ def test_numbers_go_on_from_what_stands_in_the_buffers_and_wrap() -> None:
 
 
 def test_a_machine_that_goes_on_for_ever_is_given_up() -> None:
-    cell = Below((Row(1, "", machine="ENGRAVE PART"),))
-    cell.station.cell = Cell(False, False, "tbox", robot_at="FIX-SAFE")
+    cell = Below((ScriptRow(1, "", machine="ENGRAVE PART"),))
+    cell.station.cell = CellState(False, False, "tbox", robot_at="FIX-SAFE")
     cell.step(ANSWER_TICKS + 1)
     assert cell.held[MACHINE_ORDER] == (1, 1)
     assert cell.station.results[-1].reason == "the machine does not answer"
@@ -419,7 +422,7 @@ def test_everything_stands_as_it_stood() -> None:
     other = begun()
     go_on(other)
     assert other.system.tick == made.system.tick
-    assert other.station.cell == made.station.cell != Cell()
+    assert other.station.cell == made.station.cell != CellState()
     for mine, its in zip(other.system.levels, made.system.levels, strict=True):
         count = len(its.sign.leaves)
         assert repr(mine.values[:count]) == repr(its.values[:count]), its.name
@@ -672,7 +675,7 @@ def test_a_resumed_script_may_go_on_behind_the_row_that_stopped_it(capfd: pytest
     made = begun()
     go_on(made)
     made.station.begin_at(2)
-    assert made.station.cell == Cell(False, False, robot_at="FIX-SAFE")
+    assert made.station.cell == CellState(False, False, robot_at="FIX-SAFE")
     assert run(["run", "go.csv", *QUICK, "--resume", "--from-row", "3"]) == 0
     assert re.findall(r"^ +(\d+) ", capfd.readouterr().out, re.MULTILINE) == ["3", "4"]
 

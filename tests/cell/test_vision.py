@@ -20,7 +20,7 @@ from rcsc_cell.vision import line as line_module
 from rcsc_cell.vision import optics as optics_module
 from rcsc_cell.vision.blobs import blobs, half_turn, label
 from rcsc_cell.vision.camera import Camera
-from rcsc_cell.vision.flood import Features, Found, find
+from rcsc_cell.vision.flood import Features, FoundPart, find
 from rcsc_cell.vision.formulas import Top, perceive, perceive_surface
 from rcsc_cell.vision.line import LEAN, Surface, measure
 from rcsc_cell.vision.optics import STANDARD, Floats, FloodImage, LineImage
@@ -44,7 +44,7 @@ EXACT = replace(STANDARD, noise=0.0, peak_px=0.0, step_px=1e-3, aim_rad=0.0)
 UP = (0.0, 0.0, 1.0)
 
 
-def look(scene: Scene, size: Size, seed: int = 1) -> Found | None:
+def look(scene: Scene, size: Size, seed: int = 1) -> FoundPart | None:
     image = scene.camera.flood(scene.data, np.random.default_rng(seed))
     return find(image, features(size), expected_mm(size), scene.optics)
 

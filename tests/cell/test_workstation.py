@@ -15,9 +15,9 @@ from rcsc_cell.cell.plant import Plant
 from rcsc_cell.cell.ready import Lying, lying, plant
 from rcsc_cell.database.ask import Database, open_database
 from rcsc_cell.database.build import BadData, build
-from rcsc_cell.workstation.interlocks import Cell, after, refusal
+from rcsc_cell.workstation.interlocks import CellState, after, refusal
 from rcsc_cell.workstation.prepared import prepare
-from rcsc_cell.workstation.script import BadScript, Row, read_script
+from rcsc_cell.workstation.script import BadScript, ScriptRow, read_script
 from tests.support.cells import REPO, SYSTEM
 
 PARTS = ("null_obj", "tbox", "bbox", "flag", "hous", "close_grip", "unknown_object")
@@ -286,29 +286,29 @@ def test_the_scripts_are_fig_7() -> None:
 
 # --- interlocks ---
 
-CLOSED = Cell(right_open=False, left_open=False, fixture="tbox", robot_at="FIX-SAFE")
+CLOSED = CellState(right_open=False, left_open=False, fixture="tbox", robot_at="FIX-SAFE")
 REFUSED = {
     "no part": (
-        Cell(right_open=False, left_open=False, robot_at="FIX-SAFE"),
-        Row(1, "", machine="ENGRAVE PART"),
+        CellState(right_open=False, left_open=False, robot_at="FIX-SAFE"),
+        ScriptRow(1, "", machine="ENGRAVE PART"),
     ),
-    "open vise": (Cell(fixture="tbox", robot_at="FIX-SAFE"), Row(1, "", machine="ENGRAVE PART")),
+    "open vise": (CellState(fixture="tbox", robot_at="FIX-SAFE"), ScriptRow(1, "", machine="ENGRAVE PART")),
     "robot there": (
-        Cell(right_open=False, left_open=False, fixture="tbox", robot_at="FIX-MAC4"),
-        Row(1, "", machine="ENGRAVE PART"),
+        CellState(right_open=False, left_open=False, fixture="tbox", robot_at="FIX-MAC4"),
+        ScriptRow(1, "", machine="ENGRAVE PART"),
     ),
-    "loose part": (CLOSED, Row(1, "", vise={"right": True})),
+    "loose part": (CLOSED, ScriptRow(1, "", vise={"right": True})),
     "full fixture": (
-        Cell(fixture="tbox", robot_at="WS-SAFE"),
-        Row(1, "", "move", part="bbox", source="BUFFER", dest="FIX-MAC1"),
+        CellState(fixture="tbox", robot_at="WS-SAFE"),
+        ScriptRow(1, "", "move", part="bbox", source="BUFFER", dest="FIX-MAC1"),
     ),
     "closed vise": (
-        Cell(right_open=False),
-        Row(1, "", "move", part="bbox", source="BUFFER", dest="FIX-MAC1"),
+        CellState(right_open=False),
+        ScriptRow(1, "", "move", part="bbox", source="BUFFER", dest="FIX-MAC1"),
     ),
-    "nothing held": (Cell(), Row(1, "", "release")),
-    "nothing to take": (Cell(), Row(1, "", "acquire", part="tbox", source="FIX-MAC5")),
-    "held already": (Cell(held="tbox"), Row(1, "", "acquire", part="tbox", source="BUFFER")),
+    "nothing held": (CellState(), ScriptRow(1, "", "release")),
+    "nothing to take": (CellState(), ScriptRow(1, "", "acquire", part="tbox", source="FIX-MAC5")),
+    "held already": (CellState(held="tbox"), ScriptRow(1, "", "acquire", part="tbox", source="BUFFER")),
 }
 
 
@@ -318,7 +318,7 @@ def test_interlocks_refuse(name: str) -> None:
 
 
 def test_interlocks_let_the_corrected_script_pass() -> None:
-    cell = Cell()
+    cell = CellState()
     for row in read_script(SYSTEM.parent / "scripts/make_boxt.csv"):
         assert not refusal(cell, row), row
         cell = after(cell, row)
@@ -347,12 +347,12 @@ def test_a_part_of_the_wrong_size_is_let_go_of_and_the_next_is_acquired() -> Non
         return [plant(database, "kinematic", [*lying(database), house])]
 
     rows = (
-        Row(1, "", "acquire", part="tbox", grasp=3, source="FIX-MAC5"),
-        Row(2, "", "release", end_at="FIX-SAFE"),
-        Row(3, "", "acquire", part="tbox", grasp=2, source="BUFFER"),
+        ScriptRow(1, "", "acquire", part="tbox", grasp=3, source="FIX-MAC5"),
+        ScriptRow(2, "", "release", end_at="FIX-SAFE"),
+        ScriptRow(3, "", "acquire", part="tbox", grasp=2, source="BUFFER"),
     )
     made = prepare(SYSTEM, rows, "c", house_in_the_fixture)
-    made.station.cell = Cell(fixture="tbox")  # as a script before this one left it
+    made.station.cell = CellState(fixture="tbox")  # as a script before this one left it
     [failed] = made.steps()
     assert (failed.state, failed.reason) == ("failed", "pic")
     assert made.station.cell.held == "unknown_object"
@@ -373,7 +373,7 @@ def _shifted(world: Plant, by_mm: float) -> None:
 
 def test_a_part_that_was_not_picked_up_is_counted_on_the_buffer_again() -> None:
     """Taken away as the hand comes down, which closes on nothing: the count falls by one, and rises again, once."""
-    rows = tuple(Row(at, "", "acquire", part="tbox", grasp=2, source="BUFFER") for at in (1, 2))
+    rows = tuple(ScriptRow(at, "", "acquire", part="tbox", grasp=2, source="BUFFER") for at in (1, 2))
     made = prepare(SYSTEM, rows, "c", kinematic)
     world = made.system.outside[1]
     assert isinstance(world, Plant)

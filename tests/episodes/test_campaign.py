@@ -32,7 +32,7 @@ from rcsc_cell.campaign.counterexamples import (
     save,
     saved_episode,
 )
-from rcsc_cell.campaign.journal import BadJournal, Journal, Record, header, journal_path
+from rcsc_cell.campaign.journal import BadJournal, EpisodeRecord, Journal, header, journal_path
 from rcsc_cell.campaign.rig import Rig, digest, episode_seed, known_lines, mask
 from rcsc_cell.campaign.runner import campaign
 from rcsc_cell.campaign.shrink import shrink
@@ -63,14 +63,14 @@ def threads(count: int) -> Iterator[WorkerPool]:
         yield WorkerPool(pool, count)
 
 
-def played(rig: Rig, count: int, pool: WorkerPool, path: Path, seed: int = 5) -> dict[int, Record]:
+def played(rig: Rig, count: int, pool: WorkerPool, path: Path, seed: int = 5) -> dict[int, EpisodeRecord]:
     with Journal(path, header(rig, seed)) as journal:
         for _ in campaign(rig, seed, count, pool, journal):
             pass
         return dict(journal.records)
 
 
-def alone(rig: Rig, count: int, seed: int = 5) -> dict[int, Record]:
+def alone(rig: Rig, count: int, seed: int = 5) -> dict[int, EpisodeRecord]:
     """The records without any worker pool."""
     return {one.index: one for one in play(rig, digest(rig.system), seed, range(count))}
 
@@ -548,9 +548,11 @@ def test_shrinking_asks_no_episode_twice_and_no_more_than_it_may() -> None:
 # --- counterexamples ---
 
 
-def _record(index: int, *faults: str, found: Sequence[str] = (), end: str = "done", lines: int = 0) -> Record:
+def _record(
+    index: int, *faults: str, found: Sequence[str] = (), end: str = "done", lines: int = 0
+) -> EpisodeRecord:
     findings = tuple(Finding(name, 3, f"said {index}") for name in found)
-    return Record(index, faults, end, 10, findings, lines, "")
+    return EpisodeRecord(index, faults, end, 10, findings, lines, "")
 
 
 def test_one_counterexample_for_each_property_and_set_of_faults() -> None:

@@ -17,7 +17,7 @@ from rcsc.diagnostics.diagnostic import Diagnostic
 from rcsc.diagnostics.source import Source
 from rcsc.graph.derive import Derived, derive
 from rcsc.graph.drawing import plain, svg
-from rcsc.graph.find import Found, NotFound, tables
+from rcsc.graph.find import FoundTable, NotFound, tables
 from rcsc.graph.formats.choice import FORMS, form_of
 from rcsc.graph.formats.reading import UnreadableError, diagnosed
 from rcsc.graph.formats.state_graph import ANY, StateGraph
@@ -39,18 +39,18 @@ EVERY_FORM = sorted(FORMS)
 
 
 @pytest.fixture(scope="module")
-def shipped() -> dict[str, Found]:
+def shipped() -> dict[str, FoundTable]:
     """Every table of the system, by program and name."""
     found = tables(str(ROOT / "tables"))
     assert not isinstance(found, NotFound)
     return {f"{one.program.name}.{one.table.name}": one for one in found if "examples" not in one.table.file}
 
 
-KEPT: dict[tuple[int, str], tuple[Found, Derived]] = {}
+KEPT: dict[tuple[int, str], tuple[FoundTable, Derived]] = {}
 """Graphs already derived, by the identity of what was found, which is kept too."""
 
 
-def graph_of(one: Found, state: str = "") -> Derived:
+def graph_of(one: FoundTable, state: str = "") -> Derived:
     if (id(one), state) not in KEPT:
         made = derive(one.program, one.table, one.loaded.files[one.table.file], OPTIONS, state)
         assert isinstance(made, Derived), made
@@ -58,13 +58,13 @@ def graph_of(one: Found, state: str = "") -> Derived:
     return KEPT[id(one), state][1]
 
 
-def said(one: Found, text: str, form: str) -> Against:
+def said(one: FoundTable, text: str, form: str) -> Against:
     """The verdict on the table that the graph's text says."""
     table = tabled(FORMS[form].read(text))
     return against(one.loaded, one.root, one.program, one.table, table, OPTIONS)
 
 
-def found_in(text: str, tmp_path: Path, name: str = "") -> Found:
+def found_in(text: str, tmp_path: Path, name: str = "") -> FoundTable:
     file = tmp_path / "case.rcs"
     file.write_text(text, encoding="utf-8")
     made = tables(f"{file}:{name}" if name else str(file))
@@ -76,7 +76,7 @@ def found_in(text: str, tmp_path: Path, name: str = "") -> Found:
 
 
 def test_every_table_of_the_system_comes_back_from_every_form_and_is_proved_the_same(
-    shipped: dict[str, Found],
+    shipped: dict[str, FoundTable],
 ) -> None:
     assert len(shipped) == 24
     for name, one in shipped.items():
@@ -87,7 +87,7 @@ def test_every_table_of_the_system_comes_back_from_every_form_and_is_proved_the_
         assert verdict.found == (), name
 
 
-def test_the_graph_of_acquire_is_fig_10(shipped: dict[str, Found]) -> None:
+def test_the_graph_of_acquire_is_fig_10(shipped: dict[str, FoundTable]) -> None:
     made = graph_of(shipped["task.acquire"])
     assert [(edge.line, edge.source, edge.target) for edge in made.graph.edges] == [
         ("0", ANY, ANY),
@@ -149,7 +149,7 @@ BREAKS = [
     ("old", "new"), [(old, new) for _, old, new in BREAKS], ids=[what for what, *_ in BREAKS]
 )
 def test_a_broken_graph_is_refuted_by_an_input(
-    shipped: dict[str, Found], form: str, old: str, new: str
+    shipped: dict[str, FoundTable], form: str, old: str, new: str
 ) -> None:
     one = shipped["task.acquire"]
     text = FORMS[form].write(graph_of(one).graph)
@@ -160,7 +160,7 @@ def test_a_broken_graph_is_refuted_by_an_input(
 
 
 @pytest.mark.parametrize("form", EVERY_FORM)
-def test_a_dropped_edge_is_refuted(shipped: dict[str, Found], form: str) -> None:
+def test_a_dropped_edge_is_refuted(shipped: dict[str, FoundTable], form: str) -> None:
     one = shipped["primitive.goto"]
     lines = FORMS[form].write(graph_of(one).graph).splitlines(keepends=True)
     at = next(at for at, line in enumerate(lines) if "robot_status_in = done and there = true" in line)
@@ -169,7 +169,7 @@ def test_a_dropped_edge_is_refuted(shipped: dict[str, Found], form: str) -> None
     assert "line `6`, the graph to line `10`" in found.message  # DEFAULT takes it
 
 
-def test_a_table_that_rests_on_other_assumptions_is_not_the_same(shipped: dict[str, Found]) -> None:
+def test_a_table_that_rests_on_other_assumptions_is_not_the_same(shipped: dict[str, FoundTable]) -> None:
     one = shipped["task.acquire"]
     text = (
         FORMS["mermaid"]
@@ -613,7 +613,7 @@ def test_what_is_no_graph_is_refused_at_its_place(form: str, text: str, line: in
 
 
 @pytest.mark.parametrize("form", EVERY_FORM)
-def test_no_damaged_graph_is_a_bug(shipped: dict[str, Found], form: str) -> None:
+def test_no_damaged_graph_is_a_bug(shipped: dict[str, FoundTable], form: str) -> None:
     choose = random.Random(form)  # noqa: S311  # by seed
     text = FORMS[form].write(graph_of(shipped["vision.flood_flash"]).graph)
     for _ in range(150):
@@ -631,7 +631,7 @@ def test_no_damaged_graph_is_a_bug(shipped: dict[str, Found], form: str) -> None
 
 
 def test_a_table_takes_the_place_of_its_namesake_or_stands_behind_the_others(
-    shipped: dict[str, Found],
+    shipped: dict[str, FoundTable],
 ) -> None:
     one = shipped["vision.flood_flash"]
     file = one.loaded.files[one.table.file]
@@ -650,7 +650,7 @@ def test_a_table_takes_the_place_of_its_namesake_or_stands_behind_the_others(
 # --- drawings --------------------------------------------------------------------------------
 
 
-def test_the_drawing_shows_every_state_and_every_line_once_an_arrow(shipped: dict[str, Found]) -> None:
+def test_the_drawing_shows_every_state_and_every_line_once_an_arrow(shipped: dict[str, FoundTable]) -> None:
     made = graph_of(shipped["task.acquire"])
     text = svg(made.graph, made.everywhere)
     root = ET.fromstring(text)  # noqa: S314  # made here
@@ -665,7 +665,7 @@ def test_the_drawing_shows_every_state_and_every_line_once_an_arrow(shipped: dic
     assert text == svg(made.graph, made.everywhere)
 
 
-def test_no_label_hides_a_state_or_another_label(shipped: dict[str, Found]) -> None:
+def test_no_label_hides_a_state_or_another_label(shipped: dict[str, FoundTable]) -> None:
     for name, found in shipped.items():
         made = graph_of(found)
         root = ET.fromstring(svg(made.graph, made.everywhere))  # noqa: S314  # made here
@@ -725,7 +725,7 @@ def test_guards_are_short_for_the_eye(guard: str, shown: str) -> None:
     assert plain(guard) == shown
 
 
-def test_the_graph_of_lines_is_drawn_and_makes_no_table(shipped: dict[str, Found]) -> None:
+def test_the_graph_of_lines_is_drawn_and_makes_no_table(shipped: dict[str, FoundTable]) -> None:
     one = shipped["vision.flood_flash"]
     made = derive_lines(one.program, one.table, one.loaded.files[one.table.file], OPTIONS)
     assert isinstance(made, Derived)
@@ -805,7 +805,7 @@ def test_a_drawing_needs_a_layout_program(monkeypatch: pytest.MonkeyPatch) -> No
     assert (status, "error[RCS705]: `graphviz-pure` is not installed" in out) == (1, True)
 
 
-def test_states_are_members_in_declared_order(shipped: dict[str, Found]) -> None:
+def test_states_are_members_in_declared_order(shipped: dict[str, FoundTable]) -> None:
     graph: StateGraph = graph_of(shipped["emove.locate"]).graph
     kind = shipped["emove.locate"].program.variable("cur_state").type
     assert isinstance(kind, Enum)

@@ -22,7 +22,7 @@ from rcsc.run.description import description
 from rcsc.run.system import Kind, assemble, signatures
 from rcsc.shell.commands import HELP, Commands
 from rcsc.shell.reload.refusal import Refused
-from rcsc.shell.reload.reload import Plant
+from rcsc.shell.reload.reload import Origin
 from rcsc.shell.reload.sources import kept, laid_out
 from rcsc.shell.session import Session, silent_queries
 from rcsc.solvers.options import Options
@@ -40,7 +40,7 @@ def alone(path: Path = SYSTEM, kind: Kind = "c") -> Commands:
     """Levels with nothing outside and a database that knows nothing."""
     said = description(path)
     queries = silent_queries(said, signatures(said))
-    return Commands(Session(assemble(said, kind, queries), Plant(path, said, kind, queries)))
+    return Commands(Session(assemble(said, kind, queries), Origin(path, said, kind, queries)))
 
 
 def inhabited(kind: Kind = "c") -> Commands:
@@ -48,7 +48,7 @@ def inhabited(kind: Kind = "c") -> Commands:
     said = description(SYSTEM)
     database = database_of(said, signatures(said))
     system = assemble(said, kind, database.queries, (plant(database, "kinematic"),))
-    return Commands(Session(system, Plant(SYSTEM, said, kind, database.queries)))
+    return Commands(Session(system, Origin(SYSTEM, said, kind, database.queries)))
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ from rcsc.commands.shared.show import Output, show, writing
 from rcsc.diagnostics.diagnostic import Diagnostic, sort_key
 from rcsc.diagnostics.report import Report
 from rcsc.diagnostics.source import Source
-from rcsc.graph.find import Found, NotFound, tables
+from rcsc.graph.find import FoundTable, NotFound, tables
 from rcsc.host.files import write_atomically
 
 ENDINGS = {"svg": ".svg", "dot": ".dot", "mermaid": ".mmd", "scxml": ".scxml"}
@@ -36,7 +36,7 @@ class WrongError(Exception):
         return 1
 
 
-def found_tables(named: str, *, running: bool = False) -> list[Found]:
+def found_tables(named: str, *, running: bool = False) -> list[FoundTable]:
     """The tables that are named.
 
     Raises:

@@ -20,7 +20,7 @@ from rcsc_cell.campaign.counterexamples import (
     is_saved,
     save,
 )
-from rcsc_cell.campaign.journal import Journal, Record, header, journal_path
+from rcsc_cell.campaign.journal import EpisodeRecord, Journal, header, journal_path
 from rcsc_cell.campaign.rig import Rig, known_lines
 from rcsc_cell.campaign.runner import campaign as play
 from rcsc_cell.campaign.summary import as_json, as_text, summary
@@ -141,7 +141,7 @@ def _campaign(  # as many as there are options
 class _Told:
     """Progress, now and then on standard error."""
 
-    def __init__(self, wanted: int, known: list[Record]) -> None:
+    def __init__(self, wanted: int, known: list[EpisodeRecord]) -> None:
         self._wanted, self._known, self._done = wanted, len(known), len(known)
         self._findings = sum(bool(one.findings) for one in known)
         self._progress = Progress()
@@ -159,7 +159,7 @@ class _Told:
         """Since the campaign began or went on."""
         return time.monotonic() - self._begun
 
-    def __call__(self, records: tuple[Record, ...]) -> None:
+    def __call__(self, records: tuple[EpisodeRecord, ...]) -> None:
         """Takes what came in."""
         self._done += len(records)
         self._findings += sum(bool(one.findings) for one in records)
@@ -188,7 +188,7 @@ def _clock(seconds: float) -> str:
     return f"{hours}:{minutes:02}:{rest:02}" if hours else f"{minutes}:{rest:02}"
 
 
-def _sum_up(rig: Rig, records: list[Record], said: _Told, json_: Path | None) -> None:
+def _sum_up(rig: Rig, records: list[EpisodeRecord], said: _Told, json_: Path | None) -> None:
 
     found = summary(records, known_lines(rig.system), tuple(FAULTS))
     seconds = max(said.seconds, 1e-9)
@@ -204,7 +204,7 @@ def _sum_up(rig: Rig, records: list[Record], said: _Told, json_: Path | None) ->
     click.echo(f"wrote {json_}")
 
 
-def _save(rig: Rig, seed: int, records: list[Record], pool: WorkerPool, folder: Path) -> None:
+def _save(rig: Rig, seed: int, records: list[EpisodeRecord], pool: WorkerPool, folder: Path) -> None:
     """Shrinks and saves what is not saved already, and says what to type."""
     chosen = choices(records)
     wanted = [one for one in chosen[:MOST] if not is_saved(folder, rig, seed, one)]

@@ -21,7 +21,7 @@ from rcsc.run.log.states import begun_in_words, fault_in_words
 from rcsc.run.system import signatures
 from rcsc_cell.database.build import BadData
 from rcsc_cell.pictures.finding_page import trace
-from rcsc_cell.pictures.scene import Cell, cell, same_system
+from rcsc_cell.pictures.scene import DrawnCell, cell, same_system
 from rcsc_cell.workstation.prepared import database_of
 
 _TO = click.Path(dir_okay=False, path_type=Path)
@@ -163,7 +163,7 @@ def _summed(level: LoggedLevel) -> None:
         click.echo(f"  and {len(level.restarts) - SHOWN} times more")
 
 
-def _cell_of(log: Log, given: Path | None) -> tuple[Cell | None, str]:
+def _cell_of(log: Log, given: Path | None) -> tuple[DrawnCell | None, str]:
     """The cell, or none and why, a sentence.
 
     Args:
@@ -180,7 +180,7 @@ def _cell_of(log: Log, given: Path | None) -> tuple[Cell | None, str]:
         return None, f"{error}; `--system` names another system."
 
 
-def _cell(log: Log, path: Path) -> Cell:
+def _cell(log: Log, path: Path) -> DrawnCell:
     """The cell of a description.
 
     Raises:

@@ -14,7 +14,7 @@ from rcsc.run.signature import Signature
 from rcsc.run.system import Kind, Outside, assemble, signatures
 from rcsc.shell.commands import Commands
 from rcsc.shell.reload.refusal import Refused
-from rcsc.shell.reload.reload import Plant
+from rcsc.shell.reload.reload import Origin
 from rcsc.shell.session import Session, silent_queries
 from rcsc.shell.terminal import converse, follow
 from rcsc_cell.cell.ready import plant
@@ -69,7 +69,7 @@ def _commands(path: Path, kind: Kind, alone: bool) -> Commands:
         database = database_of(said, signs)
         queries, outside = database.queries, (plant(database, "kinematic"),)
     system = assemble(said, kind, queries, outside)
-    return Commands(Session(system, Plant(path, said, kind, queries)))
+    return Commands(Session(system, Origin(path, said, kind, queries)))
 
 
 def _is_cell(system: Description, signs: Mapping[str, Signature]) -> bool:

@@ -9,7 +9,7 @@ from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label
 from rcsc.graph.derive import Derived, derive
 from rcsc.graph.drawing import svg
-from rcsc.graph.find import Found
+from rcsc.graph.find import FoundTable
 from rcsc.graph.formats.choice import FORMS
 from rcsc.graph.formats.state_graph import LINES
 from rcsc.graph.layout import PACKAGE, NoLayoutError
@@ -55,7 +55,7 @@ def command(named: str, form: str | None, lines: bool, state: str, out: Path | N
 
 
 def _draw_all(
-    found: list[Found], form: str, lines: bool, state: str, out: Path | None, options: Options
+    found: list[FoundTable], form: str, lines: bool, state: str, out: Path | None, options: Options
 ) -> None:
     """Draws every table; of several, those without a state are left out, and what is wrong is told at the end."""
     wrong: list[Diagnostic] = []
@@ -85,7 +85,7 @@ def _form_of(out: Path | None) -> str:
     return next((form for form, one in ENDINGS.items() if one == ending), others.get(ending, "svg"))
 
 
-def _derived(one: Found, lines: bool, state: str, options: Options) -> Derived:
+def _derived(one: FoundTable, lines: bool, state: str, options: Options) -> Derived:
 
     file = one.loaded.files[one.table.file]
     found = (
@@ -98,7 +98,7 @@ def _derived(one: Found, lines: bool, state: str, options: Options) -> Derived:
     return found
 
 
-def _draw(one: Found, form: str, made: Derived, out: Path | None, options: Options) -> None:
+def _draw(one: FoundTable, form: str, made: Derived, out: Path | None, options: Options) -> None:
     """Writes one graph; what its form does not hold is said beside it."""
     if form == "svg":
         written(_drawing(one, made), out)
@@ -116,7 +116,7 @@ def _draw(one: Found, form: str, made: Derived, out: Path | None, options: Optio
     )
 
 
-def _drawing(one: Found, made: Derived) -> str:
+def _drawing(one: FoundTable, made: Derived) -> str:
 
     try:
         return svg(made.graph, made.everywhere)
@@ -128,7 +128,7 @@ def _drawing(one: Found, made: Derived) -> str:
         raise WrongError((found,), one.loaded.sources) from error
 
 
-def _read_back(one: Found, form: str, text: str, options: Options) -> int:
+def _read_back(one: FoundTable, form: str, text: str, options: Options) -> int:
     """How many questions prove that the written graph says the table."""
     made = tabled(FORMS[form].read(text))
     verdict = against(one.loaded, one.root, one.program, one.table, made, options)

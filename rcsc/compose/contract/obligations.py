@@ -292,9 +292,7 @@ def _no_pause(ts: TransitionSystem, below: Below) -> Iterator[str]:
 
 def run_by(ts: TransitionSystem) -> list[Table]:
     """List the tables that the level runs."""
-    chosen = ts.level.tables
-    names = {chosen.table} if isinstance(chosen, OneTable) else {table for _, table in chosen.tables}
-    return [one for one in ts.program.tables if one.name in names]
+    return [one for one in ts.program.tables if one.name in ts.level.tables.names]
 
 
 def _rests(ts: TransitionSystem, table: Table) -> bool:

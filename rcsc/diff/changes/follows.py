@@ -5,12 +5,12 @@ pairs are those of `relation.follow`: inputs are free under the table's assumpti
 in either version.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 
 from rcsc.diff.changes.difference import Follows
-from rcsc.diff.changes.versions import Versions
+from rcsc.diff.changes.versions import Versions, run_by
 from rcsc.lang.digest import Digests
-from rcsc.lang.model import Call, Level, Line, OneTable, ProcedureName, Program, Statement, Table
+from rcsc.lang.model import Call, Level, Line, ProcedureName, Program, Statement, Table
 from rcsc.relation.follow import following
 from rcsc.relation.steps import UnansweredError
 from rcsc.solvers.options import Options
@@ -26,7 +26,7 @@ def follows(versions: Versions) -> Iterator[Follows]:
             continue
         pair = level, later[level.name]
         around = _around(versions.digests[0], level) != _around(versions.digests[1], pair[1])
-        tables = [_tables(side.program, one) for side, one in zip(versions.digests, pair, strict=True)]
+        tables = [run_by(side.program, one) for side, one in zip(versions.digests, pair, strict=True)]
         for name, one in tables[0].items():
             two = tables[1].get(name)
             if two is not None and (
@@ -44,13 +44,6 @@ def _around(digests: Digests, level: Level) -> object:
         (v.name, repr(v.deferred_until)) for v in digests.program.variables if v.deferred_until is not None
     ]
     return [digests.body(body) for body in bodies], deferred
-
-
-def _tables(program: Program, level: Level) -> Mapping[str, Table]:
-    named = {str(table.name): table for table in program.tables}
-    if isinstance(level.tables, OneTable):
-        return {str(level.tables.table): named[level.tables.table]}
-    return {str(name): named[name] for _, name in level.tables.tables}
 
 
 def _compared(versions: Versions, level: str, one: Table, two: Table) -> Follows:

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from rcsc.diff.changes.difference import Traces, Transition
 from rcsc.diff.changes.spell import number
 from rcsc.diff.changes.tables import assumed
-from rcsc.diff.changes.versions import Versions
+from rcsc.diff.changes.versions import Versions, run_by
 from rcsc.lang.interpret import initial
-from rcsc.lang.model import Default, Level, Line, OneTable, Program, Scalar, Table, key_bounds, pending
+from rcsc.lang.model import Default, Level, Line, Scalar, Table, key_bounds, pending
 from rcsc.symbolic import values
 from rcsc.symbolic.values import FALSE, Node
 
@@ -23,7 +23,7 @@ MOST_STATES = 64
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class GraphStep:
     """One step: from a state to a state, by a line of a table."""
 
     table: str
@@ -32,7 +32,7 @@ class Step:
     after: str
 
 
-Steps = Mapping[Step, Node]
+Steps = Mapping[GraphStep, Node]
 """Each step with the inputs at which it is taken."""
 
 
@@ -54,7 +54,7 @@ def _level(versions: Versions, pair: tuple[Level, Level]) -> Traces:
     new: list[Transition] = []
     gone: list[Transition] = []
     programs = versions.before, versions.after
-    tables = [_tables(program, level) for program, level in zip(programs, pair, strict=True)]
+    tables = [run_by(program, level) for program, level in zip(programs, pair, strict=True)]
     differing = [
         name
         for name in dict.fromkeys((*tables[0], *tables[1]))
@@ -78,13 +78,6 @@ def _level(versions: Versions, pair: tuple[Level, Level]) -> Traces:
     return Traces(pair[0].name, tuple(new), tuple(gone), versions.queries - before)
 
 
-def _tables(program: Program, level: Level) -> dict[str, Table]:
-    named = {str(table.name): table for table in program.tables}
-    if isinstance(level.tables, OneTable):
-        return {str(level.tables.table): named[level.tables.table]}
-    return {str(name): named[name] for _, name in level.tables.tables}
-
-
 def _states(versions: Versions) -> list[str]:
     """Deferred variables of both versions with few values."""
     both = [
@@ -101,7 +94,7 @@ def _few(kind: Scalar) -> bool:
     return high - low < MOST_STATES
 
 
-def _steps(versions: Versions, side: int, table: Table, state: str) -> Iterator[tuple[Step, Node]]:
+def _steps(versions: Versions, side: int, table: Table, state: str) -> Iterator[tuple[GraphStep, Node]]:
     """Every step of the table, each once, in order of its lines."""
     program = (versions.before, versions.after)[side]
     meaning = versions.meanings()[side]
@@ -121,7 +114,7 @@ def _steps(versions: Versions, side: int, table: Table, state: str) -> Iterator[
                     versions, wrote, versions.shared.start[state], effect.leaves[leaf]
                 ):
                     words = [number(versions.types[state], value) for value in (before, after)]
-                    yield Step(str(table.name), str(line.name), words[0], words[1]), taken
+                    yield GraphStep(str(table.name), str(line.name), words[0], words[1]), taken
 
 
 def _reached(versions: Versions, wrote: Node, state: Node, now: Node) -> Iterator[tuple[int, int, Node]]:
@@ -146,7 +139,7 @@ def _is(node: Node, value: int) -> Node:
 def _only(versions: Versions, state: str, here: Steps, there: Steps, first: str) -> Iterator[Transition]:
     """Steps (from state, to state) that one version has and the other has by no line at all."""
     known = {(step.before, step.after) for step in there}
-    by: dict[tuple[str, str], list[Step]] = {}
+    by: dict[tuple[str, str], list[GraphStep]] = {}
     for step in here:
         if (step.before, step.after) not in known:
             by.setdefault((step.before, step.after), []).append(step)
@@ -158,9 +151,9 @@ def _only(versions: Versions, state: str, here: Steps, there: Steps, first: str)
         )
 
 
-def _trace(steps: Iterable[Step], first: str, last: str, then: Step) -> tuple[tuple[str, str], ...]:
+def _trace(steps: Iterable[GraphStep], first: str, last: str, then: GraphStep) -> tuple[tuple[str, str], ...]:
     """The shortest way from the first state to the step, by steps of its table: each state with the line that leads on."""
-    edges: dict[str, list[Step]] = {}
+    edges: dict[str, list[GraphStep]] = {}
     for step in steps:
         if step.table == then.table:
             edges.setdefault(step.before, []).append(step)

@@ -16,10 +16,12 @@ from rcsc.lang.model import (
     Bool,
     Enum,
     Int,
+    Level,
     Op,
     Program,
     Real,
     Scalar,
+    Table,
     earlier,
     key_bounds,
     value_of_key,
@@ -274,3 +276,9 @@ def is_across(condition: Node) -> bool:
             if wide and not (values.root(one).op == CONSTANT or values.root(two).op == CONSTANT):
                 return True
     return False
+
+
+def run_by(program: Program, level: Level) -> dict[str, Table]:
+    """The tables that a level runs, by name."""
+    named = {table.name: table for table in program.tables}
+    return {str(name): named[name] for name in level.tables.names}

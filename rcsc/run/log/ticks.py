@@ -80,7 +80,7 @@ class Reported:
 
 
 @dataclass(frozen=True, slots=True)
-class State:
+class ShownState:
     """A state variable, or an output that nobody answers.
 
     Attributes:
@@ -96,7 +96,7 @@ class State:
 
 
 @dataclass(frozen=True, slots=True)
-class Box:
+class LevelTick:
     """A level in a tick.
 
     Attributes:
@@ -119,7 +119,7 @@ class Box:
     above: tuple[tuple[Order | None, Reported | None], ...] = ()
     below: tuple[tuple[Reported | None, Order | None], ...] = ()
     inputs: tuple[Said, ...] = ()
-    states: tuple[State, ...] = ()
+    states: tuple[ShownState, ...] = ()
 
     @property
     def matched(self) -> str:
@@ -134,7 +134,7 @@ class Frame:
     """A tick: every level of the log, from the top down."""
 
     tick: int
-    boxes: tuple[Box, ...]
+    boxes: tuple[LevelTick, ...]
 
 
 def frames(log: Log) -> Iterator[Frame]:
@@ -153,10 +153,10 @@ def _wires(log: Log) -> dict[str, str]:
     return found
 
 
-def _box(log: Log, level: LoggedLevel, tick: int, wires: Mapping[str, str]) -> Box:
+def _box(log: Log, level: LoggedLevel, tick: int, wires: Mapping[str, str]) -> LevelTick:
     at = level.track.place(tick)
     if at < 1 or level.track.ticks[at] != tick:
-        return Box(level.name, ran=False)
+        return LevelTick(level.name, ran=False)
     restart = level.restarted(at)
     before = level.track.layout.unpack(level.track.packed[at - 1]) if restart is None else restart.values
     after = level.track.layout.unpack(level.track.packed[at])
@@ -173,14 +173,14 @@ class _Cycle:
     after: Values
     wires: Mapping[str, str]
 
-    def box(self, told: LoggedCycle | None) -> Box:
+    def box(self, told: LoggedCycle | None) -> LevelTick:
         """What there is to be seen."""
         sign, level = self.logged.sign, self.logged.level
         fault, leaf = fault_of(sign, self.after), refused_of(sign, self.after)
         line, failed = line_of(sign, level, self.after), failed_of(sign, self.after)
         lines = told.matched if told is not None and told.matched else (line,) if line else ()
         above, below = self._exchanges()
-        return Box(
+        return LevelTick(
             level.name,
             ran=True,
             table=sign.table_of(level, self.after),
@@ -257,19 +257,21 @@ class _Cycle:
             if kind == "input" and not self._is_said(record):
                 yield record
 
-    def _states(self) -> Iterator[State]:
+    def _states(self) -> Iterator[ShownState]:
         """Deferred ones first, whether or not they changed; then what changed of the others, and of outputs to nobody who answers."""
         index, leaves = self.logged.sign.index, self.logged.sign.leaves
         deferred = [leaf.name for leaf in leaves if pending(leaf.name) in index]
         nexts = {str(pending(name)) for name in deferred}
         for name in deferred:
             now, then = self._word(self.after, name), self._word(self.after, pending(name))
-            yield State(name, self._word(self.before, name), now, True, then if then != now else "")
+            yield ShownState(name, self._word(self.before, name), now, True, then if then != now else "")
         said = {*deferred, *nexts}
         for leaf in leaves:
             aside = leaf.kind == "state" or (leaf.kind == "output" and not self._is_said(leaf.name))
             if aside and leaf.name not in said and self._changed(leaf):
-                yield State(leaf.name, self._word(self.before, leaf.name), self._word(self.after, leaf.name))
+                yield ShownState(
+                    leaf.name, self._word(self.before, leaf.name), self._word(self.after, leaf.name)
+                )
 
     def _fields(
         self, record: str, but: tuple[str, ...] = (), *, only_changed: bool = False

@@ -13,11 +13,11 @@ from rcsc.driver.outline import known
 from rcsc.host.cache import Cache, open_cache
 from rcsc.run.description import BadDescription, LevelSpec
 from rcsc.shell.reload.refusal import Refused
-from rcsc.shell.reload.reload import Plant, source_of
-from rcsc.shell.reload.sources import Kept, kept
+from rcsc.shell.reload.reload import Origin, source_of
+from rcsc.shell.reload.sources import KeptSources, kept
 
 
-def held_by(plant: Plant, spec: LevelSpec) -> Kept | None:
+def held_by(plant: Origin, spec: LevelSpec) -> KeptSources | None:
     """What a level's file, and those that it uses, hold now; None where it is not there."""
     try:
         return kept(source_of(plant, spec))
@@ -26,9 +26,9 @@ def held_by(plant: Plant, spec: LevelSpec) -> Kept | None:
 
 
 def together(
-    plant: Plant,
+    plant: Origin,
     level: str,
-    runs: Mapping[str, Kept | None],
+    runs: Mapping[str, KeptSources | None],
     compiled: Callable[[str], bool],
     *,
     prove: bool,
@@ -64,7 +64,7 @@ def together(
     return f"level `{level}` is not known to be proved together with its neighbours: {why}"
 
 
-def _prove(plant: Plant, cache: Cache) -> None:
+def _prove(plant: Origin, cache: Cache) -> None:
     """Proves what no earlier run did, and keeps it."""
     from rcsc.compose.proof.system import NoProgramError, prove_transition_systems, transition_systems
 
@@ -75,7 +75,7 @@ def _prove(plant: Plant, cache: Cache) -> None:
     prove_transition_systems(made, None, 1, tuple(made), None, cache)
 
 
-def _unknown(plant: Plant, level: str, made: KnownSystem | None, edited: Sequence[str]) -> str:
+def _unknown(plant: Origin, level: str, made: KnownSystem | None, edited: Sequence[str]) -> str:
     if edited:
         return f"level `{edited[0]}` runs other tables than its file holds"
     if made is not None and made.broken:
@@ -86,7 +86,7 @@ def _unknown(plant: Plant, level: str, made: KnownSystem | None, edited: Sequenc
     return f"`rcsc prove {plant.path}` decides it"
 
 
-def _refused(plant: Plant, level: str, why: str) -> Refused:
+def _refused(plant: Origin, level: str, why: str) -> Refused:
     return Refused(
         Code.SHELL_NOT_COMPOSED,
         f"level `{level}` keeps its tables: the new ones are not proved together with its neighbours{why}",

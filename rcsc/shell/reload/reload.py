@@ -28,14 +28,14 @@ from rcsc.run.signature import Leaf, Signature, generated_files, signature
 from rcsc.run.system import Kind, executors
 from rcsc.shell.reload.gate import witness
 from rcsc.shell.reload.refusal import Refused
-from rcsc.shell.reload.sources import Kept, kept, laid_out
+from rcsc.shell.reload.sources import KeptSources, kept, laid_out
 from rcsc.solvers.options import Options
 
 MOST_SHOWN = 5
 
 
 @dataclass(frozen=True, slots=True)
-class Plant:
+class Origin:
     """Where a system comes from, to make a level of it again.
 
     Attributes:
@@ -61,11 +61,11 @@ class Reloaded:
     level: RunningLevel
     program: Program
     digest: str
-    sources: Kept
+    sources: KeptSources
     said: str
 
 
-def source_of(plant: Plant, spec: LevelSpec) -> Path:
+def source_of(plant: Origin, spec: LevelSpec) -> Path:
     """The file that a level's program is compiled of.
 
     Raises:
@@ -81,7 +81,7 @@ def source_of(plant: Plant, spec: LevelSpec) -> Path:
     return found
 
 
-def program_of(plant: Plant, spec: LevelSpec, held: Kept | None) -> Program:
+def program_of(plant: Origin, spec: LevelSpec, held: KeptSources | None) -> Program:
     """What the tables that the executors were compiled of mean.
 
     Args:
@@ -104,7 +104,7 @@ def program_of(plant: Plant, spec: LevelSpec, held: Kept | None) -> Program:
         return _resolved(there)
 
 
-def reload(plant: Plant, spec: LevelSpec, old: RunningLevel) -> Reloaded:
+def reload(plant: Origin, spec: LevelSpec, old: RunningLevel) -> Reloaded:
     """The level with the tables as they are now.
 
     Raises:

@@ -1,6 +1,6 @@
 """The sources of what runs, kept from before anybody edits them: what a running table says, when its file says something else.
 
-In: a root file. Out: `Kept`, and the same files laid out elsewhere.
+In: a root file. Out: `KeptSources`, and the same files laid out elsewhere.
 """
 
 import os
@@ -14,7 +14,7 @@ from rcsc.lang.project import PROJECT_FILE, load, project_root
 
 
 @dataclass(frozen=True, slots=True)
-class Kept:
+class KeptSources:
     """A root file and all that it uses.
 
     Attributes:
@@ -26,11 +26,11 @@ class Kept:
     texts: Mapping[str, bytes]
 
 
-def kept(source: Path) -> Kept:
+def kept(source: Path) -> KeptSources:
     """The texts as they are now, of exactly the files that a check reads; what cannot be read is left out."""
     project = os.path.abspath(project_root(str(source)))
     texts = {_below(name, project): one.text.encode() for name, one in load([str(source)]).sources.items()}
-    return Kept(_below(str(source), project), {PROJECT_FILE: b"", **texts})
+    return KeptSources(_below(str(source), project), {PROJECT_FILE: b"", **texts})
 
 
 def _below(file: str, project: str) -> str:
@@ -47,7 +47,7 @@ def _below(file: str, project: str) -> str:
 
 
 @contextmanager
-def laid_out(held: Kept) -> Iterator[Path]:
+def laid_out(held: KeptSources) -> Iterator[Path]:
     """The root file among the others, in a folder that is gone afterwards; nothing is written anywhere else."""
     with scratch("reload") as place:
         for name, text in held.texts.items():

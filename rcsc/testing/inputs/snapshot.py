@@ -96,7 +96,7 @@ def related_leaves(expr: Expr) -> set[str]:
 
 
 @dataclass(slots=True)
-class Search:
+class InputSearch:
     """Searches over one program; remembers its edges."""
 
     program: Program
@@ -195,7 +195,7 @@ class Search:
             yield tuple(drawn[name] for name in names)
 
 
-def search_in(program: Program, solver: Solver | None = None) -> Search:
+def search_in(program: Program, solver: Solver | None = None) -> InputSearch:
     """A search over the program's leaves."""
     variables = {str(variable.name): variable for variable in program.variables}
-    return Search(program, solver, variables, leaf_edges(program), companions(program))
+    return InputSearch(program, solver, variables, leaf_edges(program), companions(program))

@@ -15,7 +15,7 @@ from itertools import product
 from rcsc.lang.interpret import holds, matching_lines
 from rcsc.lang.model import Apply, Expr, Line, Program, Snapshot, Table, Test, pending
 from rcsc.lang.operator_table import Op, is_logic
-from rcsc.testing.inputs.snapshot import Missing, Search, Wanted, conjunction, expr_of
+from rcsc.testing.inputs.snapshot import InputSearch, Missing, Wanted, conjunction, expr_of
 from rcsc.testing.inputs.spell import words
 
 MOST_ATOMS = 8  # of one `when` cell; its truth table is enumerated
@@ -137,7 +137,7 @@ def _spelled(condition: Test | Expr) -> str:
 class Finder:
     """Makes the vectors of one table."""
 
-    search: Search
+    search: InputSearch
     table: Table
     given: tuple[Wanted, ...]
 
@@ -197,7 +197,7 @@ def given_in(program: Program, table: Table) -> tuple[Wanted, ...]:
     return tuple((expr, True) for expr in (*used, *(i.condition for i in program.invariants)))
 
 
-def vectors_of(search: Search, table: Table, lines: Sequence[Line] | None = None) -> Vectors:
+def vectors_of(search: InputSearch, table: Table, lines: Sequence[Line] | None = None) -> Vectors:
     """Vectors for the table's lines (or for those given).
 
     Args:

@@ -18,7 +18,7 @@ from rcsc.host.files.names import shown
 from rcsc.host.files.read import json_of, text
 from rcsc.run.description import description
 from rcsc.run.system import Kind
-from rcsc_cell.campaign.journal import Record
+from rcsc_cell.campaign.journal import EpisodeRecord
 from rcsc_cell.campaign.rig import Rig, digest
 from rcsc_cell.campaign.runner import death
 from rcsc_cell.campaign.shrink import MOST_TRIES, shrink
@@ -56,7 +56,7 @@ class Choice:
         return f"{seed}-{self.index}-{re.sub('[^a-z0-9]+', '-', self.property.lower()).strip('-')[:MOST_CHARACTERS]}"
 
 
-def choices(records: Iterable[Record]) -> tuple[Choice, ...]:
+def choices(records: Iterable[EpisodeRecord]) -> tuple[Choice, ...]:
     """For each property and set of faults the episode with the lowest number: others would likely shrink to the same.
 
     Whatever has several faults counts as one set. Those of fewer faults come first, as they say more.

@@ -49,7 +49,7 @@ class BadJournal(CodedError):  # noqa: N818  # what happened, not an error of ou
 
 
 @dataclass(frozen=True, slots=True)
-class Record:
+class EpisodeRecord:
     """What became of one episode.
 
     Attributes:
@@ -106,7 +106,7 @@ class Journal:
         """
         path.parent.mkdir(parents=True, exist_ok=True)
         self.path = path
-        self.records: dict[int, Record] = {}
+        self.records: dict[int, EpisodeRecord] = {}
         self._file = _opened(path)
         try:
             _lock(self._file, path)
@@ -133,7 +133,7 @@ class Journal:
             self._file.write(first)
             self._file.flush()
 
-    def add(self, records: Iterable[Record]) -> None:
+    def add(self, records: Iterable[EpisodeRecord]) -> None:
         """Writes records; when it returns, a kill of this process loses none of them.
 
         Raises:
@@ -191,7 +191,7 @@ def _line(said: dict[str, Any]) -> bytes:
     return json.dumps(said, separators=(",", ":")).encode() + b"\n"
 
 
-def _said(one: Record) -> dict[str, Any]:
+def _said(one: EpisodeRecord) -> dict[str, Any]:
     return {
         "index": one.index,
         "faults": one.faults,
@@ -216,13 +216,13 @@ class _Line:
     digest: str
 
 
-def _read(path: Path, number: int, line: bytes) -> Record:
+def _read(path: Path, number: int, line: bytes) -> EpisodeRecord:
     try:
         said: _Line = read(_Line, json_of(line))
         found = tuple(Finding(*one) for one in said.findings)
         if min(said.index, said.ticks, *(one.tick for one in found), 0) < 0 or len(said.lines) > MOST_DIGITS:
             raise ValueError  # noqa: TRY301  # told below
         lines = int(said.lines, 16)
-        return Record(said.index, tuple(said.faults), said.end, said.ticks, found, lines, said.digest)
+        return EpisodeRecord(said.index, tuple(said.faults), said.end, said.ticks, found, lines, said.digest)
     except ValueError as error:
         raise BadJournal(f"{path}, line {number} is damaged") from error

@@ -12,7 +12,7 @@ from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, Future
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from rcsc_cell.campaign.journal import Journal, Record
+from rcsc_cell.campaign.journal import EpisodeRecord, Journal
 from rcsc_cell.campaign.rig import Rig, digest
 from rcsc_cell.campaign.work import CRASH, ENDS, HANG, SURVIVES, no_end, odd, play
 from rcsc_cell.campaign.worker_pool import WorkerPool, WorkersGone
@@ -20,7 +20,7 @@ from rcsc_cell.episodes.episode import Finding, Outcome
 from rcsc_cell.episodes.part_faults import fault_classes
 
 Chunk: TypeAlias = tuple[int, ...]
-Records: TypeAlias = tuple[Record, ...]
+Records: TypeAlias = tuple[EpisodeRecord, ...]
 
 CHUNKS = {"kinematic": 10, "mujoco": 4}
 """Episodes a task at most: about a second of work, which handing over does not slow, and which is all that a kill loses."""
@@ -116,11 +116,11 @@ class _Round:
             return (self._guilty(flight.chunk[0]),)
         return ()
 
-    def _guilty(self, index: int) -> Record:
+    def _guilty(self, index: int) -> EpisodeRecord:
         """The record of an episode that a worker died of."""
         outcome = death(self._rig, time.monotonic() - self._since_s)
         faults = fault_classes(self._rig.episode(self._seed, index))
-        return Record(index, faults, outcome.end, 0, outcome.findings, 0, "")
+        return EpisodeRecord(index, faults, outcome.end, 0, outcome.findings, 0, "")
 
 
 def death(rig: Rig, took_s: float) -> Outcome:

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from rcsc_cell.campaign.journal import Record
+from rcsc_cell.campaign.journal import EpisodeRecord
 from rcsc_cell.campaign.rig import LineName
 
 NOMINAL = "nominal"
@@ -57,7 +57,7 @@ class Summary:
     reached: tuple[Reached, ...]
 
 
-def summary(records: Iterable[Record], lines: Sequence[LineName], faults: Sequence[str]) -> Summary:
+def summary(records: Iterable[EpisodeRecord], lines: Sequence[LineName], faults: Sequence[str]) -> Summary:
     """Sums up.
 
     Args:
@@ -84,7 +84,7 @@ def summary(records: Iterable[Record], lines: Sequence[LineName], faults: Sequen
     )
 
 
-def _broken(records: Iterable[Record]) -> tuple[Broken, ...]:
+def _broken(records: Iterable[EpisodeRecord]) -> tuple[Broken, ...]:
     episodes: Counter[str] = Counter()
     first: dict[str, tuple[int, str]] = {}
     for record in records:

@@ -21,7 +21,7 @@ from rcsc.diagnostics.codes import Code
 from rcsc.host.children import scratch
 from rcsc.run.description import BadDescription
 from rcsc.run.executors import NotBuilt
-from rcsc_cell.campaign.journal import Record
+from rcsc_cell.campaign.journal import EpisodeRecord
 from rcsc_cell.campaign.rig import Rig, digest, mask
 from rcsc_cell.campaign.shrink import MOST_TRIES, shrink
 from rcsc_cell.database.build import BadData
@@ -60,7 +60,7 @@ class Shrunk:
     log: bytes
 
 
-def play(rig: Rig, wanted: str, seed: int, indices: Sequence[int]) -> tuple[Record, ...]:
+def play(rig: Rig, wanted: str, seed: int, indices: Sequence[int]) -> tuple[EpisodeRecord, ...]:
     """Plays episodes of a campaign, one after the other.
 
     Args:
@@ -82,10 +82,10 @@ def _same(rig: Rig, wanted: str) -> None:
         raise OtherTables("a worker has other tables, data or programs than this campaign")
 
 
-def _record(rig: Rig, index: int, episode: Episode) -> Record:
+def _record(rig: Rig, index: int, episode: Episode) -> EpisodeRecord:
     outcome = attempt(rig, episode)
     lines = mask(outcome.lines, rig.system)
-    return Record(
+    return EpisodeRecord(
         index, fault_classes(episode), outcome.end, outcome.ticks, outcome.findings, lines, outcome.digest
     )
 

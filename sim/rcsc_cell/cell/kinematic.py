@@ -19,7 +19,7 @@ from rcsc_cell.cell.mujoco_model import GAIN_N_M, OPEN_MM, Body
 from rcsc_cell.cell.plant import CYCLE_S, EMPTY_MM, JAWS_MM, Grip, Noise, noise_of, put_noise
 from rcsc_cell.database.ask import Database
 from rcsc_cell.database.pose import Pose, Rotation, Vector, apply, cross, dot, minus, transposed, unit
-from rcsc_cell.vision.flood import Features, Found
+from rcsc_cell.vision.flood import Features, FoundPart
 from rcsc_cell.vision.formulas import Top, perceive, perceive_surface
 from rcsc_cell.vision.line import Surface
 from rcsc_cell.vision.optics import NOISY, STANDARD, Optics
@@ -248,7 +248,7 @@ class Kinematic:
 
     # --- camera ---
 
-    def flood(self, wanted: Features, expected_mm: float) -> Found | None:
+    def flood(self, wanted: Features, expected_mm: float) -> FoundPart | None:
         """What the image processing would say of a flood picture."""
         return perceive(self._tops(), wanted, expected_mm, self._rng, self._optics())
 

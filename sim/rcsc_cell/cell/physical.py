@@ -20,7 +20,7 @@ from rcsc_cell.cell.plant import CYCLE_S, EMPTY_MM, JAWS_MM, Grip, Noise, noise_
 from rcsc_cell.database.ask import Database
 from rcsc_cell.database.pose import Pose, Rotation, Vector
 from rcsc_cell.vision.camera import Camera
-from rcsc_cell.vision.flood import Features, Found, find
+from rcsc_cell.vision.flood import Features, FoundPart, find
 from rcsc_cell.vision.line import Surface, measure
 from rcsc_cell.vision.optics import NOISY, STANDARD, Optics
 
@@ -205,7 +205,7 @@ class Physical:
 
     # --- camera ---
 
-    def flood(self, wanted: Features, expected_mm: float) -> Found | None:
+    def flood(self, wanted: Features, expected_mm: float) -> FoundPart | None:
         """A flood picture, looked at for a part."""
         camera, optics = self._camera()
         return find(camera.flood(self.data, self._rng), wanted, expected_mm, optics)

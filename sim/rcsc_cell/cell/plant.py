@@ -19,7 +19,7 @@ from rcsc_cell.cell.fixture import MachineController, ViseController
 from rcsc_cell.cell.robot import FOLLOW, Robot
 from rcsc_cell.database.ask import Database
 from rcsc_cell.database.pose import Pose, nine
-from rcsc_cell.vision.flood import Features, Found
+from rcsc_cell.vision.flood import Features, FoundPart
 from rcsc_cell.vision.line import Surface
 from rcsc_cell.workstation.orders import MACHINE_ORDER, MACHINE_REPORT, VISE_ORDER, VISE_REPORT
 
@@ -119,7 +119,7 @@ class Mechanism(Protocol):
         """One cycle: the joints go to the goal in equal steps, fingers and jaws to their own."""
         ...
 
-    def flood(self, wanted: Features, expected_mm: float) -> Found | None:
+    def flood(self, wanted: Features, expected_mm: float) -> FoundPart | None:
         """A flood picture, looked at for a part; None where none matches."""
         ...
 
@@ -264,14 +264,14 @@ class Plant:
         flat = surface.normal[2] >= FLAT_COS and not self.faults.tilted
         return (True, 0.0, 0.0, 1.0, 0.0, min(RANGE_MM, surface.range_mm), flat)
 
-    def _found(self, wanted: int, expected_mm: float) -> Found | None:
+    def _found(self, wanted: int, expected_mm: float) -> FoundPart | None:
         """Where the camera sees the part; None where it sees none, or where none can be looked for."""
         size = self.database.sizes.get(wanted)
         if size is None or min(size) <= 0.0:
             return None
         return self.mechanism.flood(Features(size[0], size[1]), expected_mm)
 
-    def _in_hand(self, found: Found) -> tuple[float, float, float, float, float]:
+    def _in_hand(self, found: FoundPart) -> tuple[float, float, float, float, float]:
         """From camera coordinates to the hand's: along the plate's x, to the left of it, and a turn about the vertical.
 
         By that turn the plate's x comes to lie along the part's long side. The camera's picture has the plate's y to the right and

@@ -8,9 +8,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from rcsc.run.signature import Leaf, Value, Values
-from rcsc_cell.workstation.interlocks import Cell, after
+from rcsc_cell.workstation.interlocks import CellState, after
 from rcsc_cell.workstation.orders import NUMBERS, Latest
-from rcsc_cell.workstation.script import Row, RowEnd
+from rcsc_cell.workstation.script import RowEnd, ScriptRow
 from rcsc_cell.workstation.station import Workstation
 
 ORDER, REPORT = "workstation.order", "task.report"
@@ -28,11 +28,11 @@ class Operator:
     """
 
     station: Workstation
-    changes: list[tuple[int, Row]]
+    changes: list[tuple[int, ScriptRow]]
     ends: list[RowEnd] = field(default_factory=list)
     sent: Values = ()
     given: int = 0
-    _row: Row | None = None
+    _row: ScriptRow | None = None
     _since: int = 0
     _known: int = 0
     _alone: bool = False  # the station has ended or was given up
@@ -76,7 +76,7 @@ class Operator:
 
     # --- the other command ---
 
-    def _change(self, tick: int, row: Row, latest: Latest) -> None:
+    def _change(self, tick: int, row: ScriptRow, latest: Latest) -> None:
         self._leave(tick)
         number = int(self.sent[_number_at(self.station.order)]) if self.sent else _echoed(latest)
         self.sent = order(self.station, row, (number + 1) % NUMBERS)
@@ -91,7 +91,7 @@ class Operator:
             row, self._cut = self.station.rows[self.station.at], True
             self.ends.append(RowEnd(row.number, row.text, "changed", "", tick - self._first))
 
-    def _wait(self, tick: int, row: Row, latest: Latest) -> None:
+    def _wait(self, tick: int, row: ScriptRow, latest: Latest) -> None:
         report = latest(REPORT)
         words = {_last(leaf): leaf for leaf in self.station.report}
         places = {_last(leaf): at for at, leaf in enumerate(self.station.report)}
@@ -107,7 +107,7 @@ class Operator:
         holds = words["status_parameter"].shown(report[places["status_parameter"]])
         self._resume(tick, row, status, "" if holds == "null_obj" else holds)
 
-    def _resume(self, tick: int, row: Row, status: str, holds: str) -> None:
+    def _resume(self, tick: int, row: ScriptRow, status: str, holds: str) -> None:
         """The script goes on behind the row that was changed; what the station believes of the hand is what TASK says of it."""
         if self._alone or self.station.over or status != "done":
             self._alone = True
@@ -122,12 +122,12 @@ class Operator:
         self._known, self._first, self._cut = 0, tick, False
 
 
-def replace_rows(station: Workstation, rows: tuple[Row, ...], cell: Cell) -> Workstation:
+def replace_rows(station: Workstation, rows: tuple[ScriptRow, ...], cell: CellState) -> Workstation:
     """A workstation that has sent nothing yet, and believes this of the cell."""
     return Workstation(rows, station.locations, station.order, station.report, cell)
 
 
-def order(station: Workstation, row: Row, number: int) -> Values:
+def order(station: Workstation, row: ScriptRow, number: int) -> Values:
     """A row as TASK's order.
 
     Raises:

@@ -19,7 +19,7 @@ from rcsc_cell.database.pose import about_z
 from rcsc_cell.episodes.episode import Episode, Interruption, PartSpec, script
 from rcsc_cell.episodes.operator import Operator, order
 from rcsc_cell.workstation.prepared import database_of, needs_cell
-from rcsc_cell.workstation.script import BadScript, Row, read_script
+from rcsc_cell.workstation.script import BadScript, ScriptRow, read_script
 from rcsc_cell.workstation.station import workstation
 
 
@@ -45,7 +45,7 @@ def _ready(
 
 
 @lru_cache(maxsize=1024)
-def rows_of(rows: tuple[str, ...]) -> tuple[Row, ...]:
+def rows_of(rows: tuple[str, ...]) -> tuple[ScriptRow, ...]:
     """Rows of a script.
 
     Raises:
@@ -70,7 +70,7 @@ def operator_of(episode: Episode, database: Database, task: Signature) -> Operat
     return operator
 
 
-def commands(changes: Iterable[Interruption], operator: Operator) -> list[tuple[int, Row]]:
+def commands(changes: Iterable[Interruption], operator: Operator) -> list[tuple[int, ScriptRow]]:
     """Ticks and rows; a row that TASK cannot be told is refused now."""
     found = []
     for one in sorted(changes, key=lambda change: change.tick):

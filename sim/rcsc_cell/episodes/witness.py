@@ -19,7 +19,7 @@ from rcsc_cell.cell.plant import Latest, Plant
 from rcsc_cell.database.ask import Database
 from rcsc_cell.database.build import depth_mm
 from rcsc_cell.database.pose import Vector, minus, pose_of
-from rcsc_cell.pictures.report import Figure, Frame, Matched, Placement, Row, Story
+from rcsc_cell.pictures.report import Figure, Frame, Matched, Placement, ReportRow, Story
 from rcsc_cell.pictures.solid import solid
 from rcsc_cell.pictures.stick import Scene, pads, stick
 from rcsc_cell.pictures.things import outline
@@ -198,7 +198,8 @@ class Witness:
         station, system = self.run.station, self.run.system
         ticks, cycle_s = system.tick, 0.001 * system.description.tick_ms
         rows = [
-            Row(one.row.number, one.row.text, one.state, one.ticks, one.reason) for one in station.results
+            ReportRow(one.row.number, one.row.text, one.state, one.ticks, one.reason)
+            for one in station.results
         ]
         return Story(
             title,

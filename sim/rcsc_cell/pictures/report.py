@@ -15,7 +15,7 @@ from rcsc_cell.pictures.plot import plot
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class ReportRow:
     """A row of the script: `state` is `done`, `failed`, `refused` or what else became of it; `reason` may be empty."""
 
     number: int
@@ -80,7 +80,7 @@ class Story:
     """
 
     title: str
-    rows: Sequence[Row] = ()
+    rows: Sequence[ReportRow] = ()
     frames: Sequence[Frame] = ()
     series: Mapping[str, Sequence[tuple[float, float]]] = field(default_factory=dict)
     matched: Sequence[Matched] = ()

@@ -66,7 +66,7 @@ class _Plate:
 
 
 @dataclass(frozen=True, slots=True)
-class Cell:
+class DrawnCell:
     """A cell to be drawn.
 
     Attributes:
@@ -249,7 +249,7 @@ _ASKED = _OF_PARTS | {"place", "route", "point"}
 """Questions whose answers stand somewhere in the cell."""
 
 
-def cell(log: Log, system: Description, database: Database) -> Cell:
+def cell(log: Log, system: Description, database: Database) -> DrawnCell:
     """The cell of a log.
 
     Raises:
@@ -258,7 +258,7 @@ def cell(log: Log, system: Description, database: Database) -> Cell:
     rest = home(database)
     if rest is None:
         raise BadData(("the robot cannot be at its home",))
-    return Cell(log, system, database, system.database.name, rest)
+    return DrawnCell(log, system, database, system.database.name, rest)
 
 
 def same_system(log: Log, system: Description) -> bool:

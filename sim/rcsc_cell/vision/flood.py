@@ -49,7 +49,7 @@ class Shape:
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class FoundPart:
     """What FLOOD-FLASH says of the part.
 
     Attributes:
@@ -69,7 +69,7 @@ class Found:
 
 def find(
     image: FloodImage, wanted: Features, expected_range_mm: float, optics: Optics = STANDARD
-) -> Found | None:
+) -> FoundPart | None:
     """The part that matches best and, of those alike, is nearest to the middle of the picture; None if none matches.
 
     Raises:
@@ -105,7 +105,7 @@ def shape(blob: Blob, expected_range_mm: float, optics: Optics) -> Shape:
     )
 
 
-def choose(shapes: Iterable[Shape], wanted: Features, expected_range_mm: float) -> Found | None:
+def choose(shapes: Iterable[Shape], wanted: Features, expected_range_mm: float) -> FoundPart | None:
     """The matching of section 5.1.
 
     Raises:
@@ -122,7 +122,7 @@ def choose(shapes: Iterable[Shape], wanted: Features, expected_range_mm: float) 
     _, score, best = min(alike, key=lambda one: one[:2])
     size_mm2 = wanted.length_mm * wanted.width_mm
     range_mm = expected_range_mm * sqrt(size_mm2 / best.area_mm2)
-    return Found(best.x_mm, best.y_mm, best.roll_rad, range_mm, score)
+    return FoundPart(best.x_mm, best.y_mm, best.roll_rad, range_mm, score)
 
 
 def mismatch(seen: Shape, wanted: Features) -> float:

@@ -11,7 +11,7 @@ from math import cos, hypot, pi, sin, sqrt
 import numpy as np
 
 from rcsc_cell.vision.blobs import half_turn
-from rcsc_cell.vision.flood import Features, Found, Shape, choose
+from rcsc_cell.vision.flood import Features, FoundPart, Shape, choose
 from rcsc_cell.vision.line import LEAST_POINTS, Surface, surface
 from rcsc_cell.vision.optics import STANDARD, Floats, Optics
 
@@ -58,7 +58,7 @@ def perceive(
     expected_range_mm: float,
     rng: np.random.Generator,
     optics: Optics = STANDARD,
-) -> Found | None:
+) -> FoundPart | None:
     """What FLOOD-FLASH says when these tops are there, each facing the camera.
 
     Raises:

@@ -5,7 +5,7 @@ In: the cell as the workstation knows it, and a row. Out: why the row must not b
 
 from dataclasses import dataclass, replace
 
-from rcsc_cell.workstation.script import Row
+from rcsc_cell.workstation.script import ScriptRow
 
 FIXTURE = ("FIX-MAC1", "FIX-MAC5")
 """Locations at which a part lies in the fixture."""
@@ -15,7 +15,7 @@ CLEAR_OF_MACHINE = ("FIX-SAFE", "WS-SAFE", "BUFFER-SAFE", "V-BLK2")
 
 
 @dataclass(frozen=True, slots=True)
-class Cell:
+class CellState:
     """What the workstation knows: the jaws, what is in the fixture and in the hand, and where the robot ended."""
 
     right_open: bool = True
@@ -25,7 +25,7 @@ class Cell:
     robot_at: str = ""
 
 
-def refusal(cell: Cell, row: Row) -> str:
+def refusal(cell: CellState, row: ScriptRow) -> str:
     """Why the row must not be done now; empty when it may."""
     if row.machine:
         return _machine(cell)
@@ -34,7 +34,7 @@ def refusal(cell: Cell, row: Row) -> str:
     return _robot(cell, row)
 
 
-def _machine(cell: Cell) -> str:
+def _machine(cell: CellState) -> str:
     if not cell.fixture:
         return "there is no part in the fixture"
     if cell.right_open or cell.left_open:
@@ -44,7 +44,7 @@ def _machine(cell: Cell) -> str:
     return ""
 
 
-def _vise(cell: Cell, row: Row) -> str:
+def _vise(cell: CellState, row: ScriptRow) -> str:
     opens = [jaw for jaw, opened in row.vise.items() if opened]
     loose = cell.fixture and not (cell.robot_at in FIXTURE and cell.held) and cell.robot_at not in PRESSED
     if opens and loose:
@@ -52,7 +52,7 @@ def _vise(cell: Cell, row: Row) -> str:
     return ""
 
 
-def _robot(cell: Cell, row: Row) -> str:
+def _robot(cell: CellState, row: ScriptRow) -> str:
     brings = row.dest in FIXTURE and bool(cell.held or row.source)
     if brings and cell.fixture:
         return "the fixture is full"
@@ -71,7 +71,7 @@ def _robot(cell: Cell, row: Row) -> str:
     return ""
 
 
-def after(cell: Cell, row: Row) -> Cell:
+def after(cell: CellState, row: ScriptRow) -> CellState:
     """The cell when the row is done."""
     if row.vise:
         return replace(

@@ -13,7 +13,7 @@ from rcsc.run.signature import Leaf, Signature
 from rcsc.run.system import Kind, Outside, System, assemble, signatures
 from rcsc_cell.database.ask import Database, fresh, open_database
 from rcsc_cell.database.build import Limit, build, digest
-from rcsc_cell.workstation.script import ROBOT, Row, read_script
+from rcsc_cell.workstation.script import ROBOT, ScriptRow, read_script
 from rcsc_cell.workstation.station import Result, Workstation, workstation
 
 MOST_TICKS = 100_000
@@ -187,7 +187,7 @@ def safe_places(database: Database) -> dict[str, str]:
 
 def prepare(
     path: Path,
-    rows: tuple[Row, ...] | str,
+    rows: tuple[ScriptRow, ...] | str,
     kind: Kind,
     outside: Callable[[Database], Iterable[Outside]],
     database: Path | None = None,

@@ -8,8 +8,8 @@ that lets go of nothing (tables/task).
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-from rcsc_cell.workstation.interlocks import FIXTURE, Cell
-from rcsc_cell.workstation.script import Row
+from rcsc_cell.workstation.interlocks import FIXTURE, CellState
+from rcsc_cell.workstation.script import ScriptRow
 
 PUTS = ("release", "transfer", "clear")
 NOTHING = "null_obj"
@@ -31,9 +31,9 @@ class Progress:
     tried: bool = False
     taken: bool = False
     put: bool = False
-    before: Cell = field(default_factory=Cell)
+    before: CellState = field(default_factory=CellState)
 
-    def begin(self, cell: Cell) -> None:
+    def begin(self, cell: CellState) -> None:
         """The row is tried, for the first time or again."""
         if not self.tried:
             self.tried, self.before = True, cell
@@ -42,13 +42,13 @@ class Progress:
         """TASK says what is in the gripper."""
         self.taken = self.taken or in_gripper != NOTHING
 
-    def failed(self, row: Row, in_gripper: str, failure: str) -> None:
+    def failed(self, row: ScriptRow, in_gripper: str, failure: str) -> None:
         """TASK has given up."""
         lets_go = row.robot in PUTS and in_gripper == NOTHING
         self.put = self.put or (self.taken and lets_go and failure == MOVE_FAILED)
 
 
-def stands(row: Row, progress: Progress, in_gripper: str, cell: Cell) -> Cell:
+def stands(row: ScriptRow, progress: Progress, in_gripper: str, cell: CellState) -> CellState:
     """The cell after a try that failed: what the gripper holds by TASK's word, and a part in the fixture that was put there."""
     held = "" if in_gripper == NOTHING else in_gripper
     fixture = cell.fixture
@@ -57,12 +57,12 @@ def stands(row: Row, progress: Progress, in_gripper: str, cell: Cell) -> Cell:
     return replace(cell, held=held, fixture=fixture)
 
 
-def _put_at(row: Row, progress: Progress) -> str:
+def _put_at(row: ScriptRow, progress: Progress) -> str:
     """Where the row lets go of a part: at its destination, or where the robot was when it began."""
     return row.dest or progress.before.robot_at
 
 
-def rest(row: Row, progress: Progress, in_gripper: str, safe: Mapping[str, str]) -> Row:
+def rest(row: ScriptRow, progress: Progress, in_gripper: str, safe: Mapping[str, str]) -> ScriptRow:
     """What is to be sent.
 
     Args:
@@ -75,7 +75,7 @@ def rest(row: Row, progress: Progress, in_gripper: str, safe: Mapping[str, str])
         return row
     if progress.put:
         put_at = _put_at(row, progress)
-        return Row(row.number, row.text, "move", dest=row.end_at or safe.get(put_at, put_at))
+        return ScriptRow(row.number, row.text, "move", dest=row.end_at or safe.get(put_at, put_at))
     if row.source and row.dest and in_gripper == row.part:
         return replace(row, source="")
     return row

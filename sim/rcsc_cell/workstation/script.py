@@ -27,7 +27,7 @@ class BadScript(CodedError):  # noqa: N818  # what happened, not an error of our
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class ScriptRow:
     """One command.
 
     Attributes:
@@ -50,7 +50,7 @@ class Row:
     sector: int = 0
 
 
-def read_script(path: Path) -> tuple[Row, ...]:
+def read_script(path: Path) -> tuple[ScriptRow, ...]:
     """The rows of a script.
 
     Raises:
@@ -73,18 +73,18 @@ def read_script(path: Path) -> tuple[Row, ...]:
     return tuple(rows)
 
 
-def _row(number: int, line: Mapping[str, str]) -> Row:
+def _row(number: int, line: Mapping[str, str]) -> ScriptRow:
     text = " ".join(line[key] for key in COLUMNS if line[key])
     command = line["command"]
     if command.startswith("VISE-"):
-        return Row(number, text, vise=_jaws(command.removeprefix("VISE-")))
+        return ScriptRow(number, text, vise=_jaws(command.removeprefix("VISE-")))
     if command in MACHINE:
-        return Row(number, text, machine=command)
+        return ScriptRow(number, text, machine=command)
     if command.lower() not in ROBOT:
         raise ValueError(f"`{command}` is no command of the workstation")
     part, grasp = _part(line["part"])
     (source, a), (dest, b), (end_at, c) = (_place(line[key]) for key in ("source", "dest", "end_at"))
-    return Row(number, text, command.lower(), {}, "", part, grasp, source, dest, end_at, max(a, b, c))
+    return ScriptRow(number, text, command.lower(), {}, "", part, grasp, source, dest, end_at, max(a, b, c))
 
 
 def _jaws(text: str) -> dict[str, bool]:

@@ -9,7 +9,7 @@ from typing import Any, Literal, cast
 
 from rcsc.host.files.plain import plain, read
 from rcsc.run.signature import Leaf, Signature, Value, Values
-from rcsc_cell.workstation.interlocks import Cell, after, refusal
+from rcsc_cell.workstation.interlocks import CellState, after, refusal
 from rcsc_cell.workstation.orders import (
     CLOSED_MM,
     DONE,
@@ -23,7 +23,7 @@ from rcsc_cell.workstation.orders import (
     ajar,
 )
 from rcsc_cell.workstation.rest import NOTHING, Progress, rest, stands
-from rcsc_cell.workstation.script import MACHINE, ROBOT, BadScript, Row
+from rcsc_cell.workstation.script import MACHINE, ROBOT, BadScript, ScriptRow
 
 ANSWER_TICKS = 75
 """Within which the vise and the machine have repeated an order's number, and the vise has ended: 3 s; it gives up after two."""
@@ -44,7 +44,7 @@ RUNNING: Now = ("running", "")
 class Result:
     """What became of a row."""
 
-    row: Row
+    row: ScriptRow
     state: State
     reason: str
     first_tick: int
@@ -56,7 +56,7 @@ class _State:
     """What a stopped workstation goes on from; its orders stand in their buffers."""
 
     at: int
-    cell: Cell
+    cell: CellState
     progress: Progress
     trouble: str
 
@@ -75,11 +75,11 @@ class Workstation:
         safe: The safe location of each that has one.
     """
 
-    rows: tuple[Row, ...]
+    rows: tuple[ScriptRow, ...]
     locations: Mapping[str, int]
     order: tuple[Leaf, ...]
     report: tuple[Leaf, ...]
-    cell: Cell = field(default_factory=Cell)
+    cell: CellState = field(default_factory=CellState)
     at: int = 0
     results: list[Result] = field(default_factory=list)
     trouble: str = ""
@@ -167,7 +167,7 @@ class Workstation:
     # --- the row under way ---
 
     @property
-    def _before(self) -> Cell:
+    def _before(self) -> CellState:
         """The cell as it was before the first try of the row under way: `after` is told of whole rows only."""
         return self.progress.before if self.progress.tried else self.cell
 
@@ -180,7 +180,7 @@ class Workstation:
         if state != "running":
             self._end(row, tick, state, why)
 
-    def _begin(self, row: Row, tick: int, latest: Latest) -> None:
+    def _begin(self, row: ScriptRow, tick: int, latest: Latest) -> None:
         self._since = tick
         if self.trouble:
             self._end(row, tick, "failed", self.trouble)
@@ -197,20 +197,20 @@ class Workstation:
             self.progress.begin(self.cell)
             self._tell(left.robot, left)
 
-    def _left(self, row: Row, latest: Latest) -> Row:
+    def _left(self, row: ScriptRow, latest: Latest) -> ScriptRow:
         """What is to be done of a row for TASK: all of it, or the rest."""
         report = latest(self._task.report)
         held = NOTHING if report is None else self._word(report, IN_GRIPPER)
         return rest(row, self.progress, held, self.safe)
 
-    def _end(self, row: Row, tick: int, state: State, reason: str) -> None:
+    def _end(self, row: ScriptRow, tick: int, state: State, reason: str) -> None:
         self.results.append(Result(row, state, reason, self._since, tick - self._since))
         if state == "done":
             self.cell = after(self._before, row)
             self.at += 1
             self._since, self.progress = -1, Progress()
         elif state == "failed":
-            self._tell("pause", Row(row.number, "PAUSE", "pause"))
+            self._tell("pause", ScriptRow(row.number, "PAUSE", "pause"))
             self._paused = tick
 
     def _await_pause(self, tick: int, latest: Latest) -> None:
@@ -226,14 +226,14 @@ class Workstation:
 
     # --- how it stands ---
 
-    def _now(self, row: Row, ticks: int, latest: Latest) -> Now:
+    def _now(self, row: ScriptRow, ticks: int, latest: Latest) -> Now:
         if row.vise:
             return self._vise_now(row, ticks, latest)
         if row.machine:
             return self._machine_now(ticks, latest)
         return self._task_now(row, latest)
 
-    def _task_now(self, row: Row, latest: Latest) -> Now:
+    def _task_now(self, row: ScriptRow, latest: Latest) -> Now:
         report = self._task.answer(latest)
         if report is None:
             return RUNNING
@@ -250,7 +250,7 @@ class Workstation:
             case _:
                 return RUNNING
 
-    def _vise_now(self, row: Row, ticks: int, latest: Latest) -> Now:
+    def _vise_now(self, row: ScriptRow, ticks: int, latest: Latest) -> Now:
         right_open, left_open = self._jaws(row)
         report = self._vise.answer(latest)
         if report is not None and report[1] == FAILED:
@@ -267,11 +267,11 @@ class Workstation:
 
     # --- what is sent ---
 
-    def _jaws(self, row: Row) -> tuple[bool, bool]:
+    def _jaws(self, row: ScriptRow) -> tuple[bool, bool]:
         """How the right and the left jaw are to stand; one that the row does not name stays as it is."""
         return row.vise.get("right", self.cell.right_open), row.vise.get("left", self.cell.left_open)
 
-    def _tell(self, command: str, row: Row) -> None:
+    def _tell(self, command: str, row: ScriptRow) -> None:
         said: dict[str, Value | str] = {
             "input_command": command,
             "obj": row.part or "null_obj",
@@ -289,7 +289,7 @@ class Workstation:
 
 
 def workstation(
-    rows: Sequence[Row],
+    rows: Sequence[ScriptRow],
     locations: Mapping[str, int],
     task: Signature,
     safe: Mapping[str, str] | None = None,

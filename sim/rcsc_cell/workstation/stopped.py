@@ -25,7 +25,7 @@ from rcsc.run.signature import generated_files
 from rcsc.run.system import Outside
 from rcsc_cell.workstation.orders import BETWEEN, KINDS
 from rcsc_cell.workstation.prepared import Run
-from rcsc_cell.workstation.script import Row
+from rcsc_cell.workstation.script import ScriptRow
 from rcsc_cell.workstation.station import Workstation
 
 FORM = 1
@@ -118,7 +118,7 @@ def go_on(run: Run) -> None:
         raise NotResumed(Code.BAD_SYSTEM, f"the stopped run is of another cell: {error}") from error
 
 
-def rows_digest(rows: Sequence[Row]) -> str:
+def rows_digest(rows: Sequence[ScriptRow]) -> str:
     """Changes with what a script says, not with how it is spelled."""
     return _digest(_text([asdict(row) for row in rows]))
 
