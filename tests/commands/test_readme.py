@@ -29,7 +29,7 @@ TINY = {
     "rcsc test my_robot": "rcsc test --examples 2 --mutants 1 --no-cortex my_robot",
     "rcsc prove tables/system.toml": "rcsc prove --level gripper tables/system.toml",
     "published/system.toml": "published/system.toml --trace 0 --steps 1",
-    "--without-deferral tables/system.toml": "--without-deferral tables/system.toml --trace 0 --steps 1",
+    "--level task --without-deferral tables/system.toml": "--without-deferral --trace 0 tests/data/composed/system.toml",
     "tests.differential --count 100000": "tests.differential --count 2",
     "--count 10000": "--count 1",
     "--runs 10000": "--runs 3",
