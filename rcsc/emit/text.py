@@ -218,5 +218,5 @@ class PyText(Text):
         self.cases += 1
         subject = Name(f"case_{self.cases}")
         let = Set(subject, self.expr(statement.subject))
-        orelse = self.block(statement.orelse) if statement.orelse else None
-        return let, Branch(self.arms(subject, statement), orelse)
+        arms = self.arms(subject, statement)
+        return let, Branch(arms, self.block(statement.orelse) if statement.orelse else None)

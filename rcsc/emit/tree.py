@@ -223,6 +223,9 @@ def read(node: object) -> Iterator[Code]:
 
 # --- spelling ------------------------------------------------------------------------
 
+TIGHTEST = 9
+"""A level above that of every operator."""
+
 
 class Language(ABC):
     """Spells code.
@@ -261,7 +264,7 @@ class Language(ABC):
             case Cast() | Choice() | Items():
                 return self.own(one)
             case Element(of=of, at=at):
-                return f"{self.code(of)}[{self.code(at)}]"
+                return f"{self.operand(of, TIGHTEST)}[{self.code(at)}]"
             case Round(inner=inner):
                 return f"({self.code(inner)})"
             case _:
