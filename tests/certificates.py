@@ -109,9 +109,9 @@ def wrong_with(program: Program) -> str:
 class _Truth:
     def __init__(self, program: Program) -> None:
         self.program = program
-        self.procedures = {str(one.name): one for one in program.procedures}
-        self.types = {str(one.name): one.type for one in program.variables}
-        self.outputs = {str(one.name) for one in program.variables if one.kind is Kind.OUTPUT}
+        self.procedures = {str(procedure.name): procedure for procedure in program.procedures}
+        self.types = {str(variable.name): variable.type for variable in program.variables}
+        self.outputs = {str(variable.name) for variable in program.variables if variable.kind is Kind.OUTPUT}
         self.uncalled = self.procedures.keys() - self.called()
 
     def all(self) -> None:
@@ -122,13 +122,17 @@ class _Truth:
         self.owe(self.kept(first), "an invariant at first")
         states = [dict(zip(self.types, at, strict=True)) for at in product(*map(values, self.types.values()))]
         for state in states:
-            for one in self.program.invariants:
-                self.value(one.condition, state, {})
+            for invariant in self.program.invariants:
+                self.value(invariant.condition, state, {})
             self.alone(state)
             if self.kept(state):
                 self.cycle(state)
         for table in self.program.tables:
-            assumed = [one.condition for one in self.program.assumptions if one.name in table.assumptions]
+            assumed = [
+                assumption.condition
+                for assumption in self.program.assumptions
+                if assumption.name in table.assumptions
+            ]
             fine = (state for state in states if self.kept(state))
             self.owe(
                 any(all(self.value(c, state, {}) for c in assumed) for state in fine),
@@ -140,7 +144,7 @@ class _Truth:
             raise WrongError(what)
 
     def kept(self, state: dict[str, Value]) -> bool:
-        return all(self.value(one.condition, state, {}) for one in self.program.invariants)
+        return all(self.value(invariant.condition, state, {}) for invariant in self.program.invariants)
 
     def cycle(self, state: dict[str, Value]) -> None:
         """Every step that a cycle may take here."""
@@ -168,7 +172,7 @@ class _Truth:
             self.table(table, state)
 
     def table(self, table: Table, state: dict[str, Value]) -> None:
-        conditions = {str(one.name): one.condition for one in self.program.assumptions}
+        conditions = {str(assumption.name): assumption.condition for assumption in self.program.assumptions}
         if not all(self.value(conditions[name], state, {}) for name in table.stops):
             return
         matching = [
@@ -359,14 +363,14 @@ class _Text:
         invariants = self.invariants()
         assumptions = self.assumptions()
         lines += [*invariants, *assumptions, *self.module()]
-        lines += self.table([one.split()[1] for one in assumptions])
+        lines += self.table([assumption.split()[1] for assumption in assumptions])
         if rng.random() < 0.4:
             free = [name for name in self.procedures if "(" not in name]
             picked = [
                 f"  {word} {', '.join(rng.sample(free, 1))}" for word in ("preprocess", "postprocess") if free
             ]
             parts = [picked[0]] if picked and rng.random() < 0.6 else picked
-            order = [one for one in parts if "pre" in one], [one for one in parts if "post" in one]
+            order = [part for part in parts if "pre" in part], [part for part in parts if "post" in part]
             lines += ["level top {", "  period 10 [ms]", *order[0], "  table work", *order[1], "}"]
         return "\n".join(lines) + "\n"
 
@@ -455,7 +459,7 @@ class _Text:
                 cells.append(cell)
                 continue
             column = rng.choice(open_)
-            cells += [{**cell, column: one} for one in self.halves(column)]
+            cells += [{**cell, column: half} for half in self.halves(column)]
         if rng.random() < 0.05 and len(cells) > 1:
             cells.pop()
         used = [column for column in columns if any(column in cell for cell in cells)]
@@ -514,8 +518,8 @@ def small(program: object) -> Program | None:
     if not isinstance(program, Program):
         return None
     states = 1
-    for one in program.variables:
-        low, high = key_bounds(one.type)
+    for variable in program.variables:
+        low, high = key_bounds(variable.type)
         states *= high - low + 1
     return program if states <= MOST_STATES else None
 
@@ -574,7 +578,7 @@ def stopping(program: Program, certificate: dict[str, Any]) -> Program:
     for entry in entries if isinstance(entries, list) else ():
         if isinstance(entry, dict) and isinstance(entry.get("stops"), list):
             claimed[str(entry.get("table"))] = tuple(AssumptionName(str(name)) for name in entry["stops"])
-    tables = (replace(one, stops=claimed.get(str(one.name), ())) for one in program.tables)
+    tables = (replace(table, stops=claimed.get(str(table.name), ())) for table in program.tables)
     return replace(program, tables=tuple(tables))
 
 

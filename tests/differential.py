@@ -509,8 +509,8 @@ class Maker:
         doings = [one for _, one in pairs]
 
         def run(s: State, v: Locals) -> None:
-            for one in doings:
-                one(s, v)
+            for doing in doings:
+                doing(s, v)
 
         return " ".join(text for text, _ in pairs), run
 
@@ -606,8 +606,8 @@ class Maker:
         """A call of a procedure that is already there."""
         name, kinds, body = self.made.procedures[number]
         args = [self.of_kind(kind, 2) for kind in kinds]
-        text = f"{name}({', '.join(one.text for one in args)})" if args else name
-        return text, lambda s, v: body(s, [kept(one.of(s, v)) for one in args])
+        text = f"{name}({', '.join(arg.text for arg in args)})" if args else name
+        return text, lambda s, v: body(s, [kept(arg.of(s, v)) for arg in args])
 
     def procedure(self) -> None:
         """A procedure with parameters."""
@@ -710,7 +710,7 @@ class Maker:
             Kind("enum", name, 0, size - 1, tuple(self.name("m") for _ in range(size)))
             for name, size in sizes
         )
-        made.text += [f"enum {one.text} {{ {', '.join(one.members)} }}" for one in self.enums]
+        made.text += [f"enum {enum.text} {{ {', '.join(enum.members)} }}" for enum in self.enums]
         for word, count in (("input", 3), ("state", 3), ("output", 1)):
             for _ in range(rng.randint(1, count)):
                 self.declare(word)
@@ -972,12 +972,12 @@ def driver_c(one: Built) -> Iterator[str]:
 def library(programs: Sequence[Built], folder: Path, *flags: str, cc: str = "cc") -> ctypes.CDLL:
     """The C of several programs and their drivers in one shared library."""
     texts = ["#include <stdint.h>\n#include <stdbool.h>\n#include <string.h>\n"]
-    for one in programs:
-        for path, text in one.files.items():
+    for program in programs:
+        for path, text in program.files.items():
             if path.endswith(".h"):
                 (folder / Path(path).name).write_text(text)
-        texts += [text for path, text in one.files.items() if path.endswith(".c")]
-        texts += driver_c(one)
+        texts += [text for path, text in program.files.items() if path.endswith(".c")]
+        texts += driver_c(program)
     (folder / "all.c").write_text("\n".join(texts))
     subprocess.run([cc, *FLAGS, *flags, "all.c", "-o", "all.so"], cwd=folder, check=True)
     return ctypes.CDLL(str(folder / "all.so"))

@@ -185,7 +185,7 @@ def standing(ts: TransitionSystem, proof: LevelProof, needed: frozenset[str]) ->
         for obligation in proof.open
         if obligation.sort is not Sort.NUMBERED or obligation.name in needed
     )
-    endless = frozenset(f"{one.table}: the command ends" for one in proof.endings if not one.proved)
+    endless = frozenset(f"{ending.table}: the command ends" for ending in proof.endings if not ending.proved)
     seen = proof.context.unreached if proof.context is not None else ()
     unreached = frozenset(f"{table}: line {line} is reached" for table, line in seen)
     return Standing(left | endless | unreached, repr(ts.links), needed)

@@ -167,7 +167,7 @@ def _known(made: Hierarchy, name: str, made_systems: dict[str, TransitionSystem]
             truth = None
         proof = prove_level(ts, LITTLE)
         every = edges(role, seen) if truth is not None and proof.endings else []
-        forever = {one.table: endless(every, one.table, one.still) for one in proof.endings}
+        forever = {ending.table: endless(every, ending.table, ending.still) for ending in proof.endings}
         found = tuple(
             (replace(obligation, holds=TRUE), verdict) for obligation, verdict in proof.found
         )  # without their many nodes
@@ -372,12 +372,12 @@ def judged_seed(seed: int) -> Judged:
 def smaller(seed: int) -> tuple[Hierarchy, Judged]:
     """The hierarchy of a seed with only those slips without which it would not disagree."""
     made, found = furnished(seed), judged(furnished(seed), seed, traces=99)
-    sought = {(one.what, one.level) for one in found.disagreements}
+    sought = {(disagreement.what, disagreement.level) for disagreement in found.disagreements}
     skipped: frozenset[int] = frozenset()
     for number in range(SLIPS):
         other = furnished(seed, skipped | {number})
         again = judged(other, seed, traces=99)
-        if sought & {(one.what, one.level) for one in again.disagreements}:
+        if sought & {(disagreement.what, disagreement.level) for disagreement in again.disagreements}:
             made, found, skipped = other, again, skipped | {number}
     return made, found
 

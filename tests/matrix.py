@@ -197,7 +197,7 @@ def findings(bug: Bug, folder: Path) -> tuple[bool, tuple[Finding, ...]]:
     while (
         not loop.over
         and loop.system.tick < MOST_TICKS
-        and all(one.property != bug.property for one in loop.findings)
+        and all(finding.property != bug.property for finding in loop.findings)
     ):
         loop.step()
     return proved, tuple(loop.findings)

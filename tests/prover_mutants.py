@@ -413,7 +413,7 @@ def _tell(told: Mapping[Mutant, str]) -> int:
         print(f"{module:34}{row}")
     known = _reasons()
     reasons = [known.get(mutant.change, "") for mutant, state in told.items() if state != CAUGHT]
-    equal, unsaid = sum(one.startswith("equivalent") for one in reasons), reasons.count("")
+    equal, unsaid = sum(reason.startswith("equivalent") for reason in reasons), reasons.count("")
     caught = len(told) - len(reasons)
     share = caught / max(1, len(told) - equal)
     print(

@@ -24,7 +24,9 @@ def test_a_room_teaches_what_is_in_it(room: str) -> None:
     assert module.__file__ is not None
     files = {path.stem for path in Path(module.__file__).parent.glob("*.py")} - {"__init__"}
     named = set(re.findall(r"`(?:\w+/)?(\w+)(?:\.py)?`", module.__doc__))
-    named |= {name.rpartition(".")[2] for name in COMMANDS if room.startswith("rcsc.commands")}  # `group` tells of each
+    named |= {
+        name.rpartition(".")[2] for name in COMMANDS if room.startswith("rcsc.commands")
+    }  # `group` tells of each
     assert not files - named, "modules that the room does not name"
     lines = len(module.__doc__.splitlines())
     assert (4 if ".compose" in room else 14) <= lines <= 62, lines

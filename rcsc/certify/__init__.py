@@ -98,7 +98,7 @@ class Certified:
 def check_certificate(program: Program, certificate: Mapping[str, object]) -> tuple[str, ...]:
     """Problems of the certificate, and what it leaves unchecked; none when it shows all that `program` owes."""
     found = certify(program, certificate)
-    return (*found.problems, *(f"not checked: {one.name}" for one in found.unchecked))
+    return (*found.problems, *(f"not checked: {unchecked.name}" for unchecked in found.unchecked))
 
 
 def certify(
@@ -157,7 +157,7 @@ class _Check:
             raise RejectedError("it is of another program")
         self.relying = relying(self.program)
         self.start = Start(self.relying)
-        first = {str(one.name): one.initial for one in program.variables}
+        first = {str(variable.name): variable.initial for variable in program.variables}
         self.settler = Settler(self.start.terms, ask, first)
         self.problems: list[str] = []
         self.checked: dict[str, None] = {}
@@ -188,9 +188,9 @@ class _Check:
         self.checked[f"table `{table.name}`: exactly one line matches"] = None
         for debt in checker.questions:
             self.settle(debt)
-        for one in checker.assumptions:
-            if one.standing is not Standing.PROVED:
-                self.rests[f"assumption `{one.name}` ({one.standing.value})"] = None
+        for assumption in checker.assumptions:
+            if assumption.standing is not Standing.PROVED:
+                self.rests[f"assumption `{assumption.name}` ({assumption.standing.value})"] = None
         for name in table.stops:
             self.rests[f"table `{table.name}`: a cycle in which `{name}` fails is stopped"] = None
         if table.assumptions:
@@ -204,14 +204,15 @@ class _Check:
             if leaf.name in given and not _is_value(leaf.type, given[leaf.name]):
                 raise RejectedError(f"`{leaf.name}` cannot have the value {given[leaf.name]!r}"[:200])
         conditions = [
-            self.start.condition(one.condition)
-            for one in self.relying.assumptions
-            if one.name in table.assumptions
+            self.start.condition(assumption.condition)
+            for assumption in self.relying.assumptions
+            if assumption.name in table.assumptions
         ]
-        invariants = [one.condition for one in self.program.invariants]
+        invariants = [invariant.condition for invariant in self.program.invariants]
         whole = self.start.terms.every((*conditions, *map(self.start.condition, invariants)))
         values = {
-            one: _column(one, given.get(one.name, self.settler.first[one.name])) for one in variables(whole)
+            term: _column(term, given.get(term.name, self.settler.first[term.name]))
+            for term in variables(whole)
         }
         if not values_in(whole, values, 1)[0]:
             raise RejectedError("its assumptions do not hold at the values that are to show that they can")

@@ -107,7 +107,7 @@ class Start:
         self.terms = Terms()
         self.types = {str(v.name): v.type for v in program.variables}
         self.leaves = {name: self.terms.variable(name, kind) for name, kind in self.types.items()}
-        self.procedures = {str(one.name): one for one in program.procedures}
+        self.procedures = {str(procedure.name): procedure for procedure in program.procedures}
         # by identity; the expression is kept, so that its identity is not used again
         self._conditions: dict[int, tuple[Expr, Term]] = {}
 
@@ -187,7 +187,7 @@ class Run:
         found = (
             self.terms.constant(subject.sort, value) for value in values if isinstance(value, int | float)
         )
-        return self.terms.some(self.terms.make("=", subject, one) for one in found)
+        return self.terms.some(self.terms.make("=", subject, term) for term in found)
 
     def _truth(self, true: Pairs, first: Expr, second: Expr) -> Term:
         """The right side is looked at only where the left does not decide."""

@@ -83,8 +83,8 @@ class Known:
             more = self._told(part, yes)
             if more is None:
                 return None
-            for one, span in more.items():
-                told[one] = _meet(told.get(one, FREE), span)
+            for term, span in more.items():
+                told[term] = _meet(told.get(term, FREE), span)
         return told
 
     def _any(self, parts: Iterable[Term], yes: bool) -> Facts | None:
@@ -94,9 +94,9 @@ class Known:
             return None
         first, *others = several
         return {
-            one: (min([span[0], *(other[one][0] for other in others)]), max([span[1], *(other[one][1] for other in others)]))
-            for one, span in first.items()
-            if all(one in other for other in others)
+            term: (min([span[0], *(other[term][0] for other in others)]), max([span[1], *(other[term][1] for other in others)]))
+            for term, span in first.items()
+            if all(term in other for other in others)
         }  # fmt: skip
 
     def _compared(self, term: Term, yes: bool) -> Iterable[tuple[Term, tuple[Number, Number]]]:

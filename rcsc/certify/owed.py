@@ -73,8 +73,8 @@ class Debts:
     def __init__(self, program: Program, start: Start) -> None:
         self.program, self.start, self.terms = program, start, start.terms
         self.invariants = [
-            (str(one.name), one.condition, frozenset(map(str, read_by(one.condition))))
-            for one in self.program.invariants
+            (str(invariant.name), invariant.condition, frozenset(map(str, read_by(invariant.condition))))
+            for invariant in self.program.invariants
         ]
         self.holding = tuple(start.condition(condition) for _, condition, _ in self.invariants)
 
@@ -93,18 +93,22 @@ class Debts:
 
     def stopping(self, table: Table) -> tuple[Term, ...]:
         """What holds when the table is matched: invariants and the stopping assumptions."""
-        known = (one.condition for one in self.program.assumptions if one.name in table.stops)
+        known = (
+            assumption.condition for assumption in self.program.assumptions if assumption.name in table.stops
+        )
         return (*self.holding, *map(self.start.condition, known))
 
     # --- conditions ---
 
     def _first(self) -> Debt:
         run = Run(self.start, "at first")
-        for one in self.program.variables:
-            self._set(run, one, one.initial)
+        for variable in self.program.variables:
+            self._set(run, variable, variable.initial)
         for name, condition, reads in self.invariants:
             inputs = [
-                one.name for one in self.program.variables if one.kind is Kind.INPUT and one.name in reads
+                variable.name
+                for variable in self.program.variables
+                if variable.kind is Kind.INPUT and variable.name in reads
             ]
             good_ = self.terms.false if inputs else Run.evaluate(_at(run), condition)
             run.owe(f"invariant `{name}` holds", good_)
@@ -116,8 +120,8 @@ class Debts:
         return Debt(tuple(known), tuple(run.owed))
 
     def _conditions(self) -> Iterator[Debt]:
-        for one in self.program.invariants:
-            yield self._defined(one.condition, f"invariant `{one.name}`", (), one.span)
+        for invariant in self.program.invariants:
+            yield self._defined(invariant.condition, f"invariant `{invariant.name}`", (), invariant.span)
         for leaf in self.program.variables:
             if leaf.deferred_until is not None:
                 yield self._defined(
@@ -142,12 +146,16 @@ class Debts:
 
     def _deferred(self) -> Debt:
         """All deferred values whose condition holds are taken at once."""
-        deferred = [one for one in self.program.variables if one.deferred_until is not None]
+        deferred = [variable for variable in self.program.variables if variable.deferred_until is not None]
         run = Run(self.start, "taking deferred values")
         taken = [
-            (one.name, self.start.leaves[pending(one.name)], self.start.condition(one.deferred_until))
-            for one in deferred
-            if one.deferred_until is not None
+            (
+                variable.name,
+                self.start.leaves[pending(variable.name)],
+                self.start.condition(variable.deferred_until),
+            )
+            for variable in deferred
+            if variable.deferred_until is not None
         ]
         for name, value, when in taken:
             run.write(name, value, when)
@@ -157,9 +165,9 @@ class Debts:
     def _safe_values(self) -> Debt:
         """After a fault every output that has a safe value shows it; where the cycle ended, the invariants held."""
         run = Run(self.start, "showing safe values after a fault")
-        for one in self.program.variables:
-            if one.safe is not None:
-                self._set(run, one, one.safe)
+        for variable in self.program.variables:
+            if variable.safe is not None:
+                self._set(run, variable, variable.safe)
         run.keeps(self.invariants)
         return Debt(self.holding, tuple(run.owed))
 
@@ -213,7 +221,7 @@ class Debts:
     def _alone(self, procedure: Procedure) -> Debt:
         run = Run(self.start, f"procedure `{procedure.name}`", procedure.span)
         try:
-            given = [(run.any_value(one.name, one.type), one.span) for one in procedure.params]
+            given = [(run.any_value(param.name, param.type), param.span) for param in procedure.params]
             run.call(procedure, given)
         except (TooLongError, RecursionError):
             return Debt((), (), run.where, procedure.span)
@@ -256,7 +264,7 @@ class Debts:
 
     def _actions(self, run: _Running, actions: Iterable[Action]) -> None:
         """Left to right; an output that two of them write gets one value."""
-        outputs = {str(one.name) for one in self.program.variables if one.kind is Kind.OUTPUT}
+        outputs = {str(variable.name) for variable in self.program.variables if variable.kind is Kind.OUTPUT}
         wrote: dict[str, Term] = {}
         for action in actions:
             before, run.state.wrote = dict(run.state.leaves), {}

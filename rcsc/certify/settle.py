@@ -113,10 +113,10 @@ class Settler:
             if not len(found):
                 return Shown()  # the obligation cannot fail, or the hypotheses cannot hold
             case |= dict(_row(cases, int(found[0])))
-            rest = [one for one in rest if one not in together]
+            rest = [term for term in rest if term not in together]
             if not rest:
                 return Fails(tuple(sorted(case.items())))
-            if any(name in case for one in rest for name in (leaf.name for leaf in variables(one))):
+            if any(name in case for term in rest for name in (leaf.name for leaf in variables(term))):
                 return None  # a hypothesis that ties too much together was left out
             wanted = rest[0]
 
@@ -127,11 +127,15 @@ class Settler:
         picked = random.Random(len(wanted))  # noqa: S311 - the same cases in every run
         edges = _edges(wrong)
         columns = {}
-        for one in wanted:
-            ends = [one.low, one.high, *(edge for edge in edges[one.sort] if one.low <= edge <= one.high)]
-            start = self.first.get(one.name, one.low)
-            columns[one] = _array(
-                one.sort, [start, one.low, one.high, *picked.choices(ends, k=SAMPLES)], wide=True
+        for term in wanted:
+            ends = [
+                term.low,
+                term.high,
+                *(edge for edge in edges[term.sort] if term.low <= edge <= term.high),
+            ]
+            start = self.first.get(term.name, term.low)
+            columns[term] = _array(
+                term.sort, [start, term.low, term.high, *picked.choices(ends, k=SAMPLES)], wide=True
             )
         failing = self._where(wrong, columns)
         return (
@@ -162,13 +166,13 @@ def _tied(wanted: Term, hypotheses: Sequence[Term], known: Known) -> list[Term] 
     growing = True
     while growing:
         growing = False
-        for one in hypotheses:
-            spoken = set(variables(one))
-            if one in used or (spoken and spoken.isdisjoint(leaves)):
+        for hypothesis in hypotheses:
+            spoken = set(variables(hypothesis))
+            if hypothesis in used or (spoken and spoken.isdisjoint(leaves)):
                 continue
-            if _few(leaves | spoken, known, len(parts_first(wanted, *used, one))):
+            if _few(leaves | spoken, known, len(parts_first(wanted, *used, hypothesis))):
                 leaves |= spoken
-                used.append(one)
+                used.append(hypothesis)
                 growing = True
     return used
 
@@ -185,11 +189,11 @@ def _extent(one: Term, known: Known) -> tuple[Number, Number]:
 def _few(wanted: Iterable[Term], known: Known, size: int) -> bool:
     """Whether all cases of the variables can be tried."""
     total = size
-    for one in wanted:
-        low, high = _extent(one, known)
-        if one.sort == REAL and low != high:
+    for term in wanted:
+        low, high = _extent(term, known)
+        if term.sort == REAL and low != high:
             return False
-        total *= 1 if one.sort == REAL else max(0, int(high) - int(low) + 1)
+        total *= 1 if term.sort == REAL else max(0, int(high) - int(low) + 1)
         if total > MOST_WORK:
             return False
     return True
@@ -198,16 +202,16 @@ def _few(wanted: Iterable[Term], known: Known, size: int) -> bool:
 def _crossed(wanted: Sequence[Term], known: Known) -> dict[Term, Any]:
     """Every combination of the variables' values."""
     axes = []
-    for one in wanted:
-        low, high = _extent(one, known)
-        values = [low] if one.sort == REAL else range(int(low), int(high) + 1)
-        axes.append(_array(one.sort, values))
+    for term in wanted:
+        low, high = _extent(term, known)
+        values = [low] if term.sort == REAL else range(int(low), int(high) + 1)
+        axes.append(_array(term.sort, values))
     total = prod(len(axis) for axis in axes)
     if not total:  # a variable that cannot have a value
-        return {one: axis[:0] for one, axis in zip(wanted, axes, strict=True)}
+        return {term: axis[:0] for term, axis in zip(wanted, axes, strict=True)}
     crossed, before = {}, 1
-    for one, axis in zip(wanted, axes, strict=True):
-        crossed[one] = np.tile(np.repeat(axis, total // (before * len(axis))), before)
+    for term, axis in zip(wanted, axes, strict=True):
+        crossed[term] = np.tile(np.repeat(axis, total // (before * len(axis))), before)
         before *= len(axis)
     return crossed
 
@@ -224,7 +228,7 @@ def _array(sort: str, values: Iterable[Number], *, wide: bool = False) -> Any:
 
 def _row(cases: Cases, at: int) -> Iterator[tuple[str, Number]]:
     """One case: values by the names of variables."""
-    return ((one.name, column[at : at + 1].tolist()[0]) for one, column in cases.items())
+    return ((term.name, column[at : at + 1].tolist()[0]) for term, column in cases.items())
 
 
 def _edges(term: Term) -> Mapping[str, list[Number]]:

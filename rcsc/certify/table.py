@@ -195,7 +195,7 @@ class TableChecker:
         self.names = tuple(str(name) for name in entry["assumptions"])
         conditions = {str(a.name): a for a in start.program.assumptions if a.name in table.assumptions}
         self.assumptions = [conditions[name] for name in self.names]
-        self.assumed = [self.terms.formula(one.condition) for one in self.assumptions]
+        self.assumed = [self.terms.formula(assumption.condition) for assumption in self.assumptions]
         columns = [str(name) for name in entry["columns"]]
         self.forms = [self.read_form([(columns[c], k) for c, k in form]) for form in entry["forms"]]
         self.tree: list[list[Any]] = list(entry["tree"])
@@ -359,7 +359,7 @@ class TableChecker:
         good = [terms.negation(terms.every(pair)) for pair in combinations(lines, 2)]
         if self.cover:
             good.append(terms.some(lines))
-        known = [*(condition(one.condition) for one in self.assumptions)]
+        known = [*(condition(assumption.condition) for assumption in self.assumptions)]
         for form, (low, high) in bounds.items():
             known += self.within_bounds(form, low, high)
         name = f"table `{self.table.name}`: exactly one line matches in region {len(self.questions) + 1}"

@@ -29,9 +29,9 @@ def report_to_json(report: Report, command: str) -> Json:
         "command": command,
         "ok": not report.failed,
         "counts": {f"{severity.value}s": report.count(severity) for severity in Severity},
-        "diagnostics": [diagnostic_to_json(one, report.sources) for one in report.found],
+        "diagnostics": [diagnostic_to_json(diagnostic, report.sources) for diagnostic in report.found],
         "tables": [table_to_json(table) for table in report.tables],
-        "systems": [_listed(one) for one in report.systems],
+        "systems": [_listed(system) for system in report.systems],
     }
 
 

@@ -24,7 +24,7 @@ Json = dict[str, Any]
 
 def sarif(report: Report) -> Json:
     """One run with a result for each diagnostic; table verdicts are properties of the run."""
-    codes = sorted({one.code for one in report.found})
+    codes = sorted({diagnostic.code for diagnostic in report.found})
     index = {code: number for number, code in enumerate(codes)}
     return {
         "$schema": SCHEMA,
@@ -40,7 +40,9 @@ def sarif(report: Report) -> Json:
                     }
                 },
                 "columnKind": "unicodeCodePoints",
-                "results": [_result(one, index[one.code], report.sources) for one in report.found],
+                "results": [
+                    _result(diagnostic, index[diagnostic.code], report.sources) for diagnostic in report.found
+                ],
                 "properties": {"tables": [table_to_json(table) for table in report.tables]},
             }
         ],

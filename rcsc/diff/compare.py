@@ -43,8 +43,8 @@ def compare(
         except given_up:
             undecided.append(what)
     told = [
-        *(one.what for one in made.changes),
-        *(f"{one.what} `{one.name}`" for one in found if one.changed),
+        *(change.what for change in made.changes),
+        *(f"{part.what} `{part.name}`" for part in found if part.changed),
     ]
     try:
         found = _with_stops(versions, found, everywhere=bool(made.changes or undecided))
@@ -92,8 +92,10 @@ def _with_stops(versions: Versions, found: Sequence[Part], *, everywhere: bool) 
         found: All parts.
         everywhere: Whether more changed than these.
     """
-    everywhere = everywhere or any(one.changed and one.what not in _APART for one in found)
-    wanted = {one.name for one in found if one.what == "table" and (one.changed or one.moved or everywhere)}
+    everywhere = everywhere or any(part.changed and part.what not in _APART for part in found)
+    wanted = {
+        part.name for part in found if part.what == "table" and (part.changed or part.moved or everywhere)
+    }
     before, after = (
         {str(table.name): table for table in program.tables if table.name in wanted and table.assumptions}
         for program in (versions.before, versions.after)
@@ -103,17 +105,17 @@ def _with_stops(versions: Versions, found: Sequence[Part], *, everywhere: bool) 
         for program, tables in ((versions.before, before), (versions.after, after))
         if before.keys() | after.keys()
     ]
-    alone = {one.name for one in found if one.said in (("gone",), ("new",))}
+    alone = {part.name for part in found if part.said in (("gone",), ("new",))}
     return [
-        replace(one, said=(*one.said, *_stops(stops, one.name)))
-        if one.what == "table" and stops and one.name not in alone
-        else one
-        for one in found
+        replace(part, said=(*part.said, *_stops(stops, part.name)))
+        if part.what == "table" and stops and part.name not in alone
+        else part
+        for part in found
     ]
 
 
 def _stops(stops: Sequence[Mapping[str, Sequence[str]]], table: str) -> Iterator[str]:
-    before, after = (one.get(table, ()) for one in stops)
+    before, after = (stop.get(table, ()) for stop in stops)
     yield from (f"`{name}` no longer stops the cycle where it fails" for name in before if name not in after)
     yield from (f"`{name}` newly stops the cycle where it fails" for name in after if name not in before)
 
@@ -131,10 +133,10 @@ def difference(
             "neither side has a table to compare", "give a file, or a folder with `*.rcs` files"
         )
     found, said = [], []
-    for name, one, two in pairs(before, after):
-        if one is None or two is None:
-            said.append(f"program `{name}` is {'new' if one is None else 'gone'}")
+    for name, program, two in pairs(before, after):
+        if program is None or two is None:
+            said.append(f"program `{name}` is {'new' if program is None else 'gone'}")
         else:
             progress(f"comparing {name}")
-            found.append(compare(name, one, two, options, follow=follow))
+            found.append(compare(name, program, two, options, follow=follow))
     return Difference(before.name, after.name, tuple(found), tuple(said))

@@ -41,7 +41,7 @@ def _program_json(program: ProgramDifference) -> Json:
             {"level": t.level, "new": [_step_json(s) for s in t.new], "gone": [_step_json(s) for s in t.gone]}
             for t in program.traces
         ],
-        "follows": [_follows_json(one) for one in program.follows],
+        "follows": [_follows_json(follow) for follow in program.follows],
     }
 
 

@@ -85,12 +85,17 @@ def within_reach(
 
 def _declared(found: ProgramDifference) -> Iterator[Met]:
     """Declarations that say what a cycle does: what is admitted of an input, and whether a value is deferred."""
-    for one in found.declarations:
-        if one.before and one.after:
-            admits = one.before.startswith("input ") or one.after.startswith("input ")
-            defers = one.before.endswith(" deferred") != one.after.endswith(" deferred")
+    for declaration in found.declarations:
+        if declaration.before and declaration.after:
+            admits = declaration.before.startswith("input ") or declaration.after.startswith("input ")
+            defers = declaration.before.endswith(" deferred") != declaration.after.endswith(" deferred")
             if admits or defers:
-                yield Met(Part("declaration of", one.what, (f"{one.before} -> {one.after}",)), None)
+                yield Met(
+                    Part(
+                        "declaration of", declaration.what, (f"{declaration.before} -> {declaration.after}",)
+                    ),
+                    None,
+                )
 
 
 def _met(part: Part, cycle: "_Cycle | None") -> Iterator[Met]:
@@ -158,7 +163,9 @@ class _Cycle:
         kind, own = self.found.kinds.get(name, self.kinds[name]), self.kinds[name]
         if isinstance(kind, Enum) and isinstance(own, Enum):
             members = [kind.members[key] for low, high in box for key in range(low, high + 1)]
-            return values.among(node, [own.members.index(one) for one in members if one in own.members])
+            return values.among(
+                node, [own.members.index(member) for member in members if member in own.members]
+            )
         return values.any_of(
             values.inside(node, value_of_key(kind, low), value_of_key(kind, high)) for low, high in box
         )

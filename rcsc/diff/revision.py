@@ -90,7 +90,7 @@ def _contents(entries: Sequence[Entry]) -> Iterator[bytes]:
     """The content of each, all asked at once."""
     if not entries:
         return
-    given = _git("cat-file", "--batch", stdin="".join(f"{one.blob}\n" for one in entries).encode())
+    given = _git("cat-file", "--batch", stdin="".join(f"{entry.blob}\n" for entry in entries).encode())
     at = 0
     for _ in entries:
         end = given.index(b"\n", at)

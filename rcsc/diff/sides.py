@@ -97,7 +97,7 @@ def _read(asked: Given, paths: tuple[str, ...], hidden: str, shown: str) -> Side
     if loaded is None or (asked.may_lack and not loaded.given):
         return Side(asked.name, {}, (), {})
     programs: dict[str, Program] = {}
-    found = [one for one in loaded.found if one.severity is Severity.ERROR]
+    found = [diagnostic for diagnostic in loaded.found if diagnostic.severity is Severity.ERROR]
     for root in loaded.roots:
         made = resolve(root, loaded)
         if isinstance(made, Program):
@@ -107,7 +107,10 @@ def _read(asked: Given, paths: tuple[str, ...], hidden: str, shown: str) -> Side
     named = {_renamed(name, hidden, shown): source for name, source in loaded.sources.items()}
     sources = {name: Source(name, source.text) for name, source in named.items()}
     return Side(
-        asked.name, programs, tuple(_said(one, hidden, shown) for one in dict.fromkeys(found)), sources
+        asked.name,
+        programs,
+        tuple(_said(diagnostic, hidden, shown) for diagnostic in dict.fromkeys(found)),
+        sources,
     )
 
 

@@ -114,7 +114,7 @@ def _shown(part: Part) -> bool:
 
 def _steps(steps: Sequence[Transition]) -> tuple[list[Transition], int]:
     """The steps that a trace from the first state leads to, and how many others there are."""
-    reached = [one for one in steps if one.trace]
+    reached = [step for step in steps if step.trace]
     return reached[:MOST_TRANSITIONS], len(steps) - min(len(reached), MOST_TRANSITIONS)
 
 
@@ -141,8 +141,8 @@ def rows(found: Difference, *, quiet: bool = False) -> Iterator[Row]:
 
 def _program(program: ProgramDifference) -> Iterator[Row]:
     yield (Piece(escape(program.name), Style.STRONG),)
-    for one in program.declarations:
-        yield (Piece(f"  {one.what}: {_declared(one)}", Style.WARNING),)
+    for declaration in program.declarations:
+        yield (Piece(f"  {declaration.what}: {_declared(declaration)}", Style.WARNING),)
     for part in program.parts:
         if _shown(part):
             yield from _part(part)
@@ -258,8 +258,8 @@ def _program_marked(program: ProgramDifference) -> Iterator[str]:
     if program.declarations:
         yield from ("| declared | before | after |", "|---|---|---|")
         yield from (
-            f"| {_cell(one.what)} | {_cell(one.before)} | {_cell(one.after)} |"
-            for one in program.declarations
+            f"| {_cell(declaration.what)} | {_cell(declaration.before)} | {_cell(declaration.after)} |"
+            for declaration in program.declarations
         )
         yield ""
     for part in program.parts:

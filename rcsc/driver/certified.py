@@ -96,18 +96,20 @@ def _reviewed(
     program = resolve(loaded.roots[0], loaded) if loaded.roots else loaded.found
     if not isinstance(program, Program):
         return Conclusion(Report(program, (), loaded.sources), "not certified")
-    stops = None if proved is None else {str(one.name): one.stops for one in proved.program.tables}
+    stops = None if proved is None else {str(table.name): table.stops for table in proved.program.tables}
     outcome = checker.certify(program, certificate, _cvc5 if how.cvc5 else None, stops)
     found = [
-        _refused(program.file, f"the certificate is refused: {one}")
-        for one in outcome.problems[:MOST_PROBLEMS]
+        _refused(program.file, f"the certificate is refused: {problem}")
+        for problem in outcome.problems[:MOST_PROBLEMS]
     ]
     if how.questions is not None:
         found += _kept_questions(outcome, how.questions)
     severity = Severity.ERROR if how.strict else Severity.NOTE
     found += [
-        Diagnostic(Code.NOT_CHECKED, f"not checked: {one.name}", Label(one.written), severity=severity)
-        for one in outcome.unchecked
+        Diagnostic(
+            Code.NOT_CHECKED, f"not checked: {unchecked.name}", Label(unchecked.written), severity=severity
+        )
+        for unchecked in outcome.unchecked
     ]
     return Conclusion(Report(tuple(found), (), loaded.sources), _closing(program, outcome))
 
@@ -126,9 +128,9 @@ def _closing(program: Program, outcome: Certified) -> str:
 
 def _kept_questions(outcome: Certified, folder: Path) -> list[Diagnostic]:
     """Writes what is left, one file a question; why a file could not be written."""
-    for number, one in enumerate(outcome.unchecked, start=1):
+    for number, unchecked in enumerate(outcome.unchecked, start=1):
         path = folder / f"{number:03}.smt2"
-        text = f"; {one.name}\n; unsat: it holds\n{one.question}"
+        text = f"; {unchecked.name}\n; unsat: it holds\n{unchecked.question}"
         try:
             folder.mkdir(parents=True, exist_ok=True)
             write_atomically(path, text.encode())

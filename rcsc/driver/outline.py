@@ -69,7 +69,7 @@ def _read(system: Path) -> "tuple[dict[str, TransitionSystem], dict[str, str]] |
             files = digests(loaded)
             if files is None:
                 return None
-            looked_at |= {str(one): digest_at(str(one)) for one in places(system, spec.program)} | files
+            looked_at |= {str(path): digest_at(str(path)) for path in places(system, spec.program)} | files
         made = transition_systems_of(said, programs)
     except (BadDescription, NoProgramError):
         return None

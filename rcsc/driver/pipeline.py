@@ -22,7 +22,11 @@ class Proved:
 
     def report(self, found: tuple[Diagnostic, ...] = ()) -> Report:
         """Everything found, each once, and each table once, with the worst verdict of all programs that it is in."""
-        every = {*self.loaded.found, *found, *(one for proof in self.proofs for one in proof.found)}
+        every = {
+            *self.loaded.found,
+            *found,
+            *(diagnostic for proof in self.proofs for diagnostic in proof.found),
+        }
         tables = merged(table for proof in self.proofs for table in proof.tables)
         return Report(tuple(sorted(every, key=sort_key)), tables, self.loaded.sources)
 

@@ -46,8 +46,8 @@ def prove(root: str, program: Program, loaded: Loaded, options: Options, cache: 
     if not missing and memory.rest():
         return _proof(root, program, elsewhere, known)
     verdict = prove_program(program, options, only=[table.name for table in missing])
-    if not any(one.severity is Severity.ERROR for one in verdict.findings):
-        memory.keep([one for one in verdict.findings if one not in elsewhere], verdict.tables)
+    if not any(finding.severity is Severity.ERROR for finding in verdict.findings):
+        memory.keep([finding for finding in verdict.findings if finding not in elsewhere], verdict.tables)
     new = {one.table.name: _Kept(table_report(one, program), ()) for one in verdict.tables}
     return _proof(root, program, verdict.findings, {**known, **new}, verdict.unproved, verdict.unsafe)
 
@@ -102,7 +102,7 @@ class _Memory:
         if kept is None:
             return None
         place = _extent(table)
-        notes = tuple(_moved(one, place.start, place.file) for one in kept.notes)
+        notes = tuple(_moved(note, place.start, place.file) for note in kept.notes)
         return _Kept(replace(kept.report, file=table.file, cached=True), notes)
 
     def keep(self, found: Sequence[Diagnostic], verdicts: Sequence[TableVerdict]) -> None:
@@ -110,12 +110,16 @@ class _Memory:
         rest = set(found)
         for verdict in verdicts:
             place = _extent(verdict.table)
-            notes = [one for one in found if all(_inside(span, place) for span in _spans(one))]
-            touching = [one for one in found if any(_inside(span, place) for span in _spans(one))]
+            notes = [
+                diagnostic for diagnostic in found if all(_inside(span, place) for span in _spans(diagnostic))
+            ]
+            touching = [
+                diagnostic for diagnostic in found if any(_inside(span, place) for span in _spans(diagnostic))
+            ]
             rest -= set(notes)
             report = table_report(verdict, self.program)
             if report.verdict is Verdict.PROVED and touching == notes:
-                moved = tuple(_moved(one, -place.start, "") for one in notes)
+                moved = tuple(_moved(note, -place.start, "") for note in notes)
                 self.cache.store(_Kept(report, moved), *self._key(verdict.table))
         if not rest:
             self.cache.store(_Rest(), self.common)
@@ -154,10 +158,10 @@ def _moved(diagnostic: Diagnostic, by: int, file: str) -> Diagnostic:
 
     witnesses = tuple(
         replace(
-            one,
-            lines=tuple(replace(line, span=span(line.span) if line.span else None) for line in one.lines),
+            witness,
+            lines=tuple(replace(line, span=span(line.span) if line.span else None) for line in witness.lines),
         )
-        for one in diagnostic.witnesses
+        for witness in diagnostic.witnesses
     )
     related = tuple(map(label, diagnostic.related))
     return replace(diagnostic, primary=label(diagnostic.primary), related=related, witnesses=witnesses)
@@ -166,7 +170,9 @@ def _moved(diagnostic: Diagnostic, by: int, file: str) -> Diagnostic:
 def table_report(verdict: TableVerdict, program: Program) -> TableReport:
     """A verdict as the report shows it."""
     backing, stops = verdict.backing, verdict.table.stops
-    checked = [one.name for one in program.assumptions if one.standing is Standing.MONITORED]
+    checked = [
+        assumption.name for assumption in program.assumptions if assumption.standing is Standing.MONITORED
+    ]
     tells = [name for name in checked if name in verdict.table.assumptions and name not in stops]
     return TableReport(
         verdict.table.name,
@@ -187,7 +193,8 @@ def _said(verdict: TableVerdict) -> Verdict:
         return Verdict.UNDECIDED
     falls = not must_cover(verdict.table)
     wrong = any(
-        not (isinstance(one, Gap) and falls) and not (isinstance(one, DeadLine) and one.assuming)
-        for one in verdict.found
+        not (isinstance(dead_line, Gap) and falls)
+        and not (isinstance(dead_line, DeadLine) and dead_line.assuming)
+        for dead_line in verdict.found
     )
     return Verdict.REFUTED if wrong else Verdict.PROVED

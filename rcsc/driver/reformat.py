@@ -39,7 +39,11 @@ def reformat(paths: tuple[str, ...], stdin: bytes | None, *, write: bool) -> For
     """Format every file that the paths mean; used files that they do not mean are left alone."""
     loaded = load(paths, stdin)
     roots = [name for name in loaded.given if name in loaded.files]
-    mine = tuple(one for one in loaded.found if one.code.value < "RCS2" and _of(one, loaded.given, paths))
+    mine = tuple(
+        diagnostic
+        for diagnostic in loaded.found
+        if diagnostic.code.value < "RCS2" and _of(diagnostic, loaded.given, paths)
+    )
     texts = {name: _text(name, loaded.files[name]) for name in roots}
     changed = {name: text for name, text in texts.items() if text != loaded.sources[name].text}
     found = list(mine)

@@ -31,7 +31,7 @@ MOST_OPEN = 5
 def with_levels(report: Report, cache: Cache) -> Report:
     """The report, with what is known of the systems that its tables belong to."""
     seen = _Seen(cache)
-    tables = tuple(seen.table(one) for one in report.tables)
+    tables = tuple(seen.table(table) for table in report.tables)
     found = {*map(seen.noted, report.found), *seen.warnings()}
     sources = {**seen.sources, **report.sources}
     systems = tuple(seen.systems.values())
@@ -109,12 +109,12 @@ class _Seen:
 
     def _placed(self, table: TableReport, system: str, at: list[_Place]) -> TableReport:
         """A table that levels of a system run: what is known in all of them."""
-        for one in at:
-            self.levels.setdefault((system, one.level.name), (one.standing, one.level))
-        states = {name: _worst({one.known(name) for one in at}) for name in _open(table)}
+        for place in at:
+            self.levels.setdefault((system, place.level.name), (place.standing, place.level))
+        states = {name: _worst({place.known(name) for place in at}) for name in _open(table)}
         by = {known: tuple(name for name, found in states.items() if found is known) for known in Known}
         proved, conditional = by[Known.PROVED], by[Known.CONDITIONAL]
-        unreached = tuple(line for line in at[0].unreached if all(line in one.unreached for one in at))
+        unreached = tuple(line for line in at[0].unreached if all(line in place.unreached for place in at))
         if at[0].default in unreached:
             self.idle[table.file, table.table] = system
         made = at[0].standing
@@ -122,9 +122,13 @@ class _Seen:
         assumptions = tuple(
             (name, Known.PROVED.value if name in proved else was) for name, was in table.assumptions
         )
-        rests = tuple(dict.fromkeys(word for one in at for name in conditional for word in one.rests(name)))
+        rests = tuple(
+            dict.fromkeys(word for place in at for name in conditional for word in place.rests(name))
+        )
         claims = [*((ASSUMPTION, name) for name in proved), *((UNREACHED, line) for line in unreached)]
-        trusts = tuple(dict.fromkeys(word for one in at for claim in claims for word in one.trusts(*claim)))
+        trusts = tuple(
+            dict.fromkeys(word for place in at for claim in claims for word in place.trusts(*claim))
+        )
         together = InSystem(system, proved, by[Known.NOT_PROVED], unreached, conditional, rests, trusts)
         return replace(table, assumptions=assumptions, together=together)
 
@@ -134,7 +138,7 @@ class _Seen:
         whole = Known.UNKNOWN if made is None else made.whole
         missing: tuple[str, ...] = ()
         if made is not None and whole in {Known.PARTLY, Known.CONDITIONAL}:
-            levels = [one.name for one in made.outline.levels]
+            levels = [level.name for level in made.outline.levels]
             missing = tuple(f"level `{name}`: {why}" for name in levels for why in made.missing(name))
         self.systems[system] = SystemReport(system, whole.value, wanted, missing)
 
@@ -180,9 +184,9 @@ class _Seen:
         for (system, _), (made, level) in self.levels.items():
             if made.of_level(level.name) is Known.NOT_PROVED:
                 yield self._not_proved(system, made, level)
-            for one in made.broken:
-                if one.level == level.name:
-                    yield self._not_kept(system, level, one)
+            for promise in made.broken:
+                if promise.level == level.name:
+                    yield self._not_kept(system, level, promise)
 
     def _not_proved(self, system: str, made: KnownSystem, level: LevelOutline) -> Diagnostic:
         still = made.known[level.name].open
@@ -216,8 +220,8 @@ def _systems_above(file: str) -> list[Path]:
     """Descriptions beside the file and above it, up to the project's folder, or one up where there is no project."""
     here = Path(os.path.dirname(file) or ".").resolve()
     folders = [here, *here.parents]
-    root = next((at for at, one in enumerate(folders) if (one / PROJECT_FILE).is_file()), 1)
-    return [one / SYSTEM_FILE for one in folders[: root + 1] if (one / SYSTEM_FILE).is_file()]
+    root = next((at for at, path in enumerate(folders) if (path / PROJECT_FILE).is_file()), 1)
+    return [folder / SYSTEM_FILE for folder in folders[: root + 1] if (folder / SYSTEM_FILE).is_file()]
 
 
 def _beside(system: Path, file: str) -> bool:

@@ -42,7 +42,11 @@ def test(settings: Settings, effort: Effort) -> Conclusion:
         found += one
         figures.append(text)
     if effort.vectors is not None:
-        found += _write_vectors([one.program for _, one in made.executable], settings.options, effort.vectors)
+        found += _write_vectors(
+            [proved_program.program for _, proved_program in made.executable],
+            settings.options,
+            effort.vectors,
+        )
     settings.progress("")
     return Conclusion(made.report(tuple(found)), "\n".join(figures))
 

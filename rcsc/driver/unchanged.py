@@ -49,12 +49,12 @@ def recall(cache: Cache, paths: tuple[str, ...], options: Options) -> Report | N
         return None
     named = {name for name in texts if name.endswith(".rcs")} if kept.found else set()
     sources = {name: Source(name, texts[name].decode("utf-8-sig")) for name in sorted(named)}
-    return Report(kept.found, tuple(replace(one, cached=True) for one in kept.tables), sources)
+    return Report(kept.found, tuple(replace(table, cached=True) for table in kept.tables), sources)
 
 
 def remember(cache: Cache, paths: tuple[str, ...], options: Options, loaded: Loaded, report: Report) -> None:
     """Keep the report, unless it may change though no file does."""
-    if any(one.code in _PASSING or one.code.value[3] in "19" for one in report.found):
+    if any(diagnostic.code in _PASSING or diagnostic.code.value[3] in "19" for diagnostic in report.found):
         return
     looked_at = digests(loaded)
     if looked_at is None:
@@ -111,10 +111,10 @@ def _looked_at(loaded: Loaded) -> list[str]:
 def _uses(loaded: Loaded) -> list[tuple[str, str]]:
 
     return [
-        (os.path.dirname(name), f"{one.path}.rcs")
+        (os.path.dirname(name), f"{declaration.path}.rcs")
         for name, file in loaded.files.items()
-        for one in file.declarations
-        if isinstance(one, tree.Use)
+        for declaration in file.declarations
+        if isinstance(declaration, tree.Use)
     ]
 
 

@@ -113,22 +113,25 @@ class _Maker:
         self.plan = plan
         self.program = plan.program
         self.names = names_of(plan.program)
-        parameters = {str(one.name): tuple(p.type for p in one.params) for one in plan.program.procedures}
+        parameters = {
+            str(procedure.name): tuple(p.type for p in procedure.params)
+            for procedure in plan.program.procedures
+        }
         self.text = CText(self.names, parameters, _failing(plan.program))
         self.p = self.names.program
         self.cuts: list[Function] = []
 
     def view(self) -> dict[str, object]:
         """What the templates lay out."""
-        procedures = [self._procedure(one) for one in _callees_first(self.program)]
+        procedures = [self._procedure(procedure) for procedure in _callees_first(self.program)]
         tables = [function for table in self.plan.tables for function in self._table(table)]
         levels = [self._level(level) for level in self.program.levels]
         shared = [self._settle(), *self._safe(), *self._actions()]
         publics = (self._init(), self._check(), *tables, *self._steps(), *levels)
         code = tuple(read((*procedures, *shared, *publics, *self.cuts)))
-        used = {one.helper for one in code if isinstance(one, Invoke) and one.helper}
+        used = {invoke.helper for invoke in code if isinstance(invoke, Invoke) and invoke.helper}
         bits = {one for one in used if one.startswith("bit")}
-        kinds = {c_type(one.type) for one in self.program.variables}
+        kinds = {c_type(variable.type) for variable in self.program.variables}
         reals = "double" in kinds.union(getattr(one, "type", "") for one in code)
         return {
             "plan": self.plan,
@@ -183,15 +186,18 @@ class _Maker:
 
     def declared(self) -> Iterator[tuple[str, tuple[str, ...]]]:
         """Each function of the user's, and the types of its parameters; a pointer's ends in a star."""
-        for one in self.program.procedures:
-            if one.extern is not None:
-                yield one.extern.c, tuple(kind.replace(" ", "") for kind, _ in self._parameters(one))
+        for procedure in self.program.procedures:
+            if procedure.extern is not None:
+                yield (
+                    procedure.extern.c,
+                    tuple(kind.replace(" ", "") for kind, _ in self._parameters(procedure)),
+                )
 
     def _externs(self) -> Iterator[str]:
         declared = (
-            f"extern void {one.extern.c}({', '.join(map(''.join, self._parameters(one))) or 'void'});"
-            for one in self.program.procedures
-            if one.extern is not None
+            f"extern void {procedure.extern.c}({', '.join(map(''.join, self._parameters(procedure))) or 'void'});"
+            for procedure in self.program.procedures
+            if procedure.extern is not None
         )
         yield from dict.fromkeys(declared)
 
@@ -200,7 +206,9 @@ class _Maker:
         kinds = {v.name: v.type for v in self.program.variables}
         word = Scope().fresh
         yield from ((f"{c_type(kinds[name])} ", word(parameter_word(name))) for name in extern.reads)
-        yield from ((f"{wide_type(one.type)} ", word(parameter_word(one.name))) for one in extern.params)
+        yield from (
+            (f"{wide_type(param.type)} ", word(parameter_word(param.name))) for param in extern.params
+        )
         yield from (
             (f"{c_type(kinds[name])} *", word(f"{parameter_word(name)}_out")) for name in extern.writes
         )
@@ -232,15 +240,15 @@ class _Maker:
         assert procedure.extern is not None
         variables = {v.name: (at, v) for at, v in enumerate(self.program.variables)}
         results = [(*variables[name], Name(f"w{at}")) for at, name in enumerate(procedure.writes)]
-        for _, one, result in results:
-            yield Let(c_type(one.type), result.text, self.text.place(one.name))
+        for _, variable, result in results:
+            yield Let(c_type(variable.type), result.text, self.text.place(variable.name))
         given: list[Code] = [self.text.place(name) for name in procedure.reads]
         given += [local(p.name) for p in procedure.params]
         outs = (Prefix("&", result) for *_, result in results)
         yield Do(Invoke(procedure.extern.c, (*given, *outs)))
-        for at, one, result in results:
-            yield when(FAULTLESS, *_admitted(one, result, at, Fault.EXTERN))
-            yield when(FAULTLESS, Set(self.text.place(one.name), result))
+        for at, variable, result in results:
+            yield when(FAULTLESS, *_admitted(variable, result, at, Fault.EXTERN))
+            yield when(FAULTLESS, Set(self.text.place(variable.name), result))
 
     # --- admission ---
 
@@ -254,7 +262,11 @@ class _Maker:
     def _admit(self, reals: bool) -> Function:
         """Admits into a copy, so that a refused cycle changes nothing."""
         exact = when(Prefix("!", Invoke(f"{self.p}_exact")), Set(FAULT, Constant(Fault.ARITHMETIC)))
-        inputs = [(at, one) for at, one in enumerate(self.program.variables) if one.kind is model.Kind.INPUT]
+        inputs = [
+            (at, variable)
+            for at, variable in enumerate(self.program.variables)
+            if variable.kind is model.Kind.INPUT
+        ]
         refused = when(
             FAULTED,
             *self._trace(FAULT, FAULT_AT, "before"),
@@ -266,14 +278,20 @@ class _Maker:
             Let(f"{self.p}_t", "before", Prefix("*", STATE)),
             *self._trace(Constant(0), NONE),
             *((exact,) if reals else ()),
-            *(s for at, one in inputs for s in _admitted(one, self.text.place(one.name), at, Fault.ADMIT)),
+            *(
+                s
+                for at, variable in inputs
+                for s in _admitted(variable, self.text.place(variable.name), at, Fault.ADMIT)
+            ),
             refused,
         )
 
     def _check(self) -> Function:
         """All states and outputs, and the representation of every bool; then the invariants, which are about these."""
-        tests = [self._unfit(one) for one in self.program.variables]
-        tests += [Prefix("!", Round(self.text.expr(one.condition))) for one in self.program.invariants]
+        tests = [self._unfit(variable) for variable in self.program.variables]
+        tests += [
+            Prefix("!", Round(self.text.expr(invariant.condition))) for invariant in self.program.invariants
+        ]
         asked = [(at, test) for at, test in enumerate(tests) if test is not None]
         doc = (
             "Whether the state may be gone on from: -1, or the position of the first variable outside its range, or, counted after "
@@ -331,7 +349,11 @@ class _Maker:
         return self._on_state(doc, "settle", *lets, *sets, *(() if deferred else (_unused(STATE),)))
 
     def _safe(self) -> Iterator[Function]:
-        shown = [self._assigned(one, one.safe) for one in self.program.variables if one.safe is not None]
+        shown = [
+            self._assigned(variable, variable.safe)
+            for variable in self.program.variables
+            if variable.safe is not None
+        ]
         if shown:
             yield self._on_state("After a fault: outputs that have a safe value show it.", "safe", *shown)
 
@@ -500,7 +522,7 @@ class _Maker:
     def _cycle(self, doc: str, name: str, *body: Stmt) -> Function:
         """What every step and cycle begins and ends with."""
         begin = self._run_on_state("begin" if self.plan.defensive else "admit")
-        shown = any(one.safe is not None for one in self.program.variables)
+        shown = any(variable.safe is not None for variable in self.program.variables)
         safe = (when(FAULTED, self._run_on_state("safe")),) if shown else ()
         run = when(FAULTLESS, self._run_on_state("settle"), *body)
         return self._on_state(doc, name, begin, run, *safe, Leave(FAULT), gives="int32_t")
@@ -527,7 +549,8 @@ class _Maker:
         kind, chosen = level.tables.selector.type, Name("chosen")
         yield Let(f"const {wide_type(kind)}", "chosen", self.text.expr(level.tables.selector))
         arms = (
-            (infix("==", chosen, constant(kind, value)), (run[one],)) for value, one in level.tables.tables
+            (infix("==", chosen, constant(kind, value)), (run[table_name],))
+            for value, table_name in level.tables.tables
         )
         yield Branch(
             tuple(arms), (Line(f"s->fault = {Fault.NO_LINE:d}; /* no table for it: proved impossible */"),)
@@ -728,4 +751,4 @@ def _callees_first(program: Program) -> list[Procedure]:
 
 def _called(body: Iterable[model.Statement]) -> dict[model.ProcedureName, None]:
     """The procedures that statements call, in order."""
-    return dict.fromkeys(one.procedure for one in everything(body) if isinstance(one, model.Call))
+    return dict.fromkeys(call.procedure for call in everything(body) if isinstance(call, model.Call))

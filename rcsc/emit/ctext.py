@@ -255,8 +255,8 @@ class CText(Text):
         return tuple(done)
 
     def _may_fail(self, statement: model.Statement) -> bool:
-        calls = (one for one in everything((statement,)) if isinstance(one, model.Call))
-        return any(one.procedure in self.failing for one in calls)
+        calls = (call for call in everything((statement,)) if isinstance(call, model.Call))
+        return any(call.procedure in self.failing for call in calls)
 
     def guard(self, loop: model.For) -> tuple[Code, ...]:
         """What must hold in a loop that it goes on."""

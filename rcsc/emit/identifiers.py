@@ -89,7 +89,7 @@ class Scope:
 
     def fresh(self, name: str) -> str:
         """`name`, or the first of `name_2`, `name_3` that is free; it is then taken."""
-        found = next(one for one in _variants(name) if one not in self.names)
+        found = next(variant for variant in _variants(name) if variant not in self.names)
         self.names.add(found)
         return found
 
@@ -107,12 +107,12 @@ class Scope:
         return {name: given[name] for name, _ in pairs}
 
     def _claimed(self, word: str, claims: "Claims | None") -> str:
-        for one in _variants(word):
-            made = [(self, one), *(claims(one) if claims else ())]
+        for variant in _variants(word):
+            made = [(self, variant), *(claims(variant) if claims else ())]
             if all(name not in scope.names for scope, name in made):
                 for scope, name in made:
                     scope.names.add(name)
-                return one
+                return variant
         raise AssertionError(word)
 
 
@@ -184,10 +184,10 @@ def names_of(program: Program) -> Names:
         ("{x}_line", "{x}_lines", "{x}_step", "_run_{x}"),
     )  # fmt: skip
     levels = stems.of((level.name for level in program.levels), ("{p}_{x}_cycle",), ("{x}_cycle",))
-    procedures = stems.of((one.name for one in program.procedures), ("{p}_do_{x}",), ("_do_{x}",))
-    records = stems.of((one.name for one in program.records), ("{p}_{x}_t",), ())
-    enums = stems.of((one.name for one in program.enums), ("{p}_{x}_t",), ())
-    classes = module.all((one.name, python_word(one.name)) for one in program.enums)
+    procedures = stems.of((procedure.name for procedure in program.procedures), ("{p}_do_{x}",), ("_do_{x}",))
+    records = stems.of((record.name for record in program.records), ("{p}_{x}_t",), ())
+    enums = stems.of((enum.name for enum in program.enums), ("{p}_{x}_t",), ())
+    classes = module.all((enum.name, python_word(enum.name)) for enum in program.enums)
     return Names(
         file, p, _attributes(program, failed), paths, roots, members, tables, levels, procedures, records, enums,
         _constants(program, p, c), classes, _class_members(program), failed, c, module,
@@ -214,7 +214,7 @@ def guard(p: str) -> str:
 
 
 def _file_scope(program: Program, p: str) -> Scope:
-    externs = {one.extern.c for one in program.procedures if one.extern is not None}
+    externs = {procedure.extern.c for procedure in program.procedures if procedure.extern is not None}
     own = {f"{p}_{end}" for end in (*OWN, "exact", "bit32", "bit64")}
     return Scope(set(reserved.C_COMPOSED | C_WORDS) | externs | own | {guard(p)})
 

@@ -77,11 +77,12 @@ def _table(program: Program, table: Table, monitored: tuple[int, ...], file: str
         name = table.default.name
         lines.append(PlanLine(name, table.default.actions, f"{file} line {name}"))
     named = [(place, program.assumptions[at]) for place, at in enumerate(monitored)]
-    stops = tuple(place for place, one in named if one.name in table.stops)
+    stops = tuple(place for place, assumption in named if assumption.name in table.stops)
     relied = tuple(
         place
-        for place, one in named
-        if place in stops or (one.standing is Standing.MONITORED and one.name in table.assumptions)
+        for place, assumption in named
+        if place in stops
+        or (assumption.standing is Standing.MONITORED and assumption.name in table.assumptions)
     )
     return PlanTable(table, _matcher(program, table), tuple(lines), relied, stops)
 
@@ -101,7 +102,7 @@ def _matcher(program: Program, table: Table) -> Matcher:
     everyone = (1 << len(table.lines)) - 1
     probes = [_leaf_probe(variables[name], stated, everyone) for name, stated in _declared(table, by_leaf)]
     probes += [_test_probe(test, lines, everyone) for test, lines in relational.values()]
-    groups = grouped(probes, MOST_GROUPED) if len(table.lines) > WORD else tuple((one,) for one in probes)
+    groups = grouped(probes, MOST_GROUPED) if len(table.lines) > WORD else tuple((probe,) for probe in probes)
     return Matcher(len(table.lines), table.default is not None, groups)
 
 

@@ -105,7 +105,7 @@ def joined(group: Group) -> tuple[int, ...]:
     """The masks of a group: one for each combination of classes."""
     masks = group[0].masks
     for probe in group[1:]:
-        masks = tuple(one & two for one in masks for two in probe.masks)
+        masks = tuple(mask & two for mask in masks for two in probe.masks)
     return masks
 
 
@@ -177,8 +177,10 @@ class Plan:
         return tuple(self._checked(place, at) for place, at in enumerate(self.monitored))
 
     def _checked(self, place: int, at: int) -> str:
-        stops = [one.table.name for one in self.tables if place in one.stops]
-        told = [one.table.name for one in self.tables if place in one.monitored and place not in one.stops]
+        stops = [table.table.name for table in self.tables if place in table.stops]
+        told = [
+            table.table.name for table in self.tables if place in table.monitored and place not in table.stops
+        ]
         parts = [(f"ends the cycle in {', '.join(stops)}", stops), (f"only told in {', '.join(told)}", told)]
         does = "; ".join(words for words, tables in parts if tables) or "no table relies on it"
         return f"{self.program.assumptions[at].name}: {does}"

@@ -91,7 +91,7 @@ class _Maker:
 
     def _modules(self) -> Iterator[str]:
         externs = [p.extern.python for p in self.program.procedures if p.extern is not None]
-        yield from dict.fromkeys(one.partition(":")[0] for one in externs)
+        yield from dict.fromkeys(extern.partition(":")[0] for extern in externs)
 
     def _constant(self, wanted: str, rows: tuple[str, ...]) -> Name:
         """A tuple of the module; its name."""
@@ -122,11 +122,11 @@ class _Maker:
         yield when(Prefix("not ", Invoke("isinstance", (given, Name("tuple")))), Set(given, Items((given,))))
         several = infix("!=", Invoke("len", (given,)), Constant(len(results)))
         yield when(several, _refused(results[0][0]))
-        for number, (at, one) in enumerate(results):
+        for number, (at, variable) in enumerate(results):
             value = Name(f"w{number}")
-            yield Set(value, _typed(one.type, Element(given, Constant(number))))
-            yield from _admitted(one, value, _refused(at))
-            yield Set(self.text.place(one.name), value)
+            yield Set(value, _typed(variable.type, Element(given, Constant(number))))
+            yield from _admitted(variable, value, _refused(at))
+            yield Set(self.text.place(variable.name), value)
 
     # --- admission ---
 
@@ -152,11 +152,11 @@ class _Maker:
     def _check(self) -> Function:
         """As in C."""
         body = []
-        for at, one in enumerate(self.program.variables):
-            if one.kind is not model.Kind.INPUT or isinstance(one.type, Bool):
-                place = self.text.place(one.name)
-                types = Name("(int, float)" if isinstance(one.type, Real) else "int")
-                fits = infix("and", Invoke("isinstance", (place, types)), _within(one.type, place))
+        for at, variable in enumerate(self.program.variables):
+            if variable.kind is not model.Kind.INPUT or isinstance(variable.type, Bool):
+                place = self.text.place(variable.name)
+                types = Name("(int, float)" if isinstance(variable.type, Real) else "int")
+                fits = infix("and", Invoke("isinstance", (place, types)), _within(variable.type, place))
                 body.append(when(Prefix("not ", fits), Leave(Constant(at))))
         for at, invariant in enumerate(self.program.invariants, len(self.program.variables)):
             body.append(when(Prefix("not ", self.text.expr(invariant.condition)), Leave(Constant(at))))
@@ -188,15 +188,19 @@ class _Maker:
         return _on_state("Deferred variables take their next values, all at once.", "_settle", *lets, *sets)
 
     def _safe(self) -> Iterator[Function]:
-        pairs = [(one, one.safe) for one in self.program.variables if one.safe is not None]
+        pairs = [
+            (variable, variable.safe) for variable in self.program.variables if variable.safe is not None
+        ]
         if pairs:
-            shown = (Set(self.text.place(one.name), constant(one.type, safe)) for one, safe in pairs)
+            shown = (
+                Set(self.text.place(variable.name), constant(variable.type, safe)) for variable, safe in pairs
+            )
             yield _on_state("After a fault: outputs that have a safe value show it.", "_safe", *shown)
 
     def _cycle(self, doc: str, name: str, *body: Stmt) -> Function:
         """What every step and cycle begins and ends with."""
         begin = Invoke("_begin" if self.plan.defensive else "_admit", (STATE,))
-        shown = any(one.safe is not None for one in self.program.variables)
+        shown = any(variable.safe is not None for variable in self.program.variables)
         safe = (when(FAULTED, _run("_safe")),) if shown else ()
         run = Frame("try:", (_run("_settle"), *body))
         refused = Frame(

@@ -20,7 +20,7 @@ def symbols(plan: Plan, names: Names) -> str:
         "init": f"{p}_init",
         "check": f"{p}_check",
         **({"defensive": True} if plan.defensive else {}),
-        "invariants": [one.name for one in plan.program.invariants],
+        "invariants": [invariant.name for invariant in plan.program.invariants],
         "python": {"module": f"{p}.py", "class": "State"},
         **({"failed": names.failed} if len(names.failed) > 1 else {}),
         "leaves": [

@@ -63,7 +63,9 @@ def derive(
     if isinstance(chosen, Diagnostic):
         return chosen
     written = next(
-        one for one in file.declarations if isinstance(one, tree.TableDecl) and one.name.text == table.name
+        declaration
+        for declaration in file.declarations
+        if isinstance(declaration, tree.TableDecl) and declaration.name.text == table.name
     )
     try:
         return _Derivation(program, table, file, written, Steps(program, table, chosen, options)).derived()
@@ -122,7 +124,7 @@ class _Derivation:
         steps = self.steps.steps(states)
         edges: list[Edge] = []
         for at, line in enumerate(self._lines()):
-            edges += self._edges(at, line, [one for one in steps if one.line == at], states)
+            edges += self._edges(at, line, [step for step in steps if step.line == at], states)
         common = self._common(edges)
         edges = [self._eased(edge, common) for edge in edges]
         self._comments()
@@ -136,7 +138,11 @@ class _Derivation:
             self.steps.state.deferred_until is not None,
             self._spelled(self.steps.state.initial),
             tuple(self.table.assumptions),
-            tuple(one.path for one in self.file.declarations if isinstance(one, tree.Use)),
+            tuple(
+                declaration.path
+                for declaration in self.file.declarations
+                if isinstance(declaration, tree.Use)
+            ),
             self._columns(),
             tuple(line.name for line in self._lines()),
             used,
@@ -159,8 +165,8 @@ class _Derivation:
         return heading.subject is not None and spell_expr(heading.subject) == self.steps.state.name
 
     def _columns(self) -> str:
-        left = [_heading(one) for one in self.written.conditions]
-        right = [_heading(one) for one in self.written.actions]
+        left = [_heading(condition) for condition in self.written.conditions]
+        right = [_heading(action) for action in self.written.actions]
         return f"{' | '.join(left)} || {' | '.join(right)}".strip()
 
     def _terms(self, at: int, columns: tuple[int, ...] | None = None) -> list[tree.Expr]:
@@ -177,7 +183,7 @@ class _Derivation:
     def _edges(self, at: int, line: Line | Default, steps: list[Step], states: list[Value]) -> list[Edge]:
         """The edges of one line, drawn from every state at once where it is so."""
         default = "" if isinstance(line, Line) else f"DEFAULT{' unreachable' if line.unreachable else ''}"
-        sources = list(dict.fromkeys(one.source for one in steps))
+        sources = list(dict.fromkeys(step.source for step in steps))
         goal = self._goal(line.actions)
         if goal is not None and goal in sources and sources != states:
             goal = None  # a loop says that nothing is written: here the action has to say it
@@ -187,18 +193,18 @@ class _Derivation:
         base = Edge(line.name, ANY, ANY, labels.guard(self._terms(at)), effect, default=default)
         if not steps:
             return self._unreached(base, goal, at)
-        anywhere = sources == states and (stays or all(one.target == goal for one in steps))
+        anywhere = sources == states and (stays or all(step.target == goal for step in steps))
         self._narrowed(at, [] if anywhere else sources)
         if anywhere:
             return [replace(base, target=ANY if goal is None else self._spelled(goal))]
         return [
             replace(
                 base,
-                source=self._spelled(one.source),
-                target=self._spelled(one.target),
-                decided="" if stays or one.target == goal else by,
+                source=self._spelled(step.source),
+                target=self._spelled(step.target),
+                decided="" if stays or step.target == goal else by,
             )
-            for one in steps
+            for step in steps
         ]
 
     def _goal(self, actions: tuple[Action, ...]) -> Value | None:
@@ -228,7 +234,7 @@ class _Derivation:
             for heading, cell in zip(self.written.conditions, self._row(at).conditions, strict=True)
             if cell is not None and self._is_state(heading)
         ]
-        names = [self._spelled(one) for one in sources]
+        names = [self._spelled(source) for source in sources]
         again = names[0] if len(names) == 1 else "in {" + ", ".join(names) + "}" if names else ""
         before = " and ".join(stated)
         if before != again and not self._row(at).default:
@@ -239,12 +245,12 @@ class _Derivation:
     def _effect(self, row: tree.Row, actions: tuple[Action, ...], goal: Value | None) -> str:
         """The action cells, without the one action that the edge itself says."""
         left = list(actions)
-        told = None if goal is None else next(one for one in actions if self.steps.writes(one))
+        told = None if goal is None else next(action for action in actions if self.steps.writes(action))
         cells = []
         for cell in row.actions:
             written = (cell,) if isinstance(cell, tree.Comparison) else cell
             taken = [_taken(left) for _ in written]
-            cells.append("; ".join(one.text for one in taken if one is not told))
+            cells.append("; ".join(action.text for action in taken if action is not told))
         return labels.effect(tuple(map(_heading, self.written.actions)), tuple(cells))
 
     # --- what is shown ---
@@ -261,7 +267,7 @@ class _Derivation:
         source = None if edge.source == ANY else self._value(edge.source)
         terms = self._terms(at, self.steps.needed(at, source))
         if source is not None:
-            terms = [one for one in terms if one not in common]
+            terms = [term for term in terms if term not in common]
         return replace(edge, shown=labels.guard(terms))
 
     def _value(self, name: str) -> Value:

@@ -195,7 +195,7 @@ def folded(text: str) -> Iterator[str]:
 def drawn(picture: Picture) -> str:
     """The picture as SVG."""
     boxes = [_box(name, shown) for name, shown in picture.nodes.items()]
-    placed = place(boxes, [_arrow(one) for one in picture.sheaves])
+    placed = place(boxes, [_arrow(sheave) for sheave in picture.sheaves])
     head_px = 22.0 + 16.0 * len(picture.notes)
     widest = max([8.6 * len(picture.title), *(_LETTER_PX * len(note) for note in picture.notes)])
     width = round(max(placed.width_px, widest) + 2 * _EDGE_PX)

@@ -67,7 +67,10 @@ def tables(named: str, *, running: bool = False) -> list[FoundTable] | NotFound:
     if not own:
         return _nothing(f"`{file}` has no table{f' `{name}`' if name else ''}", file)
     found = [FoundTable(loaded, loaded.roots[0], program, table) for table in own]
-    return [_in_level(one) if running and not _run_here(one) else one for one in found]
+    return [
+        _in_level(found_table) if running and not _run_here(found_table) else found_table
+        for found_table in found
+    ]
 
 
 def _parted(named: str) -> tuple[str | None, str]:
@@ -106,14 +109,16 @@ def _by_name(name: str, loaded: Loaded) -> list[FoundTable] | NotFound:
     every = _every(loaded)
     if isinstance(every, NotFound):
         return every
-    found = [one for one in every if one.table.name == name]
-    found = [one for one in found if _run_here(one)] or found  # an example is meant only by its file
+    found = [found_table for found_table in every if found_table.table.name == name]
+    found = [
+        found_table for found_table in found if _run_here(found_table)
+    ] or found  # an example is meant only by its file
     if len(found) == 1:
         return found
     if found:
-        names = tuple(f"`{one.table.file}:{name}`" for one in found)
+        names = tuple(f"`{found_table.table.file}:{name}`" for found_table in found)
         return _nothing(f"{len(found)} tables are called `{name}`", "", f"say which: {', '.join(names)}")
-    near = get_close_matches(name, sorted({one.table.name for one in every}), 3, 0.5)
+    near = get_close_matches(name, sorted({found_table.table.name for found_table in every}), 3, 0.5)
     helps = (f"near it: {', '.join(f'`{one}`' for one in near)}",) if near else ()
     return _nothing(f"there is no table `{name}`", "", *helps)
 

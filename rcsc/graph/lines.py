@@ -28,24 +28,26 @@ def derive_lines(program: Program, table: Table, file: tree.File, options: Optio
         message = f"which lines of table `{table.name}` can follow which is not decided within the limits"
         return Diagnostic(Code.UNDECIDED, message, Label(table.span), help=("raise `--steps`",))
     written = next(
-        one for one in file.declarations if isinstance(one, tree.TableDecl) and one.name.text == table.name
+        declaration
+        for declaration in file.declarations
+        if isinstance(declaration, tree.TableDecl) and declaration.name.text == table.name
     )
     names = [row.name for row in written.rows if not row.default] + [
         row.name for row in written.rows if row.default
     ]
     rows = {row.name: row for row in written.rows}
     terms = [_terms(written, rows[name]) for name in names]
-    live = sorted({one.line for one in follows})
+    live = sorted({follow.line for follow in follows})
     edges: list[Edge] = []
-    many = [at for at in live if sum(one.then == at for one in follows) > _MOST * len(live)]
-    own = [one for one in follows if one.then not in many]
-    common = _common([list(terms[one.then].values()) for one in own])
+    many = [at for at in live if sum(follow.then == at for follow in follows) > _MOST * len(live)]
+    own = [follow for follow in follows if follow.then not in many]
+    common = _common([list(terms[follow.then].values()) for follow in own])
     for at in live:
-        before = [one for one in follows if one.then == at]
+        before = [follow for follow in follows if follow.then == at]
         if at in many:
             edges.append(_from_any(names, at, before, terms[at], live))
         else:
-            edges += [_edge(names, one, terms[at], common) for one in before]
+            edges += [_edge(names, follow, terms[at], common) for follow in before]
     graph = StateGraph(
         table.name, LINES, tuple(edges), lines=tuple(names), states=tuple(names[at] for at in live)
     )

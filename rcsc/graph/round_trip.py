@@ -42,12 +42,12 @@ def in_place(file: tree.File, table: tree.TableDecl) -> str:
     """The file's text with the table in the place of the one of its name, or at its end; comments above a table stay."""
     kept: list[tree.Declaration] = []
     there = False
-    for one in file.declarations:
-        if isinstance(one, tree.TableDecl) and one.name.text == table.name.text:
+    for declaration in file.declarations:
+        if isinstance(declaration, tree.TableDecl) and declaration.name.text == table.name.text:
             there = True
-            kept.append(replace(table, comments=one.comments, doc=one.doc))
+            kept.append(replace(table, comments=declaration.comments, doc=declaration.doc))
         else:
-            kept.append(one)
+            kept.append(declaration)
     declarations = tuple(kept) if there else (*kept, table)
     return format_file(replace(file, declarations=declarations))
 
@@ -74,7 +74,7 @@ def against(
     changed = replace(loaded, files={**loaded.files, table.file: parsed}, sources=sources)
     resolved = resolve(root, changed)
     if not isinstance(resolved, Program):
-        shown = tuple(_renamed(one, table.file, name) for one in resolved)
+        shown = tuple(_renamed(diagnostic, table.file, name) for diagnostic in resolved)
         return Against(shown, sources={**loaded.sources, name: Source(name, text)})
     other = next(one for one in resolved.tables if one.name == table.name)
     verdict = compare((program, table), (resolved, other), options)
@@ -109,7 +109,7 @@ def _assuming(table: Table, other: Table) -> Diagnostic:
 def _begins(program: Program, table: Table, new: Tabled) -> Diagnostic | None:
     """That the graph begins in another state."""
     name, initial = new.begins
-    state = next((one for one in program.variables if one.name == name), None)
+    state = next((variable for variable in program.variables if variable.name == name), None)
     if not initial or state is None or spell(state.type, state.initial) == initial:
         return None
     message = f"the graph begins in `{initial}`, table `{table.name}` in `{spell(state.type, state.initial)}`"
@@ -125,7 +125,9 @@ def _findings(verdict: Comparison, program: Program, table: Table) -> tuple[Diag
             return (Diagnostic(Code.UNDECIDED, message, Label(table.span), help=("raise `--steps`",)),)
         case Differs(witness=witness, first=first, second=second, changed=changed):
             shown = [
-                (v, value) for v, value in witness if any(v.name == one.name for one in program.variables)
+                (v, value)
+                for v, value in witness
+                if any(v.name == variable.name for variable in program.variables)
             ]
             column = WitnessColumn(
                 table.name,

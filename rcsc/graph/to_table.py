@@ -59,7 +59,7 @@ def tabled(graph: StateGraph) -> Tabled:
     parsed = parse(Source("", text))
     if not isinstance(parsed, tree.File):
         raise UnreadableError(f"the table that the graph says is not in the language: {parsed[0].message}")
-    [table] = (one for one in parsed.declarations if isinstance(one, tree.TableDecl))
+    [table] = (declaration for declaration in parsed.declarations if isinstance(declaration, tree.TableDecl))
     uses = tuple(tree.Use(path) for path in graph.uses)
     return Tabled(table, uses, tuple(notes), (graph.state, graph.initial))
 
@@ -222,12 +222,12 @@ class _Columns:
         assuming = f" assuming {', '.join(graph.assuming)}" if graph.assuming else ""
         lines = [f"table {graph.table}{assuming} {{", _row(["line", *conditions], actions)]
         for line, said, done in rows:
-            cells = [said.get(one, "") for one in conditions]
+            cells = [said.get(condition, "") for condition in conditions]
             if line.edge.default:
                 cells[0] = line.edge.default
             elif not said and conditions == [_WHEN]:
                 cells[0] = "true"
-            lines.append(_row([line.name, *cells], [done.get(one, "") for one in actions]))
+            lines.append(_row([line.name, *cells], [done.get(action, "") for action in actions]))
         return "\n".join([*lines, "}", ""])
 
 

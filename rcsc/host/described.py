@@ -39,7 +39,7 @@ class BadFile(CodedError):  # noqa: N818  # what happened, not an error of ours
         self.found, self.sources = tuple(found), dict(sources or {})
         if self.found:
             self.code = self.found[0].code
-        super().__init__(text or "; ".join(self._line(one) for one in found))
+        super().__init__(text or "; ".join(self._line(diagnostic) for diagnostic in found))
 
     def __reduce__(self) -> tuple[Any, ...]:
         """As it is, from one process to another: classes below take other arguments."""

@@ -52,7 +52,7 @@ def _running(processes: list[int]) -> list[int]:
     ended = set(select.select(processes, [], [], 0)[0])
     for one in ended:
         os.close(one)
-    return [one for one in processes if one not in ended]
+    return [process for process in processes if process not in ended]
 
 
 def _kill(group: int) -> None:

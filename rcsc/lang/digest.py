@@ -33,9 +33,9 @@ class Digests:
     assumptions: dict[str, Assumption] = field(init=False)
 
     def __post_init__(self) -> None:
-        self.procedures = {str(one.name): one for one in self.program.procedures}
-        self.variables = {str(one.name): one for one in self.program.variables}
-        self.assumptions = {str(one.name): one for one in self.program.assumptions}
+        self.procedures = {str(procedure.name): procedure for procedure in self.program.procedures}
+        self.variables = {str(variable.name): variable for variable in self.program.variables}
+        self.assumptions = {str(assumption.name): assumption for assumption in self.program.assumptions}
 
     def table(self, table: Table) -> str:
         """Of a table: its lines, what they run, its assumptions and invariants, and the types of what it touches."""
@@ -58,7 +58,7 @@ class Digests:
             (name, self.assumptions[name].standing, repr(self.assumptions[name].condition))
             for name in table.assumptions
         ]
-        kept = [(one.name, repr(one.condition)) for one in self.program.invariants]
+        kept = [(invariant.name, repr(invariant.condition)) for invariant in self.program.invariants]
         hashed.update(repr((stated, kept)).encode())
         body = [
             action.statement
@@ -67,14 +67,14 @@ class Digests:
             for action in line.actions
         ]
         tests = {id(test): test.condition for line in table.lines for test in line.tests if test is not None}
-        conditions += [*tests.values(), *(one.condition for one in self.program.invariants)]
+        conditions += [*tests.values(), *(invariant.condition for invariant in self.program.invariants)]
         hashed.update(self._rest(body, conditions).encode())
         return hashed.hexdigest()
 
     def body(self, body: Iterable[Statement]) -> str:
         """Of statements and all that they call."""
         statements = list(body)
-        return repr([repr(one) for one in statements]) + self._rest(statements, ())
+        return repr([repr(statement) for statement in statements]) + self._rest(statements, ())
 
     def procedure(self, name: str) -> str:
         """Of a procedure and all that it calls."""
@@ -85,12 +85,12 @@ class Digests:
         """Leaves that statements, all that they call, and conditions read or write."""
         called = [self.procedures[name] for name in self.closure(body)]
         found = {str(leaf) for condition in conditions for leaf in read_by(condition)}
-        for part in (body, *(one.body for one in called)):
+        for part in (body, *(procedure.body for procedure in called)):
             for statement in everything(part):
                 found.update(written_by(statement))
                 found.update(leaf for expr in expressions(statement) for leaf in read_by(expr))
-        for one in called:
-            found.update((*one.reads, *one.writes))
+        for procedure in called:
+            found.update((*procedure.reads, *procedure.writes))
         return found
 
     def closure(self, body: Iterable[Statement]) -> list[str]:
@@ -112,7 +112,7 @@ class Digests:
 
 
 def _called(body: Iterable[Statement]) -> Iterator[str]:
-    return (str(one.procedure) for one in everything(body) if isinstance(one, Call))
+    return (str(call.procedure) for call in everything(body) if isinstance(call, Call))
 
 
 def _stated(test: Test, known: dict[int, str]) -> str:

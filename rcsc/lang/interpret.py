@@ -312,7 +312,9 @@ def unfit(program: Program, snapshot: Snapshot) -> str:
         of_kind = isinstance(value, int | float if isinstance(kind, Real) else int)
         if variable.kind is not Kind.INPUT and not (of_kind and low <= value <= high):
             return variable.name
-    broken = (one.name for one in program.invariants if not evaluate(one.condition, snapshot))
+    broken = (
+        invariant.name for invariant in program.invariants if not evaluate(invariant.condition, snapshot)
+    )
     return next(broken, "")
 
 

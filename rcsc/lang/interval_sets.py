@@ -15,7 +15,7 @@ def meet(one: Box, two: Box) -> Box:
 def joined(intervals: Iterable[tuple[int, int]]) -> Box:
     """The keys in any of the intervals."""
     found: list[tuple[int, int]] = []
-    for low, high in sorted(one for one in intervals if one[0] <= one[1]):
+    for low, high in sorted(interval for interval in intervals if interval[0] <= interval[1]):
         if found and low <= found[-1][1] + 1:
             found[-1] = (found[-1][0], max(found[-1][1], high))
         else:

@@ -46,13 +46,21 @@ def relying(program: Program) -> Program:
     if not program.invariants:
         return program
     made = [
-        Assumption(AssumptionName(one.name), Standing.PROVED, one.condition, one.doc, one.span)
-        for one in program.invariants
+        Assumption(
+            AssumptionName(invariant.name),
+            Standing.PROVED,
+            invariant.condition,
+            invariant.doc,
+            invariant.span,
+        )
+        for invariant in program.invariants
     ]
-    reads = {one.name: set(read_by(one.condition)) for one in made}
+    reads = {assumption.name: set(read_by(assumption.condition)) for assumption in made}
 
     def of(table: Table) -> Table:
-        names = tuple(one.name for one in made if not reads[one.name].isdisjoint(table.variables))
+        names = tuple(
+            assumption.name for assumption in made if not reads[assumption.name].isdisjoint(table.variables)
+        )
         return replace(table, assumptions=(*table.assumptions, *names)) if names else table
 
     tables = tuple(of(table) for table in program.tables)
@@ -70,8 +78,8 @@ def checked(program: Program) -> tuple[int, ...]:
     stopping = {name for table in program.tables for name in table.stops}
     return tuple(
         at
-        for at, one in enumerate(program.assumptions)
-        if one.standing is Standing.MONITORED or one.name in stopping
+        for at, assumption in enumerate(program.assumptions)
+        if assumption.standing is Standing.MONITORED or assumption.name in stopping
     )
 
 

@@ -67,7 +67,7 @@ def _heads(roots: tuple[str, ...], named: set[str], uses: Mapping[str, tuple[str
             if part not in used:
                 used.add(part)
                 waiting.append(part)
-    heads = tuple(one for one in roots if one not in used or os.path.realpath(one) in explicit)
+    heads = tuple(root for root in roots if root not in used or os.path.realpath(root) in explicit)
     return heads or roots
 
 
@@ -194,7 +194,7 @@ class _Loader:
         wrong = f"`{unknown[0]}` is not a setting" if unknown else ""
         if not isinstance(settings.get("name", ""), str):
             wrong = "`name` is a text"
-        if not isinstance(patterns, list) or not all(isinstance(one, str) for one in patterns):
+        if not isinstance(patterns, list) or not all(isinstance(pattern, str) for pattern in patterns):
             wrong = "`exclude` is a list of patterns"
         if wrong:
             self.report(Code.PROJECT_FILE, wrong, Span(path, 0, 0), "the settings are `name` and `exclude`")
@@ -226,7 +226,9 @@ class _Loader:
     def _used_by(self, file: str) -> "Iterator[tree.Use]":
         from rcsc.lang.syntax.tree import Use
 
-        return iter([one for one in self.files[file].declarations if isinstance(one, Use)])
+        return iter(
+            [declaration for declaration in self.files[file].declarations if isinstance(declaration, Use)]
+        )
 
     def _read(self, file: str, asked: Span) -> bool:
         """Whether the file is now read and parsed, for the first time."""

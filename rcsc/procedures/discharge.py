@@ -81,7 +81,7 @@ class Asker:
         try:
             return _Question(self, obligations, base(), wanted).answer()
         except smt.troubles():
-            return [Failure(one, Outcome.OPEN) for one in obligations]
+            return [Failure(obligation, Outcome.OPEN) for obligation in obligations]
 
     def all_hold(self, obligations: Sequence[Obligation], base: Callable[[], Sequence[Node]]) -> bool:
         """Whether all of them are shown wherever `base` holds, by one question; left open is not shown."""
@@ -133,7 +133,7 @@ class _Question:
         wanted: Callable[[Obligation], bool],
     ) -> None:
         self.asker, self.owed, self.wanted = asker, owed, wanted
-        self.bad = [values.both(one.path, values.negation(one.good)) for one in owed]
+        self.bad = [values.both(obligation.path, values.negation(obligation.good)) for obligation in owed]
         found = values.variables([*base, *self.bad])
         self.variables = sorted(found.values(), key=lambda node: self._place(node.name))
         self.reals = any(isinstance(node.kind, Real) for node in self.variables)
@@ -161,7 +161,7 @@ class _Question:
     def _search(self, first: int, last: int) -> None:
         """Looks among the obligations `first .. last - 1`; those before hold, or were found."""
         if self.unknown > MOST_UNKNOWN:
-            self.failures += [Failure(one, Outcome.OPEN) for one in self.owed[first:last]]
+            self.failures += [Failure(obligation, Outcome.OPEN) for obligation in self.owed[first:last]]
             return
         bad = values.any_of(self.bad[first:last])
         tried = trial.found([*self.known, bad], self.variables) if self.reals else None
@@ -216,7 +216,7 @@ class _Question:
             for node in self.variables
         ]
         found = self._least(bad, shown) if tried is None else tried
-        return () if found is None else tuple((one, found[one.name]) for one in shown)
+        return () if found is None else tuple((variable, found[variable.name]) for variable in shown)
 
     def _least(self, bad: Node, shown: list[Variable]) -> dict[str, Value] | None:
         solver = self._fresh()

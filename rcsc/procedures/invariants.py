@@ -74,12 +74,15 @@ def assumptions_satisfiable(program: Program, table: Table, options: Options) ->
     answer = solver.check()
     if answer is not Answer.SATISFIABLE:
         return answer
-    return {one.name: solver.value(frame.leaves[one.name], one.type) for one in program.variables}
+    return {
+        variable.name: solver.value(frame.leaves[variable.name], variable.type)
+        for variable in program.variables
+    }
 
 
 def assumed_of(program: Program, table: Table) -> tuple[Assumption | Invariant, ...]:
     """The assumptions of the table, and every invariant of the program."""
-    named = (one for one in program.assumptions if one.name in table.assumptions)
+    named = (assumption for assumption in program.assumptions if assumption.name in table.assumptions)
     return (*named, *program.invariants)
 
 
@@ -87,4 +90,7 @@ def _trials(program: Program) -> Iterator[dict[str, Value]]:
     """A few inputs that are quickly tried."""
     yield initial(program)
     for end in (0, 1):
-        yield {one.name: value_of_key(one.type, key_bounds(one.type)[end]) for one in program.variables}
+        yield {
+            variable.name: value_of_key(variable.type, key_bounds(variable.type)[end])
+            for variable in program.variables
+        }

@@ -72,7 +72,9 @@ def called_by_lines(program: Program) -> set[str]:
 def defined_alone(program: Program, table: Table) -> bool:
     """Whether the declared ranges alone show every condition of the table to be defined, without a solver."""
     run = Run(
-        {str(one.name): one for one in program.procedures}, {v.name: v.type for v in program.variables}, {}
+        {str(procedure.name): procedure for procedure in program.procedures},
+        {v.name: v.type for v in program.variables},
+        {},
     )
     tests = {id(test): test for line in table.lines for test in line.tests if test is not None}
     for test in tests.values():
@@ -134,7 +136,7 @@ class Obligations:
         self._procedures = {procedure.name: procedure for procedure in self.program.procedures}
         self._kinds = {v.name: v.type for v in leaves}
         self._outputs = {v.name for v in leaves if v.kind is Kind.OUTPUT}
-        self._kept = [(one, set(read_by(one.condition))) for one in self.program.invariants]
+        self._kept = [(invariant, set(read_by(invariant.condition))) for invariant in self.program.invariants]
 
     def prove(self, tables: Iterable[Table]) -> list[Diagnostic]:
         """What is wrong with conditions, deferred values, procedures, levels, and the lines of `tables`."""
@@ -171,7 +173,7 @@ class Obligations:
         return [run.evaluate(condition) for condition in conditions]
 
     def _invariants(self) -> list[Node]:
-        return self._known(one.condition for one in self.program.invariants)
+        return self._known(invariant.condition for invariant in self.program.invariants)
 
     # --- conditions ---
 
@@ -181,8 +183,8 @@ class Obligations:
         selectors = [
             level.tables.selector for level in self.program.levels if isinstance(level.tables, TableByCommand)
         ]
-        for one in self.program.invariants:
-            self._defined(one.condition, [])
+        for invariant in self.program.invariants:
+            self._defined(invariant.condition, [])
         for condition in (*deferred, *selectors):
             self._defined(condition, self._invariants())
         for assumption in self.program.assumptions:
@@ -232,14 +234,16 @@ class Obligations:
 
     def _table(self, table: Table) -> None:
         """Its conditions and lines, and on which assumptions they rest."""
-        assumptions = [one for one in self.program.assumptions if one.name in table.assumptions]
+        assumptions = [
+            assumption for assumption in self.program.assumptions if assumption.name in table.assumptions
+        ]
         needing = []
         for owing in (*self._tests(table), *self._lines(table)):
             try:
                 run, known = owing.run([])
                 if assumptions and not self._asker.all_hold(run.obligations, known):
                     needing.append(owing)
-                    run, known = owing.run(self._known(one.condition for one in assumptions))
+                    run, known = owing.run(self._known(assumption.condition for assumption in assumptions))
                 if not self._settle(run, known, owing.where, table.name):
                     self.unsafe.add(table.name)
                     self.undefined.update([table.name] if owing.condition else [])
@@ -248,13 +252,17 @@ class Obligations:
                 self._give_up(owing.where, owing.span)
         if needing:
             chosen = fewest(assumptions, partial(self._suffice, needing))
-            self.stops[table.name] = tuple(one.name for one in chosen)
+            self.stops[table.name] = tuple(assumption.name for assumption in chosen)
 
     def _suffice(self, needing: Iterable[_Owing], chosen: Sequence[Assumption]) -> bool:
         """Whether all is shown under these assumptions that is not reported under all of them."""
         for owing in needing:
-            run, known = owing.run(self._known(one.condition for one in chosen))
-            left = [one for one in run.obligations if (one.code, one.span, one.message) not in self._causes]
+            run, known = owing.run(self._known(assumption.condition for assumption in chosen))
+            left = [
+                obligation
+                for obligation in run.obligations
+                if (obligation.code, obligation.span, obligation.message) not in self._causes
+            ]
             if not self._asker.all_hold(left, known):
                 return False
         return True

@@ -93,15 +93,17 @@ def loosened(nodes: Sequence[Node], numbers: Iterator[int]) -> Iterator[Term]:
         nodes: None of which is a term yet.
         numbers: Others for each result: two results are not the same.
     """
-    for one in values.parts_first(*nodes):
-        if one.op in _ARITHMETIC and any(isinstance(part.kind, Real) for part in (one, *one.args)):
-            if one.term is None:
-                one.term = smt.variable(f"double!{next(numbers)}", one.kind)
-            if one.ordered:
+    for node in values.parts_first(*nodes):
+        if node.op in _ARITHMETIC and any(isinstance(part.kind, Real) for part in (node, *node.args)):
+            if node.term is None:
+                node.term = smt.variable(f"double!{next(numbers)}", node.kind)
+            if node.ordered:
                 ends = (
-                    Int(int(one.low), int(one.high)) if isinstance(one.kind, Int) else Real(one.low, one.high)
+                    Int(int(node.low), int(node.high))
+                    if isinstance(node.kind, Int)
+                    else Real(node.low, node.high)
                 )
-                yield within(one.term, ends)
+                yield within(node.term, ends)
 
 
 class _Cycles:
@@ -122,9 +124,9 @@ class _Cycles:
         """Every pair that is possible."""
         first = self._run()
         self._before_table(first)
-        for one in self.program.variables:
-            if one.deferred_until is not None:
-                first.state.leaves[pending(one.name)] = first.leaf(one.name)
+        for variable in self.program.variables:
+            if variable.deferred_until is not None:
+                first.state.leaves[pending(variable.name)] = first.leaf(variable.name)
         facts = self._facts(first)
         lines = self._lines(first)
         for at, actions in enumerate(self._actions()):
@@ -170,9 +172,11 @@ class _Cycles:
     def _before_table(self, run: Run) -> None:
         """Any inputs, the deferred values that are due, and the preprocess."""
         self.cycle += 1
-        for one in self.program.variables:
-            if one.kind is Kind.INPUT:
-                run.state.leaves[one.name] = values.variable(f"{one.name}'{self.cycle}", one.type)
+        for variable in self.program.variables:
+            if variable.kind is Kind.INPUT:
+                run.state.leaves[variable.name] = values.variable(
+                    f"{variable.name}'{self.cycle}", variable.type
+                )
         run.settle(self.program)
         self._procedures(run, () if self.level is None else self.level[0].preprocess)
 

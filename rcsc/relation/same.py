@@ -103,10 +103,10 @@ class _Question:
 
     def answer(self) -> Comparison:
         """Each outcome of the first table against those of the second that it can meet, its namesake first."""
-        for one in self.one:
-            left = one.when  # what of it no outcome of the second table has met yet
-            for two in sorted(self.two, key=lambda two: two.name != one.name):
-                found = self._asked(one, two)
+        for outcome in self.one:
+            left = outcome.when  # what of it no outcome of the second table has met yet
+            for two in sorted(self.two, key=lambda two: two.name != outcome.name):
+                found = self._asked(outcome, two)
                 if found is not None:
                     return found
                 left = values.both(left, values.negation(two.when))

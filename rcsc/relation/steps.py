@@ -64,7 +64,7 @@ class Steps:
 
     def __post_init__(self) -> None:
         self.program = relying(self.program)
-        self.table = next(one for one in self.program.tables if one.name == self.table.name)
+        self.table = next(table for table in self.program.tables if table.name == self.table.name)
         self._solver = Solver(self.options.limits)
         before = values.variable(self.state.name, self.state.type)
         self._start[self.state.name] = before
@@ -169,8 +169,8 @@ class Steps:
 
     def _declare(self, nodes: Sequence[Node]) -> None:
         """Asserts the ranges of variables not met before."""
-        new = [one for name, one in values.variables(nodes).items() if name not in self._asserted]
-        self._asserted.update(one.name for one in new)
+        new = [node for name, node in values.variables(nodes).items() if name not in self._asserted]
+        self._asserted.update(node.name for node in new)
         self._solver.add(*values.domain(new))
 
     def _possible(self, *nodes: Node) -> bool:
@@ -182,7 +182,9 @@ class Steps:
 
 def assumed(program: Program, table: Table) -> list[Expr]:
     """The conditions that the table may rely on."""
-    return [one.condition for one in program.assumptions if one.name in table.assumptions]
+    return [
+        assumption.condition for assumption in program.assumptions if assumption.name in table.assumptions
+    ]
 
 
 def answered(solver: Solver, *terms: Term) -> bool:

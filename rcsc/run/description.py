@@ -227,7 +227,7 @@ def _ends(buffers: Mapping[str, str]) -> Iterator[tuple[KeyPath, str, str]]:
 def _alike(party: str, levels: list[str], parties: list[str]) -> str:
     """The level, or the party that is named oftener, whose spelling is nearest; empty where none is near."""
     oftener = [one for one in parties if parties.count(one) > parties.count(party)]
-    swapped = [one for one in levels if sorted(one) == sorted(party)]
+    swapped = [level for level in levels if sorted(level) == sorted(party)]
     near = [*swapped, *get_close_matches(party, [*levels, *oftener], n=1, cutoff=0.8)]
     return near[0] if near else ""
 

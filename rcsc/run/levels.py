@@ -217,7 +217,7 @@ def running_level(
         sign,
         level,
         executor,
-        tuple(Take(*one, sign.form(range(one[1], one[1] + one[2]))) for one in takes),
+        tuple(Take(*take, sign.form(range(take[1], take[1] + take[2]))) for take in takes),
         tuple(Give(name, first, first + count) for name, first, count in gives),
         tuple(_fill(spec, sign, feed, queries) for feed in spec.feeds),
     )

@@ -234,7 +234,9 @@ def executors(system: Description, signs: Mapping[str, Signature], kind: Kind) -
     Raises:
         NotBuilt: The C could not be built.
     """
-    levels = {name: next(one for one in sign.levels if one.name == name) for name, sign in signs.items()}
+    levels = {
+        name: next(level for level in sign.levels if level.name == name) for name, sign in signs.items()
+    }
     if kind == "python":
         return {name: PythonExecutor(system.generated, sign, levels[name]) for name, sign in signs.items()}
     library = build(system.generated, list({sign.program: sign for sign in signs.values()}.values()))
@@ -253,7 +255,7 @@ def assemble(
     refuse_unproved(system)
     signs = signatures(system)
     for name, sign in signs.items():
-        if not any(one.name == name for one in sign.levels):
+        if not any(level.name == name for level in sign.levels):
             raise BadDescription(f"program `{sign.program}` has no level `{name}`")
     made = executors(system, signs, kind)
     levels: Sequence[RunningLevel] = [

@@ -188,14 +188,14 @@ class Commands:
     def _levels(self, rest: str) -> Said:
         _nothing("levels", rest)
         return [
-            f"{'*' if one.name == self.session.chosen else ' '} {one.name:14} every {one.level.period_ms} ms: "
-            f"{', '.join(typed_names.tables_of(one))}"
-            for one in self.session.levels
+            f"{'*' if level.name == self.session.chosen else ' '} {level.name:14} every {level.level.period_ms} ms: "
+            f"{', '.join(typed_names.tables_of(level))}"
+            for level in self.session.levels
         ]
 
     def _lines(self, rest: str) -> Said:
         _nothing("lines", rest)
-        return [f"{one.name:14} {_at(one)}" for one in self.session.levels]
+        return [f"{level.name:14} {_at(level)}" for level in self.session.levels]
 
     # --- cycles ---
 
@@ -248,7 +248,7 @@ class Commands:
 
     def _undo(self, rest: str) -> Said:
         self.session.undo(_number(rest or "1"))
-        return [f"cycle {self.session.system.tick}: {', '.join(_at(one) for one in self.session.levels)}"]
+        return [f"cycle {self.session.system.tick}: {', '.join(_at(level) for level in self.session.levels)}"]
 
     def _reload(self, rest: str) -> Said:
         words, said = rest.split(), set[str]()

@@ -78,7 +78,7 @@ def put_back(moment: Moment, system: System, memory: Memory) -> None:
 
 def _copied(outside: Outside) -> Outside:
     """A copy that shares what never changes, as the database."""
-    return copy.deepcopy(outside, {id(one): one for one in _parts(outside) if _is_frozen(one)})
+    return copy.deepcopy(outside, {id(part): part for part in _parts(outside) if _is_frozen(part)})
 
 
 def _parts(whole: object) -> list[object]:

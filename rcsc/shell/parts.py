@@ -74,9 +74,9 @@ class _Part:
 def part_names(program: Program) -> Iterator[str]:
     """What can be run by name."""
     yield from STEPS
-    yield from (one.name for one in program.owners)
-    yield from (one.name for one in program.tables)
-    yield from (one.name for one in program.procedures)
+    yield from (owner.name for owner in program.owners)
+    yield from (table.name for table in program.tables)
+    yield from (procedure.name for procedure in program.procedures)
 
 
 def call_of(text: str) -> tuple[str, tuple[str, ...]] | None:
@@ -150,14 +150,14 @@ def _step(part: _Part, name: str) -> str:
 
 
 def _in_order(part: _Part, procedures: Sequence[str]) -> Sequence[str]:
-    for one in procedures:
-        call(part.program, one, [], part.now)
+    for procedure in procedures:
+        call(part.program, procedure, [], part.now)
     return procedures
 
 
 def _flat(program: Program, members: Sequence[str]) -> list[str]:
     """The procedures of an owner, those of owners in it too."""
-    owners: Mapping[str, Sequence[str]] = {one.name: one.members for one in program.owners}
+    owners: Mapping[str, Sequence[str]] = {owner.name: owner.members for owner in program.owners}
     return [
         name
         for member in members
@@ -172,7 +172,7 @@ def _chosen(part: _Part) -> Table:
         if isinstance(tables, OneTable)
         else dict(tables.tables)[evaluate(tables.selector, part.now)]
     )
-    return next(one for one in part.program.tables if one.name == name)
+    return next(table for table in part.program.tables if table.name == name)
 
 
 def _match(part: _Part, table: Table) -> str:

@@ -78,7 +78,7 @@ class Session:
 
     def spec(self, name: str) -> LevelSpec:
         """What the description says of a level."""
-        return next(one for one in self.system.description.levels if one.name == name)
+        return next(level for level in self.system.description.levels if level.name == name)
 
     def question(self, text: str) -> Question:
         """What a condition asks.
@@ -266,7 +266,7 @@ class Session:
         self._keep()
         self._programs[id(made.level)] = made.level, made.program
         self._made[id(made.level)] = made.level, made.digest, made.sources
-        self.system.levels = tuple(made.level if one is old else one for one in self.levels)
+        self.system.levels = tuple(made.level if level is old else level for level in self.levels)
         gone = self.stops.ask_again(self.levels)
         taken = f"level `{name}` runs its new tables from cycle {self.system.tick + 1} on: {made.said}"
         return [*judged.said, *judged.doubts, taken, *gone]
@@ -295,7 +295,9 @@ class Session:
         except Refused:
             program = None
         judged = judge(Running(old, program), made.level, made.program, self.memory)
-        runs = {one.name: made.sources if one is old else self._made[id(one)][2] for one in self.levels}
+        runs = {
+            level.name: made.sources if level is old else self._made[id(level)][2] for level in self.levels
+        }
         known = together(self.plant, name, runs, self._compiled, prove=prove)
         return old, made, replace(judged, said=(*judged.said, known))
 

@@ -46,7 +46,7 @@ def found(name: str, known: Iterable[str]) -> str | None:
 def near(name: str, known: Iterable[str]) -> tuple[str, ...]:
     """`near it: ...`; nothing where nothing is near."""
     every = {normal(one): one for one in known}
-    like = [every[one] for one in difflib.get_close_matches(normal(name), every, 3)]
+    like = [every[get_close_match] for get_close_match in difflib.get_close_matches(normal(name), every, 3)]
     return (f"near it: {', '.join(like)}",) if like else ()
 
 

@@ -104,7 +104,7 @@ def together(steps: int) -> Iterator[Budget]:
 
 def spent() -> bool:
     """Whether no question is asked any more, so that none need be made."""
-    return any(one.spent for one in _budgets)
+    return any(budget.spent for budget in _budgets)
 
 
 def troubles() -> tuple[type[BaseException], ...]:
@@ -307,7 +307,7 @@ class Solver:
             return Answer.UNKNOWN
         z3 = _z3()
         self.queries += 1
-        self._give(min([self._steps, *(one.left for one in _budgets)]))
+        self._give(min([self._steps, *(budget.left for budget in _budgets)]))
         try:
             answer, why = self._answer(assuming)
         except (z3.Z3Exception, MemoryError) as error:
@@ -355,8 +355,8 @@ class Solver:
     def _charge(self, before: int) -> None:
         """Takes what a question cost from all budgets; not what an attempt cost that only the clock ended."""
         used = self._count() - before
-        for one in _budgets:
-            one.left -= used
+        for budget in _budgets:
+            budget.left -= used
 
     def _wait(self) -> None:
         """Has Z3 end a question after so much time as passes, which on a busy machine is more than it gets."""

@@ -83,8 +83,8 @@ class Bits:
     def all_of(self, literals: Iterable[Literal]) -> Literal:
         """The literal of all of them together."""
         found = TRUE
-        for one in literals:
-            found = self.both(found, one)
+        for literal in literals:
+            found = self.both(found, literal)
         return found
 
     def _either(self, a: Literal, b: Literal) -> Literal:
@@ -300,13 +300,13 @@ def few(nodes: Sequence[Node]) -> dict[Node, Few]:
         if classes.of(node) not in spoilt:
             members.setdefault(classes.of(node), []).append(node)
     found: dict[Node, Few] = {}
-    for one in members.values():
-        values = dict.fromkeys(node.low for node in one if node.op is Shape.CONSTANT)
-        names = {node.name for node in one if node.op is Shape.VARIABLE}
-        others = sum(not isinstance(node.op, Shape) for node in one)
+    for member in members.values():
+        values = dict.fromkeys(node.low for node in member if node.op is Shape.CONSTANT)
+        names = {node.name for node in member if node.op is Shape.VARIABLE}
+        others = sum(not isinstance(node.op, Shape) for node in member)
         width = max(1, (len(values) + len(names) + others - 1).bit_length())
         shared = Few(width, {value: at for at, value in enumerate(values)})
-        found |= dict.fromkeys(one, shared)
+        found |= dict.fromkeys(member, shared)
     return found
 
 

@@ -139,7 +139,7 @@ class Meaning:
     _procedures: dict[str, Procedure] = field(init=False)
 
     def __post_init__(self) -> None:
-        self._procedures = {str(one.name): one for one in self.program.procedures}
+        self._procedures = {str(procedure.name): procedure for procedure in self.program.procedures}
 
     def _run(self) -> _Followed:
         return _Followed(self._procedures, self.kinds, self.shared.start)
@@ -148,7 +148,7 @@ class Meaning:
         """The condition; where it is undefined is added to `bad`."""
         run = self._run()
         found = run.evaluate(expr)
-        self.bad += [self.shared.one(values.negation(_paid(one))) for one in run.obligations]
+        self.bad += [self.shared.one(values.negation(_paid(obligation))) for obligation in run.obligations]
         return self.shared.one(found)
 
     def effect(self, body: Iterable[Statement], given: Iterable[Node] = ()) -> Effect:

@@ -69,11 +69,15 @@ class Run(Evaluation):
 
     def settle(self, program: Program) -> None:
         """Write each pending value whose condition holds, all conditions evaluated before (`lang.interpret.settle`)."""
-        deferred = [(one, one.deferred_until) for one in program.variables if one.deferred_until is not None]
+        deferred = [
+            (variable, variable.deferred_until)
+            for variable in program.variables
+            if variable.deferred_until is not None
+        ]
         ready = [self.evaluate(until) for _, until in deferred]
-        later = [self.leaf(pending(one.name)) for one, _ in deferred]
-        for (one, _), when, value in zip(deferred, ready, later, strict=True):
-            self.write(one.name, value, when)
+        later = [self.leaf(pending(variable.name)) for variable, _ in deferred]
+        for (variable, _), when, value in zip(deferred, ready, later, strict=True):
+            self.write(variable.name, value, when)
 
     def choices(self, level: Level) -> dict[str, Node]:
         """Return the condition under which each table of the level runs, now that what selects it is computed."""

@@ -64,7 +64,7 @@ class Measured(Keyed):
     def _reached(self, node: Node) -> Term:
         """That each operand has a value which it may have there; elsewhere the node is not read."""
         parts = [arg for arg in node.args if arg.op not in (CONSTANT, VARIABLE)]
-        return smt.all_of([one for arg in parts for one in self._inside(arg)])
+        return smt.all_of([term for arg in parts for term in self._inside(arg)])
 
     def _inside(self, node: Node) -> list[Term]:
         term = self.term(node)

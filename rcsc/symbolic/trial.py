@@ -39,7 +39,7 @@ def found(conditions: Sequence[Node], variables: Sequence[Node]) -> Point | None
     random = Random(0)  # noqa: S311  # a sample, not a secret
     best: Point | None = None
     for number in range(SAMPLES):
-        point = {one.name: _pick(one, number, random) for one in variables}
+        point = {variable.name: _pick(variable, number, random) for variable in variables}
         if _all_hold(order, conditions, point) and (best is None or _less(point, best, variables)):
             best = point
     return None if best is None else _lowered(order, conditions, variables, best)
@@ -48,9 +48,9 @@ def found(conditions: Sequence[Node], variables: Sequence[Node]) -> Point | None
 def points(variables: Sequence[Variable]) -> Iterator[Point]:
     """Values of these variables to try: ends first, then edges and others; always the same."""
     random = Random(0)  # noqa: S311  # a sample, not a secret
-    nodes = [variable_of(str(one.name), one.type) for one in variables]
+    nodes = [variable_of(str(variable.name), variable.type) for variable in variables]
     for number in range(SAMPLES):
-        yield {one.name: _pick(one, number, random) for one in nodes}
+        yield {node.name: _pick(node, number, random) for node in nodes}
 
 
 def holds_at(condition: Node, point: Mapping[str, Value]) -> bool:
@@ -120,7 +120,7 @@ def _value(node: Node, parts: list[Value | None], point: Mapping[str, Value]) ->
             return (
                 None
                 if None in parts
-                else _computed(op, node.args[0].kind, [one for one in parts if one is not None])
+                else _computed(op, node.args[0].kind, [part for part in parts if part is not None])
             )
 
 

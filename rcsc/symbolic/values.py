@@ -293,12 +293,12 @@ def _term(node: Node, parts: list[Term]) -> Term:
 
 def variables(nodes: Iterable[Node]) -> dict[str, Node]:
     """The variables below the nodes, by name."""
-    return {one.name: one for one in parts_first(*nodes) if one.op == VARIABLE}
+    return {node.name: node for node in parts_first(*nodes) if node.op == VARIABLE}
 
 
 def domain(found: Iterable[Node]) -> list[Term]:
     """That each variable is a value of its type."""
-    return [within(term_of(one), one.kind) for one in found if not isinstance(one.kind, Bool)]
+    return [within(term_of(node), node.kind) for node in found if not isinstance(node.kind, Bool)]
 
 
 def parts_first(*nodes: Node, known: Container[Node] = ()) -> Iterator[Node]:

@@ -289,7 +289,7 @@ class Search:
             if self._looked_at > BUDGET:
                 raise BudgetError
             inside = [at for at in alive if name not in lines[at] or holds(lines[at][name], low)]
-            counted = [one for one in pieces if name not in one.box or holds(one.box[name], low)]
+            counted = [piece for piece in pieces if name not in piece.box or holds(piece.box[name], low)]
             found = self._search(depth + 1, inside, lines, counted)
             if found is not None:
                 return {name: (low, high), **found}

@@ -112,7 +112,7 @@ def confirm(program: Program, table: Table, found: tuple[Found, ...], options: O
 
 def _some_gap(asked: Asked, gaps: Sequence[Gap]) -> Answer:
     """Whether no line matches some input: first at one that was found, which costs little."""
-    for witness in (one.witnesses[0] for one in gaps if one.witnesses):
+    for witness in (gap.witnesses[0] for gap in gaps if gap.witnesses):
         here = [
             smt.equal(asked.frame.leaves[v.name], smt.literal(v.type, witness[v.name]), v.type)
             for v in asked.program.variables

@@ -58,8 +58,8 @@ def _by_boxes(program: Program, table: Table) -> tuple[Found, ...]:
 
 def _narrows(program: Program, table: Table) -> bool:
     """Whether an assumption reads what the table's conditions read."""
-    assumed = [one for one in program.assumptions if one.name in table.assumptions]
-    return any(not set(read_by(one.condition)).isdisjoint(table.variables) for one in assumed)
+    assumed = [assumption for assumption in program.assumptions if assumption.name in table.assumptions]
+    return any(not set(read_by(assumption.condition)).isdisjoint(table.variables) for assumption in assumed)
 
 
 def _wrong(table: Table, found: tuple[Found, ...]) -> bool:

@@ -30,8 +30,8 @@ MOST_PAIRS = 20
 def diagnostics(program: Program, verdict: TableVerdict, unproved: Collection[str] = ()) -> list[Diagnostic]:
     """The verdict's findings, ready to show; `unproved` are invariants and assumptions that should be proved and are not."""
     table = verdict.table
-    overlaps = [one for one in verdict.found if isinstance(one, Overlap)]
-    shown = [_overlap(program, table, one) for one in overlaps[:MOST_PAIRS]]
+    overlaps = [overlap for overlap in verdict.found if isinstance(overlap, Overlap)]
+    shown = [_overlap(program, table, overlap) for overlap in overlaps[:MOST_PAIRS]]
     if len(overlaps) > MOST_PAIRS:
         least = "at least " if len(overlaps) == boxes.MOST_PAIRS else ""
         message = (
@@ -43,10 +43,10 @@ def diagnostics(program: Program, verdict: TableVerdict, unproved: Collection[st
 
 def _others(program: Program, verdict: TableVerdict, unproved: Collection[str]) -> Iterator[Diagnostic]:
     table = verdict.table
-    for one in verdict.found:
-        match one:
+    for gap in verdict.found:
+        match gap:
             case Gap():
-                yield _gap(program, table, one)
+                yield _gap(program, table, gap)
             case DeadLine(line, assuming):
                 yield _dead(table, line, assuming, _under(table, unproved))
             case ContradictoryAssumptions():

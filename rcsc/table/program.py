@@ -80,7 +80,7 @@ def prove_program(
         if verdict.table.name not in owed.undefined:
             found += diagnostics(assuming, verdict, unproved)
     findings = tuple(sorted(dict.fromkeys(found), key=sort_key))
-    wrong = any(one.severity is Severity.ERROR for one in findings)
+    wrong = any(finding.severity is Severity.ERROR for finding in findings)
     if wrong or only is not None:
         unsafe = frozenset(owed.unsafe)
         return ProgramVerdict(findings, None, verdicts, None, owed.tally, program, unproved, unsafe)
@@ -96,14 +96,14 @@ def _unproved(program: Program, found: Iterable[Diagnostic]) -> frozenset[str]:
     Invariants are shown by one induction in which every run rests on all of them, and on what it owes itself: any
     error breaks it. An assumption that is proved rests on the invariants.
     """
-    errors = [one for one in found if one.severity is Severity.ERROR]
-    spans = {one.primary.span for one in errors}
+    errors = [diagnostic for diagnostic in found if diagnostic.severity is Severity.ERROR]
+    spans = {error.primary.span for error in errors}
     broken = bool(errors and program.invariants)
-    claimed = (one for one in program.assumptions if one.standing is Standing.PROVED)
+    claimed = (assumption for assumption in program.assumptions if assumption.standing is Standing.PROVED)
     return frozenset(
         (
-            *(one.name for one in program.invariants if broken),
-            *(str(one.name) for one in claimed if broken or one.span in spans),
+            *(invariant.name for invariant in program.invariants if broken),
+            *(str(assumption.name) for assumption in claimed if broken or assumption.span in spans),
         )
     )
 
@@ -113,7 +113,7 @@ def _with_invariants(program: Program, verdict: TableVerdict) -> TableVerdict:
     if not program.invariants or defined_alone(program, verdict.table):
         return verdict
     named = dict(verdict.backing.assumptions)
-    more = {AssumptionName(one.name): Standing.PROVED for one in program.invariants}
+    more = {AssumptionName(invariant.name): Standing.PROVED for invariant in program.invariants}
     backing = replace(verdict.backing, assumptions=tuple((named | more).items()))
     return replace(verdict, backing=backing)
 
@@ -127,7 +127,7 @@ def _verdicts(
         made = _in_processes(program, defined, options)
     else:
         made = [_verdict(program, table, options) for table in defined]
-    by_name = {one.table.name: one for one in made}
+    by_name = {table_verdict.table.name: table_verdict for table_verdict in made}
     why = Undecided("a condition is not defined for every input")
     return tuple(by_name.get(table.name) or _left_open(table, why) for table in tables)
 
@@ -175,7 +175,8 @@ def _in_processes(program: Program, tables: list[Table], options: Options) -> li
     with children.pool(min(options.jobs, len(tables))) as pool:
         waiting = [pool.submit(_verdict, program, table, one_each) for table in tables]
         return [
-            replace(children.answer(one), table=table) for one, table in zip(waiting, tables, strict=True)
+            replace(children.answer(future), table=table)
+            for future, table in zip(waiting, tables, strict=True)
         ]
 
 

@@ -115,7 +115,11 @@ class _Decision:
     def allowed(self, snapshot: Snapshot) -> bool:
         """Whether the table's assumptions hold, and every condition of its lines is defined."""
         names = self.table.assumptions
-        if not all(fold(one.condition, snapshot) for one in self.program.assumptions if one.name in names):
+        if not all(
+            fold(assumption.condition, snapshot)
+            for assumption in self.program.assumptions
+            if assumption.name in names
+        ):
             return False
         try:
             self.matching(snapshot)
@@ -153,7 +157,7 @@ class _Decision:
         wrong = self.contradiction()
         if wrong:
             return wrong
-        gaps = [found for one in settled if isinstance(one, Gap) for found in self.narrowed_gap(one)]
+        gaps = [found for gap in settled if isinstance(gap, Gap) for found in self.narrowed_gap(gap)]
         return (*self.dead(), *gaps)
 
     def contradiction(self) -> tuple[Found, ...]:
@@ -291,7 +295,7 @@ class _Decision:
 
     def dead(self) -> list[Found]:
         """Lines that no input matches, those that only an assumption excludes told apart from those that ranges and invariants do."""
-        standing = {one.name: one.standing for one in self.program.assumptions}
+        standing = {assumption.name: assumption.standing for assumption in self.program.assumptions}
         names = zip(self.table.assumptions, self.assumed, strict=True)
         sure = [formula for name, formula in names if standing[name] is Standing.PROVED]
         found: list[Found] = []

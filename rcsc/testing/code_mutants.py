@@ -436,9 +436,9 @@ class Sample:
             return [*others, *self.equal]
         random = Random(SEED)  # noqa: S311  # a repeatable sample
         return [
-            one
+            code_mutant
             for group in (others, self.equal)
-            for one in random.sample(group, min(self.others, len(group)))
+            for code_mutant in random.sample(group, min(self.others, len(group)))
         ]
 
 

@@ -137,7 +137,7 @@ def costs(made: Hierarchy, effort: Effort | None = None) -> list[Cost]:
         seconds = time.perf_counter() - begun
         left = len(essential(proofs[level.name]))
         found.append(Cost(level.name, len(level.tables), seconds, questions.many, left))
-    assert any(one.open for one in found) or all(one.holds for one in agreements(known, proofs))
+    assert any(one.open for one in found) or all(agreement.holds for agreement in agreements(known, proofs))
     return found
 
 
@@ -168,9 +168,9 @@ def main(arguments: list[str] | None = None) -> int:
     )
     given = parser.parse_args(arguments)
     if given.tables:
-        for one in costs(chain(given.tables)):
+        for cost in costs(chain(given.tables)):
             print(
-                f"{one.level:6} {one.tables:4} tables {one.seconds:8.2f} s {one.questions:7} questions",
+                f"{cost.level:6} {cost.tables:4} tables {cost.seconds:8.2f} s {cost.questions:7} questions",
                 flush=True,
             )
         return 0

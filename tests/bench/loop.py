@@ -80,7 +80,7 @@ def spent(backend: Backend, kind: Kind, log: Path) -> Spent:
         whole = time.perf_counter() - begun
     ticks = run.system.tick
     control_s = ticks * run.system.description.tick_ms / 1000
-    return Spent(ticks, control_s, whole, timed[0].seconds, *(one.seconds for one in watches))
+    return Spent(ticks, control_s, whole, timed[0].seconds, *(watch.seconds for watch in watches))
 
 
 def best(backend: Backend, kind: Kind, log: Path) -> Spent:

@@ -173,7 +173,7 @@ def test_what_comes_of_a_lost_command_stands_behind_it(published: Path) -> None:
 def test_two_levels_stand_one_above_the_other(last_echo: Path) -> None:
     """The upper one changes its order and not the number; the lower one takes it, and answers as if it were the first."""
     page = page_of(last_echo / "lower_same_order_command.mcap")
-    assert [re.findall(r"<h3>(\w+)<span>", one) for one in page.frames] == [["upper", "lower"]] * 3
+    assert [re.findall(r"<h3>(\w+)<span>", frame) for frame in page.frames] == [["upper", "lower"]] * 3
     above, _, below = page.words(2).partition("upper ↓")
     assert "order no. 1 drill changed, same number" in above
     assert "order no. 1 rest new" in below

@@ -96,7 +96,7 @@ def test_a_run_is_its_controls_and_nothing_else(monkeypatch: pytest.MonkeyPatch,
 
     run = prepare(SYSTEM, str(tmp_path / "move.csv"), "c", outside)
     results = list(run.steps())
-    assert [one.state for one in results] == ["done"]
+    assert [result.state for result in results] == ["done"]
     real = made[0].mechanism
     assert isinstance(real, Physical)
     start = home(run.database)
@@ -203,7 +203,7 @@ def test_a_run_needs_no_true_pose(monkeypatch: pytest.MonkeyPatch, tmp_path: Pat
     monkeypatch.setattr(Physical, "touching", refuse)
     (tmp_path / "move.csv").write_text(FIRST_ROW, encoding="utf-8")
     run = prepare(SYSTEM, str(tmp_path / "move.csv"), "c", lambda held: [plant(held)])
-    assert [one.state for one in run.steps()] == ["done"]
+    assert [step.state for step in run.steps()] == ["done"]
 
 
 def _above_the_buffer(held: Database) -> Physical:

@@ -74,8 +74,8 @@ def test_three_points_that_are_no_plate(numbers: tuple[float, ...]) -> None:
 @given(joint)
 def test_every_solution_brings_the_plate_there(joints: tuple[float, ...]) -> None:
     wanted = plate(joints)
-    for one in solutions(wanted):
-        assert near(plate(one), wanted, 1e-5)
+    for solution in solutions(wanted):
+        assert near(plate(solution), wanted, 1e-5)
     found = solve(wanted, joints)
     if found is not None:  # within a hair of a limit the way that is nearest may lie beyond it
         assert all(low <= value <= high for value, (low, high) in zip(found, LIMITS, strict=True))
@@ -210,7 +210,7 @@ def test_a_station_out_of_reach_is_named(tmp_path: Path) -> None:
     build(tmp_path / "cell.toml", tmp_path / "cell.sqlite", parts_of(signatures(description(SYSTEM))))
     problems = unreachable(open_database(tmp_path / "cell.sqlite"))
     assert problems
-    assert all("STATION" in one for one in problems)
+    assert all("STATION" in problem for problem in problems)
 
 
 # --- the plants ---
@@ -404,7 +404,7 @@ def became(backend: Backend, path: str, fault: str = "", value: object = True) -
         return made
 
     run = prepare(SYSTEM, path, "c", outside)
-    return [(one.row.number, one.state, one.reason) for one in run.steps(4000)]
+    return [(step.row.number, step.state, step.reason) for step in run.steps(4000)]
 
 
 @pytest.mark.parametrize("name", list(SCRIPTS))

@@ -553,7 +553,7 @@ def _places(value: object, path: tuple[str | int, ...] = ()) -> Iterable[tuple[s
 def _odd(said: dict[str, Any], rnd: Random) -> None:
     """Puts something odd somewhere, beside something, or nowhere in its place."""
     part = rnd.choice(["tick", "station", "levels", "buffers", "outside", "outside"])
-    *path, last = rnd.choice([one for one in _places(said) if one[0] == part])
+    *path, last = rnd.choice([place for place in _places(said) if place[0] == part])
     held: Any = said
     for key in path:
         held = held[key]

@@ -304,7 +304,7 @@ def test_image_processing_cannot_know_the_world(module: ModuleType) -> None:
 
 def test_what_image_processing_is_given() -> None:
     given_to = {
-        function: [one.annotation for one in inspect.signature(function).parameters.values()]
+        function: [parameter.annotation for parameter in inspect.signature(function).parameters.values()]
         for function in (find, measure)
     }
     optics = optics_module.Optics
@@ -360,7 +360,7 @@ def test_moments_of_a_drawn_rectangle(u: float, v: float, length: float, width: 
 @pytest.mark.parametrize("angle", [0.0, pi / 2])
 def test_sides_are_right_on_average_wherever_the_edges_fall(angle: float) -> None:
     places = [30 + at / 8 for at in range(8)]
-    seen = [one for u in places for v in places for one in blobs(drawn(u, v, 12, 8, angle), 0.6)]
+    seen = [blob for u in places for v in places for blob in blobs(drawn(u, v, 12, 8, angle), 0.6)]
     assert len(seen) == 64
     assert np.mean([one.length_px for one in seen]) == pytest.approx(12, abs=0.04)
     assert np.mean([one.width_px for one in seen]) == pytest.approx(8, abs=0.04)

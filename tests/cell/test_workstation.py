@@ -358,7 +358,7 @@ def test_a_part_of_the_wrong_size_is_let_go_of_and_the_next_is_acquired() -> Non
     assert made.station.cell.held == "unknown_object"
     made.station.resume()
     made.station.begin_at(1)
-    assert [(one.state, one.reason) for one in made.steps()] == [("done", ""), ("done", "")]
+    assert [(step.state, step.reason) for step in made.steps()] == [("done", ""), ("done", "")]
     assert made.system.level("task").shown("obj_now_in_gripper") == "tbox"
     [*_, house] = made.system.outside[1].mechanism.parts()  # type: ignore[attr-defined]  # a plant
     assert house.at_mm[2] == pytest.approx(395.0, abs=1.0), "it lies where it lay"
@@ -392,7 +392,7 @@ def test_a_part_that_was_not_picked_up_is_counted_on_the_buffer_again() -> None:
         made.system.step()
     assert counts == [10, 9, 10]
     made.station.resume()
-    assert [one.state for one in made.steps()] == ["done", "refused"]
+    assert [step.state for step in made.steps()] == ["done", "refused"]
     assert counts == [10, 9, 10, 9]
 
 

@@ -207,7 +207,7 @@ def test_what_the_commands_print_is_shown_as_it_is() -> None:
 def lines_of(path: Path) -> int:
     """Lines of a file, or of all files in a folder but compiled ones and guides."""
     files = [path] if path.is_file() else [one for one in path.rglob("*") if one.is_file()]
-    return sum(len(one.read_bytes().splitlines()) for one in files if one.suffix not in {".pyc", ".md"})
+    return sum(len(file.read_bytes().splitlines()) for file in files if file.suffix not in {".pyc", ".md"})
 
 
 def test_what_is_trusted_is_about_as_long_as_it_says() -> None:

@@ -87,9 +87,15 @@ def test_everything_is_proved_of_two_levels_that_keep_to_the_protocol(small: Sys
 
 
 def test_what_a_level_assumes_of_a_level_is_what_was_proved_of_it(small: SystemProof) -> None:
-    inside = {(one.level, one.reason.split(":")[0]) for one in small.agreements if not one.outside}
+    inside = {
+        (agreement.level, agreement.reason.split(":")[0])
+        for agreement in small.agreements
+        if not agreement.outside
+    }
     assert inside == {("upper", "proved of `lower`"), ("lower", "proved of `upper`")}
-    assert [one.level for one in small.agreements if one.outside] == ["upper"]  # the station
+    assert [agreement.level for agreement in small.agreements if agreement.outside] == [
+        "upper"
+    ]  # the station
 
 
 def test_no_state_that_the_interpreter_reaches_breaks_the_invariant(
@@ -121,7 +127,7 @@ def test_another_solver_confirms_every_question(upper: tuple[TransitionSystem, L
 
 def test_another_solver_refuses_an_invariant_that_is_none(upper: tuple[TransitionSystem, LevelProof]) -> None:
     ts, proof = upper
-    predicates = [one.name for one in proof.predicates]
+    predicates = [predicate.name for predicate in proof.predicates]
     never = ((predicates.index("cur_state"), 2),)  # that the level is never under way
     false = LevelProof(proof.level, proof.found, proof.predicates, (*proof.clauses, never), 0, 0, 0.0)
     assert not all(cvc5_refutes(text) for text in certificate(ts, false).values())
@@ -172,7 +178,9 @@ def test_a_subordinate_that_echoes_another_command_breaks_what_its_superior_assu
     )
     found = prove_system(path, LITTLE)
     assert not found.proved
-    assert [(one.level, one.holds) for one in found.agreements if not one.outside] == [
+    assert [
+        (agreement.level, agreement.holds) for agreement in found.agreements if not agreement.outside
+    ] == [
         ("upper", False),
         ("lower", True),
     ]
@@ -186,7 +194,9 @@ def test_a_superior_that_does_not_number_breaks_what_its_subordinate_assumes(tmp
         return text.replace("module send reads ", "module send reads begun, ")
 
     found = prove_system(changed(tmp_path, upper=twice), LITTLE)
-    assert [(one.level, one.holds) for one in found.agreements if not one.outside] == [
+    assert [
+        (agreement.level, agreement.holds) for agreement in found.agreements if not agreement.outside
+    ] == [
         ("upper", True),
         ("lower", False),
     ]
@@ -200,11 +210,11 @@ def test_levels_that_begin_with_different_orders_do_not_agree(
 ) -> None:
     made = transition_systems(SMALL / "system.toml")
     proofs = {proof.level: proof for proof in small.levels}
-    assert all(one.holds for one in agreements(made, proofs))
+    assert all(agreement.holds for agreement in agreements(made, proofs))
     program = made[level].program
     other = tuple(replace(v, initial=1) if v.name == leaf else v for v in program.variables)
     made[level] = made[level].of(replace(program, variables=other))
-    assert [one.level for one in agreements(made, proofs) if not one.holds] == ["upper"]
+    assert [agreement.level for agreement in agreements(made, proofs) if not agreement.holds] == ["upper"]
 
 
 # --- descriptions ---------------------------------------------------------------------------
@@ -304,7 +314,7 @@ def proved_in_its_environment(level: str) -> None:
     assert (proof.context.unreached, proof.context.restless) == ((), False)
     again = {(one.table, one.line, one.leaves) for one in proof.context.repeated}
     assert again <= {("goto", "1", ("length_mm",)), ("gothru", "1", ("length_mm",))}
-    assert {one.table for one in proof.endings if not one.proved} == set()
+    assert {ending.table for ending in proof.endings if not ending.proved} == set()
     questions = certificate(ts, proof)
     # those about lines take cvc5 longest: `rcsc prove --certify` asks them
     asked = {name: text for name, text in questions.items() if not name.startswith("lines")}

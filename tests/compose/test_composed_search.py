@@ -263,9 +263,12 @@ def test_lines_of_the_small_levels_are_all_reached_and_say_the_same_again(tmp_pa
         assert found.context is not None
         assert (found.context.unreached, found.context.repeated, found.context.restless) == ((), (), False)
     # `go` of the lower level waits for its input: nothing there makes that come
-    lower = {one.table: (one.changes, one.endless) for one in proved(tmp_path, "lower").endings}
+    lower = {ending.table: (ending.changes, ending.endless) for ending in proved(tmp_path, "lower").endings}
     assert lower == {"pause": (1, ()), "go": (1, ("2",))}
-    assert {one.table: one.changes for one in proved(tmp_path, "upper").endings} == {"rest": 2, "work": 3}
+    assert {ending.table: ending.changes for ending in proved(tmp_path, "upper").endings} == {
+        "rest": 2,
+        "work": 3,
+    }
 
 
 def test_a_line_that_is_dead_in_its_context_is_named(tmp_path: Path) -> None:
@@ -321,7 +324,7 @@ def test_a_command_that_need_not_end_is_named(tmp_path: Path) -> None:
         tmp_path, "upper", upper=swap("| f_state   ||                         | pause       | fail       |",
                                       "| f_state   || nextstate(d_state)      | pause       | executing  |")
     )  # fmt: skip
-    ends = {one.table: one for one in found.endings}
+    ends = {ending.table: ending for ending in found.endings}
     assert ends["work"].proved  # from a failure to done: one state more, and it ends
     assert ends["work"].changes == 4  # new, going; failed, which is to be done, and is; new no more
     gone = "nextstate(d_state)      | pause       | done       |"
@@ -332,7 +335,7 @@ def test_a_command_that_need_not_end_is_named(tmp_path: Path) -> None:
         return text.replace(more, "| d_state   || nextstate(going)        | go          | executing  |")
 
     round_ = proved(tmp_path / "round", "upper", upper=edit)
-    assert [one.table for one in round_.endings if one.changes is None] == ["work"]
+    assert [ending.table for ending in round_.endings if ending.changes is None] == ["work"]
 
 
 DONE = "go             | done      | going     || nextstate(d_state)      | pause       | done       |"
@@ -341,7 +344,7 @@ DONE = "go             | done      | going     || nextstate(d_state)      | paus
 def test_a_level_that_waits_for_what_nobody_says_is_named(tmp_path: Path) -> None:
     waits = "go             | done      | going     ||                         |             | executing  |"
     found = proved(tmp_path, "upper", upper=swap(DONE, waits))
-    ends = {one.table: one for one in found.endings}
+    ends = {ending.table: ending for ending in found.endings}
     assert (ends["work"].endless, ends["work"].proved) == (("2",), False)
 
 
@@ -365,7 +368,9 @@ def test_a_proof_is_recalled_as_it_was_and_only_for_the_same_level(cache: Cache,
     assert [(obligation.key, verdict) for obligation, verdict in kept.found] == [
         (obligation.key, verdict) for obligation, verdict in proof.found
     ]
-    assert [one.name for one in kept.predicates] == [one.name for one in proof.predicates]
+    assert [predicate.name for predicate in kept.predicates] == [
+        predicate.name for predicate in proof.predicates
+    ]
     other = changed(tmp_path / "other", upper=swap(DONE, DONE.replace("d_state", "f_state")))
     assert recall(cache, transition_systems(other)["upper"], LITTLE) is None
     assert recall(cache, upper, Effort(walks=11, cycles=80)) is None
@@ -396,10 +401,10 @@ def test_a_system_is_not_proved_twice(cache: Cache, monkeypatch: pytest.MonkeyPa
 
     monkeypatch.setattr("rcsc.compose.proof.system.prove_level", never)
     again = prove_transition_systems(made, LITTLE, 1, tuple(made), None, cache)
-    assert [one.clauses for one in again.levels] == [one.clauses for one in first.levels]
+    assert [level.clauses for level in again.levels] == [level.clauses for level in first.levels]
     assert again.agreements == first.agreements
     assert again.proved
-    assert all(one.cached for one in again.levels)
+    assert all(level.cached for level in again.levels)
     with pytest.raises(AssertionError):
         prove_transition_systems(made, LITTLE, 1, tuple(made), None, None)
 
@@ -436,7 +441,7 @@ def test_what_z3_does_not_confirm_is_not_proved(monkeypatch: pytest.MonkeyPatch,
         effort: Effort,
     ) -> Invariant:
         found = search(ts, firsts, cycle, wanted, effort)
-        names = [one.name for one in found.predicates]
+        names = [predicate.name for predicate in found.predicates]
         at = names.index("cur_state")
         return replace(found, clauses=(*found.clauses, *(((at, lie),) for lie in lies)))
 

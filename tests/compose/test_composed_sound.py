@@ -380,7 +380,7 @@ def test_no_answer_of_the_database_is_a_key_of_a_question(
 
 @pytest.fixture(scope="module")
 def small() -> dict[str, LevelProof]:
-    return {one.level: one for one in prove_system(SMALL / "system.toml", LITTLE).levels}
+    return {level.level: level for level in prove_system(SMALL / "system.toml", LITTLE).levels}
 
 
 @pytest.mark.parametrize(
@@ -422,7 +422,11 @@ def test_levels_begin_with_what_each_assumes(
     program = made["upper"].program
     other = tuple(replace(v, initial=value) if v.name == leaf else v for v in program.variables)
     made["upper"] = made["upper"].of(replace(program, variables=other))
-    of_it = [one for one in agreements(made, small) if one.level == "upper" and not one.outside]
+    of_it = [
+        agreement
+        for agreement in agreements(made, small)
+        if agreement.level == "upper" and not agreement.outside
+    ]
     assert [one.holds for one in of_it] == [agree]
 
 
@@ -1093,7 +1097,7 @@ def test_a_neighbour_outside_need_not_speak_of_orders() -> None:
     path = Path(__file__).parents[2] / "tables" / "system.toml"
     program, _ = loaded_program(path, "gripper")
     found = links(description(path), "gripper", program)
-    assert [one.name for one in program.variables if one.name.startswith("to_hand.")]
+    assert [variable.name for variable in program.variables if variable.name.startswith("to_hand.")]
     assert found.unread == ()
 
 

@@ -706,7 +706,10 @@ def test_the_weakest_condition_holds_of_just_the_inputs_that_one_line_matches(tm
         SMALL / "system.toml", tmp_path, upper=swap(stated, f"assume in_step monitored : {weakest}")
     )
     changed = transition_systems(path)["upper"].program
-    table, [condition] = table_of(changed, "work"), [one.condition for one in changed.assumptions]
+    table, [condition] = (
+        table_of(changed, "work"),
+        [assumption.condition for assumption in changed.assumptions],
+    )
     held = [
         holds(condition, seen) is (len(matching_lines(table, seen)) == 1)
         for seen in inputs_of(changed, table)

@@ -172,7 +172,7 @@ def test_too_many_states_are_said_to_be(tmp_path: Path) -> None:
 
 def words(made: Hierarchy) -> set[str]:
     """What the two disagree about."""
-    return {one.what for one in judged(made, traces=99).disagreements}
+    return {disagreement.what for disagreement in judged(made, traces=99).disagreements}
 
 
 def test_a_prover_that_believes_in_a_better_world_is_found_out(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -212,10 +212,13 @@ def saying(call: str, more: str, *states: str, asks: tuple[tuple[str, int], ...]
     upper, lower = plain().levels
     tables = tuple(
         replace(
-            one,
-            lines=(replace(one.lines[0], calls=(*filter(None, [call]), *one.lines[0].calls)), *one.lines[1:]),
+            table,
+            lines=(
+                replace(table.lines[0], calls=(*filter(None, [call]), *table.lines[0].calls)),
+                *table.lines[1:],
+            ),
         )
-        for one in lower.tables
+        for table in lower.tables
     )
     return Hierarchy((upper, replace(lower, more=(more,), states=states, asks=asks, tables=tables)))
 
@@ -250,7 +253,7 @@ def test_hierarchies_have_all_that_is_to_be_judged() -> None:
         ("tell", 0),
         ("tell", 1),
     }
-    said = Counter(" ".join(one.split()[:3:2]) for level in levels for one in level.states)
+    said = Counter(" ".join(state.split()[:3:2]) for level in levels for state in level.states)
     assert {one.split()[0] for one in said} == {"assume", "invariant", "property"}
     assert min(said["assume monitored"], said["assume assumed"]) > 10
 
@@ -294,7 +297,7 @@ def test_two_levels_see_a_cycle_that_stops_behind_a_restart(
     """What is trusted is needed: else the report that stood is followed by an older one."""
     monkeypatch.setattr(together, "TRUSTED", frozenset())
     upper, lower = saying("slow", "load", "assume loaded monitored : load /= 0").levels
-    tables = tuple(replace(one, assuming=("loaded",)) for one in lower.tables)
+    tables = tuple(replace(table, assuming=("loaded",)) for table in lower.tables)
     both = pair(Hierarchy((upper, replace(lower, tables=tables))), tmp_path)
     found, _ = broken_together(
         replace(both, claimed_upper=frozenset(), claimed_lower=frozenset()), most=20_000

@@ -523,7 +523,9 @@ def test_an_invariant_that_check_proves_may_be_false_after_a_restart(tmp_path: P
         "invariant never_fails : status_report /= failed\ninvariant under_way : cur_state /= f_state implies status_report /= failed\n",
     )
     assert [
-        one for one in prove_program(ts.program, Options()).findings if one.severity is Severity.ERROR
+        finding
+        for finding in prove_program(ts.program, Options()).findings
+        if finding.severity is Severity.ERROR
     ] == []
     assert verdicts(prove_level(ts, LITTLE)) == {"never_fails": False, "under_way": True}
     obligation = stated(ts)["never_fails"]

@@ -541,9 +541,11 @@ def test_a_condition_about_a_variable_of_another_kind_cannot_be_compared() -> No
 
 def test_members_are_the_same_by_name_whatever_their_number() -> None:
     found = differ(GRIP, GRIP.replace("{ executing, done }", "{ done, failed, executing }"))
-    assert [(one.what, one.before, one.after) for one in found.declarations if "enum" in one.what] == [
-        ("enumeration `status`", "executing, done", "done, failed, executing")
-    ]
+    assert [
+        (declaration.what, declaration.before, declaration.after)
+        for declaration in found.declarations
+        if "enum" in declaration.what
+    ] == [("enumeration `status`", "executing, done", "done, failed, executing")]
     assert part(found, "grip").changes == ()
     changed = differ(
         GRIP, GRIP.replace("{ executing, done }", "{ done, executing }").replace("| 1     |", "| 3     |")
@@ -563,7 +565,7 @@ def test_a_variable_of_another_kind_cannot_be_compared() -> None:
 
 def test_a_wider_range_is_a_changed_declaration_and_compares_where_both_have_values() -> None:
     found = differ(GRIP, GRIP.replace("input width : int 0 .. 9", "input width : int 0 .. 12"))
-    assert [one.what for one in found.declarations] == ["variable `width`"]
+    assert [declaration.what for declaration in found.declarations] == ["variable `width`"]
     assert part(found, "grip").changes == ()
     assert part(found, "grip").basis is Basis.SOLVER
 

@@ -149,7 +149,7 @@ def test_what_a_cycle_that_ends_in_a_fault_leaves() -> None:
     compared = Compared()
     with executors_of(program) as executors:
         assert list(found_of(executors, compared, 120)) == []
-        kinds = {executors.number(one): one.kind for one in executors.targets}
+        kinds = {executors.number(target): target.kind for target in executors.targets}
     met: Counter[tuple[str, int]] = Counter()
     for number, _, session, seen in compared.kept:
         state = session.start

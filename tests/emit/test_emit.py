@@ -295,7 +295,7 @@ def test_a_program_may_be_called_as_a_library_s_part_is(tmp_path: Path) -> None:
     flags = ("-std=gnu11", "-O0", "-Wall", "-Werror", "-I.")
     subprocess.run(["cc", *flags, "run.c", *sources, "-o", "run"], cwd=tmp_path, check=True)
     assert subprocess.run([tmp_path / "run"], check=False).returncode == 0
-    script = "".join(f"import {one} as m; assert m.l_cycle(m.State()) == 0\n" for one in modules)
+    script = "".join(f"import {module} as m; assert m.l_cycle(m.State()) == 0\n" for module in modules)
     subprocess.run([sys.executable, "-c", script], cwd=tmp_path, check=True)
 
 
@@ -521,7 +521,7 @@ def test_a_symbol_file_is_read_back_or_none_is_made(said: str, more: int, long: 
         return
     [made] = [text for name, text in emitted(program).items() if name.endswith(".json")]
     read = signature_of(Said(json_of(made)))
-    assert [leaf.name for leaf in read.leaves] == [str(one.name) for one in program.variables]
+    assert [leaf.name for leaf in read.leaves] == [str(variable.name) for variable in program.variables]
 
 
 def test_names_may_be_very_long(tmp_path: Path) -> None:
@@ -721,7 +721,7 @@ def as_python_computes(values: list[tuple[float, ...]], files: dict[str, str]) -
         state.x, state.y, state.z, state.tiny = x, y, z, tiny
         assert module.t_step(state) == 0
         reals = [getattr(state, f"r_{at}") for at in range(6)]
-        found.append([str(int(state.o)), *(float(one).hex() for one in reals)])
+        found.append([str(int(state.o)), *(float(real).hex() for real in reals)])
     return found
 
 

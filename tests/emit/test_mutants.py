@@ -169,14 +169,14 @@ def classed() -> tuple[Program, dict[str, str], Checked, Decider]:
 def behaviour(tables: list[Compared]) -> list[int]:
     """For every input of the tables the lines that all their masks leave; each leaf is in one table."""
     found = [-1]
-    for one in tables:
-        keys = product(*(classes or [(0, 0), (1, 0)] for classes in one.classes))
+    for table in tables:
+        keys = product(*(classes or [(0, 0), (1, 0)] for classes in table.classes))
         masks = []
         for classes in keys:
             at = 0
-            for (number, _), count in zip(classes, one.counts, strict=True):
+            for (number, _), count in zip(classes, table.counts, strict=True):
                 at = at * count + number
-            masks.append(one.entries[at] if at < len(one.entries) else 0)
+            masks.append(table.entries[at] if at < len(table.entries) else 0)
         found = [left & mask for left in found for mask in masks]
     return found
 
@@ -186,7 +186,11 @@ def test_the_check_of_the_masks_decides_every_mutant_of_a_mask_and_of_a_class(
 ) -> None:
     program, files, _, decides = classed
     source = source_of(symbols_of(program, files), files)
-    every = [one for one in code_mutants(source, len(program.tables[0].lines)) if one.change == "mask"]
+    every = [
+        code_mutant
+        for code_mutant in code_mutants(source, len(program.tables[0].lines))
+        if code_mutant.change == "mask"
+    ]
     judged = Counter(decides.decides(one) for one in every)
     assert "classes[301]" in source
     assert judged[Noticed.MATCHER] > 2000

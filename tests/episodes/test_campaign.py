@@ -121,7 +121,9 @@ def test_a_worker_that_dies_costs_its_own_episode_and_no_other(tmp_path: Path) -
     with processes(2) as pool:
         found = played(rig, 40, pool, tmp_path / "j")
     assert {at for at, one in found.items() if one.end == "crash"} == kills
-    assert all([one.property for one in found[at].findings] == ["the process survives"] for at in kills)
+    assert all(
+        [finding.property for finding in found[at].findings] == ["the process survives"] for at in kills
+    )
     expected = play(rig, digest(rig.system), 5, [at for at in range(40) if at not in kills])
     assert [found[at] for at in sorted(found) if at not in kills] == list(expected)
     raised = [one for one in found.values() if one.end == "error:ArithmeticError"]
@@ -130,7 +132,7 @@ def test_a_worker_that_dies_costs_its_own_episode_and_no_other(tmp_path: Path) -
 
 
 def _faults(rig: Rig, index: int, seed: int = 5) -> list[str]:
-    return [one.name for one in rig.episode(seed, index).faults]
+    return [fault.name for fault in rig.episode(seed, index).faults]
 
 
 def test_what_hangs_is_stopped_and_so_is_what_cannot_be_stopped(tmp_path: Path) -> None:
@@ -370,7 +372,7 @@ with processes(2) as crew:
         killed.wait()
     workers = {int(one) for one in runs.read_text().split()}
     assert workers
-    _until(lambda: not any(_runs(one) for one in workers))
+    _until(lambda: not any(_runs(worker) for worker in workers))
     with Journal(path, header(slow(), 5)) as journal:
         kept = dict(journal.records)
     assert 30 <= len(kept) < 2000
@@ -564,7 +566,12 @@ def test_one_counterexample_for_each_property_and_set_of_faults() -> None:
         _record(8, found=["b"]),
         _record(3, "dark"),
     ]
-    assert [(one.index, one.property) for one in choices(records)] == [(8, "b"), (7, "a"), (1, "a"), (2, "b")]
+    assert [(choice.index, choice.property) for choice in choices(records)] == [
+        (8, "b"),
+        (7, "a"),
+        (1, "a"),
+        (2, "b"),
+    ]
     assert choices(records) == choices(reversed(records))
     assert (
         Choice(3, (), "FAIL carries the right reason (4.6)").name(7)
@@ -586,7 +593,7 @@ def test_a_counterexample_of_the_cell_is_small_replays_and_fails_again(tmp_path:
     ]
     whole, least = rig.episode(2, choice.index), saved_episode(place)
     assert len(least.rows) == 1 <= len(whole.rows)
-    assert [one.property for one in again(place, rig).findings] == ["no row fails"]
+    assert [finding.property for finding in again(place, rig).findings] == ["no row fails"]
     assert again(place, rig, "python").digest == again(place, rig, "c").digest
     assert again(place / "episode.json").digest == again(place, rig).digest  # properties look on
     assert is_saved(tmp_path, rig, 2, choice)
@@ -604,7 +611,7 @@ def test_what_kills_its_process_is_shrunk_all_the_same() -> None:
     with processes(1) as pool:
         [(_, made)] = counterexamples(rig, 5, [Choice(index, (), "the process survives")], pool)
     assert made.episode == Episode(faults=(replace(made.episode.faults[0]),))
-    assert [(one.name, one.first_tick == one.last_tick) for one in made.episode.faults] == [
+    assert [(fault.name, fault.first_tick == fault.last_tick) for fault in made.episode.faults] == [
         (fake.KILLS, True)
     ]
     assert (made.found.property, made.log) == ("the process survives", b"")
@@ -718,7 +725,7 @@ def test_findings_are_saved_and_told_and_the_status_is_1(
     places = sorted((tmp_path / "c").iterdir())
     assert len(places) == err.count("error[RCS743]") > 0
     assert all(f"rcsc campaign --again {place}\n" in err for place in places)
-    assert [one.name for one in saved_episode(places[0]).faults] == [fake.BREAKS]
+    assert [fault.name for fault in saved_episode(places[0]).faults] == [fake.BREAKS]
     assert cli.run(args) == 1
     assert "RCS743" not in capsys.readouterr().err  # saved before
     assert cli.run(["campaign", "--system", str(SYSTEM), "--no-compile", "--again", str(places[0])]) == 1

@@ -220,7 +220,7 @@ def test_the_log_of_an_episode_replays_exactly_whatever_is_restarted(
     ]
     assert began == [(one.tick + 1, one.level, Begun.ANEW) for one in dict.fromkeys(restarts)]
     for level in log.levels:
-        assert len(level.restarts) == sum(one.level == level.name for one in restarts)
+        assert len(level.restarts) == sum(restart.level == level.name for restart in restarts)
 
 
 # --- episodes as values ---

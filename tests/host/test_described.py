@@ -192,7 +192,7 @@ def test_what_may_not_is_told_once_each(kind: Kind, value: object, many: int) ->
     document = page(value)
     document.check(Record({"x": kind}))
     assert len(document.faults) == many
-    assert all(one.message.startswith("`x") for one in document.faults)
+    assert all(fault.message.startswith("`x") for fault in document.faults)
     assert not document.holds(Record({"x": kind}))
 
 

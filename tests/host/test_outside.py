@@ -110,8 +110,8 @@ def test_only_the_bounded_readers_parse_text_from_outside() -> None:
 
 def _imported(node: ast.Import | ast.ImportFrom) -> list[str]:
     if isinstance(node, ast.Import):
-        return [one.name for one in node.names]
-    return [f"{node.module}.{one.name}" for one in node.names]
+        return [name.name for name in node.names]
+    return [f"{node.module}.{name.name}" for name in node.names]
 
 
 def test_formats_of_bytes_are_named_where_they_are_known() -> None:

@@ -50,7 +50,11 @@ DIVIDED = compile_text(f"input a : {WIDE}\ninput b : {WIDE}\nassume d : a / b = 
 @given(st.integers(-(2**63), 2**63 - 1), st.integers(-(2**63), 2**63 - 1).filter(bool))
 def test_quotients_round_toward_zero_and_remainders_have_the_sign_of_the_dividend(a: int, b: int) -> None:
     assert isinstance(DIVIDED, Program)
-    sides = [one.condition.args[0] for one in DIVIDED.assumptions if isinstance(one.condition, Apply)]
+    sides = [
+        assumption.condition.args[0]
+        for assumption in DIVIDED.assumptions
+        if isinstance(assumption.condition, Apply)
+    ]
     quotient, rest = (int(evaluate(side, {"a": a, "b": b})) for side in sides)
     assert quotient == divide(a, b)
     assert quotient * b + rest == a

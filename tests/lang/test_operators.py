@@ -184,7 +184,7 @@ def different(case: Case, found: Iterable[Value]) -> list[object]:
     ],
 )  # fmt: skip
 def test_facts_of_ieee_754(op: Op, operands: tuple[float, ...], value: Value) -> None:
-    made = Apply(op, tuple(Literal(one, REAL) for one in operands), REAL)
+    made = Apply(op, tuple(Literal(operand, REAL) for operand in operands), REAL)
     assert same(evaluate(made, {}), value)
     assert type(evaluate(made, {})) is type(value)
 
@@ -197,7 +197,9 @@ def test_facts_of_ieee_754(op: Op, operands: tuple[float, ...], value: Value) ->
     ],
 )  # fmt: skip
 def test_facts_of_integers(op: Op, operands: tuple[int, ...], value: Value) -> None:
-    assert same(evaluate(Apply(op, tuple(Literal(one, SIGNED) for one in operands), SIGNED), {}), value)
+    assert same(
+        evaluate(Apply(op, tuple(Literal(operand, SIGNED) for operand in operands), SIGNED), {}), value
+    )
 
 
 def test_what_no_machine_can_do_is_owed() -> None:
@@ -255,7 +257,7 @@ def test_bounds_enclose_every_result(op: Op, whole: bool) -> None:
             if op in (Op.DIV, Op.MOD) and operands[1] == 0:
                 continue
             kind = SIGNED if whole else REAL
-            value = evaluate(Apply(op, tuple(Literal(one, kind) for one in operands), kind), {})
+            value = evaluate(Apply(op, tuple(Literal(operand, kind) for operand in operands), kind), {})
             unbounded = not (math.isfinite(made.low) and math.isfinite(made.high))
             assert made.low <= value <= made.high or (unbounded and math.isnan(value)), (kinds, operands)
 
@@ -336,7 +338,11 @@ def composed(op: Core, whole: bool) -> Iterator[tuple[Node, tuple[Value, ...], V
         args = tuple(known.setdefault(one, values.variable(f"{one!r}", kind)) for one in map(repr, operands))
         made: Scalar = Bool() if op in COMPARISONS else Int(-(2**41), 2**41) if whole else kind
         node = Node(op, args, made, *((0, 1) if op in COMPARISONS else values.bounds(made)))
-        yield node, operands, evaluate(Apply(op, tuple(Literal(one, kind) for one in operands), made), {})
+        yield (
+            node,
+            operands,
+            evaluate(Apply(op, tuple(Literal(operand, kind) for operand in operands), made), {}),
+        )
 
 
 def key(value: Value) -> int:
@@ -560,7 +566,7 @@ def test_no_table_is_proved_that_an_edge_refutes(one: str, two: str, sign: str) 
         edges = (-1.7e308, -1e308, -1.0, 0.0, 1.0, 1e308, 1.7e308)
         matching = [matching_lines(table, {"x": x, "y": y}) for x, y in product(edges, edges)]
         verdict = prove_program(program, Options(steps=20_000, solver="boxes"))
-        found = {one.code for one in verdict.findings}
+        found = {finding.code for finding in verdict.findings}
         if any(len(one) != 1 for one in matching):
             assert not verdict.proved
         elif other.startswith("not") and Code.DEAD_LINE in found:

@@ -242,7 +242,7 @@ def test_values_and_variables_called_like_words_stay_what_they_are() -> None:
     assert isinstance(parsed, tree.File)
     formatted = format_file(parsed)
     assert parse(Source("case.rcs", formatted)) == parsed
-    [table] = [one for one in parsed.declarations if isinstance(one, tree.TableDecl)]
+    [table] = [declaration for declaration in parsed.declarations if isinstance(declaration, tree.TableDecl)]
     assert not any(row.default for row in table.rows)
     assert [heading.word for heading in (*table.conditions, *table.actions)] == ["", "", "when", ""]
 

@@ -115,7 +115,7 @@ def edited(tmp_path: Path) -> Path:
 
 
 def run(*args: object) -> Result:
-    return CliRunner().invoke(commands, [str(one) for one in args], standalone_mode=False)
+    return CliRunner().invoke(commands, [str(arg) for arg in args], standalone_mode=False)
 
 
 def test_the_executors_write_the_same_bytes(tmp_path: Path, logged: Path) -> None:
@@ -210,7 +210,11 @@ def test_a_cut_log_loses_at_most_a_chunk(tmp_path: Path, logged: Path, log: Log)
     with logged.open("rb") as file:
         summary = make_reader(file).get_summary()
     assert summary is not None
-    ends = [one.offset + one.length for one in summary.metadata_indexes if one.name == CHAIN]
+    ends = [
+        metadata_index.offset + metadata_index.length
+        for metadata_index in summary.metadata_indexes
+        if metadata_index.name == CHAIN
+    ]
     assert len(ends) == 1 + -(-TICKS * 40 // CHUNK_MS)
     cut = tmp_path / "cut.mcap"
     edges = {end + step for end in ends for step in (-1, 0, 1)}
@@ -299,7 +303,7 @@ def test_what_other_tables_would_have_done(log: Log, edited: Path, logged: Path)
     [cycle] = [one for one in moment.cycles if one.differences]
     assert cycle.level == "gripper"
     assert moment.tick == 43  # published in tick 42 (the 41st from 0), taken in the next
-    assert [(one.name, one.then, one.now) for one in cycle.differences] == [
+    assert [(difference.name, difference.then, difference.now) for difference in cycle.differences] == [
         ("report.opening_mm", "20.5", "20.0")
     ]
     result = run("replay", logged, "--executor", "python", "--generated", edited)
@@ -324,7 +328,7 @@ def test_tables_with_other_lines_and_leaves(log: Log, edited: Path) -> None:
     assert moment.tick == 1
     [cycle] = [one for one in moment.cycles if one.differences]
     assert (cycle.line_then, cycle.line_now) == ("pause_gripper line 1", "pause_gripper line new_1")
-    assert {(one.name, one.then, one.now) for one in cycle.differences} == {
+    assert {(difference.name, difference.then, difference.now) for difference in cycle.differences} == {
         ("line", "1", "new_1"),
         ("report.ref_command_echo", "pause", "rest"),
     }
@@ -416,7 +420,9 @@ def test_the_executors_record_the_same_restarts(tmp_path: Path, again_and_again:
 
 def test_every_restart_is_in_the_log_and_said(again_and_again: Path) -> None:
     log = read(again_and_again)
-    assert [(one.tick, one.begun) for one in log.level("emove").restarts] == [(33, Begun.ANEW)] * 2
+    assert [(restart.tick, restart.begun) for restart in log.level("emove").restarts] == [
+        (33, Begun.ANEW)
+    ] * 2
     anew, gripper = log.level("gripper").restarts
     assert (anew.begun, gripper.begun) == (Begun.ANEW, Begun.CHECKPOINT)
     assert anew.values != gripper.values

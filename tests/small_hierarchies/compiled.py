@@ -112,15 +112,15 @@ class _Writer:
 
     def written(self) -> Iterator[str]:
         """All of it, line by line."""
-        for one in self.program.procedures:
-            yield from self._procedure(one)
+        for procedure in self.program.procedures:
+            yield from self._procedure(procedure)
         yield from self._settle()
         for at, table in enumerate(self.program.tables):
             yield from self._table(at, table)
         yield from self._run()
         yield from self._in_range()
         self._between = True
-        conditions = [one.condition for one in self.program.invariants]
+        conditions = [invariant.condition for invariant in self.program.invariants]
         conditions += [one.condition for one in self.program.properties]
         for at, condition in enumerate(conditions):
             yield f"def stated_{at}(s, b):"
@@ -246,9 +246,9 @@ class _Writer:
     def _table(self, number: int, table: Table) -> Iterator[str]:
         yield f"def assumed_{number}(s, r):"
         yield "  failed = []"
-        for one in self.program.assumptions:
-            if one.name in table.assumptions:
-                yield f"  if not {self._of(one.condition)}: failed.append({str(one.name)!r})"
+        for assumption in self.program.assumptions:
+            if assumption.name in table.assumptions:
+                yield f"  if not {self._of(assumption.condition)}: failed.append({str(assumption.name)!r})"
         yield "  return frozenset(failed)"
         yield f"def matched_{number}(s, r):"
         yield "  found = []"

@@ -219,20 +219,21 @@ class Role:
         early = {str(v.name) for v in self.program.variables if v.deferred_until is not None} | set(
             self.inputs
         )
-        for one in self.program.procedures:
-            if one.name in self.level.preprocess:
-                early |= set(map(str, one.writes))
+        for procedure in self.program.procedures:
+            if procedure.name in self.level.preprocess:
+                early |= set(map(str, procedure.writes))
         may = frozenset(
-            str(one.name)
-            for one in self.program.assumptions
-            if one.standing is Standing.ASSUMED and early & set(map(str, read_by(one.condition)))
+            str(assumption.name)
+            for assumption in self.program.assumptions
+            if assumption.standing is Standing.ASSUMED
+            and early & set(map(str, read_by(assumption.condition)))
         )
         return may if self.relied is None else may & self.relied
 
     @cached_property
     def asks(self) -> bool:
         """Whether it has extern procedures."""
-        return any(one.extern is not None for one in self.program.procedures)
+        return any(procedure.extern is not None for procedure in self.program.procedures)
 
     @cached_property
     def tables(self) -> dict[str, Table]:
@@ -256,7 +257,9 @@ class Role:
         """The leaves of its report."""
         above = self.links.above
         return (
-            () if above is None else tuple(one for one in self.leaves if one.startswith(f"{above.report}."))
+            ()
+            if above is None
+            else tuple(leaf for leaf in self.leaves if leaf.startswith(f"{above.report}."))
         )
 
     @cached_property
@@ -291,7 +294,7 @@ class Role:
     @cached_property
     def results(self) -> dict[str, list[tuple[Value, ...]]]:
         """All that a call of each extern procedure may give."""
-        every = [one for one in self.program.procedures if one.extern is not None]
+        every = [procedure for procedure in self.program.procedures if procedure.extern is not None]
         return {str(one.name): list(results(self.program, one)) for one in every}
 
     @cached_property
@@ -374,9 +377,9 @@ class Role:
             return self._early(now, self._chosen(now), "", Fault.EXTERN, frozenset(), dict(now))
         middle, table = dict(now), self._chosen(now)
         failed = frozenset(
-            str(one.name)
-            for one in program.assumptions
-            if one.name in table.assumptions and not holds(one.condition, now)
+            str(assumption.name)
+            for assumption in program.assumptions
+            if assumption.name in table.assumptions and not holds(assumption.condition, now)
         )
         if failed & set(table.stops):
             return self._early(now, table, "", Fault.ASSUMPTION, failed, middle)
@@ -470,9 +473,9 @@ class Role:
         assert str(outcome.line or "") == ran.line
         stops = self.tables[ran.table].stops
         checked = {
-            str(one.name)
-            for one in self.program.assumptions
-            if one.standing is Standing.MONITORED or one.name in stops
+            str(assumption.name)
+            for assumption in self.program.assumptions
+            if assumption.standing is Standing.MONITORED or assumption.name in stops
         }
         assert set(outcome.failed_assumptions) == ran.failed & checked
 

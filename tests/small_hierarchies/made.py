@@ -403,7 +403,7 @@ def _other_status(line: Line, _level: MadeLevel, random: Random) -> tuple[tuple[
 def _not_begun(line: Line, level: MadeLevel, random: Random) -> tuple[tuple[Line, ...], str]:
     if "begin" not in line.calls:
         return _other_state(line, level, random)
-    return (replace(line, calls=tuple(one for one in line.calls if one != "begin")),), "does not begin"
+    return (replace(line, calls=tuple(call for call in line.calls if call != "begin")),), "does not begin"
 
 
 LINE_SLIPS: tuple[Slip, ...] = (

@@ -110,7 +110,7 @@ def _declared(level: MadeLevel, said: dict[str, str]) -> str:
     if level.waits:
         states.append(f"waited : int 0 .. {MOST_WAITED}")
     states += states_of(level)
-    lines += [f"state {one}" for one in states]
+    lines += [f"state {state}" for state in states]
     lines.append(f"output report : {level.name}_report")
     if level.assumption:
         lines.append(f"assume in_step monitored : {level.assumption}")

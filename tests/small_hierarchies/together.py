@@ -183,12 +183,12 @@ def _canonical(pair: Pair, both: Both) -> Both:
     places += [(lower, leaf) for leaf in given_numbers(pair.lower)]
     buffers = [list(one) for one in (both.order, both.report, both.report_wire)]
     newest = int(upper[f"{pair.order}.inc_command"])
-    numbers = [int(state[leaf]) for state, leaf in places] + [int(one[0]) for one in buffers]
+    numbers = [int(state[leaf]) for state, leaf in places] + [int(buffer[0]) for buffer in buffers]
     ages = sorted({(newest - number) % NUMBERS for number in numbers})
     name = {age: (-GAP * rank) % NUMBERS for rank, age in enumerate(ages)}
     for state, leaf in places:
         state[leaf] = name[(newest - int(state[leaf])) % NUMBERS]
-    for one in buffers:
-        one[0] = name[(newest - int(one[0])) % NUMBERS]
-    order, report, report_wire = (tuple(one) for one in buffers)
+    for buffer in buffers:
+        buffer[0] = name[(newest - int(buffer[0])) % NUMBERS]
+    order, report, report_wire = (tuple(buffer) for buffer in buffers)
     return Both(upper, lower, order, report, report_wire)

@@ -121,7 +121,7 @@ def wanted(role: Role) -> frozenset[Key]:
     tables = (chosen.table,) if isinstance(chosen, OneTable) else tuple(name for _, name in chosen.tables)
     for table in (role.tables[str(name)] for name in tables):
         name = str(table.name)
-        found |= {(Sort.ASSUMPTION, name, str(one)) for one in table.assumptions}
+        found |= {(Sort.ASSUMPTION, name, str(assumption)) for assumption in table.assumptions}
         found.add((Sort.ONE_LINE, name, ""))
         if table.default is None:
             found.add((Sort.SOME_LINE, name, ""))
@@ -140,7 +140,7 @@ def wanted(role: Role) -> frozenset[Key]:
             found.add((Sort.WAITS, "", below.order))
             found |= {(Sort.PAUSES, "", below.order)} if not isinstance(chosen, OneTable) else set()
     found |= {(Sort.DEFERRED, "", leaf) for leaf, _ in role.deferred}
-    found |= {(Sort.INVARIANT, "", one.name) for one in role.program.invariants}
+    found |= {(Sort.INVARIANT, "", invariant.name) for invariant in role.program.invariants}
     found |= {(Sort.PROPERTY, "", one.name) for one in role.program.properties}
     return frozenset(found)
 

@@ -49,7 +49,7 @@ class Browser:
         self._held, self._number = b"", 0
         self.said: list[str] = []
         targets = self._tell("Target.getTargets")["targetInfos"]
-        page = next(one["targetId"] for one in targets if one["type"] == "page")
+        page = next(target["targetId"] for target in targets if target["type"] == "page")
         self._session = self._tell("Target.attachToTarget", targetId=page, flatten=True)["sessionId"]
         for domain in ("Page", "Runtime", "Log"):
             self._tell(f"{domain}.enable")

@@ -42,5 +42,7 @@ def keep(episode: Episode, outcome: Outcome) -> str:
     (folder / "episode.json").write_text(episode.to_json(), encoding="utf-8")
     (folder / "script.csv").write_text(script(episode.rows), encoding="utf-8")
     run(episode, log=folder / "log.mcap")
-    said = "; ".join(f"{one.property}, cycle {one.tick}: {one.said}" for one in outcome.findings)
+    said = "; ".join(
+        f"{finding.property}, cycle {finding.tick}: {finding.said}" for finding in outcome.findings
+    )
     return f"{said}\nkept in {folder}; rcsc replay {folder / 'log.mcap'}\n{episode.to_json()}"

@@ -63,7 +63,7 @@ def play(episode: Episode, system: Path, log: Path | None = None) -> Outcome:
     _note()
     if log is not None:
         log.write_bytes(b"begun")
-    names = {one.name for one in episode.faults}
+    names = {fault.name for fault in episode.faults}
     if KILLS in names:
         os._exit(7)
     if RAISES in names:
@@ -78,7 +78,7 @@ def play(episode: Episode, system: Path, log: Path | None = None) -> Outcome:
     rows = tuple(RowEnd(at, row, "done", "", 10) for at, row in enumerate(episode.rows, 1))
     lines = known_lines(system)[: 3 + len(rows)]
     sum_ = hashlib.sha256(episode.to_json().encode()).hexdigest()
-    found = [Finding(HELD, one.first_tick, "it fell") for one in episode.faults if one.name == BREAKS]
+    found = [Finding(HELD, fault.first_tick, "it fell") for fault in episode.faults if fault.name == BREAKS]
     return Outcome(
         rows, tuple(found), "failed:part_lost" if found else "done", 10 * len(rows), frozenset(lines), sum_
     )

@@ -102,8 +102,8 @@ def wrong() -> tuple[Wrong, ...]:
 def alone(repo: Path) -> Description:
     """TASK between a sender and a stand-in of E-MOVE."""
     whole = description(repo / "tables/system.toml")
-    task = next(one for one in whole.levels if one.name == "task")
-    wires = tuple(one for one in whole.wires if "task." in one.source + one.target)
+    task = next(level for level in whole.levels if level.name == "task")
+    wires = tuple(wire for wire in whole.wires if "task." in wire.source + wire.target)
     return Description("task", whole.generated, whole.database, 40, (task,), wires)
 
 

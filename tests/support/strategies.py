@@ -83,7 +83,7 @@ def conditions(
     operators: tuple[str, ...] = ORDERED,
 ) -> SearchStrategy[str]:
     """A boolean combination of conditions of subjects against constants."""
-    leaf = st.one_of([_compared(one, constants, sets, operators) for one in subjects])
+    leaf = st.one_of([_compared(subject, constants, sets, operators) for subject in subjects])
     return st.recursive(
         leaf,
         lambda inner: st.one_of(

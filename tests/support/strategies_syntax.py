@@ -165,7 +165,7 @@ def tables(draw: st.DrawFn) -> tree.TableDecl:
     """A table with even rows."""
     columns = draw(_columns())
     words = draw(ACTIONS)
-    headings = tuple(tree.Heading(one, "when" if one is None else "") for one in columns)
+    headings = tuple(tree.Heading(column, "when" if column is None else "") for column in columns)
     actions = tuple(
         tree.Heading(draw(places()), "") if w == "place" else tree.Heading(None, w) for w in words
     )

@@ -275,7 +275,7 @@ def test_a_verdict_that_z3_disagrees_with_is_told_as_a_fault_of_rcsc(
     verdict = prove_program(program, Options())
     assert verdict.proved is None
     assert not verdict.tables[0].backing.confirmed_by_z3
-    assert Code.SOLVERS_DISAGREE in {one.code for one in verdict.findings}
+    assert Code.SOLVERS_DISAGREE in {finding.code for finding in verdict.findings}
 
 
 @pytest.mark.parametrize(("solver", "spare", "asked"), [

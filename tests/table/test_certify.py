@@ -966,7 +966,7 @@ def test_each_region_that_is_left_is_asked_of_all_its_inputs(
     )
     names = list(form)
     entry = {
-        "assumptions": [str(one.name) for one in program.assumptions],
+        "assumptions": [str(assumption.name) for assumption in program.assumptions],
         "columns": names,
         "forms": [[[number, form[name]] for number, name in enumerate(names)]],
         "tree": [["s", 0, cut], ["z"], ["z"]],

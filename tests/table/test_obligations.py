@@ -266,7 +266,9 @@ table t assuming small {
     assert codes(proved(text.replace("assuming small ", "")).findings) == ["RCS412"]
     [found] = proved(text.replace("a < 4", "9 / a > 2")).findings
     assert found.code is Code.DIVISION_BY_ZERO
-    assert [(one.table, one.variables, one.values) for one in found.witnesses] == [("", ("a",), ("0",))]
+    assert [(witness.table, witness.variables, witness.values) for witness in found.witnesses] == [
+        ("", ("a",), ("0",))
+    ]
 
 
 @pytest.mark.parametrize(

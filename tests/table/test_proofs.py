@@ -61,7 +61,7 @@ def run(text: str, cache: Cache | None) -> Proof:
 
 
 def seen(proof: Proof) -> list[tuple[object, ...]]:
-    tables = [(one.table, one.verdict, one.method, one.assumptions) for one in proof.tables]
+    tables = [(table.table, table.verdict, table.method, table.assumptions) for table in proof.tables]
     return [*tables, *((one,) for one in proof.found)]
 
 

@@ -50,7 +50,7 @@ def verdict_of(text: str) -> ProgramVerdict:
 def stops_of(text: str) -> tuple[str, ...]:
     """Those of the text's first table."""
     verdict = verdict_of(text)
-    assert not [one for one in verdict.findings if one.code.value in SAFETY]
+    assert not [finding for finding in verdict.findings if finding.code.value in SAFETY]
     return verdict.program.tables[0].stops
 
 
@@ -146,7 +146,7 @@ table t assuming some, third {{
   | all  |   || 1 |
 }}
 """
-    assert [one.code.value for one in verdict_of(text).findings] == ["RCS411"]
+    assert [finding.code.value for finding in verdict_of(text).findings] == ["RCS411"]
 
 
 # --- by brute force ------------------------------------------------------------------
@@ -187,8 +187,11 @@ def drawn(seed: int) -> str:
     lines, bodies = [], []
     for at, (half, when) in enumerate(rows):
         targets = random.sample(list(ACTIONS), random.randint(1, 3))
-        bodies += [f"procedure {one}_{at} {{ {one} := {random.choice(ACTIONS[one])} }}" for one in targets]
-        lines.append(f"  | l{at} | {half} | {when} || {'; '.join(f'{one}_{at}' for one in targets)} |")
+        bodies += [
+            f"procedure {target}_{at} {{ {target} := {random.choice(ACTIONS[target])} }}"
+            for target in targets
+        ]
+        lines.append(f"  | l{at} | {half} | {when} || {'; '.join(f'{target}_{at}' for target in targets)} |")
     names = ", ".join(f"f{at}" for at in range(len(assumed)))
     head = f"table t assuming {names} {{\n  | line | n | when || procedures |"
     return "\n".join([SMALL, facts, *bodies, random.choice(INVARIANTS), head, *lines, "}"])
@@ -206,7 +209,7 @@ def goes_wrong(program: Program, state: Snapshot) -> bool:
     """Whether a step from the state does what is undefined, or leaves what the next one rests on."""
     try:
         outcome = run_table(program, program.tables[0], state)
-        kept = all(evaluate(one.condition, outcome.snapshot) for one in program.invariants)
+        kept = all(evaluate(invariant.condition, outcome.snapshot) for invariant in program.invariants)
     except UNDEFINED:
         return True
     return not kept or not in_range(program, outcome.snapshot)
@@ -219,7 +222,7 @@ def states(program: Program) -> list[dict[str, Value]]:
     found = []
     for point in product(*ranges):
         state = initial(program) | dict(zip((str(v.name) for v in varied), point, strict=True))
-        if all(evaluate(one.condition, state) for one in program.invariants):
+        if all(evaluate(invariant.condition, state) for invariant in program.invariants):
             found.append(state)
     return found
 
@@ -236,7 +239,7 @@ def test_no_input_goes_wrong_and_no_fewer_assumptions_would_do() -> None:
         assert isinstance(program, Program), (seed, program)
         every, names = states(program), program.tables[0].assumptions
         verdict = prove_program(program, Options(solver="boxes"))
-        owed = [one for one in verdict.findings if one.code.value in SAFETY]
+        owed = [finding for finding in verdict.findings if finding.code.value in SAFETY]
         if owed:
             refused += 1
             assert not safe(program, names, every), (seed, owed)
@@ -281,7 +284,7 @@ def test_reports_and_generated_files_say_which_stop_and_which_only_tell(tmp_path
     source = tmp_path / "said.rcs"
     source.write_text(STOPS)
     made = compile_(Settings((str(source),), Options(), use_cache=False), tmp_path, TARGETS, only_check=False)
-    said = {one.table: (one.stops, one.tells) for one in made.report.tables}
+    said = {table.table: (table.stops, table.tells) for table in made.report.tables}
     assert said == {
         "sees": (("place", "some"), ("calm", "low")),
         "keeps": (("some", "low"), ("calm",)),
@@ -316,13 +319,13 @@ procedure q { spot.safe := 1
   safe := false }
 """
     program = verdict_of(text).program
-    shown = {str(one.name): one.safe for one in program.variables if one.safe is not None}
+    shown = {str(variable.name): variable.safe for variable in program.variables if variable.safe is not None}
     assert shown == {"m": 1, "k": 2, "r": -0.5}
 
 
 def test_safe_values_keep_the_invariants() -> None:
     text = "output a : bool safe true\noutput b : bool{}\ninvariant one : not a or not b\n"
-    assert [one.code.value for one in verdict_of(text.format("")).findings] == ["RCS417"]
+    assert [finding.code.value for finding in verdict_of(text.format("")).findings] == ["RCS417"]
     assert verdict_of(text.format(" safe false")).findings == ()
 
 
@@ -388,7 +391,7 @@ def test_a_state_is_checked_alike_everywhere(tmp_path: Path) -> None:
         for state in drawn_states(program, 300):
             executor.put(0, [state[name] for name in names])
             at = executor.check()
-            positions = [*names, *(one.name for one in program.invariants)]
+            positions = [*names, *(invariant.name for invariant in program.invariants)]
             assert (positions[at] if at >= 0 else "") == unfit(program, state), state
             said[unfit(program, state)] += 1
     assert set(said) == {"", "below", "never_both", *STRANGE} - {
@@ -423,7 +426,10 @@ def test_defensive_executors_refuse_a_state_in_every_cycle(tmp_path: Path) -> No
             met[fault] += 1
             left = executor.values()
             if wrong:
-                expected, position = state | shown, [*names, *(one.name for one in program.invariants)]
+                expected, position = (
+                    state | shown,
+                    [*names, *(invariant.name for invariant in program.invariants)],
+                )
                 assert (fault, position[int(left[len(names) + 2])]) == (Fault.STATE, wrong)
             else:
                 outcome = cycle(program, program.levels[0], state)

@@ -50,7 +50,10 @@ def test_the_worst_verdict_counts_in_every_order(tmp_path: Path, names: tuple[st
         assert verdicts(report) == {"t": Verdict.REFUTED, "ta": Verdict.PROVED, "tb": Verdict.PROVED}
         shown = [report_to_json(report, "check")["tables"], sarif(report)["runs"][0]["properties"]["tables"]]
         for tables in shown:
-            assert json.loads(json.dumps({one["table"]: one["verdict"] for one in tables}))["t"] == "refuted"
+            assert (
+                json.loads(json.dumps({table["table"]: table["verdict"] for table in tables}))["t"]
+                == "refuted"
+            )
 
 
 def test_merging_keeps_the_worst_and_all_that_is_rested_on() -> None:
@@ -204,7 +207,7 @@ def told(program: Program, options: Options) -> tuple[set[object], list[object],
         assert isinstance(witness, dict)
         snapshot = {name: values[0] for name, values in RANGES.items()} | witness
         assert matching_lines(program.tables[0], snapshot) == []
-    return found, gaps, {(one.code, one.message) for one in verdict.findings}
+    return found, gaps, {(finding.code, finding.message) for finding in verdict.findings}
 
 
 @given(tables())
@@ -251,7 +254,7 @@ def test_what_an_unproved_invariant_kills_says_so() -> None:
         "table t {\n  | line | n || n |\n  | l | <= 4 || 9 |\n  | d | DEFAULT || 1 |\n}\n"
     )
     assert isinstance(program, Program)
-    notes = {one.code: one.notes for one in prove_program(program, Options()).findings}
+    notes = {finding.code: finding.notes for finding in prove_program(program, Options()).findings}
     assert notes[Code.DEFAULT_DEAD] == ("under `small` (not proved)",)
 
 

@@ -28,7 +28,7 @@ def standing(whole: SystemProof, level: str, key: Key) -> str:
 
 def trusting(whole: SystemProof, level: str, keys: Sequence[Key]) -> str:
     """The assumptions that these verdicts trust, as the tables declare them; empty for none."""
-    return report.trusting(declared(one for key in keys for one in whole.of(level, key).trusts))
+    return report.trusting(declared(trust for key in keys for trust in whole.of(level, key).trusts))
 
 
 def named(whole: SystemProof, level: str, needs: Sequence[Need]) -> str:
@@ -38,8 +38,8 @@ def named(whole: SystemProof, level: str, needs: Sequence[Need]) -> str:
 
 def not_looked_at(proof: LevelProof) -> Iterator[str]:
     """Obligations that could not be stated."""
-    for one in proof.unstated:
-        yield f"not looked at: {one.shown}"
+    for unstated in proof.unstated:
+        yield f"not looked at: {unstated.shown}"
 
 
 def in_context(whole: SystemProof, proof: LevelProof) -> Iterator[str]:
@@ -58,17 +58,22 @@ def in_context(whole: SystemProof, proof: LevelProof) -> Iterator[str]:
         yield from _again(whole, proof.level, seen)
     if proof.endings:
         yield "given that every order that is not replaced is answered some time, and stays so,"
-        for one in proof.endings:
-            found = whole.of(proof.level, (Sort.ENDS, one.table, ""))
+        for ending in proof.endings:
+            found = whole.of(proof.level, (Sort.ENDS, ending.table, ""))
             only = (
-                f"; rests on {named(whole, proof.level, found.lacks)}" if one.proved and found.lacks else ""
+                f"; rests on {named(whole, proof.level, found.lacks)}"
+                if ending.proved and found.lacks
+                else ""
             )
-            yield f"  {one.table} {_ends(one)}{only}"
+            yield f"  {ending.table} {_ends(ending)}{only}"
 
 
 def _again(whole: SystemProof, level: str, seen: Context) -> Iterator[str]:
     """What lines do that match again; of a level that gives no orders there is nothing to say."""
-    again = "; ".join(f"{one.table} {one.line}: {', '.join(one.leaves)}" for one in seen.repeated)
+    again = "; ".join(
+        f"{repeated_line.table} {repeated_line.line}: {', '.join(repeated_line.leaves)}"
+        for repeated_line in seen.repeated
+    )
     rests = "" if seen.repeated or seen.restless else standing(whole, level, (AGAIN, "", ""))
     only = f" ({rests})" if rests not in {"", "proved"} else ""
     yield f"what a line does when it matches again before its order is echoed: {again or 'nothing'}{only}"
@@ -78,7 +83,7 @@ def _again(whole: SystemProof, level: str, seen: Context) -> Iterator[str]:
 
 def trusted(whole: SystemProof) -> Iterator[str]:
     """What is taken for granted that no level is responsible for."""
-    every = sorted({one for found in whole.closed.values() for one in found.trusts})
+    every = sorted({trust for found in whole.closed.values() for trust in found.trusts})
     if every:
         yield "taken for granted"
         yield from (f"  {one}" for one in every)
@@ -90,7 +95,7 @@ def left_out(whole: SystemProof) -> Iterator[str]:
         return
     unstated = sum(len(one.unstated) for one in whole.levels)
     rests = sum(found.found and not found.proved for found in whole.closed.values())
-    ends = sum(not one.proved for level in whole.levels for one in level.endings)
+    ends = sum(not ending.proved for level in whole.levels for ending in level.endings)
     said = [
         f"{unstated} not looked at" if unstated else "",
         f"{rests} rest on what is not known" if rests else "",
@@ -122,15 +127,15 @@ def _counted(one: Counted) -> str:
 def assumptions(proof: SystemProof) -> str:
     """How many there are, and how they stand."""
     found = [
-        proof.of(one.level, obligation.key)
-        for one in proof.levels
-        for obligation, _ in one.found
+        proof.of(level.level, obligation.key)
+        for level in proof.levels
+        for obligation, _ in level.found
         if obligation.sort is Sort.ASSUMPTION
     ]
     if not found:
         return "the tables assume nothing"
-    believed = sum(one.proved and one.verdict.value != "proved" for one in found)
-    good = sum(one.proved for one in found) - believed
+    believed = sum(closed.proved and closed.verdict.value != "proved" for closed in found)
+    good = sum(closed.proved for closed in found) - believed
     rest = len(found) - good - believed
     trusts = f", {believed} taken for granted" if believed else ""
     return f"assumptions of tables: {good} proved{trusts}" + (
@@ -141,17 +146,17 @@ def assumptions(proof: SystemProof) -> str:
 def reaction(made: Mapping[str, TransitionSystem], proof: SystemProof) -> Iterator[str]:
     """The way of a PAUSE from the top down, as far as it is proved that it is passed on at once."""
     passes = {
-        (one.level, obligation.name)
-        for one in proof.levels
-        for obligation, _ in one.found
-        if obligation.sort is Sort.PAUSES and proof.of(one.level, obligation.key).proved
+        (level.level, obligation.name)
+        for level in proof.levels
+        for obligation, _ in level.found
+        if obligation.sort is Sort.PAUSES and proof.of(level.level, obligation.key).proved
     }
     tops = [
         name
         for name, one in made.items()
         if one.links.above is not None and one.links.above.outside and one.links.below
     ]
-    for top in tops if {one.level for one in proof.levels} == set(made) else ():
+    for top in tops if {level.level for level in proof.levels} == set(made) else ():
         reached: dict[str, int] = {top: 1}
         for name in made:
             for below in made[name].links.below if name in reached else ():
@@ -190,7 +195,11 @@ def as_json(whole: SystemProof, proof: LevelProof) -> dict[str, Any]:
         "runs": claim(whole, proof.level, RUNS),
         "context": again or None,
         "endings": [
-            {**asdict(one), "proved": one.proved, **claim(whole, proof.level, (Sort.ENDS, one.table, ""))}
-            for one in proof.endings
+            {
+                **asdict(ending),
+                "proved": ending.proved,
+                **claim(whole, proof.level, (Sort.ENDS, ending.table, "")),
+            }
+            for ending in proof.endings
         ],
     }

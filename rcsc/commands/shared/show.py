@@ -145,7 +145,7 @@ def _github(report: Report, _command: str, _output: Output, _closing: str) -> st
 
 
 def _lines(report: Report, _command: str, _output: Output, _closing: str) -> str:
-    return "".join(f"{one_line(one, report.sources)}\n" for one in report.found)
+    return "".join(f"{one_line(diagnostic, report.sources)}\n" for diagnostic in report.found)
 
 
 def _text(report: Report, _command: str, output: Output, closing: str) -> str:

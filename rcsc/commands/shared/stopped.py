@@ -34,8 +34,8 @@ class StoppedByFile(Stopped):
 
     def show(self, file: object = None) -> None:  # noqa: ARG002  # click's signature
         """Each fault, with the line it stands in."""
-        for one in self.found:
-            click.echo(plain(full(one, self.sources)), err=True)
+        for diagnostic in self.found:
+            click.echo(plain(full(diagnostic, self.sources)), err=True)
 
 
 def stopped(error: CodedError) -> Stopped:

@@ -119,7 +119,9 @@ def _campaign(  # as many as there are options
 ) -> int:  # fmt: skip
     """Plays, sums up, and saves counterexamples."""
     with journal, hired as pool:
-        said = _Told(episodes, [one for at, one in journal.records.items() if at < episodes])
+        said = _Told(
+            episodes, [episode_record for at, episode_record in journal.records.items() if at < episodes]
+        )
         try:
             for new in play(rig, seed, episodes, pool, journal):
                 said(new)
@@ -143,7 +145,7 @@ class _Told:
 
     def __init__(self, wanted: int, known: list[EpisodeRecord]) -> None:
         self._wanted, self._known, self._done = wanted, len(known), len(known)
-        self._findings = sum(bool(one.findings) for one in known)
+        self._findings = sum(bool(episode_record.findings) for episode_record in known)
         self._progress = Progress()
         self._terminal = sys.stderr.isatty()
         self._begun = self._last = time.monotonic()
@@ -162,8 +164,8 @@ class _Told:
     def __call__(self, records: tuple[EpisodeRecord, ...]) -> None:
         """Takes what came in."""
         self._done += len(records)
-        self._findings += sum(bool(one.findings) for one in records)
-        self.cycles += sum(one.ticks for one in records)
+        self._findings += sum(bool(record.findings) for record in records)
+        self.cycles += sum(record.ticks for record in records)
         now = time.monotonic()
         if now - self._last >= (_TERMINAL_S if self._terminal else _PLAIN_S):
             self._last = now
@@ -207,14 +209,14 @@ def _sum_up(rig: Rig, records: list[EpisodeRecord], said: _Told, json_: Path | N
 def _save(rig: Rig, seed: int, records: list[EpisodeRecord], pool: WorkerPool, folder: Path) -> None:
     """Shrinks and saves what is not saved already, and says what to type."""
     chosen = choices(records)
-    wanted = [one for one in chosen[:MOST] if not is_saved(folder, rig, seed, one)]
-    for one in chosen[:MOST]:
-        if one not in wanted:
-            click.echo(f"saved before: {folder / one.name(seed)}")
-    for one, made in counterexamples(rig, seed, wanted, pool):
-        with writing(folder / one.name(seed)):
-            place = save(folder, rig, seed, one, made)
-        _tell(f"episode {one.index}", made.found.property, made.found.tick, made.found.said)
+    wanted = [choice for choice in chosen[:MOST] if not is_saved(folder, rig, seed, choice)]
+    for choice in chosen[:MOST]:
+        if choice not in wanted:
+            click.echo(f"saved before: {folder / choice.name(seed)}")
+    for choice, made in counterexamples(rig, seed, wanted, pool):
+        with writing(folder / choice.name(seed)):
+            place = save(folder, rig, seed, choice, made)
+        _tell(f"episode {choice.index}", made.found.property, made.found.tick, made.found.said)
         click.echo(f"  = help: rcsc campaign --again {place}", err=True)
         if made.log:
             click.echo(f"  = help: rcsc replay {place / 'log.mcap'}", err=True)

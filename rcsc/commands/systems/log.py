@@ -157,8 +157,8 @@ def _summed(level: LoggedLevel) -> None:
     click.echo(
         f"level {level.name}: {len(level.track.ticks) - 1} cycles{f'; the last: {fault}' if fault else ''}"
     )
-    for one in level.restarts[:SHOWN]:
-        click.echo(f"  started again before cycle {one.tick}: {begun_in_words(one.begun)}")
+    for restart in level.restarts[:SHOWN]:
+        click.echo(f"  started again before cycle {restart.tick}: {begun_in_words(restart.begun)}")
     if len(level.restarts) > SHOWN:
         click.echo(f"  and {len(level.restarts) - SHOWN} times more")
 

@@ -162,7 +162,7 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
 
 def _jobs(levels: Iterable[TransitionSystem]) -> int:
     """How many levels to prove at once where nobody says."""
-    lines = sum(len(table.lines) for one in levels for table in one.program.tables)
+    lines = sum(len(table.lines) for level in levels for table in level.program.tables)
     return min(2, os.cpu_count() or 1) if lines >= _WORTH_PROCESSES else 1
 
 
@@ -196,15 +196,17 @@ class _Said:
 def _refused(made: dict[str, TransitionSystem], proof: SystemProof, *, quiet: bool) -> list[str]:
     """Questions that cvc5 does not answer as Z3 did; says how many there were."""
     refused = []
-    for one in proof.levels:
-        answers = confirmed(made[one.level], one)
+    for level in proof.levels:
+        answers = confirmed(made[level.level], level)
         wrong = [name for name, same in answers.items() if not same]
         refused += wrong
         good = len(answers) - len(wrong)
-        click.echo(f"level {one.level}: cvc5 says the same of {good} of {len(answers)} questions", err=quiet)
+        click.echo(
+            f"level {level.level}: cvc5 says the same of {good} of {len(answers)} questions", err=quiet
+        )
         for name in wrong:
             click.echo(
-                f"error[{Code.SOLVERS_DISAGREE.value}]: level `{one.level}`: cvc5 does not confirm `{name}`",
+                f"error[{Code.SOLVERS_DISAGREE.value}]: level `{level.level}`: cvc5 does not confirm `{name}`",
                 err=True,
             )
     return refused
@@ -251,10 +253,10 @@ def _say_level(whole: SystemProof, proof: LevelProof) -> None:
 
 def _say_invariants(proof: SystemProof) -> None:
 
-    for one in proof.levels:
-        click.echo(f"invariant of level {one.level}: never")
-        for clause in one.clauses:
-            click.echo(f"  {shown(one.predicates, clause)}")
+    for level in proof.levels:
+        click.echo(f"invariant of level {level.level}: never")
+        for clause in level.clauses:
+            click.echo(f"  {shown(level.predicates, clause)}")
 
 
 def _say_whole(made: dict[str, TransitionSystem], proof: SystemProof) -> None:
@@ -268,12 +270,14 @@ def _say_agreements(proof: SystemProof) -> None:
 
     if proof.agreements:
         click.echo("between the levels")
-    for one in proof.agreements:
-        lacks = named(proof, one.level, proof.of(one.level, (CONTRACT, "", one.record)).lacks)
-        standing = "kept by: " if one.outside else "NOT " if not one.holds else ""
-        standing += f"only if {lacks}: " if one.holds and lacks else ""
-        click.echo(f"  {one.level} assumes that {one.assumed}")
-        click.echo(f"    {standing}{one.reason}")
+    for agreement in proof.agreements:
+        lacks = named(
+            proof, agreement.level, proof.of(agreement.level, (CONTRACT, "", agreement.record)).lacks
+        )
+        standing = "kept by: " if agreement.outside else "NOT " if not agreement.holds else ""
+        standing += f"only if {lacks}: " if agreement.holds and lacks else ""
+        click.echo(f"  {agreement.level} assumes that {agreement.assumed}")
+        click.echo(f"    {standing}{agreement.reason}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -297,12 +301,12 @@ def _look(
     settings = TraceSettings(description(keep.system), cycles, altered=bool(keep.variants), log=keep.logs)
     found = []
     try:
-        for one in explain(made, proof, settings):
-            found.append(one)
-            if keep.cases is not None and one.finding is not None and not one.beside:
-                _freeze(made, one.finding, keep.cases, keep)
+        for explanation in explain(made, proof, settings):
+            found.append(explanation)
+            if keep.cases is not None and explanation.finding is not None and not explanation.beside:
+                _freeze(made, explanation.finding, keep.cases, keep)
             if say is not None:
-                say(made, one, cycles)
+                say(made, explanation, cycles)
     except OSError as error:
         raise UnwritableError(
             str(error.filename or keep.logs), error.strerror or "no reason given"
@@ -439,19 +443,20 @@ def _unbroken(text: str) -> str:
 
 def _say_not_agreed(proof: SystemProof) -> None:
 
-    for one in proof.agreements:
-        if not one.holds:
+    for agreement in proof.agreements:
+        if not agreement.holds:
             click.echo(
-                f"error[{Code.NOT_AGREED.value}]: level `{one.level}` assumes that {one.assumed}", err=True
+                f"error[{Code.NOT_AGREED.value}]: level `{agreement.level}` assumes that {agreement.assumed}",
+                err=True,
             )
 
 
 def _write(folder: Path, made: dict[str, TransitionSystem], proof: SystemProof) -> None:
 
     folder.mkdir(parents=True, exist_ok=True)
-    for one in proof.levels:
-        for name, text in certificate(made[one.level], one).items():
-            write_atomically(folder / f"{one.level} {name}.smt2".replace(" ", "_"), text.encode())
+    for level in proof.levels:
+        for name, text in certificate(made[level.level], level).items():
+            write_atomically(folder / f"{level.level} {name}.smt2".replace(" ", "_"), text.encode())
 
 
 def _as_json(
@@ -464,34 +469,34 @@ def _as_json(
         "findings": [_told_as_json(made, one) for one in explanation],
         "levels": [
             {
-                "level": one.level,
+                "level": level.level,
                 "goals": [
                     {
                         "what": obligation.sort.value,
                         "table": obligation.table,
                         "name": obligation.name,
-                        **claim(proof, one.level, obligation.key),
+                        **claim(proof, level.level, obligation.key),
                     }
-                    for obligation, _ in one.found
+                    for obligation, _ in level.found
                 ],
                 "not_looked_at": [
                     {"what": each.sort.value, "table": each.table, "missing": each.missing}
-                    for each in one.unstated
+                    for each in level.unstated
                 ],
-                "clauses": len(one.clauses),
-                **as_json(proof, one),
+                "clauses": len(level.clauses),
+                **as_json(proof, level),
             }
-            for one in proof.levels
+            for level in proof.levels
         ],
         "agreements": [
             {
-                "level": one.level,
-                "assumed": one.assumed,
-                "reason": one.reason,
-                "holds": one.holds,
-                "outside": one.outside,
+                "level": agreement.level,
+                "assumed": agreement.assumed,
+                "reason": agreement.reason,
+                "holds": agreement.holds,
+                "outside": agreement.outside,
             }
-            for one in proof.agreements
+            for agreement in proof.agreements
         ],
     }
 

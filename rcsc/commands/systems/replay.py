@@ -103,11 +103,17 @@ def _differs(file: Path, again: Replay, moment: Moment) -> int:
 
 def _leading(cycle: Cycle) -> Any:
     """The difference that is named: a leaf's, where there is one."""
-    return next((one for one in cycle.differences if one.name not in TRACED), cycle.differences[0])
+    return next(
+        (difference for difference in cycle.differences if difference.name not in TRACED),
+        cycle.differences[0],
+    )
 
 
 def _notes(cycle: Cycle) -> tuple[str, ...]:
     lines = f"{cycle.level}: {cycle.line_then} matched then, {cycle.line_now} now"
-    shown = [f"{cycle.level}.{one.name}: {one.then} then, {one.now} now" for one in cycle.differences[:SHOWN]]
+    shown = [
+        f"{cycle.level}.{difference.name}: {difference.then} then, {difference.now} now"
+        for difference in cycle.differences[:SHOWN]
+    ]
     more = len(cycle.differences) - SHOWN
     return (lines, *shown, *([f"and {more} more of {cycle.level}'s"] if more > 0 else []))

@@ -340,8 +340,8 @@ def _closing(witness: Witness, asked: Asked, seconds: float, log: Path) -> int:
 def _figures(witness: Witness, seconds: float) -> Iterator[str]:
     """Where parts lie, how near the joints came to their limits, and how long it took."""
     system = witness.run.system
-    for one in witness.placed():
-        yield f"{one.part} at {one.place}: {one.error_mm:.2f} mm from where it should lie"
+    for placed in witness.placed():
+        yield f"{placed.part} at {placed.place}: {placed.error_mm:.2f} mm from where it should lie"
     margins = ", ".join(f"{margin:.0f}" for margin in witness.margins_deg)
     yield f"joints kept {margins} degrees from their limits"
     control_s = system.tick * system.description.tick_ms / 1000

@@ -51,7 +51,7 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
         if write is not None or against is not None or questions is not None:
             raise click.UsageError("the certificate of a system is written by `rcsc prove --certificate`")
         here = click.get_current_context()
-        given = {one.name for one in here.command.params if _is_given(here, str(one.name))}
+        given = {param.name for param in here.command.params if _is_given(here, str(param.name))}
         if more := sorted(str(name) for name in given - {"source", "cvc5", "strict", "no_cache"}):
             named = ", ".join(f"--{name.replace('_', '-')}" for name in more)
             raise click.UsageError(f"{named}: not of a system; `rcsc prove --certify` has options of its own")

@@ -115,7 +115,7 @@ def _found(
 
 def _wrong(sides: list[Side]) -> int:
     """Shows what keeps the sides from being compared."""
-    every = dict.fromkeys(one for side in sides for one in side.found)
+    every = dict.fromkeys(diagnostic for side in sides for diagnostic in side.found)
     sources = {name: source for side in sides for name, source in side.sources.items()}
     show(Report(tuple(every), (), sources), "diff", Output(quiet=True))
     return ERROR

@@ -59,12 +59,18 @@ def _draw_all(
 ) -> None:
     """Draws every table; of several, those without a state are left out, and what is wrong is told at the end."""
     wrong: list[Diagnostic] = []
-    for one in found:
-        name = f"{one.program.name}_{one.table.name}{'_lines' if lines else ''}{ENDINGS[form]}"
+    for found_table in found:
+        name = (
+            f"{found_table.program.name}_{found_table.table.name}{'_lines' if lines else ''}{ENDINGS[form]}"
+        )
         into = out is not None and (len(found) > 1 or out.is_dir())
         try:
             _draw(
-                one, form, _derived(one, lines, state, options), out / name if into and out else out, options
+                found_table,
+                form,
+                _derived(found_table, lines, state, options),
+                out / name if into and out else out,
+                options,
             )
         except WrongError as error:
             if len(found) == 1:
@@ -75,7 +81,7 @@ def _draw_all(
                 else:
                     wrong.append(left)
     if wrong:
-        texts = {file: text for one in found for file, text in one.loaded.sources.items()}
+        texts = {file: text for found_table in found for file, text in found_table.loaded.sources.items()}
         raise WrongError(tuple(wrong), texts)
 
 

@@ -76,7 +76,7 @@ def _prove(made: Tabled, named: str, options: Options) -> None:
 
     name = made.table.name.text
     found = found_tables(f"{named}:{name}" if named.endswith(".rcs") else named)
-    one = next((one for one in found if one.table.name == name), found[0])
+    one = next((found_table for found_table in found if found_table.table.name == name), found[0])
     verdict = against(one.loaded, one.root, one.program, one.table, made, options)
     if verdict.found:
         raise WrongError(verdict.found, {**one.loaded.sources, **(verdict.sources or {})})

@@ -151,7 +151,7 @@ def worst(verdicts: Iterable[Verdict]) -> Verdict:
     """Return the verdict of a conjunction of claims."""
     order = (Verdict.NOT_PROVED, Verdict.UNDECIDED, Verdict.UNLOOKED, Verdict.TRUSTED)
     every = set(verdicts)
-    return next((one for one in order if one in every), Verdict.PROVED)
+    return next((verdict for verdict in order if verdict in every), Verdict.PROVED)
 
 
 DECLARED = ", as it is declared"
@@ -160,7 +160,7 @@ DECLARED = ", as it is declared"
 
 def declared(trusts: Iterable[str]) -> tuple[str, ...]:
     """Select the assumptions of tables from what is trusted, in order."""
-    return tuple(sorted(one.removesuffix(DECLARED) for one in set(trusts) if one.endswith(DECLARED)))
+    return tuple(sorted(trust.removesuffix(DECLARED) for trust in set(trusts) if trust.endswith(DECLARED)))
 
 
 def spelled(need: Need, level: str, claims: Collection[Need] | None = None) -> str:

@@ -155,7 +155,7 @@ def links(system: Description, level: str, program: Program) -> Links:
 
 
 def _level(program: Program, name: str) -> Level:
-    found = next((one for one in program.levels if one.name == name), None)
+    found = next((level for level in program.levels if level.name == name), None)
     if found is None:
         raise BadDescription(f"program `{program.name}` has no level `{name}`")
     return found
@@ -239,11 +239,14 @@ def check_ends(system: Description, programs: Mapping[str, Program]) -> None:
     for end in filled:
         if filled.count(end) > 1:
             raise BadDescription(f"`{end}` is filled twice")
-        if any(one.kind is not Kind.INPUT for one in _at_end(programs, end)):
+        if any(variable.kind is not Kind.INPUT for variable in _at_end(programs, end)):
             raise BadDescription(f"`{end}` is filled, and is no input")
     for wire in system.wires:
         given, taken = (
-            {str(one.name).removeprefix(_variable(end)): one.type for one in _at_end(programs, end)}
+            {
+                str(variable.name).removeprefix(_variable(end)): variable.type
+                for variable in _at_end(programs, end)
+            }
             for end in (wire.source, wire.target)
         )
         if not given or not taken:
@@ -265,7 +268,7 @@ def _at_end(programs: Mapping[str, Program], end: str) -> tuple[Variable, ...]:
     leaves = leaves_under(program, _variable(end))
     if not leaves:
         raise BadDescription(f"program `{program.name}` has no variable `{_variable(end)}` ({end})")
-    return tuple(one for one in program.variables if one.name in leaves)
+    return tuple(variable for variable in program.variables if variable.name in leaves)
 
 
 def _admits(taken: Scalar, given: Scalar) -> bool:

@@ -292,7 +292,7 @@ def _no_pause(ts: TransitionSystem, below: Below) -> Iterator[str]:
 
 def run_by(ts: TransitionSystem) -> list[Table]:
     """List the tables that the level runs."""
-    return [one for one in ts.program.tables if one.name in ts.level.tables.names]
+    return [table for table in ts.program.tables if table.name in ts.level.tables.names]
 
 
 def _rests(ts: TransitionSystem, table: Table) -> bool:
@@ -315,7 +315,7 @@ def _stated(ts: TransitionSystem, cycle: Cycle) -> Iterator[Obligation]:
 
 def asks(program: Program) -> bool:
     """Return whether a cycle can end early because an extern procedure is refused."""
-    return any(one.extern is not None for one in program.procedures)
+    return any(procedure.extern is not None for procedure in program.procedures)
 
 
 def _overlooking(at: TableAt) -> tuple[Node, ...] | None:

@@ -101,7 +101,9 @@ def cone(cycle: Cycle, obligations: Iterable[Node]) -> frozenset[str]:
         name = waiting.pop()
         if name not in found:
             found.add(name)
-            waiting += [one for one in values.variables([cycle.after[name]]) if one in cycle.before]
+            waiting += [
+                variable for variable in values.variables([cycle.after[name]]) if variable in cycle.before
+            ]
     return frozenset(found)
 
 
@@ -139,7 +141,7 @@ def predicates(
     ]
     found += _cells(ts, {*inside, *computed})
     if closely:
-        found += _branches(ts, inside, {one.leaf for one in found})
+        found += _branches(ts, inside, {predicate.leaf for predicate in found})
     return tuple(found)
 
 
@@ -147,18 +149,18 @@ def point(ts: TransitionSystem, chosen: tuple[Predicate, ...], state: Mapping[st
     """Evaluate the predicates in a state that was reached; modules are run by the interpreter."""
     again: dict[str, dict[str, Value]] = {}
     found = []
-    for one in chosen:
-        if one.condition is not None:
-            found.append(int(holds(one.condition, state)))
-        elif one.module is not None:
-            if one.module.name not in again:
-                again[one.module.name] = dict(state)
-                call(ts.program, one.module.name, [], again[one.module.name])
-            found.append(int(state[one.leaf] == again[one.module.name][one.leaf]))
-        elif one.other:
-            found.append(int(state[one.leaf] == state[one.other]))
+    for predicate in chosen:
+        if predicate.condition is not None:
+            found.append(int(holds(predicate.condition, state)))
+        elif predicate.module is not None:
+            if predicate.module.name not in again:
+                again[predicate.module.name] = dict(state)
+                call(ts.program, predicate.module.name, [], again[predicate.module.name])
+            found.append(int(state[predicate.leaf] == again[predicate.module.name][predicate.leaf]))
+        elif predicate.other:
+            found.append(int(state[predicate.leaf] == state[predicate.other]))
         else:
-            found.append(key_of(one.kind, state[one.leaf]))
+            found.append(key_of(predicate.kind, state[predicate.leaf]))
     return tuple(found)
 
 
@@ -177,7 +179,7 @@ def _flag(program: Program, name: str) -> bool:
 def _read(ts: TransitionSystem) -> set[str]:
     """Collect the leaves that decide which line runs or that the contract is about, and their pending values."""
     program, level = ts.program, ts.level
-    conditions = [one.condition for one in program.assumptions]
+    conditions = [assumption.condition for assumption in program.assumptions]
     conditions += [
         test.condition
         for table in program.tables

@@ -45,16 +45,19 @@ _PARTIAL = frozenset({Op.DIV, Op.MOD, Op.TO_INT})
 
 def invariants(program: Program, cycle: Cycle) -> Iterator[tuple[str, Node]]:
     """State each invariant by name: it holds before the cycle and after it."""
-    for one in program.invariants:
-        yield one.name, values.both(_true(one.condition, cycle.before), _true(one.condition, cycle.after))
+    for invariant in program.invariants:
+        yield (
+            invariant.name,
+            values.both(_true(invariant.condition, cycle.before), _true(invariant.condition, cycle.after)),
+        )
 
 
 def kept_within(program: Program, cycle: Cycle, names: Collection[str]) -> Node:
     """State that the invariants hold within the cycle, too, wherever operations are shown to be safe under them."""
     return values.all_of(
-        _true(one.condition, leaves)
-        for one in program.invariants
-        if one.name in names
+        _true(invariant.condition, leaves)
+        for invariant in program.invariants
+        if invariant.name in names
         for leaves in (cycle.settled, cycle.middle, cycle.acted)
     )
 
@@ -70,7 +73,9 @@ def _true(condition: Expr, leaves: Leaves) -> Node:
     """Return the condition that an expression is defined and true."""
     run = Run({}, {}, dict(leaves))
     found = run.evaluate(condition)
-    return values.all_of((*(values.follows(one.path, one.good) for one in run.obligations), found))
+    return values.all_of(
+        (*(values.follows(obligation.path, obligation.good) for obligation in run.obligations), found)
+    )
 
 
 # --- of a run --------------------------------------------------------------------------------
@@ -84,7 +89,7 @@ def invariant_kept(
     Raises:
         StopIteration: There is no such invariant.
     """
-    condition = next(one.condition for one in ts.program.invariants if one.name == name)
+    condition = next(invariant.condition for invariant in ts.program.invariants if invariant.name == name)
     return all(_held(condition, state, ts.kinds) for state in (before, after))
 
 
@@ -124,18 +129,21 @@ def every_predicate(
     """
     wanted = list(obligations)
     first = predicates(ts, cycle, wanted)
-    said = _said(ts, cone(cycle, wanted), {one.name for one in first}) if _states(ts) else ()
+    said = _said(ts, cone(cycle, wanted), {predicate.name for predicate in first}) if _states(ts) else ()
     found = (*first, *said)
     if closely:
-        there = {one.name for one in found}
+        there = {predicate.name for predicate in found}
         closer = predicates(ts, cycle, wanted, closely)
-        found = (*found, *(one for one in closer if one.name not in there))
+        found = (*found, *(predicate for predicate in closer if predicate.name not in there))
     return found
 
 
 def _states(ts: TransitionSystem) -> list[Expr]:
     program = ts.program
-    return [*(one.condition for one in program.invariants), *(one.condition for one in program.properties)]
+    return [
+        *(invariant.condition for invariant in program.invariants),
+        *(one.condition for one in program.properties),
+    ]
 
 
 def _said(ts: TransitionSystem, inside: frozenset[str], there: set[str]) -> tuple[Predicate, ...]:
@@ -145,12 +153,12 @@ def _said(ts: TransitionSystem, inside: frozenset[str], there: set[str]) -> tupl
         for part in parts(condition):
             if len({name.startswith(BEFORE) for name in read_by(part)}) > 1:
                 continue  # it says of two cycles what no state shows
-            for one in _predicates_of(_of_one_cycle(part), ts.kinds):
-                read = {one.leaf, *([one.other] if one.other else [])}
-                if one.condition is not None:
-                    read = set(map(str, read_by(one.condition)))
-                if one.name not in there and read and read <= inside:
-                    found.setdefault(one.name, one)
+            for predicate in _predicates_of(_of_one_cycle(part), ts.kinds):
+                read = {predicate.leaf, *([predicate.other] if predicate.other else [])}
+                if predicate.condition is not None:
+                    read = set(map(str, read_by(predicate.condition)))
+                if predicate.name not in there and read and read <= inside:
+                    found.setdefault(predicate.name, predicate)
     return tuple(found.values())
 
 
@@ -185,8 +193,8 @@ def _predicates_of(part: Expr, kinds: Mapping[str, Scalar]) -> Iterator[Predicat
 def _condition(part: Expr, kinds: Mapping[str, Scalar]) -> Iterator[Predicate]:
     """Make a predicate of a comparison of numbers, where it is defined of every value."""
     whole = all(
-        not isinstance(one, Select) and not (isinstance(one, Apply) and one.op in _PARTIAL)
-        for one in parts(part)
+        not isinstance(apply, Select) and not (isinstance(apply, Apply) and apply.op in _PARTIAL)
+        for apply in parts(part)
     )
     if whole and not all(listed(kinds[leaf]) for leaf in read_by(part)):
         yield Predicate(spelled(part), Bool(), condition=part)

@@ -177,7 +177,7 @@ class TransitionSystem:
 
     def __post_init__(self) -> None:
         """Reads what cycles are made of."""
-        self.procedures = {one.name: one for one in self.program.procedures}
+        self.procedures = {procedure.name: procedure for procedure in self.program.procedures}
         self.kinds = {str(v.name): v.type for v in self.program.variables}
         self.inputs = tuple(str(v.name) for v in self.program.variables if v.kind is Kind.INPUT)
         for asked in self.links.asked:
@@ -188,7 +188,11 @@ class TransitionSystem:
 
     def _of_the_environment(self) -> frozenset[str]:
         """Find the *assumed* assumptions about what a cycle takes; those about state alone are to be proved."""
-        wanted = {str(one.name) for one in self.program.assumptions if one.standing is Standing.ASSUMED}
+        wanted = {
+            str(assumption.name)
+            for assumption in self.program.assumptions
+            if assumption.standing is Standing.ASSUMED
+        }
         if not wanted:
             return frozenset()
         cycle = self.cycle(self.havoc())
@@ -244,7 +248,7 @@ class TransitionSystem:
         """Return the same level with another program of the same leaves."""
         return TransitionSystem(
             program,
-            next(one for one in program.levels if one.name == self.level.name),
+            next(level for level in program.levels if level.name == self.level.name),
             self.links,
             self.safety,
         )
@@ -356,9 +360,9 @@ class TransitionSystem:
         for name, selected in run.choices(self.level).items():
             table = self.table(name)
             assumptions = {
-                str(one.name): run.evaluate(one.condition)
-                for one in self.program.assumptions
-                if one.name in table.assumptions
+                str(assumption.name): run.evaluate(assumption.condition)
+                for assumption in self.program.assumptions
+                if assumption.name in table.assumptions
             }
             matches = tuple(
                 values.all_of(run.evaluate(test.condition) for test in line.tests if test is not None)

@@ -57,15 +57,15 @@ def _first_match(table: Table) -> Table:
 
 def _none_of(table: Table, conditions: list[Expr]) -> Test:
     found = conditions[0]
-    for one in conditions[1:]:
-        found = Apply(Op.OR, (found, one), Bool())
+    for condition in conditions[1:]:
+        found = Apply(Op.OR, (found, condition), Bool())
     return Test("no line before", Apply(Op.NOT, (found,), Bool()), table.variables, None)
 
 
 def _all_of(conditions: list[Expr]) -> Expr:
     found: Expr = TRUE
-    for one in conditions:
-        found = one if found is TRUE else Apply(Op.AND, (found, one), Bool())
+    for condition in conditions:
+        found = condition if found is TRUE else Apply(Op.AND, (found, condition), Bool())
     return found
 
 

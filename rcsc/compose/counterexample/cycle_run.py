@@ -138,7 +138,7 @@ def _actions(ts: TransitionSystem, step: CycleRun) -> tuple[Action, ...]:
     """Return the actions of the line that ran."""
     table = ts.table(step.table)
     lines: list[Line | Default] = [*table.lines, *([] if table.default is None else [table.default])]
-    return next((one.actions for one in lines if one.name == step.line), ())
+    return next((line.actions for line in lines if line.name == step.line), ())
 
 
 def seen_by_table(ts: TransitionSystem, step: CycleRun) -> Snapshot | None:
@@ -178,14 +178,16 @@ def _also_failed(ts: TransitionSystem, step: CycleRun) -> tuple[str, ...]:
     """List the table's assumptions that failed and that no executor looks at."""
     table = ts.table(step.table)
     others = [
-        one
-        for one in ts.program.assumptions
-        if one.name in table.assumptions
-        and one.standing is not Standing.MONITORED
-        and one.name not in step.failed
+        assumption
+        for assumption in ts.program.assumptions
+        if assumption.name in table.assumptions
+        and assumption.standing is not Standing.MONITORED
+        and assumption.name not in step.failed
     ]
     seen = seen_by_table(ts, step) if others else None
-    return () if seen is None else tuple(str(one.name) for one in others if not holds(one.condition, seen))
+    return (
+        () if seen is None else tuple(str(other.name) for other in others if not holds(other.condition, seen))
+    )
 
 
 def broken(ts: TransitionSystem, obligation: Obligation, step: CycleRun) -> bool:

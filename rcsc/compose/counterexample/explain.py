@@ -90,12 +90,12 @@ def explain(
     """
     with scratch("findings") as kept:
         rerun = _Rerun(made, settings, settings.log or kept)
-        for one in proof.levels:
-            for explanation in _level(made, one.level, essential(one), settings):
+        for level in proof.levels:
+            for explanation in _level(made, level.level, essential(level), settings):
                 yield rerun.run(explanation)
-            for explanation in _together(made, one.level, essential(one), settings):
+            for explanation in _together(made, level.level, essential(level), settings):
                 yield rerun.run(explanation)
-            for explanation in _endless(made[one.level], one, settings):
+            for explanation in _endless(made[level.level], level, settings):
                 yield rerun.run(explanation)
 
 

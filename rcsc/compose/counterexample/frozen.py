@@ -236,7 +236,7 @@ def _answer(ts: TransitionSystem, said: Any) -> ExternAnswer:
     try:
         name, results = said
         procedure = next(one for one in ts.program.procedures if one.name == name and one.extern)
-        given = tuple(float(one) if isinstance(one, str) else one for one in results)
+        given = tuple(float(result) if isinstance(result, str) else result for result in results)
         if len(given) == len(procedure.writes) and all(isinstance(one, bool | int | float) for one in given):
             return str(name), given
     except (TypeError, ValueError, StopIteration):

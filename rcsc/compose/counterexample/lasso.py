@@ -58,30 +58,30 @@ def lassos(
 def _comes_round(ts: TransitionSystem, table: str, cycles: Sequence[Cycle]) -> Node:
     """Return the condition that the cycles are a lasso of the table's command."""
     first, last = cycles[0], cycles[-1]
-    number = next(at for at, one in enumerate(first.tables) if one.table.name == table)
+    number = next(at for at, table_at in enumerate(first.tables) if table_at.table.name == table)
     goes = [
         values.all_of(
             (
-                one.contract,
-                one.goes_on,
-                values.negation(one.refused),
-                one.tables[number].chosen,
-                command_stays(ts, one),
+                cycle.contract,
+                cycle.goes_on,
+                values.negation(cycle.refused),
+                cycle.tables[number].chosen,
+                command_stays(ts, cycle),
             )
         )
-        for one in cycles
+        for cycle in cycles
     ]
     moving = _moving(ts)
     same = [values.equal(first.before[leaf], last.after[leaf]) for leaf in first.before if leaf not in moving]
     due = []
     for below in ts.links.below:
         ordered = values.negation(values.equal(first.before[below.number], last.after[below.number]))
-        due.append(values.either(ordered, values.all_of(answered(ts, one, below) for one in cycles)))
+        due.append(values.either(ordered, values.all_of(answered(ts, cycle, below) for cycle in cycles)))
         before, after = (
             values.equal(leaves[below.echo], leaves[below.number]) for leaves in (first.before, last.after)
         )
         due.append(values.equal(before, after))
-    waits = values.any_of(unanswered(ts, one) for one in cycles)
+    waits = values.any_of(unanswered(ts, cycle) for cycle in cycles)
     return values.all_of((*goes, waits, *same, *due))
 
 
@@ -109,7 +109,9 @@ def lasso_of(ts: TransitionSystem, table: str, steps: Sequence[CycleRun]) -> int
         lasso = steps[first:]
         if _is_lasso(ts, table, lasso):
             again = _again(ts, lasso)
-            same = [(one.table, one.line) for one in lasso] == [(one.table, one.line) for one in again]
+            same = [(cycle_run.table, cycle_run.line) for cycle_run in lasso] == [
+                (cycle_run.table, cycle_run.line) for cycle_run in again
+            ]
             if same and _is_lasso(ts, table, again):
                 return first + 1
     return None

@@ -88,7 +88,7 @@ class _Together:
         assert above is not None
         reports = _renamed(self.upper, self.below.report, above.report)
         orders = _renamed(self.lower, above.order, self.below.order)
-        others = tuple(one for one in self.upper.links.below if one != self.below)
+        others = tuple(below for below in self.upper.links.below if below != self.below)
         self.sides = (
             _Side(self.upper.level.name, _with(self.upper, below=others), reports),
             _Side(self.lower.level.name, _with(self.lower, above=None), orders),

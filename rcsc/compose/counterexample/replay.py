@@ -82,27 +82,30 @@ def told_what_externs_give(program: Program) -> Program:
     return replace(
         program,
         procedures=tuple(
-            one
-            if one.extern is None
-            else replace(one, extern=replace(one.extern, python=f"{answers.MODULE}:{answers.OF}{one.name}"))
-            for one in program.procedures
+            procedure
+            if procedure.extern is None
+            else replace(
+                procedure,
+                extern=replace(procedure.extern, python=f"{answers.MODULE}:{answers.OF}{procedure.name}"),
+            )
+            for procedure in program.procedures
         ),
     )
 
 
 def _stand_ins(program: Program) -> Iterator[str]:
     """Write the stand-ins in C, after the program's own text."""
-    externs = [one for one in program.procedures if one.extern is not None]
+    externs = [procedure for procedure in program.procedures if procedure.extern is not None]
     if externs:
         yield answers.HEAD
     kinds = {str(v.name): c_type(v.type) for v in program.variables}
-    for one in externs:
-        assert one.extern is not None
-        given = [kinds[name] for name in one.reads] + [wide_type(each.type) for each in one.params]
+    for extern in externs:
+        assert extern.extern is not None
+        given = [kinds[name] for name in extern.reads] + [wide_type(each.type) for each in extern.params]
         yield answers.stand_in(
-            one.extern.c,
+            extern.extern.c,
             [(kind, f"a{at}") for at, kind in enumerate(given)],
-            [(kinds[name], f"r{at}") for at, name in enumerate(one.writes)],
+            [(kinds[name], f"r{at}") for at, name in enumerate(extern.writes)],
         )
 
 

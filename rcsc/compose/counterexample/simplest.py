@@ -115,7 +115,9 @@ class Simplest:
         return bool(path.low) if path.known else bool(self.settle([path], [False])[0])
 
     def _answer(self, program: Program, call: ExternResults) -> ExternAnswer:
-        writes = next(one.writes for one in program.procedures if one.name == call.procedure)
+        writes = next(
+            procedure.writes for procedure in program.procedures if procedure.name == call.procedure
+        )
         given = self.settle(call.results, [least(node.kind) for node in call.results])
         wrong = self.settle(call.refusals, [False] * len(call.refusals))
         results = [

@@ -217,7 +217,7 @@ class Unrolled:
     @property
     def _asks(self) -> bool:
         """Whether extern procedures are called: an obligation may speak of what they give in the cycle after the last."""
-        return any(one.calls for one in self.cycles)
+        return any(cycle.calls for cycle in self.cycles)
 
     def _settled(self, settled: Simplest) -> tuple[dict[str, Value], list[Given]]:
         start = self._begins(settled)
@@ -229,9 +229,9 @@ class Unrolled:
         program = self.ts.program
         inputs = self.ts.inputs
         before = [start[name] for name in inputs]
-        for one in self.cycles:
-            before = settled.settle([one.taken[name] for name in inputs], before)
-            found.append((dict(zip(inputs, before, strict=True)), settled.answers(program, one)))
+        for cycle in self.cycles:
+            before = settled.settle([cycle.taken[name] for name in inputs], before)
+            found.append((dict(zip(inputs, before, strict=True)), settled.answers(program, cycle)))
         return found
 
     def _begins(self, settled: Simplest) -> dict[str, Value]:
@@ -246,11 +246,11 @@ class Unrolled:
 
     def _beside(self, trace: Trace) -> tuple[str, ...]:
         """Describe the first cycle in which the solver's run and the interpreter's differ."""
-        for number, (one, step) in enumerate(zip(self.cycles, trace.steps, strict=False), 1):
+        for number, (cycle, step) in enumerate(zip(self.cycles, trace.steps, strict=False), 1):
             said = {
-                name: value_of_key(kind, self._run.key(one.after[name]))
+                name: value_of_key(kind, self._run.key(cycle.after[name]))
                 for name, kind in self.ts.kinds.items()
-                if name in step.after and self._run.met(one.after[name])
+                if name in step.after and self._run.met(cycle.after[name])
             }
             other = [
                 f"cycle {number}: `{name}` = {spell(kind, said[name])} by the solver, {spell(kind, step.after[name])} as it ran"

@@ -103,7 +103,7 @@ class Confirmation:
 
     def first_question(self, clauses: Sequence[Clause], first: Cycle) -> Solver:
         """Ask whether a first cycle leads to where a clause is broken: unsatisfiable if the clauses are an invariant."""
-        nodes = [one.node(first.after) for one in self.predicates]
+        nodes = [predicate.node(first.after) for predicate in self.predicates]
         equal = [self.keyed.equal(self._end(at), node) for at, node in enumerate(nodes)]
         solver = self.beginning(first)
         solver.add(*self.keyed.ranges, *equal, smt.any_of([self._stands(clause) for clause in clauses]))

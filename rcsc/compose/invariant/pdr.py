@@ -48,11 +48,11 @@ class Posed:
     def __init__(
         self, predicates: Sequence[Predicate], cycle: Cycle, obligations: Mapping[int, Node]
     ) -> None:
-        starts = [one.node(cycle.before) for one in predicates]
-        ends = [one.node(cycle.after) for one in predicates]
+        starts = [predicate.node(cycle.before) for predicate in predicates]
+        ends = [predicate.node(cycle.after) for predicate in predicates]
         bits = Bits.of((*starts, *ends, cycle.contract, *obligations.values()))
-        self._kinds = [one.kind for one in predicates]
-        self.sizes = [one.size for one in predicates]
+        self._kinds = [predicate.kind for predicate in predicates]
+        self.sizes = [predicate.size for predicate in predicates]
         self._starts = [bits.word(node) for node in starts]
         self._ends = [bits.word(node) for node in ends]
         self.before = self._values(bits, predicates, self._starts)

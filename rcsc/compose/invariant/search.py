@@ -102,7 +102,7 @@ def strengthened(
         GaveUpError: The solver did.
     """
     chosen, every = found.predicates, range(len(wanted))
-    posed = [Posed(chosen, one, dict.fromkeys(every, TRUE)) for one in firsts]
+    posed = [Posed(chosen, first, dict.fromkeys(every, TRUE)) for first in firsts]
     posed.append(Posed(chosen, cycle, dict(enumerate(wanted))))
     made, _ = _searched(ts, chosen, posed, found, every)
     return replace(made, open=found.open, walked=found.walked)
@@ -131,7 +131,7 @@ def _searched(
 ) -> tuple[Invariant, set[int]]:
     walked = dict.fromkeys(point(ts, chosen, state) for state in before.states)
     reached = Reached.of(walked, len(chosen))
-    weights = [2 if one.parts else int(one.size > 2) for one in chosen]
+    weights = [2 if predicate.parts else int(predicate.size > 2) for predicate in chosen]
     clauses, left_open = PDR(posed[:-1], posed[-1], reached, weights, before.clauses).search(left)
     for one in posed:
         one.sat.close()

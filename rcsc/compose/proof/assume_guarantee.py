@@ -37,7 +37,10 @@ def agreements(made: Mapping[str, TransitionSystem], proofs: Mapping[str, LevelP
         for obligation, verdict in proof.found
         if verdict in FOUND
     }
-    return [replace(one, holds=one.begins and proved.issuperset(one.needs)) for one in promises(made)]
+    return [
+        replace(promise, holds=promise.begins and proved.issuperset(promise.needs))
+        for promise in promises(made)
+    ]
 
 
 # --- claims --------------------------------------------------------------------------------
@@ -45,7 +48,7 @@ def agreements(made: Mapping[str, TransitionSystem], proofs: Mapping[str, LevelP
 
 def claims(made: Mapping[str, TransitionSystem], proofs: Mapping[str, LevelProof]) -> dict[Need, Claim]:
     """Return everything that is claimed of these levels, and what it rests on."""
-    found = dict(one.claim for one in promises(made))
+    found = dict(promise.claim for promise in promises(made))
     for name, proof in proofs.items():
         found |= {(name, key): claim for key, claim in of_level(made[name], proof)}
     return found
@@ -104,7 +107,7 @@ def _of_runs(ts: TransitionSystem, proof: LevelProof) -> Iterator[tuple[Key, Cla
     ]
     yield RUNS, Claim(Verdict.PROVED, tuple((name, key) for key in needs), tuple(trusts))
     within = [verdict for obligation, verdict in proof.found if obligation.key == SAFE]
-    invariants = tuple((name, (Sort.INVARIANT, "", one)) for one in ts.safety.invariants)
+    invariants = tuple((name, (Sort.INVARIANT, "", invariant)) for invariant in ts.safety.invariants)
     rests = ((name, RUNS), *invariants) if within else invariants
     yield SAFE, Claim(worst(within), rests)
 
@@ -172,7 +175,7 @@ def _of_above(name: str, ts: TransitionSystem, made: Mapping[str, TransitionSyst
     if above.outside:
         yield Promise(name, above.order, words, f"`{above.name}` stands outside the levels", outside=True)
         return
-    upper = next(one for one in made[above.name].links.below if one.name == name)
+    upper = next(below for below in made[above.name].links.below if below.name == name)
     keys: list[Key] = [
         (Sort.NUMBERED, "", other_end(leaf, above.order, upper.order)) for leaf in above.numbered
     ]
@@ -194,7 +197,7 @@ def _begin(upper: TransitionSystem, order: str, lower: TransitionSystem, record:
     numbered = () if above is None else above.numbered
     ends = {leaf: other_end(leaf, record, order) for leaf in (f"{record}.{COMMAND}", *numbered)}
     ends[f"{record}.{NUMBER}"] = number = f"{order}.{NUMBER}"
-    report = next(one.report for one in upper.links.below if one.order == order)
+    report = next(below.report for below in upper.links.below if below.order == order)
     if not first.keys() >= {*ends.values(), f"{report}.{ECHOED}"} or not other.keys() >= ends.keys():
         return False  # a field is missing, or named otherwise
     sent, echo = int(first[number]), int(first[f"{report}.{ECHO}"])

@@ -72,14 +72,14 @@ def context(
 ) -> Context:
     """Ask all of it; lines that `ran` on walks are known to be reached."""
     every = list(_starts(ts, asked, clauses))
-    asked.rested_on += [one.solver for one in every]
-    reached = [set(_reached(asked, one)) for one in every]
+    asked.rested_on += [start.solver for start in every]
+    reached = [set(_reached(asked, start)) for start in every]
     lines = [line for line, _ in _lines(every[0].cycle)]
     unreached = tuple(line for line in lines if not any(line in found for found in reached))
     return Context(
         unreached,
         tuple(_every_repeated(ts, asked, every)),
-        any(_restless(ts, asked, one) for one in every),
+        any(_restless(ts, asked, start) for start in every),
         tuple(line for line in lines if line not in unreached and line not in ran),
         bool(ts.links.below),
     )
@@ -156,11 +156,11 @@ def _repeated(
     }
     lines = [
         (
-            (str(one.table.name), str(line.name)),
-            keyed.term(values.all_of((one.chosen, match, two.chosen, more))),
+            (str(table_at.table.name), str(line.name)),
+            keyed.term(values.all_of((table_at.chosen, match, two.chosen, more))),
         )
-        for one, two in zip(cycle.tables, again.tables, strict=True)
-        for (line, match), (_, more) in zip(one.lines, two.lines, strict=True)
+        for table_at, two in zip(cycle.tables, again.tables, strict=True)
+        for (line, match), (_, more) in zip(table_at.lines, two.lines, strict=True)
     ]
     gives = keyed.term(gives_an_order(ts, cycle))
     solver = start.solver
@@ -223,8 +223,8 @@ def of_lines(ts: TransitionSystem) -> set[str]:
 
 def _written(ts: TransitionSystem, statement: Statement) -> set[str]:
     found: set[str] = set()
-    for one in everything((statement,)):
-        found |= set(map(str, written_by(one)))
-        if isinstance(one, Call):
-            found |= set(map(str, ts.procedures[one.procedure].writes))
+    for call in everything((statement,)):
+        found |= set(map(str, written_by(call)))
+        if isinstance(call, Call):
+            found |= set(map(str, ts.procedures[call.procedure].writes))
     return found

@@ -49,7 +49,7 @@ def recall(cache: Cache, ts: TransitionSystem, effort: Effort) -> LevelProof | N
         return None
     for closely in range(CLOSELY + 1):
         chosen = every_predicate(ts, cycle, read(ts, cycle, wanted), closely)
-        if tuple(one.name for one in chosen) == kept.predicates:
+        if tuple(predicate.name for predicate in chosen) == kept.predicates:
             found = tuple((goal, verdict) for goal, (_, verdict) in zip(wanted, kept.found, strict=True))
             proof = LevelProof(
                 ts.level.name, found, chosen, kept.clauses, kept.walked, kept.learnt, kept.seconds, cached=True,
@@ -66,7 +66,7 @@ def keep(cache: Cache, ts: TransitionSystem, effort: Effort, proof: LevelProof) 
         return
     kept = _Kept(
         tuple((obligation.key, verdict) for obligation, verdict in proof.found),
-        tuple(one.name for one in proof.predicates), proof.clauses, proof.walked, proof.learnt, proof.seconds,
+        tuple(predicate.name for predicate in proof.predicates), proof.clauses, proof.walked, proof.learnt, proof.seconds,
         proof.context, proof.endings, proof.unstated,
     )  # fmt: skip
     cache.store(kept, *_key(ts, effort))
@@ -76,7 +76,9 @@ def keep(cache: Cache, ts: TransitionSystem, effort: Effort, proof: LevelProof) 
 def _shortened(ts: TransitionSystem, proof: LevelProof) -> Verdicts:
     """Shorten the proof to what was found, without what shows it."""
     claims = dict(of_level(ts, proof))
-    return Verdicts(claims, tuple(map(_said, essential(proof))), tuple(one.shown for one in proof.unstated))
+    return Verdicts(
+        claims, tuple(map(_said, essential(proof))), tuple(unstated.shown for unstated in proof.unstated)
+    )
 
 
 def _said(obligation: Obligation) -> str:
@@ -89,6 +91,6 @@ def _key(ts: TransitionSystem, effort: Effort) -> tuple[str, ...]:
 
 def content(ts: TransitionSystem) -> str:
     """Return the digest of all that a proof of the level is about, wherever the files stand."""
-    tables = tuple(replace(one, file="", stops=()) for one in ts.program.tables)  # they follow from it
+    tables = tuple(replace(table, file="", stops=()) for table in ts.program.tables)  # they follow from it
     program = replace(ts.program, file="", tables=tables)
     return hashlib.sha256(repr((program, ts.level.name, ts.links)).encode()).hexdigest()

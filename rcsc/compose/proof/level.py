@@ -283,7 +283,7 @@ def _looked_again(ts: TransitionSystem, proof: LevelProof, asked: Confirmation) 
 
 def _refuted(asked: Confirmation) -> list[str]:
     """Take the scripts of what was refuted since the last call, one a solver."""
-    found = [one.refutations() for one in asked.rested_on if one.refuted]
+    found = [solver.refutations() for solver in asked.rested_on if solver.refuted]
     asked.rested_on.clear()
     return found
 

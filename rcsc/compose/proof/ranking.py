@@ -240,10 +240,10 @@ class _Ranking:
         self.solver.add(runs)
         answer = self.solver.check()
         seen = [
-            one
-            for one in self.numbers
+            number
+            for number in self.numbers
             if answer is not Answer.SATISFIABLE
-            or self.solver.value(smt.below(one.before, one.after, KEY), Bool())
+            or self.solver.value(smt.below(number.before, number.after, KEY), Bool())
         ]
         self.solver.pop()
         return None if answer is Answer.UNSATISFIABLE else seen
@@ -252,15 +252,15 @@ class _Ranking:
         """Yield the numbers that always rise with the line and never fall within the part."""
         others = smt.any_of([self.now[other] for other in sorted(part)])
         name = str(self.turn.at.lines[line][0].name)
-        for one in among:
-            if may(self.solver, others, smt.below(one.after, one.before, KEY)):
+        for number in among:
+            if may(self.solver, others, smt.below(number.after, number.before, KEY)):
                 continue
-            if isinstance(one.kind, Real):
-                least = self._least_rise(runs, one, one.kind.high - one.kind.low)
+            if isinstance(number.kind, Real):
+                least = self._least_rise(runs, number, number.kind.high - number.kind.low)
                 if least is not None:
-                    yield Counted(name, one.name, least)
-            elif not may(self.solver, runs, smt.at_most(one.after, one.before, KEY)):
-                yield Counted(name, one.name)
+                    yield Counted(name, number.name, least)
+            elif not may(self.solver, runs, smt.at_most(number.after, number.before, KEY)):
+                yield Counted(name, number.name)
 
     def _least_rise(self, runs: Term, number: KeptNumber, width: float) -> float | None:
         """Return how much the real rises at least; None where that is not shown to be anything."""

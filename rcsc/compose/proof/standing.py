@@ -157,7 +157,7 @@ class KnownSystem:
 
     def __post_init__(self) -> None:
         """Closes the claims."""
-        claims = dict(one.claim for one in self.outline.assumed)
+        claims = dict(promise.claim for promise in self.outline.assumed)
         claims |= {
             (level, key): claim for level, kept in self.known.items() for key, claim in kept.claims.items()
         }
@@ -224,7 +224,7 @@ class KnownSystem:
     @property
     def whole(self) -> Known:
         """Whether all of it is proved."""
-        found = {self.of_level(one.name) for one in self.outline.levels}
+        found = {self.of_level(level.name) for level in self.outline.levels}
         if Known.NOT_PROVED in found or self.broken:
             return Known.NOT_PROVED
         worst = (Known.UNKNOWN, Known.CONDITIONAL, Known.PARTLY)
@@ -252,5 +252,5 @@ class KnownSystem:
 
 def standing(cache: Cache, outline: Outline) -> KnownSystem:
     """Return what the cache knows of a system."""
-    found = {one.name: verdicts_of(cache, one.content) for one in outline.levels}
-    return KnownSystem(outline, {name: one for name, one in found.items() if one is not None})
+    found = {level.name: verdicts_of(cache, level.content) for level in outline.levels}
+    return KnownSystem(outline, {name: verdicts for name, verdicts in found.items() if verdicts is not None})

@@ -55,7 +55,7 @@ class SystemProof:
     def proved(self) -> bool:
         """Whether every obligation that could be stated, and every agreement between levels, is found so."""
         return all(not essential(proof) for proof in self.levels) and all(
-            one.holds for one in self.agreements
+            agreement.holds for agreement in self.agreements
         )
 
     @property
@@ -132,7 +132,7 @@ def _narrowed(mine: Links, every: Mapping[str, Links], programs: Mapping[str, Pr
         return mine
     from rcsc.compose.contract.predicates import compared
 
-    upper = next((one for one in every[above.name].below if one.name == mine.level), None)
+    upper = next((below for below in every[above.name].below if below.name == mine.level), None)
     if upper is None:
         raise BadDescription(
             f"`{mine.level}.{above.order}` is an order of `{above.name}`, which takes no report of it"
@@ -166,9 +166,9 @@ def checked(path: Path, name: str) -> tuple[Program, Safety]:
     program = loaded_program(path, name)[0]
     owed = Obligations(program, Options())
     found = owed.prove(program.tables)
-    for one in found:
-        if one.code not in SHOWN_HERE:
-            raise NoProgramError(f"{one.message}: see `rcsc check {one.primary.span.file}`")
+    for diagnostic in found:
+        if diagnostic.code not in SHOWN_HERE:
+            raise NoProgramError(f"{diagnostic.message}: see `rcsc check {diagnostic.primary.span.file}`")
     return with_stops(program, owed.stops), _safety(program, owed.stops, found)
 
 
@@ -182,11 +182,11 @@ def _safety(
     if not program.invariants:
         return Safety()
     without = Obligations(replace(program, invariants=()), Options())
-    wrong = any(one.code not in SHOWN_HERE for one in without.prove(program.tables))
+    wrong = any(diagnostic.code not in SHOWN_HERE for diagnostic in without.prove(program.tables))
     if not wrong and all(set(names) <= set(stops.get(table, ())) for table, names in without.stops.items()):
         return Safety()
-    broken = any(one.code is Code.INVARIANT_BROKEN for one in found)
-    return Safety(tuple(one.name for one in program.invariants), broken)
+    broken = any(diagnostic.code is Code.INVARIANT_BROKEN for diagnostic in found)
+    return Safety(tuple(invariant.name for invariant in program.invariants), broken)
 
 
 def replace_safety(ts: TransitionSystem, safety: Safety) -> TransitionSystem:
@@ -277,8 +277,8 @@ def _each(
         return
     with children.pool(min(jobs, len(only))) as pool:
         waiting = {name: pool.submit(_proved, made[name], effort) for name in only}
-        for name, one in waiting.items():
-            proof = children.answer(one)
+        for name, future in waiting.items():
+            proof = children.answer(future)
             yield name, replace(proof, found=_again(made[name], proof))
 
 

@@ -205,9 +205,10 @@ class _Rewriter:
 
 def _declarations(before: Program, after: Program) -> Iterable[Declaration]:
     """Enumerations and variables that are new, gone, or declared otherwise."""
-    enums = [{one.name: ", ".join(one.members) for one in program.enums} for program in (before, after)]
+    enums = [{enum.name: ", ".join(enum.members) for enum in program.enums} for program in (before, after)]
     yield from _changed(
-        "enumeration", *({n: said for n, said in one.items() if all(n in e for e in enums)} for one in enums)
+        "enumeration",
+        *({n: said for n, said in enum.items() if all(n in e for e in enums)} for enum in enums),
     )
     yield from _changed(
         "variable",

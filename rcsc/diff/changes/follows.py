@@ -27,12 +27,12 @@ def follows(versions: Versions) -> Iterator[Follows]:
         pair = level, later[level.name]
         around = _around(versions.digests[0], level) != _around(versions.digests[1], pair[1])
         tables = [run_by(side.program, one) for side, one in zip(versions.digests, pair, strict=True)]
-        for name, one in tables[0].items():
+        for name, table in tables[0].items():
             two = tables[1].get(name)
             if two is not None and (
-                around or versions.digests[0].table(one) != versions.digests[1].table(two)
+                around or versions.digests[0].table(table) != versions.digests[1].table(two)
             ):
-                yield _compared(versions, level.name, one, two)
+                yield _compared(versions, level.name, table, two)
 
 
 def _around(digests: Digests, level: Level) -> object:
@@ -65,7 +65,9 @@ def _compared(versions: Versions, level: str, one: Table, two: Table) -> Follows
 
 def _pairs(program: Program, table: Table, options: Options) -> Pairs:
     names = _names(table)
-    return frozenset((names[one.line], names[one.then]) for one in following(program, table, options))
+    return frozenset(
+        (names[follow.line], names[follow.then]) for follow in following(program, table, options)
+    )
 
 
 def _names(table: Table) -> list[str]:

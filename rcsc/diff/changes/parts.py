@@ -48,9 +48,9 @@ def procedures(versions: Versions) -> Iterator[Part]:
         UndecidedError, TooLongError, RecursionError: As `tables.table_part`.
     """
     later = versions.digests[1].procedures
-    for name, one in versions.digests[0].procedures.items():
+    for name, procedure in versions.digests[0].procedures.items():
         if name in later:
-            yield _procedure(versions, one, later[name])
+            yield _procedure(versions, procedure, later[name])
 
 
 def _procedure(versions: Versions, one: Procedure, two: Procedure) -> Part:
@@ -288,7 +288,7 @@ def _words(stated: Property) -> str:
 
 
 def _named(conditions: Iterable[Assumption | Invariant]) -> dict[str, Expr]:
-    return {str(one.name): one.condition for one in conditions}
+    return {str(condition.name): condition.condition for condition in conditions}
 
 
 def _deferred(program: Program) -> dict[str, Expr]:

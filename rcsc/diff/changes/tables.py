@@ -127,9 +127,14 @@ class _Comparison:
         moved: list[Change] = []
         first, second = (list(outs) for outs in self.outcomes)
         kept = [(self.outcomes[0][key], self.outcomes[1][key]) for key in first if key in second]
-        pairs = [*((one, two) for one, two in kept if self._bodies_differ(one, two)), *self._pairs(kept)]
-        for one, two in sorted(pairs, key=lambda both: (first.index(both[0].key), second.index(both[1].key))):
-            for change in self._compared(one, two):
+        pairs = [
+            *((outcome, two) for outcome, two in kept if self._bodies_differ(outcome, two)),
+            *self._pairs(kept),
+        ]
+        for outcome, two in sorted(
+            pairs, key=lambda both: (first.index(both[0].key), second.index(both[1].key))
+        ):
+            for change in self._compared(outcome, two):
                 (moved if change.sort is Sort.LINE else changed).append(change)
         space = versions.space(*(out.when for outs in self.outcomes for out in outs.values()))
         return Part(
@@ -152,7 +157,7 @@ class _Comparison:
         versions = self.versions
         space = versions.space(*(out.when for outs in self.outcomes for out in outs.values()))
         solver = space.solver(
-            values.negation(values.any_of(values.both(one.when, two.when) for one, two in kept))
+            values.negation(values.any_of(values.both(outcome.when, two.when) for outcome, two in kept))
         )
         found = []
         while space.answered(solver):
@@ -266,7 +271,7 @@ def _run(body: list[Statement], program: Program, now: dict[str, Value]) -> None
 
 def _headings(program: Program, actions: tuple[Action, ...] | None) -> Mapping[str, tuple[str, ...]]:
     """For each leaf the headings of the actions that may write it."""
-    writes = {str(one.name): one.writes for one in program.procedures}
+    writes = {str(procedure.name): procedure.writes for procedure in program.procedures}
     found: dict[str, dict[str, None]] = {}
     for action in actions or ():
         for statement in everything([action.statement]):

@@ -73,8 +73,8 @@ def read(text: str) -> StateGraph:
         if name.startswith(f"{{{OWN}}}")
     }
     said.setdefault("table", root.get("name", ""))
-    states = [one for one in root if one.tag == _STATE]
-    whole = len(states) == 1 and any(one.tag == _STATE for one in states[0])
+    states = [element for element in root if element.tag == _STATE]
+    whole = len(states) == 1 and any(element.tag == _STATE for element in states[0])
     said.setdefault("initial", (states[0] if whole else root).get("initial", ""))
     reader = _Reader(text)
     for state in states:
@@ -98,17 +98,19 @@ class _Reader:
 
     def state(self, state: "Element", name: str) -> None:
         """The transitions of a state and of those within it, in the order of the text."""
-        for one in state:
-            if one.tag == _STATE and name != ANY:
+        for element in state:
+            if element.tag == _STATE and name != ANY:
                 raise UnreadableError(f"state `{name}` has states of its own; only the outermost may")
-            if one.tag == _STATE:
-                self.state(one, one.get("id", ""))
-            if one.tag != f"{{{SCXML}}}transition":
+            if element.tag == _STATE:
+                self.state(element, element.get("id", ""))
+            if element.tag != f"{{{SCXML}}}transition":
                 continue
             at = len(self.drawn)
-            said = {word: one.get(f"{{{OWN}}}{word}", "") for word in _WORDS} | {"when": one.get("cond", "")}
+            said = {word: element.get(f"{{{OWN}}}{word}", "") for word in _WORDS} | {
+                "when": element.get("cond", "")
+            }
             offset = self.places[at] if at < len(self.places) else 0
-            self.drawn.append(Drawn(name, one.get("target") or name, said, offset))
+            self.drawn.append(Drawn(name, element.get("target") or name, said, offset))
 
 
 def _blank(match: re.Match[str]) -> str:

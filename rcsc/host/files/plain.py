@@ -134,7 +134,7 @@ def alike(now: Any, then: Any) -> bool:
         return isinstance(then, tuple) and len(now) == len(then) and all(map(alike, now, then))
     if is_dataclass(now):
         return type(now) is type(then) and all(
-            alike(getattr(now, one), getattr(then, one)) for one in _names(now)
+            alike(getattr(now, name), getattr(then, name)) for name in _names(now)
         )
     return type(now) is type(then) or None in (now, then) or {type(now), type(then)} == {int, float}
 

@@ -207,7 +207,7 @@ def _element(scope: Scope, body: Body, base: Path | None, written: tree.Expr) ->
                 Code.OUT_OF_RANGE_CONSTANT, f"the index {at} is not in 0 .. {length - 1}", written.span
             )
             return None
-        return Path(tuple(f"{one}[{at}]" for one in base.names), base.type.element, base.index)
+        return Path(tuple(f"{name}[{at}]" for name in base.names), base.type.element, base.index)
     if base.index is not None:
         scope.report(Code.KIND, "a path has at most one computed index", written.span)
         return None

@@ -33,12 +33,12 @@ class Names:
             if scope.claim(unit.name, "unit"):
                 scope.units.add(unit.name.text)
         enums = tuple(variables.declare_enum(scope, d) for d in self.all if isinstance(d, tree.EnumDecl))
-        for one in self.all:
-            match one:
+        for const in self.all:
+            match const:
                 case tree.ConstDecl(name=name) if scope.claim(name, "value"):
-                    self.waiting[f"value {name.text}"] = one
+                    self.waiting[f"value {name.text}"] = const
                 case tree.TypeDecl(name=name) | tree.RecordDecl(name=name) if scope.claim(name, "type"):
-                    self.waiting[f"type {name.text}"] = one
+                    self.waiting[f"type {name.text}"] = const
                 case _:
                     pass
         declared = [d for d in self.all if isinstance(d, tree.VariableDecl)]

@@ -86,20 +86,20 @@ def _chosen(
     pairs: dict[Value, TableName] = {}
     places: dict[Value, Span] = {}
     sound = True
-    for one in written.dispatch:
-        sound = _table(scope, one.table, tables) and sound
-        value = constant(scope, one.value, selector.expr.type)
-        if value is None or not fits(scope, selector.expr.type, value, one.value.span):
+    for dispatch in written.dispatch:
+        sound = _table(scope, dispatch.table, tables) and sound
+        value = constant(scope, dispatch.value, selector.expr.type)
+        if value is None or not fits(scope, selector.expr.type, value, dispatch.value.span):
             sound = False
             continue
         found = value.literal().value
         if found in pairs:
             first = Label(places[found], "here")
             scope.report(
-                Code.DUPLICATE_ARM, "this command has a table already", one.value.span, related=(first,)
+                Code.DUPLICATE_ARM, "this command has a table already", dispatch.value.span, related=(first,)
             )
-        places.setdefault(found, one.value.span)
-        pairs.setdefault(found, TableName(one.table.text))
+        places.setdefault(found, dispatch.value.span)
+        pairs.setdefault(found, TableName(dispatch.table.text))
     if not sound or not _complete(scope, selector.expr.type, pairs, written.selector.span):
         return None
     return TableByCommand(selector.expr, tuple(sorted(pairs.items())))
@@ -140,7 +140,7 @@ def _written(
 def _table(scope: Scope, name: tree.Name, tables: set[TableName]) -> bool:
     if name.text in tables:
         return True
-    scope.unknown("table", name, [str(one) for one in tables])
+    scope.unknown("table", name, [str(table) for table in tables])
     return False
 
 

@@ -18,7 +18,7 @@ class Owners:
 
     def __init__(self, scope: Scope, written: list[tree.OwnerDecl]) -> None:
         self.scope = scope
-        self.written = {one.name.text: one for one in written}
+        self.written = {owner.name.text: owner for owner in written}
         self.runs: dict[str, tuple[str, ...]] = {}
         for name in self.written:
             if name not in self.runs:
@@ -27,8 +27,8 @@ class Owners:
     def all(self) -> tuple[Owner, ...]:
         """The owners as declared."""
         return tuple(
-            Owner(name, tuple(m.text for m in one.members), " ".join(one.doc), one.name.span)
-            for name, one in self.written.items()
+            Owner(name, tuple(m.text for m in owner.members), " ".join(owner.doc), owner.name.span)
+            for name, owner in self.written.items()
         )
 
     def laid_out(self, names: tuple[tree.Name, ...]) -> tuple[str, ...]:

@@ -33,13 +33,15 @@ _Body: TypeAlias = tuple[tuple[Parameter, ...], tuple[Statement, ...]]
 
 def procedures(scope: Scope, written: list[tree.ProcedureDecl]) -> tuple[Procedure, ...]:
     """All procedures, with what they read and write, calls included."""
-    for one in written:
-        scope.signatures[one.name.text] = tuple(scalar_of(scope, param.type) for param in one.params)
-    bodies = {one.name.text: _body(scope, one) for one in written}
+    for procedure in written:
+        scope.signatures[procedure.name.text] = tuple(
+            scalar_of(scope, param.type) for param in procedure.params
+        )
+    bodies = {procedure.name.text: _body(scope, procedure) for procedure in written}
     order = _call_order(scope, bodies)
     known: dict[str, Procedure] = {}
     costs: dict[str, int] = {}
-    by_name = {one.name.text: one for one in written}
+    by_name = {procedure.name.text: procedure for procedure in written}
     for name in order:
         known[name] = _procedure(scope, by_name[name], bodies[name], known)
         costs[name] = cost(bodies[name][1], costs)
@@ -49,7 +51,7 @@ def procedures(scope: Scope, written: list[tree.ProcedureDecl]) -> tuple[Procedu
                 f"`{name}` runs more than {MOST_STATEMENTS} statements",
                 by_name[name].name.span,
             )
-    return tuple(known[one.name.text] for one in written if one.name.text in known)
+    return tuple(known[procedure.name.text] for procedure in written if procedure.name.text in known)
 
 
 def _body(scope: Scope, written: tree.ProcedureDecl) -> _Body:

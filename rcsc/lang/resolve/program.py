@@ -123,21 +123,23 @@ class _Resolver:
 
     def _assumptions(self, all_: list[tree.Declaration]) -> tuple[Assumption, ...]:
         made = []
-        for one in all_:
-            if isinstance(one, tree.AssumeDecl) and self.scope.claim(one.name, "assumption"):
-                condition = boolean(self.scope, Body(), one.condition)
+        for assume in all_:
+            if isinstance(assume, tree.AssumeDecl) and self.scope.claim(assume.name, "assumption"):
+                condition = boolean(self.scope, Body(), assume.condition)
                 if condition is not None:
-                    standing = Standing(one.state or "assumed")
-                    name = AssumptionName(one.name.text)
-                    made.append(Assumption(name, standing, condition, " ".join(one.doc), one.name.span))
+                    standing = Standing(assume.state or "assumed")
+                    name = AssumptionName(assume.name.text)
+                    made.append(Assumption(name, standing, condition, " ".join(assume.doc), assume.name.span))
         return tuple(made)
 
     def _invariants(self, all_: list[tree.Declaration]) -> tuple[Invariant, ...]:
         made = []
-        for one in all_:
-            if not (isinstance(one, tree.InvariantDecl) and self.scope.claim(one.name, "assumption")):
+        for invariant in all_:
+            if not (
+                isinstance(invariant, tree.InvariantDecl) and self.scope.claim(invariant.name, "assumption")
+            ):
                 continue
-            condition = boolean(self.scope, Body(), one.condition)
+            condition = boolean(self.scope, Body(), invariant.condition)
             if condition is None:
                 continue
             inputs = [n for n in read_by(condition) if self.scope.leaves[n].kind is Kind.INPUT]
@@ -145,10 +147,12 @@ class _Resolver:
                 self.scope.report(
                     Code.KIND,
                     f"an invariant is about state and outputs; `{inputs[0]}` is an input",
-                    one.condition.span,
+                    invariant.condition.span,
                     "an assumption can be about inputs",
                 )
-            made.append(Invariant(one.name.text, condition, " ".join(one.doc), one.name.span))
+            made.append(
+                Invariant(invariant.name.text, condition, " ".join(invariant.doc), invariant.name.span)
+            )
         return tuple(made)
 
     def _properties(self, all_: list[tree.Declaration]) -> tuple[Property, ...]:
@@ -164,7 +168,7 @@ class _Resolver:
         procedures: tuple[Procedure, ...],
     ) -> tuple[Level, ...]:
         by_name = {one.name: one for one in tables}
-        bodies = {str(one.name): one for one in procedures}
+        bodies = {str(procedure.name): procedure for procedure in procedures}
         written = [d for d in all_ if isinstance(d, tree.LevelDecl) and self.scope.claim(d.name, "table")]
         made = (level(self.scope, one, by_name, owners, bodies) for one in written)
         return tuple(one for one in made if one is not None)

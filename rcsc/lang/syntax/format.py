@@ -27,11 +27,11 @@ def format_file(file: tree.File) -> str:
     """The file's text."""
     lines: list[str] = []
     before: tree.Declaration | None = None
-    for one in file.declarations:
-        if before is not None and not _together(before, one):
+    for declaration in file.declarations:
+        if before is not None and not _together(before, declaration):
             lines.append("")
-        lines.extend(_declaration(one))
-        before = one
+        lines.extend(_declaration(declaration))
+        before = declaration
     if file.trailing:
         lines.extend([""] if lines else [])
         lines.extend(_above(file.trailing, ()))

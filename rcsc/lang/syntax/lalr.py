@@ -83,7 +83,11 @@ class Tables:
         self._terminals = sorted(parser.terminals, key=_rank)
         self._words: dict[frozenset[str], _Words] = {}
         self._words_of: dict[int, _Words] = {}
-        ignored = (one.pattern.to_regexp() for one in parser.terminals if one.name in parser.ignore_tokens)
+        ignored = (
+            terminal.pattern.to_regexp()
+            for terminal in parser.terminals
+            if terminal.name in parser.ignore_tokens
+        )
         self._skipped = f"(?:{'|'.join(ignored)})*+"
         self._skip = re.compile(self._skipped).match
 
@@ -126,7 +130,9 @@ class Tables:
         """What may stand next in a state; the same for all states that take the same terminals."""
         taken = frozenset(self._states[state])
         if taken not in self._words:
-            self._words[taken] = _words(self._skipped, [one for one in self._terminals if one.name in taken])
+            self._words[taken] = _words(
+                self._skipped, [terminal for terminal in self._terminals if terminal.name in taken]
+            )
         return self._words_of.setdefault(state, self._words[taken])
 
 
@@ -139,14 +145,22 @@ def _rank(terminal: Any) -> tuple[int, int, int, str]:
 def _words(skipped: str, terminals: Sequence[Any]) -> _Words:
     """One expression for what is skipped and one of these terminals; a word that another of its priority matches is told by its text."""
     special: dict[str, dict[str, str]] = {}
-    for wide in (one for one in terminals if one.pattern.type == "re"):
+    for wide in (terminal for terminal in terminals if terminal.pattern.type == "re"):
         whole = re.compile(wide.pattern.to_regexp()).fullmatch
-        words = (one for one in terminals if one.pattern.type == "str" and one.priority == wide.priority)
-        found = {one.pattern.value: one.name for one in words if whole(one.pattern.value)}
+        words = (
+            terminal
+            for terminal in terminals
+            if terminal.pattern.type == "str" and terminal.priority == wide.priority
+        )
+        found = {word.pattern.value: word.name for word in words if whole(word.pattern.value)}
         if found:
             special[wide.name] = found
     inside = {name for found in special.values() for name in found.values()}
-    parts = (f"(?P<{one.name}>{one.pattern.to_regexp()})" for one in terminals if one.name not in inside)
+    parts = (
+        f"(?P<{terminal.name}>{terminal.pattern.to_regexp()})"
+        for terminal in terminals
+        if terminal.name not in inside
+    )
     return _Words(re.compile(f"{skipped}(?:{'|'.join(parts) or '(?!)'})").match, special)
 
 

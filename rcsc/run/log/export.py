@@ -89,9 +89,9 @@ def json_text(log: Log) -> str:
         "programs": dict(log.programs),
         "levels": [level.name for level in log.levels],
         "restarts": [
-            {"level": level.name, "tick": one.tick, "from": one.begun.value}
+            {"level": level.name, "tick": restart.tick, "from": restart.begun.value}
             for level in log.levels
-            for one in level.restarts
+            for restart in level.restarts
         ],
     }
     known = {level.name: columns(level.sign, level.level) for level in log.levels}

@@ -59,8 +59,14 @@ class LoggedFinding:
 def finding_facts(finding: LoggedFinding) -> dict[str, str]:
     """As a metadata record: texts by name."""
     cycles = [
-        [tick, level, list(one.matched), one.wrong, [[name, _numbers(given)] for name, given in one.answers]]
-        for (tick, level), one in sorted(finding.cycles.items())
+        [
+            tick,
+            level,
+            list(logged_cycle.matched),
+            logged_cycle.wrong,
+            [[name, _numbers(given)] for name, given in logged_cycle.answers],
+        ]
+        for (tick, level), logged_cycle in sorted(finding.cycles.items())
     ]
     return {
         "level": finding.level,

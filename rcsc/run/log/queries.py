@@ -150,13 +150,13 @@ def _compared(left: _Operand, op: ast.cmpop, right: _Operand) -> Predicate:
         )
     if left.kind != "number" and not isinstance(op, _EQUALITY):
         raise BadExpression(f"`{left.said}` and `{right.said}` have no order: use == or !=")
-    for one, other in ((left, right), (right, left)):
-        if one.bare and other.members and one.said not in other.members:
+    for operand, other in ((left, right), (right, left)):
+        if operand.bare and other.members and operand.said not in other.members:
             raise BadExpression(
-                f"`{other.said}` is never `{one.said}`: it is one of {', '.join(filter(None, other.members))}"
+                f"`{other.said}` is never `{operand.said}`: it is one of {', '.join(filter(None, other.members))}"
             )
-        if one.bare and other.bare:
-            raise BadExpression(f"`{one.said}` is no leaf: write `level.leaf`")
+        if operand.bare and other.bare:
+            raise BadExpression(f"`{operand.said}` is no leaf: write `level.leaf`")
     compare = _COMPARE[type(op)]
     return lambda moment: compare(left.term(moment), right.term(moment))
 

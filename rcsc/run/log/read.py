@@ -115,7 +115,7 @@ class LoggedLevel:
     def restarted(self, at: int) -> LoggedRestart | None:
         """The restart that the cycle whose record has this place began from; None where it went on from the record before."""
         after, until = self.track.ticks[at - 1], self.track.ticks[at]
-        return next((one for one in reversed(self.restarts) if after < one.tick <= until), None)
+        return next((restart for restart in reversed(self.restarts) if after < restart.tick <= until), None)
 
 
 @dataclass(frozen=True, slots=True)

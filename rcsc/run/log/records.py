@@ -243,8 +243,12 @@ class _Unpacking:
     def all_of(self, several: list[McapRecord], checked: Checked) -> Iterator[McapRecord]:
         """The records, those in chunks for the chunks."""
         try:
-            for one in several:
-                inside = _inside(self._unpack(one)) if isinstance(one, Chunk) else iter((one,))
+            for mcap_record in several:
+                inside = (
+                    _inside(self._unpack(mcap_record))
+                    if isinstance(mcap_record, Chunk)
+                    else iter((mcap_record,))
+                )
                 for record in inside:
                     self._count()
                     if record is not None:

@@ -147,7 +147,7 @@ class _Again:
             for name, said in then_words.items()
             if name in now_words and now_words[name] != said
         )
-        return found if any(one.name not in self.aside for one in found) else ()
+        return found if any(difference.name not in self.aside for difference in found) else ()
 
 
 def _translated(then: Leaf, now: Leaf, value: Value) -> Value:

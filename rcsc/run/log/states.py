@@ -97,7 +97,7 @@ def columns(sign: Signature, level: LevelSign) -> tuple[Column, ...]:
     """Every column of a level: what the cycle did, then the leaves in declared order."""
     leaves = tuple(_leaf(sign, at) for at in range(len(sign.leaves)))
     taken = {leaf.name for leaf in sign.leaves}
-    return (*(one for one in _trace(sign, level) if one.name not in taken), *leaves)
+    return (*(column for column in _trace(sign, level) if column.name not in taken), *leaves)
 
 
 def _leaf(sign: Signature, at: int) -> Column:

@@ -186,8 +186,8 @@ class Recorder:
 
     def _write_tick(self, system: System, ran: tuple[RunningLevel, ...]) -> None:
         self._tick = system.tick
-        for one in system.restarts:
-            self._write_restart(system.level(one.level), one, system.tick)
+        for restart in system.restarts:
+            self._write_restart(system.level(restart.level), restart, system.tick)
         for level in ran:
             self._write_level(level, system.tick)
         self._write_buffers(system)

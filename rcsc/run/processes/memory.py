@@ -153,8 +153,8 @@ def _laid(payloads: Mapping[str, struct.Struct], places: Mapping[str, Place]) ->
         slot = -(-(HEAD.size + packed.size) // LINE) * LINE
         regions[name] = Region(at, packed, slot)
         at += LINE + 2 * slot
-    said = [(name, one.at, one.packed.format) for name, one in regions.items()]
-    said += [(name, one.first, one.packed.format) for name, one in places.items()]
+    said = [(name, region.at, region.packed.format) for name, region in regions.items()]
+    said += [(name, place.first, place.packed.format) for name, place in places.items()]
     return Layout(regions, places, at, zlib.crc32(repr(said).encode()))
 
 

@@ -109,7 +109,7 @@ def judge(old: Running, new: RunningLevel, program: Program, buffers: Buffers) -
 
 
 def _extern(program: Program) -> bool:
-    return any(one.extern is not None for one in program.procedures)
+    return any(procedure.extern is not None for procedure in program.procedures)
 
 
 def _tried(level: RunningLevel, buffers: Buffers, *, run: bool) -> _Tried:
@@ -248,12 +248,12 @@ def _proved(old: Running, new: RunningLevel, program: Program, taken: Values) ->
 
 def _in_proof(level: RunningLevel, program: Program, table: Table, now: Mapping[str, Value]) -> None:
     """The assumptions of the table that the next cycle runs hold of what it sees."""
-    for one in program.assumptions:
-        if one.name in table.assumptions and not holds(one.condition, now):
+    for assumption in program.assumptions:
+        if assumption.name in table.assumptions and not holds(assumption.condition, now):
             raise Refused(
                 Code.SHELL_RELOAD,
-                f"level `{level.name}` keeps its tables: assumption `{one.name}` of table `{table.name}` does not hold of the "
-                f"present state: {witness(program, one.condition, now)}",
+                f"level `{level.name}` keeps its tables: assumption `{assumption.name}` of table `{table.name}` does not hold of the "
+                f"present state: {witness(program, assumption.condition, now)}",
                 "the table was proved for other states: let the level come to one of those, or set what the assumption speaks of",
             )
 
@@ -266,20 +266,24 @@ def witness(program: Program, condition: Expr, now: Mapping[str, Value]) -> str:
 
 def _known(old: Running, new: RunningLevel, program: Program, table: Table, now: Mapping[str, Value]) -> None:
     """The table has a line for each of the states that it tests, as it is and as it is to be; or never had one."""
-    for one in program.variables:
-        if one.kind is not Kind.STATE or not isinstance(one.type, Enum) or one.name not in table.variables:
+    for variable in program.variables:
+        if (
+            variable.kind is not Kind.STATE
+            or not isinstance(variable.type, Enum)
+            or variable.name not in table.variables
+        ):
             continue
-        told = [] if matching_lines(table, now) else [("is", now[one.name])]
-        if one.deferred_until is not None and now[pending(one.name)] != now[one.name]:
-            told.append(("is to be", now[pending(one.name)]))
+        told = [] if matching_lines(table, now) else [("is", now[variable.name])]
+        if variable.deferred_until is not None and now[pending(variable.name)] != now[variable.name]:
+            told.append(("is to be", now[pending(variable.name)]))
         for word, value in told:
-            state = spell(one.type, value)
-            if not _has_line(program, table.name, one.name, state) and (
-                old.program is None or _has_line(old.program, table.name, one.name, state)
+            state = spell(variable.type, value)
+            if not _has_line(program, table.name, variable.name, state) and (
+                old.program is None or _has_line(old.program, table.name, variable.name, state)
             ):
                 raise Refused(
                     Code.SHELL_RELOAD,
-                    f"level `{new.name}` keeps its tables: `{one.name}` {word} {state}, for which table `{table.name}` "
+                    f"level `{new.name}` keeps its tables: `{variable.name}` {word} {state}, for which table `{table.name}` "
                     "has no line",
                     f"add a line for {state}, or let the level leave it first",
                 )
@@ -288,7 +292,7 @@ def _known(old: Running, new: RunningLevel, program: Program, table: Table, now:
 def _has_line(program: Program, name: str, leaf: str, state: str) -> bool:
     """Whether the table of that name has a line for a state; in doubt not, and where there is no such table."""
     table = next((one for one in program.tables if one.name == name), None)
-    kinds = {str(one.name): one.type for one in program.variables}
+    kinds = {str(variable.name): variable.type for variable in program.variables}
     kind = kinds.get(leaf)
     if table is None or not isinstance(kind, Enum) or state not in kind.members:
         return False

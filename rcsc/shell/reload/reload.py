@@ -72,9 +72,9 @@ def source_of(plant: Origin, spec: LevelSpec) -> Path:
         Refused: It is not where it is looked for.
     """
     tried = places(plant.path, spec.program)
-    found = next((one for one in tried if one.is_file()), None)
+    found = next((path for path in tried if path.is_file()), None)
     if found is None:
-        looked = " and ".join(f"`{one}`" for one in tried)
+        looked = " and ".join(f"`{path}`" for path in tried)
         raise Refused(
             Code.SHELL_RELOAD, f"the tables of level `{spec.name}` are not there", f"looked for {looked}"
         )
@@ -147,8 +147,8 @@ def _refused(level: str, why: str, *helps: str) -> Refused:
 
 
 def _why(report: Report) -> str:
-    errors = [one for one in report.found if one.severity is Severity.ERROR]
-    shown = [one_line(one, report.sources) for one in errors[:MOST_SHOWN]]
+    errors = [diagnostic for diagnostic in report.found if diagnostic.severity is Severity.ERROR]
+    shown = [one_line(error, report.sources) for error in errors[:MOST_SHOWN]]
     more = [f"and {len(errors) - MOST_SHOWN} more"] if len(errors) > MOST_SHOWN else []
     return "\n".join(["", *shown, *more])
 
@@ -220,10 +220,10 @@ def _in_proof(level: RunningLevel, program: Program) -> None:
     """The invariants, which every cycle keeps, hold of the present values."""
     sign: Signature = level.sign
     now = {leaf.name: value for leaf, value in zip(sign.leaves, level.values, strict=False)}
-    for one in program.invariants:
-        if not holds(one.condition, now):
+    for invariant in program.invariants:
+        if not holds(invariant.condition, now):
             raise _refused(
                 level.name,
-                f"invariant `{one.name}` does not hold of the present state: {witness(program, one.condition, now)}",
+                f"invariant `{invariant.name}` does not hold of the present state: {witness(program, invariant.condition, now)}",
                 "it is proved to be kept, but of a state in which it holds: set what it speaks of first",
             )

@@ -264,7 +264,9 @@ class Tree:
         """
         before = [*region.lines, *region.open]
         region.lines = [self._dropped(region, line) for line in region.lines]
-        region.open = [kept for kept in (self._dropped(region, one) for one in region.open) if not kept.holds]
+        region.open = [
+            kept for kept in (self._dropped(region, candidate) for candidate in region.open) if not kept.holds
+        ]
         if [*region.lines, *region.open] == before:
             return self._ask(region), []
         return self._decide(region)

@@ -185,6 +185,6 @@ def outside(kind: Scalar) -> tuple[Value, ...]:
 
 def may_be_matched(program: Program, table: Table, snapshot: Snapshot) -> bool:
     """Whether the table's conditions are defined: the invariants hold, and no stopping assumption fails."""
-    rests = [one.condition for one in program.invariants]
-    rests += [one.condition for one in program.assumptions if one.name in table.stops]
+    rests = [invariant.condition for invariant in program.invariants]
+    rests += [assumption.condition for assumption in program.assumptions if assumption.name in table.stops]
     return all(holds(condition, snapshot) for condition in rests)

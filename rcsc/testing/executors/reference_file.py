@@ -168,7 +168,7 @@ def _monitors(writer: Writer, number: int, table: Table) -> Iterator[str]:
 def _safe(writer: Writer, number: int, table: Table) -> Iterator[str]:
     """Whether the table may be matched: its conditions are defined."""
     yield f"static int32_t ref_t{number}_safe(const {writer.symbols.struct} *s) {{"
-    used = [one.condition for one in writer.program.invariants]
+    used = [invariant.condition for invariant in writer.program.invariants]
     used += [a.condition for a in writer.program.assumptions if a.name in table.stops]
     yield f"(void)s; return {' && '.join(writer.expr(expr) for expr in used) or '1'}; }}"
 

@@ -51,8 +51,8 @@ def vectors_json(program: Program, found: Sequence[Vectors]) -> str:
                     for vector in part.vectors
                 ],
                 "unshown": [
-                    {"line": one.line, "condition": one.condition, "reason": one.reason}
-                    for one in part.unshown
+                    {"line": unshown.line, "condition": unshown.condition, "reason": unshown.reason}
+                    for unshown in part.unshown
                 ],
             }
             for part in found

@@ -270,10 +270,10 @@ class _Checker:
         counts[0] = lookup.entries // max(1, prod(counts[1:]))
         entries = self.entries(number, lookup)
         for chosen in product(*ways):
-            lines = [one.lines for one in chosen]
+            lines = [way.lines for way in chosen]
             compared = agrees(entries, counts, lines, self.everyone)
             if compared is not None:
-                self.stated |= {one.test for one in chosen}
+                self.stated |= {way.test for way in chosen}
                 self.cells += compared * len(self.table.lines)
                 self.tables.append(Compared(self.everyone, lookup.words, entries, counts, lines, classes))
                 break

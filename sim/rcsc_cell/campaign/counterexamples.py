@@ -79,34 +79,36 @@ def counterexamples(
         WorkersGone: Nobody is left to do it.
         OtherTables: A worker is of another checkout.
     """
-    careful = [one for one in wanted if one.property == SURVIVES]
+    careful = [choice for choice in wanted if choice.property == SURVIVES]
     flying: dict[Choice, tuple[Future[Shrunk], Executor]] = {}
-    for one in wanted:
-        if one.property != SURVIVES:
-            future = pool.submit(shrunk, rig, digest(rig.system), seed, one.index, one.property)
-            flying[one] = future, pool.executor
-    for one, (future, executor) in flying.items():
+    for choice in wanted:
+        if choice.property != SURVIVES:
+            future = pool.submit(shrunk, rig, digest(rig.system), seed, choice.index, choice.property)
+            flying[choice] = future, pool.executor
+    for choice, (future, executor) in flying.items():
         try:
-            yield one, future.result()
+            yield choice, future.result()
         except pool.deaths as died:
             pool.survive(died, executor)
-            careful.append(one)
-    for one in careful:
-        yield one, _carefully(rig, seed, one, pool)
+            careful.append(choice)
+    for choice in careful:
+        yield choice, _carefully(rig, seed, choice, pool)
 
 
 def _carefully(rig: Rig, seed: int, choice: Choice, pool: WorkerPool) -> Shrunk:
     """Shrinks from here, so that a worker may die of each try."""
 
     def fails(episode: Episode) -> bool:
-        return any(one.property == choice.property for one in _survived(rig, episode, pool).findings)
+        return any(finding.property == choice.property for finding in _survived(rig, episode, pool).findings)
 
     tries = TRIES.get(choice.property, MOST_TRIES)
     least = shrink(rig.episode(seed, choice.index), fails, tries)
     try:
         return pool.call(logged, rig, least, choice.property)
     except Crashed:
-        found = next(one for one in _survived(rig, least, pool).findings if one.property == choice.property)
+        found = next(
+            finding for finding in _survived(rig, least, pool).findings if finding.property == choice.property
+        )
         return Shrunk(least, found, b"")
 
 
@@ -194,7 +196,7 @@ def again(path: Path, rig: Rig | None = None, executor: Kind | None = None) -> O
     episode = saved_episode(path)
     rig = rig or Rig()
     levels = {level.name for level in description(rig.system).levels}
-    for one in episode.restarts:
-        if one.level not in levels:
-            raise BadEpisode(f"{path}: there is no level {shown(one.level)} to start again")
+    for restart in episode.restarts:
+        if restart.level not in levels:
+            raise BadEpisode(f"{path}: there is no level {shown(restart.level)} to start again")
     return attempt(rig, replace(episode, executor=executor) if executor else episode)

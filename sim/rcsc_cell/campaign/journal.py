@@ -140,8 +140,8 @@ class Journal:
             OSError: They cannot be written.
         """
         new = list(records)
-        self.records |= {one.index: one for one in new}
-        self._file.write(b"".join(_line(_said(one)) for one in new))
+        self.records |= {episode_record.index: episode_record for episode_record in new}
+        self._file.write(b"".join(_line(_said(episode_record)) for episode_record in new))
         self._file.flush()
 
     def close(self) -> None:
@@ -219,8 +219,11 @@ class _Line:
 def _read(path: Path, number: int, line: bytes) -> EpisodeRecord:
     try:
         said: _Line = read(_Line, json_of(line))
-        found = tuple(Finding(*one) for one in said.findings)
-        if min(said.index, said.ticks, *(one.tick for one in found), 0) < 0 or len(said.lines) > MOST_DIGITS:
+        found = tuple(Finding(*finding) for finding in said.findings)
+        if (
+            min(said.index, said.ticks, *(finding.tick for finding in found), 0) < 0
+            or len(said.lines) > MOST_DIGITS
+        ):
             raise ValueError  # noqa: TRY301  # told below
         lines = int(said.lines, 16)
         return EpisodeRecord(said.index, tuple(said.faults), said.end, said.ticks, found, lines, said.digest)

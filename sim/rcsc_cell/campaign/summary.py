@@ -135,7 +135,7 @@ def as_json(found: Summary) -> dict[str, Any]:
 def _outcomes(found: Summary) -> list[str]:
     seen = {end for counts in found.by_fault.values() for end in counts}
     columns = [one for one in _FIRST if one in seen] + sorted(seen - set(_FIRST))
-    widths = [max(len(one), 6) for one in columns]
+    widths = [max(len(column), 6) for column in columns]
     head = "  ".join(f"{one:>{wide}}" for one, wide in zip(columns, widths, strict=True))
     longest = max([len("fault"), *map(len, found.by_fault)])
     lines = [f"{'fault':{longest}}  {head}".rstrip()]
@@ -159,9 +159,12 @@ def _coverage(reached: Iterable[Reached]) -> list[str]:
     for one in reached:
         by_level.setdefault(one.level, []).append(one)
     for level, tables in by_level.items():
-        ran, all_ = sum(len(one.ran) for one in tables), sum(len(one.ran) + len(one.never) for one in tables)
+        ran, all_ = (
+            sum(len(table.ran) for table in tables),
+            sum(len(table.ran) + len(table.never) for table in tables),
+        )
         lines.append(f"level {level}: {ran} of {all_} lines reached")
-        lines += [f"  {one.table} never: {_named(one.never)}" for one in tables if one.never]
+        lines += [f"  {table.table} never: {_named(table.never)}" for table in tables if table.never]
     return lines
 
 

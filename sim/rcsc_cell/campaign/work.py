@@ -139,7 +139,10 @@ def logged(rig: Rig, episode: Episode, name: str) -> Shrunk:
     with scratch("campaign") as folder:
         path = folder / "log.mcap"
         outcome = attempt(rig, episode, path)
-        found = next((one for one in outcome.findings if one.property == name), Finding(name, 0, outcome.end))
+        found = next(
+            (finding for finding in outcome.findings if finding.property == name),
+            Finding(name, 0, outcome.end),
+        )
         return Shrunk(episode, found, path.read_bytes() if path.is_file() else b"")
 
 

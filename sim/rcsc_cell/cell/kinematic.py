@@ -59,7 +59,7 @@ class Kinematic:
 
     def __init__(self, database: Database, bodies: Sequence[Body], start: Joints, seed: int = 0) -> None:
         self.database, self.bodies, self.start, self.seed = database, tuple(bodies), start, seed
-        self._vise = next((one for one in database.stations.values() if one.vise), None)
+        self._vise = next((station for station in database.stations.values() if station.vise), None)
         self.reset()
 
     def reset(self) -> None:

@@ -282,7 +282,7 @@ def _part(number: int, one: Body) -> str:
 
 
 def _drives(database: Database) -> str:
-    vise = next((one.vise for one in database.stations.values() if one.vise), None)
+    vise = next((station.vise for station in database.stations.values() if station.vise), None)
     joints = "\n".join(
         f'<pid name="j{at + 1}" joint="j{at + 1}" kp="{GAINS[at]}" dampratio="1" input="pos vel" '
         f'forcerange="{-TORQUES_NM[at]} {TORQUES_NM[at]}"/>'

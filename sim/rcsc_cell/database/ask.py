@@ -136,7 +136,7 @@ class Database:
 
     def station_below(self, at_mm: Vector) -> Station | None:
         """The station that stands below a point; None over the floor."""
-        return next((one for one in self.stations.values() if one.below(at_mm)), None)
+        return next((station for station in self.stations.values() if station.below(at_mm)), None)
 
     def routes(self) -> tuple[tuple[int, int, Values], ...]:
         """Every route with its location and sector."""

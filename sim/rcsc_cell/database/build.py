@@ -85,7 +85,7 @@ class BadData(BadFile):
         found: Sequence[Diagnostic] = (),
         sources: Mapping[str, Source] | None = None,
     ) -> None:
-        self.problems = tuple(problems) or tuple(one.message for one in found)
+        self.problems = tuple(problems) or tuple(diagnostic.message for diagnostic in found)
         super().__init__("; ".join(problems), found, sources)
 
     @property

@@ -149,7 +149,7 @@ class Episode:
             (self.backend, get_args(Backend)),
             (self.executor, get_args(Kind)),
             *((fault.name, known) for fault in self.faults),
-            *((one.kind, get_args(HARM)) for one in self.transport),
+            *((transport_spec.kind, get_args(HARM)) for transport_spec in self.transport),
         ):
             if said not in words:
                 raise ValueError(f"{shown(said)} is none of {', '.join(sorted(words))}")

@@ -72,7 +72,7 @@ class Loop:
         self._seen: set[tuple[str, int, int]] = set()
         self._digest, self._end, self._cool = hashlib.blake2b(digest_size=16), "", COOL_TICKS
         said, signs, self.database = ready(system)
-        lying = [lying_at(self.database, one) for one in episode.parts]
+        lying = [lying_at(self.database, part) for part in episode.parts]
         self.plant = plant(self.database, episode.backend, lying, episode.seed, Make(episode.step_s))
         self._signs = signs
         try:
@@ -124,7 +124,7 @@ class Loop:
             OSError: The log cannot be written.
         """
         rows = len(self.episode.rows) + len(self.episode.interruptions)
-        latest = max((one.tick for one in self.episode.interruptions), default=0)
+        latest = max((interruption.tick for interruption in self.episode.interruptions), default=0)
         most = latest + MOST_TICKS_A_ROW * (rows + 1)
         while not self.over:
             if self.system.tick >= most:
@@ -139,12 +139,14 @@ class Loop:
         if tick in self._changes:
             self._switch(tick)
         self.buffers.begin(tick)
-        self.cycle.restarted = tuple(one.level for one in self.episode.restarts if one.tick == tick)
+        self.cycle.restarted = tuple(
+            restart.level for restart in self.episode.restarts if restart.tick == tick
+        )
         for name in self.cycle.restarted:
             self.system.restart(name)
-        for one in self.episode.pushes:
-            if one.tick == tick:
-                self._push(one)
+        for push in self.episode.pushes:
+            if push.tick == tick:
+                self._push(push)
         self._note(tick)
         self.cycle.before = {level.name: level.values for level in self.system.levels}
         if self.operator.over:
@@ -176,7 +178,7 @@ class Loop:
         )
 
     def _ended(self) -> str:
-        last = next((one for one in reversed(self.operator.ends) if one.state != "changed"), None)
+        last = next((end for end in reversed(self.operator.ends) if end.state != "changed"), None)
         if last is None or last.state == "done":
             return "done" if self.operator.over else "running"
         if last.state == "refused":
@@ -224,11 +226,13 @@ class Loop:
 
     def _fault_changes(self) -> frozenset[int]:
         faults = self.episode.faults
-        return frozenset(tick for one in faults for tick in (one.first_tick, one.last_tick + 1))
+        return frozenset(tick for fault in faults for tick in (fault.first_tick, fault.last_tick + 1))
 
     def _switch(self, tick: int) -> None:
         wanted = {
-            one.name: one.value for one in self.episode.faults if one.first_tick <= tick <= one.last_tick
+            fault.name: fault.value
+            for fault in self.episode.faults
+            if fault.first_tick <= tick <= fault.last_tick
         }
         for name, usual in USUAL.items():
             setattr(self.plant.faults, name, type(usual)(wanted.get(name, usual)))
@@ -237,12 +241,16 @@ class Loop:
     def _note(self, tick: int) -> None:
         """Which fault classes are at work in this tick."""
         cycle, harms = self.cycle, self.buffers.harms
-        now = [one for one in harms if one.first_tick <= tick <= one.last_tick + one.ticks] if harms else []
-        cycle.harmed = frozenset(one.buffer for one in now)
-        cycle.active = self._active.union(one.kind for one in now)
+        now = (
+            [harm for harm in harms if harm.first_tick <= tick <= harm.last_tick + harm.ticks]
+            if harms
+            else []
+        )
+        cycle.harmed = frozenset(spec.buffer for spec in now)
+        cycle.active = self._active.union(spec.kind for spec in now)
         if cycle.restarted:
             cycle.active |= {"restarted"}
-        if any(one.tick == tick for one in self.episode.pushes):
+        if any(push.tick == tick for push in self.episode.pushes):
             cycle.active |= {"pushed"}
         for name in cycle.active:
             cycle.last[name] = tick
@@ -322,7 +330,7 @@ class Loop:
         )
 
     def _find(self, name: str, said: str) -> None:
-        if all(one.property != name for one in self.findings):
+        if all(finding.property != name for finding in self.findings):
             self.findings.append(Finding(name, self.system.tick, said))
 
 

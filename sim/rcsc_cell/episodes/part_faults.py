@@ -15,7 +15,7 @@ USUAL = PartSpec("")
 def part_faults(episode: Episode) -> Iterator[str]:
     """`missing part`, `wrong part` and `two parts` of those that are asked for at the buffer; `odd size`, `odd weight` of any."""
     here = [part.object for part in episode.parts if part.station == "buffer"]
-    for wanted in _asked((*episode.rows, *(one.row for one in episode.interruptions))):
+    for wanted in _asked((*episode.rows, *(interruption.row for interruption in episode.interruptions))):
         if wanted not in here:
             yield "wrong part" if here else "missing part"
         elif sum(_top(part) == _top(wanted) for part in here) > 1:
@@ -46,8 +46,8 @@ def fault_classes(episode: Episode) -> tuple[str, ...]:
     Parts count only where the script asks for one: what lies about and is not asked for is no fault.
     """
     has = {
-        *(one.name for one in episode.faults),
-        *(one.kind for one in episode.transport),
+        *(fault.name for fault in episode.faults),
+        *(transport_spec.kind for transport_spec in episode.transport),
         *(("restarted",) if episode.restarts else ()),
         *(("changed command",) if episode.interruptions else ()),
         *(("pushed",) if episode.pushes else ()),

@@ -31,7 +31,7 @@ def ready(system: Path) -> tuple[Description, dict[str, Signature], Database]:
     """
     folder = system.parent.parent
     files = [system, *sorted((folder / "generated" / "c").glob("*.json")), system.parent / "cell.toml"]
-    return _ready(system, tuple((str(one), one.stat().st_mtime_ns) for one in files if one.is_file()))
+    return _ready(system, tuple((str(file), file.stat().st_mtime_ns) for file in files if file.is_file()))
 
 
 @lru_cache(maxsize=64)

@@ -64,7 +64,7 @@ class Harmed(CommonMemory):
         self.tick = tick
         if not self.harms:
             return
-        self._now = {one.buffer: one for one in self.harms if one.first_tick <= tick <= one.last_tick}
+        self._now = {harm.buffer: harm for harm in self.harms if harm.first_tick <= tick <= harm.last_tick}
         for name in [name for name in self._kept if self._kind(name) != "stale"]:
             self._arrive(name, *self._kept.pop(name))
         for name, late in self._late.items():

@@ -172,8 +172,8 @@ class Witness:
         if self._told < 0:
             for row in station.rows:
                 live.row(row.number, row.text, "")
-        for one in station.results[max(0, self._told) :]:
-            live.row(one.row.number, one.row.text, one.state)
+        for result in station.results[max(0, self._told) :]:
+            live.row(result.row.number, result.row.text, result.state)
         if self._told != len(station.results) and station.at < len(station.rows):
             row = station.rows[station.at]
             live.row(row.number, row.text, "running")
@@ -198,8 +198,8 @@ class Witness:
         station, system = self.run.station, self.run.system
         ticks, cycle_s = system.tick, 0.001 * system.description.tick_ms
         rows = [
-            ReportRow(one.row.number, one.row.text, one.state, one.ticks, one.reason)
-            for one in station.results
+            ReportRow(result.row.number, result.row.text, result.state, result.ticks, result.reason)
+            for result in station.results
         ]
         return Story(
             title,
@@ -217,9 +217,12 @@ class Witness:
             ],
             [
                 Placement(
-                    f"{one.part} at {one.place}", _shown(one.wanted_mm), _shown(one.found_mm), one.error_mm
+                    f"{placed.part} at {placed.place}",
+                    _shown(placed.wanted_mm),
+                    _shown(placed.found_mm),
+                    placed.error_mm,
                 )
-                for one in self.placed()
+                for placed in self.placed()
             ],
             self.margins_deg,
             system.description.tick_ms,
@@ -244,9 +247,9 @@ def placements(results: list[Result], database: Database, plant: Plant) -> tuple
     """Where parts that rows put somewhere should lie, and the nearest part of the kind; the last row counts."""
     put: dict[str, tuple[str, int]] = {}
     held = ""
-    for one in results:
-        row = one.row
-        if one.state != "done" or not row.robot:
+    for result in results:
+        row = result.row
+        if result.state != "done" or not row.robot:
             continue
         held = row.part if row.source else held
         put = {place: what for place, what in put.items() if place != row.source}

@@ -104,22 +104,22 @@ class DrawnCell:
         scene = Scene(outlines, (), self.database.hand.tool_mm, blocks, marks)
         return Drawn(
             stick(plate, self._opening_mm(states), joints, scene, ALONE),
-            (said, *self._told(named), *(f"`{one.name}` is marked." for one in others)),
+            (said, *self._told(named), *(f"`{other.name}` is marked." for other in others)),
         )
 
     # --- the arm ---
 
     def _arm(self, plates: list[_Plate]) -> tuple[tuple[float, ...], Joints | None, str]:
         """The plate that is drawn, the joints that bring it there, and which it is; at rest where none is a pose."""
-        for one in plates:
-            pose = pose_of(one.numbers)
+        for plate in plates:
+            pose = pose_of(plate.numbers)
             if pose is not None:
                 joints = solve(pose, self.rest)
                 cannot = "" if joints is not None else "; the arm cannot be there"
-                return one.numbers, joints, f"The hand is where `{one.name}` says{cannot}."
+                return plate.numbers, joints, f"The hand is where `{plate.name}` says{cannot}."
         at_rest = tuple(float(value) for value in self.database.home)
         if plates:
-            none = " and ".join(f"`{one.name}`" for one in plates)
+            none = " and ".join(f"`{plate.name}`" for plate in plates)
             return at_rest, self.rest, f"No pose is in {none}; the arm is drawn at rest."
         return at_rest, self.rest, "The log holds no pose; the arm is drawn at rest."
 
@@ -139,10 +139,10 @@ class DrawnCell:
 
     def _others(self, plates: list[_Plate], drawn: tuple[float, ...]) -> Iterator[Mark]:
         """Where the pads are by other nine numbers than those that are drawn."""
-        for one in plates:
-            pose = pose_of(one.numbers)
-            if pose is not None and one.numbers != drawn:
-                yield Mark(one.name, pads(pose, self.database.hand.tool_mm))
+        for plate in plates:
+            pose = pose_of(plate.numbers)
+            if pose is not None and plate.numbers != drawn:
+                yield Mark(plate.name, pads(pose, self.database.hand.tool_mm))
 
     def _opening_mm(self, states: Mapping[str, Values]) -> float:
         """What is reported of the fingers; open where nothing is."""

@@ -102,9 +102,9 @@ ALONE: tuple[View | Perspective, ...] = (
 
 def page_px(pictures: Sequence[View | Perspective]) -> tuple[int, int]:
     """Width and height of a page that holds these pictures, with a rim where they have one."""
-    wide = max(one.left_px + one.size_px[0] for one in pictures)
-    high = max(one.top_px + one.size_px[1] for one in pictures)
-    rim = min(one.left_px for one in pictures)
+    wide = max(picture.left_px + picture.size_px[0] for picture in pictures)
+    high = max(picture.top_px + picture.size_px[1] for picture in pictures)
+    rim = min(picture.left_px for picture in pictures)
     return round(wide + rim), round(high + rim)
 
 

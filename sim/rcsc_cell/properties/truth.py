@@ -235,11 +235,11 @@ def _buffers(database: Database) -> tuple[Station, ...]:
     for location in database.locations.values():
         at = database.pads(location, 0) if database.place(location)[2] else None
         if at is not None:
-            found += [one for one in database.stations.values() if one.below(at)]
+            found += [station for station in database.stations.values() if station.below(at)]
     return tuple(found)
 
 
 def _lies_on(cycle: Cycle, part: int, tables: tuple[Station, ...]) -> bool:
     pose = cycle.parts[part]
     low = cycle.bodies[part].lowest_mm(pose)
-    return any(one.below(pose.at_mm) and low - one.frame.at_mm[2] < ON_TABLE_MM for one in tables)
+    return any(table.below(pose.at_mm) and low - table.frame.at_mm[2] < ON_TABLE_MM for table in tables)

@@ -123,7 +123,7 @@ def _squares(x: Floats, z: Floats, spread_mm: float) -> Floats:
     """
     z = z - z.mean()  # else the sums' differences would lose digits
     n = np.maximum(_runs(np.ones_like(x)), 1.0)
-    sx, sz, xx, xz, zz = (_runs(one) for one in (x, z, x * x, x * z, z * z))
+    sx, sz, xx, xz, zz = (_runs(ndarray) for ndarray in (x, z, x * x, x * z, z * z))
     about_xx, about_xz, about_zz = xx - sx * sx / n, xz - sx * sz / n, zz - sz * sz / n
     squares: Floats = about_zz - about_xz**2 / (about_xx + (spread_mm / LEAN) ** 2)
     return np.maximum(squares, 0.0)

@@ -89,7 +89,7 @@ def keep(run: Run, script: str) -> Path:
         "buffers": {
             name: list(held) for name in _buffers(run) if (held := system.buffers.latest(name)) is not None
         },
-        "outside": {name: one.state() for name, one in _restorable(system.outside)},
+        "outside": {name: restorable.state() for name, restorable in _restorable(system.outside)},
     }
     path = stopped_path(system.description)
     path.parent.mkdir(parents=True, exist_ok=True)
