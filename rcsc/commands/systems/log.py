@@ -8,6 +8,7 @@ import click
 
 from rcsc.commands.shared.logs import FILE, SHOWN, refuse, told
 from rcsc.commands.shared.show import writing
+from rcsc.commands.shared.stopped import stopped
 from rcsc.commands.shared.systems import NoSystem, system_path
 from rcsc.diagnostics.codes import Code
 from rcsc.host.files import write_atomically
@@ -176,7 +177,7 @@ def _cell_of(log: Log, given: Path | None) -> tuple[DrawnCell | None, str]:
         return None, f"{error}; `--system` names one."
     except (BadData, BadDescription) as error:
         if given is not None:
-            raise
+            raise stopped(error) from error  # of the system that was named, not of the log
         return None, f"{error}; `--system` names another system."
 
 
