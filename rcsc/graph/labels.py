@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from functools import lru_cache
 
 from rcsc.diagnostics.source import Source
+from rcsc.lang.operator_table import NEGATION
 from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.parse import parse
 from rcsc.lang.syntax.rows import ACTION_WORDS
@@ -50,7 +51,7 @@ def term(heading: tree.Heading, cell: tree.Condition) -> tree.Expr:
 
 def guard(terms: list[tree.Expr]) -> str:
     """The terms joined by `and`; "" without any."""
-    return " and ".join(spell_expr(one, 4) for one in terms)
+    return " and ".join(spell_expr(one, NEGATION) for one in terms)
 
 
 def terms_of(text: str) -> list[tree.Expr]:

@@ -13,6 +13,7 @@ from rcsc.diagnostics.source import Source
 from rcsc.graph import labels
 from rcsc.graph.formats.reading import UnreadableError
 from rcsc.graph.formats.state_graph import ANY, LINES, Edge, StateGraph
+from rcsc.lang.operator_table import NEGATION
 from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.format import format_file
 from rcsc.lang.syntax.parse import parse
@@ -210,7 +211,7 @@ class _Columns:
                 return
         if _WHEN not in self.conditions:
             self.conditions.append(_WHEN)
-        text = spell_expr(expr, 4)
+        text = spell_expr(expr, NEGATION)
         cells[_WHEN] = f"{cells[_WHEN]} and {text}" if _WHEN in cells else text
 
     def text(self, graph: StateGraph, rows: list[tuple[_Line, dict[str, str], dict[str, str]]]) -> str:

@@ -400,7 +400,7 @@ def test_rcsc_prove_certify_asks_cvc5(
     assert said[1] == said[2]
     assert int(said[1]) > 10
     monkeypatch.setattr(
-        "rcsc.solvers.smtlib.cvc5_refutes", lambda text, **_: "step" not in text and len(text) < 3000
+        "rcsc.commands.shared.proved.cvc5_refutes", lambda text, **_: "step" not in text and len(text) < 3000
     )
     assert run(asked) == 3
     assert "error[RCS901]: level `lower`: cvc5 does not confirm" in capsys.readouterr().err

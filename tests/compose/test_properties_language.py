@@ -84,7 +84,7 @@ input x : e
 input then : bool
 
 state until : bool
-state from : bool
+state upon : bool
 state property : int 0 .. 9
 
 ## Doc.
@@ -92,7 +92,7 @@ property plain : was x = a implies property = was property + 1 and was (property
 # why
 property two : property = 3 then property = -was property - was (-property)
 property three : until until not then
-property four : from from not until
+property four : upon upon not until
 """
 
 
@@ -106,7 +106,7 @@ def test_properties_are_laid_out_and_their_words_are_still_names() -> None:
         "was x = a implies property = was property + 1 and was (property = 2 or until)",
         "property = 3 then property = -was property - was (-property)",
         "until until not then",
-        "from from not until",
+        "upon upon not until",
     ]
     assert program_of(WORDS).properties[0].doc == "Doc."
 
@@ -133,8 +133,8 @@ def test_properties_are_laid_out_and_their_words_are_still_names() -> None:
         ("property p : was n = 1 then n = 2", [("RCS315", "was n")]),
         ("property p : was n = 1 until n = 2", [("RCS315", "was n")]),
         ("property p : n = 1 until was go", [("RCS315", "was go")]),
-        ("property p : was n = 1 from n = 2", [("RCS315", "was n")]),
-        ("property p : n = 1 from was go", [("RCS315", "was go")]),
+        ("property p : was n = 1 upon n = 2", [("RCS315", "was n")]),
+        ("property p : n = 1 upon was go", [("RCS315", "was go")]),
         ("invariant p : n = was n", [("RCS315", "was n")]),
         ("assume p : was go", [("RCS315", "was go")]),
         ("procedure p { n := was n }", [("RCS315", "was n")]),
@@ -242,7 +242,7 @@ MEANINGS: dict[str, Meaning] = {
     "p or q": lambda _p, _q, p, q: p or q,
     "p then q": lambda p, _q, _p2, q2: q2 if p else True,
     "p until q": lambda p, q, p2, q2: p2 or q2 or not p or q,
-    "p from q": lambda p, _q, p2, q2: p or q2 or not p2,
+    "p upon q": lambda p, _q, p2, q2: p or q2 or not p2,
     "was p": lambda p, _q, _p2, _q2: p,
     "was (p and not q) implies q": lambda p, q, _p2, q2: q2 if p and not q else True,
     "p and not q then p": lambda p, q, p2, _q2: p2 if p and not q else True,
@@ -352,10 +352,10 @@ def some_condition(random: Random, *, was: bool) -> str:
 
 
 def some_property(random: Random) -> str:
-    match word := random.choice(("", "then", "until", "from")):
+    match word := random.choice(("", "then", "until", "upon")):
         case "then":
             return f"{some_condition(random, was=False)} then {some_condition(random, was=True)}"
-        case "until" | "from":
+        case "until" | "upon":
             return f"{some_condition(random, was=False)} {word} {some_condition(random, was=False)}"
         case _:
             return some_condition(random, was=True)

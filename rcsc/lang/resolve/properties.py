@@ -7,7 +7,7 @@ In: a declaration. Out: a `Property`, whose one condition says all of it, or dia
 - `P until Q` is `was (P and not Q) implies P or Q`: always (P implies (P weakly until Q)). That Q ever holds is not said; once P
   has begun to hold it ends no sooner than in the cycle in which Q holds. Source: *unless*, Chandy and Misra, *Parallel Program Design*
   (1988), chapter 3;
-- `P from Q` is `P implies was P or Q`: once P does not hold it begins no sooner than in the cycle in which Q holds.
+- `P upon Q` is `P implies was P or Q`: once P does not hold it begins no sooner than in the cycle in which Q holds.
 """
 
 from collections.abc import Callable
@@ -58,7 +58,7 @@ def _until(first: Expr, other: Expr) -> Expr:
     return _apply(Op.IMPLIES, one_earlier(before), _apply(Op.OR, first, other))
 
 
-def _from(first: Expr, other: Expr) -> Expr:
+def _upon(first: Expr, other: Expr) -> Expr:
     return _apply(Op.IMPLIES, first, _apply(Op.OR, one_earlier(first), other))
 
 
@@ -81,8 +81,8 @@ _FORMS = {
     "until": _Form(
         _until, "what stands before `until` is of one cycle", "what stands behind `until` is of one cycle"
     ),
-    "from": _Form(
-        _from, "what stands before `from` is of one cycle", "what stands after `from` is of one cycle"
+    "upon": _Form(
+        _upon, "what stands before `upon` is of one cycle", "what stands after `upon` is of one cycle"
     ),
 }
 

@@ -7,6 +7,7 @@ from collections.abc import Collection, Iterator
 
 from rcsc.diagnostics.diagnostic import Diagnostic
 from rcsc.diagnostics.source import Source
+from rcsc.lang.operator_table import SUM
 from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.rows import ACTION_WORDS
 from rcsc.lang.syntax.spell import spell_condition, spell_expr, spell_type
@@ -160,7 +161,7 @@ def _statement(one: tree.Statement, depth: int) -> Iterator[str]:
                 yield f"{pad}  }}"
             yield f"{pad}}}"
         case tree.For(name, low, high, body):
-            yield f"{pad}for {name.text} in {spell_expr(low, 6)} .. {spell_expr(high, 6)} {{"
+            yield f"{pad}for {name.text} in {spell_expr(low, SUM)} .. {spell_expr(high, SUM)} {{"
             yield from _block(body, depth + 1)
             yield f"{pad}}}"
 

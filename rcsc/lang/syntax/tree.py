@@ -467,7 +467,7 @@ class InvariantDecl(Documented):
 
 @dataclass(frozen=True, slots=True)
 class PropertyDecl(Documented):
-    """`property name : expr [then|until|from expr]`.
+    """`property name : expr [then|until|upon expr]`.
 
     `word` is "" or the word between the two; `other` stands after it.
     """
