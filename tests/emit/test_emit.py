@@ -38,8 +38,8 @@ from tests.support.emitted import EXTERN, RICH, emitted, program_of
 
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Wpedantic", "-Wtrigraphs", "-Wshadow", "-Werror")
 KEYWORDS = frozenset("""input state output table level procedure module owner extern enum record type unit const use assume
-    invariant property was then reads writes python c bool int real true false and or xor not implies in mod abs min max if else case for next
-    local call array of period preprocess postprocess by reject clamp deferred until assumed monitored proved
+    invariant property was then reads writes python c bool int real true false and or xor not implies in mod abs min max if else case for
+    next local call array of period preprocess postprocess by reject clamp deferred until assumed monitored proved
     assuming""".split())  # fmt: skip
 
 
