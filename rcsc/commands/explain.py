@@ -1,11 +1,10 @@
 """`rcsc explain`: what a code means."""
 
-from textwrap import fill
+from textwrap import fill, indent
 
 import click
 
-from rcsc.diagnostics.codes import Code
-from rcsc.diagnostics.explanations import Explanation, explain, explanations
+from rcsc.diagnostics.codes import FAMILIES, Code, Explanation
 
 
 @click.command(
@@ -25,42 +24,34 @@ def command(code: str | None) -> int:
     return 0
 
 
-_STAGES = {
-    "1": "syntax and files",
-    "2": "names and writers",
-    "3": "kinds, units and ranges",
-    "4": "proof",
-    "5": "generated files",
-    "6": "tests of what is generated",
-    "7": "running systems and recorded runs",
-    "9": "bugs in rcsc",
-}
-
-
 def _page(code: Code) -> str:
     """One code's page."""
-    found = explain(code)
-    paragraphs = "\n\n".join(fill(one, 90) for one in found.text.split("\n\n"))
-    parts = [f"{code.value}: {found.title}\n", paragraphs + "\n", *_examples(found)]
-    return "\n".join(parts)
+    explanation = code.explanation
+    blocks = explanation.text.split("\n\n")
+    paragraphs = [block if block.startswith(" ") else fill(block, 90) for block in blocks]
+    return "\n\n".join([f"{code.value}: {explanation.title}", *paragraphs, *_examples(explanation)]) + "\n"
 
 
-def _examples(found: Explanation) -> list[str]:
-    heads = (("This is reported:", found.wrong), ("This is not:", found.right))
-    return [f"{head}\n\n{_indented(text)}" for head, text in heads if text]
+def _examples(explanation: Explanation) -> list[str]:
+    shown: list[str] = []
+    if explanation.wrong:
+        shown += ["This is reported:", _indented(explanation.wrong), fill(explanation.report, 90)]
+    if explanation.right:
+        shown += ["This is not:", _indented(explanation.right)]
+    return shown
 
 
 def _indented(text: str) -> str:
-    return "".join(f"    {line}\n" if line else "\n" for line in text.splitlines())
+    return indent(text.rstrip("\n"), "    ")
 
 
 def _listing() -> str:
-    """Every code with its title, by stage."""
-    lines: list[str] = []
-    stage = ""
-    for code, found in explanations().items():
-        if code.value[3] != stage:
-            stage = code.value[3]
-            lines.append(f"{'' if not lines else chr(10)}{stage}xx {_STAGES[stage]}")
-        lines.append(f"  {code.value}  {found.title}")
-    return "\n".join(lines) + "\n\n`rcsc explain CODE` says more.\n"
+    """Every code with its title, by family."""
+    families = [
+        "\n".join(
+            [f"{digit}xx {about}"]
+            + [f"  {code.value}  {code.explanation.title}" for code in Code if code.value[3] == digit]
+        )
+        for digit, about in FAMILIES.items()
+    ]
+    return "\n\n".join([*families, "`rcsc explain CODE` says more.\n"])

@@ -16,7 +16,7 @@ columns of them. User errors are such values; exceptions are for bugs.
 Nothing here is trusted for a verdict. What comes from a user's file is made safe for a terminal, a log or a page
 before it is shown.
 
-Modules, in the order the data flows: `source` (named texts and spans), `codes` and `explanations` (what each code
-means), `coded` (errors that know their code), `diagnostic`, `report` (what a command found and what backs it); then the
+Modules, in the order the data flows: `source` (named texts and spans), `codes` (what each code means, with its
+example), `coded` (errors that know their code), `diagnostic`, `report` (what a command found and what backs it); then the
 forms of a report: `render` (text; `printable` makes user text safe), `jsonform`, `github`, `sarif`.
 """

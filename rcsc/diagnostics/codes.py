@@ -1,136 +1,1399 @@
-"""Every code, with its title; the text of `rcsc explain` is in `explanations`.
+"""Every code in one catalogue: a code's title, why it is reported, and an example with its message and its mend."""
 
-Codes are never renumbered and never reused. 1xx syntax and files, 2xx names and writers, 3xx kinds,
-units, ranges, 4xx proof, 5xx emission and generated files, 6xx generated-code tests, 7xx
-recorded runs, 9xx a bug in rcsc.
-"""
-
+import re
+from dataclasses import dataclass
 from enum import StrEnum
+from inspect import cleandoc
+from textwrap import dedent
+from typing import Self
+
+FAMILIES = {
+    "1": "syntax and files",
+    "2": "names and writers",
+    "3": "kinds, units and ranges",
+    "4": "proof",
+    "5": "generated files",
+    "6": "tests of what is generated",
+    "7": "running systems and recorded runs",
+    "9": "bugs in rcsc",
+}
+"""What the codes with this first digit are about."""
+
+_REPORT = re.compile(r"(?:error|warning|note): ")
+
+
+@dataclass(frozen=True, slots=True)
+class Explanation:
+    """One entry of the catalogue, taken apart.
+
+    Attributes:
+        title: What it is, in a few words, in lower case.
+        text: Why it is reported, what to do, and how it arises where there is no example; code is indented by four.
+        wrong: A whole source text that is reported with this code and no other; may be empty.
+        report: How: its severity and message, as `error: the divisor can be zero`; empty where `wrong` is.
+        right: The same text, mended; may be empty.
+    """
+
+    title: str
+    text: str
+    wrong: str
+    report: str
+    right: str
 
 
 class Code(StrEnum):
-    """Stable identity of a diagnostic; the value is what users see and search for."""
+    """Stable identity of a diagnostic, never renumbered and never reused; the value is what users see and search for.
 
-    # 1xx syntax and files
-    SYNTAX = "RCS101"
-    RAGGED_ROW = "RCS102"
-    TOO_DEEP = "RCS103"
-    TOO_LARGE = "RCS104"
-    BAD_ENCODING = "RCS105"
-    NUL_BYTE = "RCS106"
-    UNREADABLE = "RCS107"
-    DEFAULT_WITH_CONDITIONS = "RCS108"
-    NON_ASCII_NAME = "RCS109"
-    PROJECT_FILE = "RCS110"
-    NO_TABLES = "RCS111"
-    NOT_FORMATTED = "RCS112"
-    DEFAULT_ELSEWHERE = "RCS113"
-    UNPRINTED = "RCS114"
-    LONG_NAME = "RCS115"
-    # 2xx names and writers
-    UNKNOWN_NAME = "RCS201"
-    DUPLICATE_NAME = "RCS202"
-    CALL_CYCLE = "RCS203"
-    FILE_CYCLE = "RCS204"
-    FILE_NOT_FOUND = "RCS205"
-    NOT_WRITABLE = "RCS206"
-    DUPLICATE_LINE = "RCS207"
-    UNDECLARED_ACCESS = "RCS208"
-    WRONG_ARGUMENTS = "RCS209"
-    NOT_DEFERRED = "RCS210"
-    MISSING_TABLE = "RCS211"
-    SEVERAL_DEFAULTS = "RCS212"
-    OWNER_CYCLE = "RCS213"
-    UNSTEADY_SELECTOR = "RCS214"
-    # 3xx kinds, units, ranges
-    KIND = "RCS301"
-    UNIT = "RCS302"
-    EMPTY_RANGE = "RCS303"
-    TOO_WIDE = "RCS304"
-    NOT_CONSTANT = "RCS305"
-    OUT_OF_RANGE_CONSTANT = "RCS306"
-    SAME_DOUBLE = "RCS307"
-    BAD_LENGTH = "RCS308"
-    NOT_FINITE = "RCS309"
-    DUPLICATE_ARM = "RCS310"
-    MIXED_SIGN = "RCS311"
-    TOO_MANY_LEAVES = "RCS312"
-    LOOP_TOO_LONG = "RCS313"
-    EMPTY_CONDITION = "RCS314"
-    NO_CYCLE_BEFORE = "RCS315"
-    NO_PROPERTY = "RCS316"
-    # 4xx proof
-    GAP = "RCS401"
-    OVERLAP = "RCS402"
-    DEAD_LINE = "RCS403"
-    DEFAULT_REACHED = "RCS404"
-    CONTRADICTORY_ASSUMPTIONS = "RCS405"
-    ASSUMPTION_NOT_PROVED = "RCS406"
-    DEFAULT_COVERS = "RCS407"
-    DEFAULT_DEAD = "RCS408"
-    UNDECIDED = "RCS409"
-    OVERFLOW = "RCS410"
-    DIVISION_BY_ZERO = "RCS411"
-    INDEX = "RCS412"
-    ASSIGNED_RANGE = "RCS413"
-    USE_BEFORE_ASSIGNMENT = "RCS414"
-    TWO_WRITERS = "RCS415"
-    INVARIANT_INITIAL = "RCS416"
-    INVARIANT_BROKEN = "RCS417"
-    CERTIFICATE = "RCS418"
-    ASSUMPTION_INITIAL = "RCS419"
-    PROPERTY_ELSEWHERE = "RCS420"
-    NOT_CHECKED = "RCS421"
-    # 5xx emission and generated files
-    STALE = "RCS501"
-    NOT_WRITTEN = "RCS502"
-    NAME_COLLISION = "RCS503"
-    EXTERN_NAME = "RCS504"
-    # 6xx generated-code tests
-    EXECUTORS_DISAGREE = "RCS601"
-    LINE_NOT_REACHED = "RCS602"
-    NO_C_COMPILER = "RCS603"
-    MATCHER_DIFFERS = "RCS604"
-    # 7xx recorded runs
-    LOG_UNREADABLE = "RCS701"
-    REPLAY_DIFFERS = "RCS702"
-    TABLES_DECIDE_OTHERWISE = "RCS703"
-    NOT_REPLAYED = "RCS704"
-    EXTRA_MISSING = "RCS705"
-    NO_FINDING = "RCS706"
-    LOG_NOT_WHOLE = "RCS707"
-    BAD_SYSTEM = "RCS721"
-    BAD_DATA = "RCS722"
-    BAD_SCRIPT = "RCS723"
-    SCRIPT_STOPPED = "RCS724"
-    STATE_TABLE_ERROR = "RCS725"
-    NOT_RESUMED = "RCS726"
-    EXECUTORS_NOT_PROVED = "RCS727"
-    PROCESS_LOST = "RCS728"
-    SHELL_NAME = "RCS731"
-    SHELL_VALUE = "RCS732"
-    SHELL_RELOAD = "RCS733"
-    SHELL_COMMAND = "RCS734"
-    SHELL_PART = "RCS735"
-    SHELL_EXPECTED = "RCS736"
-    SHELL_OTHERWISE = "RCS737"
-    SHELL_NOT_COMPOSED = "RCS738"
-    BAD_JOURNAL = "RCS741"
-    BAD_EPISODE = "RCS742"
-    PROPERTY_BROKEN = "RCS743"
-    WORKERS_GONE = "RCS744"
-    NOT_COMPOSED = "RCS751"
-    NOT_AGREED = "RCS752"
-    FOUND_AGAIN = "RCS753"
-    BAD_CASE = "RCS754"
-    ENDLESS = "RCS756"
-    GRAPH_NO_STATE = "RCS771"
-    GRAPH_UNREADABLE = "RCS772"
-    GRAPH_DIFFERS = "RCS773"
-    GRAPH_LOSES = "RCS774"
-    NOT_COMPARED = "RCS781"
-    # 9xx a bug in rcsc
-    SOLVERS_DISAGREE = "RCS901"
-    INTERNAL = "RCS902"
-    NOT_REPRODUCED = "RCS903"
-    WORKER_ENDED = "RCS904"
+    An entry is code and title, paragraphs, and perhaps an example: a text, how it is reported, the text mended.
+    """
+
+    entry: str
+
+    def __new__(cls, entry: str) -> Self:
+        """The member whose value is the code that `entry` begins with."""
+        code = entry.partition(":")[0]
+        member = str.__new__(cls, code)
+        member._value_ = code
+        member.entry = entry
+        return member
+
+    @property
+    def explanation(self) -> Explanation:
+        """What `rcsc explain` says of the code."""
+        title, *blocks = cleandoc(self.entry.partition(": ")[2]).split("\n\n")
+        at = next((at for at, block in enumerate(blocks) if _REPORT.match(block)), None)
+        if at is None:
+            return Explanation(title, "\n\n".join(blocks), "", "", "")
+        wrong, report, *right = blocks[at - 1 :]
+        return Explanation(
+            title, "\n\n".join(blocks[: at - 1]), _unindented(wrong), report, "".join(map(_unindented, right))
+        )
+
+    SYNTAX = """RCS101: the text is not in the language
+
+    The parser met something that cannot stand there; the message says what could. Newlines mean nothing outside tables, so the mistake
+    may be at the end of the line before. One message is given for the first mistake of a declaration; reading goes on with the next
+    declaration.
+
+        input ready bool
+
+    error: expected `:`, found `bool`
+
+        input ready : bool
+    """
+    RAGGED_ROW = """RCS102: a row has another number of cells than the heading
+
+    Every row of a table has a cell for each heading, with one `||` between conditions and actions. Leave a cell blank rather than out:
+    a blank condition is don't care, a blank action does nothing.
+
+        input ready : bool
+        output go : bool
+        table start {
+          | line | ready || go   |
+          | yes  | true  ||
+          | no   | false || false |
+        }
+
+    error: this row has 0 cells of actions, the heading 1
+
+        input ready : bool
+        output go : bool
+        table start {
+          | line | ready || go    |
+          | yes  | true  ||       |
+          | no   | false || false |
+        }
+    """
+    TOO_DEEP = """RCS103: nested too deeply
+
+    Expressions, blocks and types nest at most 100 deep, so that no stage can run out of stack. Name the parts: a procedure for
+    an inner block, a local for a part of an expression.
+
+    It arises for example from one hundred and one opening parentheses.
+    """
+    TOO_LARGE = """RCS104: the file is too large
+
+    A source file has at most 16 MiB, which is some 100 000 lines of a table. Split it, and let a file `use` the others.
+    """
+    BAD_ENCODING = """RCS105: the file is not UTF-8
+
+    Source files are UTF-8 (a byte order mark at the start is tolerated). The message names the first byte that is not. Save the file
+    again in that encoding.
+    """
+    NUL_BYTE = """RCS106: the file contains a NUL byte
+
+    A source file is text. A NUL byte mostly means that the file is binary or in UTF-16; save it as UTF-8.
+    """
+    UNREADABLE = """RCS107: the file cannot be read
+
+    The operating system refused: the message gives its reason. Look at the name, and at the permissions of the file and of its folders.
+    """
+    DEFAULT_WITH_CONDITIONS = """RCS108: a DEFAULT line with conditions
+
+    The DEFAULT line runs where no other line matches; it has no conditions of its own. All its other condition cells are blank.
+    Make it an ordinary line, or empty its cells.
+
+        input ready : bool
+        input warm : bool
+        output go : bool
+        table start {
+          | line | ready   | warm || go    |
+          | yes  | true    |      || true  |
+          | no   | DEFAULT | true || false |
+        }
+
+    error: a DEFAULT line has no conditions
+
+        input ready : bool
+        input warm : bool
+        output go : bool
+        table start {
+          | line | ready   | warm || go    |
+          | yes  | true    |      || true  |
+          | no   | DEFAULT |      || false |
+        }
+    """
+    NON_ASCII_NAME = """RCS109: a name with letters other than ASCII
+
+    Names go unchanged into C and Python, logs and messages, so they are `A` to `Z`, `a` to `z`, `0` to `9` and `_`. That also keeps two
+    names that look alike (a Latin and a Cyrillic `a`) apart. Comments and documentation may use any letters.
+
+        input größe : int 0 .. 9
+
+    error: `ö` is not allowed here: names are made of ASCII letters, digits and `_`
+
+        input groesse : int 0 .. 9
+    """
+    PROJECT_FILE = """RCS110: the project file is not right
+
+    `rcsc.toml` marks the root of a project. It may say `name = "..."` and `exclude = ["glob", ...]`, and nothing else. The message says
+    what is wrong with it.
+    """
+    NO_TABLES = """RCS111: there is nothing to check
+
+    The folder given has no `*.rcs` file in it, or everything in it is excluded by `rcsc.toml`. A check that checks nothing must not
+    look like one that passed.
+    """
+    NOT_FORMATTED = """RCS112: the file is not formatted
+
+    `rcsc fmt --check` found a file that `rcsc fmt` would change. Run `rcsc fmt` on it; `rcsc fmt --diff` shows what it would do.
+    """
+    DEFAULT_ELSEWHERE = """RCS113: DEFAULT in another column
+
+    `DEFAULT` (or `DEFAULT unreachable`) makes a line the DEFAULT line, and stands in the first column of conditions. In another column
+    it could be taken for a condition: move it to the first column. A value that is called `DEFAULT` is written `= DEFAULT`, under
+    `when` `(DEFAULT)`.
+
+        input ready : bool
+        input warm : bool
+        output go : bool
+        table start {
+          | line | ready   | warm    || go    |
+          | yes  | true    |         || true  |
+          | no   |         | DEFAULT || false |
+        }
+
+    error: DEFAULT stands in the first column of conditions, or nowhere
+
+        input ready : bool
+        input warm : bool
+        output go : bool
+        table start {
+          | line | ready   | warm || go    |
+          | yes  | true    |      || true  |
+          | no   | DEFAULT |      || false |
+        }
+    """
+    UNPRINTED = r"""RCS114: a character that does not print
+
+    The text, perhaps a comment, contains a control character or a mark of writing direction (U+061C, U+200E, U+200F, U+202A to U+202E,
+    U+2066 to U+2069). An editor may then show other text than the one that is compiled, and what is said of a variable goes into symbol
+    files, logs and terminals. Delete the character; `\u{202e}` in the message shows where it stands. Letters of all scripts may stand
+    in comments without such marks.
+    """
+    LONG_NAME = """RCS115: a name that is too long
+
+    A name has at most 1,000 characters, and so has a part of a record or an array, written out as `robot.plate[1]`: they go into symbol
+    files and logs, whose readers bound what they take. Shorten the name, or nest records less deep.
+    """
+    UNKNOWN_NAME = """RCS201: an unknown name
+
+    Nothing of this name is declared in this file or in the files it uses. Where a declared name is much alike, the message's help names it.
+
+        input ready : bool
+        output go : bool
+        table start {
+          | line | raedy || go    |
+          | yes  | true  || true  |
+          | no   | false || false |
+        }
+
+    error: no variable, constant or member is called `raedy`
+
+        input ready : bool
+        output go : bool
+        table start {
+          | line | ready || go    |
+          | yes  | true  || true  |
+          | no   | false || false |
+        }
+    """
+    DUPLICATE_NAME = """RCS202: a name declared twice
+
+    A name means one thing in a program, all files that it uses included. The other declaration is shown, too. Rename one, or delete it.
+
+        input ready : bool
+        output ready : bool
+
+    error: `ready` is declared twice
+
+        input ready : bool
+        output ready_out : bool
+    """
+    CALL_CYCLE = """RCS203: procedures that call each other in a circle
+
+    Procedures do not recurse, directly or by way of others: so each ends, needs a known stack, and can be proved. Use a bounded loop.
+
+        state n : int 0 .. 9
+        procedure count { n := 0; again }
+        procedure again { count }
+
+    error: procedures call each other in a circle: count -> again -> count
+
+        state n : int 0 .. 9
+        procedure count { n := 0; again }
+        procedure again { n := 1 }
+    """
+    FILE_CYCLE = """RCS204: files that use each other in a circle
+
+    A file cannot use a file that uses it, directly or by way of others. Move what both need to a third file.
+
+    It arises from two files at least: `a.rcs` with `use b`, and `b.rcs` with `use a`.
+    """
+    FILE_NOT_FOUND = """RCS205: a used file is not found
+
+    `use NAME` looks for `NAME.rcs` beside the file, then from the root of the project (the folder with `rcsc.toml`).
+
+        use no_such_file
+
+    error: no file `no_such_file.rcs` is found
+    """
+    NOT_WRITABLE = """RCS206: something that cannot be written
+
+    A procedure or an action assigns to what is not its to write: an input (the world writes it), a constant, a parameter, a loop
+    variable. Use a state or an output variable.
+
+        input width_mm : int 0 .. 110
+        procedure reset { width_mm := 0 }
+
+    error: `width_mm` is an input; only the world writes it
+
+        state width_mm : int 0 .. 110
+        procedure reset { width_mm := 0 }
+    """
+    DUPLICATE_LINE = """RCS207: two lines of one name
+
+    The name of a line is what the log, the message and the executor's trace show. It is unique within its table.
+
+        input ready : bool
+        output go : bool
+        table start {
+          | line | ready || go    |
+          | 1    | true  || true  |
+          | 1    | false || false |
+        }
+
+    error: two lines are called `1`
+
+        input ready : bool
+        output go : bool
+        table start {
+          | line | ready || go    |
+          | 1    | true  || true  |
+          | 2    | false || false |
+        }
+    """
+    UNDECLARED_ACCESS = """RCS208: a module reads or writes more than it declares
+
+    A functionally bounded module says what it reads and what it writes, and does no more. Declare the variable, or leave it alone.
+
+        input a : int 0 .. 9
+        output c : int 0 .. 9
+        output d : int 0 .. 9
+        module update reads a writes c { d := a }
+
+    error: the module writes `d`, which it does not name
+
+        input a : int 0 .. 9
+        output c : int 0 .. 9
+        output d : int 0 .. 9
+        module update reads a writes d { d := a }
+    """
+    WRONG_ARGUMENTS = """RCS209: wrong arguments
+
+    A call gives one argument for each parameter, in order.
+
+        state n : int 0 .. 9
+        procedure set_to(by : int 0 .. 9) { n := by }
+        procedure go { set_to(1, 2) }
+
+    error: `set_to` takes 1 argument, not 2
+
+        state n : int 0 .. 9
+        procedure set_to(by : int 0 .. 9) { n := by }
+        procedure go { set_to(1) }
+    """
+    NOT_DEFERRED = """RCS210: `next` of a variable that is not deferred
+
+    `next x := e` sets the value that `x` takes when its condition `deferred until ...` holds. Only a variable declared so has one.
+
+        state cur : int 0 .. 9
+        procedure go { next cur := 3 }
+
+    error: `cur` has no deferred next value
+
+        input echoed : bool
+        state cur : int 0 .. 9 deferred until echoed
+        procedure go { next cur := 3 }
+    """
+    MISSING_TABLE = """RCS211: a value of the command without a table
+
+    A level with `table by` runs one table a command, so each value the selector can have has a table, once.
+
+        enum command { work, rest }
+        input order : command
+        output go : bool
+        table working {
+          | line | order   || go   |
+          | all  | DEFAULT || true |
+        }
+        level task {
+          period 40 [ms]
+          table by order { work : working }
+        }
+
+    error: `rest` has no table
+
+        enum command { work, rest }
+        input order : command
+        output go : bool
+        table working {
+          | line | order   || go   |
+          | all  | DEFAULT || true |
+        }
+        level task {
+          period 40 [ms]
+          table by order { work : working  rest : working }
+        }
+    """
+    SEVERAL_DEFAULTS = """RCS212: more than one DEFAULT line
+
+    A table has at most one DEFAULT line: where no other line matches there must be no choice.
+
+        input ready : bool
+        output go : bool
+        table start {
+          | line | ready   || go    |
+          | yes  | true    || true  |
+          | no   | DEFAULT || false |
+          | too  | DEFAULT || true  |
+        }
+
+    error: a table has at most one DEFAULT line
+
+        input ready : bool
+        output go : bool
+        table start {
+          | line | ready   || go    |
+          | yes  | true    || true  |
+          | no   | DEFAULT || false |
+        }
+    """
+    OWNER_CYCLE = """RCS213: executing owners that contain each other
+
+    An executing owner lists modules and other owners, run in order. It cannot contain itself, directly or by way of others.
+
+        owner sense { act }
+        owner act { sense }
+        output go : bool
+        table t {
+          | line | when || go   |
+          | all  |      || true |
+        }
+        level task { period 40 [ms] preprocess sense table t }
+
+    error: owners contain each other in a circle: sense -> act -> sense
+
+        state n : int 0 .. 9
+        procedure clear { n := 0 }
+        owner sense { act }
+        owner act { clear }
+        output go : bool
+        table t {
+          | line | when || go   |
+          | all  |      || true |
+        }
+        level task { period 40 [ms] preprocess sense table t }
+    """
+    UNSTEADY_SELECTOR = """RCS214: what chooses the table may change after it was chosen
+
+    The variable after `table by` chooses the table after the preprocess. A line, the postprocess or a safe value that changed it would
+    leave a state that shows another table than the one that ran: logs, runs that `rcsc prove` finds and the shell could not say which
+    line it was. So an input chooses, or a state that only the preprocess writes. A state machine over tables gives its state the next
+    value with `next`, which is taken at the start of the next cycle.
+
+        enum step { first, second }
+        input ready : bool
+        state now : step
+        table begin {
+          | line | ready || now    |
+          | go   | true  || second |
+          | wait | false ||        |
+        }
+        table end {
+          | line | when || now   |
+          | back |      || first |
+        }
+        level task {
+          period 40 [ms]
+          table by now { first : begin  second : end }
+        }
+
+    error: `now` chooses the table, and line `back` of table `end` may change it after that
+
+        enum step { first, second }
+        input ready : bool
+        state now : step deferred until true
+        procedure move(to : step) { next now := to }
+        table begin {
+          | line | ready || procedures   |
+          | go   | true  || move(second) |
+          | wait | false ||              |
+        }
+        table end {
+          | line | when || procedures  |
+          | back |      || move(first) |
+        }
+        level task {
+          period 40 [ms]
+          table by now { first : begin  second : end }
+        }
+    """
+    KIND = """RCS301: the wrong kind of value
+
+    A bool, a number, a member of an enumeration stands where another kind is wanted. Nothing converts by itself: compare (`n > 0`) to
+    get a bool, and use `int(...)` and `real(...)` between whole numbers and doubles.
+
+        input n : int 0 .. 9
+        output go : bool
+        procedure start { go := n }
+
+    error: expected bool, this is int
+
+        input n : int 0 .. 9
+        output go : bool
+        procedure start { go := n > 0 }
+    """
+    UNIT = """RCS302: units that do not fit
+
+    Millimetres are not added to seconds, nor compared with metres: units never convert by themselves. A literal without a unit takes
+    the unit it meets.
+
+        input width : int 0 .. 110 [mm]
+        input held : int 0 .. 60 [s]
+        output go : bool
+        procedure start { go := width > held }
+
+    error: the units differ: mm and s
+
+        input width : int 0 .. 110 [mm]
+        input held : int 0 .. 60 [mm]
+        output go : bool
+        procedure start { go := width > held }
+    """
+    EMPTY_RANGE = """RCS303: a range upside down
+
+    The low bound is above the high one, so that no value would fit.
+
+        input n : int 9 .. 0
+
+    error: the range 9 .. 0 is empty
+
+        input n : int 0 .. 9
+    """
+    TOO_WIDE = """RCS304: a range too wide for C
+
+    An integer fits in 64 bits, signed (from -2^63) or unsigned (to 2^64 - 1).
+
+        input n : int 0 .. 18446744073709551616
+
+    error: no 64-bit integer holds this number
+
+        input n : int 0 .. 18446744073709551615
+    """
+    NOT_CONSTANT = """RCS305: not a constant
+
+    Bounds, lengths, initial values and the values of `in {...}` arms are constant: literals, constants, and arithmetic on them.
+
+        input limit : int 0 .. 9
+        input n : int 0 .. limit
+
+    error: this must be a constant
+
+        const limit = 9
+        input n : int 0 .. limit
+    """
+    OUT_OF_RANGE_CONSTANT = """RCS306: a constant outside the range
+
+    A value outside its type's declared range can never be had there: an initial value that does not fit, a comparison that is always or
+    never true.
+
+        state n : int 0 .. 9 = 10
+
+    error: 10 is not in 0 .. 9
+
+        state n : int 0 .. 9 = 9
+    """
+    SAME_DOUBLE = """RCS307: two constants that are the same double
+
+    Two different decimal texts denote one IEEE double. They look like two cases and are one; nothing is merged silently.
+
+        input x : real 0.0 .. 1.0
+        output y : int 0 .. 2
+        table t {
+          | line | x                             || y |
+          | low  | < 0.1                         || 0 |
+          | high | >= 0.10000000000000000555     || 1 |
+        }
+
+    error: `0.10000000000000000555` and `0.1` are different numbers but the same double, 0.1
+
+        input x : real 0.0 .. 1.0
+        output y : int 0 .. 2
+        table t {
+          | line | x      || y |
+          | low  | < 0.1  || 0 |
+          | high | >= 0.1 || 1 |
+        }
+    """
+    BAD_LENGTH = """RCS308: the length of an array
+
+    An array has 1 to 4096 elements.
+
+        state counts : array[0] of int 0 .. 9
+
+    error: an array has 1 to 4096 elements
+
+        state counts : array[4] of int 0 .. 9
+    """
+    NOT_FINITE = """RCS309: not a finite double
+
+    The literal is too large for an IEEE double, or constant arithmetic gives infinity or no number. Ranges of `real` are finite.
+
+        input x : real 0.0 .. 1e999
+
+    error: `1e999` is larger than every double
+
+        input x : real 0.0 .. 1e99
+    """
+    DUPLICATE_ARM = """RCS310: a value in two arms of a case
+
+    The arms of a `case` are disjoint, so that their order does not matter.
+
+        input n : int 0 .. 9
+        state m : int 0 .. 9
+        procedure go {
+          case n { 1, 2 { m := 1 } 2 { m := 2 } else { m := 0 } }
+        }
+
+    error: an arm above already takes this value
+
+        input n : int 0 .. 9
+        state m : int 0 .. 9
+        procedure go {
+          case n { 1 { m := 1 } 2 { m := 2 } else { m := 0 } }
+        }
+    """
+    MIXED_SIGN = """RCS311: signed and unsigned 64-bit numbers together
+
+    Some values of one operand are negative, some of the other above 2^63 - 1: no C type holds both, and C would convert one silently.
+    Narrow one of the ranges.
+
+        input a : int -1 .. 9
+        input b : int 0 .. 18446744073709551615
+        output go : bool
+        procedure start { go := a < b }
+
+    error: no 64-bit integer type holds both sides
+
+        input a : int -1 .. 9
+        input b : int 0 .. 9223372036854775807
+        output go : bool
+        procedure start { go := a < b }
+    """
+    TOO_MANY_LEAVES = """RCS312: too many variables
+
+    Arrays and records taken apart, a program has at most 10 000 scalar variables.
+
+        state grid : array[200] of array[200] of bool
+
+    error: a type has at most 10000 scalar parts
+
+        state grid : array[20] of array[20] of bool
+    """
+    LOOP_TOO_LONG = """RCS313: a loop that is too long
+
+    A loop runs at most 4096 times, and all loops of a procedure together at most 1 000 000 statements: a cycle has a few milliseconds.
+
+        state n : int 0 .. 9
+        procedure go { for i in 0 .. 4096 { n := 0 } }
+
+    error: a loop has at most 4096 rounds
+
+        state n : int 0 .. 9
+        procedure go { for i in 0 .. 4095 { n := 0 } }
+    """
+    EMPTY_CONDITION = """RCS314: a condition that never holds
+
+    The condition is empty: no value of the column fits it, so that its line can never match.
+
+        input n : int 0 .. 9
+        output go : bool
+        table t {
+          | line | n       || go    |
+          | a    | < 0     || true  |
+          | b    | DEFAULT || false |
+        }
+
+    error: no value satisfies `< 0`
+
+        input n : int 0 .. 9
+        output go : bool
+        table t {
+          | line | n       || go    |
+          | a    | < 1     || true  |
+          | b    | DEFAULT || false |
+        }
+    """
+    NO_CYCLE_BEFORE = """RCS315: there is no cycle before to speak of
+
+    `was x` is the value that `x` had after the cycle before. Only a property speaks of two cycles: lines, procedures, assumptions and
+    invariants see one, and keep in a `state` what they need later. `was` does not nest, and neither what stands before `then` nor
+    either side of `until` or `upon` can have it: these are each about one cycle.
+
+        state n : int 0 .. 9
+        invariant grows : n >= was n
+
+    error: `was` stands in a property only
+
+        state n : int 0 .. 9
+        property grows : n >= was n
+    """
+    NO_PROPERTY = """RCS316: a property about nothing
+
+    No variable stands in the condition, so that it is always true, or never.
+
+        state n : int 0 .. 9
+        property fine : 1 < 2
+
+    error: this is about no variable: it is always so, or never
+
+        state n : int 0 .. 9
+        property fine : n < 2
+    """
+    GAP = """RCS401: an input that no line matches
+
+    Exactly one line matches in every cycle; here is an input that none matches: on the robot this is a STATE-TABLE error. The least
+    such input is shown, and the largest region found around it. Widen a line, add one (the help proposes one, proved to close this
+    gap), or give the table a DEFAULT line.
+
+        input width_mm : int 0 .. 110
+        output held : bool
+        table grip {
+          | line  | width_mm || held  |
+          | small | < 20     || false |
+          | held  | 20 .. 40 || true  |
+        }
+
+    error: no line of table `grip` matches 70 of 111 (63.1 %) of the inputs
+
+        input width_mm : int 0 .. 110
+        output held : bool
+        table grip {
+          | line  | width_mm || held  |
+          | small | < 20     || false |
+          | held  | 20 .. 40 || true  |
+          | wide  | > 40     || false |
+        }
+    """
+    OVERLAP = """RCS402: an input that two lines match
+
+    Exactly one line matches in every cycle; here is an input that two match, shown beside the cells of both. The help proposes the
+    smallest change of a cell that parts them. If the input cannot occur, say why in an assumption.
+
+        input width_mm : int 0 .. 110
+        output held : bool
+        table grip {
+          | line | width_mm || held  |
+          | open | > 40     || false |
+          | held | <= 41    || true  |
+        }
+
+    error: lines `open` and `held` of table `grip` both match some input
+
+        input width_mm : int 0 .. 110
+        output held : bool
+        table grip {
+          | line | width_mm || held  |
+          | open | > 40     || false |
+          | held | <= 40    || true  |
+        }
+    """
+    DEAD_LINE = """RCS403: a line that never matches
+
+    Under the declared ranges and the invariants no input matches this line. It is not wrong by itself, but it is not what its author
+    meant. Where only an assumption excludes the line this is a warning: the line is what runs when the assumption fails.
+
+        input a : int 0 .. 9
+        output go : bool
+        table t {
+          | line | a    | when  || go    |
+          | one  | <= 4 |       || true  |
+          | two  | > 4  |       || false |
+          | dead | > 4  | a < 3 || true  |
+        }
+
+    error: line `dead` of table `t` can never match
+
+        input a : int 0 .. 9
+        output go : bool
+        table t {
+          | line | a    || go    |
+          | one  | <= 4 || true  |
+          | two  | > 4  || false |
+        }
+    """
+    DEFAULT_REACHED = """RCS404: a DEFAULT line declared unreachable is reached
+
+    `DEFAULT unreachable` claims that the other lines cover every input; here is one that they do not.
+
+        input n : int 0 .. 9
+        output go : bool
+        table t {
+          | line | n                   || go    |
+          | low  | < 5                 || true  |
+          | high | > 5                 || true  |
+          | none | DEFAULT unreachable || false |
+        }
+
+    error: the DEFAULT line of table `t` is declared unreachable, but 1 of 10 (10 %) of the inputs fall to it
+
+        input n : int 0 .. 9
+        output go : bool
+        table t {
+          | line | n                   || go    |
+          | low  | < 5                 || true  |
+          | high | >= 5                || true  |
+          | none | DEFAULT unreachable || false |
+        }
+    """
+    CONTRADICTORY_ASSUMPTIONS = """RCS405: assumptions that contradict each other
+
+    No values satisfy all the assumptions of the table and the invariants. Everything would be proved of it, and nothing would be worth
+    anything.
+
+        input n : int 0 .. 9
+        output go : bool
+        assume low : n < 3
+        assume high : n > 6
+        table t assuming low, high {
+          | line | n   || go    |
+          | low  | < 5 || true  |
+          | high | > 5 || false |
+        }
+
+    error: the assumptions of table `t` contradict each other, an invariant or the declared ranges
+
+        input n : int 0 .. 9
+        output go : bool
+        assume off_five : n /= 5
+        table t assuming off_five {
+          | line | n   || go    |
+          | low  | < 5 || true  |
+          | high | > 5 || false |
+        }
+    """
+    ASSUMPTION_NOT_PROVED = """RCS406: an assumption declared proved that nothing proves
+
+    `proved` says that declared ranges and invariants ensure the assumption, and they do not. Write `assumed` or, better, `monitored`:
+    then the executors check it in every cycle; and where `rcsc prove` shows that the levels put together ensure it, `rcsc check` says
+    that it is proved.
+
+        input n : int 0 .. 9
+        output go : bool
+        assume off_five proved : n /= 5
+        table t assuming off_five {
+          | line | n   || go    |
+          | low  | < 5 || true  |
+          | high | > 5 || false |
+        }
+
+    error: assumption `off_five` does not follow from the declared ranges and the invariants
+
+        input n : int 0 .. 9
+        output go : bool
+        assume off_five monitored : n /= 5
+        table t assuming off_five {
+          | line | n   || go    |
+          | low  | < 5 || true  |
+          | high | > 5 || false |
+        }
+    """
+    DEFAULT_COVERS = """RCS407: what falls to the DEFAULT line
+
+    A note, not an error: DEFAULT hides gaps, so rcsc says which inputs fall to it and, where that can be counted, what share of
+    all they are. Declare the line `DEFAULT unreachable` where nothing should.
+
+        input n : int 0 .. 9
+        output go : bool
+        table t {
+          | line | n       || go    |
+          | low  | < 5     || true  |
+          | rest | DEFAULT || false |
+        }
+
+    note: 5 of 10 (50 %) of the inputs fall to the DEFAULT line of table `t`
+    """
+    DEFAULT_DEAD = """RCS408: a DEFAULT line that nothing falls to
+
+    The other lines already cover every input. Declare it `DEFAULT unreachable`, which is then proved, or leave it out.
+
+        input n : int 0 .. 9
+        output go : bool
+        table t {
+          | line | n       || go    |
+          | low  | < 5     || true  |
+          | high | >= 5    || false |
+          | rest | DEFAULT || false |
+        }
+
+    warning: the DEFAULT line of table `t` is never reached
+
+        input n : int 0 .. 9
+        output go : bool
+        table t {
+          | line | n                   || go    |
+          | low  | < 5                 || true  |
+          | high | >= 5                || false |
+          | rest | DEFAULT unreachable || false |
+        }
+    """
+    UNDECIDED = """RCS409: could not be decided
+
+    The solver gave up: it said *unknown*, or its budget of steps or its memory ran out, for one question or for all about a table or a
+    procedure together. That is never counted as proved. Give it more (`--steps MILLIONS`), or make the condition simpler: products of
+    variables and doubles are hard.
+
+    It arises from hard arithmetic. Steps are the same on every machine, so that a verdict does not depend on how busy it is.
+    """
+    OVERFLOW = """RCS410: arithmetic that overflows
+
+    A value in the middle of an expression can leave 64 bits. The executor's integers would wrap; the proof's do not; so it is an error.
+    Narrow the ranges, or test before.
+
+        input a : int 0 .. 9223372036854775807
+        state s : int 0 .. 9223372036854775807
+        procedure double { s := a * 4 / 8 }
+
+    error: the product can leave 64 bits
+
+        input a : int 0 .. 1000000
+        state s : int 0 .. 9223372036854775807
+        procedure double { s := a * 4 / 8 }
+    """
+    DIVISION_BY_ZERO = """RCS411: division by zero
+
+    The divisor of `/` or `mod` can be zero. Test it before: `n /= 0 and x / n > 2` is safe.
+
+        input n : int 0 .. 9
+        state s : int 0 .. 100
+        procedure share { s := 100 / n }
+
+    error: the divisor can be zero
+
+        input n : int 0 .. 9
+        state s : int 0 .. 100
+        procedure share { if n > 0 { s := 100 / n } }
+    """
+    INDEX = """RCS412: an index outside the array
+
+    An array of length n has the elements 0 to n - 1.
+
+        input n : int 0 .. 9
+        state counts : array[4] of int 0 .. 9
+        procedure clear { counts[n] := 0 }
+
+    error: the index can lie outside 0 .. 3
+
+        input n : int 0 .. 9
+        state counts : array[4] of int 0 .. 9
+        procedure clear { if n < 4 { counts[n] := 0 } }
+    """
+    ASSIGNED_RANGE = """RCS413: a value assigned outside the range
+
+    The value can leave the declared range of what it is assigned to. Test before, use `min` and `max`, or widen the range.
+
+        state n : int 0 .. 9
+        procedure bump { n := n + 1 }
+
+    error: the value can lie outside 0 .. 9, the range of `n`
+
+        state n : int 0 .. 9
+        procedure bump { n := min(n + 1, 9) }
+    """
+    USE_BEFORE_ASSIGNMENT = """RCS414: a local read before it is assigned
+
+    A local declared without a value has none until it is assigned, on every way that leads to the reading.
+
+        input a : bool
+        state n : int 0 .. 9
+        procedure go { local k : int 0 .. 9 if a { k := 1 } n := k }
+
+    error: `k` can be read before it is assigned
+
+        input a : bool
+        state n : int 0 .. 9
+        procedure go { local k : int 0 .. 9 := 0 if a { k := 1 } n := k }
+    """
+    TWO_WRITERS = """RCS415: one output written twice in a line
+
+    Two actions of one line write the same output: which of them counts would hang on the order of columns.
+
+        input ready : bool
+        output go : bool
+        procedure stop { go := false }
+        table start {
+          | line | ready || procedures | go    |
+          | yes  | true  || stop       | true  |
+          | no   | false ||            | false |
+        }
+
+    error: `stop` and `true` can write different values to `go`
+
+        input ready : bool
+        output go : bool
+        procedure stop { go := false }
+        table start {
+          | line | ready || procedures | go   |
+          | yes  | true  ||            | true |
+          | no   | false || stop       |      |
+        }
+    """
+    INVARIANT_INITIAL = """RCS416: an invariant false at first
+
+    An invariant holds of the initial values, before the first cycle.
+
+        state n : int 0 .. 9
+        invariant some : n > 0
+
+    error: the initial values do not satisfy invariant `some`
+
+        state n : int 0 .. 9 = 1
+        invariant some : n > 0
+    """
+    INVARIANT_BROKEN = """RCS417: an invariant that a line breaks
+
+    Every line, and every preprocess and postprocess procedure of a level, keeps each invariant: where it holds before, it holds after. The
+    state shown is one from which this line breaks it. Mend the line, or strengthen the invariant if that state cannot occur.
+
+        input up : bool
+        state n : int 0 .. 9 = 1
+        invariant some : n > 0
+        table t {
+          | line | up    || n |
+          | one  | true  || 1 |
+          | two  | false || 0 |
+        }
+
+    error: line `two` of table `t` can break invariant `some`
+
+        input up : bool
+        state n : int 0 .. 9 = 1
+        invariant some : n > 0
+        table t {
+          | line | up    || n |
+          | one  | true  || 1 |
+          | two  | false || 2 |
+        }
+    """
+    CERTIFICATE = """RCS418: a certificate that does not show what it claims
+
+    `rcsc certify` re-checks a program's certificate with a small checker that shares no code with the prover; it was refused. If the
+    certificate came from a file, it belongs to another text or was changed; make it anew. If rcsc has just made it, that is a bug in
+    rcsc: please report it.
+    """
+    ASSUMPTION_INITIAL = """RCS419: an assumption false at first
+
+    A warning: with the initial values, an assumption about states and outputs is false already. Unless a preprocess procedure mends
+    that, the first cycle does not run under it.
+
+        state n : int 0 .. 9
+        output go : bool
+        assume some : n > 0
+        table t assuming some {
+          | line | n   || go    |
+          | low  | < 5 || true  |
+          | high | >= 5 || false |
+        }
+
+    warning: assumption `some` does not hold of the initial values
+
+        state n : int 0 .. 9 = 1
+        output go : bool
+        assume some : n > 0
+        table t assuming some {
+          | line | n    || go    |
+          | low  | < 5  || true  |
+          | high | >= 5 || false |
+        }
+    """
+    PROPERTY_ELSEWHERE = """RCS420: properties are proved elsewhere
+
+    A note, not an error. A property is about what a level does cycle after cycle in its environment, which a table proved alone does
+    not show: `rcsc check` and `rcsc compile` make sure that it can be read, no more. `rcsc prove` proves it, or shows the shortest run
+    that breaks it; as long as nothing changes after that, the note of `rcsc check` says that it is proved.
+
+        state n : int 0 .. 9
+        property some : n < 9
+
+    note: property `some` is not proved here
+
+        state n : int 0 .. 8
+    """
+    NOT_CHECKED = """RCS421: an obligation that `rcsc certify` did not check
+
+    The checker of certificates settles what a program owes by spans, and by trying every case where there are few. Of what is left,
+    such as differences of variables with large ranges or arithmetic on doubles, there is only the prover's word, which is Z3's.
+    `--certify` puts it to cvc5, which has no part in the proof; `--questions DIR` writes it as SMT-LIB for any other solver. It is a
+    note where the program was proved in the same run, and an error with `--strict` and for a certificate from a file (`--against`).
+    """
+    STALE = """RCS501: the generated files are not fresh
+
+    `rcsc compile --check` found that `generated/` is not what the tables now give: a file differs or is missing. Run `rcsc compile` and
+    commit the result. Generated files are never edited by hand.
+    """
+    NOT_WRITTEN = """RCS502: a file could not be written
+
+    The operating system refused: the message gives its reason (no permission, no space). Nothing is left half written: the files are as
+    they were before.
+    """
+    NAME_COLLISION = """RCS503: two things of one name in the generated code
+
+    What is compiled together can be linked together and stands in one folder. So two programs may not give one name in C to two things
+    (table `b_c` of `a.rcs` and table `c` of `a_b.rcs` both make `a_b_c_step`), nor be compiled to one file (`a-b.rcs` and `a_b.rcs`),
+    and functions of yours that have one name in C take the same types. Rename one of them.
+    """
+    EXTERN_NAME = """RCS504: an extern procedure's name does not fit
+
+    The name given for Python is `package.module:function`; the name for C is a C identifier, and no word of the language or of
+    its library.
+
+        input a : int 0 .. 9
+        output c : int 0 .. 9
+        extern procedure lookup reads a writes c python "pkg.mod:function" c "while"
+
+    error: `while` does not name a C function
+
+        input a : int 0 .. 9
+        output c : int 0 .. 9
+        extern procedure lookup reads a writes c python "pkg.mod:function" c "lookup_in_table"
+    """
+    EXECUTORS_DISAGREE = """RCS601: the executors disagree
+
+    On the same input the interpreter, the Python executor and the C executor gave different lines, states or faults. That is a bug in
+    rcsc or, for an extern procedure, in one of its two implementations.
+
+    It arises in `rcsc test`, which shows the simplest input that it finds.
+    """
+    LINE_NOT_REACHED = """RCS602: a line was never reached
+
+    `rcsc test` knows an input that makes this line match, and yet no step of the executors took it: the test is not complete.
+    """
+    NO_C_COMPILER = """RCS603: the C compiler is missing or refuses
+
+    `rcsc test` builds and runs the generated C. Install a C compiler (`cc` or the one `CC` names); where it refuses the code, its words
+    are shown, and that is a bug in rcsc or in the C of an extern procedure.
+    """
+    MATCHER_DIFFERS = """RCS604: the C matcher is not shown equal to the table
+
+    The check of the emitted masks against the table, for every value of every variable, found a difference, or a model checker refuted
+    that a C function does what the tables say. What a tool could not decide is a figure of `rcsc test`, and no finding. Please report
+    it: this is a bug in rcsc.
+    """
+    LOG_UNREADABLE = """RCS701: a log cannot be read
+
+    The file is not there, is no MCAP file, or holds no run that rcsc recorded: a name in it is none, or it unpacks to more than a log
+    of its size can hold. A log that was cut off is no such thing: it is read as far as it goes, and what is lost is at most the last
+    second.
+    """
+    REPLAY_DIFFERS = """RCS702: a replay differs from the run
+
+    Each cycle was run again from the recorded state with the recorded inputs, by executors of the very tables that the run had, and
+    left something else than it left then. The same executor always does the same, and so do those in C and in Python: it is a bug in
+    rcsc, in the compiler that built the C, or in an extern procedure that keeps something to itself. `--executor python` shows whether
+    it is the C.
+    """
+    TABLES_DECIDE_OTHERWISE = """RCS703: other tables decide otherwise
+
+    `rcsc replay --generated FOLDER` ran the run again with other tables than it was recorded with. The cycle that is shown is the first
+    in which they leave something else; up to there the run would have been the same. The notes show the line that matched then and the
+    one that matches now.
+    """
+    NOT_REPLAYED = """RCS704: a log cannot be replayed
+
+    The generated programs do not fit the log, are not there, or the C could not be built. Run `rcsc compile` first, name the folder
+    with `--generated`, or take `--executor python`.
+    """
+    EXTRA_MISSING = """RCS705: a package is missing
+
+    `pip install rcsc` brings what checking, compiling, proving and the hooks need. The rest comes with extras, which the help names:
+    `cell` for `rcsc run` and `rcsc campaign` (MuJoCo), `log` for logs, `plot` for pictures of them, `parquet` for Parquet files, `live`
+    for the page that follows a run, `certify` for cvc5, `graph` for drawings of tables, `cluster` for a campaign on a cluster. In a
+    checkout: `pip install -e '.[cell]'`.
+    """
+    NO_FINDING = """RCS706: a log keeps no finding
+
+    `rcsc log FILE --report PAGE` draws the run of a finding, which `rcsc prove --log DIR` keeps: a few cycles, each whole. A run in the
+    cell is drawn while it runs: `rcsc run SCRIPT --report PAGE`; of its log `--plot` draws single values.
+    """
+    LOG_NOT_WHOLE = """RCS707: a log is not whole
+
+    Every byte of a log is in a chain of digests, which a seal ends. The log ends before its seal (a kill or a full disk cut it off),
+    has no chain (an older version of rcsc or another program wrote it), or is from some byte on not what was recorded. It was read and
+    replayed as far as the chain holds, and nothing is said about the rest. The chain has no key: it shows that a log was damaged, and
+    not that nobody made another.
+    """
+    BAD_SYSTEM = """RCS721: the system cannot be put together
+
+    The description (`system.toml`) cannot be read, has a key that means nothing or lacks one, names a buffer, a party, a level or a
+    feed that is not there, has a `tick_ms` that does not divide the period of every level, or the generated executors are not there or
+    do not build. Every fault is named with its line. Nothing has moved. Run `rcsc compile`, or mend what the message names. A party
+    that is no level is taken for something outside; with `outside = ["robot", ...]` in the description any other name is a fault.
+    """
+    BAD_DATA = """RCS722: the data is not in order
+
+    The cell's data names something that does not exist, has a value that is no number or not within what it may be, puts a point where
+    the robot does not reach, says more than the level that asks can hold (`primitive.goal.speed_mm_s` would be 9000, and holds 1 ..
+    2000), or the database made of it is missing or broken. Nothing has moved. `rcsc db check` names every problem with its line.
+    """
+    BAD_SCRIPT = """RCS723: the script cannot be run
+
+    A row of the workstation's script says no command, no part or no location that is known, the file cannot be read, or the script has
+    no such row as `--from-row` names. Nothing has moved. Mend the script and run it; one that was stopped and is changed since is begun
+    anew with `--from-row`, for `--resume` goes on with the same script only.
+    """
+    SCRIPT_STOPPED = """RCS724: the script was stopped
+
+    A row failed, with the reason that TASK reported, or an interlock refused it before it began: it would have machined a loose part,
+    put a second part into the fixture, or let go of a part. The robot is paused, and where everything stands is kept: mend the cause
+    and go on from this row with `rcsc run SCRIPT --resume`. What has been done of the row is not done again. `--from-row N` besides
+    goes on after it, as if it were done.
+    """
+    STATE_TABLE_ERROR = """RCS725: STATE-TABLE error
+
+    No line of a table matched, or several did, or an input lay outside its declared range and was refused, or an assumption failed on
+    which the safety of the table's lines rests, or a state from outside (after a restart, or set by hand) is none that the tables are
+    proved for. The proofs exclude the first two for what they assume: look at the assumptions that failed, and at the executors'
+    source.
+    """
+    NOT_RESUMED = """RCS726: there is nothing to go on from
+
+    `rcsc run SCRIPT --resume` goes on where a script was stopped. No run of this system was stopped, or what was kept of it is damaged
+    or of another version of rcsc, or the script is another one than was stopped, or has changed since. Nothing has moved. `--from-row
+    N` without `--resume` begins anew at a row, as if those before it were done.
+    """
+    EXECUTORS_NOT_PROVED = """RCS727: executors of tables that are not proved
+
+    `rcsc prove --log` runs a finding on executors that it makes by force where the tables do not prove, or where it looks at them under
+    another rule. They say so in every file, and no cell runs them: nothing has moved. Mend the tables and run `rcsc compile`.
+    """
+    PROCESS_LOST = """RCS728: a process of the running system is lost
+
+    `rcsc run --processes` runs each level in a process of its own. A level that is killed, or that commits nothing for 25 of its
+    periods because it was stopped by a signal, loops or waits, is started again and goes on from its last cycle. Too many of them were,
+    or the process of workstation and plant was, which cannot be taken up again; or one ended by an exception, which stands on the
+    standard error stream. The message names the process. Everything was ended, and nothing is left of it.
+    """
+    SHELL_NAME = """RCS731: the shell knows no such name
+
+    `rcsc shell` was given a name that is no variable, level, line, module, procedure, owner or table of the level that is meant. Names
+    without a level are those of the level chosen (`level task`); `task.cur_state` names one of another. Case does not matter, and
+    hyphens are underscores: `STATE-TABLE` is `state_table`.
+    """
+    SHELL_VALUE = """RCS732: a value that is none of the variable's
+
+    A variable takes members of its enumeration, `false` or `true`, or numbers within its declared range: the proofs assume that it
+    holds nothing else. Nothing was set.
+    """
+    SHELL_RELOAD = """RCS733: a level keeps its tables
+
+    `reload` compiles a level's tables as they are now, and takes them only if they are proved and the present state lies in what was
+    proved: each variable, by name, is of the same kind and within its new range; invariants hold, and so do the assumptions of the
+    table that runs next, of what it will see; and that table has a line for the states that it tests, as they are and as they are to be
+    when the echo comes. Otherwise the old ones run on, and the message says what was against it, with the values. Parts of a level
+    cannot be run by name while the sources that the session began with are not those of its executors, either: reload it. What the
+    level and its neighbours do together is looked up, not proved (RCS738).
+    """
+    SHELL_COMMAND = """RCS734: the shell does not understand a command
+
+    A word, a number or a condition is not as `help` in the shell shows it, or there is nothing to undo, to stop at or to come to.
+    """
+    SHELL_PART = """RCS735: a part cannot be run here
+
+    A module, procedure or table that is run by itself met what the proofs exclude within a cycle: a division by zero, an index outside
+    an array, a value out of its variable's range. Nothing was changed. Set what it reads first, or run the whole level.
+    """
+    SHELL_EXPECTED = """RCS736: what was expected does not hold
+
+    `expect CONDITION` in a script of the shell: the condition is false now. The message shows the variables that it is about. The
+    script was stopped here.
+    """
+    SHELL_OTHERWISE = """RCS737: the next cycle would do otherwise
+
+    `reload` found the new tables proved, and the present state among those that they were proved for; but it is a state in which they
+    do otherwise than the ones that run, at once. The message shows the line of either version, what the next cycle would leave
+    otherwise, and, as `rcsc diff` does, everything else that changed. It is also said where the two cannot be compared: the solver gave
+    up, or the sources had been edited before the session began. Nothing was taken. `reload LEVEL anyway` takes it; or run on until the
+    level has left that state, and reload there. `diff LEVEL` shows the same without taking anything.
+    """
+    SHELL_NOT_COMPOSED = """RCS738: new tables that are not proved together with their neighbours
+
+    `reload` found the new tables proved by themselves, but an earlier `rcsc prove` looked at the level with exactly these tables in its
+    environment and could not show what it is to keep: an assumption, an echo, an order of numbers. The message names what is open.
+    Nothing was taken, and `anyway` does not change that; tables that nobody has looked at so are taken, and it is said. `reload LEVEL
+    proved` looks at them first, as `rcsc prove` does, and refuses likewise what then is not proved. `rcsc prove --level LEVEL` looks
+    for the shortest run that shows it.
+    """
+    BAD_JOURNAL = """RCS741: a journal is not this campaign's
+
+    `rcsc campaign` goes on from its journal only if that has the same seed, plant and executors, and was written with the same tables,
+    data and programs: what it holds would not be what the episodes do now. The same is said of a file that is no journal or is damaged
+    before its last line, and of one that another campaign is writing. The file was not changed. Name another one with `--journal`, or
+    leave the option out: then each state of the tables has a journal of its own.
+    """
+    BAD_EPISODE = """RCS742: an episode cannot be read
+
+    `rcsc campaign --again FILE` runs an episode that a campaign saved: `episode.json`, or the folder that has it. This file is none.
+    """
+    PROPERTY_BROKEN = """RCS743: a property does not hold
+
+    In an episode of a campaign something happened that the paper or the safety of the cell excludes. The message names the property,
+    the cycle and what was seen; the counterexample's folder has the episode as small as it could be made, its script, and its log for
+    `rcsc replay`.
+    """
+    WORKERS_GONE = """RCS744: nobody is left to play
+
+    The workers of a campaign are gone and cannot be had again: the scheduler does not answer, or it lost them, or they have other
+    tables or programs than the campaign. What was done is kept in the journal; the same command goes on from there.
+    """
+    NOT_COMPOSED = """RCS751: a level is not proved in its environment
+
+    `rcsc prove` looks at a level with every command at every moment, and with every delay, repetition and loss in its buffers.
+    Something that should hold in each cycle could not be proved: an assumption of a table, that one line matches, or what a neighbour
+    relies on. Where a run from the first cycle shows it, the shortest is printed, cycle by cycle, as the interpreter ran it: repair the
+    table. Where none is printed, either no run of that length does, or no invariant that rcsc looks for says why it holds; `--trace N`
+    looks further. A table's assumption that is not proved stays monitored. What *rests on* it is found so only if it holds; what is
+    *not looked at* could not be stated, and is never proved: the manual has every verdict under "What a verdict says". `--log DIR`
+    keeps each trace as a log for `rcsc replay`, `--freeze DIR` as a case that `--case FILE` runs again. `rcsc check` repeats it as a
+    warning, as long as nothing that was looked at has changed: the tables by themselves may well be proved.
+    """
+    NOT_AGREED = """RCS752: a level assumes what its neighbour does not keep
+
+    What a level assumes of the level above or below is matched with what was proved of that level: that a report echoes the command it
+    answers, that an order changes only together with its number, and that both begin in agreement. Here it was not proved of the
+    neighbour, so that the proofs of the levels do not make a proof of the system. `rcsc check` repeats it as a warning, and calls no
+    assumption proved then.
+    """
+    FOUND_AGAIN = """RCS753: a frozen finding breaks again
+
+    A finding that `rcsc prove --freeze` kept was run on the tables as they are now, with the inputs that it was found with. It should
+    not break what it broke then, and does; or, where the case says that it is to break it, no longer does. Mend the tables; a case that
+    is to show a hazard (`"expect": "broken"`) and no longer does is out of date.
+    """
+    BAD_CASE = """RCS754: a frozen finding cannot be run
+
+    The case cannot be read, or names a system, a level, a variable or a value that the tables do not have any more. Find it anew with
+    `rcsc prove --freeze`, or remove it.
+    """
+    ENDLESS = """RCS756: a command is not shown to end
+
+    Every command is to end if every order that is not replaced is answered. For this table that is not shown: the lines named may run
+    for ever, or its states may go round. The run, where there is one, ends as it was before the cycle named, with every order answered
+    or followed by another, so that it may go on for ever. It is a warning: a line may wait for what nobody in the system brings about,
+    and be right. Where it is not, count the cycles and fail, or give the state in which the command is done; a number that rises with
+    the line, and that no other line sets back, shows that it ends.
+    """
+    GRAPH_NO_STATE = """RCS771: a table has no state to draw
+
+    `rcsc graph` draws the values of one variable as states: `cur_state`, else the only enumeration that the table tests and keeps as
+    state. It has to be a `state` of few values: an enumeration, a boolean or up to 64 integers. Name it with `--state`, or draw which
+    line can match after which: `--lines`.
+    """
+    GRAPH_UNREADABLE = """RCS772: a graph cannot be read
+
+    `rcsc table` reads DOT, Mermaid (`stateDiagram-v2`) and SCXML as `rcsc graph` writes them. The text is not in its form, does not
+    name its table, or a guard or an effect on an arrow is not in the language: a guard is a condition, terms joined by `and`; an effect
+    is what the line does, each column's actions in parentheses after its heading.
+
+        stateDiagram-v2
+          %% table: door
+          shut --> open : 1 [button] command_out(lift)
+          open --> shut : 2 [not button and clear] command_out(drop)
+    """
+    GRAPH_DIFFERS = """RCS773: a graph does not say the table
+
+    The table made of the graph does not do what the present one does: for the input shown another line's worth of actions runs, or none
+    does, or two lines match. If the graph was changed on purpose, that is the change; `rcsc diff` shows all of it. A graph that `rcsc
+    graph` wrote and nobody changed always says its table where nothing is reported.
+    """
+    GRAPH_LOSES = """RCS774: a graph does not hold this
+
+    What a graph cannot say is named when it is written: comments, lines that match nothing under the assumptions, and conditions on the
+    state that come back narrower, as the states from which the arrows come. What is proved of the table that comes back holds all the
+    same. When a table is made of a graph, lines that were named or split are told in the same way.
+
+    DOT, Mermaid and SCXML hold the same. But Mermaid draws several loops of one state on top of each other, and SCXML's guards are in
+    the table's words: its processors cannot run them.
+    """
+    NOT_COMPARED = """RCS781: two versions cannot be compared
+
+    `rcsc diff` was given a file, a folder or a revision that is not there, or neither side has a table. Revisions are those of the git
+    repository that one stands in; `REV:path` counts from its top, `REV:./path` from this folder. Nothing was compared.
+    """
+    SOLVERS_DISAGREE = """RCS901: two deciders disagree
+
+    The fast decision by boxes or regions and the solver gave different answers on the same question, or cvc5 did not confirm what `rcsc
+    prove --certify` put to it. One of them is wrong, or gave up, so nothing is proved, and it is a bug in rcsc. Please report it with
+    the table.
+    """
+    INTERNAL = """RCS902: a bug in rcsc
+
+    Something happened in rcsc that should not be possible. Nothing was proved and nothing written. Please report it with the text that
+    `RCSC_DEBUG=1` prints and, if you can, the tables.
+    """
+    NOT_REPRODUCED = """RCS903: a trace does not run
+
+    The solver found a run that should break something, and the interpreter, run on the same inputs, did not break it; or the
+    interpreter did, and the generated Python or C, run on them, left something else. One of them is wrong about the language. The first
+    cycle in which they part is shown, both side by side. Nothing is claimed of the goal. Please report it with the tables.
+    """
+    WORKER_ENDED = """RCS904: a worker process ended without an answer
+
+    With `--jobs` above 1 each table or level is proved in a process of its own. One of them was killed, ran out of memory, or crashed
+    before it answered, so nothing is known of what it was to decide, and the command ends with status 3: nothing is proved, and nothing
+    is refuted. Look at the system's log for a process that was killed for its memory; `--jobs 1` takes the least.
+    """
+
+
+def _unindented(block: str) -> str:
+    return dedent(block) + "\n"

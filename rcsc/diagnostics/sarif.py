@@ -11,7 +11,6 @@ from urllib.parse import quote
 from rcsc import __version__
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label
-from rcsc.diagnostics.explanations import explain
 from rcsc.diagnostics.jsonform import table_to_json
 from rcsc.diagnostics.render import region
 from rcsc.diagnostics.report import Report
@@ -50,7 +49,7 @@ def sarif(report: Report) -> Json:
 
 
 def _rule(code: Code) -> Json:
-    explanation = explain(code)
+    explanation = code.explanation
     return {
         "id": code.value,
         "name": "".join(word.capitalize() for word in code.name.split("_")),

@@ -1,12 +1,11 @@
-"""`rcsc explain`: every code has a page; every example is reported with its code and no other."""
+"""`rcsc explain`: every code has a page; every example is reported as its entry shows, and with no other code."""
 
 import pytest
 from click.testing import CliRunner
 
 from rcsc.commands.group import commands
-from rcsc.diagnostics.codes import Code
-from rcsc.diagnostics.diagnostic import Severity
-from rcsc.diagnostics.explanations import explain, explanations
+from rcsc.diagnostics.codes import FAMILIES, Code
+from rcsc.diagnostics.diagnostic import Diagnostic, Severity
 from rcsc.lang.model import Program
 from rcsc.lang.resolve import compile_text
 from rcsc.solvers.options import Options
@@ -16,29 +15,34 @@ NOTES = {Code.DEFAULT_COVERS, Code.PROPERTY_ELSEWHERE}
 """Codes whose right form is the wrong one's, or that are said of what is right."""
 
 
-def reported(text: str) -> set[Code]:
+def reported(text: str) -> list[Diagnostic]:
     program = compile_text(text)
     found = prove_program(program, Options()).findings if isinstance(program, Program) else program
-    return {one.code for one in found if one.severity is not Severity.NOTE or one.code in NOTES}
+    return [one for one in found if one.severity is not Severity.NOTE or one.code in NOTES]
 
 
-@pytest.mark.parametrize("code", [code for code in Code if explain(code).wrong])
-def test_the_wrong_example_is_reported_with_its_code_and_no_other(code: Code) -> None:
-    assert reported(explain(code).wrong) == {code}
+@pytest.mark.parametrize("code", [code for code in Code if code.explanation.wrong])
+def test_the_wrong_example_is_reported_as_the_entry_shows(code: Code) -> None:
+    diagnostics = reported(code.explanation.wrong)
+    assert {diagnostic.code for diagnostic in diagnostics} == {code}
+    assert f"{diagnostics[0].severity.value}: {diagnostics[0].message}" == code.explanation.report
 
 
-@pytest.mark.parametrize("code", [code for code in Code if explain(code).right])
+@pytest.mark.parametrize("code", [code for code in Code if code.explanation.right])
 def test_the_right_example_is_not_reported(code: Code) -> None:
-    assert reported(explain(code).right) - NOTES == set()
+    assert {diagnostic.code for diagnostic in reported(code.explanation.right)} <= NOTES
 
 
 def test_every_code_is_explained_and_most_by_example() -> None:
-    assert list(explanations()) == list(Code)
-    for found in explanations().values():
-        assert not found.title[0].isupper() or found.title.split()[0].isupper()
-        assert not found.title.endswith(".")
-        assert len(found.text) > 30
-    without = {code for code, found in explanations().items() if not found.wrong}
+    assert {code.value[3] for code in Code} == set(FAMILIES)
+    assert [code.value for code in Code] == sorted({code.value for code in Code})
+    for code in Code:
+        explanation = code.explanation
+        assert not explanation.title[0].isupper() or explanation.title.split()[0].isupper()
+        assert not explanation.title.endswith(".")
+        assert len(explanation.text) > 30
+        assert bool(explanation.wrong) == bool(explanation.report)
+    without = {code for code in Code if not code.explanation.wrong}
     runs = {
         code for code in without if code.value[3] in "79"
     }  # no text of a table shows a recorded run, or a bug in rcsc
