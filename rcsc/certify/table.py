@@ -221,8 +221,8 @@ class TableChecker:
         run = Run(self.start, "")
         holds = run.evaluate(expr)
         defined = run.terms.every(run.terms.follows(owed.path, owed.good) for owed in run.owed)
-        keys = np.arange(low, high + 1) if leaf.sort == BOOL else np.array(range(low, high + 1), dtype=object)
-        cases = {leaf: keys.astype(bool) if leaf.sort == BOOL else keys}
+        keys = np.array(range(low, high + 1))
+        cases = {leaf: keys}
         if not values_in(defined, cases, len(keys)).all():
             return None
         holding = keys[values_in(holds, cases, len(keys))]

@@ -7,6 +7,7 @@ from itertools import product
 from pathlib import Path
 
 import pytest
+import z3
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -26,11 +27,14 @@ from rcsc.compose.proof.termination import Phase, longest
 from rcsc.host.cache import Cache
 from rcsc.lang.model import Bool, Enum, Int, Op, Real, Scalar, real_key
 from rcsc.lang.operator_table import Arithmetic, divide
+from rcsc.solvers import smt
 from rcsc.solvers.sat import Sat
 from rcsc.solvers.smt import Answer, Limits, Solver
 from rcsc.symbolic import values
 from rcsc.symbolic.bits import Bits, few, key_of_bits
+from rcsc.symbolic.encode import at_most_key
 from rcsc.symbolic.keyed import Keyed
+from rcsc.symbolic.trial import holds_at
 from rcsc.symbolic.values import Node
 from tests.compose.test_compose import LITTLE, SMALL, Edit, changed, swap
 
@@ -172,6 +176,38 @@ def test_an_open_operation_gives_the_same_for_the_same_operands(op: Arithmetic) 
         differ = keyed.term(values.negation(values.equal(made("b"), made(other))))
         solver.add(*keyed.ranges, differ)
         assert solver.check() is answer
+
+
+def test_a_real_stands_by_the_rank_of_its_double() -> None:
+    """By its whole part, nothing would lie between a half and 0.9."""
+    r = values.variable("r", Real(0.0, 0.9))
+    keyed, solver = Keyed(), Solver()
+    more = keyed.term(values.compare(Op.LT, values.constant(r.kind, 0.5), r))
+    solver.add(*keyed.ranges, more)
+    assert solver.check() is Answer.SATISFIABLE
+
+
+@pytest.mark.parametrize("key", [0, 1])
+def test_keys_of_truths_are_bounded(key: int) -> None:
+    truth, solver = smt.variable("b", Bool()), Solver()
+    solver.add(at_most_key(truth, Bool(), key), truth)
+    assert solver.check() is (Answer.SATISFIABLE if key else Answer.UNSATISFIABLE)
+
+
+def test_a_condition_holds_at_the_points_at_which_it_does() -> None:
+    i, j = (values.variable(name, INT) for name in "ij")
+    less = values.compare(Op.LT, i, j)
+    assert [holds_at(less, {"i": at, "j": 1}) for at in (0, 1, 2)] == [True, False, False]
+
+
+def test_ctrl_c_that_z3_took_ends_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(*_: object) -> None:
+        raise z3.Z3Exception("interrupted from keyboard")
+
+    solver = Solver()
+    monkeypatch.setattr(solver, "_answer", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        solver.check()
 
 
 def test_what_is_known_where_a_branch_is_taken_is_not_carried_elsewhere() -> None:

@@ -9,10 +9,10 @@ from random import Random
 import pytest
 
 from rcsc.commands import run
-from rcsc.compose.contract.claims import CONTRACT, FOUND, RUNS, SAFE, Claim, Key, closed
+from rcsc.compose.contract.claims import CONTRACT, ENDING, FOUND, RUNS, SAFE, Claim, Key, closed
 from rcsc.compose.contract.environment import links
 from rcsc.compose.contract.obligations import Sort, unstated
-from rcsc.compose.contract.properties import property_kept
+from rcsc.compose.contract.properties import invariant_kept, property_kept
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.counterexample.cycle_run import one_cycle, ran, ran_on
 from rcsc.compose.counterexample.explain import TraceSettings, explain
@@ -20,12 +20,13 @@ from rcsc.compose.counterexample.finding import of_trace
 from rcsc.compose.counterexample.frozen import BadCaseError, case_breaks, read_case
 from rcsc.compose.counterexample.lasso import Lasso, lassos
 from rcsc.compose.counterexample.trace import TraceSearch, shortest
-from rcsc.compose.proof.assume_guarantee import agreements
+from rcsc.compose.proof.assume_guarantee import agreements, of_level
+from rcsc.compose.proof.context import of_lines
 from rcsc.compose.proof.level import LevelProof, Verdict, prove_level
 from rcsc.compose.proof.system import NoProgramError, loaded_program, prove_system, transition_systems
 from rcsc.compose.proof.termination import Ending
 from rcsc.lang.interpret import Fault, initial
-from rcsc.lang.model import Value
+from rcsc.lang.model import Value, VariableName
 from rcsc.run.description import BadDescription, description
 from rcsc.solvers.smt import Answer, Solver
 from rcsc.symbolic import values
@@ -103,9 +104,11 @@ def whole_of_what_overflows(text: str) -> str:
 @pytest.mark.parametrize(("edit", "ends"), [(nested, True), (whole_of_what_overflows, False)])
 def test_what_the_preprocess_may_do_is_followed(edit: Edit, ends: bool, tmp_path: Path) -> None:
     """Calls, and the whole part of what may be no number."""
-    _, proof = proved(tmp_path, edit)
+    ts, proof = proved(tmp_path, edit)
     assert proof.open == ()
     assert ending(proof, "go").proved == ends
+    every = dict(of_level(ts, proof))[ENDING]  # what a level above rests on
+    assert set(every.rests_on) == {("lower", (Sort.ENDS, table, "")) for table in ("go", "pause")}
 
 
 def test_a_refusal_in_the_preprocess_passes_over_a_new_command(tmp_path: Path) -> None:
@@ -296,6 +299,14 @@ def test_an_honest_report_is_not_about_an_order_whose_number_stays(tmp_path: Pat
     assert first.after["to_lower.input_command"] == 1
     second = one_cycle(ts, first.after, order)
     assert not property_kept(ts, "about", first.after, second.after)
+
+
+def test_an_invariant_is_kept_by_a_cycle_before_and_after_which_it_holds(tmp_path: Path) -> None:
+    path = changed(tmp_path, upper=lambda text: f"{text}\ninvariant known : begun or not new_command\n")
+    ts = transition_systems(path)["upper"]
+    good, bad = ({"begun": False, "new_command": new} for new in (False, True))
+    kept = [invariant_kept(ts, "known", before, after) for before in (good, bad) for after in (good, bad)]
+    assert kept == [True, False, False, False]
 
 
 # --- both ends of a buffer -----------------------------------------------------------------------
@@ -1099,6 +1110,32 @@ def test_a_neighbour_outside_need_not_speak_of_orders() -> None:
     found = links(description(path), "gripper", program)
     assert [variable.name for variable in program.variables if variable.name.startswith("to_hand.")]
     assert found.unread == ()
+
+
+@pytest.mark.parametrize(
+    ("renamed", "lacks"),
+    [
+        ("command.number", "has no `inc_command`"),
+        ("command.head.inc_command", "is not one order and one report"),
+    ],
+)
+def test_what_two_levels_say_to_each_other_is_named_where_it_is_no_order(
+    tmp_path: Path, renamed: str, lacks: str
+) -> None:
+    path = changed(tmp_path)
+    program, _ = loaded_program(path, "lower")
+    variables = tuple(
+        replace(one, name=VariableName(renamed)) if one.name == "command.inc_command" else one
+        for one in program.variables
+    )
+    found = links(description(path), "lower", replace(program, variables=variables))
+    assert found.unread[0] == f"what `lower` and `upper` say to each other (`command`, `report`) {lacks}"
+
+
+def test_what_lines_write_is_what_all_their_actions_do(tmp_path: Path) -> None:
+    assert of_lines(transition_systems(changed(tmp_path))["upper"]) == {
+        "begun", "cur_state.next", "status_report", "to_lower.input_command",
+    }  # fmt: skip
 
 
 # --- what is shown -----------------------------------------------------------------------------------

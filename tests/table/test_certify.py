@@ -79,8 +79,8 @@ input x : int -5 .. 5
 input y : int -5 .. 5
 table t {
   | line | when                       ||
-  | 1    | x + y + 3 in {1, 4}        ||
-  | 2    | x + y /= -2 and x + y /= 1 ||
+  | 1    | x + y + 3 in {1, 4}         ||
+  | 2    | -x /= y + 2 and x + y /= 1  ||
 }
 """
 WRONG = [  # a change of a cell, and whether the table then has a gap or an overlap

@@ -3,10 +3,11 @@
 import pytest
 
 from rcsc.certify import certify
+from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic
 from rcsc.lang.model import Program
 from rcsc.lang.resolve import compile_text
-from rcsc.procedures.invariants import assumptions_satisfiable
+from rcsc.procedures.invariants import assumptions_satisfiable, at_first
 from rcsc.solvers.options import Options
 from rcsc.solvers.smt import Answer
 from rcsc.table.program import ProgramVerdict, prove_program
@@ -67,6 +68,12 @@ def test_the_state_before_the_line_is_the_witness() -> None:
     values = dict(zip(found.witnesses[0].variables, found.witnesses[0].values, strict=True))
     assert values == {"up": "true", "n": "1", "m": "2"}
     assert "line `one` of table `t`" in found.message
+
+
+def test_an_assumption_that_the_initial_values_break_is_told_at_its_place() -> None:
+    program = program_of(RELYING + "assume far monitored : n > 3\n")
+    [found] = [one for one in at_first(program) if one.code is Code.ASSUMPTION_INITIAL]
+    assert found.primary.span == program.assumptions[-1].span
 
 
 def test_a_default_line_owes_the_invariant_too() -> None:

@@ -322,7 +322,9 @@ def test_respelt_conditions_meet_in_one_form() -> None:
     first = universe.of(compare(Op.LE, total([2, -2], ["x", "y"]), number(3)))
     second = universe.of(Apply(Op.NOT, (compare(Op.GT, x, Apply(Op.ADD, (y, number(1)), WIDE)),), BOOL))
     third = universe.of(compare(Op.GE, total([-6, 6], ["x", "y"]), number(-11)))
-    assert first == second == third
+    opposite = Apply(Op.NEG, (x,), WIDE)
+    fourth = universe.of(compare(Op.GE, opposite, Apply(Op.SUB, (number(-1), y), WIDE)))
+    assert first == second == third == fourth
     assert len([form for form in universe.forms if len(form) > 1]) == 1
 
 

@@ -248,6 +248,25 @@ def test_a_line_that_an_invariant_kills_is_a_mistake(solver: Literal["boxes", "a
     assert [(one.code, one.severity) for one in found] == [(Code.DEAD_LINE, Severity.ERROR)]
 
 
+def test_a_gap_between_related_lines_is_told_with_the_region_around_its_least_point() -> None:
+    program = compile_text(
+        "input x : int 0 .. 9\ninput y : int 0 .. 9\n"
+        "table t {\n  | line | when ||\n  | l | x < y ||\n  | m | x > y + 1 ||\n}\n"
+    )
+    assert isinstance(program, Program)
+    [gap] = [one for one in prove_program(program, Options()).tables[0].found if isinstance(one, Gap)]
+    assert gap.witnesses == ({"x": 0, "y": 0},)
+    assert gap.regions[0] is not None
+
+
+def test_the_zeros_of_both_signs_are_one_value_to_the_solver() -> None:
+    program = compile_text(
+        "input r : real -1.0 .. 1.0\ntable t {\n  | line | r * 0.0 ||\n  | l | = 0.0 ||\n}\n"
+    )
+    assert isinstance(program, Program)
+    assert prove_program(program, Options()).tables[0].found == ()
+
+
 def test_what_an_unproved_invariant_kills_says_so() -> None:
     program = compile_text(
         "state n : int 0 .. 9 = 1\ninput v : bool\ninvariant small : n <= 4\n"
