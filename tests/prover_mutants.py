@@ -346,12 +346,20 @@ def _spent() -> float:
 
 
 def _drawn(count: int, seed: int, only: str) -> list[Mutant]:
-    """Mutants drawn from the modules whose names are like `only`."""
+    """Mutants drawn from the modules whose names are like `only`, without those of code that types show never to run."""
     paths = [path for path in MODULES if fnmatch(_module(path), only.partition(":")[0])]
     every = [made for path in paths for made in _changes(path) if fnmatch(made[0], only)]
     drawn = Random(seed).sample(every, min(count, len(every)))
     print(f"{len(every)} mutants, {len(drawn)} drawn by seed {seed}", flush=True)
-    return [_mutant(*change) for change in drawn]
+    mutants = [_mutant(*change) for change in drawn]
+    return [mutant for mutant in mutants if not _unreachable(mutant)]
+
+
+def _unreachable(mutant: Mutant) -> bool:
+    """Whether the lines that it takes away are those that mypy keeps from being reached."""
+    return any("assert_never(" in line for line in mutant.gone) and all(
+        line == "case _:" or "assert_never(" in line for line in mutant.gone
+    )
 
 
 def _module(path: str) -> str:
