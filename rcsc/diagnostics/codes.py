@@ -1223,10 +1223,10 @@ class Code(StrEnum):
     """
     PROCESS_LOST = """RCS728: a process of the running system is lost
 
-    `rcsc run --processes` runs each level in a process of its own. A level that is killed, or that commits nothing for 25 of its
-    periods because it was stopped by a signal, loops or waits, is started again and goes on from its last cycle. Too many of them were,
-    or the process of workstation and plant was, which cannot be taken up again; or one ended by an exception, which stands on the
-    standard error stream. The message names the process. Everything was ended, and nothing is left of it.
+    `rcsc run --processes` runs each level in a process of its own. A level that is killed, or that has begun and commits nothing for 25
+    of its periods because it was stopped by a signal, loops or waits, is started again and goes on from its last cycle. Too many of
+    them were, or the process of workstation and plant was, which cannot be taken up again; or one ended by an exception,
+    which stands on the standard error stream. The message names the process. Everything was ended, and nothing is left of it.
     """
     SHELL_NAME = """RCS731: the shell knows no such name
 

@@ -682,25 +682,29 @@ def test_what_is_killed_outside_ends_the_run_by_its_name(repo: Path, tmp_path: P
 
 
 SEEN = [
-    # of a level: stamp changes, state, seconds by the clock and of the processor since the last commit; what is said
-    (True, "T", 100.0, 0.0, ""),
-    (False, "T", 0.1, 0.0, ""),
-    (False, "T", 1.1, 0.0, "stopped by a signal"),
-    (False, "t", 1.1, 0.0, "stopped by a signal"),
-    (False, "R", 1000.0, 0.1, ""),  # it gets no processor
-    (False, "S", 9.0, 0.1, ""),
-    (False, "S", 11.0, 0.1, "waiting for something that does not come"),
-    (False, "D", 11.0, 0.1, "waiting for something that does not come"),
-    (False, "R", 6.0, 5.1, "5 s of computing without an end of its cycle"),
-    (True, "R", 6.0, 5.1, ""),
+    # of a level: its commits since it was started, of which the second is new; its state;
+    # seconds by the clock and of the processor since it was last looked at; what is said
+    (2, "T", 100.0, 0.0, ""),
+    (1, "T", 0.1, 0.0, ""),
+    (1, "T", 1.1, 0.0, "stopped by a signal"),
+    (1, "t", 1.1, 0.0, "stopped by a signal"),
+    (1, "R", 1000.0, 0.1, ""),  # it gets no processor
+    (1, "S", 9.0, 0.1, ""),
+    (1, "S", 11.0, 0.1, "waiting for something that does not come"),
+    (1, "D", 11.0, 0.1, "waiting for something that does not come"),
+    (1, "R", 6.0, 5.1, "5 s of computing without an end of its cycle"),
+    (2, "R", 6.0, 5.1, ""),
+    (0, "S", 1000.0, 0.1, ""),  # it waits for the compiler of its executor
+    (0, "R", 1000.0, 100.0, ""),
+    (0, "T", 1.1, 0.0, "stopped by a signal"),
 ]
 
 
-@pytest.mark.parametrize(("changes", "state", "clock_s", "cpu_s", "said"), SEEN)
+@pytest.mark.parametrize(("commits", "state", "clock_s", "cpu_s", "said"), SEEN)
 def test_still_is_told_from_late(
     repo: Path,
     monkeypatch: pytest.MonkeyPatch,
-    changes: bool,
+    commits: int,
     state: str,
     clock_s: float,
     cpu_s: float,
@@ -715,8 +719,11 @@ def test_still_is_told_from_late(
         system.buffers.commit("task", started(repo, 1))
         system._running["task"] = cast(Any, SimpleNamespace(pid=1, is_alive=lambda: True))
         assert system.still() == {}
-        if changes:
+        if commits:
             system.buffers.commit("task", started(repo, 2))
+            assert system.still() == {}
+        if commits > 1:
+            system.buffers.commit("task", started(repo, 3))
         now[:] = clock_s, cpu_s
         assert system.still() == ({"task": said} if said else {})
     finally:

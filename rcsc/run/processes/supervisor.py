@@ -45,11 +45,13 @@ class _Pulse:
         stamp: Of its last commit; 0 for what has no region of its own.
         since_s: By the clock.
         cpu_s: Of the processor, that it had used by then.
+        begun: Whether it has been seen to commit since it was started.
     """
 
     stamp: int
     since_s: float
     cpu_s: float
+    begun: bool
 
 
 class Supervisor:
@@ -180,12 +182,14 @@ class Supervisor:
         now_s, pulse = time.monotonic(), self._pulses.get(name)
         idle = region is None and state not in STOPPED  # nothing is known of what it does
         if pulse is None or pulse.stamp != stamp or idle:
-            self._pulses[name] = _Pulse(stamp, now_s, cpu_s)
+            self._pulses[name] = _Pulse(stamp, now_s, cpu_s, begun=pulse is not None and not idle)
             return ""
         if now_s - pulse.since_s < self._still_s[name]:
             return ""
         if state in STOPPED:
             return "stopped by a signal"
+        if not pulse.begun:  # it loads, or waits for its executor's compiler, however slow that is
+            return ""
         if cpu_s - pulse.cpu_s > LOOP_CPU_S:
             return f"{LOOP_CPU_S:g} s of computing without an end of its cycle"
         waits = state in WAITING and now_s - pulse.since_s > max(WAIT_S, self._still_s[name])
