@@ -5,7 +5,7 @@ import copy
 import json
 import random
 from dataclasses import fields, is_dataclass, replace
-from itertools import product
+from itertools import combinations_with_replacement, product
 from math import isnan
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,7 @@ from rcsc.certify.execution import Run, Start
 from rcsc.certify.known import Known
 from rcsc.certify.settle import script, values_in
 from rcsc.certify.table import TableChecker
-from rcsc.certify.values import Term, parts_first
+from rcsc.certify.values import INT, Term, parts_first, spanned
 from rcsc.lang.interpret import call, evaluate, holds, matching_lines
 from rcsc.lang.meaning import digest
 from rcsc.lang.model import AssumptionName, Program, Read, Table, Value, key_bounds, key_of, value_of_key
@@ -990,3 +990,29 @@ def test_each_region_that_is_left_is_asked_of_all_its_inputs(
                 assert good[number] == (matching == 1 or (matching == 0 and not checker.cover)), point
             elif "r" not in form or len(form) == 1:
                 assert not known[number], point  # what is left is no more than the region
+
+
+@pytest.mark.parametrize("op", ["+", "-", "*", "/", "mod"])
+def test_the_span_of_an_operation_holds_every_value_of_it(op: str) -> None:
+    """All spans of small integers, points among them; a quotient by 0 is asked for elsewhere."""
+    part = Term("variable", (), INT, -4, 4, "n")
+    term = Term(op, (part, part), INT)
+    spans = list(combinations_with_replacement(range(-4, 5), 2))
+    meant = {"+": int.__add__, "-": int.__sub__, "*": int.__mul__, "/": _quotient, "mod": _remainder}[op]
+    for one, two in product(spans, spans):
+        span = spanned(term, [one, two])
+        assert span is not None
+        values = [
+            meant(x, y)
+            for x, y in product(range(one[0], one[1] + 1), range(two[0], two[1] + 1))
+            if y or op not in ("/", "mod")
+        ]
+        assert all(span[0] <= value <= span[1] for value in values), (one, two, span)
+
+
+def _quotient(a: int, b: int) -> int:
+    return int(a / b)
+
+
+def _remainder(a: int, b: int) -> int:
+    return a - b * _quotient(a, b)
