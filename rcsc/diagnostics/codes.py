@@ -1092,10 +1092,6 @@ class Code(StrEnum):
     What is compiled together can be linked together and stands in one folder. So two programs may not give one name in C to two things
     (table `b_c` of `a.rcs` and table `c` of `a_b.rcs` both make `a_b_c_step`), nor be compiled to one file (`a-b.rcs` and `a_b.rcs`),
     and functions of yours that have one name in C take the same types. Rename one of them.
-
-    The same holds for what stands in the folder already, from an earlier run: a file names the source that it was compiled from, and
-    another source does not overwrite it. Choose another folder with `--out`, rename the program, or, where the source was moved or
-    deleted, delete what it left.
     """
     EXTERN_NAME = """RCS504: an extern procedure's name does not fit
 

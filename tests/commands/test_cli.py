@@ -498,48 +498,6 @@ def test_what_could_not_be_linked_together_is_refused(what: str, rcsc: Rcsc) -> 
     assert name in ran.out
 
 
-@pytest.mark.parametrize(
-    "what", ["members", "a guard", "files", "an extern and a step", "externs of other types"]
-)
-def test_what_could_not_be_linked_with_an_earlier_run_is_refused(what: str, rcsc: Rcsc) -> None:
-    first, one, second, two, name = TOGETHER[what]
-    write(f"{first}.rcs", one)
-    write(f"{second}.rcs", two)
-    assert rcsc("compile", f"{first}.rcs").status == 0
-    before = {path: path.read_bytes() for path in Path("generated").rglob("*.*")}
-    ran = rcsc("compile", f"{second}.rcs")
-    assert ran.status == 1
-    assert "error[RCS503]: " in ran.out
-    assert name in ran.out
-    assert f"`{first}.rcs`" in ran.out
-    assert "--out" in ran.out
-    assert {path: path.read_bytes() for path in Path("generated").rglob("*.*")} == before
-
-
-def test_another_source_overwrites_nothing(rcsc: Rcsc) -> None:
-    write("rcsc.toml", "")
-    write("grip.rcs")
-    assert rcsc("compile").status == 0
-    write("sub/grip.rcs")
-    ran = rcsc("compile", "sub/grip.rcs", "--target", "python")
-    assert ran.status == 1
-    assert (
-        "`generated/python/grip.py` was compiled from `grip.rcs`, and `sub/grip.rcs` would overwrite it"
-        in ran.out
-    )
-    assert "error[RCS501]" in rcsc("compile", "sub/grip.rcs", "--check").out
-    Path("generated/python/grip.py").unlink()
-    assert rcsc("compile", "sub/grip.rcs", "--target", "python").status == 0
-
-
-def test_what_is_compiled_in_two_runs_can_be_linked_together(rcsc: Rcsc) -> None:
-    same = F.format("writes n")
-    write("a.rcs", told("b", "enum k { p, q }\n" + same, "f"))
-    write("b_c.rcs", told("a", "enum k { p, q }\n" + same, "f"))
-    for again in ("a.rcs", "b_c.rcs", "a.rcs"):
-        assert rcsc("compile", again).status == 0
-
-
 def test_what_is_compiled_together_can_be_linked_together(rcsc: Rcsc) -> None:
     same = F.format("writes n")
     more = "enum k { p, q }\nrecord r { f : bool }\n"
