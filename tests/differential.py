@@ -15,6 +15,7 @@ import json
 import math
 import random
 import shutil
+import signal
 import struct
 import subprocess
 import sys
@@ -23,6 +24,8 @@ from array import array
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from multiprocessing import get_context
+from multiprocessing.connection import Connection
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -36,6 +39,8 @@ from rcsc.lang.resolve import compile_text
 I64, U64 = 2**63 - 1, 2**64 - 1
 BATCH = 50
 CYCLES = 10
+LONGEST_CPU_S = 20.0
+"""Of the cycles of one program, which take some hundredths."""
 FLAGS = ("-std=c99", "-w", "-fPIC", "-shared")
 ROUND = 50
 BUILDS: Mapping[int, tuple[str, ...]] = {
@@ -1104,11 +1109,55 @@ def differing(
     cc, *flags = build
     with tempfile.TemporaryDirectory(prefix="rcsc-differential-") as place:
         made = library([*batch.values()], Path(place), *flags, cc=cc)
-        for number, one in batch.items():
+        left = [*batch.items()]
+        while left:
+            judged = [*_in_child(left, made, seed)]
+            for (number, _), (bug, counted) in zip(left, judged, strict=False):
+                told.update(counted)
+                if bug:
+                    yield number, bug
+            left = left[len(judged) :]
+
+
+def _in_child(
+    left: Sequence[tuple[int, Built]], made: ctypes.CDLL, seed: int
+) -> Iterator[tuple[str, Counter[str]]]:
+    """What is wrong with each of some programs, empty if nothing, up to the first that does not end.
+
+    A compiler can make a loop without end of what has one. Nothing in this process can end it, so the cycles run in another.
+    """
+    fork = get_context("fork")
+    here, there = fork.Pipe(duplex=False)
+    child = fork.Process(target=_judge, args=(left, made, seed, there))
+    child.start()
+    there.close()
+    answers = 0
+    with here:
+        while True:
             try:
-                compare(one, made, random.Random(f"{seed} {number} inputs"), told)
-            except Exception as bug:  # noqa: BLE001  # an executor may raise anything, which is a difference
-                yield number, f"{type(bug).__name__}: {bug}"
+                yield here.recv()
+            except EOFError:
+                break
+            answers += 1
+    child.join()
+    if answers < len(left):
+        yield (
+            f"ended by signal {-(child.exitcode or 0)}, within {LONGEST_CPU_S} s of processor time",
+            Counter(),
+        )
+
+
+def _judge(left: Sequence[tuple[int, Built]], made: ctypes.CDLL, seed: int, answers: Connection) -> None:
+    """Compares each of some programs, and says so; ended by SIGVTALRM where one takes too long."""
+    for number, one in left:
+        signal.setitimer(signal.ITIMER_VIRTUAL, LONGEST_CPU_S)
+        told: Counter[str] = Counter()
+        bug = ""
+        try:
+            compare(one, made, random.Random(f"{seed} {number} inputs"), told)
+        except Exception as raised:  # noqa: BLE001  # an executor may raise anything, which is a difference
+            bug = f"{type(raised).__name__}: {raised}"
+        answers.send((bug, told))
 
 
 def campaign(count: int, seed: int) -> Counter[str]:
@@ -1128,18 +1177,20 @@ def main() -> int:
     """Runs a long comparison with a line of progress now and then; status 1 where any program differs."""
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument("--count", type=int, default=10_000)
+    arguments.add_argument("--first", type=int, default=0, help="the number of the first program")
     arguments.add_argument("--seed", type=int, default=1)
     given = arguments.parse_args()
     gc.freeze()
     gc.set_threshold(200_000)  # what is drawn has few cycles: a fifth of the time went into looking for them
     told: Counter[str] = Counter()
-    for begin in range(0, given.count, BATCH):
-        end = min(begin + BATCH, given.count)
+    last = given.first + given.count
+    for begin in range(given.first, last, BATCH):
+        end = min(begin + BATCH, last)
         for differs in compared(begin, end, given.seed, told):
             told["different"] += 1
             print(differs, flush=True)
-        if end % (BATCH * 20) == 0 or end == given.count:
-            print(f"{end} of {given.count} drawn, {told['different']} different", flush=True)
+        if (end - given.first) % (BATCH * 20) == 0 or end == last:
+            print(f"{end - given.first} of {given.count} drawn, {told['different']} different", flush=True)
     for name, number in sorted(told.items()):
         print(f"{name:24} {number:9}")
     return int(told["different"] > 0)

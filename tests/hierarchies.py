@@ -11,6 +11,7 @@ proved of either may break.
 """
 
 import argparse
+import gc
 import json
 import sys
 import tempfile
@@ -442,7 +443,7 @@ def _each(seeds: range, jobs: int) -> Iterator[Judged]:
     if jobs == 1:
         yield from map(judged_seed, seeds)
         return
-    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
+    with ProcessPoolExecutor(jobs, get_context("spawn"), gc.set_threshold, (200_000,)) as pool:
         yield from pool.map(judged_seed, seeds, chunksize=10)
 
 

@@ -1,7 +1,11 @@
 """Short runs of the fuzzers; the long ones are `python -m tests.fuzz` and `python -m tests.differential`."""
 
+import os
+import signal
+from collections import Counter
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -23,6 +27,25 @@ def test_cycles_of_drawn_programs_are_the_same_to_all() -> None:
     told = differential.campaign(count=40, seed=20261122)
     assert told["programs"] > 35
     assert all(told[f"fault {number}"] > 5 for number in (0, 1, 2, 3, 5))
+
+
+def test_a_program_whose_c_does_not_end_is_told_and_the_others_are_compared(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    compare, told = differential.compare, Counter[str]()
+
+    def misled(one: differential.Built, *rest: Any) -> None:
+        while one.program.name == "p2":
+            pass
+        if one.program.name == "p4":
+            os.kill(os.getpid(), signal.SIGKILL)
+        compare(one, *rest)
+
+    monkeypatch.setattr(differential, "compare", misled)
+    monkeypatch.setattr(differential, "LONGEST_CPU_S", 0.5)
+    texts = [*differential.compared(0, 7, 3, told)]
+    assert [text.split(",")[0] for text in texts] == ["program 2 of seed 3", "program 4 of seed 3"]
+    assert sum(many for word, many in told.items() if word.startswith("fault ")) == 5 * differential.CYCLES
 
 
 @pytest.mark.parametrize("cc", ["gcc", pytest.param("clang", marks=pytest.mark.needs("clang"))])
