@@ -28,7 +28,7 @@ from random import Random
 from rcsc.compose.contract.claims import FOUND, SAFE, Closed, Need, closed
 from rcsc.compose.contract.obligations import Obligation, Sort
 from rcsc.compose.contract.transition import TransitionSystem
-from rcsc.compose.counterexample.trace import NotReproducedError, Trace, shortest
+from rcsc.compose.counterexample.trace import NotReproducedError, Trace
 from rcsc.compose.invariant.search import Effort
 from rcsc.compose.proof.assume_guarantee import agreements, claims
 from rcsc.compose.proof.level import LevelProof, Verdict, essential, prove_level
@@ -43,6 +43,7 @@ from tests.small_hierarchies.more import SLIPS, furnished
 from tests.small_hierarchies.text import files, written
 from tests.small_hierarchies.together import Pair, broken_together
 from tests.small_hierarchies.world import allowed, broken, wanted
+from tests.support.proved import shortest
 
 LITTLE = Effort(walks=6, cycles=20)
 MOST_CYCLES = 7

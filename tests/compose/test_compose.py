@@ -18,13 +18,13 @@ from rcsc.compose.contract.transition import Cycle, TransitionSystem
 from rcsc.compose.contract.variants import undeferred
 from rcsc.compose.contract.walk import Walk
 from rcsc.compose.counterexample.cycle_run import broken
-from rcsc.compose.counterexample.finding import of_trace, time_line
-from rcsc.compose.counterexample.trace import Trace, shortest
+from rcsc.compose.counterexample.finding import of_trace
+from rcsc.compose.counterexample.trace import Trace
 from rcsc.compose.invariant.cubes import Reached
 from rcsc.compose.invariant.search import Effort
 from rcsc.compose.proof.assume_guarantee import agreements
 from rcsc.compose.proof.level import LevelProof, Verdict, certificate, essential, prove_level
-from rcsc.compose.proof.system import NoProgramError, SystemProof, prove_system, transition_systems
+from rcsc.compose.proof.system import NoProgramError, SystemProof, transition_systems
 from rcsc.lang.interpret import Fault, cycle, initial
 from rcsc.lang.model import Kind, Real
 from rcsc.run.adopt import adopt
@@ -32,6 +32,7 @@ from rcsc.run.description import BadDescription, description
 from rcsc.run.system import signatures
 from rcsc.solvers.smtlib import cvc5_refutes
 from rcsc.symbolic import values
+from tests.support.proved import prove_system, shortest, time_line
 
 REPO = Path(__file__).parents[2]
 SMALL = REPO / "tests" / "data" / "composed"

@@ -14,16 +14,16 @@ from rcsc.compose.contract.environment import links
 from rcsc.compose.contract.obligations import Sort, unstated
 from rcsc.compose.contract.properties import invariant_kept, property_kept
 from rcsc.compose.contract.transition import TransitionSystem
-from rcsc.compose.counterexample.cycle_run import one_cycle, ran, ran_on
+from rcsc.compose.counterexample.cycle_run import one_cycle, ran_on
 from rcsc.compose.counterexample.explain import TraceSettings, explain
 from rcsc.compose.counterexample.finding import of_trace
 from rcsc.compose.counterexample.frozen import BadCaseError, case_breaks, read_case
 from rcsc.compose.counterexample.lasso import Lasso, lassos
-from rcsc.compose.counterexample.trace import TraceSearch, shortest
+from rcsc.compose.counterexample.trace import TraceSearch
 from rcsc.compose.proof.assume_guarantee import agreements, of_level
 from rcsc.compose.proof.context import of_lines
 from rcsc.compose.proof.level import LevelProof, Verdict, prove_level
-from rcsc.compose.proof.system import NoProgramError, loaded_program, prove_system, transition_systems
+from rcsc.compose.proof.system import NoProgramError, loaded_program, transition_systems
 from rcsc.compose.proof.termination import Ending
 from rcsc.lang.interpret import Fault, initial
 from rcsc.lang.model import Value, VariableName
@@ -35,6 +35,7 @@ from tests.compose.test_compose import LITTLE, SMALL, Edit, changed, swap
 from tests.compose.test_endings import WAY, go
 from tests.small_hierarchies.explored import adopted
 from tests.small_hierarchies.level import Reading, Role
+from tests.support.proved import prove_system, ran, shortest
 
 
 def proved(folder: Path, edit: Edit) -> tuple[TransitionSystem, LevelProof]:

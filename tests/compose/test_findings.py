@@ -21,19 +21,12 @@ from rcsc.compose.contract.obligations import Obligation, ObligationKey, Sort, m
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.contract.variants import VARIANTS, defaults_reported, first_match, undeferred
 from rcsc.compose.counterexample.cycle_run import broken, seen_by_table
-from rcsc.compose.counterexample.finding import Finding, of_trace, rows, time_line
+from rcsc.compose.counterexample.finding import Finding, of_trace, rows
 from rcsc.compose.counterexample.frozen import BadCaseError, case_breaks, frozen, read_case
 from rcsc.compose.counterexample.pair import broken_together
 from rcsc.compose.counterexample.repair import helps, weakest_condition
 from rcsc.compose.counterexample.replay import ExecutorsDifferError, make, record
-from rcsc.compose.counterexample.trace import (
-    NotReproducedError,
-    Trace,
-    TraceResult,
-    TraceSearch,
-    shortest,
-    traces,
-)
+from rcsc.compose.counterexample.trace import NotReproducedError, Trace, TraceResult, TraceSearch, traces
 from rcsc.compose.proof.system import transition_systems
 from rcsc.host.files.write import UNPROVED
 from rcsc.lang.interpret import Fault, holds, matching_lines
@@ -46,6 +39,7 @@ from rcsc.run.unproved import UnprovedExecutors, marked
 from rcsc.solvers.options import Options
 from rcsc.table.decide import prove_table
 from tests.support.emitted import shipped
+from tests.support.proved import shortest, time_line
 
 REPO = Path(__file__).parents[2]
 EXAMPLES = REPO / "tables" / "examples"

@@ -13,7 +13,7 @@ from rcsc.compose.contract.claims import Claim, Closed, Need, closed
 from rcsc.compose.contract.obligations import Obligation, Sort
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.contract.walk import Walk
-from rcsc.compose.counterexample.trace import NotReproducedError, Trace, shortest
+from rcsc.compose.counterexample.trace import NotReproducedError, Trace
 from rcsc.compose.proof.system import transition_systems
 from rcsc.symbolic import values
 from rcsc.symbolic.execution import Run
@@ -28,6 +28,7 @@ from tests.small_hierarchies.more import EVERY, furnished
 from tests.small_hierarchies.text import files, written
 from tests.small_hierarchies.together import Pair, broken_together
 from tests.small_hierarchies.world import canonical, offers, wanted
+from tests.support.proved import shortest
 
 LITTLE = 12
 """Lines of the tables of a hierarchy that is quickly judged."""

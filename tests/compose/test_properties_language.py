@@ -18,9 +18,9 @@ from rcsc.compose.contract.predicates import CLOSELY, Predicate
 from rcsc.compose.contract.properties import every_predicate, property_kept
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.contract.walk import Walk
-from rcsc.compose.counterexample.cycle_run import broken, ran
-from rcsc.compose.counterexample.finding import of_trace, time_line
-from rcsc.compose.counterexample.trace import Trace, TraceSearch, shortest, traces
+from rcsc.compose.counterexample.cycle_run import broken
+from rcsc.compose.counterexample.finding import of_trace
+from rcsc.compose.counterexample.trace import Trace, TraceSearch, traces
 from rcsc.compose.invariant.search import Effort, read
 from rcsc.compose.proof.kept import keep, recall
 from rcsc.compose.proof.level import LevelProof, Verdict, certificate, prove_level
@@ -32,11 +32,14 @@ from rcsc.host.cache import open_cache
 from rcsc.lang.interpret import Fault, cycle, initial
 from rcsc.lang.model import Enum, Kind, Program, Value, key_bounds, value_of_key
 from rcsc.lang.resolve import compile_text
-from rcsc.lang.syntax.format import format_text
+from rcsc.lang.syntax import tree
+from rcsc.lang.syntax.format import format_file
+from rcsc.lang.syntax.parse import parse
 from rcsc.solvers.options import Options
 from rcsc.solvers.smtlib import cvc5_refutes
 from rcsc.table.program import prove_program
 from tests.support.emitted import emitted
+from tests.support.proved import ran, shortest, time_line
 
 REPO = Path(__file__).parents[2]
 SMALL = REPO / "tests" / "data" / "composed"
@@ -100,8 +103,10 @@ def test_properties_are_laid_out_and_their_words_are_still_names() -> None:
     ragged = re.sub(r"(?<=\w) (?=[:=])", "   ", WORDS).replace(" then property", "\n   then\n property")
     assert ragged != WORDS
     laid_out = WORDS.replace("\n# why", "\n\n# why")
-    assert format_text(Source("case.rcs", ragged)) == laid_out
-    assert format_text(Source("case.rcs", laid_out)) == laid_out
+    for text in (ragged, laid_out):
+        parsed = parse(Source("case.rcs", text))
+        assert isinstance(parsed, tree.File)
+        assert format_file(parsed) == laid_out
     assert [one.text for one in program_of(WORDS).properties] == [
         "was x = a implies property = was property + 1 and was (property = 2 or until)",
         "property = 3 then property = -was property - was (-property)",

@@ -66,13 +66,6 @@ Given: TypeAlias = tuple[Mapping[str, Value], tuple[ExternAnswer, ...]]
 """What the environment gives in a cycle: the inputs, and the results of extern procedures."""
 
 
-def ran(
-    ts: TransitionSystem, start: Mapping[str, Value], inputs: Sequence[Mapping[str, Value]]
-) -> tuple[CycleRun, ...]:
-    """Run cycles from `start` on these inputs, up to the first fault that ends a run."""
-    return ran_on(ts, start, [(taken, ()) for taken in inputs])
-
-
 def ran_on(ts: TransitionSystem, start: Mapping[str, Value], given: Sequence[Given]) -> tuple[CycleRun, ...]:
     """Run cycles from `start` on inputs and results of extern procedures, up to the first fault that ends a run."""
     now = dict(start)

@@ -137,16 +137,3 @@ def _answers(ts: TransitionSystem, step: CycleRun) -> Iterator[tuple[str, str]]:
                 f"{leaf} from {procedure}",
                 spell(ts.kinds[leaf], value) if inside else f"{value}, refused",
             )
-
-
-def time_line(made: Mapping[str, TransitionSystem], finding: Finding) -> list[str]:
-    """Spell the time line: for each cycle the line that matched, what was taken, and what changed."""
-    lines = []
-    for row in rows(made, finding):
-        who = f"level `{row.level}`, " if len(finding.levels) > 1 else ""
-        wrong = f"; {row.wrong}" if row.wrong else ""
-        lines.append(f"cycle {row.tick}: {who}table `{row.table}`, line `{row.line}`{wrong}")
-        for word, changed in (("takes", row.takes), ("leaves", row.leaves)):
-            if changed:
-                lines.append(f"  {word} {', '.join(f'{name} = {said}' for name, said in changed.items())}")
-    return lines

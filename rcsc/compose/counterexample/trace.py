@@ -82,20 +82,6 @@ class TraceSearch:
 TraceResult: TypeAlias = Trace | NotReproducedError
 
 
-def shortest(
-    ts: TransitionSystem, obligation: Obligation, most: int = 10, *, legal: bool = False
-) -> Trace | None:
-    """Find the shortest trace of at most `most` cycles; None where there is none or the solver gave up.
-
-    Raises:
-        NotReproducedError: The interpreter does not break the obligation there.
-    """
-    found = traces(ts, (obligation,), TraceSearch(most, legal=legal)).get(obligation.key)
-    if isinstance(found, NotReproducedError):
-        raise found
-    return found
-
-
 def traces(
     ts: TransitionSystem, wanted: Sequence[Obligation], search: TraceSearch
 ) -> dict[ObligationKey, TraceResult]:
@@ -271,18 +257,6 @@ def in_order(ts: TransitionSystem, before: Leaves, taken: Leaves) -> Node:
 
 
 # --- the run -------------------------------------------------------------------------------
-
-
-def replayed(ts: TransitionSystem, obligation: Obligation, inputs: Sequence[Given]) -> Trace:
-    """Run the inputs from the initial values.
-
-    Raises:
-        NotReproducedError: It does not break the obligation in its last cycle.
-    """
-    trace = _ran(ts, obligation, inputs, initial(ts.program), TraceSearch())
-    if not _breaks(ts, obligation, trace, len(inputs)):
-        raise NotReproducedError(obligation.shown)
-    return trace
 
 
 def _ran(

@@ -142,15 +142,6 @@ def _narrowed(mine: Links, every: Mapping[str, Links], programs: Mapping[str, Pr
     return replace(mine, above=replace(above, numbered=kept))
 
 
-def program_of(path: Path, name: str) -> Program:
-    """Return the program of a level, which stands beside the description.
-
-    Raises:
-        NoProgramError: It is not there, does not resolve, or something in it may leave its range or not be defined.
-    """
-    return checked(path, name)[0]
-
-
 def checked(path: Path, name: str) -> tuple[Program, Safety]:
     """Return the program of a level, and why a cycle as nodes is what its executors do.
 
@@ -210,17 +201,6 @@ def loaded_program(path: Path, name: str) -> tuple[Program, Loaded]:
                 return program, loaded
             raise NoProgramError(f"`{file}` is not in order: see `rcsc check {file}`")
     raise NoProgramError(f"there is no program `{name}` beside {path}")
-
-
-def prove_system(path: Path, effort: Effort | None = None, jobs: int = 1) -> SystemProof:
-    """Prove every level of the system that the file describes.
-
-    Raises:
-        BadDescription: The description says something that cannot be.
-        NoProgramError: The tables of a level cannot be read.
-    """
-    made = transition_systems(path)
-    return prove_transition_systems(made, effort, jobs, tuple(made))
 
 
 def prove_transition_systems(

@@ -5,8 +5,6 @@ Comments stand above what they belong to, doc lines directly above the declarati
 
 from collections.abc import Collection, Iterator
 
-from rcsc.diagnostics.diagnostic import Diagnostic
-from rcsc.diagnostics.source import Source
 from rcsc.lang.operator_table import SUM
 from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.rows import ACTION_WORDS
@@ -14,14 +12,6 @@ from rcsc.lang.syntax.spell import spell_condition, spell_expr, spell_type
 
 _LONE = (tree.Use, tree.UnitDecl, tree.ConstDecl, tree.TypeDecl, tree.VariableDecl, tree.AssumeDecl, tree.InvariantDecl,
          tree.PropertyDecl, tree.EnumDecl, tree.OwnerDecl)  # fmt: skip
-
-
-def format_text(source: Source) -> str | tuple[Diagnostic, ...]:
-    """The text in the one layout, or what is wrong with it."""
-    from rcsc.lang.syntax.parse import parse
-
-    parsed = parse(source)
-    return format_file(parsed) if isinstance(parsed, tree.File) else parsed
 
 
 def format_file(file: tree.File) -> str:
