@@ -904,7 +904,7 @@ def built(drawn: Drawn, name: str) -> Built | tuple[str, ...]:
     program = modelled(drawn, name)
     if not isinstance(program, Program):
         return program
-    plan = lower(ProvedProgram(program, (), seal_of_proof()))
+    plan = lower(ProvedProgram(program, seal_of_proof()))
     files = emit_c(plan) | emit_python(plan)
     [symbols] = [json.loads(text) for path, text in files.items() if path.endswith(".json")]
     return Built(drawn, program, symbols, files)

@@ -183,12 +183,8 @@ def knows(program: Program, table: Table, leaf: str, value: Value, options: Opti
         shared.start[name] = shared.one(values.variable(name, kind))
     meaning = Meaning(program, kinds, shared)
     known = assumed(program, table, meaning)
-    lines = [
-        values.all_of(meaning.condition(test.condition) for test in line.tests if test is not None)
-        for line in table.lines
-    ]
     here = values.equal(shared.start[leaf], values.constant(kinds[leaf], value))
-    whole = shared.one(values.all_of([known, here, values.any_of(lines)]))
+    whole = shared.one(values.all_of([known, here, values.any_of(meaning.lines(table))]))
     if whole.known:
         return bool(whole.low)
     return Space(values.variables([whole]).values(), (), options).possible(whole)

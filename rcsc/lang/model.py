@@ -714,7 +714,6 @@ class ProvedProgram:
     """
 
     program: Program
-    backings: tuple[tuple[TableName, Backing], ...]
     seal: object = field(repr=False, compare=False, default=None)
 
     def __post_init__(self) -> None:

@@ -17,7 +17,15 @@ from rcsc.solvers import smt
 from rcsc.solvers.options import Options
 from rcsc.solvers.smt import Answer, Solver
 from rcsc.symbolic import values
-from rcsc.symbolic.effect import Effect, Meaning, Shared, goes_wrong_otherwise, same_calls, value_after
+from rcsc.symbolic.effect import (
+    Effect,
+    Meaning,
+    Shared,
+    goes_wrong_otherwise,
+    same_calls,
+    several,
+    value_after,
+)
 from rcsc.symbolic.encode import Frame, least_witness
 from rcsc.symbolic.evaluation import TooLongError
 from rcsc.symbolic.execution import Run
@@ -117,15 +125,9 @@ class _Question:
     def _outcomes(self, program: Program, table: Table) -> Iterator[_Outcome]:
         """What the table can come to; the conditions exclude each other and leave nothing out."""
         meaning = Meaning(program, self.kinds, self.shared)
-        lines = [
-            values.all_of(meaning.condition(t.condition) for t in line.tests if t) for line in table.lines
-        ]
-        undefined = values.any_of(meaning.bad)
+        lines = meaning.lines(table)
+        undefined, twice = values.any_of(meaning.bad), several(lines)
         defined, none = values.negation(undefined), values.negation(values.any_of(lines))
-        before, twice = values.FALSE, values.FALSE
-        for when in lines:
-            twice = values.either(twice, values.both(before, when))
-            before = values.either(before, when)
         for line, when in zip(table.lines, lines, strict=True):
             alone = values.all_of((when, values.negation(twice), defined))
             yield _Outcome(line.name, alone, _done(meaning, line.actions))

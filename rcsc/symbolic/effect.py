@@ -11,7 +11,7 @@ from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 
 from rcsc.diagnostics.source import Span
-from rcsc.lang.model import Expr, Procedure, Program, Scalar, Statement
+from rcsc.lang.model import Expr, Procedure, Program, Scalar, Statement, Table
 from rcsc.symbolic import values
 from rcsc.symbolic.evaluation import Obligation
 from rcsc.symbolic.execution import Run
@@ -150,6 +150,14 @@ class Meaning:
         found = run.evaluate(expr)
         self.bad += [self.shared.one(values.negation(_paid(obligation))) for obligation in run.obligations]
         return self.shared.one(found)
+
+    def lines(self, table: Table) -> list[Node]:
+        """Return where each line matches, looking at no other; each test is asked once."""
+        tests = {id(test): test for line in table.lines for test in line.tests if test is not None}
+        known = {at: self.condition(test.condition) for at, test in tests.items()}
+        return [
+            values.all_of(known[id(test)] for test in line.tests if test is not None) for line in table.lines
+        ]
 
     def effect(self, body: Iterable[Statement], given: Iterable[Node] = ()) -> Effect:
         """What the statements do where all of `given` holds.

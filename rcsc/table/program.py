@@ -84,8 +84,7 @@ def prove_program(
     if wrong or only is not None:
         unsafe = frozenset(owed.unsafe)
         return ProgramVerdict(findings, None, verdicts, None, owed.tally, program, unproved, unsafe)
-    backings = tuple((verdict.table.name, verdict.backing) for verdict in verdicts)
-    proved = ProvedProgram(program, backings, seal_of_proof())
+    proved = ProvedProgram(program, seal_of_proof())
     certificate = _certificate(program, verdicts)
     return ProgramVerdict(findings, proved, verdicts, certificate, owed.tally, program)
 

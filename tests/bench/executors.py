@@ -229,9 +229,7 @@ def measured(label: str, program: Program) -> str:
         assert verdict.proved is not None
         plan = lower(verdict.proved)
     else:
-        plan = lower(
-            ProvedProgram(program, (), seal_of_proof())
-        )  # right by construction; `proofs` proves them
+        plan = lower(ProvedProgram(program, seal_of_proof()))  # right by construction; `proofs` proves them
     files = {**emit_c(plan), **emit_python(plan)}
     samples = inputs(program, random.Random(7))
     names = names_of(program)

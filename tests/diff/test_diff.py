@@ -15,7 +15,7 @@ import pytest
 
 from rcsc.commands import run
 from rcsc.diagnostics.render import plain
-from rcsc.diff.changes.difference import Basis, Change, Difference, Part, ProgramDifference, Sort, holds_in
+from rcsc.diff.changes.difference import Basis, Change, Difference, Part, ProgramDifference, Sort
 from rcsc.diff.compare import compare
 from rcsc.diff.present import knows, within_reach
 from rcsc.diff.text import rows
@@ -355,7 +355,10 @@ def disagreements(before: Program, after: Program, seen: Counter[str]) -> list[s
         says = set()
         for change in (*claimed.changes, *claimed.moved):
             if (bare(change.before), bare(change.after)) == (one[0], two[0]):
-                inside = any(holds_in(box, keys) for box in change.where.boxes)
+                inside = any(
+                    all(any(low <= keys[name] <= high for low, high in part) for name, part in box.items())
+                    for box in change.where.boxes
+                )
                 exact = change.where.exact and not change.where.also
                 seen["exact" if exact else "besides"] += inside
                 if inside if exact else (inside and change.sort is sort):

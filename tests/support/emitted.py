@@ -213,5 +213,5 @@ def shipped(path: str, repo: Path) -> Program:
 
 def emitted(program: Program) -> dict[str, str]:
     """Its generated files; these tests are about emission, so that the proof is taken as given."""
-    plan = lower(ProvedProgram(program, (), seal_of_proof()))
+    plan = lower(ProvedProgram(program, seal_of_proof()))
     return emit_c(plan) | emit_python(plan)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 
 from rcsc.diff.changes.align import Declaration
-from rcsc.lang.model import Box, Scalar
+from rcsc.lang.model import Scalar
 from rcsc.lang.model import Value as Scalars
 from rcsc.table.verdict import Region
 
@@ -219,12 +219,3 @@ class Difference:
         for program in self.programs:
             for part in program.parts:
                 yield program, part
-
-
-def holds_in(box: Region, keys: dict[str, int]) -> bool:
-    """Whether an input, by key, lies in a box."""
-    return all(_has(part, keys[name]) for name, part in box.items())
-
-
-def _has(part: Box, key: int) -> bool:
-    return any(low <= key <= high for low, high in part)

@@ -239,11 +239,7 @@ def assumed(program: Program, table: Table, meaning: Meaning) -> Node:
 
 def _outcomes(table: Table, meaning: Meaning) -> Iterable[Outcome]:
     """Everything that can become of an input: exactly one of them does."""
-    tests = {id(test): test for line in table.lines for test in line.tests if test is not None}
-    known = {at: meaning.condition(test.condition) for at, test in tests.items()}
-    lines = [
-        values.all_of(known[id(test)] for test in line.tests if test is not None) for line in table.lines
-    ]
+    lines = meaning.lines(table)
     fine = values.all_of(values.negation(bad) for bad in meaning.bad)
     many, one = several(lines), meaning.shared.one
     alone = values.both(fine, values.negation(many))

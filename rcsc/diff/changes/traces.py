@@ -99,8 +99,7 @@ def _steps(versions: Versions, side: int, table: Table, state: str) -> Iterator[
     program = (versions.before, versions.after)[side]
     meaning = versions.meanings()[side]
     known = assumed(program, table, meaning)
-    tests = [[meaning.condition(t.condition) for t in line.tests if t is not None] for line in table.lines]
-    holds = [values.all_of(nodes) for nodes in tests]
+    holds = meaning.lines(table)
     default = values.negation(values.any_of(holds))
     lines: list[tuple[Line | Default, Node]] = [*zip(table.lines, holds, strict=True)]
     lines += [] if table.default is None else [(table.default, default)]

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, BinaryIO
 
-from rcsc.host.files.names import BadName, file_name, identifier, line_name, member, shown
+from rcsc.host.files.names import BadName, identifier, line_name, member, shown
 
 if TYPE_CHECKING:
     from xml.etree.ElementTree import Element
@@ -307,14 +307,6 @@ class Said:
             Malformed: It is none, or missing.
         """
         return self._checked(key, identifier, default)
-
-    def file_name(self, key: str) -> str:
-        """Return what a file may be called.
-
-        Raises:
-            Malformed: None may, or it is missing.
-        """
-        return self._checked(key, file_name, _REQUIRED)
 
     def member(self, key: str) -> str:
         """Return a place in a struct.
