@@ -24,7 +24,7 @@ def shown(program: Program, table: Table) -> list[Variable]:
     return [variable for variable in program.variables if variable.name in wanted]
 
 
-class Asked:
+class TableSolver:
     """One solver that knows the table's domain and assumptions, and each line as a literal."""
 
     def __init__(self, program: Program, table: Table, options: Options) -> None:
@@ -96,7 +96,7 @@ def confirm(program: Program, table: Table, found: tuple[Found, ...], options: O
         return Agreement.NOT_ASKED
     if options.solver == "auto":
         options = replace(options, steps=min(options.steps, _STEPS))
-    asked = Asked(program, table, options)
+    asked = TableSolver(program, table, options)
     overlap = _some_overlap(asked)
     gaps = [one for one in found if isinstance(one, Gap)]
     gap = _some_gap(asked, gaps) if must_cover(table) or gaps else None
@@ -110,7 +110,7 @@ def confirm(program: Program, table: Table, found: tuple[Found, ...], options: O
     return Agreement.AGREES if agrees else Agreement.DISAGREES
 
 
-def _some_gap(asked: Asked, gaps: Sequence[Gap]) -> Answer:
+def _some_gap(asked: TableSolver, gaps: Sequence[Gap]) -> Answer:
     """Whether no line matches some input: first at one that was found, which costs little."""
     for witness in (gap.witnesses[0] for gap in gaps if gap.witnesses):
         here = [
@@ -123,7 +123,7 @@ def _some_gap(asked: Asked, gaps: Sequence[Gap]) -> Answer:
     return asked.holds(asked.none())
 
 
-def _some_overlap(asked: Asked) -> Answer:
+def _some_overlap(asked: TableSolver) -> Answer:
     """Whether two lines can match at once: each line against all before it."""
     terms = []
     seen = smt.truth(False)

@@ -30,7 +30,7 @@ from rcsc.solvers.smt import Answer, Term
 from rcsc.symbolic import trial
 from rcsc.symbolic.encode import encode
 from rcsc.table.certificate import must_cover, tree_certificate
-from rcsc.table.confirm import Asked, shown
+from rcsc.table.confirm import TableSolver, shown
 from rcsc.table.regions.atoms import Formula, Universe, assumptions_of, lines_of, some
 from rcsc.table.regions.least import find, inside, least, negated, whole, widest
 from rcsc.table.regions.region import Answer as Unsettled
@@ -99,7 +99,7 @@ class _Decision:
         self.assumptions = assumptions_of(self.universe, program, table)
         self.lines = [whole(line) for line in self.clauses]
         self.assumed = [whole(assumption) for assumption in self.assumptions]
-        self._asked: Asked | None = None
+        self._asked: TableSolver | None = None
         self._tried: tuple[Snapshot, ...] | None = None
 
     @property
@@ -128,10 +128,10 @@ class _Decision:
         return True
 
     @property
-    def asked(self) -> Asked:
+    def asked(self) -> TableSolver:
         """Z3, made when first asked."""
         if self._asked is None:
-            self._asked = Asked(self.program, self.table, self.options)
+            self._asked = TableSolver(self.program, self.table, self.options)
         return self._asked
 
     def decided(self) -> Decided:
@@ -316,13 +316,13 @@ class _Decision:
         return found
 
     def witness(
-        self, seen: Sequence[Snapshot], terms: Callable[[Asked], tuple[Term, ...]]
+        self, seen: Sequence[Snapshot], terms: Callable[[TableSolver], tuple[Term, ...]]
     ) -> Snapshot | None:
         """The least input for which the terms hold; where Z3 gives up, the least of those that are known."""
         z3 = self.asked
         if seen:
             few = replace(self.options, steps=min(self.options.steps, _STEPS_OF_LEAST))
-            z3 = Asked(self.program, self.table, few)
+            z3 = TableSolver(self.program, self.table, few)
         found = z3.witness(*terms(z3))
         if found is None and seen:
             best = min(seen, key=lambda one: [key_of(v.type, one[v.name]) for v in self.variables])

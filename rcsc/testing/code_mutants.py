@@ -21,7 +21,7 @@ from random import Random
 from rcsc.host.children import scratch
 from rcsc.host.tools import Absent, c_compiler, run_command, write_c
 from rcsc.lang.model import Program, Snapshot
-from rcsc.testing.esbmc import Said, prove_function, too_large
+from rcsc.testing.esbmc import EsbmcAnswer, prove_function, too_large
 from rcsc.testing.executors.externs import STAND_INS
 from rcsc.testing.executors.native import COMPILE_S, Native
 from rcsc.testing.executors.shim import shim_c
@@ -355,7 +355,9 @@ class Judge:
         if not self.esbmc_s or too_large(self.program, target):
             return Noticed.UNDECIDED
         said = prove_function(self.program, self.symbols, files, target, self.esbmc_s).said
-        return {Said.PROVED: Noticed.EQUIVALENT, Said.REFUTED: Noticed.ESBMC}.get(said, Noticed.UNDECIDED)
+        return {EsbmcAnswer.PROVED: Noticed.EQUIVALENT, EsbmcAnswer.REFUTED: Noticed.ESBMC}.get(
+            said, Noticed.UNDECIDED
+        )
 
 
 def _rows(native: Native, sessions: Sequence[tuple[int, int, Sequence[Snapshot]]]) -> bytes:

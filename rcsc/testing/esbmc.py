@@ -47,7 +47,7 @@ SAME = """static int ref_same(double a, double b) {
 }"""
 
 
-class Said(StrEnum):
+class EsbmcAnswer(StrEnum):
     """What ESBMC said."""
 
     PROVED = "proved"
@@ -68,7 +68,7 @@ class EsbmcVerdict:
     """
 
     function: str
-    said: Said
+    said: EsbmcAnswer
     properties: int
     seconds: float
     detail: str = ""
@@ -245,10 +245,10 @@ def _prove_parts(
         text = part_harness(program, symbols, target, part, function)
         verdict = ask(files, target.function, text, timeout_s, with_sources=False)
         properties, seconds = properties + verdict.properties, seconds + verdict.seconds
-        if verdict.said is not Said.PROVED:
+        if verdict.said is not EsbmcAnswer.PROVED:
             detail = f"{function}: {verdict.detail}"
             return EsbmcVerdict(target.function, verdict.said, properties, seconds, detail)
-    return EsbmcVerdict(target.function, Said.PROVED, properties, seconds)
+    return EsbmcVerdict(target.function, EsbmcAnswer.PROVED, properties, seconds)
 
 
 def ask(
@@ -265,15 +265,15 @@ def ask(
     """
     binary = esbmc()
     if isinstance(binary, Absent):
-        return EsbmcVerdict(function, Said.ABSENT, 0, 0.0, binary.reason)
+        return EsbmcVerdict(function, EsbmcAnswer.ABSENT, 0, 0.0, binary.reason)
     began = perf_counter()
-    verdict = EsbmcVerdict(function, Said.TOO_LARGE, 0, 0.0)
+    verdict = EsbmcVerdict(function, EsbmcAnswer.TOO_LARGE, 0, 0.0)
     with scratch("esbmc") as place:
         sources = [one for one in write_c(files, place) if with_sources and one != STAND_INS]
         (place / "harness.c").write_text(text, "utf-8")
         for solver in SOLVERS:
             left = timeout_s - (perf_counter() - began)
-            if verdict.said is Said.TOO_LARGE and left > 1.0:
+            if verdict.said is EsbmcAnswer.TOO_LARGE and left > 1.0:
                 command = [binary, "harness.c", *sources, *CHECKS, solver]
                 ran = run_command(command, place, left, MEMORY_MB)
                 verdict = _verdict(function, ran, perf_counter() - began)
@@ -285,7 +285,7 @@ def _verdict(function: str, ran: Ran, seconds: float) -> EsbmcVerdict:
     counts = COUNT.search(text)
     shown = int(counts[3]) if counts else 0
     if ran.status is None:
-        return EsbmcVerdict(function, Said.TOO_LARGE, 0, seconds, f"no answer in {seconds:.0f} s")
+        return EsbmcVerdict(function, EsbmcAnswer.TOO_LARGE, 0, seconds, f"no answer in {seconds:.0f} s")
     if (
         ran.status == 0
         and "VERIFICATION SUCCESSFUL" in text
@@ -293,14 +293,14 @@ def _verdict(function: str, ran: Ran, seconds: float) -> EsbmcVerdict:
         and int(counts[1]) == 0
         and shown == int(counts[2])
     ):
-        return EsbmcVerdict(function, Said.PROVED, shown, seconds)
+        return EsbmcVerdict(function, EsbmcAnswer.PROVED, shown, seconds)
     if "VERIFICATION FAILED" in text:
         failed = [line.strip() for line in text.splitlines() if line.strip().startswith("FAILED")]
         if failed and all(RECORD in line for line in failed):
             reason = f"more than {MOST_CALLS} calls of an extern"
-            return EsbmcVerdict(function, Said.TOO_LARGE, 0, seconds, reason)
-        return EsbmcVerdict(function, Said.REFUTED, shown, seconds, "; ".join(failed)[:400])
+            return EsbmcVerdict(function, EsbmcAnswer.TOO_LARGE, 0, seconds, reason)
+        return EsbmcVerdict(function, EsbmcAnswer.REFUTED, shown, seconds, "; ".join(failed)[:400])
     if "memory" in text.lower() or "bad_alloc" in text:
-        return EsbmcVerdict(function, Said.TOO_LARGE, 0, seconds, "out of memory")
+        return EsbmcVerdict(function, EsbmcAnswer.TOO_LARGE, 0, seconds, "out of memory")
     last = text.strip().splitlines()[-1:] or ["no output"]
-    return EsbmcVerdict(function, Said.FAILED, shown, seconds, last[0][:400])
+    return EsbmcVerdict(function, EsbmcAnswer.FAILED, shown, seconds, last[0][:400])

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 from rcsc.diagnostics.diagnostic import Diagnostic, Severity
 from rcsc.testing.cortex import CortexRun
-from rcsc.testing.esbmc import EsbmcVerdict, Said
+from rcsc.testing.esbmc import EsbmcAnswer, EsbmcVerdict
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +95,7 @@ def _program_text(program: ProgramFigures) -> Iterator[str]:
     )
     yield f"  sanitizers: {program.sanitized}"
     for verdict in program.esbmc:
-        shown = f", {verdict.properties} properties" if verdict.said is Said.PROVED else ""
+        shown = f", {verdict.properties} properties" if verdict.said is EsbmcAnswer.PROVED else ""
         detail = f": {verdict.detail}" if verdict.detail else ""
         yield f"  ESBMC {verdict.function}: {verdict.said}{shown} ({verdict.seconds:.1f} s){detail}"
     for table in program.tables:

@@ -25,7 +25,7 @@ from rcsc.testing.agree import (
 )
 from rcsc.testing.code_mutants import Noticed, Sample, decider, judge_code, judge_masks, portable_agrees
 from rcsc.testing.cortex import MOST_INPUTS, CortexRun, run_cortex
-from rcsc.testing.esbmc import EsbmcVerdict, Said, prove_function, too_large
+from rcsc.testing.esbmc import EsbmcAnswer, EsbmcVerdict, prove_function, too_large
 from rcsc.testing.executors.externs import PythonStandIns, python_stand_ins, with_c_stand_ins
 from rcsc.testing.executors.native import Native, build
 from rcsc.testing.executors.python import python_executor
@@ -205,10 +205,10 @@ class Suite:
             self.options.progress(f"proving {target.function} with ESBMC")
             if too_large(self.program, target):
                 reason = "complete per-variable check used"
-                yield EsbmcVerdict(target.function, Said.TOO_LARGE, 0, 0.0, reason)
+                yield EsbmcVerdict(target.function, EsbmcAnswer.TOO_LARGE, 0, 0.0, reason)
                 continue
             verdict = prove_function(self.program, self.symbols, self.files, target, self.options.esbmc_s)
-            if verdict.said is Said.REFUTED:
+            if verdict.said is EsbmcAnswer.REFUTED:
                 message = f"ESBMC refutes that the C function `{target.function}` equals the tables"
                 self.differs(message, self.table(target), (verdict.detail,))
             yield verdict

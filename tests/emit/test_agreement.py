@@ -23,7 +23,7 @@ from rcsc.run.executors import build as build_executors
 from rcsc.run.signature import signature
 from rcsc.testing.agree import Compared, Disagreement, Executors, run_init, run_sanitized
 from rcsc.testing.differential_search import search_lines, search_sessions
-from rcsc.testing.esbmc import Said, prove_function
+from rcsc.testing.esbmc import EsbmcAnswer, prove_function
 from rcsc.testing.executors.equality import same_value
 from rcsc.testing.executors.externs import python_stand_ins, with_c_stand_ins
 from rcsc.testing.executors.native import Native, build
@@ -490,14 +490,16 @@ table t {{
 @pytest.mark.parametrize(
     ("last", "old", "new", "said"),
     [
-        (2, "", "", Said.PROVED),
-        (2, "do_pong(s, INT64_C(2))", "do_pong(s, INT64_C(3))", Said.REFUTED),  # other arguments
-        (2, "case__do_pong(s, INT64_C(2));", ";", Said.REFUTED),  # a call less
-        (2, "s->fault = 4;", "s->fault = 0;", Said.REFUTED),  # what is refused is taken
-        (30, "", "", Said.TOO_LARGE),  # more calls than are recorded: not known, and said so
+        (2, "", "", EsbmcAnswer.PROVED),
+        (2, "do_pong(s, INT64_C(2))", "do_pong(s, INT64_C(3))", EsbmcAnswer.REFUTED),  # other arguments
+        (2, "case__do_pong(s, INT64_C(2));", ";", EsbmcAnswer.REFUTED),  # a call less
+        (2, "s->fault = 4;", "s->fault = 0;", EsbmcAnswer.REFUTED),  # what is refused is taken
+        (30, "", "", EsbmcAnswer.TOO_LARGE),  # more calls than are recorded: not known, and said so
     ],
 )
-def test_esbmc_knows_nothing_of_what_an_extern_gives(last: int, old: str, new: str, said: Said) -> None:
+def test_esbmc_knows_nothing_of_what_an_extern_gives(
+    last: int, old: str, new: str, said: EsbmcAnswer
+) -> None:
     program = program_of(CALLS.format(last=last))
     files = emitted(program)
     symbols = symbols_of(program, files)

@@ -19,7 +19,7 @@ from rcsc.lang.resolve import resolve
 from rcsc.solvers.options import Options
 from rcsc.testing import suite
 from rcsc.testing.code_mutants import Decider, Noticed, code_mutants, decider, source_of
-from rcsc.testing.esbmc import EsbmcVerdict, Said
+from rcsc.testing.esbmc import EsbmcAnswer, EsbmcVerdict
 from rcsc.testing.executors.symbols import symbols_of
 from rcsc.testing.figures import SuiteResult
 from rcsc.testing.inputs.snapshot import Missing, search_in
@@ -240,7 +240,7 @@ def test_what_nobody_can_decide_is_a_figure_and_no_failure(
     assert result.found == ()
     assert "mutants of the masks: " in result.text()
     assert set(result.programs[0].code_mutants["mutants of the masks"]) <= {"the matcher check", "equivalent"}
-    for said, failed in ((Said.FAILED, False), (Said.REFUTED, True)):
+    for said, failed in ((EsbmcAnswer.FAILED, False), (EsbmcAnswer.REFUTED, True)):
         monkeypatch.setattr(suite, "prove_function", lambda *_, said=said: EsbmcVerdict("f", said, 0, 0.0))
         asked = SuiteOptions(examples=1, esbmc_s=1.0, cortex=False, mutants=0)
         assert run_suite(program, files, asked).failed is failed

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class RunOptions:
     """What the user asked for."""
 
     script: str
@@ -114,7 +114,7 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
         return 1
     kind: Literal["c", "python"] = "c" if executor == "c" else "python"
     again = _command(script, system, database, executor, backend)
-    asked = Asked(script, path, kind, database, backend, seed, log, report, live, rate, quiet, again)
+    asked = RunOptions(script, path, kind, database, backend, seed, log, report, live, rate, quiet, again)
 
     try:
         return _run(asked, processes, from_row, resumes)
@@ -122,7 +122,7 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
         raise Stopped(Code.PROCESS_LOST, str(error), "what levels say as they end stands above") from error
 
 
-def _run(asked: Asked, processes: bool, from_row: int | None, resumes: bool) -> int:
+def _run(asked: RunOptions, processes: bool, from_row: int | None, resumes: bool) -> int:
     """The run itself.
 
     Raises:
@@ -181,7 +181,7 @@ def _command(script: str, system: Path | None, database: Path | None, executor: 
 
 
 @contextlib.contextmanager
-def _recorded(made: Run, asked: Asked) -> Iterator[Path]:
+def _recorded(made: Run, asked: RunOptions) -> Iterator[Path]:
     """Writes the log; its path."""
     path = (
         asked.log
@@ -200,7 +200,7 @@ def _recorded(made: Run, asked: Asked) -> Iterator[Path]:
 
 
 @contextlib.contextmanager
-def _followed(witness: Witness, asked: Asked) -> Iterator[None]:
+def _followed(witness: Witness, asked: RunOptions) -> Iterator[None]:
     """Opens the page, where one was asked for, and keeps the clock's pace for whoever looks."""
     if not asked.live:
         yield
@@ -218,7 +218,7 @@ def _followed(witness: Witness, asked: Asked) -> Iterator[None]:
         live.stop()
 
 
-def _page(witness: Witness, asked: Asked) -> "Live":
+def _page(witness: Witness, asked: RunOptions) -> "Live":
     from rcsc_cell.live import Live  # of an extra
 
     system = witness.run.system
@@ -241,7 +241,7 @@ class _Pace:
         time.sleep(max(0.0, self._next - time.monotonic()))
 
 
-def _watch(made: Run, asked: Asked) -> float:
+def _watch(made: Run, asked: RunOptions) -> float:
     """Runs to the end, and says what becomes of each row; the seconds that it took."""
     begun = time.perf_counter()
     for result in made.steps():
@@ -256,7 +256,7 @@ def _say(number: int, text: str, state: str, ticks: int) -> None:
     sys.stdout.flush()
 
 
-def _apart(made: Run, asked: Asked) -> int:
+def _apart(made: Run, asked: RunOptions) -> int:
     """The same with a process for each level."""
     with scratch("run") as folder:
         rows = _rows_apart(asked, made.station.at, folder / "results")
@@ -272,7 +272,7 @@ def _apart(made: Run, asked: Asked) -> int:
     return 0
 
 
-def _rows_apart(asked: Asked, first: int, results: Path) -> list[list[Any]]:
+def _rows_apart(asked: RunOptions, first: int, results: Path) -> list[list[Any]]:
     """Runs the processes to the end: of each row its number, text, state, reason and ticks; `results` is where they travel."""
     held = str(asked.database.resolve()) if asked.database else ""
     place = str(asked.path.resolve())
@@ -307,7 +307,7 @@ def _rows_apart(asked: Asked, first: int, results: Path) -> list[list[Any]]:
 # --- when it is over ---
 
 
-def _write_report(path: Path, witness: Witness, asked: Asked, seconds: float) -> None:
+def _write_report(path: Path, witness: Witness, asked: RunOptions, seconds: float) -> None:
 
     try:
         report(path, witness.story(asked.script, seconds))
@@ -315,7 +315,7 @@ def _write_report(path: Path, witness: Witness, asked: Asked, seconds: float) ->
         raise BadDescription(f"the report {path} cannot be written: {error.strerror}") from error
 
 
-def _closing(witness: Witness, asked: Asked, seconds: float, log: Path) -> int:
+def _closing(witness: Witness, asked: RunOptions, seconds: float, log: Path) -> int:
 
     made = witness.run
     again = _kept(made, asked)
@@ -352,7 +352,7 @@ def _figures(witness: Witness, seconds: float) -> Iterator[str]:
     )
 
 
-def _kept(made: Run, asked: Asked) -> str:
+def _kept(made: Run, asked: RunOptions) -> str:
     """Keeps a run that stopped, forgets one that came to its end; what to do about it."""
     if made.station.stopped is None:
         if made.station.over:

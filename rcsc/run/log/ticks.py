@@ -19,7 +19,7 @@ ECHO, ECHOED, STATUS = "inc_command_echo", "ref_command_echo", "status_report"
 
 
 @dataclass(frozen=True, slots=True)
-class Said:
+class TickValue:
     """A value by its name, and whether this cycle changed it."""
 
     name: str
@@ -46,7 +46,7 @@ class Order:
     command: str
     new: bool
     altered: bool
-    fields: tuple[Said, ...]
+    fields: tuple[TickValue, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +66,7 @@ class Reported:
     status: str
     of_number: int | None
     of_command: str
-    fields: tuple[Said, ...]
+    fields: tuple[TickValue, ...]
 
     @property
     def matches(self) -> bool:
@@ -118,7 +118,7 @@ class LevelTick:
     wrong: str = ""
     above: tuple[tuple[Order | None, Reported | None], ...] = ()
     below: tuple[tuple[Reported | None, Order | None], ...] = ()
-    inputs: tuple[Said, ...] = ()
+    inputs: tuple[TickValue, ...] = ()
     states: tuple[ShownState, ...] = ()
 
     @property
@@ -275,7 +275,7 @@ class _Cycle:
 
     def _fields(
         self, record: str, but: tuple[str, ...] = (), *, only_changed: bool = False
-    ) -> tuple[Said, ...]:
+    ) -> tuple[TickValue, ...]:
         """The leaves of a record that are not as at first, or that changed; an array in it as one."""
         aside = {f"{record}.{name}" for name in but}
         arrays: dict[str, list[Leaf]] = {}
@@ -290,7 +290,9 @@ class _Cycle:
             if changed or not (only_changed or at_first):
                 words = [self._word(self.after, leaf.name) for leaf in leaves]
                 shown = words[0] if "[" not in leaves[0].name else f"({', '.join(words)})"
-                found.append(Said(name if only_changed else name.removeprefix(f"{record}."), shown, changed))
+                found.append(
+                    TickValue(name if only_changed else name.removeprefix(f"{record}."), shown, changed)
+                )
         return tuple(found)
 
     def _records(self) -> dict[str, str]:
