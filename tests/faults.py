@@ -42,8 +42,8 @@ from rcsc.solvers.options import Options
 from rcsc_cell.episodes.episode import Episode, FaultSpec, Interruption, Restart
 from rcsc_cell.episodes.loop import Loop
 from tests.matrix import ACQUIRE, project
-from tests.support.emitted import emitted
 from tests.support.faults_made import LEVELS, Fault, sample
+from tests.support.programs.stages import emitted
 
 REPO = Path(__file__).parents[1]
 CACHE = REPO / "tables" / ".rcsc-cache" / "faults"

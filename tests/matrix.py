@@ -22,7 +22,7 @@ from rcsc.solvers.options import Options
 from rcsc_cell.episodes.episode import Episode, FaultSpec, Finding, Interruption, PartSpec, Restart
 from rcsc_cell.episodes.loop import Loop
 from rcsc_cell.properties import PROPERTIES
-from tests.support.emitted import emitted
+from tests.support.programs.stages import emitted
 
 REPO = Path(__file__).parents[1]
 TBOX = (PartSpec("tbox", "buffer", 20.0, -30.0, 10.0),)

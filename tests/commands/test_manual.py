@@ -11,10 +11,8 @@ from rcsc.compose.proof.standing import Known
 from rcsc.diagnostics import report
 from rcsc.diagnostics.diagnostic import Severity
 from rcsc.diagnostics.source import Source
-from rcsc.lang.model import Program
-from rcsc.lang.resolve import compile_text
 from rcsc.solvers.options import Options
-from rcsc.table.program import prove_program
+from tests.support.programs.stages import reported
 
 REPO = Path(__file__).parents[2]
 CASE = re.compile(r"^```rcs\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL)
@@ -38,15 +36,13 @@ def test_reports_exactly_what_the_comments_say(text: str) -> None:
         for number, line in enumerate(text.splitlines(), start=1)
         for code in EXPECTED.findall(line)
     }
-    program = compile_text(text)
-    found = prove_program(program, Options()).findings if isinstance(program, Program) else program
     source = Source("case.rcs", text)
-    reported = {
+    found = {
         (source.position(d.primary.span.start).line, d.code.value)
-        for d in found
+        for d in reported(text, Options())
         if d.severity is Severity.ERROR
     }
-    assert reported == expected
+    assert found == expected
 
 
 def test_the_manual_has_examples_of_both_kinds() -> None:

@@ -38,7 +38,7 @@ from rcsc.run.system import assemble
 from rcsc.run.unproved import UnprovedExecutors, marked
 from rcsc.solvers.options import Options
 from rcsc.table.decide import prove_table
-from tests.support.emitted import shipped
+from tests.support.programs.stages import shipped
 from tests.support.proved import shortest, time_line
 
 REPO = Path(__file__).parents[2]

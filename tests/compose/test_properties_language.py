@@ -30,27 +30,20 @@ from rcsc.diagnostics.diagnostic import Severity
 from rcsc.diagnostics.source import Source
 from rcsc.host.cache import open_cache
 from rcsc.lang.interpret import Fault, cycle, initial
-from rcsc.lang.model import Enum, Kind, Program, Value, key_bounds, value_of_key
-from rcsc.lang.resolve import compile_text
+from rcsc.lang.model import Enum, Kind, Value, key_bounds, value_of_key
 from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.format import format_file
 from rcsc.lang.syntax.parse import parse
 from rcsc.solvers.options import Options
 from rcsc.solvers.smtlib import cvc5_refutes
 from rcsc.table.program import prove_program
-from tests.support.emitted import emitted
+from tests.support.programs.stages import emitted, program_of, refused
 from tests.support.proved import ran, shortest, time_line
 
 REPO = Path(__file__).parents[2]
 SMALL = REPO / "tests" / "data" / "composed"
 SHIPPED = REPO / "tables" / "system.toml"
 LITTLE = Effort(walks=6, cycles=40)
-
-
-def program_of(text: str) -> Program:
-    program = compile_text(text)
-    assert isinstance(program, Program), program
-    return program
 
 
 def alone(text: str) -> TransitionSystem:
@@ -152,15 +145,13 @@ def test_properties_are_laid_out_and_their_words_are_still_names() -> None:
 def test_what_is_wrong_is_said_where_it_stands(text: str, found: list[tuple[str, str]]) -> None:
     before = "state n : int 0 .. 9\nstate go : bool\nstate long : int 0 .. 9 [m]\n"
     whole = before + text
-    said = compile_text(whole)
-    assert not isinstance(said, Program)
+    said = refused(whole)
     places = [(one.code.value, whole[one.primary.span.start : one.primary.span.end].strip()) for one in said]
     assert places == found
 
 
 def test_an_error_in_a_property_does_not_hide_the_next_declaration() -> None:
-    said = compile_text("property p : (\nproperty q : n = 1\nproperty r :: go\n")
-    assert not isinstance(said, Program)
+    said = refused("property p : (\nproperty q : n = 1\nproperty r :: go\n")
     assert [(one.code.value, one.primary.span.start) for one in said] == [("RCS101", 24), ("RCS101", 46)]
 
 

@@ -6,31 +6,29 @@ from click.testing import CliRunner
 from rcsc.commands.group import commands
 from rcsc.diagnostics.codes import FAMILIES, Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Severity
-from rcsc.lang.model import Program
-from rcsc.lang.resolve import compile_text
 from rcsc.solvers.options import Options
-from rcsc.table.program import prove_program
+from tests.support.programs.stages import reported
 
 NOTES = {Code.DEFAULT_COVERS, Code.PROPERTY_ELSEWHERE}
 """Codes whose right form is the wrong one's, or that are said of what is right."""
 
 
-def reported(text: str) -> list[Diagnostic]:
-    program = compile_text(text)
-    found = prove_program(program, Options()).findings if isinstance(program, Program) else program
-    return [one for one in found if one.severity is not Severity.NOTE or one.code in NOTES]
+def told(text: str) -> list[Diagnostic]:
+    return [
+        one for one in reported(text, Options()) if one.severity is not Severity.NOTE or one.code in NOTES
+    ]
 
 
 @pytest.mark.parametrize("code", [code for code in Code if code.explanation.wrong])
 def test_the_wrong_example_is_reported_as_the_entry_shows(code: Code) -> None:
-    diagnostics = reported(code.explanation.wrong)
+    diagnostics = told(code.explanation.wrong)
     assert {diagnostic.code for diagnostic in diagnostics} == {code}
     assert f"{diagnostics[0].severity.value}: {diagnostics[0].message}" == code.explanation.report
 
 
 @pytest.mark.parametrize("code", [code for code in Code if code.explanation.right])
 def test_the_right_example_is_not_reported(code: Code) -> None:
-    assert {diagnostic.code for diagnostic in reported(code.explanation.right)} <= NOTES
+    assert {diagnostic.code for diagnostic in told(code.explanation.right)} <= NOTES
 
 
 def test_every_code_is_explained_and_most_by_example() -> None:

@@ -40,22 +40,17 @@ from rcsc.lang.model import (
     value_of_key,
 )
 from rcsc.lang.project import load
-from rcsc.lang.resolve import compile_text, resolve
+from rcsc.lang.resolve import resolve
 from rcsc.relation.steps import UnansweredError
 from rcsc.solvers.options import Options
 from rcsc.solvers.smt import Answer, Solver
+from tests.support.programs.stages import program_of
 
 REPO = Path(__file__).parents[2]
 
 
-def program(text: str) -> Program:
-    made = compile_text(text)
-    assert isinstance(made, Program), made
-    return made
-
-
 def differ(before: str, after: str) -> ProgramDifference:
-    found = compare("case", program(before), program(after), Options())
+    found = compare("case", program_of(before), program_of(after), Options())
     assert not found.undecided
     return found
 
@@ -377,7 +372,7 @@ def test_the_regions_are_those_that_every_input_shows(seed: int) -> None:
     for _ in range(5):
         rows = drawn(random)
         default = random.random() < 0.5
-        before, after = program(spelled(rows, default)), program(spelled(edited(random, rows), default))
+        before, after = program_of(spelled(rows, default)), program_of(spelled(edited(random, rows), default))
         assert disagreements(before, after, seen) == []
     assert seen["exact"] > seen["besides"]
 
@@ -610,7 +605,7 @@ def test_a_condition_that_becomes_undefined_changed(where: str) -> None:
             PARTLY.format(until=f" {where}{one}" if deferred else "", what="" if deferred else where + one)
             for one in pair
         ]
-        sides = [program(text) for text in texts]
+        sides = [program_of(text) for text in texts]
         worths = [worth(side, where.split(maxsplit=1)[0]) for side in sides]
         expected = {(one, two) for one, two in zip(*worths, strict=True) if one != two}
         found = differ(*texts)
@@ -769,7 +764,7 @@ def test_out_of_reach_is_where_no_input_makes_a_difference(edits: tuple[tuple[st
     for old, new in edits:
         assert text.count(old) == 1, old
         text = text.replace(old, new)
-    before, after = program(SMALL), program(text)
+    before, after = program_of(SMALL), program_of(text)
     found = compare("case", before, after, Options())
     kinds = {str(v.name): v.type for v in after.variables}
     taken = [v for v in after.variables if v.kind is Kind.INPUT]
@@ -793,8 +788,8 @@ def test_out_of_reach_is_where_no_input_makes_a_difference(edits: tuple[tuple[st
 
 
 def test_a_region_that_boxes_do_not_say_counts_as_met() -> None:
-    after = program(LEVEL.replace("|| to(end)    |", "|| to(start)  |"))
-    found = compare("case", program(LEVEL), after, Options())
+    after = program_of(LEVEL.replace("|| to(end)    |", "|| to(start)  |"))
+    found = compare("case", program_of(LEVEL), after, Options())
     level, [table, *_] = after.levels[0], found.parts
     [change] = table.changes
     for where, met in ((change.where, False), (replace(change.where, exact=False), True)):
@@ -803,7 +798,7 @@ def test_a_region_that_boxes_do_not_say_counts_as_met() -> None:
 
 
 def test_a_state_is_known_where_some_line_is_for_it() -> None:
-    made = program(
+    made = program_of(
         LEVEL.replace("  | back | end    |       || to(start)  |\n", "").replace(
             "| rest | /= end | false ||            |\n",
             "| rest | /= end | false || |\n  | lost | DEFAULT | || |\n",
@@ -811,7 +806,7 @@ def test_a_state_is_known_where_some_line_is_for_it() -> None:
     )
     table = made.tables[0]
     assert [knows(made, table, "at", value, Options()) for value in range(3)] == [True, True, False]
-    narrow = program(
+    narrow = program_of(
         LEVEL.replace("table walk {", "assume early monitored : at /= end\ntable walk assuming early {")
     )
     assert [knows(narrow, narrow.tables[0], "at", value, Options()) for value in range(3)] == [
@@ -844,7 +839,7 @@ def test_lines_that_can_newly_follow_are_those_that_do(edits: tuple[tuple[str, s
     text = SMALL
     for old, new in edits:
         text = text.replace(old, new)
-    before, after = program(SMALL), program(text)
+    before, after = program_of(SMALL), program_of(text)
     found = compare("case", before, after, Options(), follow=True)
     names = {"back": "home"} if "| home |" in text else {}
     one = {(names.get(a, a), names.get(b, b)) for a, b in walked(before)}
@@ -859,7 +854,11 @@ def test_a_question_without_an_answer_leaves_the_steps_open(monkeypatch: pytest.
 
     monkeypatch.setattr("rcsc.diff.changes.follows.following", unanswered)
     found = compare(
-        "case", program(LEVEL), program(LEVEL.replace("to(end)    |", "to(start)  |")), Options(), follow=True
+        "case",
+        program_of(LEVEL),
+        program_of(LEVEL.replace("to(end)    |", "to(start)  |")),
+        Options(),
+        follow=True,
     )
     [one] = found.follows
     assert (one.new, one.gone, one.decided) == ((), (), False)
@@ -1095,7 +1094,7 @@ def otherwise_made(value: tuple[object, ...], owner: object, name: str) -> Itera
 
 
 def test_whatever_differs_is_told_or_proved_to_mean_the_same() -> None:
-    whole = program(EVERYTHING)
+    whole = program_of(EVERYTHING)
     assert not compare("case", whole, whole, Options()).changed
     told: Counter[str] = Counter()
     for field in fields(Program):
@@ -1132,8 +1131,8 @@ def test_whatever_differs_is_told_or_proved_to_mean_the_same() -> None:
 )  # fmt: skip
 def test_what_no_region_shows_is_said(change: tuple[str, str], said: str) -> None:
     assert change[0] in EVERYTHING
-    made = program(EVERYTHING.replace(*change))
-    found = compare("case", program(EVERYTHING), made, Options())
+    made = program_of(EVERYTHING.replace(*change))
+    found = compare("case", program_of(EVERYTHING), made, Options())
     assert found.changed
     assert said in plain(list(rows(Difference("a", "b", (found,)))))
 
@@ -1170,7 +1169,7 @@ table other assuming odd {
 )
 def test_an_assumption_that_newly_stops_or_no_longer_does_is_said(old: str, new: str, said: str) -> None:
     assert old in STOPPED
-    before, after = program(STOPPED), program(STOPPED.replace(old, new))
+    before, after = program_of(STOPPED), program_of(STOPPED.replace(old, new))
     for one, two, word in ((before, after, said), (after, before, said.replace("no longer", "newly"))):
         found = compare("case", one, two, Options())
         assert (found.changed, found.undecided) == (True, ())

@@ -32,18 +32,8 @@ from rcsc.testing.executors.sessions import Seen
 from rcsc.testing.executors.symbols import symbols_of
 from rcsc.testing.executors.targets import is_matcher, targets
 from rcsc.testing.suite import SuiteOptions, run_suite
-from tests.support.emitted import (
-    EXTERN,
-    FAULTED,
-    RICH,
-    SHIPPED,
-    STOPS,
-    emitted,
-    program_of,
-    proved_of,
-    shipped,
-    stopping,
-)
+from tests.support.programs.examples import EXTERN, FAULTED, RICH, SHIPPED, STOPS
+from tests.support.programs.stages import emitted, program_of, proved_of, shipped, verdict_of
 
 pytestmark = pytest.mark.skipif(not isinstance(c_compiler(), str), reason="no C compiler")
 
@@ -145,7 +135,7 @@ def test_all_executors_stop_where_safety_rests_on_an_assumption_that_fails() -> 
 
 def test_what_a_cycle_that_ends_in_a_fault_leaves() -> None:
     """The manual's "What a fault leaves", of every executor: they leave the same."""
-    program = stopping(FAULTED)
+    program = verdict_of(FAULTED).program
     compared = Compared()
     with executors_of(program) as executors:
         assert list(found_of(executors, compared, 120)) == []

@@ -34,7 +34,8 @@ from rcsc.run.signature import generated_files, signature_of
 from rcsc.testing.cortex import CortexRun, run_cortex
 from rcsc.testing.executors.externs import python_stand_ins
 from rcsc.testing.executors.symbols import symbols_of
-from tests.support.emitted import EXTERN, RICH, emitted, program_of
+from tests.support.programs.examples import EXTERN, RICH
+from tests.support.programs.stages import emitted, program_of
 
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Wpedantic", "-Wtrigraphs", "-Wshadow", "-Werror")
 KEYWORDS = frozenset("""input state output table level procedure module owner extern enum record type unit const use assume
@@ -280,8 +281,7 @@ HEADERS = "".join(f"#include <{name}.h>\n" for name in
 def test_a_program_may_be_called_as_a_library_s_part_is(tmp_path: Path) -> None:
     includes, inits, sources, modules = HEADERS, "", [], []
     for name in KEPT:
-        program = compile_text(LONE, f"{name}.rcs")
-        assert not isinstance(program, tuple), program
+        program = program_of(LONE, f"{name}.rcs")
         files = emitted(program)
         said = json.loads(files[f"c/{name}.json"])
         assert said["header"].removesuffix(".h").lower() not in reserved.C_HEADERS | reserved.PYTHON_MODULES
@@ -449,8 +449,7 @@ output int : int 0 .. 9
 
 def test_files_of_a_program_are_found_by_its_own_name(tmp_path: Path) -> None:
     for name in ("time", "plain"):
-        program = compile_text(LONE, f"{name}.rcs")
-        assert not isinstance(program, tuple)
+        program = program_of(LONE, f"{name}.rcs")
         files = emitted(program)
         write(files, str(tmp_path))
         found = generated_files(tmp_path, name)
@@ -582,7 +581,8 @@ def test_the_header_is_one_for_cpp_too(tmp_path: Path) -> None:
 
 def test_the_bytes_do_not_hang_on_the_hash_seed(repo: Path) -> None:
     script = (
-        "import sys; from tests.support.emitted import *\n"
+        "from tests.support.programs.examples import EXTERN, RICH\n"
+        "from tests.support.programs.stages import emitted, program_of\n"
         "for text in (RICH, EXTERN):\n"
         "    for name, made in sorted(emitted(program_of(text)).items()): print(name, made)"
     )

@@ -14,8 +14,6 @@ from rcsc.commands import run
 from rcsc.driver.trials import proofs
 from rcsc.lang.interpret import matching_lines
 from rcsc.lang.model import Program, Table, key_bounds, value_of_key
-from rcsc.lang.project import load
-from rcsc.lang.resolve import resolve
 from rcsc.solvers.options import Options
 from rcsc.testing import suite
 from rcsc.testing.code_mutants import Decider, Noticed, code_mutants, decider, source_of
@@ -26,18 +24,11 @@ from rcsc.testing.inputs.snapshot import Missing, search_in
 from rcsc.testing.matchers.matcher import Checked, Compared, check_matcher
 from rcsc.testing.mutants import Caught, Opinion, difference, judge_table, narrower, table_mutants, wider
 from rcsc.testing.suite import SuiteOptions, run_suite
-from tests.support.emitted import emitted, program_of
+from tests.support.programs.stages import emitted, program_of, shipped
 
 BOXES = proofs(Options(solver="boxes"))
 SAMPLE = 100
 """Of the mutants of a shipped table; `rcsc test --mutants -1` judges them all."""
-
-
-def shipped(path: str, repo: Path) -> Program:
-    loaded = load([str(repo / path)])
-    program = resolve(loaded.roots[0], loaded)
-    assert isinstance(program, Program), program
-    return program
 
 
 @pytest.mark.parametrize("path", ["tables/task/acquire.rcs", "tables/examples/approach.rcs"])

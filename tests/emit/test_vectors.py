@@ -10,11 +10,10 @@ import pytest
 from rcsc.lang.interpret import holds, matching_lines
 from rcsc.lang.interval_sets import complement, meet
 from rcsc.lang.model import Program, key_bounds
-from rcsc.lang.project import load
-from rcsc.lang.resolve import compile_text, resolve
 from rcsc.testing.inputs.export import vectors_csv, vectors_json
 from rcsc.testing.inputs.snapshot import Missing, box_of, search_in
 from rcsc.testing.inputs.vectors import Vectors, atoms, vectors_of
+from tests.support.programs.stages import program_of, shipped
 
 COUPLED = """
 enum mode { idle, run, stop }
@@ -32,19 +31,6 @@ table t {
   | 4    | DEFAULT |       |                                   || false |
 }
 """
-
-
-def program_of(text: str) -> Program:
-    program = compile_text(text)
-    assert isinstance(program, Program), program
-    return program
-
-
-def shipped(path: str, repo: Path) -> Program:
-    loaded = load([str(repo / path)])
-    program = resolve(loaded.roots[0], loaded)
-    assert isinstance(program, Program), program
-    return program
 
 
 def check_pairs(program: Program, found: Vectors) -> None:

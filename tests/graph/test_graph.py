@@ -27,11 +27,11 @@ from rcsc.graph.to_table import tabled
 from rcsc.lang.interpret import cycle, holds, initial, run_table
 from rcsc.lang.model import Enum, Program, Snapshot, Table, Value, key_bounds, value_of_key
 from rcsc.lang.project import load
-from rcsc.lang.resolve import compile_text
 from rcsc.relation.follow import following
 from rcsc.relation.same import Differs, Same, compare
 from rcsc.relation.steps import Steps
 from rcsc.solvers.options import Options
+from tests.support.programs.stages import program_of
 
 ROOT = Path(__file__).parents[2]
 OPTIONS = Options()
@@ -333,9 +333,7 @@ def small(rows: Sequence[tuple[str, ...]]) -> Program:
     text = "".join(
         f"  | {at} | {' | '.join(row[:3])} || {' | '.join(row[3:])} |\n" for at, row in enumerate(rows)
     )
-    program = compile_text(SMALL.format(rows=text))
-    assert isinstance(program, Program), program
-    return program
+    return program_of(SMALL.format(rows=text))
 
 
 def done(program: Program, now: Snapshot) -> object:

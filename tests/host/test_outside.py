@@ -37,7 +37,7 @@ from rcsc.run.log.write import Recorder
 from rcsc.run.signature import signature
 from rcsc.run.system import System, assemble
 from rcsc_cell.pictures.page import quoted
-from tests.support.emitted import emitted, shipped
+from tests.support.programs.stages import emitted, shipped
 
 REPO = Path(__file__).parents[2]
 

@@ -22,7 +22,7 @@ from rcsc.lang.model import (
     real_key,
     value_of_key,
 )
-from rcsc.lang.resolve import compile_text
+from tests.support.programs.stages import drawn_program, program_of
 from tests.support.strategies import EQUAL, INTS, REALS, conditions, integers_over, reals_over, snapshots_of
 
 
@@ -36,11 +36,7 @@ def _parts(expr: Expr) -> Iterator[Expr]:
 
 
 def _condition(declared: str, text: str) -> tuple[Program, Expr]:
-    found = compile_text(f"{declared}assume it : {text}")
-    if not isinstance(found, Program):
-        assert {one.code.value for one in found} <= {"RCS304", "RCS309", "RCS311"}, found
-        reject()
-    assert isinstance(found, Program)
+    found = drawn_program(f"{declared}assume it : {text}", "RCS304", "RCS309", "RCS311")
     return found, found.assumptions[0].condition
 
 
@@ -82,11 +78,7 @@ def test_bounds_of_small_integers_are_met_where_each_operand_is_read_once() -> N
 
 
 def _test(declared: str, text: str) -> tuple[Program, Test]:
-    found = compile_text(f"{declared}table t {{\n| line | when ||\n| x | {text} ||\n}}")
-    if not isinstance(found, Program):
-        assert {one.code.value for one in found} <= {"RCS314", "RCS301"}, found
-        reject()
-    assert isinstance(found, Program)
+    found = drawn_program(f"{declared}table t {{\n| line | when ||\n| x | {text} ||\n}}", "RCS314", "RCS301")
     test = found.tables[0].lines[0].tests[0]
     if test is None or not test.variables:
         reject()
@@ -166,7 +158,7 @@ def test_a_large_enumeration_has_boxes() -> None:
 def test_a_cell_gives_the_same_box_as_the_condition_under_when() -> None:
     cells = {"> 3": "n > 3", "2 .. 5": "n in 2 .. 5", "in {1, 4, 5}": "n in {1, 4, 5}", "/= 7": "n /= 7"}
     for cell, condition in cells.items():
-        found = compile_text(
+        found = program_of(
             f"input n : int 0 .. 99\ntable t {{\n| line | n | when ||\n| x | {cell} | {condition} ||\n}}"
         )
         assert isinstance(found, Program)

@@ -26,16 +26,11 @@ from rcsc.lang.model import Apply, Program, Value
 from rcsc.lang.operator_table import divide
 from rcsc.lang.resolve import compile_text
 from tests import differential
-
-
-def program(text: str) -> Program:
-    found = compile_text(text)
-    assert isinstance(found, Program), found
-    return found
+from tests.support.programs.stages import program_of
 
 
 def value_of(declared: str, text: str, **snapshot: Value) -> Value:
-    made = program(f"{declared}\nassume it : ({text}) = ({text})")
+    made = program_of(f"{declared}\nassume it : ({text}) = ({text})")
     condition = made.assumptions[0].condition
     return evaluate(condition.args[0], snapshot)  # type: ignore[union-attr]  # a comparison
 
@@ -78,7 +73,7 @@ def test_reals_are_ieee_doubles() -> None:
 
 
 def test_the_right_operand_is_looked_at_only_where_the_left_does_not_decide() -> None:
-    made = program(
+    made = program_of(
         "input n : int 0 .. 9\nassume a : n /= 0 and 9 / n > 2\nassume o : n = 0 or 9 / n > 2\n"
         "assume i : n /= 0 implies 9 / n > 2"
     )
@@ -87,7 +82,7 @@ def test_the_right_operand_is_looked_at_only_where_the_left_does_not_decide() ->
 
 
 def test_an_index_outside_the_array_is_no_value() -> None:
-    made = program("input a : array[2] of bool\ninput n : int 0 .. 9\nassume it : a[n]")
+    made = program_of("input a : array[2] of bool\ninput n : int 0 .. 9\nassume it : a[n]")
     condition = made.assumptions[0].condition
     assert evaluate(condition, {"a[0]": False, "a[1]": True, "n": 1}) is True
     with pytest.raises(IndexError):
@@ -98,7 +93,7 @@ def test_an_index_outside_the_array_is_no_value() -> None:
 
 
 def after(text: str, procedure: str = "p", *args: Value, **start: Value) -> dict[str, Value]:
-    made = program(text)
+    made = program_of(text)
     snapshot = {**initial(made), **start}
     call(made, procedure, list(args), snapshot)
     return snapshot
@@ -144,7 +139,7 @@ def test_initial_values_are_as_declared_or_the_least() -> None:
     text = (
         "enum e { a, b }\nstate s : e = b\nstate f : bool\ninput n : int -3 .. 3\nstate x : real -2.5 .. 1.0"
     )
-    assert initial(program(text)) == {"s": 1, "f": False, "n": -3, "x": -2.5}
+    assert initial(program_of(text)) == {"s": 1, "f": False, "n": -3, "x": -2.5}
 
 
 # --- what comes from outside ---
@@ -174,11 +169,11 @@ GOOD: dict[str, Value] = {"n": 1, "m": 2, "x": 0.5, "y": 0.5}
     ],
 )
 def test_inputs_are_admitted(given_: dict[str, Value], admitted: dict[str, Value] | str) -> None:
-    assert admit(program(READINGS), {**GOOD, **given_}) == admitted
+    assert admit(program_of(READINGS), {**GOOD, **given_}) == admitted
 
 
 def test_minus_zero_is_admitted_as_zero() -> None:
-    admitted = admit(program(READINGS), {**GOOD, "y": -0.0})
+    admitted = admit(program_of(READINGS), {**GOOD, "y": -0.0})
     assert isinstance(admitted, dict)
     assert math.copysign(1, admitted["y"]) == 1
 
@@ -216,7 +211,7 @@ level m { preprocess before table by k { 0 : t 1 : t 2 : u } postprocess behind 
 
 
 def run(level: str = "l", begin: dict[str, Value] | None = None, **start: Value) -> Outcome:
-    made = program(LEVEL)
+    made = program_of(LEVEL)
     chosen = next(one for one in made.levels if one.name == level)
     return cycle(made, chosen, {**initial(made), **(begin or {}), **start})
 
@@ -228,7 +223,7 @@ def test_a_cycle_senses_decides_and_acts_in_order() -> None:
 
 
 def test_actions_run_from_left_to_right_and_columns_assign_in_their_place() -> None:
-    made = program(LEVEL)
+    made = program_of(LEVEL)
     table = made.tables[0]
     done = run_table(made, table, {**initial(made), "seen": 9, "log": 5})
     assert (done.line, done.snapshot["log"]) == ("high", 52)
@@ -239,7 +234,7 @@ def test_no_line_and_several_lines_end_the_cycle_before_any_action() -> None:
     done = run(go=2)
     assert (done.fault, done.line, done.line_index) == (Fault.SEVERAL_LINES, None, -1)
     assert (done.snapshot["log"], done.snapshot["seen"]) == (1, 2)  # preprocess stays, postprocess is not run
-    made = program(LEVEL)
+    made = program_of(LEVEL)
     done = run_table(made, made.tables[1], initial(made))
     assert (done.fault, done.line) == (Fault.NO_LINE, None)
 
@@ -253,7 +248,7 @@ def test_a_refused_input_leaves_all_as_it_was() -> None:
     start: dict[str, Value] = {"k": 3, "go": 99, "log": 7}
     done = run(go=99, k=3, log=7)
     assert (done.fault, done.fault_at, done.line_index) == (Fault.ADMIT, "k", -1)
-    assert done.snapshot == {**initial(program(LEVEL)), **start}
+    assert done.snapshot == {**initial(program_of(LEVEL)), **start}
 
 
 def test_clamped_inputs_are_what_the_cycle_sees() -> None:
@@ -275,7 +270,7 @@ def test_next_is_kept_for_a_later_cycle() -> None:
         "input ack : bool\nstate a : int 0 .. 9 deferred until ack\nprocedure p { next a := a + 1 }\n"
         "table t {\n| line | ack || procedures |\n| x | false || p |\n| y | true || p |\n}"
     )
-    made = program(text)
+    made = program_of(text)
     first = run_table(made, made.tables[0], initial(made)).snapshot
     assert (first["a"], first["a.next"]) == (0, 1)
     second = run_table(made, made.tables[0], {**first, "ack": True}).snapshot
@@ -316,14 +311,14 @@ def _extern(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("_extern")
 def test_extern_procedures_take_reads_and_arguments_and_give_writes_in_declared_order() -> None:
-    made = program(EXTERN)
+    made = program_of(EXTERN)
     done = run_table(made, made.tables[0], {**initial(made), "a": 0, "b": 3})
     assert (done.fault, done.snapshot) == (Fault.OK, {"a": 0, "b": 5, "c": 0, "done": True})
 
 
 @pytest.mark.usefixtures("_extern")
 def test_what_an_extern_procedure_gives_is_admitted() -> None:
-    made = program(EXTERN)
+    made = program_of(EXTERN)
     done = run_table(made, made.tables[0], {**initial(made), "a": 1, "b": 3})
     assert (done.fault, done.fault_at, done.line) == (Fault.EXTERN, "c", "x")
     assert done.snapshot["done"] is False
@@ -366,7 +361,7 @@ def test_a_cycle_that_an_extern_stops_tells_how_far_it_came(
     before: str, does: str, after: str, line: int, failed: tuple[str, ...]
 ) -> None:
     text = REFUSED.replace("|| look(2) ", f"|| {does} ")
-    made = program(f"{text}level l {{ period 10 [ms] {before} table t {after} }}")
+    made = program_of(f"{text}level l {{ period 10 [ms] {before} table t {after} }}")
     out = cycle(made, made.levels[0], dict(initial(made)) | {"a": 9, "b": 9})  # which sum is no value of b
     assert (out.fault, out.fault_at, out.line_index, out.failed_assumptions) == (
         Fault.EXTERN,
@@ -377,7 +372,7 @@ def test_a_cycle_that_an_extern_stops_tells_how_far_it_came(
     assert (out.line is None) == (line < 0)
 
 
-UNFIT = program(
+UNFIT = program_of(
     "input i : int 0 .. 3\nstate s : int 1 .. 3\nstate r : real 0.0 .. 1.0\noutput b : bool\n"
     "invariant low : s <= 2\ninvariant both : s = 1 or b\n"
 )

@@ -68,7 +68,7 @@ from rcsc.testing.executors.reference import Writer, c_type
 from rcsc.testing.executors.reference_file import EXTREMES
 from rcsc.testing.executors.reference_file import PRELUDE as C_PRELUDE
 from rcsc.testing.executors.symbols import symbols_of
-from tests.support.emitted import emitted, program_of
+from tests.support.programs.stages import emitted, program_of
 
 NAN, INF, GREATEST = math.nan, math.inf, 1.7976931348623157e308
 REAL, SIGNED, UNSIGNED = Real(-INF, INF), Int(I64_MIN, I64_MAX), Int(0, U64_MAX)

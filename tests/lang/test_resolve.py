@@ -8,6 +8,7 @@ from rcsc.diagnostics.diagnostic import Diagnostic
 from rcsc.diagnostics.source import Source
 from rcsc.lang.model import Assign, Call, Int, Program, Real, Select, Test, ToElement, ToLeaf, VariableName
 from rcsc.lang.resolve import compile_text
+from tests.support.programs.stages import program_of
 
 # Each case: the text, and for every error in it its line, its code and the text of its span.
 CASES: dict[str, tuple[str, list[tuple[int, str, str]]]] = {
@@ -223,12 +224,6 @@ def test_each_error_is_reported_once_on_its_smallest_span(name: str) -> None:
     assert reported(text) == expected
 
 
-def program(text: str) -> Program:
-    found = compile_text(text)
-    assert isinstance(found, Program), found
-    return found
-
-
 def test_every_code_of_names_kinds_and_ranges_has_a_case() -> None:
     from rcsc.diagnostics.codes import Code
 
@@ -323,23 +318,23 @@ def test_a_heading_is_wrong_once_not_in_every_line() -> None:
 
 def test_declarations_may_stand_in_any_order() -> None:
     text = "state r : rec\nrecord rec { w : width }\ntype width = int 0 .. most\nconst most = half * 2\nconst half = 4"
-    assert program(text).variable("r.w").type == Int(0, 8)
-    assert program(text).records[0].name == "rec"
+    assert program_of(text).variable("r.w").type == Int(0, 8)
+    assert program_of(text).records[0].name == "rec"
 
 
 def test_records_and_arrays_come_to_leaves_in_declared_order() -> None:
     text = "record r { a : bool b : array[2] of int 0 .. 3 }\nstate s : array[2] of r\nstate d : bool deferred until d"
-    names = [str(v.name) for v in program(text).variables]
+    names = [str(v.name) for v in program_of(text).variables]
     assert names == ["s[0].a", "s[0].b[0]", "s[0].b[1]", "s[1].a", "s[1].b[0]", "s[1].b[1]", "d", "d.next"]
 
 
 def test_a_record_is_copied_leaf_by_leaf() -> None:
     text = "record r { a : bool b : bool }\nstate s : array[2] of r\nstate t : r\nstate i : int 0 .. 1\n"
-    whole, part = program(text + "procedure p { t := s[1] }\nprocedure q { s[i] := t }").procedures
+    whole, part = program_of(text + "procedure p { t := s[1] }\nprocedure q { s[i] := t }").procedures
     assert [one.place for one in whole.body if isinstance(one, Assign)] == [
         ToLeaf(VariableName(name), kind.type)
         for name in ("t.a", "t.b")
-        for kind in [program(text).variable(name)]
+        for kind in [program_of(text).variable(name)]
     ]
     (first, _) = part.body
     assert isinstance(first, Assign)
@@ -349,7 +344,7 @@ def test_a_record_is_copied_leaf_by_leaf() -> None:
 
 def test_locals_of_one_name_are_kept_apart() -> None:
     text = "procedure p { if true { local n : bool } else { local n : bool } for n in 0 .. 1 { } }"
-    shown = repr(program(text).procedures[0].body)
+    shown = repr(program_of(text).procedures[0].body)
     assert all(f"name='{name}'" in shown for name in ("n", "n_2", "n_3"))
 
 
@@ -358,7 +353,7 @@ def test_reads_and_writes_go_through_calls_in_declared_order() -> None:
         "input a : array[11] of bool\ninput i : int 0 .. 10\nstate y : bool\nstate x : bool deferred until y\n"
         "procedure inner { next x := a[i] }\nprocedure outer { y := x inner }"
     )
-    outer = program(text).procedures[1]
+    outer = program_of(text).procedures[1]
     assert outer.writes == ("y", "x.next")
     assert outer.reads == (*(f"a[{at}]" for at in range(11)), "i", "x")
 
@@ -368,7 +363,7 @@ def test_a_declared_path_covers_what_is_below_it() -> None:
         "record r { a : bool b : bool }\ninput s : r\nstate x : bool deferred until x\n"
         "module m reads s writes x { next x := s.a or s.b }"
     )
-    (module,) = program(text).procedures
+    (module,) = program_of(text).procedures
     assert module.reads == ("s.a", "s.b")
     assert module.writes == ("x", "x.next")
 
@@ -379,7 +374,7 @@ def test_owners_are_laid_out_in_order() -> None:
         "owner inner { q, p }\nowner outer { p, inner }\ntable t {\n| line | a ||\n| x | true ||\n| y | false ||\n}\n"
         "level l { period 2 [s] preprocess outer, q table t postprocess inner }"
     )
-    (level,) = program(text).levels
+    (level,) = program_of(text).levels
     assert (level.period_ms, level.preprocess, level.postprocess) == (2000, ("p", "q", "p", "q"), ("q", "p"))
 
 
@@ -387,7 +382,7 @@ def test_one_meaning_is_one_test_shared_by_its_lines() -> None:
     text = (
         "enum e { a, b }\ninput s : e\ntable t {\n| line | s ||\n| x | a ||\n| y | = a ||\n| z |  =   a ||\n}"
     )
-    lines = program(text).tables[0].lines
+    lines = program_of(text).tables[0].lines
     assert lines[0].tests[0] is lines[1].tests[0] is lines[2].tests[0]
     assert isinstance(lines[0].tests[0], Test)
 
@@ -397,7 +392,7 @@ def test_expressions_in_cells_have_spans_in_the_file() -> None:
         "input w : int 0 .. 9\nstate n : int 0 .. 9\nstate a : array[3] of int 0 .. 9\nprocedure p(k : int 0 .. 9) { }\n"
         "table t {\n| line | w + 1 || procedures | a[n] |\n| x | < 3 || p(w); p(n) | a[w] |\n| y | >= 3 || p(w); p(n) | |\n}"
     )
-    table = program(text).tables[0]
+    table = program_of(text).tables[0]
     for line, begin in zip(table.lines, ("| x", "| y"), strict=True):
         row = text.index(begin)
         for action in line.actions[:2]:
@@ -417,7 +412,7 @@ def test_expressions_in_cells_have_spans_in_the_file() -> None:
 
 def test_a_quotient_whose_divisor_may_be_zero_keeps_its_unit() -> None:
     text = "input w : real 0.0 .. 9.0 [mm]\ninput t : real 0.0 .. 9.0 [s]\nassume a : w / t < 3.0 [mm/s]"
-    condition = program(text).assumptions[0].condition
+    condition = program_of(text).assumptions[0].condition
     kind = condition.args[0].type  # type: ignore[union-attr]  # a comparison
     assert isinstance(kind, Real)
     assert kind.unit == (("mm", 1), ("s", -1))
@@ -488,7 +483,7 @@ def calls_to_resolve(count: int) -> int:
     before = sys.getprofile()
     sys.setprofile(counted)
     try:
-        found = program(head + heading + rows + "}\n")
+        found = program_of(head + heading + rows + "}\n")
     finally:
         sys.setprofile(before)
     assert len(found.tables[0].lines) == count

@@ -29,7 +29,7 @@ from rcsc.run.log.states import words
 from rcsc.run.log.write import CHUNK_MS, Recorder
 from rcsc.run.signature import Values
 from rcsc.run.system import Kind, StateTableError, System, assemble
-from tests.support.emitted import emitted, program_of
+from tests.support.programs.stages import emitted, program_of
 
 REPO = Path(__file__).parents[2]
 TICKS = 130

@@ -5,14 +5,13 @@ from itertools import combinations, pairwise, permutations, product
 from typing import Any, Literal
 
 import pytest
-from hypothesis import given, reject
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rcsc.diagnostics.codes import Code
 from rcsc.lang.interpret import matching_lines
 from rcsc.lang.interval_sets import furthest, joined
 from rcsc.lang.model import Program, key_bounds, key_of, value_of_key
-from rcsc.lang.resolve import compile_text
 from rcsc.solvers.options import Options
 from rcsc.table import boxes
 from rcsc.table.confirm import Agreement, confirm
@@ -22,6 +21,7 @@ from rcsc.table.program import prove_program
 from rcsc.table.repair import closing_line, parting_cell
 from rcsc.table.verdict import ContradictoryAssumptions, DeadLine, Gap, Overlap, Region, Undecided
 from tests.bench import families
+from tests.support.programs.stages import BOXES, program_of
 
 HEAD = """enum colour { red, green, blue }
 input a : bool
@@ -50,13 +50,6 @@ def written(rows: list[list[str]], columns: str = "acn") -> str:
     """The text of the table."""
     lines = "\n".join("| " + " | ".join(row) + " ||" for row in rows)
     return f"{HEAD}table t {{\n| line | {' | '.join(columns)} ||\n{lines}\n}}\n"
-
-
-def program_of(text: str) -> Program:
-    program = compile_text(text)
-    if not isinstance(program, Program):
-        reject()
-    return program
 
 
 def matched(program: Program) -> dict[Point, tuple[int, ...]]:
@@ -153,7 +146,7 @@ def test_gaps_are_found_beside_overlaps_in_large_tables(
 def test_a_search_for_gaps_that_takes_too_long_is_undecided(monkeypatch: pytest.MonkeyPatch) -> None:
     program = program_of(families.box(40, 9, 1, "gap", 10))
     monkeypatch.setattr(boxes, "BUDGET", 30)
-    found = prove_table(program, program.tables[0], Options(solver="boxes")).found
+    found = prove_table(program, program.tables[0], BOXES).found
     assert any(isinstance(one, Undecided) for one in found)
     assert not any(isinstance(one, Gap) for one in found)
 
@@ -161,7 +154,7 @@ def test_a_search_for_gaps_that_takes_too_long_is_undecided(monkeypatch: pytest.
 def test_a_report_of_very_many_overlaps_ends() -> None:
     rows = [[f"l{at}", "", "", ""] for at in range(300)]
     program = program_of(written(rows))
-    found = prove_table(program, program.tables[0], Options(solver="boxes"))
+    found = prove_table(program, program.tables[0], BOXES)
     assert len(found.found) == boxes.MOST_PAIRS
     assert "at least" in diagnostics(program, found)[-1].message
 
@@ -259,7 +252,7 @@ def test_z3_disagrees_with_every_verdict_that_is_of_another_kind(
     asked: str, claimed: str, solver: Literal["auto", "both"]
 ) -> None:
     other, program = ANSWERED[claimed], ANSWERED[asked]
-    found = prove_table(other, other.tables[0], Options(solver="boxes")).found
+    found = prove_table(other, other.tables[0], BOXES).found
     agreed = confirm(program, program.tables[0], found, Options(solver=solver))
     assert agreed is (Agreement.AGREES if asked == claimed else Agreement.DISAGREES)
 
@@ -269,7 +262,7 @@ def test_a_verdict_that_z3_disagrees_with_is_told_as_a_fault_of_rcsc(
     monkeypatch: pytest.MonkeyPatch, asked: str, claimed: str
 ) -> None:
     other, program = ANSWERED[claimed], ANSWERED[asked]
-    claim = prove_table(other, other.tables[0], Options(solver="boxes")).found
+    claim = prove_table(other, other.tables[0], BOXES).found
     monkeypatch.setattr("rcsc.table.decide._by_boxes", lambda *_: claim)
     monkeypatch.setattr("rcsc.table.decide.box_certificate", lambda *_: {})
     verdict = prove_program(program, Options())
@@ -312,7 +305,7 @@ ALLOWED = [
 def test_a_table_is_not_decided_under_what_cannot_hold(column: str, claim: str, possible: bool) -> None:
     text = f"assume it assumed : {claim}\ntable t assuming it {{\n| line | {column} | n ||\n| x | <= 1 | ||\n| y | > 1 | ||\n}}\n"
     program = program_of(HEAD + text)
-    options = Options(solver="boxes")
+    options = BOXES
     [whole] = prove_program(program, options).tables
     assert any(isinstance(one, ContradictoryAssumptions) for one in whole.found) is not possible
     assert not any(isinstance(one, Gap | Overlap | Undecided) for one in whole.found)

@@ -30,7 +30,8 @@ from rcsc.solvers.smtlib import cvc5_says
 from rcsc.table.program import prove_program
 from tests.bench import families
 from tests.certificates import Attack, signed, wrong_with
-from tests.support.emitted import EXTERN, RICH, program_of, shipped
+from tests.support.programs.examples import EXTERN, RICH
+from tests.support.programs.stages import program_of, shipped
 
 
 def by_cvc5(question: str) -> Answer:

@@ -4,30 +4,10 @@ import pytest
 
 from rcsc.certify import certify
 from rcsc.diagnostics.codes import Code
-from rcsc.diagnostics.diagnostic import Diagnostic
-from rcsc.lang.model import Program
-from rcsc.lang.resolve import compile_text
 from rcsc.procedures.invariants import assumptions_satisfiable, at_first
-from rcsc.solvers.options import Options
 from rcsc.solvers.smt import Answer
-from rcsc.table.program import ProgramVerdict, prove_program
-
-OPTIONS = Options(solver="boxes")
-
-
-def program_of(text: str) -> Program:
-    program = compile_text(text)
-    assert isinstance(program, Program), program
-    return program
-
-
-def proved(text: str) -> ProgramVerdict:
-    return prove_program(program_of(text), OPTIONS)
-
-
-def codes(found: tuple[Diagnostic, ...]) -> list[str]:
-    return [one.code.value for one in found if one.severity.value == "error"]
-
+from rcsc.table.program import prove_program
+from tests.support.programs.stages import BOXES, errors, program_of, verdict_of
 
 COUNTER = """
 input up : bool
@@ -46,7 +26,7 @@ table t {
 
 
 def test_an_invariant_is_kept_by_every_line() -> None:
-    assert codes(proved(COUNTER).findings) == []
+    assert errors(verdict_of(COUNTER).findings) == []
 
 
 @pytest.mark.parametrize(
@@ -59,11 +39,11 @@ def test_an_invariant_is_kept_by_every_line() -> None:
     ],
 )
 def test_a_mutant_is_caught(old: str, new: str, code: str) -> None:
-    assert code in codes(proved(COUNTER.replace(old, new)).findings)
+    assert code in errors(verdict_of(COUNTER.replace(old, new)).findings)
 
 
 def test_the_state_before_the_line_is_the_witness() -> None:
-    [found] = proved(COUNTER.replace("} }", "} m := max(m - 1, 1) }").replace("n < 7", "n < 0")).findings
+    [found] = verdict_of(COUNTER.replace("} }", "} m := max(m - 1, 1) }").replace("n < 7", "n < 0")).findings
     assert found.code.value == "RCS417"
     values = dict(zip(found.witnesses[0].variables, found.witnesses[0].values, strict=True))
     assert values == {"up": "true", "n": "1", "m": "2"}
@@ -78,18 +58,18 @@ def test_an_assumption_that_the_initial_values_break_is_told_at_its_place() -> N
 
 def test_a_default_line_owes_the_invariant_too() -> None:
     text = COUNTER.replace("| two  | false ||            |      |", "| two | DEFAULT || n := 5 | |")
-    assert codes(proved(text).findings) == ["RCS417"]
+    assert errors(verdict_of(text).findings) == ["RCS417"]
 
 
 def test_procedures_of_levels_keep_invariants_as_a_whole() -> None:
     level = (
         "procedure first { n := 5 } procedure second { m := 6 } level l { preprocess first, second table t }"
     )
-    assert codes(proved(COUNTER + level).findings) == []
-    assert codes(proved(COUNTER + level.replace("first, second", "first")).findings) == ["RCS417"]
+    assert errors(verdict_of(COUNTER + level).findings) == []
+    assert errors(verdict_of(COUNTER + level.replace("first, second", "first")).findings) == ["RCS417"]
     behind = level.replace("preprocess first, second table t", "table t postprocess first, second")
-    assert codes(proved(COUNTER + behind).findings) == []
-    assert codes(proved(COUNTER + behind.replace("m := 6", "m := 5")).findings) == ["RCS417"]
+    assert errors(verdict_of(COUNTER + behind).findings) == []
+    assert errors(verdict_of(COUNTER + behind.replace("m := 6", "m := 5")).findings) == ["RCS417"]
 
 
 def test_deferred_values_keep_invariants() -> None:
@@ -105,10 +85,10 @@ table t {
   | no   | false ||   |
 }
 """
-    assert codes(proved(text).findings) == ["RCS417"]
+    assert errors(verdict_of(text).findings) == ["RCS417"]
     more = text.replace("invariant", "invariant soon : x.next < 5 invariant") if ".next" in text else text
     assert more.count("invariant") == 1
-    assert codes(proved(text.replace("until ack", "until false")).findings) == []
+    assert errors(verdict_of(text.replace("until ack", "until false")).findings) == []
 
 
 EXTERN = """
@@ -127,9 +107,9 @@ table t {{
 
 
 def test_a_cycle_that_a_refused_extern_result_ends_leaves_the_invariant_true() -> None:
-    assert codes(proved(EXTERN.format(before="", after="n := 5 m := 6")).findings) == []
-    assert codes(proved(EXTERN.format(before="n := 5", after="m := 6")).findings) == ["RCS417"]
-    assert codes(proved(EXTERN.format(before="m := 6 n := 5", after="")).findings) == []
+    assert errors(verdict_of(EXTERN.format(before="", after="n := 5 m := 6")).findings) == []
+    assert errors(verdict_of(EXTERN.format(before="n := 5", after="m := 6")).findings) == ["RCS417"]
+    assert errors(verdict_of(EXTERN.format(before="m := 6 n := 5", after="")).findings) == []
 
 
 RELYING = """
@@ -147,12 +127,12 @@ table t {
 
 def test_tables_rely_on_invariants_and_so_does_the_checker() -> None:
     program = program_of(RELYING)
-    verdict = prove_program(program, OPTIONS)
-    assert codes(verdict.findings) == []
+    verdict = prove_program(program, BOXES)
+    assert errors(verdict.findings) == []
     assert verdict.certificate is not None
     assert certify(program, verdict.certificate).problems == ()
-    assert codes(proved(RELYING.replace("invariant small : n < 5", "")).findings) == ["RCS401"]
-    assert codes(proved(RELYING.replace("n < 5", "n < 6")).findings) == ["RCS401"]
+    assert errors(verdict_of(RELYING.replace("invariant small : n < 5", "")).findings) == ["RCS401"]
+    assert errors(verdict_of(RELYING.replace("n < 5", "n < 6")).findings) == ["RCS401"]
 
 
 ASSUMING = """
@@ -183,9 +163,9 @@ def test_contradictory_assumptions_are_found_where_boxes_decide(
     one: str, two: str, contradictory: bool
 ) -> None:
     text = ASSUMING.format(standing="", one=one, two=two)
-    assert codes(proved(text).findings) == (["RCS405"] if contradictory else [])
+    assert errors(verdict_of(text).findings) == (["RCS405"] if contradictory else [])
     program = program_of(text)
-    answer = assumptions_satisfiable(program, program.tables[0], OPTIONS)
+    answer = assumptions_satisfiable(program, program.tables[0], BOXES)
     assert (answer is Answer.UNSATISFIABLE) == contradictory
 
 
@@ -198,13 +178,13 @@ def test_an_assumption_that_contradicts_an_invariant_is_found_where_the_table_re
         f"invariant low : {bound}\nassume near : a <= s\n"
         "table t assuming near {\n| line | go ||\n| yes | true ||\n| no | false ||\n}\n"
     )
-    assert codes(proved(text).findings) == wrong
+    assert errors(verdict_of(text).findings) == wrong
 
 
 @pytest.mark.parametrize(("one", "wrong"), [("a < 10", []), ("a < 9", ["RCS406"]), ("a * a <= 81", [])])
 def test_an_assumption_that_claims_to_be_proved_is(one: str, wrong: list[str]) -> None:
-    found = proved(ASSUMING.format(standing="proved", one=one, two="a >= 0")).findings
-    assert codes(found) == wrong
+    found = verdict_of(ASSUMING.format(standing="proved", one=one, two="a >= 0")).findings
+    assert errors(found) == wrong
     assert all(
         dict(zip(at.variables, at.values, strict=True)) == {"a": "9"}
         for each in found
@@ -215,14 +195,14 @@ def test_an_assumption_that_claims_to_be_proved_is(one: str, wrong: list[str]) -
 
 def test_a_monitor_is_defined_for_every_input() -> None:
     monitored = ASSUMING.format(standing="monitored", one="a = 0 or 9 / a > 0", two="a >= 0")
-    assert codes(proved(monitored).findings) == []
-    assert codes(proved(monitored.replace("a = 0 or ", "")).findings) == ["RCS411"]
+    assert errors(verdict_of(monitored).findings) == []
+    assert errors(verdict_of(monitored.replace("a = 0 or ", "")).findings) == ["RCS411"]
 
 
 def test_an_unknown_answer_leaves_assumptions_undecided(monkeypatch: pytest.MonkeyPatch) -> None:
     import z3
 
     monkeypatch.setattr(z3.Solver, "check", lambda *_: z3.unknown)
-    verdict = proved(ASSUMING.format(standing="", one="a < 3 and a > 1", two="a >= 0"))
+    verdict = verdict_of(ASSUMING.format(standing="", one="a < 3 and a > 1", two="a >= 0"))
     assert verdict.proved is None
-    assert codes(verdict.findings) == ["RCS409"]
+    assert errors(verdict.findings) == ["RCS409"]

@@ -9,13 +9,13 @@ from rcsc.commands import run
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic
 from rcsc.diagnostics.source import Source
-from rcsc.lang.model import Int, Program
-from rcsc.lang.resolve import compile_text
+from rcsc.lang.model import Int
 from rcsc.solvers import smt
 from rcsc.solvers.options import Options
 from rcsc.solvers.smt import Answer, Limits, Solver, Term
 from rcsc.symbolic.encode import within
-from rcsc.table.program import ProgramVerdict, prove_program
+from rcsc.table.program import prove_program
+from tests.support.programs.stages import BOXES, codes, program_of, verdict_of
 
 VARIABLES = """
 enum colour { red, green, blue }
@@ -38,19 +38,9 @@ output out : int 0 .. 9
 """
 
 
-def proved(text: str, options: Options | None = None) -> ProgramVerdict:
-    program = compile_text(text)
-    assert isinstance(program, Program), program
-    return prove_program(program, options or Options(solver="boxes"))
-
-
-def body(statements: str, options: Options | None = None) -> tuple[Diagnostic, ...]:
+def body(statements: str, options: Options = BOXES) -> tuple[Diagnostic, ...]:
     """Findings on a procedure of its own, over `VARIABLES`."""
-    return proved(f"{VARIABLES}procedure p {{\n{statements}\n}}\n", options).findings
-
-
-def codes(found: tuple[Diagnostic, ...]) -> list[str]:
-    return [one.code.value for one in found]
+    return verdict_of(f"{VARIABLES}procedure p {{\n{statements}\n}}\n", options).findings
 
 
 RIGHT = [
@@ -132,7 +122,7 @@ WRONG = [
 @pytest.mark.parametrize(("statements", "code"), WRONG)
 def test_each_fault_is_found_at_its_place(statements: str, code: str) -> None:
     text = f"{VARIABLES}procedure p {{\n{statements}\n}}\nprocedure q(k : int 0 .. 9) {{ n := k }}\n"
-    found = proved(text).findings
+    found = verdict_of(text).findings
     assert set(codes(found)) == {code}
     line = text.splitlines().index(statements) + 1
     assert {Source("case.rcs", text).position(one.primary.span.start).line for one in found} == {line}
@@ -172,7 +162,7 @@ table t {{
 
 def table(low: str = "", high: str = "", out: str = "") -> tuple[Diagnostic, ...]:
     grow = GROW if "grow" in low + high else ""
-    return proved(VARIABLES + grow + TABLE.format(low=low, high=high, out=out)).findings
+    return verdict_of(VARIABLES + grow + TABLE.format(low=low, high=high, out=out)).findings
 
 
 def test_a_line_runs_under_its_conditions() -> None:
@@ -200,8 +190,8 @@ table t {
 }
 """
     )
-    assert "RCS413" not in codes(proved(text).findings)
-    assert "RCS413" in codes(proved(text.replace("n - 6", "n - 7")).findings)
+    assert "RCS413" not in codes(verdict_of(text).findings)
+    assert "RCS413" in codes(verdict_of(text.replace("n - 6", "n - 7")).findings)
 
 
 @pytest.mark.parametrize(
@@ -232,7 +222,7 @@ def test_the_solver_reads_an_array_at_a_changing_place(second: str, wrong: list[
         "input a : int 0 .. 3\ninput b : int -5 .. 5\nstate xs : array[4] of int 0 .. 9\n"
         f"table t {{\n| line | when ||\n| one | xs[a] * b > 3 ||\n| two | {second} ||\n}}\n"
     )
-    assert codes(proved(program, Options()).findings) == wrong
+    assert codes(verdict_of(program, Options()).findings) == wrong
 
 
 def test_actions_that_never_write_together_are_no_two_writers() -> None:
@@ -247,8 +237,8 @@ table t {
 }
 """
     )
-    assert codes(proved(text).findings) == []
-    assert codes(proved(text.replace("not yes", "n = 0")).findings) == ["RCS415"]
+    assert codes(verdict_of(text).findings) == []
+    assert codes(verdict_of(text.replace("not yes", "n = 0")).findings) == ["RCS415"]
 
 
 def test_assumptions_are_used_and_must_be_defined_themselves() -> None:
@@ -262,9 +252,9 @@ table t assuming small {
 }
 """
     )
-    assert codes(proved(text).findings) == []
-    assert codes(proved(text.replace("assuming small ", "")).findings) == ["RCS412"]
-    [found] = proved(text.replace("a < 4", "9 / a > 2")).findings
+    assert codes(verdict_of(text).findings) == []
+    assert codes(verdict_of(text.replace("assuming small ", "")).findings) == ["RCS412"]
+    [found] = verdict_of(text.replace("a < 4", "9 / a > 2")).findings
     assert found.code is Code.DIVISION_BY_ZERO
     assert [(witness.table, witness.variables, witness.values) for witness in found.witnesses] == [
         ("", ("a",), ("0",))
@@ -287,7 +277,7 @@ table t {{
   | all  | >= 0 || p          |
 }}
 """
-    assert codes(proved(text).findings) == ([Code.DIVISION_BY_ZERO.value] if looked_at else [])
+    assert codes(verdict_of(text).findings) == ([Code.DIVISION_BY_ZERO.value] if looked_at else [])
 
 
 def test_every_condition_is_defined_whatever_the_others_say() -> None:
@@ -301,11 +291,11 @@ table t {
 }
 """
     )
-    found = proved(text)
+    found = verdict_of(text)
     assert codes(found.findings) == ["RCS411"]
     assert [one.undecided for one in found.tables] == [True]
     guarded = text.replace("| 100 / b |", "| when |").replace("> 20   ", "b > 0 and 100 / b > 20")
-    assert "RCS411" not in codes(proved(guarded).findings)
+    assert "RCS411" not in codes(verdict_of(guarded).findings)
 
 
 OUTSIDE = {
@@ -330,8 +320,8 @@ def test_a_condition_outside_tables_is_defined_under_the_invariants_and_an_invar
 ) -> None:
     text = f"{VARIABLES}state q : int 0 .. 4 = 1\n{OUTSIDE[place].format(condition)}"
     wrong = [code] if code else []
-    assert codes(proved(text).findings) == wrong
-    assert codes(proved(text + "invariant above : q > 0 and s <= 0\n").findings) == (
+    assert codes(verdict_of(text).findings) == wrong
+    assert codes(verdict_of(text + "invariant above : q > 0 and s <= 0\n").findings) == (
         wrong if place == "invariant" else []
     )
 
@@ -344,8 +334,8 @@ extern procedure look reads a writes n python "m:f" c "f"
 procedure p { look if n < 9 { n := n + 1 } }
 """
     )
-    assert codes(proved(text).findings) == []
-    [found] = proved(text.replace("if n < 9 ", "if a = 2 ")).findings
+    assert codes(verdict_of(text).findings) == []
+    [found] = verdict_of(text.replace("if n < 9 ", "if a = 2 ")).findings
     assert dict(zip(found.witnesses[0].variables, found.witnesses[0].values, strict=True))["a"] == "2"
 
 
@@ -356,7 +346,7 @@ def test_unknown_is_never_proved(monkeypatch: pytest.MonkeyPatch) -> None:
     import z3
 
     monkeypatch.setattr(z3.Solver, "check", lambda *_: z3.unknown)
-    found = proved(f"{VARIABLES}procedure p {{ if b /= 0 {{ m := 100 / b }} }}")
+    found = verdict_of(f"{VARIABLES}procedure p {{ if b /= 0 {{ m := 100 / b }} }}")
     assert found.proved is None
     assert codes(found.findings) == ["RCS409"]
 
@@ -371,7 +361,7 @@ def test_a_solver_that_breaks_proves_nothing(monkeypatch: pytest.MonkeyPatch, er
     for method in ("check", "add"):
         with monkeypatch.context() as patch:
             patch.setattr(z3.Solver, method, broken)
-            found = proved(f"{VARIABLES}procedure p {{ if b /= 0 {{ m := 100 / b }} }}")
+            found = verdict_of(f"{VARIABLES}procedure p {{ if b /= 0 {{ m := 100 / b }} }}")
         assert found.proved is None
         assert codes(found.findings) == ["RCS409"]
 
@@ -388,7 +378,7 @@ def test_what_bounds_settle_costs_no_query(monkeypatch: pytest.MonkeyPatch) -> N
         raise AssertionError
 
     monkeypatch.setattr(Solver, "check", asked)
-    verdict = proved(
+    verdict = verdict_of(
         f"{VARIABLES}procedure p {{ if a < 9 {{ n := a + 1 }} m := 3 * a if a in {{1, 2}} {{ xs[a] := 1 }} }}"
     )
     assert verdict.proved is not None
@@ -397,7 +387,9 @@ def test_what_bounds_settle_costs_no_query(monkeypatch: pytest.MonkeyPatch) -> N
 
 
 def test_one_query_shows_all_that_a_line_owes() -> None:
-    verdict = proved(f"{VARIABLES}procedure p {{ if b /= 0 {{ m := 100 / b  m := 50 / b  m := 20 mod b }} }}")
+    verdict = verdict_of(
+        f"{VARIABLES}procedure p {{ if b /= 0 {{ m := 100 / b  m := 50 / b  m := 20 mod b }} }}"
+    )
     assert verdict.proved is not None
     assert (verdict.tally.by_solver, verdict.tally.queries) == (3, 1)
 
@@ -423,7 +415,7 @@ def test_runs_that_are_too_long_to_follow_are_undecided(
     monkeypatch: pytest.MonkeyPatch, text: str, place: str, what: str
 ) -> None:
     monkeypatch.setattr("rcsc.symbolic.evaluation.MOST_STEPS", 50)
-    found = proved(VARIABLES + text)
+    found = verdict_of(VARIABLES + text)
     assert found.proved is None
     [one] = found.findings
     assert one.code is Code.UNDECIDED
@@ -433,15 +425,13 @@ def test_runs_that_are_too_long_to_follow_are_undecided(
 
 def test_long_loops_are_followed() -> None:
     text = "state k : int 0 .. 4096 procedure p { k := 0 for i in 1 .. 4096 { k := k + 1 } k := k - 4096 }"
-    assert proved(text).proved is not None
-    assert codes(proved(text.replace("- 4096 }", "- 4095 k := k - 2 }")).findings) == ["RCS413"]
+    assert verdict_of(text).proved is not None
+    assert codes(verdict_of(text.replace("- 4096 }", "- 4095 k := k - 2 }")).findings) == ["RCS413"]
 
 
 def test_only_the_tables_asked_for_are_proved() -> None:
     text = VARIABLES + GROW + TABLE.format(low="", high="grow", out="")
-    program = compile_text(text)
-    assert isinstance(program, Program)
-    verdict = prove_program(program, Options(solver="boxes"), only=())
+    verdict = prove_program(program_of(text), BOXES, only=())
     assert (verdict.tables, verdict.proved) == ((), None)
     assert codes(verdict.findings) == []
 
@@ -451,8 +441,8 @@ def test_processes_give_the_same_verdicts() -> None:
         f"table t{at} {{\n  | line | a || out |\n  | l | < {at} || 1 |\n  | h | >= 3 || 2 |\n}}\n"
         for at in (2, 3, 4)
     )
-    one = proved(text)
-    two = proved(text, replace(Options(solver="boxes"), jobs=2))
+    one = verdict_of(text)
+    two = verdict_of(text, replace(BOXES, jobs=2))
     assert one.findings == two.findings
     assert [v.found for v in one.tables] == [v.found for v in two.tables]
     assert codes(one.findings) == ["RCS401", "RCS402"]
@@ -477,7 +467,7 @@ def test_what_the_processor_time_ended_is_undecided() -> None:
 def test_a_table_of_which_a_question_was_cut_short_is_undecided(monkeypatch: pytest.MonkeyPatch) -> None:
     ended = iter(range(100))
     monkeypatch.setattr(smt, "cut_short", lambda: next(ended))
-    verdict = proved("input a : bool\ntable t {\n| line | a ||\n| x | true ||\n| y | false ||\n}\n")
+    verdict = verdict_of("input a : bool\ntable t {\n| line | a ||\n| x | true ||\n| y | false ||\n}\n")
     assert verdict.proved is None
     assert codes(verdict.findings) == ["RCS409"]
 
@@ -505,9 +495,9 @@ def test_no_question_is_asked_past_what_all_of_them_may_cost(
     place: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     text = PAIR + OWED[place]
-    assert proved(text).proved is not None
+    assert verdict_of(text).proved is not None
     monkeypatch.setattr("rcsc.solvers.options.TOGETHER", 0)
-    found = proved(text)
+    found = verdict_of(text)
     assert found.proved is None
     assert set(codes(found.findings)) == {"RCS409"}
 
@@ -517,11 +507,11 @@ def test_questions_that_are_decided_one_by_one_may_be_too_many_together(
 ) -> None:
     options = Options(solver="boxes", steps=20_000)
     text = PAIR + OWED["a table"]
-    assert proved(text, options).proved is not None
+    assert verdict_of(text, options).proved is not None
     spent: list[int] = []
     monkeypatch.setattr("rcsc.solvers.options.TOGETHER", 1)
     for steps in (20_000, 400):
-        found = [proved(text, replace(options, steps=steps)) for _ in range(2)]
+        found = [verdict_of(text, replace(options, steps=steps)) for _ in range(2)]
         assert found[0].findings == found[1].findings
         spent.append(len(found[0].findings))
     assert spent == [0, 1]

@@ -9,9 +9,10 @@ from rcsc.driver.settings import Proof
 from rcsc.host.cache import Cache
 from rcsc.lang.model import Program
 from rcsc.lang.project import load
-from rcsc.lang.resolve import compile_text, resolve
+from rcsc.lang.resolve import resolve
 from rcsc.solvers.options import Options
 from rcsc.table import program as proving
+from tests.support.programs.stages import codes, errors, verdict_of
 
 HEAD = """\
 input n : int 0 .. 9
@@ -98,7 +99,7 @@ def test_notes_move_with_their_table(cache: Cache, proved: list[str]) -> None:
 def test_nothing_is_kept_of_a_program_with_errors(cache: Cache, proved: list[str]) -> None:
     broken = HEAD + TABLES.replace("| >= 5 ||", "| >= 6 ||")
     first = run(broken, cache)
-    assert {one.code.value for one in first.found} == {"RCS401", "RCS407"}
+    assert set(codes(first.found)) == {"RCS401", "RCS407"}
     assert seen(run(broken, cache)) == seen(first)
     assert proved == ["one", "two"] * 2
 
@@ -106,20 +107,14 @@ def test_nothing_is_kept_of_a_program_with_errors(cache: Cache, proved: list[str
 def test_a_procedure_that_lines_guard_is_proved_by_itself_once_no_line_calls_it(cache: Cache) -> None:
     calling, silent = HEAD + TABLES, HEAD + TABLES.replace("|| bump       |", "||            |")
     assert run(calling, cache).proved is None
-    assert not [one for one in run(calling, cache).found if one.severity.value == "error"]
-    assert [one.code.value for one in run(silent, cache).found if one.severity.value == "error"] == ["RCS413"]
+    assert errors(run(calling, cache).found) == []
+    assert errors(run(silent, cache).found) == ["RCS413"]
 
 
 def test_a_procedure_run_by_a_level_is_not_excused_by_the_lines_that_guard_it() -> None:
     text = HEAD + TABLES + "level l { period 40 [ms] preprocess bump table one }\n"
-    program = compile_text(text)
-    assert isinstance(program, Program)
-    found = proving.prove_program(program, Options()).findings
-    assert [one.code.value for one in found if one.severity.value == "error"] == ["RCS413"]
-
-
-def errors(proof: Proof) -> list[str]:
-    return [one.code.value for one in proof.found if one.severity.value == "error"]
+    found = verdict_of(text, Options()).findings
+    assert errors(found) == ["RCS413"]
 
 
 def guarded(name: str, procedure: str) -> str:
@@ -134,13 +129,13 @@ table {name} {{
 
 def test_tables_kept_from_different_versions_do_not_excuse_a_procedure_together(cache: Cache) -> None:
     for first, second in (("bump", "rest"), ("rest", "bump")):
-        assert errors(run(HEAD + guarded("one", first) + guarded("two", second), cache)) == []
+        assert errors(run(HEAD + guarded("one", first) + guarded("two", second), cache).found) == []
     nobody = HEAD + guarded("one", "rest") + guarded("two", "rest")
-    assert errors(run(nobody, cache)) == ["RCS413"]
+    assert errors(run(nobody, cache).found) == ["RCS413"]
 
 
 def test_a_constant_that_an_action_uses_is_part_of_its_table(cache: Cache) -> None:
     text = "const step = 1\n" + HEAD + TABLES.replace("|| bump       |", "|| s := s + step |")
-    assert errors(run(text.replace("procedure bump { s := s + 1 }", ""), cache)) == []
+    assert errors(run(text.replace("procedure bump { s := s + 1 }", ""), cache).found) == []
     wider = text.replace("procedure bump { s := s + 1 }", "").replace("step = 1", "step = 5")
-    assert errors(run(wider, cache)) == ["RCS413"]
+    assert errors(run(wider, cache).found) == ["RCS413"]

@@ -25,7 +25,6 @@ from rcsc.host.files.plain import plain, read
 from rcsc.lang.interpret import Fault, cycle, evaluate, initial, run_table, unfit
 from rcsc.lang.meaning import with_stops
 from rcsc.lang.model import Bool, Int, Kind, Program, Snapshot, Value
-from rcsc.lang.resolve import compile_text
 from rcsc.run.adopt import restart
 from rcsc.run.buffers import CommonMemory
 from rcsc.run.executors import CExecutor, PythonExecutor, build
@@ -33,18 +32,13 @@ from rcsc.run.levels import BadState, RunningLevel
 from rcsc.run.signature import signature
 from rcsc.solvers.options import Options
 from rcsc.symbolic.values import TRUE, constant
-from rcsc.table.program import ProgramVerdict, prove_program
+from rcsc.table.program import prove_program
 from rcsc.testing.executors.equality import same_value
-from tests.support.emitted import STOPS, proved_of
+from tests.support.programs.examples import STOPS
+from tests.support.programs.stages import BOXES, codes, program_of, proved_of, verdict_of
 
 SAFETY = {"RCS410", "RCS411", "RCS412", "RCS413", "RCS414", "RCS415", "RCS417"}
 UNDEFINED = (ArithmeticError, IndexError, KeyError)
-
-
-def verdict_of(text: str) -> ProgramVerdict:
-    program = compile_text(text)
-    assert isinstance(program, Program), program
-    return prove_program(program, Options(solver="boxes"))
 
 
 def stops_of(text: str) -> tuple[str, ...]:
@@ -146,7 +140,7 @@ table t assuming some, third {{
   | all  |   || 1 |
 }}
 """
-    assert [finding.code.value for finding in verdict_of(text).findings] == ["RCS411"]
+    assert codes(verdict_of(text).findings) == ["RCS411"]
 
 
 # --- by brute force ------------------------------------------------------------------
@@ -235,10 +229,9 @@ def safe(program: Program, stops: tuple[str, ...], every: list[dict[str, Value]]
 def test_no_input_goes_wrong_and_no_fewer_assumptions_would_do() -> None:
     stopping, refused = 0, 0
     for seed in range(SEEDS):
-        program = compile_text(drawn(seed))
-        assert isinstance(program, Program), (seed, program)
+        program = program_of(drawn(seed))
         every, names = states(program), program.tables[0].assumptions
-        verdict = prove_program(program, Options(solver="boxes"))
+        verdict = prove_program(program, BOXES)
         owed = [finding for finding in verdict.findings if finding.code.value in SAFETY]
         if owed:
             refused += 1
@@ -325,7 +318,7 @@ procedure q { spot.safe := 1
 
 def test_safe_values_keep_the_invariants() -> None:
     text = "output a : bool safe true\noutput b : bool{}\ninvariant one : not a or not b\n"
-    assert [finding.code.value for finding in verdict_of(text.format("")).findings] == ["RCS417"]
+    assert codes(verdict_of(text.format("")).findings) == ["RCS417"]
     assert verdict_of(text.format(" safe false")).findings == ()
 
 

@@ -18,10 +18,10 @@ from rcsc.driver.check import check
 from rcsc.driver.settings import Settings
 from rcsc.lang.interpret import holds, matching_lines
 from rcsc.lang.model import Program, Value
-from rcsc.lang.resolve import compile_text
 from rcsc.solvers.options import Options
 from rcsc.table.program import prove_program
 from rcsc.table.verdict import ContradictoryAssumptions, DeadLine, Gap, Overlap, Undecided
+from tests.support.programs.stages import drawn_program, program_of, verdict_of
 
 HERE = {
     "lib": "state a : int 0 .. 9\ninput g : bool\ntable t {\n  | line | a ||\n  | l | <= 4 ||\n  | h | 5 .. 8 ||\n}\n",
@@ -213,9 +213,7 @@ def told(program: Program, options: Options) -> tuple[set[object], list[object],
 @given(tables())
 @settings(max_examples=60, deadline=None)
 def test_every_way_of_deciding_finds_what_trying_all_inputs_finds(text: str) -> None:
-    program = compile_text(text)
-    if not isinstance(program, Program):  # a cell that nothing satisfies is an error of its own
-        return
+    program = drawn_program(text)  # a cell that nothing satisfies is an error of its own
     by_boxes, auto, both = (told(program, Options(solver=how)) for how in ("boxes", "auto", "both"))
     assert by_boxes == auto == both
     assert by_boxes[0] == brute(program)
@@ -229,9 +227,7 @@ def test_what_an_assumption_kills_is_told(solver: Literal["boxes", "auto", "both
     """Boxes prove both tables without the assumption, under which a line, and DEFAULT, are dead."""
     head = "input v : bool\nassume up assumed : v\ntable t assuming up {\n  | line | v ||\n  | l | true ||\n"
     for last, code in (("  | m | false ||\n", Code.DEAD_LINE), ("  | d | DEFAULT ||\n", Code.DEFAULT_DEAD)):
-        program = compile_text(f"{head}{last}}}\n")
-        assert isinstance(program, Program)
-        [found] = prove_program(program, Options(solver=solver)).findings
+        [found] = verdict_of(f"{head}{last}}}\n", Options(solver=solver)).findings
         assert found.code is code
         assert found.notes == ("under `up`",)
         assert found.severity is Severity.WARNING  # where the assumption fails it may match
@@ -239,41 +235,35 @@ def test_what_an_assumption_kills_is_told(solver: Literal["boxes", "auto", "both
 
 @pytest.mark.parametrize("solver", ["boxes", "auto", "both"])
 def test_a_line_that_an_invariant_kills_is_a_mistake(solver: Literal["boxes", "auto", "both"]) -> None:
-    program = compile_text(
+    text = (
         "state v : bool = true\ninput w : bool\ninvariant up : v\nassume w_up assumed : w\ntable t assuming w_up {\n"
         "  | line | v ||\n  | l | true ||\n  | m | false ||\n}\n"
     )
-    assert isinstance(program, Program)
-    found = prove_program(program, Options(solver=solver)).findings
+    found = verdict_of(text, Options(solver=solver)).findings
     assert [(one.code, one.severity) for one in found] == [(Code.DEAD_LINE, Severity.ERROR)]
 
 
 def test_a_gap_between_related_lines_is_told_with_the_region_around_its_least_point() -> None:
-    program = compile_text(
+    text = (
         "input x : int 0 .. 9\ninput y : int 0 .. 9\n"
         "table t {\n  | line | when ||\n  | l | x < y ||\n  | m | x > y + 1 ||\n}\n"
     )
-    assert isinstance(program, Program)
-    [gap] = [one for one in prove_program(program, Options()).tables[0].found if isinstance(one, Gap)]
+    [gap] = [one for one in verdict_of(text, Options()).tables[0].found if isinstance(one, Gap)]
     assert gap.witnesses == ({"x": 0, "y": 0},)
     assert gap.regions[0] is not None
 
 
 def test_the_zeros_of_both_signs_are_one_value_to_the_solver() -> None:
-    program = compile_text(
-        "input r : real -1.0 .. 1.0\ntable t {\n  | line | r * 0.0 ||\n  | l | = 0.0 ||\n}\n"
-    )
-    assert isinstance(program, Program)
-    assert prove_program(program, Options()).tables[0].found == ()
+    text = "input r : real -1.0 .. 1.0\ntable t {\n  | line | r * 0.0 ||\n  | l | = 0.0 ||\n}\n"
+    assert verdict_of(text, Options()).tables[0].found == ()
 
 
 def test_what_an_unproved_invariant_kills_says_so() -> None:
-    program = compile_text(
+    text = (
         "state n : int 0 .. 9 = 1\ninput v : bool\ninvariant small : n <= 4\n"
         "table t {\n  | line | n || n |\n  | l | <= 4 || 9 |\n  | d | DEFAULT || 1 |\n}\n"
     )
-    assert isinstance(program, Program)
-    notes = {finding.code: finding.notes for finding in prove_program(program, Options()).findings}
+    notes = {finding.code: finding.notes for finding in verdict_of(text, Options()).findings}
     assert notes[Code.DEFAULT_DEAD] == ("under `small` (not proved)",)
 
 
@@ -292,11 +282,10 @@ PRODUCTS: list[tuple[str, str, set[type]]] = [
 def test_what_inputs_show_of_products_of_doubles_is_told_though_z3_gives_up(
     one: str, two: str, wrong: set[type], steps: int, assumed: str
 ) -> None:
-    program = compile_text(
+    program = program_of(
         "input r : real 0.0 .. 2.0\ninput s : real 0.0 .. 2.0\nassume low assumed : r <= 1.5\n"
         f"table t {assumed}{{\n| line | when ||\n| a | {one} ||\n| b | {two} ||\n}}\n"
     )
-    assert isinstance(program, Program)
     [table] = prove_program(program, Options(solver="boxes", steps=steps)).tables
     kinds = {type(found) for found in table.found}
     assert kinds - {Undecided} <= wrong

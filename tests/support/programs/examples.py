@@ -1,15 +1,4 @@
-"""Programs for the tests of what is generated, and their generated files."""
-
-from pathlib import Path
-
-from rcsc.emit.c99 import emit_c
-from rcsc.emit.lower import lower
-from rcsc.emit.python import emit_python
-from rcsc.lang.model import Program, ProvedProgram, seal_of_proof
-from rcsc.lang.project import load
-from rcsc.lang.resolve import compile_text, resolve
-from rcsc.solvers.options import Options
-from rcsc.table.program import prove_program
+"""Programs that tests of several rooms use, and what each has."""
 
 SHIPPED = ("tables/task/acquire.rcs", "tables/examples/approach.rcs")
 
@@ -182,36 +171,3 @@ level top {
 }
 """
 """Every fault can be met: it is not proved. Outputs of each kind with a safe value, and some without."""
-
-
-def program_of(text: str) -> Program:
-    """The program of a lone text."""
-    program = compile_text(text)
-    assert isinstance(program, Program), [(d.code, d.message) for d in program]
-    return program
-
-
-def proved_of(text: str) -> Program:
-    """The program of a lone text as `prove` leaves it, with its stopping assumptions."""
-    verdict = prove_program(program_of(text), Options(solver="boxes"))
-    assert verdict.proved is not None, verdict.findings
-    return verdict.proved.program
-
-
-def stopping(text: str) -> Program:
-    """The program of a lone text with its stopping assumptions, whether it is proved or not."""
-    return prove_program(program_of(text), Options(solver="boxes")).program
-
-
-def shipped(path: str, repo: Path) -> Program:
-    """The program of a file of the repository."""
-    loaded = load([str(repo / path)])
-    program = resolve(loaded.roots[0], loaded)
-    assert isinstance(program, Program), program
-    return program
-
-
-def emitted(program: Program) -> dict[str, str]:
-    """Its generated files; these tests are about emission, so that the proof is taken as given."""
-    plan = lower(ProvedProgram(program, seal_of_proof()))
-    return emit_c(plan) | emit_python(plan)
