@@ -175,7 +175,10 @@ def let_go(path: Path) -> None:
 
 def lock(path: Path) -> int | None:
     """Lock what was just made at `path` for as long as this process lives; a descriptor, or None where a sweep was first."""
-    opened = os.open(path, os.O_RDONLY)
+    try:
+        opened = os.open(path, os.O_RDONLY)
+    except FileNotFoundError:
+        return None
     fcntl.flock(opened, fcntl.LOCK_EX)
     with contextlib.suppress(FileNotFoundError):
         if os.path.samestat(os.stat(path), os.fstat(opened)):

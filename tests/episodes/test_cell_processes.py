@@ -1,9 +1,7 @@
-"""The whole system, each level in a process of its own: MAKE BOXT ends, though levels are killed while it runs."""
+"""The whole system, each level in a process of its own: MAKE BOXT ends, though levels are killed while it runs and the others wait."""
 
 import json
-import os
 import signal
-import time
 from pathlib import Path
 
 from rcsc.run.description import description
@@ -14,23 +12,6 @@ from tests.support.cells import SYSTEM
 RATE = 4.0
 """Times as fast as the clock: a cycle in ten milliseconds."""
 KILLED = ("task", "primitive", "emove", "gripper", "vision")
-
-
-def replace(system: Supervisor, name: str) -> None:
-    """Kills a level while all run, and lets the others wait until it has begun again: how long that takes is the machine's."""
-    system.stop(name, signal.SIGKILL)
-    others = [process.pid for other, process in system._running.items() if other != name]
-    for pid in others:
-        os.kill(pid or 0, signal.SIGSTOP)
-    try:
-        region = system.buffers.layout.regions[name]
-        before = system.buffers.block.word(region.at)
-        system.start(name)
-        while system.buffers.block.word(region.at) == before and system.runs(name):
-            time.sleep(0.005)
-    finally:
-        for pid in others:
-            os.kill(pid or 0, signal.SIGCONT)
 
 
 def test_make_boxt_ends_though_every_level_is_killed_once(tmp_path: Path) -> None:
@@ -46,7 +27,8 @@ def test_make_boxt_ends_though_every_level_is_killed_once(tmp_path: Path) -> Non
         """Kills the next level whenever three rows more are done."""
         done = len(results.read_text(encoding="utf-8").splitlines())
         if len(killed) < len(KILLED) and done >= 2 + 3 * len(killed) and system.runs(KILLED[len(killed)]):
-            replace(system, KILLED[len(killed)])
+            system.stop(KILLED[len(killed)], signal.SIGKILL)
+            system.start(KILLED[len(killed)])
             killed.append(KILLED[len(killed)])
 
     run_processes(

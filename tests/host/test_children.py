@@ -262,6 +262,7 @@ def test_a_lock_on_what_is_gone_is_none(tmp_path: Path, monkeypatch: pytest.Monk
     os.close(sweeping)
     waiter.join()
     assert found == [None]
+    assert children.lock(path) is None, "swept before it was opened"
 
 
 def test_ctrl_c_ends_a_wait_after_a_question() -> None:

@@ -22,6 +22,7 @@ from rcsc.run.buffers import Buffers, CommonMemory
 from rcsc.run.description import BadDescription, Description, LevelSpec, Wire, description
 from rcsc.run.processes import serve, supervisor
 from rcsc.run.processes.block import FOLDER, PREFIX, Block
+from rcsc.run.processes.clocks import LONGEST_NAP_S, MOST_WAIT_S, Clocks, Turn
 from rcsc.run.processes.memory import TRIES, Absent, Layout, SharedMemoryBuffers, layout
 from rcsc.run.processes.serve import Factory, begin, cycle
 from rcsc.run.processes.supervisor import Supervisor, run_processes
@@ -627,6 +628,128 @@ def test_common_memory_and_shared_memory_are_used_alike(buffers: SharedMemoryBuf
         transport.publish("far.out", pattern(1))
         transport.publish("far.out", pattern(2))
         assert transport.latest("far.out") == pattern(2)
+
+
+# --- who waits for whom ---
+
+
+class Scene:
+    """Three clocks, `a` of 40 ms, `b` of 40 ms and `c` of 80 ms, and a time of its own: what happens while somebody sleeps."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, block: Block) -> None:
+        self.clocks = Clocks(block, 0, {"a": 40, "b": 40, "c": 80})
+        self.turn = Turn(self.clocks, "a")
+        self.now_s, self.meanwhile = 0.0, list[Callable[[], None]]()
+        stub = SimpleNamespace(monotonic=lambda: self.now_s, sleep=self.sleep)
+        monkeypatch.setattr("rcsc.run.processes.clocks.time", stub)
+
+    def sleep(self, seconds: float) -> None:
+        assert seconds <= LONGEST_NAP_S
+        self.now_s += seconds
+        if self.meanwhile:
+            self.meanwhile.pop(0)()
+
+    def all_at(self, now_ms: int) -> None:
+        for name in self.clocks.periods_ms:
+            self.clocks.set(name, now_ms)
+
+    def waited(self) -> bool:
+        """Whether `a` had to wait, and until everything had happened."""
+        before = self.now_s
+        self.turn.wait()
+        assert not self.meanwhile, "it did not wait to the end"
+        return self.now_s > before
+
+
+@pytest.fixture
+def scene(monkeypatch: pytest.MonkeyPatch) -> Iterator[Scene]:
+    block = Block.create(Clocks.size(3))
+    try:
+        yield Scene(monkeypatch, block)
+    finally:
+        block.unlink()
+        block.close()
+
+
+@pytest.mark.parametrize(
+    ("own_ms", "b_ms", "c_ms", "waits"),
+    [
+        (0, 0, 0, False),
+        (40, 0, 0, False),
+        (80, 40, 0, False),
+        (80, 0, 80, True),  # more than a period of 40 ms behind
+        (120, 80, 40, False),
+        (160, 120, 40, True),  # more than a period of 80 ms
+        (0, 4000, 4000, False),  # who is furthest behind never waits
+    ],
+)
+def test_nobody_begins_a_cycle_while_another_is_more_than_its_period_behind(
+    scene: Scene, own_ms: int, b_ms: int, c_ms: int, waits: bool
+) -> None:
+    for name, now_ms in {"a": own_ms, "b": b_ms, "c": c_ms}.items():
+        scene.clocks.set(name, now_ms)
+    if waits:
+        scene.meanwhile = [lambda: None, lambda: scene.all_at(own_ms)]
+    assert scene.waited() is waits
+
+
+def test_who_never_began_is_not_waited_for_and_who_begins_again_is(scene: Scene) -> None:
+    scene.clocks.set("a", 4000)
+    assert not scene.waited()
+    scene.clocks.set("b", 80)
+    scene.clocks.start("b")
+    assert scene.clocks.now_ms("b") == 80
+    scene.meanwhile = [lambda: scene.clocks.set("b", 4000)]
+    assert scene.waited()
+
+
+def test_who_does_not_move_is_waited_for_once(scene: Scene) -> None:
+    """Then the others go on without it; when it moves it is waited for again, and has to make up for nothing."""
+    for name, now_ms in {"a": 400, "b": 40, "c": 400}.items():
+        scene.clocks.set(name, now_ms)
+    assert scene.waited()
+    assert MOST_WAIT_S < scene.now_s < MOST_WAIT_S + 1
+    assert scene.clocks.now_ms("a") == 80
+    for _ in range(5):
+        scene.turn.done()
+        assert not scene.waited()
+    scene.clocks.set("b", 80)
+    scene.meanwhile = [lambda: scene.clocks.set("b", 120), lambda: scene.clocks.set("b", 240)]
+    assert scene.waited()
+
+
+def test_a_wait_ends_when_it_is_told(scene: Scene) -> None:
+    told: list[int] = []
+    scene.clocks.set("a", 400)
+    scene.clocks.set("b", 0)
+    scene.meanwhile = [lambda: None, lambda: told.append(signal.SIGTERM)]
+    beats = scene.clocks.beats("a")
+    scene.turn.wait(told)
+    assert scene.now_s < 1
+    assert scene.clocks.beats("a") == beats + 3, "who waits shows that it is alive"
+
+
+def test_no_process_runs_ahead_of_one_that_gets_no_processor(repo: Path, tmp_path: Path) -> None:
+    """What stands outside is stopped for a while, again and again, as by a busy machine: nothing happens that it does not see."""
+    stops = list[int]()
+
+    def watch(system: Supervisor) -> None:
+        now_ms = system._clocks.now_ms("below") or 0
+        if now_ms < 400 * (len(stops) + 1) or len(stops) == 3:
+            return
+        pid = system._running["below"].pid or 0
+        os.kill(pid, signal.SIGSTOP)
+        time.sleep(0.15)
+        stopped_ms = system._clocks.now_ms("below") or 0
+        stops.append(max(system._clocks.now_ms(name) or 0 for name in ("task", "sender")) - stopped_ms)
+        os.kill(pid, signal.SIGCONT)
+
+    run_processes(
+        alone(repo), "python", outside(tmp_path, 10, 1), queries=QUERIES, rate=20.0, watch=watch
+    )  # fmt: skip
+    assert len(stops) == 3
+    assert max(stops) <= 80, "a period that it may be ahead, and the one that it has just run"
+    answered_once(tmp_path / "sent", 10 * len(ROUND), 1)
 
 
 # --- what stands still ---

@@ -18,6 +18,10 @@ disk when the run ends, also after a kill: a keeper process sees to it.
 Trusted: that a store of a machine word is seen whole. What it costs: a copy of each region in and out, which `python
 -m tests.bench.transport` measures.
 
+Processes run by the clock, and on a machine that is too busy for that they run slower, but not apart: none begins a
+cycle while another is more than a period behind.
+
 Modules, in the order the data flows: `block` is shared memory that is cleared away, `memory` the buffers in it,
-`serve` runs one level or one thing outside, `supervisor` begins them, watches their pulse and stops them.
+`clocks` how far each process has come, `serve` runs one level or one thing outside, `supervisor` begins them, watches
+their pulse and stops them.
 """

@@ -172,9 +172,9 @@ class SharedMemoryBuffers:
     _read: dict[str, tuple[bytes, Values]] = field(default_factory=dict)
 
     @classmethod
-    def create(cls, layout: Layout) -> Self:
-        """A new block in which no buffer holds anything."""
-        made = cls(Block.create(layout.size), layout)
+    def create(cls, layout: Layout, more: int = 0) -> Self:
+        """A new block in which no buffer holds anything, with so many bytes more after the layout's."""
+        made = cls(Block.create(layout.size + more), layout)
         for name, region in layout.regions.items():
             made._commit(name, 0, bytes(region.packed.size))
         return made

@@ -10,7 +10,7 @@ import os
 import signal
 import struct
 import time
-from collections.abc import Iterator, Sized
+from collections.abc import Iterator, Mapping, Sized
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -19,6 +19,7 @@ from rcsc.run.buffers import Buffers
 from rcsc.run.description import Description
 from rcsc.run.executors import CExecutor, PythonExecutor, build
 from rcsc.run.levels import RunningLevel, StateTableError, running_level
+from rcsc.run.processes.clocks import Clocks, Turn
 from rcsc.run.processes.memory import Absent, SharedMemoryBuffers, layout
 from rcsc.run.signature import Signature, Values
 from rcsc.run.system import Kind, Outside, signatures
@@ -73,6 +74,7 @@ class Setting:
         rate: Seconds of the system in one of the clock; 0 is as fast as possible.
         kind: Of the executors; each level's process builds its own.
         block: Name of the shared memory.
+        periods_ms: Of each process, by its name.
     """
 
     description: Description
@@ -81,6 +83,7 @@ class Setting:
     kind: Kind
     block: str
     parent: int
+    periods_ms: Mapping[str, int]
 
 
 @dataclass(slots=True)
@@ -135,21 +138,19 @@ def serve_level(setting: Setting, name: str, told: "Connection") -> None:
     with _telling(told), _attached(setting) as (signs, transport):
         level = _level(setting, name, signs[name])
         begin(level, transport)
-        period_s = level.level.period_ms / 1000 / setting.rate if setting.rate else 0.0
-        for _ in _rounds(setting, period_s):
+        for _ in _rounds(setting, name, transport):
             if cycle(level, transport):
                 raise SystemExit(FAULTY)
 
 
-def serve_outside(setting: Setting, factory: Factory, told: "Connection") -> None:
+def serve_outside(setting: Setting, name: str, factory: Factory, told: "Connection") -> None:
     """A process for what stands outside the levels, until it is over: until one part of it says `over`."""
     with _telling(told), _attached(setting) as (_, transport):
         made: tuple[Outside, ...] = tuple(factory.make())
-        period_s = setting.description.tick_ms / 1000 / setting.rate if setting.rate else 0.0
-        for tick in _rounds(setting, period_s):
+        for tick in _rounds(setting, name, transport):
             for one in made:
-                for name, values in one.step(tick, transport.latest).items():
-                    _publish(transport, name, values)
+                for buffer, values in one.step(tick, transport.latest).items():
+                    _publish(transport, buffer, values)
             if any(getattr(one, "over", False) for one in made):
                 return
 
@@ -183,14 +184,19 @@ def _attached(setting: Setting) -> Iterator[tuple[dict[str, Signature], SharedMe
         buffers.close()
 
 
-def _rounds(setting: Setting, period_s: float) -> Iterator[int]:
-    """Counts rounds, each when it is due, until SIGTERM or until nobody is there who started this process."""
+def _rounds(setting: Setting, name: str, buffers: SharedMemoryBuffers) -> Iterator[int]:
+    """Counts a process's rounds, each when it is due and its turn has come, until SIGTERM or until nobody is there who started it."""
     told: list[int] = []
     signal.signal(signal.SIGTERM, lambda number, _: told.append(number))
-    pace, tick = Paced(period_s), 0
+    turn = Turn(Clocks(buffers.block, buffers.layout.size, setting.periods_ms), name)
+    pace, tick = Paced(setting.periods_ms[name] / 1000 / setting.rate if setting.rate else 0.0), 0
     while not told and os.getppid() == setting.parent:
+        turn.wait(told)
+        if told:
+            return
         yield tick
         tick += 1
+        turn.done()
         pace.wait(told)
 
 

@@ -3,8 +3,9 @@
 In: a description, and factories by name for what a process makes for itself. Out: a `Supervisor`, with which processes are
 stopped and started again while the others run; `run_processes`, which runs them all.
 
-Nobody waits for anybody: a level takes what the buffers hold, runs a cycle, and commits its state and its outputs in one step.
-What it sees is at times older or newer than in one process; tables that keep the protocol of numbers and echoes do not mind.
+Each keeps its own pace, and waits where another has come to lie more than a period behind (`clocks`). A level takes what the
+buffers hold, runs a cycle, and commits its state and its outputs in one step. What it sees is at times a cycle older or newer than
+in one process; tables that keep the protocol of numbers and echoes do not mind.
 """
 
 import contextlib
@@ -20,6 +21,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 from rcsc.host import children
 from rcsc.run.description import Description
+from rcsc.run.processes.clocks import Clocks
 from rcsc.run.processes.memory import Absent, SharedMemoryBuffers, layout
 from rcsc.run.processes.serve import FAULTY, MOST_TOLD, REFUSED, Factory, Setting, serve_level, serve_outside
 from rcsc.run.system import Kind, StateTableError, signatures
@@ -42,13 +44,13 @@ class _Pulse:
     """When a process was last seen to do something.
 
     Attributes:
-        stamp: Of its last commit; 0 for what has no region of its own.
+        stamp: Of its last commit, 0 for what has no region of its own; and how often it has looked whether its turn has come.
         since_s: By the clock.
         cpu_s: Of the processor, that it had used by then.
         begun: Whether it has been seen to commit since it was started.
     """
 
-    stamp: int
+    stamp: tuple[int, int]
     since_s: float
     cpu_s: float
     begun: bool
@@ -76,19 +78,21 @@ class Supervisor:
         self._running: dict[str, SpawnProcess] = {}
         self._told: dict[str, Connection] = {}
         self._pulses: dict[str, _Pulse] = {}
-        tick_s = description.tick_ms / 1000
-        periods_s = dict.fromkeys(outside, tick_s) | {
-            name: level.period_ms / 1000
+        periods_ms = dict.fromkeys(outside, description.tick_ms) | {
+            name: level.period_ms
             for name, sign in self._signs.items()
             for level in sign.levels
             if level.name == name
         }
         self._still_s = {
-            name: max(STILL_S, STILL_PERIODS * period_s / (rate or 1.0))
-            for name, period_s in periods_s.items()
+            name: max(STILL_S, STILL_PERIODS * period_ms / 1000 / (rate or 1.0))
+            for name, period_ms in periods_ms.items()
         }
-        self.buffers = SharedMemoryBuffers.create(laid)
-        self._setting = Setting(description, queries, rate, kind, self.buffers.block.name, os.getpid())
+        self.buffers = SharedMemoryBuffers.create(laid, Clocks.size(len(periods_ms)))
+        self._clocks = Clocks(self.buffers.block, laid.size, periods_ms)
+        self._setting = Setting(
+            description, queries, rate, kind, self.buffers.block.name, os.getpid(), periods_ms
+        )
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -108,7 +112,7 @@ class Supervisor:
         self.close()
 
     def start(self, name: str) -> None:
-        """Starts a process; again, if it has ended.
+        """Starts a process; again, if it has ended. Others wait for it, until `clocks.MOST_WAIT_S` are over.
 
         Raises:
             ValueError: It runs.
@@ -119,8 +123,9 @@ class Supervisor:
         work: tuple[Callable[..., None], tuple[Any, ...]] = (
             (serve_level, (self._setting, name, tells))
             if name in self._signs
-            else (serve_outside, (self._setting, self._outside[name], tells))
+            else (serve_outside, (self._setting, name, self._outside[name], tells))
         )
+        self._clocks.start(name)
         made = children.process(name, work[0], *work[1])
         children.start(made)
         tells.close()
@@ -177,7 +182,8 @@ class Supervisor:
 
     def _why_still(self, name: str) -> str:
         region = self.buffers.layout.regions.get(name)
-        stamp = 0 if region is None else self.buffers.block.word(region.at)
+        commit = 0 if region is None else self.buffers.block.word(region.at)
+        stamp = commit, self._clocks.beats(name)
         state, cpu_s = _state(self._running[name].pid or 0)
         now_s, pulse = time.monotonic(), self._pulses.get(name)
         idle = region is None and state not in STOPPED  # nothing is known of what it does
