@@ -22,13 +22,14 @@ disjoint in pairs, and their sizes add up to the size of the input space. Here 4
 ((), 'boxes', True)
 
 Tests across variables, and assumptions, take a tree of regions (`regions`), and Z3 for what is not linear. Trusted,
-without `rcsc certify`: `boxes`, `relational`, `regions` and what they rest on; by default Z3 confirms every table
-that is cheap enough, and a disagreement is a bug in rcsc.
+without `rcsc certify`: `partition`, `boxes`, `relational`, `regions` and what they rest on; by default Z3 confirms
+every table that is cheap enough, and a disagreement is a bug in rcsc.
 
-What it costs: pairs of lines and classes of keys for boxes, a budget in steps for the rest; what is over it is
+What it costs: pairs of lines and slices of keys for boxes, a budget in steps for the rest; what is over it is
 undecided, and fails.
 
-Modules, in the order the data flows: `program` (a whole program), `decide` (which way), `boxes`, `relational`,
-`confirm` (Z3), `cover` (where a condition holds), `verdict` (findings as data), `certificate` (which `rcsc.certify`
-checks anew), `spell` (keys as cells), `repair` (proved before shown), `diagnose`.
+Modules, in the order the data flows: `program` (a whole program), `decide` (which way), `partition` (lines that are
+boxes, of a table or of a region), `boxes`, `relational`, `confirm` (Z3), `cover` (where a condition holds), `verdict`
+(findings as data), `certificate` (which `rcsc.certify` checks anew), `spell` (keys as cells), `repair` (proved before
+shown), `diagnose`.
 """

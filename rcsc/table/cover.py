@@ -3,7 +3,7 @@
 In: conditions as values over leaves. Out: boxes of keys, disjoint, each as wide as it goes, and whether they are all. Each
 box is shown by Z3 to lie inside, and that nothing is left outside them; *unknown* raises, so that nobody takes it for an answer.
 
-Source: house style, example 6, for the least witness; `boxes.Search.grown` for growing in declared order.
+Source: house style, example 6, for the least witness; `partition.Gaps.grown` for growing in declared order.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from rcsc.lang.leaves import read_by
 from rcsc.lang.model import AssumptionName, Backing, Program, Table
 from rcsc.solvers.options import Options
-from rcsc.table import boxes
+from rcsc.table import boxes, partition
 from rcsc.table.certificate import box_certificate, must_cover
 from rcsc.table.verdict import DeadLine, Found, Gap, Overlap, SolversDisagree, TableVerdict, Undecided
 
@@ -43,13 +43,13 @@ def prove_table(program: Program, table: Table, options: Options) -> TableVerdic
 
 
 def _by_boxes(program: Program, table: Table) -> tuple[Found, ...]:
-    decided = boxes.Boxes.of(program, table)
-    pairs = list(islice(decided.overlaps(), boxes.MOST_PAIRS))
+    decided = boxes.TableBoxes.of(program, table)
+    pairs = list(islice(decided.overlaps(), partition.MOST_PAIRS))
     found: list[Found] = [DeadLine(at) for at in decided.dead()]
     found.extend(decided.both(first, second) for first, second in pairs)
     try:
         gap = decided.gap(disjoint=not pairs)
-    except boxes.BudgetError:
+    except partition.BudgetError:
         return (*found, Undecided("whether every input is matched by some line; first mend the overlaps"))
     if gap is not None:
         found.append(gap)

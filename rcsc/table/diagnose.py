@@ -7,7 +7,7 @@ from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label, MatchedLine, Severity, WitnessColumn
 from rcsc.lang.interval_sets import size
 from rcsc.lang.model import Program, Scalar, Table, key_bounds, spell
-from rcsc.table import boxes
+from rcsc.table import partition
 from rcsc.table import spell as words
 from rcsc.table.certificate import must_cover
 from rcsc.table.repair import closing_line, parting_cell
@@ -33,7 +33,7 @@ def diagnostics(program: Program, verdict: TableVerdict, unproved: Collection[st
     overlaps = [overlap for overlap in verdict.found if isinstance(overlap, Overlap)]
     shown = [_overlap(program, table, overlap) for overlap in overlaps[:MOST_PAIRS]]
     if len(overlaps) > MOST_PAIRS:
-        least = "at least " if len(overlaps) == boxes.MOST_PAIRS else ""
+        least = "at least " if len(overlaps) == partition.MOST_PAIRS else ""
         message = (
             f"and {least}{len(overlaps) - MOST_PAIRS} more pairs of lines of table `{table.name}` overlap"
         )

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from rcsc.lang.interval_sets import meet, size
 from rcsc.lang.model import Box, Program, Scalar, Table, key_bounds
 from rcsc.table import boxes, spell
+from rcsc.table.partition import BudgetError, Gaps
 from rcsc.table.verdict import Gap, Overlap
 
 
@@ -96,15 +97,15 @@ def closing_line(program: Program, table: Table, found: Gap) -> str | None:
         cells.append(cell)
     if not set(region) <= {str(c.variable) for c in table.columns} & set(map(str, table.variables)):
         return None  # bounds of what only an assumption reads
-    decided = boxes.Boxes.of(program, table)
+    decided = boxes.TableBoxes.of(program, table)
     decided.lines.append(dict(region.items()))
     pairs = list(decided.overlaps())
     if any(len(decided.lines) - 1 in pair for pair in pairs):
         return None
     row = " | ".join(["new", *cells])
     try:
-        closes = not boxes.Search.of(decided, disjoint=not pairs).missing()
-    except boxes.BudgetError:
+        closes = not Gaps.of(decided, disjoint=not pairs).missing()
+    except BudgetError:
         closes = False
     what = "closes the gap" if closes else "closes this part of the gap"
     return f"a line `| {row} || ... |` {what} and overlaps no other: proved"

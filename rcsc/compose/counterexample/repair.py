@@ -13,6 +13,7 @@ from rcsc.compose.counterexample.finding import Finding
 from rcsc.lang.interpret import matching_lines
 from rcsc.lang.model import Box, Program, Scalar, Snapshot, Table, key_of
 from rcsc.table import boxes, spell
+from rcsc.table.partition import BudgetError, Gaps
 from rcsc.table.repair import closing_line, parting_cell
 from rcsc.table.verdict import Gap, Overlap, Region
 
@@ -54,29 +55,29 @@ def _said(ts: TransitionSystem, table: Table, step: CycleRun) -> Iterator[str]:
 
 def around(program: Program, table: Table, seen: Snapshot) -> Region:
     """Grow a maximal region, in which no line matches, around an input that none matches."""
-    decided = boxes.Boxes.of(program, table)
+    decided = boxes.TableBoxes.of(program, table)
     kinds = {str(v.name): v.type for v in program.variables}
     cell = {name: (key_of(kinds[name], seen[name]),) * 2 for name in decided.names}
-    found = boxes.Search.of(decided, disjoint=True).grown(cell, ())
+    found = Gaps.of(decided, disjoint=True).grown(cell, ())
     return decided.narrowed(found)
 
 
 def weakest_condition(program: Program, table: Table) -> str:
     """Return the condition of exactly the inputs that one line matches; empty where it is not small."""
-    decided = boxes.Boxes.of(program, table)
+    decided = boxes.TableBoxes.of(program, table)
     regions: list[Region] = []
     for first, second in decided.overlaps():
         regions.append(decided.both(first, second).region or {})
         if len(regions) > MOST_REGIONS:
             return ""
-    search = boxes.Search.of(decided, disjoint=not regions)
+    search = Gaps.of(decided, disjoint=not regions)
     gaps: list[Mapping[str, Box]] = []
     try:
         while (cell := search.least(gaps)) is not None:
             gaps.append(search.grown(cell, gaps))
             if len(regions) + len(gaps) > MOST_REGIONS:
                 return ""
-    except boxes.BudgetError:
+    except BudgetError:
         return ""
     every = [*regions, *(decided.narrowed(gap) for gap in gaps)]
     return " and ".join(f"not ({_conditions(program, region)})" for region in every)
@@ -88,7 +89,7 @@ def _conditions(program: Program, region: Region) -> str:
 
 
 def _while(program: Program, table: Table, matching: list[int]) -> str:
-    region = boxes.Boxes.of(program, table).both(matching[0], matching[1]).region
+    region = boxes.TableBoxes.of(program, table).both(matching[0], matching[1]).region
     return f"while {_conditions(program, region or {})}"
 
 

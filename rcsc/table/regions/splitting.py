@@ -7,7 +7,7 @@ rational point is in it, its lines are boxes that can be counted, or one line ho
 Linear arithmetic is asked only where no line or several are left, or where a split leaves a
 line on both sides; a solver only where a term is not linear or rounding to integers does not end.
 
-`linear` says what is empty, `boxleaf` counts.
+`linear` says what is empty, `rcsc.table.partition` counts boxes.
 """
 
 from bisect import bisect_right
@@ -16,8 +16,8 @@ from itertools import combinations
 from math import prod
 
 from rcsc.lang.interval_sets import meet
+from rcsc.table.partition import Boxes, Cell, Gaps, common, parting
 from rcsc.table.regions.atoms import Clauses, Universe
-from rcsc.table.regions.boxleaf import defect, parting
 from rcsc.table.regions.linear import Multipliers, Simplex
 from rcsc.table.regions.region import (
     Answer,
@@ -192,7 +192,7 @@ class Tree:
         if all(not line.rest and self._singles.issuperset(line.boxes) for line in region.lines):
             extents = {form: self._range(region, form) for line in region.lines for form in line.boxes}
             boxes = [line.boxes for line in region.lines]
-            wrong = defect(boxes, extents, cover=not self.default)
+            wrong = _defect(Boxes(extents, boxes), cover=not self.default)
             if wrong is None:
                 sizes = (high - low + 1 for low, high in extents.values())
                 return Counted(None if self.default else prod(sizes), parting(boxes)), []
@@ -329,3 +329,13 @@ class Tree:
             if not simplex.knows(single):
                 simplex.add_column(single, *self._range(region, single))
         simplex.add_form(form, terms, *self._range(region, form))
+
+
+def _defect(boxes: Boxes[int], *, cover: bool) -> Cell[int] | None:
+    """A cell in which two lines hold, or (with `cover`) none; None where there is none."""
+    pair = next(boxes.overlaps(), None)
+    if pair is None:
+        return Gaps.of(boxes, disjoint=True).least(()) if cover else None
+    both = common(boxes.lines[pair[0]], boxes.lines[pair[1]])
+    assert both is not None  # they overlap
+    return {form: both[form][0] if form in both else extent for form, extent in boxes.extents.items()}

@@ -1,0 +1,394 @@
+"""Whether boxes part each other and fill their space: masks and counting, no solver.
+
+In: for each line the keys that it may have on each axis, a variable of a table or a form of a region, and the extent of
+each axis. Out: every pair of lines that meet, and the least place that no line fills.
+
+Masks are Python integers, one bit a line. An axis is cut where some line's box begins or ends; all keys of a slice
+are alike.
+"""
+
+from bisect import bisect_left, bisect_right
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import combinations, islice
+from math import prod
+from typing import Generic, TypeAlias, TypeVar
+
+from rcsc.lang.interval_sets import holds, joined, meet, size
+from rcsc.lang.model import Box
+
+MOST_PAIRS = 10_000
+"""Overlapping pairs that are told apart; a report shows a few."""
+BUDGET = 5_000_000
+"""Of a search for gaps: lines, pairs and slices looked at, which is the same on every machine."""
+MANY = 64
+"""Above so many lines a certificate leaves the parting axis of each pair to the checker."""
+
+Axis = TypeVar("Axis", bound=Hashable)
+Bounds: TypeAlias = tuple[int, int]
+BoxLine: TypeAlias = Mapping[Axis, Box]
+Cell: TypeAlias = dict[Axis, Bounds]
+
+
+class BudgetError(Exception):
+    """A search for gaps looked at more than `BUDGET`; whether there is one (or another one) is open."""
+
+
+@dataclass(slots=True)
+class Boxes(Generic[Axis]):
+    """Lines as boxes.
+
+    Attributes:
+        extents: Least and greatest key of each axis, in the order in which places are compared.
+        lines: The lines; dead ones have an empty box somewhere.
+    """
+
+    extents: dict[Axis, Bounds]
+    lines: list[BoxLine[Axis]]
+
+    @property
+    def names(self) -> tuple[Axis, ...]:
+        """The axes."""
+        return tuple(self.extents)
+
+    def dead(self) -> list[int]:
+        """Lines that nothing matches."""
+        return [at for at, boxes in enumerate(self.lines) if any(not box for box in boxes.values())]
+
+    def overlaps(self) -> Iterator[tuple[int, int]]:
+        """Every pair of lines that some input matches both of, first line first."""
+        for at, others in self.meeting():
+            for other in bits_of(others):
+                yield at, other
+
+    def meeting(self) -> Iterator[tuple[int, int]]:
+        """Each line that overlaps a later one, with the mask of those later ones."""
+        everyone = (1 << len(self.lines)) - 1
+        for at in self.dead():
+            everyone &= ~(1 << at)
+        by_box = self._by_box()
+        meets: dict[tuple[Axis, Box], int] = {}
+        for name, stated in by_box.items():
+            for box, mask in self._meetings(name, stated):
+                meets[name, box] = mask
+        for at, boxes in enumerate(self.lines):
+            if not everyone >> at & 1:
+                continue
+            others = everyone >> (at + 1) << (at + 1)
+            for name, box in boxes.items():
+                if not others:
+                    break
+                others &= meets[name, box]
+            if others:
+                yield at, others
+
+    def _by_box(self) -> dict[Axis, dict[Box, int]]:
+        """For each axis its distinct boxes, with the lines that state them as bytes, then integers."""
+        width = len(self.lines) // 8 + 1
+        stated: dict[Axis, dict[Box, bytearray]] = {name: {} for name in self.extents}
+        for at, boxes in enumerate(self.lines):
+            for name, box in boxes.items():
+                mask = stated[name].get(box)
+                if mask is None:
+                    mask = stated[name][box] = bytearray(width)
+                mask[at >> 3] |= 1 << (at & 7)
+        return {
+            name: {box: int.from_bytes(mask, "little") for box, mask in by_box.items()}
+            for name, by_box in stated.items()
+        }
+
+    def _meetings(self, name: Axis, stated: Mapping[Box, int]) -> Iterator[tuple[Box, int]]:
+        """For each box on the axis the lines that it can meet, those that do not test it among them."""
+        everyone = (1 << len(self.lines)) - 1
+        idle = everyone & ~_any(stated.values())
+        if all(len(box) == 1 for box in stated):
+            yield from _intervals_meeting(stated, idle)
+            return
+        inside = {
+            low: _any(mask for box, mask in stated.items() if holds(box, low))
+            for low, _ in slices(self.extents[name], stated)
+        }
+        for box in stated:
+            yield box, idle | _any(mask for low, mask in inside.items() if holds(box, low))
+
+    def piece(self, sign: int, box: BoxLine[Axis]) -> "Piece[Axis]":
+        """A box as it is counted."""
+        sizes = [1]
+        for name in reversed(self.names):
+            low, high = self.extents[name]
+            sizes.append(sizes[-1] * (size(box[name]) if name in box else high - low + 1))
+        sizes.reverse()
+        return Piece(sign, box, sizes)
+
+    def volume(self) -> int:
+        """How many inputs there are."""
+        return prod(high - low + 1 for low, high in self.extents.values())
+
+
+@dataclass(frozen=True, slots=True)
+class Piece(Generic[Axis]):
+    """A box that counts as many inputs as it has, or (with `sign` -1) takes as many away.
+
+    Attributes:
+        sizes: For each position in the order of axes, how many inputs it has in those from there on; last 1.
+    """
+
+    sign: int
+    box: BoxLine[Axis]
+    sizes: Sequence[int]
+
+
+@dataclass(slots=True)
+class Gaps(Generic[Axis]):
+    """Looks for the least input that no line matches.
+
+    It goes down the axes in order, each time into the first slice that the lines do not fill. Counting says which that is, so that
+    nothing is bisected (`rcsc.lang.interval_sets.lowest`): each question of a bisection would be such a search of its own.
+
+    How many inputs lines fill together is counted by inclusion and exclusion. Lines no two of which overlap are counted as they are;
+    of every other line what it adds to them: its size, less what it shares with each of them, less what it and another such line
+    both add, and so on. For `a` = 0 .. 6, `b` = 5 .. 9 of 0 .. 9 that is 7 + (5 - 2) = 10, all there are. Where this takes too many
+    terms, lines are left out of the count; what is counted is then too little, which only makes the search longer.
+
+    Attributes:
+        pieces: The terms of the count.
+        exact: Whether every line is in it.
+    """
+
+    table: Boxes[Axis]
+    pieces: Sequence[Piece[Axis]]
+    exact: bool
+    _without: set[tuple[int, frozenset[int]]] = field(default_factory=set)
+    _looked_at: int = 0
+
+    @classmethod
+    def of(cls, table: Boxes[Axis], *, disjoint: bool) -> "Gaps[Axis]":
+        """The search of a table; `disjoint` where no two of its lines overlap."""
+        counting = Counting(table, {} if disjoint else dict(table.meeting()))
+        return cls(table, counting.pieces, counting.exact)
+
+    def missing(self) -> int:
+        """How many inputs no line matches, where the count is exact; else as many or fewer."""
+        filled = sum(piece.sign * piece.sizes[0] for piece in self.pieces)
+        return self.table.volume() - filled
+
+    def least(self, shown: Sequence[BoxLine[Axis]]) -> Cell[Axis] | None:
+        """The least cell outside all lines and outside the regions shown, whose least place is the least of all.
+
+        None where there is none.
+
+        Raises:
+            BudgetError: It was not found within `BUDGET`. Where the count is exact nothing is looked at in vain, and this never happens.
+        """
+        lines = [*self.table.lines, *shown]
+        self._without = set()
+        alive = [at for at, boxes in enumerate(lines) if all(boxes.values())]
+        regions = [self.table.piece(1, region) for region in shown]  # they meet no line and not each other
+        return self._search(0, alive, lines, [*self.pieces, *regions])
+
+    def _search(
+        self, depth: int, alive: list[int], lines: Sequence[BoxLine[Axis]], pieces: Sequence[Piece[Axis]]
+    ) -> Cell[Axis] | None:
+        names = self.table.names[depth:]
+        if not alive:
+            return {name: self.table.extents[name] for name in names}
+        if not names or any(not any(name in lines[at] for name in names) for at in alive):
+            return None
+        memory = (depth, frozenset(alive))
+        if memory in self._without:
+            return None
+        name = names[0]
+        for low, high in self._short(depth, [lines[at] for at in alive], pieces):
+            self._looked_at += len(alive) + len(pieces)
+            if self._looked_at > BUDGET and not self.exact:
+                raise BudgetError
+            inside = [at for at in alive if name not in lines[at] or holds(lines[at][name], low)]
+            counted = [piece for piece in pieces if name not in piece.box or holds(piece.box[name], low)]
+            found = self._search(depth + 1, inside, lines, counted)
+            if found is not None:
+                return {name: (low, high), **found}
+        self._without.add(memory)
+        return None
+
+    def _short(
+        self, depth: int, lines: Sequence[BoxLine[Axis]], pieces: Sequence[Piece[Axis]]
+    ) -> Iterator[Bounds]:
+        """Slices of the axis at `depth`, between edges of the lines, that the pieces do not fill; counted in one sweep."""
+        name = self.table.names[depth]
+        extents = [self.table.extents[other] for other in self.table.names[depth + 1 :]]
+        whole = prod(high - low + 1 for low, high in extents)
+        everywhere, change = 0, dict[int, int]()
+        for piece in pieces:
+            inside = piece.sign * piece.sizes[depth + 1]
+            if name not in piece.box:
+                everywhere += inside
+            for low, high in piece.box.get(name, ()):
+                change[low] = change.get(low, 0) + inside
+                change[high + 1] = change.get(high + 1, 0) - inside
+        cuts = slices(self.table.extents[name], (line[name] for line in lines if name in line))
+        self._looked_at += len(cuts)
+        for low, high in cuts:
+            everywhere += change.get(low, 0)
+            if everywhere != whole:
+                yield low, high
+
+    def grown(self, cell: Cell[Axis], shown: Sequence[BoxLine[Axis]]) -> dict[Axis, Box]:
+        """A maximal region around the cell that no line and no region shown touches, grown in the order of axes."""
+        lines = [*self.table.lines, *shown]
+        cuts = {
+            name: slices(extent, (line[name] for line in self.table.lines if name in line))
+            for name, extent in self.table.extents.items()
+        }
+        region: dict[Axis, Box] = {}
+        for name, every in cuts.items():
+            region[name] = tuple(one for one in every if one[0] <= cell[name][0] <= one[1])
+        for name, every in cuts.items():
+            close = [
+                boxes for boxes in lines if all(meet(box, region[n]) for n, box in boxes.items() if n != name)
+            ]
+            region[name] = joined(
+                one
+                for one in every
+                if not any(name not in boxes or holds(boxes[name], one[0]) for boxes in close)
+            )
+        return region
+
+
+class Counting(Generic[Axis]):
+    """What lines fill together, by inclusion and exclusion (`Gaps`).
+
+    Attributes:
+        pieces: Boxes with signs, whose sizes add up to it.
+        exact: Whether every line is counted.
+    """
+
+    def __init__(self, table: Boxes[Axis], met: Mapping[int, int]) -> None:
+        """Count the lines of a table; `met` has for each the mask of later ones that it overlaps."""
+        self.table, self.lines = table, table.lines
+        self._most = 4 * len(self.lines) + 256
+        self._near, crossing = _crossing(met)
+        self._apart = ((1 << len(self.lines)) - 1) & ~sum(1 << at for at in crossing)
+        self._added: list[tuple[Piece[Axis], int]] = []  # with the lines apart that it may meet
+        self.pieces = [table.piece(1, self.lines[at]) for at in bits_of(self._apart)]
+        counted = [self._count(at) for at in reversed(crossing)]  # first those that meet few
+        self.exact = all(counted)
+
+    def _count(self, at: int) -> bool:
+        """Counts a line more, unless that takes too many terms; says whether it did."""
+        if at not in self._near:
+            return False
+        room = self._most - len(self.pieces)
+        added = list(islice(self._alone(at), room + 1))
+        shared = (
+            self.table.piece(-piece.sign, both)
+            for piece, near in added
+            for other in bits_of(near)
+            if (both := common(piece.box, self.lines[other])) is not None
+        )
+        new = [*(piece for piece, _ in added), *islice(shared, room + 1)]
+        if len(new) > room:
+            return False
+        self.pieces += new
+        self._added += added
+        return True
+
+    def _alone(self, at: int) -> Iterator[tuple[Piece[Axis], int]]:
+        """What the line adds to those that were counted beside the lines apart."""
+        yield self.table.piece(1, self.lines[at]), self._near[at] & self._apart
+        for piece, near in self._added:
+            both = common(piece.box, self.lines[at])
+            if both is not None:
+                yield self.table.piece(-piece.sign, both), near & self._near[at]
+
+
+def parting(lines: Sequence[BoxLine[Axis]]) -> tuple[Axis, ...] | None:
+    """For each pair of disjoint lines, first with second and on, an axis that parts them.
+
+    None where there are more than `MANY` lines: then a checker looks for it.
+    """
+    if len(lines) > MANY:
+        return None
+    return tuple(
+        next(name for name, box in left.items() if name in right and not meet(box, right[name]))
+        for left, right in combinations(lines, 2)
+    )
+
+
+def common(one: BoxLine[Axis], two: BoxLine[Axis]) -> dict[Axis, Box] | None:
+    """The inputs of both; None where there are none."""
+    found = dict(one)
+    for name, box in two.items():
+        found[name] = meet(found[name], box) if name in found else box
+        if not found[name]:
+            return None
+    return found
+
+
+def _crossing(met: Mapping[int, int]) -> tuple[dict[int, int], list[int]]:
+    """Which lines each line overlaps, and lines without which no two do: always the one that overlaps most others.
+
+    Where very many pairs overlap these are the later line of each, and the first answer is left empty.
+    """
+    if sum(others.bit_count() for others in met.values()) > 50 * MOST_PAIRS:
+        later = 0
+        for others in met.values():
+            later |= others
+        return {}, list(bits_of(later))
+    near: dict[int, int] = {}
+    for at, others in met.items():
+        near[at] = near.get(at, 0) | others
+        for other in bits_of(others):
+            near[other] = near.get(other, 0) | 1 << at
+    left, found = dict(near), list[int]()
+    while left:
+        most = max(left, key=lambda at: (left[at].bit_count(), at))
+        for other in bits_of(left.pop(most)):
+            left[other] &= ~(1 << most)
+            if not left[other]:
+                del left[other]
+        found.append(most)
+    return near, found
+
+
+def slices(extent: Bounds, boxes: Iterable[Box]) -> list[Bounds]:
+    """The extent, cut wherever a box begins or ends."""
+    starts = {extent[0]}
+    for box in boxes:
+        for low, high in box:
+            starts.update((low, high + 1))
+    ordered = sorted(start for start in starts if start <= extent[1])
+    return list(zip(ordered, [*(start - 1 for start in ordered[1:]), extent[1]], strict=True))
+
+
+def bits_of(mask: int) -> Iterator[int]:
+    """Positions of the bits that are set, from the lowest."""
+    while mask:
+        lowest = mask & -mask
+        yield lowest.bit_length() - 1
+        mask ^= lowest
+
+
+def _any(masks: Iterable[int]) -> int:
+    """The union."""
+    found = 0
+    for mask in masks:
+        found |= mask
+    return found
+
+
+def _intervals_meeting(stated: Mapping[Box, int], idle: int) -> Iterator[tuple[Box, int]]:
+    """For each single interval the lines whose intervals it meets: those that neither end before it nor begin after it."""
+    lows = sorted({box[0][0] for box in stated})
+    highs = sorted({box[0][1] for box in stated})
+    begin, end = dict.fromkeys(lows, 0), dict.fromkeys(highs, 0)
+    for (interval,), mask in stated.items():
+        begin[interval[0]] |= mask
+        end[interval[1]] |= mask
+    ended, begun = [0], [0]
+    for high in highs:
+        ended.append(ended[-1] | end[high])  # entry k: lines whose interval ends at one of the k lowest ends
+    for low in lows:
+        begun.append(begun[-1] | begin[low])
+    for box in stated:
+        low, high = box[0]
+        yield box, idle | begun[bisect_right(lows, high)] & ~ended[bisect_left(highs, low)]
