@@ -2,9 +2,7 @@
 
 import json
 import re
-import shutil
 import sys
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from random import Random
@@ -12,7 +10,7 @@ from random import Random
 import pytest
 
 from rcsc.commands import run
-from rcsc.compose.contract.obligations import Obligation, Sort, obligations
+from rcsc.compose.contract.obligations import Sort
 from rcsc.compose.contract.predicates import point
 from rcsc.compose.contract.transition import Cycle, TransitionSystem
 from rcsc.compose.contract.variants import undeferred
@@ -21,7 +19,6 @@ from rcsc.compose.counterexample.cycle_run import broken
 from rcsc.compose.counterexample.finding import of_trace
 from rcsc.compose.counterexample.trace import Trace
 from rcsc.compose.invariant.cubes import Reached
-from rcsc.compose.invariant.search import Effort
 from rcsc.compose.proof.assume_guarantee import agreements
 from rcsc.compose.proof.level import LevelProof, Verdict, certificate, essential, prove_level
 from rcsc.compose.proof.system import NoProgramError, SystemProof, transition_systems
@@ -32,49 +29,22 @@ from rcsc.run.description import BadDescription, description
 from rcsc.run.system import signatures
 from rcsc.solvers.smtlib import cvc5_refutes
 from rcsc.symbolic import values
-from tests.support.proved import prove_system, shortest, time_line
+from tests.support.programs.systems import LITTLE, SYSTEM, small_level, small_system, small_text
+from tests.support.programs.texts import edit_file, without_row
+from tests.support.proved import obligation_of, prove_system, shortest, time_line
 
 REPO = Path(__file__).parents[2]
-SMALL = REPO / "tests" / "data" / "composed"
 SHIPPED = REPO / "tables" / "system.toml"
-LITTLE = Effort(walks=10, cycles=80)
-
-Edit = Callable[[str], str]
-
-
-def changed(folder: Path, **edits: Edit) -> Path:
-    """The small system with some files edited."""
-    shutil.copytree(SMALL, folder, dirs_exist_ok=True)
-    for name, edit in edits.items():
-        path = folder / f"{name}.rcs"
-        before = path.read_text(encoding="utf-8")
-        after = edit(before)
-        assert after != before, f"the edit of {name} does nothing"
-        path.write_text(after, encoding="utf-8")
-    return folder / "system.toml"
-
-
-def swap(old: str, new: str) -> Edit:
-    return lambda text: text.replace(old, new)
-
-
-def without_line(start: str) -> Edit:
-    return lambda text: "\n".join(line for line in text.split("\n") if not line.strip().startswith(start))
-
-
-def obligation_of(ts: TransitionSystem, sort: Sort, table: str = "", name: str = "") -> Obligation:
-    every = obligations(ts, ts.cycle(ts.havoc()))
-    return next(one for one in every if (one.sort, one.table, one.name) == (sort, table, name))
 
 
 @pytest.fixture(scope="module")
 def small() -> SystemProof:
-    return prove_system(SMALL / "system.toml", LITTLE)
+    return prove_system(SYSTEM, LITTLE)
 
 
 @pytest.fixture(scope="module")
 def upper() -> tuple[TransitionSystem, LevelProof]:
-    ts = transition_systems(SMALL / "system.toml")["upper"]
+    ts = transition_systems(SYSTEM)["upper"]
     return ts, prove_level(ts, LITTLE)
 
 
@@ -138,33 +108,33 @@ def test_another_solver_refuses_an_invariant_that_is_none(upper: tuple[Transitio
 
 HOLD = "} else if begun and lower.inc_command_echo = to_lower.inc_command {\n    new_command := false"
 DROPPED = "} else {\n    new_command := false"
-UPPER_FAULTS: dict[str, tuple[Edit, Sort, str, str]] = {
-    "the new-command flag is not held": (swap(HOLD, DROPPED), Sort.ASSUMPTION, "work", "in_step"),
+UPPER_FAULTS: dict[str, tuple[str, Sort, str, str]] = {
+    "the new-command flag is not held": (small_text("upper", (HOLD, DROPPED)), Sort.ASSUMPTION, "work", "in_step"),
     "any echo will do": (
-        swap("cur_state : stage = d_state deferred until lower.inc_command_echo = to_lower.inc_command",
-             "cur_state : stage = d_state deferred until lower.inc_command_echo > 0"),
+        small_text("upper", ("deferred until lower.inc_command_echo = to_lower.inc_command",
+                             "deferred until lower.inc_command_echo > 0")),
         Sort.ASSUMPTION, "work", "in_step",
     ),
-    "a line is missing": (without_line("| 4 "), Sort.NO_DEFAULT, "work", ""),
+    "a line is missing": (without_row(small_text("upper"), "4"), Sort.NO_DEFAULT, "work", ""),
     "a state is written directly": (
-        swap("next cur_state := value", "cur_state := value"), Sort.DEFERRED, "", "cur_state",
+        small_text("upper", ("next cur_state := value", "cur_state := value")), Sort.DEFERRED, "", "cur_state",
     ),
     "orders are not numbered": (
-        swap("to_lower.input_command /= old_command", "false"), Sort.NUMBERED, "", "to_lower.input_command",
+        small_text("upper", ("to_lower.input_command /= old_command", "false")), Sort.NUMBERED, "", "to_lower.input_command",
     ),
     "numbers are skipped": (
-        swap("(to_lower.inc_command + 1) mod", "(to_lower.inc_command + 2) mod"), Sort.NEXT_NUMBER, "", "to_lower",
+        small_text("upper", ("(to_lower.inc_command + 1) mod", "(to_lower.inc_command + 2) mod")), Sort.NEXT_NUMBER, "", "to_lower",
     ),
     "every cycle is a new command": (
-        swap("if command.inc_command /= inc_command_seen {", "if begun {"), Sort.ONCE, "", "new_command",
+        small_text("upper", ("if command.inc_command /= inc_command_seen {", "if begun {")), Sort.ONCE, "", "new_command",
     ),
 }  # fmt: skip
 
 
 @pytest.mark.parametrize("fault", UPPER_FAULTS)
 def test_a_fault_of_a_level_is_found_with_the_shortest_run_that_shows_it(fault: str, tmp_path: Path) -> None:
-    edit, sort, table, name = UPPER_FAULTS[fault]
-    ts = transition_systems(changed(tmp_path, upper=edit))["upper"]
+    upper, sort, table, name = UPPER_FAULTS[fault]
+    ts = small_level(tmp_path, "upper", upper=upper)
     obligation = obligation_of(ts, sort, table, name)
     assert prove_level(ts, LITTLE).verdict(sort, table, name) is not Verdict.PROVED
     trace = shortest(ts, obligation)
@@ -174,10 +144,8 @@ def test_a_fault_of_a_level_is_found_with_the_shortest_run_that_shows_it(fault: 
 
 
 def test_a_subordinate_that_echoes_another_command_breaks_what_its_superior_assumes(tmp_path: Path) -> None:
-    path = changed(
-        tmp_path, lower=swap("ref_command_echo := command.input_command", "ref_command_echo := go")
-    )
-    found = prove_system(path, LITTLE)
+    other = small_text("lower", ("ref_command_echo := command.input_command", "ref_command_echo := go"))
+    found = prove_system(small_system(tmp_path, lower=other), LITTLE)
     assert not found.proved
     assert [
         (agreement.level, agreement.holds) for agreement in found.agreements if not agreement.outside
@@ -188,13 +156,12 @@ def test_a_subordinate_that_echoes_another_command_breaks_what_its_superior_assu
 
 
 def test_a_superior_that_does_not_number_breaks_what_its_subordinate_assumes(tmp_path: Path) -> None:
-    def twice(text: str) -> str:
-        text = text.replace(
-            "to_lower.input_command /= old_command", "to_lower.input_command /= old_command and begun"
-        )
-        return text.replace("module send reads ", "module send reads begun, ")
-
-    found = prove_system(changed(tmp_path, upper=twice), LITTLE)
+    twice = small_text(
+        "upper",
+        ("to_lower.input_command /= old_command", "to_lower.input_command /= old_command and begun"),
+        ("module send reads ", "module send reads begun, "),
+    )
+    found = prove_system(small_system(tmp_path, upper=twice), LITTLE)
     assert [
         (agreement.level, agreement.holds) for agreement in found.agreements if not agreement.outside
     ] == [
@@ -209,7 +176,7 @@ def test_a_superior_that_does_not_number_breaks_what_its_subordinate_assumes(tmp
 def test_levels_that_begin_with_different_orders_do_not_agree(
     small: SystemProof, level: str, leaf: str
 ) -> None:
-    made = transition_systems(SMALL / "system.toml")
+    made = transition_systems(SYSTEM)
     proofs = {proof.level: proof for proof in small.levels}
     assert all(agreement.holds for agreement in agreements(made, proofs))
     program = made[level].program
@@ -222,16 +189,14 @@ def test_levels_that_begin_with_different_orders_do_not_agree(
 
 
 def test_an_order_without_a_report_is_refused(tmp_path: Path) -> None:
-    path = changed(tmp_path)
-    path.write_text(
-        path.read_text(encoding="utf-8").replace('"lower.report" = "upper.lower"\n', ""), encoding="utf-8"
-    )
+    path = small_system(tmp_path)
+    edit_file(path, ('"lower.report" = "upper.lower"\n', ""))
     with pytest.raises(BadDescription, match=r"`lower\.command` needs one buffer to `upper`"):
         transition_systems(path)
 
 
 def test_a_level_without_tables_is_refused(tmp_path: Path) -> None:
-    path = changed(tmp_path)
+    path = small_system(tmp_path)
     (tmp_path / "lower.rcs").unlink()
     with pytest.raises(NoProgramError, match="no program `lower`"):
         transition_systems(path)
@@ -350,14 +315,14 @@ def test_a_path_begins_where_the_robot_is() -> None:
 
 
 def test_rcsc_prove_says_how_each_assumption_stands(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["prove", str(SMALL / "system.toml"), "-j", "1"]) == 0
+    assert run(["prove", str(SYSTEM), "-j", "1"]) == 0
     said = capsys.readouterr().out
     assert "in_step                  proved" in said
     assert "lower assumes that while the number of `command` stays" in said
 
 
 def test_rcsc_prove_shows_the_trace_of_what_fails(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["prove", str(SMALL / "system.toml"), "--level", "upper", "--without-deferral"]) == 1
+    assert run(["prove", str(SYSTEM), "--level", "upper", "--without-deferral"]) == 1
     said = capsys.readouterr()
     assert "monitored: not proved of the levels together" in said.out
     assert "error[RCS751]: level `upper`, table `work`: not proved: assumption `in_step`" in said.err
@@ -370,7 +335,7 @@ def test_rcsc_prove_as_json_and_certificates(tmp_path: Path, capsys: pytest.Capt
         run(
             [
                 "prove",
-                str(SMALL / "system.toml"),
+                str(SYSTEM),
                 "--level",
                 "lower",
                 "--json",
@@ -394,7 +359,7 @@ def test_rcsc_prove_as_json_and_certificates(tmp_path: Path, capsys: pytest.Capt
 def test_rcsc_prove_certify_asks_cvc5(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    asked = ["prove", str(SMALL / "system.toml"), "--level", "lower", "--certify"]
+    asked = ["prove", str(SYSTEM), "--level", "lower", "--certify"]
     assert run(asked) == 0
     said = re.search(r"level lower: cvc5 says the same of (\d+) of (\d+) questions", capsys.readouterr().out)
     assert said is not None
@@ -408,14 +373,14 @@ def test_rcsc_prove_certify_asks_cvc5(
 
 
 def test_rcsc_certify_covers_a_system(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    assert run(["certify", str(SMALL / "system.toml")]) == 0
+    assert run(["certify", str(SYSTEM)]) == 0
     assert "level upper: cvc5 says the same of" in capsys.readouterr().out
-    assert run(["certify", str(SMALL / "system.toml"), "--write", str(tmp_path / "a.json")]) == 2
+    assert run(["certify", str(SYSTEM), "--write", str(tmp_path / "a.json")]) == 2
     assert "rcsc prove --certificate" in capsys.readouterr().err
 
 
 def test_rcsc_prove_refuses_a_level_that_there_is_not(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["prove", str(SMALL / "system.toml"), "--level", "middle"]) == 2
+    assert run(["prove", str(SYSTEM), "--level", "middle"]) == 2
     assert "there is no level `middle`" in capsys.readouterr().err
 
 

@@ -36,7 +36,15 @@ from rcsc.symbolic.encode import at_most_key
 from rcsc.symbolic.keyed import Keyed
 from rcsc.symbolic.trial import holds_at
 from rcsc.symbolic.values import Node
-from tests.compose.test_compose import LITTLE, SMALL, Edit, changed, swap
+from tests.support.programs.systems import (
+    LITTLE,
+    ORDER_AFTER_ORDER,
+    SYSTEM,
+    proved_level,
+    small_level,
+    small_text,
+)
+from tests.support.programs.texts import edited
 
 INT = Int(-9, 9)
 NAMES: dict[str, Scalar] = {"i": INT, "j": INT, "b": Bool(), "c": Bool()}
@@ -288,30 +296,23 @@ def test_the_longest_way_and_ways_round(pairs: set[tuple[int, int]]) -> None:
 # --- in the context of a small level -------------------------------------------------------
 
 
-def proved(folder: Path, level: str, **edits: Edit) -> LevelProof:
-    path = changed(folder, **edits) if edits else SMALL / "system.toml"
-    return prove_level(transition_systems(path)[level], LITTLE)
-
-
 def test_lines_of_the_small_levels_are_all_reached_and_say_the_same_again(tmp_path: Path) -> None:
+    endings = {}
     for level in ("upper", "lower"):
-        found = proved(tmp_path, level)
+        _, found = proved_level(tmp_path, level)
         assert found.context is not None
         assert (found.context.unreached, found.context.repeated, found.context.restless) == ((), (), False)
+        endings[level] = {ending.table: (ending.changes, ending.endless) for ending in found.endings}
     # `go` of the lower level waits for its input: nothing there makes that come
-    lower = {ending.table: (ending.changes, ending.endless) for ending in proved(tmp_path, "lower").endings}
-    assert lower == {"pause": (1, ()), "go": (1, ("2",))}
-    assert {ending.table: ending.changes for ending in proved(tmp_path, "upper").endings} == {
-        "rest": 2,
-        "work": 3,
-    }
+    assert endings["lower"] == {"pause": (1, ()), "go": (1, ("2",))}
+    assert {table: changes for table, (changes, _) in endings["upper"].items()} == {"rest": 2, "work": 3}
 
 
 def test_a_line_that_is_dead_in_its_context_is_named(tmp_path: Path) -> None:
     """It is alive in its table: nothing there says that PAUSE is never reported while going."""
     line = "  | 6    | false               |       |                | executing | going     ||"
     more = "  | 6a   | false               |       | pause          | failed    | going     || go | | |\n"
-    found = proved(tmp_path, "upper", upper=swap(line, f"{more}{line}"))
+    _, found = proved_level(tmp_path, "upper", upper=small_text("upper", (line, f"{more}{line}")))
     assert found.open == ()
     assert found.context is not None
     assert found.context.unreached == (("work", "6a"),)
@@ -323,18 +324,19 @@ COUNTER = "state idle : bool = true"
 @pytest.mark.parametrize("before", [False, True])
 def test_a_line_that_counts_when_it_matches_again_is_named(tmp_path: Path, before: bool) -> None:
     """Whether or not the preprocess writes the counter, too."""
-
-    def edit(text: str) -> str:
-        text = text.replace(COUNTER, f"{COUNTER}\nstate tries : int 0 .. 9")
-        text = text.replace(
-            "procedure begin {", "procedure again {\n  tries := min(tries + 1, 9)\n}\n\nprocedure begin {"
+    upper = small_text(
+        "upper",
+        (COUNTER, f"{COUNTER}\nstate tries : int 0 .. 9"),
+        ("procedure begin {", "procedure again {\n  tries := min(tries + 1, 9)\n}\n\nprocedure begin {"),
+        ("|| begin; nextstate(going) | go ", "|| begin; again; nextstate(going) | go "),
+    )
+    if before:
+        upper = edited(
+            upper,
+            ("status_in, idle {", "status_in, idle, tries {"),
+            ("    new_command := true\n", "    new_command := true\n    tries := 0\n"),
         )
-        if before:
-            text = text.replace("status_in, idle {", "status_in, idle, tries {")
-            text = text.replace("    new_command := true\n", "    new_command := true\n    tries := 0\n")
-        return text.replace("|| begin; nextstate(going) | go ", "|| begin; again; nextstate(going) | go ")
-
-    found = proved(tmp_path, "upper", upper=edit)
+    _, found = proved_level(tmp_path, "upper", upper=upper)
     assert found.open == ()
     assert found.context is not None
     assert found.context.repeated == (RepeatedLine("work", "1", ("tries",)),)
@@ -348,7 +350,7 @@ def test_all_questions_about_a_level_have_a_budget_together(
 ) -> None:
     """It is proved with more; whichever question meets the end of the budget, nothing is said that is not so."""
     monkeypatch.setattr(level_proof, "TOGETHER", many)
-    upper = transition_systems(SMALL / "system.toml")["upper"]
+    upper = transition_systems(SYSTEM)["upper"]
     found = prove_level(upper, replace(LITTLE, limits=Limits.of(1_000_000)))
     assert {verdict for _, verdict in found.found} <= told
     assert found.context is None or not found.context.unreached
@@ -356,21 +358,15 @@ def test_all_questions_about_a_level_have_a_budget_together(
 
 def test_a_command_that_need_not_end_is_named(tmp_path: Path) -> None:
     """After a failure it goes on, and gives the order again for ever."""
-    found = proved(
-        tmp_path, "upper", upper=swap("| f_state   ||                         | pause       | fail       |",
-                                      "| f_state   || nextstate(d_state)      | pause       | executing  |")
-    )  # fmt: skip
+    begins_again = (
+        "| f_state   ||                         | pause       | fail       |",
+        "| f_state   || nextstate(d_state)      | pause       | executing  |",
+    )
+    _, found = proved_level(tmp_path, "upper", upper=small_text("upper", begins_again))
     ends = {ending.table: ending for ending in found.endings}
     assert ends["work"].proved  # from a failure to done: one state more, and it ends
     assert ends["work"].changes == 4  # new, going; failed, which is to be done, and is; new no more
-    gone = "nextstate(d_state)      | pause       | done       |"
-    more = "| d_state   ||                         | pause       | done       |"
-
-    def edit(text: str) -> str:
-        text = text.replace(gone, gone.replace("done  ", "executing"))
-        return text.replace(more, "| d_state   || nextstate(going)        | go          | executing  |")
-
-    round_ = proved(tmp_path / "round", "upper", upper=edit)
+    _, round_ = proved_level(tmp_path / "round", "upper", upper=small_text("upper", *ORDER_AFTER_ORDER))
     assert [ending.table for ending in round_.endings if ending.changes is None] == ["work"]
 
 
@@ -379,7 +375,7 @@ DONE = "go             | done      | going     || nextstate(d_state)      | paus
 
 def test_a_level_that_waits_for_what_nobody_says_is_named(tmp_path: Path) -> None:
     waits = "go             | done      | going     ||                         |             | executing  |"
-    found = proved(tmp_path, "upper", upper=swap(DONE, waits))
+    _, found = proved_level(tmp_path, "upper", upper=small_text("upper", (DONE, waits)))
     ends = {ending.table: ending for ending in found.endings}
     assert (ends["work"].endless, ends["work"].proved) == (("2",), False)
 
@@ -393,7 +389,7 @@ def cache(tmp_path: Path) -> Cache:
 
 
 def test_a_proof_is_recalled_as_it_was_and_only_for_the_same_level(cache: Cache, tmp_path: Path) -> None:
-    upper = transition_systems(SMALL / "system.toml")["upper"]
+    upper = transition_systems(SYSTEM)["upper"]
     proof = prove_level(upper, LITTLE)
     assert recall(cache, upper, LITTLE) is None
     keep(cache, upper, LITTLE, proof)
@@ -407,13 +403,13 @@ def test_a_proof_is_recalled_as_it_was_and_only_for_the_same_level(cache: Cache,
     assert [predicate.name for predicate in kept.predicates] == [
         predicate.name for predicate in proof.predicates
     ]
-    other = changed(tmp_path / "other", upper=swap(DONE, DONE.replace("d_state", "f_state")))
-    assert recall(cache, transition_systems(other)["upper"], LITTLE) is None
+    other = small_text("upper", (DONE, DONE.replace("d_state", "f_state")))
+    assert recall(cache, small_level(tmp_path / "other", "upper", upper=other), LITTLE) is None
     assert recall(cache, upper, Effort(walks=11, cycles=80)) is None
 
 
 def test_what_is_undecided_is_not_kept(cache: Cache) -> None:
-    upper = transition_systems(SMALL / "system.toml")["upper"]
+    upper = transition_systems(SYSTEM)["upper"]
     proof = prove_level(upper, LITTLE)
     given_up = LevelProof(
         proof.level,
@@ -429,7 +425,7 @@ def test_what_is_undecided_is_not_kept(cache: Cache) -> None:
 
 
 def test_a_system_is_not_proved_twice(cache: Cache, monkeypatch: pytest.MonkeyPatch) -> None:
-    made = transition_systems(SMALL / "system.toml")
+    made = transition_systems(SYSTEM)
     first = prove_transition_systems(made, LITTLE, 1, tuple(made), None, cache)
 
     def never(*_: object) -> LevelProof:
@@ -456,7 +452,7 @@ def test_levels_are_said_as_they_are_done_where_it_is_asked_for(
         return LevelProof(ts.level.name, (), (), (), 0, 0, 0.0)
 
     monkeypatch.setattr("rcsc.compose.proof.system.prove_level", proving)
-    asked = ["prove", str(SMALL / "system.toml"), "--no-cache", "--jobs", "1", "--trace", "0", "--json"]
+    asked = ["prove", str(SYSTEM), "--no-cache", "--jobs", "1", "--trace", "0", "--json"]
     run([*asked, "--progress"])
     assert said == ["", "level upper: 0 of 0 found proved, 0.0 s\n"]
     json.loads(capsys.readouterr().out)
@@ -482,5 +478,5 @@ def test_what_z3_does_not_confirm_is_not_proved(monkeypatch: pytest.MonkeyPatch,
         return replace(found, clauses=(*found.clauses, *(((at, lie),) for lie in lies)))
 
     monkeypatch.setattr("rcsc.compose.proof.level.search", lying)
-    proof = prove_level(transition_systems(SMALL / "system.toml")["upper"], LITTLE)
+    proof = prove_level(transition_systems(SYSTEM)["upper"], LITTLE)
     assert {verdict for _, verdict in proof.found} == {Verdict.UNDECIDED}

@@ -31,16 +31,23 @@ from rcsc.run.description import BadDescription, description
 from rcsc.solvers.smt import Answer, Solver
 from rcsc.symbolic import values
 from rcsc.symbolic.keyed import Keyed
-from tests.compose.test_compose import LITTLE, SMALL, Edit, changed, swap
-from tests.compose.test_endings import WAY, go
 from tests.small_hierarchies.explored import adopted
 from tests.small_hierarchies.level import Reading, Role
+from tests.support.programs.systems import (
+    LITTLE,
+    SYSTEM,
+    TICK,
+    WAY,
+    going,
+    lower_level,
+    proved_level,
+    small_level,
+    small_system,
+    small_text,
+    solo_system,
+)
+from tests.support.programs.texts import edit_file, edited, system, without_row
 from tests.support.proved import prove_system, ran, shortest
-
-
-def proved(folder: Path, edit: Edit) -> tuple[TransitionSystem, LevelProof]:
-    ts = transition_systems(changed(folder, lower=edit))["lower"]
-    return ts, prove_level(ts, LITTLE)
 
 
 def ending(proof: LevelProof, table: str) -> Ending:
@@ -58,22 +65,18 @@ def lines_run(ts: TransitionSystem, cycles: int, **inputs: Value) -> list[tuple[
 # --- what extern procedures give -----------------------------------------------------------------
 
 
-TOGGLES = (
-    "  | 2 | false | going | | true || | executing |\n"
-    "  | 3 | false | going | | false || state(d_state) | done |\n"
+ASKING = lower_level(
+    going("2", on="true"),
+    going("3", on="false", does="state(d_state)", status="done"),
+    declared="state tick : bool\nstate raw : bool",
+    seen="on := raw /= tick\n  tick := raw",
+    parts='extern procedure ask reads there writes raw python "no_such_module:ask" c "ask"',
+    after="answer, ask",
 )
 
 
-def asking(text: str) -> str:
-    states = "state tick : bool\nstate raw : bool"
-    text = go(TOGGLES, states, "on := raw /= tick\n  tick := raw")(text)
-    text = text.replace("module receive reads command,", "module receive reads command, raw,")
-    said = 'extern procedure ask reads there writes raw python "no_such_module:ask" c "ask"\n\nmodule receive'
-    return text.replace("module receive", said, 1).replace("postprocess answer", "postprocess answer, ask")
-
-
 def test_an_extern_procedure_may_give_something_else_in_the_next_cycle(tmp_path: Path) -> None:
-    ts, proof = proved(tmp_path, asking)
+    ts, proof = proved_level(tmp_path, "lower", lower=ASKING)
     start = initial(ts.program)
     taken: dict[str, Value] = {"command.inc_command": 1, "command.input_command": 1, "there": False}
     turns = [(taken, (("ask", (at % 2 == 0,)),)) for at in range(40)]  # another answer each time
@@ -82,30 +85,33 @@ def test_an_extern_procedure_may_give_something_else_in_the_next_cycle(tmp_path:
     assert not ending(proof, "go").proved
 
 
-def nested(text: str) -> str:
-    """A module of the preprocess that calls another."""
-    text = go(WAY, "state c : int 0 .. 9", "on := c >= 9", "c := 0", "c := min(c + 1, 9)")(text)
-    text = text.replace(
-        "module receive", "module inner reads c writes on {\n  on := c >= 9\n}\n\nmodule receive"
+def nested(inner: str) -> str:
+    """Return a lower level that counts to 9, and a module of its preprocess that calls another, which is declared so."""
+    return lower_level(
+        *WAY,
+        declared="state c : int 0 .. 9",
+        seen="inner",
+        begin="c := 0",
+        work="c := min(c + 1, 9)",
+        parts=inner,
     )
-    return text.replace("  on := c >= 9\n}\n\nmodule answer", "  inner\n}\n\nmodule answer")
 
 
-def nested_extern(text: str) -> str:
-    said = 'extern procedure inner reads there writes on python "no_such_module:ask" c "ask"'
-    return nested(text).replace("module inner reads c writes on {\n  on := c >= 9\n}", said)
+IN_A_MODULE = "module inner reads c writes on { on := c >= 9 }"
+IN_CODE = 'extern procedure inner reads there writes on python "no_such_module:ask" c "ask"'
 
 
-def whole_of_what_overflows(text: str) -> str:
-    seen = "if r * r < 5.0 {\n    on := int(r * r) >= 3\n  } else {\n    on := true\n  }"
-    text = go(WAY, "state c : int 0 .. 9\ninput r : real 0.0 .. 1.0e300", seen)(text)
-    return text.replace("module receive reads command,", "module receive reads command, r,")
+WHOLE_OF_WHAT_OVERFLOWS = lower_level(
+    *WAY,
+    declared="input r : real 0.0 .. 1.0e300",
+    seen="if r * r < 5.0 {\n    on := int(r * r) >= 3\n  } else {\n    on := true\n  }",
+)
 
 
-@pytest.mark.parametrize(("edit", "ends"), [(nested, True), (whole_of_what_overflows, False)])
-def test_what_the_preprocess_may_do_is_followed(edit: Edit, ends: bool, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("lower", "ends"), [(nested(IN_A_MODULE), True), (WHOLE_OF_WHAT_OVERFLOWS, False)])
+def test_what_the_preprocess_may_do_is_followed(lower: str, ends: bool, tmp_path: Path) -> None:
     """Calls, and the whole part of what may be no number."""
-    ts, proof = proved(tmp_path, edit)
+    ts, proof = proved_level(tmp_path, "lower", lower=lower)
     assert proof.open == ()
     assert ending(proof, "go").proved == ends
     every = dict(of_level(ts, proof))[ENDING]  # what a level above rests on
@@ -114,7 +120,7 @@ def test_what_the_preprocess_may_do_is_followed(edit: Edit, ends: bool, tmp_path
 
 def test_a_refusal_in_the_preprocess_passes_over_a_new_command(tmp_path: Path) -> None:
     """The flag is up when the module calls the procedure, and down in the cycle after the one that ended there."""
-    ts, proof = proved(tmp_path, nested_extern)
+    ts, proof = proved_level(tmp_path, "lower", lower=nested(IN_CODE))
     assert [(obligation.sort, obligation.table) for obligation in proof.open] == [(Sort.ANSWERED, "go")]
     found = shortest(ts, proof.open[0], 3)
     assert found is not None
@@ -124,22 +130,21 @@ def test_a_refusal_in_the_preprocess_passes_over_a_new_command(tmp_path: Path) -
 # --- what selects the table ----------------------------------------------------------------------
 
 
-def by_turns(text: str) -> str:
-    """The table changes in each cycle, whatever the command."""
-    text = text.replace("state cur_state", "state which : lower_command\nstate cur_state")
-    text = text.replace("module receive reads command,", "module receive reads command, which,")
-    text = text.replace("writes new_command,", "writes new_command, which,")
+def by_turns() -> str:
+    """Return a lower level whose table changes in each cycle, whatever the command, and that never is done."""
     turn = "  if which = pause {\n    which := go\n  } else {\n    which := pause\n  }\n"
-    text = text.replace(
-        "inc_command_seen := command.inc_command\n", f"inc_command_seen := command.inc_command\n{turn}"
-    )
-    before, _, tables = text.partition("table go")
-    tables = tables.replace("| done      ", "| executing")
-    return f"{before}table go{tables}".replace("by command.input_command", "by which")
+    return small_text(
+        "lower",
+        ("state cur_state", "state which : lower_command\nstate cur_state"),
+        ("module receive reads command,", "module receive reads command, which,"),
+        ("writes new_command,", "writes new_command, which,"),
+        ("inc_command_seen := command.inc_command\n", f"inc_command_seen := command.inc_command\n{turn}"),
+        ("by command.input_command", "by which"),
+    ).replace("| done      ", "| executing")
 
 
 def test_tables_that_take_turns_under_one_command_are_named(tmp_path: Path) -> None:
-    ts, proof = proved(tmp_path, by_turns)
+    ts, proof = proved_level(tmp_path, "lower", lower=by_turns())
     lines = lines_run(ts, 40, command__inc_command=1)
     assert {table for table, _ in lines[:2]} == {"go", "pause"} == {table for table, _ in lines[-2:]}
     assert all(not ending(proof, table).proved for table in ("go", "pause"))
@@ -150,15 +155,8 @@ def test_tables_that_take_turns_under_one_command_are_named(tmp_path: Path) -> N
 
 def test_a_restart_adopts_an_order_only_under_the_name_that_the_system_knows(tmp_path: Path) -> None:
     """`adopt` knows `command`: of another record the number is not counted as seen, and is taken up once more."""
-    path = changed(tmp_path, lower=swap("command", "orders"), upper=lambda text: f"{text}\n")
-    lower = tmp_path / "lower.rcs"
-    text = lower.read_text(encoding="utf-8")
-    for name in ("new_command", "inc_command", "input_command", "lower_command"):
-        text = text.replace(name.replace("command", "orders"), name)
-    lower.write_text(text.replace("ref_orders_echo", "ref_command_echo"), encoding="utf-8")
-    path.write_text(
-        path.read_text(encoding="utf-8").replace("lower.command", "lower.orders"), encoding="utf-8"
-    )
+    path = small_system(tmp_path, lower=re.sub(r"\bcommand\b", "orders", small_text("lower")))
+    edit_file(path, ('"lower.command"', '"lower.orders"'))
     ts = transition_systems(path)["lower"]
     assert ts.links.above is not None
     assert ts.links.above.order == "orders"
@@ -174,7 +172,7 @@ def test_a_restart_adopts_an_order_only_under_the_name_that_the_system_knows(tmp
 )
 def test_the_proof_knows_every_state_that_a_restart_makes(stands: int | None, echo: int) -> None:
     """The order that stands in the level's own buffer may not be echoed yet: the next number is the one after that."""
-    ts = transition_systems(SMALL / "system.toml")["upper"]
+    ts = transition_systems(SYSTEM)["upper"]
     role = Role(ts.program, ts.level, ts.links)
     now = role.start | {"command.inc_command": 7, "lower.inc_command_echo": echo}
     made = adopted(role, now, {} if stands is None else {"to_lower.inc_command": stands})
@@ -229,14 +227,13 @@ level NAME {
 def test_levels_that_take_orders_in_a_ring_are_no_system(many: int, ring: bool, tmp_path: Path) -> None:
     """Each would be shown to end its commands given that the next one does, and all of them may wait for ever."""
     names = [f"level{at}" for at in range(many)]
-    (tmp_path / "words.rcs").write_text((SMALL / "words.rcs").read_text(encoding="utf-8"), encoding="utf-8")
-    wires = ['name = "ring"\ngenerated = "generated"\ntick_ms = 40\noutside = ["station"]']
-    wires += [f'[[level]]\nname = "{name}"' for name in names] + ["[buffers]"]
+    (tmp_path / "words.rcs").write_text(small_text("words"), encoding="utf-8")
+    buffers: dict[str, str] = {}
     for name, below in zip(names, (*names[1:], names[0] if ring else "station"), strict=True):
         (tmp_path / f"{name}.rcs").write_text(RANKED.replace("NAME", name), encoding="utf-8")
-        wires += [f'"{name}.to_below" = "{below}.command"', f'"{below}.report" = "{name}.below"']
+        buffers |= {f"{name}.to_below": f"{below}.command", f"{below}.report": f"{name}.below"}
     path = tmp_path / "system.toml"
-    path.write_text("\n".join(wires) + "\n", encoding="utf-8")
+    path.write_text(system(names, buffers, outside='["station"]'), encoding="utf-8")
     if ring:
         with pytest.raises(BadDescription, match="no highest level: `level0` takes orders of"):
             transition_systems(path)
@@ -247,43 +244,44 @@ def test_levels_that_take_orders_in_a_ring_are_no_system(many: int, ring: bool, 
 # --- what is assumed of a report, where the level does not number its orders ----------------------
 
 
-def unnumbered(text: str) -> str:
-    """Another command under the same number; and what is then no longer so, however honest the level below is."""
-    said = (
-        "property about : lower.inc_command_echo = was to_lower.inc_command"
-        " implies lower.ref_command_echo = was to_lower.input_command\n\nmodule receive"
-    )
-    text = text.replace("module receive", said, 1)
-    return text.replace(
+ABOUT = """property about : lower.inc_command_echo = was to_lower.inc_command implies lower.ref_command_echo = was to_lower.input_command
+
+module receive"""
+UNNUMBERED = small_text(
+    "upper",
+    ("module receive", ABOUT),
+    (
         "    to_lower.inc_command := (to_lower.inc_command + 1) mod 65536\n",
         "    new_command := new_command\n",
-    ).replace(
+    ),
+    (
         "module send reads to_lower, old_command writes to_lower,",
         "module send reads to_lower, old_command, new_command writes to_lower, new_command,",
-    )
+    ),
+)
+"""Another command under the same number; and what is then no longer so, however honest the level below is."""
 
 
-def skipping(text: str) -> str:
-    """Every other number: one may be echoed that is the one after the last."""
-    return text.replace("(to_lower.inc_command + 1)", "(to_lower.inc_command + 65535)")
+SKIPPING = small_text("upper", ("(to_lower.inc_command + 1)", "(to_lower.inc_command + 65535)"))
+"""Every other number: one may be echoed that is the one after the last."""
 
 
 @pytest.mark.parametrize("outside", [True, False])
 @pytest.mark.parametrize(
-    ("edit", "sort", "name"),
+    ("upper", "sort", "name"),
     [
-        (unnumbered, Sort.NUMBERED, "to_lower.input_command"),
-        (skipping, Sort.NEXT_NUMBER, "to_lower"),
+        (UNNUMBERED, Sort.NUMBERED, "to_lower.input_command"),
+        (SKIPPING, Sort.NEXT_NUMBER, "to_lower"),
     ],
+    ids=["unnumbered", "skipping"],
 )
 def test_what_a_level_assumes_of_a_report_rests_on_how_it_numbers_its_orders(
-    edit: Edit, sort: Sort, name: str, outside: bool, tmp_path: Path
+    upper: str, sort: Sort, name: str, outside: bool, tmp_path: Path
 ) -> None:
     """The neighbour keeps to the protocol as far as the level does, whether it is a level or not."""
-    path = changed(tmp_path, upper=edit)
+    path = small_system(tmp_path, upper=upper)
     if outside:
-        said = path.read_text(encoding="utf-8")
-        path.write_text(said.replace('[[level]]\nname = "lower"\n', ""), encoding="utf-8")
+        edit_file(path, ('[[level]]\nname = "lower"\n', ""))
     proof = prove_system(path, LITTLE)
     wrong = ("upper", (sort, "", name))
     assert wrong not in {need for need, one in proof.closed.items() if one.found}
@@ -293,7 +291,7 @@ def test_what_a_level_assumes_of_a_report_rests_on_how_it_numbers_its_orders(
 
 def test_an_honest_report_is_not_about_an_order_whose_number_stays(tmp_path: Path) -> None:
     """What the property says is broken by a run in which the level below echoes what it took."""
-    ts = transition_systems(changed(tmp_path, upper=unnumbered))["upper"]
+    ts = small_level(tmp_path, "upper", upper=UNNUMBERED)
     start = initial(ts.program)
     order = {"command.inc_command": 1, "command.input_command": 1}
     first = one_cycle(ts, start, order)
@@ -303,8 +301,8 @@ def test_an_honest_report_is_not_about_an_order_whose_number_stays(tmp_path: Pat
 
 
 def test_an_invariant_is_kept_by_a_cycle_before_and_after_which_it_holds(tmp_path: Path) -> None:
-    path = changed(tmp_path, upper=lambda text: f"{text}\ninvariant known : begun or not new_command\n")
-    ts = transition_systems(path)["upper"]
+    known = "\ninvariant known : begun or not new_command\n"
+    ts = small_level(tmp_path, "upper", upper=small_text("upper") + known)
     good, bad = ({"begun": False, "new_command": new} for new in (False, True))
     kept = [invariant_kept(ts, "known", before, after) for before in (good, bad) for after in (good, bad)]
     assert kept == [True, False, False, False]
@@ -324,13 +322,10 @@ OTHER = {
 @pytest.mark.parametrize("other", OTHER)
 def test_both_ends_of_a_buffer_are_the_same(other: str, tmp_path: Path) -> None:
     """What the upper level takes for a command, or a status, is what the lower one gave for it."""
-    old, new = OTHER[other]
-    changed(tmp_path, lower=swap("use words", "use others"))
-    words = (SMALL / "words.rcs").read_text(encoding="utf-8")
-    assert old in words
-    (tmp_path / "others.rcs").write_text(words.replace(old, new), encoding="utf-8")
+    path = small_system(tmp_path, lower=small_text("lower", ("use words", "use others")))
+    (tmp_path / "others.rcs").write_text(small_text("words", OTHER[other]), encoding="utf-8")
     with pytest.raises(BadDescription, match="lower"):
-        transition_systems(tmp_path / "system.toml")
+        transition_systems(path)
 
 
 @pytest.mark.parametrize(
@@ -342,7 +337,7 @@ def test_both_ends_of_a_buffer_are_the_same(other: str, tmp_path: Path) -> None:
     ],
 )
 def test_a_buffer_fills_one_input_and_no_other_does(more: str, words: str, tmp_path: Path) -> None:
-    path = changed(tmp_path, lower=swap("use words\n", "use words\n\n"))
+    path = small_system(tmp_path)
     path.write_text(path.read_text(encoding="utf-8") + more + "\n", encoding="utf-8")
     with pytest.raises(BadDescription, match=words):
         transition_systems(path)
@@ -350,11 +345,12 @@ def test_a_buffer_fills_one_input_and_no_other_does(more: str, words: str, tmp_p
 
 def test_a_level_has_one_superior(tmp_path: Path) -> None:
     """The report echoes the orders of one: what the other assumes would be proved of none."""
-    edit = swap("input there", "input second : lower_order\ninput there")
-    path = changed(
-        tmp_path,
-        lower=lambda text: edit(text).replace("output report", "output other : lower_report\noutput report"),
+    lower = small_text(
+        "lower",
+        ("input there", "input second : lower_order\ninput there"),
+        ("output report", "output other : lower_report\noutput report"),
     )
+    path = small_system(tmp_path, lower=lower)
     more = '"station.second" = "lower.second"\n"lower.other" = "station.other"\n'
     path.write_text(path.read_text(encoding="utf-8") + more, encoding="utf-8")
     with pytest.raises(BadDescription, match="numbered orders in `command` and in `second`"):
@@ -373,13 +369,9 @@ def test_no_answer_of_the_database_is_a_key_of_a_question(
         "state y : bool\ntable t {\n  | line | second.at || y |\n  |---|---||---|\n  | 1 | a || true |\n  | 2 | b || false |\n}\n"
         "level solo { period 40 [ms] table t }\n"
     )
-    path = solo(tmp_path, text)
+    path = solo_system(tmp_path, text)
     feeds = f'feed = [{{ into = "first", query = "q", keys = ["command"] }}, {{ into = "second", query = "q", keys = {json.dumps(keys)} }}]'
-    said = path.read_text(encoding="utf-8")
-    path.write_text(
-        said.replace('[[level]]\nname = "solo"\n', f'[[level]]\nname = "solo"\n{feeds}\n'), encoding="utf-8"
-    )
-    assert "feed" in path.read_text(encoding="utf-8")
+    edit_file(path, ('[[level]]\nname = "solo"\n', f'[[level]]\nname = "solo"\n{feeds}\n'))
     if wrong:
         with pytest.raises(BadDescription, match="answer of the database itself"):
             transition_systems(path)
@@ -392,7 +384,7 @@ def test_no_answer_of_the_database_is_a_key_of_a_question(
 
 @pytest.fixture(scope="module")
 def small() -> dict[str, LevelProof]:
-    return {level.level: level for level in prove_system(SMALL / "system.toml", LITTLE).levels}
+    return {level.level: level for level in prove_system(SYSTEM, LITTLE).levels}
 
 
 @pytest.mark.parametrize(
@@ -409,26 +401,23 @@ def small() -> dict[str, LevelProof]:
 def test_levels_begin_with_what_each_assumes(
     leaf: str, value: int, agree: bool, small: dict[str, LevelProof], tmp_path: Path
 ) -> None:
-    def speeds(text: str) -> str:
-        return text.replace(
-            "input_command : lower_command\n", "input_command : lower_command\n  speed : int 0 .. 9\n"
-        )
-
-    def compares(text: str) -> str:
-        text = text.replace(
+    speeds = small_text(
+        "words", ("input_command : lower_command\n", "input_command : lower_command\n  speed : int 0 .. 9\n")
+    )
+    compares = small_text(
+        "upper",
+        (
             "to_lower.input_command /= old_command",
             "to_lower.speed /= old_speed or to_lower.input_command /= old_command",
-        )
-        text = text.replace(
+        ),
+        (
             "reads to_lower, old_command writes to_lower, old_command",
             "reads to_lower, old_command, old_speed writes to_lower, old_command, old_speed",
-        )
-        text = text.replace(
-            "  old_command := to_lower", "  old_speed := to_lower.speed\n  old_command := to_lower"
-        )
-        return text.replace("state new_command", "state old_speed : int 0 .. 9\nstate new_command")
-
-    made = transition_systems(changed(tmp_path, words=speeds, upper=compares))
+        ),
+        ("  old_command := to_lower", "  old_speed := to_lower.speed\n  old_command := to_lower"),
+        ("state new_command", "state old_speed : int 0 .. 9\nstate new_command"),
+    )
+    made = transition_systems(small_system(tmp_path, words=speeds, upper=compares))
     assert made["lower"].links.above is not None
     assert "command.speed" in made["lower"].links.above.numbered
     program = made["upper"].program
@@ -445,18 +434,19 @@ def test_levels_begin_with_what_each_assumes(
 # --- new commands --------------------------------------------------------------------------------
 
 
-def falls_to_default(text: str) -> str:
-    """No line takes a new command that comes while the lower level is not idle; DEFAULT begins, and fails."""
-    lines = [line for line in text.split("\n") if not line.startswith("  | 0 ")]
-    text = "\n".join(lines).replace("DEFAULT unreachable", "DEFAULT            ")
-    return text.replace(
-        "|| nextstate(f_state)      | pause       | fail       |\n}",
-        "|| begin; nextstate(f_state) | pause | fail |\n}",
-    )
+FALLS_TO_DEFAULT = edited(
+    without_row(small_text("upper"), "0"),
+    ("DEFAULT unreachable", "DEFAULT            "),
+    (
+        "|       |                |           |           || nextstate(f_state)      | pause       | fail       |",
+        "|       |                |           |           || begin; nextstate(f_state) | pause     | fail       |",
+    ),
+)
+"""No line takes a new command that comes while the lower level is not idle; DEFAULT begins, and fails."""
 
 
 def test_default_passes_over_a_new_command_like_any_line_that_does_not_look(tmp_path: Path) -> None:
-    ts = transition_systems(changed(tmp_path, upper=falls_to_default))["upper"]
+    ts = small_level(tmp_path, "upper", upper=FALLS_TO_DEFAULT)
     role = Role(ts.program, ts.level, ts.links)
     now = initial(ts.program) | {"command.inc_command": 1, "command.input_command": 1}
     now |= {"lower.status_report": 1}  # it executes its first order
@@ -473,25 +463,23 @@ def test_default_passes_over_a_new_command_like_any_line_that_does_not_look(tmp_
 
 def test_a_program_is_in_order_by_itself_before_anything_is_proved_of_the_levels(tmp_path: Path) -> None:
     """A counter that runs past its range, taken to stay in it, would end every command, and keep any property."""
-    over = go(WAY, "state c : int 0 .. 9", "on := false", "c := 0", "c := c + 1")
+    over = lower_level(*WAY, declared="state c : int 0 .. 9", begin="c := 0", work="c := c + 1")
     with pytest.raises(
         NoProgramError, match=r"the value can lie outside 0 \.\. 9, the range of `c`: see `rcsc check"
     ):
-        transition_systems(changed(tmp_path, lower=over))
+        small_level(tmp_path, "lower", lower=over)
 
 
 # --- answers that do not stay --------------------------------------------------------------------
 
 
-def done_now_and_then(text: str) -> str:
-    """Done, and executing again, in turns: whoever looks now and then may never see the one."""
-    lines = "  | 2 | false | going | | true || | executing |\n  | 3 | false | going | | false || | done |\n"
-    return go(lines, "state tick : bool", "tick := not tick\n  on := tick")(text)
+DONE_NOW_AND_THEN = lower_level(going("2", on="true"), going("3", on="false", status="done"), **TICK)
+"""Done, and executing again, in turns: whoever looks now and then may never see the one."""
 
 
 def test_an_answer_that_does_not_stay_is_none(tmp_path: Path) -> None:
     """A superior is taken to see an answer some time: it has to stay until it does."""
-    ts, proof = proved(tmp_path, done_now_and_then)
+    ts, proof = proved_level(tmp_path, "lower", lower=DONE_NOW_AND_THEN)
     lines = lines_run(ts, 40, command__inc_command=1, command__input_command=1)
     assert {line for _, line in lines[2:]} == {"2", "3"}
     assert ending(proof, "go").endless == ("2",)
@@ -502,47 +490,32 @@ def test_an_answer_that_does_not_stay_is_none(tmp_path: Path) -> None:
 
 def test_a_pause_that_fails_is_not_answered(tmp_path: Path) -> None:
     """Whoever orders PAUSE waits until it is done (`ends.answered`)."""
-
-    def fails(text: str) -> str:
-        before, _, after = text.partition("table pause")
-        after = after.replace("| done      ", "| failing   ")
-        made = "procedure failing {\n  status_report := failed\n}\n\n"
-        return f"{before}{made}table pause{after}"
-
-    _, proof = proved(tmp_path / "fails", fails)
+    fails = small_text(
+        "lower",
+        ("table pause", "procedure failing {\n  status_report := failed\n}\n\ntable pause"),
+        ("| 1    | true || state(d_state) | done       |", "| 1    | true || state(d_state) | failing    |"),
+    )
+    _, proof = proved_level(tmp_path / "fails", "lower", lower=fails)
     assert ending(proof, "pause").endless == ("1",)
-    _, proof = proved(tmp_path / "done", lambda text: f"{text}\n")
+    _, proof = proved_level(tmp_path / "done", "lower")
     assert ending(proof, "pause").proved
 
 
 def test_what_goes_round_while_the_command_is_answered_does_no_harm(tmp_path: Path) -> None:
     """A flag that the line of the end toggles: its states go round, and *done* is reported all the time."""
 
-    def flips(status: str) -> Edit:
-        lines = "  | 2 | false | going | | || state(d_state) | done |\n"
-        edit = go(lines, "state flip : bool", work="flip := not flip")
-        return lambda text: edit(text).replace(
-            "/= going | | || | done |", f"/= going | | || work | {status} |"
-        )
+    def flips(status: str) -> str:
+        ends = going("2", does="state(d_state)", status="done")
+        idle = f"4 | false | /= going | | || work | {status}"
+        return lower_level(ends, declared="state flip : bool", work="flip := not flip", idle=idle)
 
-    _, proof = proved(tmp_path / "done", flips("done"))
+    _, proof = proved_level(tmp_path / "done", "lower", lower=flips("done"))
     assert ending(proof, "go").proved
-    _, proof = proved(tmp_path / "executing", flips("executing"))
+    _, proof = proved_level(tmp_path / "executing", "lower", lower=flips("executing"))
     assert ending(proof, "go").endless == ("4",)
 
 
 # --- extern procedures that are refused ------------------------------------------------------------
-
-
-SOLO = 'name = "one"\ngenerated = ".rcsc-cache/g"\ndata = "system.toml"\ntick_ms = 40\n[[level]]\nname = "solo"\n[buffers]\n'
-
-
-def solo(folder: Path, text: str) -> Path:
-    """A system of one level without neighbours, a project of its own."""
-    (folder / "rcsc.toml").write_text('name = "one"\nexclude = []\n', encoding="utf-8")
-    (folder / "system.toml").write_text(SOLO, encoding="utf-8")
-    (folder / "solo.rcs").write_text(text, encoding="utf-8")
-    return folder / "system.toml"
 
 
 def asks(result: str, states: str, where: str = "line") -> str:
@@ -579,7 +552,7 @@ RESULTS = {
 
 @pytest.mark.parametrize("result", RESULTS)
 def test_a_result_that_is_refused_ends_the_cycle_whatever_its_type(result: str, tmp_path: Path) -> None:
-    path = solo(tmp_path, asks(*RESULTS[result]))
+    path = solo_system(tmp_path, asks(*RESULTS[result]))
     made = transition_systems(path)
     proof = prove_system(path, LITTLE)
     stated = {
@@ -600,7 +573,7 @@ def test_a_result_that_is_refused_ends_the_cycle_whatever_its_type(result: str, 
 @pytest.mark.parametrize("where", ["preprocess", "line", "postprocess"])
 def test_a_cycle_ends_where_the_result_is_refused(where: str, tmp_path: Path) -> None:
     """Wherever the procedure is called: and only there does what comes after it not run."""
-    path = solo(tmp_path, asks(*RESULTS["a number"], where))
+    path = solo_system(tmp_path, asks(*RESULTS["a number"], where))
     ts = transition_systems(path)["solo"]
     found = shortest(ts, next(obligation for obligation in prove_level(ts, LITTLE).open), 3)
     assert found is not None
@@ -614,7 +587,7 @@ def test_the_prover_calls_no_code_of_the_user(tmp_path: Path, monkeypatch: pytes
     (tmp_path / "of_the_user.py").write_text("import os\nos._exit(0)\n", encoding="utf-8")
     monkeypatch.syspath_prepend(str(tmp_path))
     text = asks(*RESULTS["a number"]).replace("no_such_module", "of_the_user")
-    path = solo(tmp_path, text)
+    path = solo_system(tmp_path, text)
     found, kept = tmp_path / "found", tmp_path / "cases"
     assert run(["prove", str(path), "--log", str(found), "--freeze", str(kept), "--jobs", "2"]) == 1
     [log] = found.glob("*.mcap")
@@ -626,7 +599,7 @@ def test_the_prover_calls_no_code_of_the_user(tmp_path: Path, monkeypatch: pytes
 
 
 def test_a_case_that_says_what_no_extern_procedure_gives_is_none(tmp_path: Path) -> None:
-    path = solo(tmp_path, asks(*RESULTS["a number"]))
+    path = solo_system(tmp_path, asks(*RESULTS["a number"]))
     kept = tmp_path / "cases"
     assert run(["prove", str(path), "--freeze", str(kept)]) == 1
     [case] = kept.glob("*.json")
@@ -638,15 +611,18 @@ def test_a_case_that_says_what_no_extern_procedure_gives_is_none(tmp_path: Path)
             case_breaks(read_case(case))
 
 
-def starts_by_asking(text: str) -> str:
-    """The line that takes a new command asks first; where that is refused, the flag is down when the next cycle comes."""
-    said = 'state h : int 0 .. 9\nextern procedure ask reads there writes h python "no_such_module:f" c "ask"\n\nprocedure state'
-    text = text.replace("procedure state", said, 1)
-    return text.replace("|| state(going)   |", "|| ask; state(going) |")
+ASKS = """state h : int 0 .. 9
+extern procedure ask reads there writes h python "no_such_module:f" c "ask"
+
+procedure state("""
+STARTS_BY_ASKING = small_text(
+    "lower", ("procedure state(", ASKS), ("|| state(going)   |", "|| ask; state(going) |")
+)
+"""The line that takes a new command asks first; where that is refused, the flag is down when the next cycle comes."""
 
 
 def test_a_new_command_whose_line_is_cut_short_is_passed_over(tmp_path: Path) -> None:
-    ts, proof = proved(tmp_path, starts_by_asking)
+    ts, proof = proved_level(tmp_path, "lower", lower=STARTS_BY_ASKING)
     assert proof.verdict(Sort.ANSWERED, "go", "new_command") is Verdict.NOT_PROVED
     obligation = next(one for one in proof.open if one.sort is Sort.ANSWERED)
     found = shortest(ts, obligation, 3)
@@ -656,20 +632,20 @@ def test_a_new_command_whose_line_is_cut_short_is_passed_over(tmp_path: Path) ->
     assert finding.ticks[-1]["lower"].line == "4"  # done, though it never began
 
 
-def stops(text: str) -> str:
-    """Every line looks for a new command; each divides by an input, which is assumed not to be zero."""
-    text = text.replace(
-        "input there", "input load : int 0 .. 2\nassume loaded monitored : load /= 0\ninput there"
-    )
-    text = text.replace("state cur_state", "state rate : int 0 .. 6\nstate cur_state")
-    text = text.replace("procedure state", "procedure slow { rate := 6 / load }\n\nprocedure state", 1)
-    text = text.replace("|| state(going)   |", "|| slow; state(going) |")
-    return text.replace("table go {", "table go assuming loaded {")
+STOPS = small_text(
+    "lower",
+    ("input there", "input load : int 0 .. 2\nassume loaded monitored : load /= 0\ninput there"),
+    ("state cur_state", "state rate : int 0 .. 6\nstate cur_state"),
+    ("procedure state(", "procedure slow { rate := 6 / load }\n\nprocedure state("),
+    ("|| state(going)   |", "|| slow; state(going) |"),
+    ("table go {", "table go assuming loaded {"),
+)
+"""Every line looks for a new command; each divides by an input, which is assumed not to be zero."""
 
 
 def test_a_new_command_is_passed_over_where_a_stopping_assumption_fails(tmp_path: Path) -> None:
     """Whether or not there are extern procedures."""
-    ts, proof = proved(tmp_path, stops)
+    ts, proof = proved_level(tmp_path, "lower", lower=STOPS)
     obligation = next(one for one in proof.open if one.sort is Sort.ANSWERED)
     found = shortest(ts, obligation, 3)
     assert found is not None
@@ -678,7 +654,7 @@ def test_a_new_command_is_passed_over_where_a_stopping_assumption_fails(tmp_path
 
 def test_what_is_trusted_of_a_restart_is_named_of_both_levels(tmp_path: Path) -> None:
     """The cycle after it may not stop: else an older report follows the one that stood."""
-    whole = prove_system(changed(tmp_path, lower=stops), LITTLE)
+    whole = prove_system(small_system(tmp_path, lower=STOPS), LITTLE)
     words = "assumption `loaded` of level `lower` does not fail in the first cycle after a restart"
     echoes = whole.of("lower", (Sort.ECHOES, "", "report"))
     assert echoes.found
@@ -710,7 +686,7 @@ level solo {{ period 40 [ms] table t }}
 @pytest.mark.parametrize(("step", "rests"), [("n + 1", True), ("min(n + 1, 9)", False)])
 def test_what_is_safe_only_under_an_invariant_falls_with_it(step: str, rests: bool, tmp_path: Path) -> None:
     """A restart breaks the invariant: then the counter leaves its range, if only the invariant kept it there."""
-    path = solo(tmp_path, FAILS.format(step=step))
+    path = solo_system(tmp_path, FAILS.format(step=step))
     whole = prove_system(path, LITTLE)
     broken: Key = (Sort.INVARIANT, "", "never_failed")
     assert whole.of("solo", broken).verdict is Verdict.NOT_PROVED
@@ -724,7 +700,7 @@ def test_what_is_safe_only_under_an_invariant_falls_with_it(step: str, rests: bo
 def test_what_a_restart_breaks_is_not_proved_anywhere(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    path = solo(tmp_path, FAILS.format(step="n + 1"))
+    path = solo_system(tmp_path, FAILS.format(step="n + 1"))
     assert run(["prove", str(path), "--trace", "0"]) == 1
     said = capsys.readouterr().out
     assert re.search(r"small +monitored: rests on invariant `never_failed`", said)
@@ -757,17 +733,20 @@ level solo {{ period 40 [ms] preprocess break_it table t postprocess mend_it }}
 def test_an_invariant_that_is_broken_within_a_cycle_keeps_nothing_safe(
     text: str, safe: bool, tmp_path: Path
 ) -> None:
-    whole = prove_system(solo(tmp_path, within(text)), LITTLE)
+    whole = prove_system(solo_system(tmp_path, within(text)), LITTLE)
     assert whole.of("solo", (Sort.INVARIANT, "", "inside")).found
     assert whole.of("solo", SAFE).found is safe
     assert whole.of("solo", (Sort.ONE_LINE, "t", "")).proved is safe
 
 
 def test_what_breaks_where_invariants_are_broken_within_a_cycle_is_shown_by_a_run(tmp_path: Path) -> None:
-    text = within("9").replace("table t", "procedure hop { next later := 0 later := 1 }\ntable t", 1)
-    text = text.replace("| false ||            |", "| false || hop        |")
-    text = text.replace("input go", "state later : int 0 .. 1 deferred until go\ninput go")
-    made = transition_systems(solo(tmp_path, text))["solo"]
+    text = edited(
+        within("9"),
+        ("table t {", "procedure hop { next later := 0 later := 1 }\ntable t {"),
+        ("| false ||            |", "| false || hop        |"),
+        ("input go", "state later : int 0 .. 1 deferred until go\ninput go"),
+    )
+    made = transition_systems(solo_system(tmp_path, text))["solo"]
     obligation = next(one for one in prove_level(made, LITTLE).open if one.sort is Sort.DEFERRED)
     trace = shortest(made, obligation, 3)
     assert trace is not None
@@ -779,12 +758,9 @@ def test_what_is_not_safe_within_a_cycle_is_shown_by_a_run_that_no_executor_does
     runs: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Where the run meets what is not defined, the interpreter cannot do it either: then that is said."""
-    text = (
-        within("9")
-        if runs
-        else within("9").replace("| no   | false ||            |", "| no | false || use |")
-    )
-    path = solo(tmp_path, text)
+    use_anyway = ("| no   | false ||            |", "| no   | false || use        |")
+    text = within("9") if runs else edited(within("9"), use_anyway)
+    path = solo_system(tmp_path, text)
     kept, found = tmp_path / "cases", tmp_path / "found"
     assert run(["prove", str(path), "--log", str(found), "--freeze", str(kept)]) == 1
     said = capsys.readouterr()
@@ -803,10 +779,12 @@ def test_what_is_not_safe_within_a_cycle_is_shown_by_a_run_that_no_executor_does
 
 def test_what_a_line_breaks_and_the_postprocess_mends_is_shown_by_its_run(tmp_path: Path) -> None:
     """The table saw nothing wrong, and nothing is wrong after the cycle."""
-    text = within("0").replace("procedure use", "procedure away { at := 9 }\nprocedure use")
-    made = transition_systems(
-        solo(tmp_path, text.replace("| false ||            |", "| false || away       |"))
+    text = edited(
+        within("0"),
+        ("procedure use", "procedure away { at := 9 }\nprocedure use"),
+        ("| false ||            |", "| false || away       |"),
     )
+    made = transition_systems(solo_system(tmp_path, text))
     [safe] = [one for one in prove_level(made["solo"], LITTLE).open if one.key == SAFE]
     trace = shortest(made["solo"], safe, 3)
     assert trace is not None
@@ -815,16 +793,8 @@ def test_what_a_line_breaks_and_the_postprocess_mends_is_shown_by_its_run(tmp_pa
 
 def test_a_fault_of_one_level_shows_in_the_verdicts_of_its_neighbours(tmp_path: Path) -> None:
     """Behind it nobody knows what the level orders."""
-    path = changed(
-        tmp_path,
-        upper=lambda text: text.replace(
-            "| 4    | false               |       | go ", "| 4    | false               | true  | go "
-        ),
-    )
-    text = (tmp_path / "upper.rcs").read_text(encoding="utf-8")
-    (tmp_path / "upper.rcs").write_text(
-        "\n".join(line for line in text.split("\n") if "| 7 " not in line), encoding="utf-8"
-    )
+    gap = ("| 4    | false               |       | go ", "| 4    | false               | true  | go ")
+    path = small_system(tmp_path, upper=without_row(small_text("upper", gap), "7"))
     whole = prove_system(path, LITTLE)
     lost = ("upper", (Sort.SOME_LINE, "work", ""))
     assert whole.closed[lost].verdict is Verdict.NOT_PROVED
@@ -885,7 +855,7 @@ level solo {{ period 40 [ms] table t }}
 
 
 def test_what_is_assumed_of_an_input_is_used_and_named_in_every_verdict(tmp_path: Path) -> None:
-    whole = prove_system(solo(tmp_path, BELIEVES.format(says="not x or y")), LITTLE)
+    whole = prove_system(solo_system(tmp_path, BELIEVES.format(says="not x or y")), LITTLE)
     assert whole.of("solo", (Sort.ASSUMPTION, "t", "never")).verdict is Verdict.TRUSTED
     stays = whole.of("solo", (Sort.PROPERTY, "", "stays"))
     assert stays.proved
@@ -920,7 +890,7 @@ def test_nothing_is_proved_of_what_no_cycle_can_be(
     by: int, more: str, before: str, possible: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """From a contradiction everything follows, even an invariant that is broken from the beginning."""
-    path = solo(tmp_path, IMPOSSIBLE.format(by=by, more=more, before=before))
+    path = solo_system(tmp_path, IMPOSSIBLE.format(by=by, more=more, before=before))
     whole = prove_system(path, LITTLE)
     odd = Sort.ASSUMPTION, "t", "odd"
     assert whole.of("solo", odd).verdict is (Verdict.TRUSTED if possible else Verdict.NOT_PROVED)
@@ -964,7 +934,7 @@ def test_nothing_is_proved_of_a_table_that_cannot_run_as_it_declares(
     says: str, states: str, verdict: Verdict, tmp_path: Path
 ) -> None:
     """Other tables can, and every cycle that would run this one is left out as impossible."""
-    whole = prove_system(solo(tmp_path, BY_TURNS.format(says=says, states=states)), LITTLE)
+    whole = prove_system(solo_system(tmp_path, BY_TURNS.format(says=says, states=states)), LITTLE)
     assert whole.of("solo", (Sort.ASSUMPTION, "busy", "odd")).verdict is verdict
     assert not whole.of("solo", (Sort.PROPERTY, "", "stays")).proved
 
@@ -987,7 +957,7 @@ def test_what_cannot_be_as_declared_in_a_later_state_is_told_as_taken_for_grante
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """After six cycles no input is: that the property holds says nothing of the seventh."""
-    path = solo(tmp_path, LATER)
+    path = solo_system(tmp_path, LATER)
     ts = transition_systems(path)["solo"]
     now = initial(ts.program)
     for _ in range(7):
@@ -1000,7 +970,7 @@ def test_what_cannot_be_as_declared_in_a_later_state_is_told_as_taken_for_grante
 
 def test_what_is_assumed_of_state_alone_is_to_be_proved(tmp_path: Path) -> None:
     """The level itself decides it, so that nobody has to believe it: and it may be wrong."""
-    path = solo(tmp_path, BELIEVES.format(says="not y"))
+    path = solo_system(tmp_path, BELIEVES.format(says="not y"))
     made, whole = transition_systems(path), prove_system(path, LITTLE)
     assert whole.of("solo", (Sort.ASSUMPTION, "t", "never")).verdict is Verdict.NOT_PROVED
     explanation = [
@@ -1025,12 +995,8 @@ UNREAD = {
 @pytest.mark.parametrize("part", UNREAD)
 def test_no_goal_is_left_out_because_of_a_name(part: str, tmp_path: Path) -> None:
     old, new, level, sorts = UNREAD[part]
-
-    def renamed(text: str) -> str:
-        return re.sub(rf"\b{old}", new, text)
-
-    edits = {"words": renamed} if part != "the flag" else {}
-    path = changed(tmp_path, lower=renamed, upper=renamed, **edits)
+    files = ("lower", "upper") if part == "the flag" else ("lower", "upper", "words")
+    path = small_system(tmp_path, **{name: re.sub(rf"\b{old}", new, small_text(name)) for name in files})
     whole = prove_system(path, LITTLE)
     left = next(one for one in whole.levels if one.level == level).unstated
     assert {one.sort for one in left} >= sorts
@@ -1040,10 +1006,8 @@ def test_no_goal_is_left_out_because_of_a_name(part: str, tmp_path: Path) -> Non
 
 def test_a_flag_is_looked_for_in_every_cell(tmp_path: Path) -> None:
     """In an expression it is looked for as well as in a column of its own."""
-    path = changed(
-        tmp_path, lower=lambda text: text.replace("| line | new_command |", "| line | not not new_command |")
-    )
-    ts = transition_systems(path)["lower"]
+    inside = ("| line | new_command |", "| line | not not new_command |")
+    ts = small_level(tmp_path, "lower", lower=small_text("lower", inside))
     assert unstated(ts) == ()
 
 
@@ -1070,37 +1034,30 @@ level solo { period 40 [ms] table t }
 def test_a_line_that_only_the_first_cycle_runs_is_reached_and_a_state_that_nothing_enters_is_not(
     tmp_path: Path,
 ) -> None:
-    whole = prove_system(solo(tmp_path, ONCE_ONLY), LITTLE)
+    whole = prove_system(solo_system(tmp_path, ONCE_ONLY), LITTLE)
     seen = whole.levels[0].context
     assert seen is not None
     assert (seen.unreached, seen.unsure) == ((("t", "spare"),), ())
 
 
 def test_a_fourth_status_answers_nothing(tmp_path: Path) -> None:
-    def waits(text: str) -> str:
-        text = text.replace(
-            "| 4    | false       | /= going  |       ||                | done       |",
-            "| 4    | false       | /= going  |       ||                | waits      |",
-        )
-        return text.replace(
-            "procedure done", "procedure waits {\n  status_report := waiting\n}\n\nprocedure done", 1
-        )
-
-    path = changed(
-        tmp_path, lower=waits, words=swap("done, executing, failed }", "done, executing, failed, waiting }")
-    )
-    proof = prove_level(transition_systems(path)["lower"], LITTLE)
+    waits = small_text(
+        "lower",
+        ("| 4    | false       | /= going  |       ||                | done       |",
+         "| 4    | false       | /= going  |       ||                | waits      |"),
+        ("procedure done", "procedure waits {\n  status_report := waiting\n}\n\nprocedure done"),
+    )  # fmt: skip
+    words = small_text("words", ("done, executing, failed }", "done, executing, failed, waiting }"))
+    _, proof = proved_level(tmp_path, "lower", lower=waits, words=words)
     assert "4" in ending(proof, "go").endless
 
 
 def test_a_table_of_several_commands_is_one_goal(tmp_path: Path) -> None:
     """Or the verdict of one command would stand for that of the other."""
-    path = changed(
-        tmp_path,
-        words=swap("{ pause, go }", "{ pause, go, run }"),
-        lower=swap("    go : go\n", "    go : go\n    run : go\n"),
-    )
-    keys = [obligation.key for obligation, _ in prove_level(transition_systems(path)["lower"], LITTLE).found]
+    words = small_text("words", ("{ pause, go }", "{ pause, go, run }"))
+    lower = small_text("lower", ("    go : go\n", "    go : go\n    run : go\n"))
+    _, proof = proved_level(tmp_path, "lower", words=words, lower=lower)
+    keys = [obligation.key for obligation, _ in proof.found]
     assert len(keys) == len(set(keys))
 
 
@@ -1123,7 +1080,7 @@ def test_a_neighbour_outside_need_not_speak_of_orders() -> None:
 def test_what_two_levels_say_to_each_other_is_named_where_it_is_no_order(
     tmp_path: Path, renamed: str, lacks: str
 ) -> None:
-    path = changed(tmp_path)
+    path = small_system(tmp_path)
     program, _ = loaded_program(path, "lower")
     variables = tuple(
         replace(one, name=VariableName(renamed)) if one.name == "command.inc_command" else one
@@ -1134,7 +1091,7 @@ def test_what_two_levels_say_to_each_other_is_named_where_it_is_no_order(
 
 
 def test_what_lines_write_is_what_all_their_actions_do(tmp_path: Path) -> None:
-    assert of_lines(transition_systems(changed(tmp_path))["upper"]) == {
+    assert of_lines(small_level(tmp_path, "upper")) == {
         "begun", "cur_state.next", "status_report", "to_lower.input_command",
     }  # fmt: skip
 
@@ -1145,11 +1102,10 @@ def test_what_lines_write_is_what_all_their_actions_do(tmp_path: Path) -> None:
 def test_a_report_without_a_status_is_an_error_that_names_it(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    path = changed(tmp_path)
-    for file in tmp_path.glob("*.rcs"):
-        file.write_text(
-            file.read_text(encoding="utf-8").replace("status_report", "outcome"), encoding="utf-8"
-        )
+    texts = {
+        name: small_text(name).replace("status_report", "outcome") for name in ("upper", "lower", "words")
+    }
+    path = small_system(tmp_path, **texts)
     assert run(["prove", str(path)]) == 1
     assert "there is no `upper.report.status_report`" in capsys.readouterr().err
 
@@ -1191,7 +1147,7 @@ def test_a_cycle_that_a_stopping_assumption_ends_is_shown_as_it_ran(  # where it
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     """No line, no postprocess, the safe value: by the interpreter and by both executors, and in words."""
-    path = solo(tmp_path, STOPPED.format(calls=calls, idle=idle, before=before, after=after))
+    path = solo_system(tmp_path, STOPPED.format(calls=calls, idle=idle, before=before, after=after))
     whole = prove_system(path, LITTLE)
     stated = {"answered", "moves"}
     assert {name for name in stated if not whole.of("solo", (Sort.PROPERTY, "", name)).proved} == broken

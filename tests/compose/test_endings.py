@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from rcsc.commands import run
+from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.counterexample.lasso import Lasso, lassos
 from rcsc.compose.counterexample.trace import NotReproducedError, TraceSearch
 from rcsc.compose.proof.context import gives_an_order
@@ -21,94 +22,71 @@ from rcsc.solvers.smtlib import cvc5_refutes
 from rcsc.symbolic import values
 from rcsc.symbolic.measured import Measured
 from rcsc.symbolic.values import Node
-from tests.compose.test_compose import LITTLE, SMALL, Edit, changed
 from tests.small_hierarchies.endless import Edge, edges, endless
 from tests.small_hierarchies.explored import explored
 from tests.small_hierarchies.level import Role, State
-
-HEAD = """table go {
-  | line | new_command | cur_state | there | on || procedures | status_out |
-  |------|-------------|-----------|-------|----||------------|------------|
-  | 1 | true | | | || state(going); begin | executing |
-  | 4 | false | /= going | | || | done |
-"""
-
-
-def go(lines: str, states: str = "", seen: str = "on := false", begin: str = "", work: str = "") -> Edit:
-    """The lower level with another `go`: `on` is what preprocess sees, `begin` and `work` what lines do."""
-
-    def edit(text: str) -> str:
-        before, _, after = text.partition("table go {")
-        after = after[after.index("table pause") :]
-        written = [name for name in ("c", "x") if f"state {name} :" in states]
-        names = ", ".join(["inc_command_seen", *written, *(["tick"] if "tick" in states else [])])
-        before = before.replace("state cur_state", f"state on : bool\n{states}\nstate cur_state")
-        before = before.replace(
-            "module receive reads command,", f"module receive reads command, there, on, {names},"
-        )
-        before = before.replace(
-            "writes new_command,", "writes new_command, on," + (" tick," if "tick" in states else "")
-        )
-        before = before.replace(
-            "inc_command_seen := command.inc_command\n}",
-            f"inc_command_seen := command.inc_command\n  {seen}\n}}",
-        )
-        made = f"procedure begin {{\n  {begin}\n}}\n\nprocedure work {{\n  {work}\n}}\n\n"
-        return f"{before}{made}{HEAD}{lines}}}\n\n{after}"
-
-    return edit
+from tests.support.programs.systems import (
+    LITTLE,
+    ORDER_AFTER_ORDER,
+    SYSTEM,
+    TICK,
+    TURNS,
+    WAY,
+    counting,
+    going,
+    lower_level,
+    proved_level,
+    small_level,
+    small_system,
+    small_text,
+)
+from tests.support.programs.texts import edit_file, edited
 
 
-def ending(folder: Path, edit: Edit) -> Ending:
-    found = prove_level(transition_systems(changed(folder, lower=edit))["lower"], LITTLE)
-    assert found.open == ()
-    return next(one for one in found.endings if one.table == "go")
-
-
-TICK = {"states": "state tick : bool", "seen": "tick := not tick\n  on := tick"}
+def ending(folder: Path, lower: str) -> Ending:
+    """Prove this lower level; return how commands under `go` end."""
+    _, proof = proved_level(folder, "lower", lower=lower)
+    assert proof.open == ()
+    return next(ending for ending in proof.endings if ending.table == "go")
 
 
 def test_lines_that_take_turns_for_ever_are_named(tmp_path: Path) -> None:
     """Neither runs twice in a row."""
-    lines = (
-        "  | 2 | false | going | | true || | executing |\n  | 3 | false | going | | false || | executing |\n"
-    )
-    assert ending(tmp_path, go(lines, **TICK)).endless == ("2", "3")
+    assert ending(tmp_path, lower_level(*TURNS, **TICK)).endless == ("2", "3")
 
 
 def test_a_counter_that_another_line_sets_back_is_none(tmp_path: Path) -> None:
-    lines = "  | 2 | false | going | | true || work | executing |\n  | 3 | false | going | | false || begin | executing |\n"
-    states = f"{TICK['states']}\nstate c : int 0 .. 9"
-    found = ending(tmp_path, go(lines, states, TICK["seen"], begin="c := 0", work="c := min(c + 1, 9)"))
+    lower = lower_level(
+        going("2", on="true", does="work"),
+        going("3", on="false", does="begin"),
+        declared="state tick : bool\nstate c : int 0 .. 9",
+        seen=TICK["seen"],
+        begin="c := 0",
+        work="c := min(c + 1, 9)",
+    )
+    found = ending(tmp_path, lower)
     assert (found.endless, found.proved) == (("2", "3"), False)
 
 
 def test_a_line_that_counts_is_shown_to_stop(tmp_path: Path) -> None:
-    lines = "  | 2 | false | going | | false || work | executing |\n  | 3 | false | going | | true || state(d_state) | done |\n"
-    counts = go(lines, "state c : int 0 .. 9", "on := c >= 9", "c := 0", "c := min(c + 1, 9)")
-    found = ending(tmp_path, counts)
+    found = ending(tmp_path, counting(9))
     assert (found.proved, found.counted, found.still) == (True, (Counted("2", "c"),), ())
 
 
 def test_a_counter_that_rises_only_now_and_then_is_none(tmp_path: Path) -> None:
-    counts = go(
-        WAY, "state c : int 0 .. 9", "on := c >= 9", "c := 0", "if there {\n    c := min(c + 1, 9)\n  }"
-    )
-    assert ending(tmp_path, counts).endless == ("2",)
+    now_and_then = edited(counting(9), ("  c := min(c + 1, 9)", "  if there { c := min(c + 1, 9) }"))
+    assert ending(tmp_path, now_and_then).endless == ("2",)
 
 
 def test_default_may_go_on_for_ever_like_any_line(tmp_path: Path) -> None:
-    lines = (
-        "  | 3 | false | going | true | || state(d_state) | done |\n  | 5 | DEFAULT | | | || | executing |\n"
-    )
-    assert ending(tmp_path, go(lines)).endless == ("5",)
+    ends = going("3", there="true", does="state(d_state)", status="done")
+    assert ending(tmp_path, lower_level(ends, "5 | DEFAULT | | | || | executing")).endless == ("5",)
 
 
-WAY = "  | 2 | false | going | | false || work | executing |\n  | 3 | false | going | | true || state(d_state) | done |\n"
-
-
-def way(work: str, seen: str = "on := x >= 100.0", inputs: str = "") -> Edit:
-    return go(WAY, f"{inputs}\nstate x : real 0.0 .. 100.0", seen, "x := 0.0", work)
+def way(work: str, seen: str = "on := x >= 100.0", inputs: str = "") -> str:
+    """Return a lower level that goes a way `x` from 0, until it is seen to be long enough."""
+    declared = f"{inputs}state x : real 0.0 .. 100.0"
+    return lower_level(*WAY, declared=declared, seen=seen, begin="x := 0.0", work=work)
 
 
 @pytest.mark.parametrize("seen", ["on := x >= 100.0", "on := 100.0 - x <= 0.0", "on := x * 0.1 >= 9.99"])
@@ -132,19 +110,16 @@ def test_a_way_on_which_a_step_may_be_lost_is_not_shown_to_end(tmp_path: Path) -
 
 def test_what_has_to_stand_still_is_said(tmp_path: Path) -> None:
     """The upper level gives its order again whenever an input changes, as often as that may be."""
-
-    def edit(text: str) -> str:
-        text = text.replace(
-            "state new_command", "input which : bool\nstate old_which : bool\nstate new_command"
-        )
-        text = text.replace("module send reads to_lower, old_command writes to_lower, old_command {",
-                            "module send reads to_lower, old_command, which, old_which, new_command, begun"
-                            " writes to_lower, old_command, old_which {")  # fmt: skip
-        text = text.replace("if to_lower.input_command /= old_command {",
-                            "if to_lower.input_command /= old_command or which /= old_which {")  # fmt: skip
-        return text.replace("  old_command := to_lower", "  old_which := which\n  old_command := to_lower")
-
-    found = prove_level(transition_systems(changed(tmp_path, upper=edit))["upper"], LITTLE)
+    upper = small_text(
+        "upper",
+        ("state new_command", "input which : bool\nstate old_which : bool\nstate new_command"),
+        ("module send reads to_lower, old_command writes to_lower, old_command {",
+         "module send reads to_lower, old_command, which, old_which, new_command, begun writes to_lower, old_command, old_which {"),
+        ("if to_lower.input_command /= old_command {",
+         "if to_lower.input_command /= old_command or which /= old_which {"),
+        ("  old_command := to_lower", "  old_which := which\n  old_command := to_lower"),
+    )  # fmt: skip
+    _, found = proved_level(tmp_path, "upper", upper=upper)
     assert found.open == ()
     work = next(one for one in found.endings if one.table == "work")
     assert (work.proved, work.still) == (True, ("which",))
@@ -153,16 +128,9 @@ def test_what_has_to_stand_still_is_said(tmp_path: Path) -> None:
 # --- another solver -----------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    "edit",
-    [
-        way("x := min(100.0, x + 0.3)"),
-        go(WAY, "state c : int 0 .. 9", "on := c >= 9", "c := 0", "c := min(c + 1, 9)"),
-    ],
-)
-def test_another_solver_says_that_it_ends(edit: Edit, tmp_path: Path) -> None:
-    ts = transition_systems(changed(tmp_path, lower=edit))["lower"]
-    proof = prove_level(ts, LITTLE)
+@pytest.mark.parametrize("lower", [way("x := min(100.0, x + 0.3)"), counting(9)])
+def test_another_solver_says_that_it_ends(lower: str, tmp_path: Path) -> None:
+    ts, proof = proved_level(tmp_path, "lower", lower=lower)
     questions = certificate(ts, proof)
     assert {"lines 1", "ends pause 1", "ends go 1", "ends go 2"} <= questions.keys()
     assert [name for name, text in questions.items() if not cvc5_refutes(text)] == []
@@ -194,55 +162,38 @@ def test_a_refutation_that_is_wrong_is_not_confirmed() -> None:
 # --- runs that go round --------------------------------------------------------------------------
 
 
-def lasso(folder: Path, level: str, table: str, **edits: Edit) -> Lasso | NotReproducedError | None:
-    ts = transition_systems(changed(folder, **edits))[level]
+def lasso(ts: TransitionSystem, table: str) -> Lasso | NotReproducedError | None:
+    """Find the shortest run of at most eight cycles in which a command of the table comes round."""
     return lassos(ts, (table,), TraceSearch(8, legal=True)).get(table)
 
 
 def test_a_line_that_waits_goes_round(tmp_path: Path) -> None:
     """For what nobody brings: the shortest run is to take the command, and to wait; it is new no more, and to wait again."""
-    found = lasso(
-        tmp_path,
-        "lower",
-        "go",
-        lower=go(
-            "  | 2 | false | going | false | || | executing |\n  | 3 | false | going | true | || | executing |\n"
-        ),
-    )
+    waits = lower_level(going("2", there="false"), going("3", there="true"))
+    found = lasso(small_level(tmp_path, "lower", lower=waits), "go")
     assert isinstance(found, Lasso)
     assert ([step.line for step in found.trace.steps], found.first) == (["1", "2", "2"], 3)
 
 
 def test_lines_that_take_turns_go_round_together(tmp_path: Path) -> None:
-    lines = (
-        "  | 2 | false | going | | true || | executing |\n  | 3 | false | going | | false || | executing |\n"
-    )
-    found = lasso(tmp_path, "lower", "go", lower=go(lines, **TICK))
+    found = lasso(small_level(tmp_path, "lower", lower=lower_level(*TURNS, **TICK)), "go")
     assert isinstance(found, Lasso)
     lines_run = [step.line for step in found.trace.steps]
     assert (len(lines_run), found.first, set(lines_run[2:])) == (4, 3, {"2", "3"})
 
 
 def test_what_ends_goes_nowhere_round(tmp_path: Path) -> None:
-    counts = go(WAY, "state c : int 0 .. 3", "on := c >= 3", "c := 0", "c := min(c + 1, 3)")
-    assert lasso(tmp_path / "counts", "lower", "go", lower=counts) is None
+    assert lasso(small_level(tmp_path / "counts", "lower", lower=counting(3)), "go") is None
     # a real's way is open to the solver; the interpreter does not come round
-    real = lasso(tmp_path / "real", "lower", "go", lower=way("x := min(100.0, x + 30.0)"))
+    far = small_level(tmp_path / "real", "lower", lower=way("x := min(100.0, x + 30.0)"))
+    real = lasso(far, "go")
     assert isinstance(real, NotReproducedError)
     assert real.guessed
 
 
-def again(text: str) -> str:
-    """When the lower level is done the upper one rests, and then gives the order again."""
-    gone = "nextstate(d_state)      | pause       | done       |"
-    text = text.replace(gone, gone.replace("done  ", "executing"))
-    rests = "| d_state   ||                         | pause       | done       |"
-    return text.replace(rests, "| d_state   || nextstate(going)        | go          | executing  |")
-
-
 def test_order_after_order_goes_round(tmp_path: Path) -> None:
     """Its numbers go on, and everything else is as before."""
-    found = lasso(tmp_path, "upper", "work", upper=again)
+    found = lasso(small_level(tmp_path, "upper", upper=small_text("upper", *ORDER_AFTER_ORDER)), "work")
     assert isinstance(found, Lasso)
     steps = found.trace.steps[found.first - 1 :]
     numbers = [step.after["to_lower.inc_command"] for step in steps]
@@ -252,7 +203,7 @@ def test_order_after_order_goes_round(tmp_path: Path) -> None:
 
 def test_it_is_shown_drawn_and_frozen(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """By the command: a warning with a time line, a log, and a case that fails until the table is mended."""
-    path = changed(tmp_path / "round", upper=again)
+    path = small_system(tmp_path / "round", upper=small_text("upper", *ORDER_AFTER_ORDER))
     (path.parent / "rcsc.toml").write_text('name = "round"\n', encoding="utf-8")
     found, cases = tmp_path / "found", path.parent / "cases"
     assert run(["prove", str(path), "--log", str(found), "--freeze", str(cases), "--no-cache"]) == 0
@@ -266,9 +217,7 @@ def test_it_is_shown_drawn_and_frozen(tmp_path: Path, capsys: pytest.CaptureFixt
     (case,) = (one for one in cases.iterdir() if "upper_work_ends" in one.name)
     assert run(["prove", "--case", str(case)]) == 1
     assert "RCS753" in capsys.readouterr().err
-    path.with_name("upper.rcs").write_text(
-        (SMALL / "upper.rcs").read_text(encoding="utf-8"), encoding="utf-8"
-    )
+    edit_file(path.with_name("upper.rcs"), *((new, old) for old, new in ORDER_AFTER_ORDER))
     assert run(["prove", "--case", str(case)]) == 0
 
 
@@ -364,7 +313,7 @@ def test_changes_of_state_are_counted_after_the_cycle_that_takes_the_command(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """As often as an enumeration of all runs finds: but not in the cycle that takes it, as the first of a run does."""
-    path = changed(tmp_path, lower=flagged)
+    path = small_system(tmp_path, lower=flagged(small_text("lower")))
     one = transition_systems(path)["lower"]
     role, seen = Role(one.program, one.level, one.links), set[State]()
     explored(role, seen=seen)
@@ -386,24 +335,22 @@ def test_changes_of_state_are_counted_after_the_cycle_that_takes_the_command(
 # --- the enumeration that holds it ----------------------------------------------------------------
 
 
-def of_lower(folder: Path, edit: Edit) -> list[Edge]:
-    one = transition_systems(changed(folder, lower=edit))["lower"]
-    role, seen = Role(one.program, one.level, one.links), set[State]()
+def of_lower(folder: Path, lower: str) -> list[Edge]:
+    """Enumerate the edges between all states of this lower level."""
+    ts = small_level(folder, "lower", lower=lower)
+    role, seen = Role(ts.program, ts.level, ts.links), set[State]()
     explored(role, seen=seen)
     return edges(role, seen)
 
 
 def test_the_enumeration_sees_rounds_and_their_end(tmp_path: Path) -> None:
-    turns = (
-        "  | 2 | false | going | | true || | executing |\n  | 3 | false | going | | false || | executing |\n"
-    )
-    assert endless(of_lower(tmp_path / "turns", go(turns, **TICK)), "go", ()) == "round in quiet cycles"
-    counts = go(WAY, "state c : int 0 .. 4", "on := c >= 4", "c := 0", "c := min(c + 1, 4)")
-    assert endless(of_lower(tmp_path / "counts", counts), "go", ()) == ""
+    turns = of_lower(tmp_path / "turns", lower_level(*TURNS, **TICK))
+    assert endless(turns, "go", ()) == "round in quiet cycles"
+    assert endless(of_lower(tmp_path / "counts", counting(4)), "go", ()) == ""
 
 
 def test_the_enumeration_sees_order_after_order_and_what_stands_still() -> None:
-    one = transition_systems(SMALL / "system.toml")["upper"]
+    one = transition_systems(SYSTEM)["upper"]
     assert "to_lower.inc_command" in one.kinds
     assert gives_an_order(one, one.cycle(one.havoc())).op != "constant"
     states: list[State] = [(0,), (1,)]

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from rcsc.compose.contract.obligations import Obligation
+from rcsc.compose.contract.obligations import Obligation, Sort, obligations, pairs
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.counterexample.cycle_run import CycleRun, ran_on
 from rcsc.compose.counterexample.finding import Finding, rows
@@ -11,6 +11,17 @@ from rcsc.compose.counterexample.trace import NotReproducedError, Trace, TraceSe
 from rcsc.compose.invariant.search import Effort
 from rcsc.compose.proof.system import SystemProof, prove_transition_systems, transition_systems
 from rcsc.lang.model import Value
+
+
+def every_obligation(ts: TransitionSystem) -> tuple[Obligation, ...]:
+    """Return all that is owed of a level, and what would be wrong of two of its lines together."""
+    cycle = ts.cycle(ts.havoc())
+    return (*obligations(ts, cycle), *pairs(cycle))
+
+
+def obligation_of(ts: TransitionSystem, sort: Sort, table: str = "", name: str = "") -> Obligation:
+    """Return the obligation of this key."""
+    return next(owed for owed in every_obligation(ts) if owed.key == (sort, table, name))
 
 
 def shortest(

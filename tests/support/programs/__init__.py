@@ -13,4 +13,6 @@ A test that needs a program writes its text, or names one of `examples`, and tak
 
 `stages`: the program of a text or of a file, what is reported of it, its verdict, its generated files.
 `examples`: programs that several rooms use.
+`texts`: parts of a text (a table, a level, the description of a system), and edits that are sure to be made.
+`systems`: a system of two levels, with other texts in some of its files, and one of a single level.
 """
