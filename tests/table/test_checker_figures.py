@@ -1,0 +1,470 @@
+"""What the checker of certificates computes, exactly: questions, columns, spans, facts, what is owed, and the work that it took."""
+
+from collections.abc import Callable, Iterable, Sequence
+from itertools import combinations_with_replacement, product
+
+import numpy as np
+import pytest
+
+from rcsc.certify.execution import Start
+from rcsc.certify.known import Known
+from rcsc.certify.owed import Debts
+from rcsc.certify.settle import Answer, Fails, Left, Settler, Shown, script, values_in
+from rcsc.certify.values import BOOL, FREE, INT, REAL, TRUTHS, Term, Terms, parts_first, spanned, truncated
+from rcsc.lang.model import Bool, Int, Real
+from tests.support.emitted import program_of
+from tests.table.test_told import FAULTY
+
+TERMS = Terms()
+MAKE = TERMS.make
+TRUTH = TERMS.variable("b", Bool())
+NUMBER, OTHER = TERMS.variable("n", Int(-3, 9)), TERMS.variable("m", Int(0, 5))
+DOUBLE = TERMS.variable("x", Real(-1.5, 2.0))
+
+
+def whole(value: int) -> Term:
+    return TERMS.constant(INT, value)
+
+
+def double(value: float) -> Term:
+    return TERMS.constant(REAL, value)
+
+
+# --- questions ----------------------------------------------------------------------------
+
+ASKED = [
+    MAKE("<", MAKE("/", NUMBER, OTHER), MAKE("mod", MAKE("neg", NUMBER), whole(-2))),
+    TERMS.some((TRUTH, TERMS.negation(MAKE("=", MAKE("real", NUMBER), MAKE("*", DOUBLE, double(-0.5)))))),
+    MAKE(
+        "<=",
+        MAKE("int", MAKE("abs", TERMS.kept(MAKE("+", DOUBLE, double(1.0)), 0.0, 1.0, 3))),
+        TERMS.choice(TRUTH, whole(0), OTHER),
+    ),
+    TERMS.true,
+]
+QUESTION = """\
+(declare-const v0 Int) ; n
+(assert (<= (- 3) v0 9))
+(declare-const v1 Int) ; m
+(assert (<= 0 v1 5))
+(define-fun t2 () Int (over v0 v1))
+(define-fun t3 () Int (- v0))
+(define-fun t5 () Int (rest t3 (- 2)))
+(define-fun t6 () Bool (< t2 t5))
+(declare-const v7 Bool) ; b
+(define-fun t8 () Float64 ((_ to_fp 11 53) RNE (to_real v0)))
+(declare-const v9 Float64) ; x
+{ranged}
+(define-fun t11 () Float64 (fp.mul RNE v9 (fp #b1 #b01111111110 #b0000000000000000000000000000000000000000000000000000)))
+(define-fun t12 () Bool (fp.eq t8 t11))
+(define-fun t13 () Bool (not t12))
+(define-fun t14 () Bool (or v7 t13))
+(define-fun t16 () Float64 (fp.add RNE v9 (fp #b0 #b01111111111 #b0000000000000000000000000000000000000000000000000000)))
+(define-fun t18 () Float64 (fp.abs t16))
+(define-fun t19 () Int (ite (or (fp.isNaN t18) (fp.isInfinite t18)) 0 (to_int (fp.to_real (fp.roundToIntegral RTZ t18)))))
+(define-fun t21 () Int (ite v7 0 v1))
+(define-fun t22 () Bool (<= t19 t21))
+(assert t6)
+(assert t14)
+(assert t22)
+(assert true)
+(check-sat)
+"""
+
+
+RANGED = (
+    "(assert (and (fp.leq (fp #b1 #b01111111111 #b1000000000000000000000000000000000000000000000000000) v9) "
+    "(fp.leq v9 (fp #b0 #b10000000000 #b0000000000000000000000000000000000000000000000000000)) "
+    "(not (and (fp.isNegative v9) (fp.isZero v9)))))"
+)
+"""That the double lies in its range, and is no zero with a sign."""
+
+
+def test_a_question_is_written_as_smt_lib_has_it() -> None:
+    prelude, asked = script(ASKED).split("(declare-const v0", maxsplit=1)
+    assert f"(declare-const v0{asked}" == QUESTION.format(ranged=RANGED)
+    assert prelude.splitlines()[0] == "(set-logic ALL)"
+
+
+# --- columns ------------------------------------------------------------------------------
+
+COLUMNS = {
+    TRUTH: np.array([0, 1]),
+    NUMBER: np.array([4, -3]),
+    OTHER: np.array([1, 2]),
+    DOUBLE: np.array([0.5, 1.0]),
+}
+
+
+@pytest.mark.parametrize(
+    ("term", "values", "kind"),
+    [
+        (TRUTH, [False, True], np.bool_),
+        (NUMBER, [4, -3], np.int64),
+        (DOUBLE, [0.5, 1.0], np.float64),
+        (ASKED[0], [False, True], np.bool_),
+        (MAKE("+", NUMBER, OTHER), [5, -1], np.int64),
+        (MAKE("*", DOUBLE, DOUBLE), [0.25, 1.0], np.float64),
+        (MAKE("/", DOUBLE, MAKE("-", DOUBLE, DOUBLE)), [np.inf, np.inf], np.float64),
+        (MAKE("/", NUMBER, OTHER), [4, -1], np.int64),
+        (MAKE("mod", NUMBER, OTHER), [0, -1], np.int64),
+        (MAKE("int", DOUBLE), [0, 1], np.int64),
+        (MAKE("real", NUMBER), [4.0, -3.0], np.float64),
+        (whole(3), [3, 3], np.int64),
+        (TERMS.choice(TRUTH, NUMBER, OTHER), [1, -3], np.int64),
+    ],
+)
+def test_columns_are_of_machine_words_where_all_values_fit(
+    term: Term, values: Sequence[float], kind: type
+) -> None:
+    found = values_in(term, COLUMNS, 2)
+    assert found.dtype == kind
+    assert found.tolist() == list(values)
+
+
+def test_columns_are_of_python_s_numbers_where_one_value_does_not_fit() -> None:
+    wide = TERMS.variable("w", Int(0, 2**63))
+    cases = {wide: np.array([2**63, 1], dtype=object), NUMBER: np.array([1, 2])}
+    found = values_in(MAKE("+", wide, NUMBER), cases, 2)
+    assert (found.dtype, found.tolist()) == (object, [2**63 + 1, 3])
+
+
+def test_a_constant_past_the_machine_word_is_one_of_python_s_numbers() -> None:
+    wide = TERMS.variable("w", Int(0, 2**63))
+    found = values_in(MAKE("-", wide, whole(2**63)), {wide: np.array([1], dtype=object)}, 1)
+    assert found.tolist() == [1 - 2**63]
+    either = TERMS.choice(TRUTH, whole(2**63 + 1), whole(-1))
+    assert values_in(either, COLUMNS, 2).tolist() == [-1, 2**63 + 1]
+
+
+# --- terms --------------------------------------------------------------------------------
+
+
+def test_terms_are_built_as_small_as_they_can_be() -> None:
+    assert TERMS.negation(TERMS.negation(TRUTH)) is TRUTH
+    assert TERMS.negation(TERMS.true) is TERMS.false
+    assert TERMS.every([TRUTH]) is TERMS.every([TERMS.true, TRUTH, TRUTH]) is TERMS.some([TRUTH]) is TRUTH
+    assert TERMS.every([]) is TERMS.true
+    assert TERMS.every([TRUTH, TERMS.false]) is TERMS.some([]) is TERMS.false
+    assert TERMS.choice(TRUTH, NUMBER, NUMBER) is TERMS.choice(TERMS.true, NUMBER, OTHER) is NUMBER
+    assert TERMS.choice(TERMS.false, NUMBER, OTHER) is OTHER
+    assert MAKE("+", whole(2), whole(3)) is whole(5)
+    assert MAKE("<", whole(3), whole(2)) is TERMS.false
+    assert MAKE("/", double(1.0), double(4.0)) is double(0.25)
+    assert MAKE("+", NUMBER, OTHER) is MAKE("+", NUMBER, OTHER)
+    assert double(-0.0) is not double(0.0)
+    assert [len(parts_first(one)) for one in ASKED] == [7, 9, 11, 1]
+
+
+# --- spans --------------------------------------------------------------------------------
+
+SPANS = list(combinations_with_replacement(range(-2, 4), 2))
+MEANT: dict[str, Callable[[int, int], int]] = {
+    "=": lambda a, b: a == b,
+    "<": lambda a, b: a < b,
+    "<=": lambda a, b: a <= b,
+    "+": lambda a, b: a + b,
+    "-": lambda a, b: a - b,
+    "*": lambda a, b: a * b,
+    "/": truncated,
+}
+
+
+def hull(values: Iterable[int]) -> tuple[int, int]:
+    every = list(values)
+    return min(every), max(every)
+
+
+@pytest.mark.parametrize("op", MEANT)
+def test_the_span_of_two_numbers_apart_is_exact(op: str) -> None:
+    term = Term(op, (NUMBER, OTHER), BOOL if op in ("=", "<", "<=") else INT)
+    for one, two in product(SPANS, SPANS):
+        pairs = product(range(one[0], one[1] + 1), range(two[0], two[1] + 1))
+        assert spanned(term, [one, two]) == hull(MEANT[op](a, b) for a, b in pairs)
+
+
+@pytest.mark.parametrize("op", ["=", "<", "<="])
+def test_a_number_is_compared_with_itself(op: str) -> None:
+    assert spanned(Term(op, (NUMBER, NUMBER), BOOL), [(-3, 9), (-3, 9)]) == ((0, 0) if op == "<" else (1, 1))
+
+
+def test_the_span_of_a_remainder_has_the_sign_of_what_is_divided_and_is_below_the_divisor() -> None:
+    term = Term("mod", (NUMBER, OTHER), INT)
+    for one, two in product(SPANS, SPANS):
+        found, most = spanned(term, [one, two]), max(abs(two[0]), abs(two[1]), 1) - 1
+        if one[0] == one[1] and two[0] == two[1]:
+            rest = one[0] - two[0] * truncated(one[0], two[0]) if two[0] else 0
+            assert found == (rest, rest)
+        else:
+            assert found == (max(min(one[0], 0), -most), min(max(one[1], 0), most))
+
+
+@pytest.mark.parametrize("op", ["<", "<="])
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize("greater", [False, True])
+def test_the_span_of_the_least_and_of_the_greatest_is_exact(op: str, turned: bool, greater: bool) -> None:
+    sides = (OTHER, NUMBER) if turned else (NUMBER, OTHER)
+    condition = Term(op, sides, BOOL)
+    chosen = sides if not greater else (sides[1], sides[0])
+    term = Term("ite", (condition, *chosen), INT)
+    for one, two in product(SPANS, SPANS):
+        spans = {sides[0]: one, sides[1]: two}
+        first = spanned(condition, [one, two])
+        pairs = product(range(one[0], one[1] + 1), range(two[0], two[1] + 1))
+        found = spanned(term, [first, spans[chosen[0]], spans[chosen[1]]])
+        assert found == hull(max(a, b) if greater else min(a, b) for a, b in pairs)
+
+
+def test_the_span_of_a_choice_is_cut_where_its_condition_cuts_it() -> None:
+    four = whole(4)
+    for condition, sides, span in [
+        (Term("<", (NUMBER, four), BOOL), (NUMBER, four), (-3, 4)),
+        (Term("<", (four, NUMBER), BOOL), (four, NUMBER), (-3, 4)),
+        (Term("<=", (NUMBER, four), BOOL), (four, NUMBER), (4, 9)),
+        (Term("=", (NUMBER, four), BOOL), (NUMBER, four), (-3, 9)),
+        (TRUTH, (NUMBER, four), (-3, 9)),
+    ]:
+        spans = [(one.low, one.high) for one in sides]
+        assert spanned(Term("ite", (condition, *sides), INT), [TRUTHS, *spans]) == span
+    choice = Term("ite", (TRUTH, NUMBER, OTHER), INT)
+    assert spanned(choice, [(1, 1), (2, 3), (5, 7)]) == (2, 3)
+    assert spanned(choice, [(0, 0), (2, 3), (5, 7)]) == (5, 7)
+    assert spanned(choice, [TRUTHS, None, (5, 7)]) is None
+
+
+def test_the_span_of_a_truth_is_exact() -> None:
+    for one, two in product([(0, 0), (0, 1), (1, 1)], repeat=2):
+        assert spanned(Term("not", (TRUTH,), BOOL), [one]) == (1 - one[1], 1 - one[0])
+        assert spanned(Term("and", (TRUTH, TRUTH), BOOL), [one, two]) == (one[0] & two[0], one[1] & two[1])
+        assert spanned(Term("or", (TRUTH, TRUTH), BOOL), [one, two]) == (one[0] | two[0], one[1] | two[1])
+    assert spanned(Term("or", (TRUTH, TRUTH), BOOL), [None, (1, 1)]) == (1, 1)
+    assert spanned(Term("<", (NUMBER, OTHER), BOOL), [None, (1, 1)]) == TRUTHS
+    assert spanned(Term("+", (NUMBER, OTHER), INT), [None, (1, 1)]) == FREE
+    assert spanned(Term("+", (DOUBLE, DOUBLE), REAL), [None, (1.0, 1.0)]) is None
+
+
+@pytest.mark.parametrize(
+    ("op", "spans", "span"),
+    [
+        ("neg", [(-1.5, 2.0)], (-2.0, 1.5)),
+        ("abs", [(-1.5, 2.0)], (0.0, 2.0)),
+        ("abs", [(-3.5, 2.0)], (0.0, 3.5)),
+        ("abs", [(1.5, 2.0)], (1.5, 2.0)),
+        ("abs", [(-2.0, -1.5)], (1.5, 2.0)),
+        ("+", [(-1.5, 2.0), (0.5, 4.0)], (-1.0, 6.0)),
+        ("-", [(-1.5, 2.0), (0.5, 4.0)], (-5.5, 1.5)),
+        ("*", [(-1.5, 2.0), (0.5, 4.0)], (-6.0, 8.0)),
+        ("/", [(-1.5, 2.0), (0.5, 4.0)], (-3.0, 4.0)),
+        ("/", [(-1.5, 2.0), (-4.0, -0.5)], (-4.0, 3.0)),
+        ("/", [(-1.5, 2.0), (0.0, 4.0)], None),
+        ("/", [(-1.5, 2.0), (-4.0, 0.0)], None),
+        ("+", [(-1.5, float("inf")), (0.5, 4.0)], None),
+        ("int", [(-1.5, 2.5)], (-1, 2)),
+        ("int", [(-1.5, float("inf"))], FREE),
+    ],
+)
+def test_the_span_of_doubles_is_exact(
+    op: str, spans: list[tuple[float, float]], span: tuple[float, float] | None
+) -> None:
+    term = Term(op, (DOUBLE, DOUBLE)[: len(spans)], INT if op == "int" else REAL)
+    assert spanned(term, spans) == span
+
+
+def test_the_span_of_a_whole_number_that_becomes_a_double_is_exact() -> None:
+    term = Term("real", (NUMBER,), REAL)
+    assert spanned(term, [(-3, 9)]) == (-3.0, 9.0)
+    assert spanned(term, [(0, 2**1000 - 1)]) == (0.0, float(2**1000 - 1))
+    assert spanned(term, [(0, 2**1000)]) is None
+    assert spanned(term, [FREE]) is None
+
+
+# --- facts --------------------------------------------------------------------------------
+
+FACTS: list[tuple[list[Term], dict[Term, tuple[int, int]]]] = [
+    ([MAKE("<", NUMBER, whole(3))], {NUMBER: (-3, 2)}),
+    ([MAKE("<=", NUMBER, whole(3))], {NUMBER: (-3, 3)}),
+    ([TERMS.negation(MAKE("<", NUMBER, whole(3)))], {NUMBER: (3, 9)}),
+    ([TERMS.negation(MAKE("<=", NUMBER, whole(3)))], {NUMBER: (4, 9)}),
+    ([MAKE("=", NUMBER, OTHER)], {NUMBER: (0, 5), OTHER: (0, 5)}),
+    ([MAKE("<", OTHER, NUMBER)], {NUMBER: (1, 9), OTHER: (0, 5)}),
+    ([MAKE("<", NUMBER, OTHER)], {NUMBER: (-3, 4), OTHER: (0, 5)}),
+    ([MAKE("<", NUMBER, OTHER), MAKE("<", OTHER, whole(2))], {NUMBER: (-3, 0), OTHER: (0, 1)}),
+    ([TERMS.negation(MAKE("=", NUMBER, whole(-3)))], {NUMBER: (-2, 9)}),
+    ([TERMS.negation(MAKE("=", NUMBER, whole(9)))], {NUMBER: (-3, 8)}),
+    ([TERMS.negation(MAKE("=", whole(0), OTHER))], {OTHER: (1, 5)}),
+    ([TERMS.negation(MAKE("=", NUMBER, whole(4)))], {NUMBER: (-3, 9)}),
+    ([TERMS.some((MAKE("=", NUMBER, whole(2)), MAKE("=", NUMBER, whole(4))))], {NUMBER: (2, 4)}),
+    ([TERMS.some((MAKE("=", NUMBER, whole(4)), MAKE("=", NUMBER, whole(2))))], {NUMBER: (2, 4)}),
+    ([TERMS.some((MAKE("=", NUMBER, whole(2)), TRUTH))], {NUMBER: (-3, 9)}),
+    (
+        [TERMS.negation(TRUTH), TERMS.some((MAKE("=", NUMBER, whole(2)), TRUTH))],
+        {NUMBER: (2, 2), TRUTH: (0, 0)},
+    ),
+    ([TERMS.every((TRUTH, MAKE("<", NUMBER, whole(0))))], {NUMBER: (-3, -1), TRUTH: (1, 1)}),
+    ([TERMS.negation(TERMS.some((TRUTH, MAKE("<", NUMBER, whole(1)))))], {NUMBER: (1, 9), TRUTH: (0, 0)}),
+    (
+        [TERMS.negation(TERMS.every((MAKE("<", NUMBER, whole(2)), MAKE("<", NUMBER, whole(7)))))],
+        {NUMBER: (2, 9)},
+    ),
+]
+
+
+@pytest.mark.parametrize(("hypotheses", "spans"), FACTS)
+def test_what_hypotheses_tell_is_exact(hypotheses: list[Term], spans: dict[Term, tuple[int, int]]) -> None:
+    known = Known(hypotheses, ())
+    assert known.impossible is False
+    assert {term: known.span(term) for term in spans} == spans
+    assert all(known.span(one) == (1, 1) for one in hypotheses if one.op != "or")
+
+
+@pytest.mark.parametrize("at", [0, 1, 2])
+def test_hypotheses_that_contradict_each_other_are_impossible_wherever_they_stand(at: int) -> None:
+    hypotheses = [MAKE("<", NUMBER, whole(0)), MAKE("<", whole(3), NUMBER)]
+    hypotheses.insert(at, TRUTH)
+    assert Known(hypotheses, ()).impossible is True
+    assert Known([MAKE("<", NUMBER, whole(-3))], ()).impossible is True
+
+
+def test_what_is_kept_lies_in_its_place_once_that_is_shown() -> None:
+    kept = TERMS.kept(MAKE("+", DOUBLE, double(1.0)), 0.0, 1.0, 3)
+    assert Known((), ()).span(kept) == (-0.5, 3.0)
+    assert Known((), {3}).span(kept) == (0.0, 1.0)
+
+
+# --- settling -----------------------------------------------------------------------------
+
+
+def settled(hypotheses: list[Term], good: Term, ask: Answer | None = None) -> tuple[object, int]:
+    """What becomes of an obligation, and the work."""
+    asked = None if ask is None else (lambda _: ask)
+    settler = Settler(TERMS, asked, {"b": 0, "n": 0, "m": 0, "x": 0.0})
+    return settler.settle(hypotheses, TERMS.true, good, Known(hypotheses, ())), settler.work
+
+
+FAR = MAKE("<=", MAKE("-", MAKE("*", DOUBLE, DOUBLE), DOUBLE), double(3.9))
+"""It holds, and neither spans nor tried values show it."""
+
+
+def test_obligations_are_settled_as_they_can_be_and_what_it_took_is_counted() -> None:
+    less, sum_ = MAKE("<", NUMBER, whole(3)), MAKE("<=", MAKE("+", NUMBER, OTHER), whole(14))
+    squares = MAKE("<=", whole(0), MAKE("*", NUMBER, NUMBER))
+    assert settled([], sum_) == (Shown(), 5)
+    assert settled([less], less) == (Shown(), 3)
+    assert settled([], squares) == (Shown(), 9)
+    assert settled([less], MAKE("<", NUMBER, whole(2))) == (Fails((("n", 2),)), 10)
+    assert settled([], TERMS.false) == (Fails(()), 2)
+    assert settled([], MAKE("<", DOUBLE, double(2.0))) == (Fails((("x", 2.0),)), 27)
+    assert settled([MAKE("<", OTHER, whole(2))], MAKE("<", NUMBER, whole(2)))[0] == Fails(
+        (("m", 0), ("n", 2))
+    )
+    square = MAKE("*", DOUBLE, DOUBLE)
+    assert settled([], MAKE("<", square, double(2.0)))[0] == Fails((("x", -1.5),))
+    minus_one = (
+        MAKE("=", MAKE("neg", DOUBLE), square),
+        TERMS.negation(MAKE("=", DOUBLE, MAKE("abs", DOUBLE))),
+    )
+    assert settled([], TERMS.negation(TERMS.every(minus_one)))[0] == Fails((("x", -1.0),))
+    found, work = settled([], FAR)
+    assert (found, work) == (Left(script([TERMS.negation(FAR)])), 41)
+    assert settled([], FAR, Answer.UNKNOWN) == (found, work)
+    assert settled([], FAR, Answer.NONE) == (Shown(), work)
+    assert settled([], FAR, Answer.SOME) == (Fails(()), work)
+
+
+# --- what is owed -------------------------------------------------------------------------
+
+OWED = """\
+under 0
+    0 at first: invariant `small` holds
+    1 at first: invariant `apart` holds
+    2 at first: invariant `begins` holds
+under 0
+    0 invariant `apart`: the result of `+` stays in its 64 bits at `n + late`
+    1 invariant `apart`: an operand stays in its 64 bits at `n + late`
+under 3
+    0 assumption `never`: follows from ranges and invariants at `never`
+under 3
+    0 taking deferred values: invariant `apart` is kept
+under 3
+    0 showing safe values after a fault: invariant `small` is kept
+under 3
+    0 `preprocess` of level `l`: `n` stays in 0 .. 9 at `a`
+    1 `preprocess` of level `l`: invariant `small` is kept where `seen` fails at `l`
+    2 `preprocess` of level `l`: invariant `apart` is kept where `seen` fails at `l`
+    3 `preprocess` of level `l`: invariant `small` is kept where `seen` fails at `l`
+    4 `preprocess` of level `l`: invariant `apart` is kept where `seen` fails at `l`
+    5 `preprocess` of level `l`: invariant `small` is kept at `l`
+    6 `preprocess` of level `l`: invariant `apart` is kept at `l`
+under 3
+    0 `postprocess` of level `l`: `shown` stays in 0 .. 9 at `a`
+    1 `postprocess` of level `l`: the result of `-` stays in its 64 bits at `9 - n`
+    2 `postprocess` of level `l`: `shown` stays in 0 .. 9 at `9 - n`
+    3 `postprocess` of level `l`: invariant `small` is kept at `l`
+under 0
+    0 procedure `over`: the result of `+` stays in its 64 bits at `low + 1`
+    1 procedure `over`: `s` stays in -9223372036854775808 .. 9223372036854775807 at `low + 1`
+under 0
+    0 procedure `under`: the divisor is not zero at `b`
+    1 procedure `under`: the result of `/` stays in its 64 bits at `low / b`
+    2 procedure `under`: `s` stays in -9223372036854775808 .. 9223372036854775807 at `low / b`
+under 0
+    0 procedure `rest`: the divisor is not zero at `b`
+    1 procedure `rest`: the quotient stays in its 64 bits at `low mod b`
+    2 procedure `rest`: the result of `mod` stays in its 64 bits at `low mod b`
+    3 procedure `rest`: `s` stays in -9223372036854775808 .. 9223372036854775807 at `low mod b`
+under 0
+    0 procedure `of_wide`: an operand stays in its 64 bits at `wide`
+    1 procedure `of_wide`: the result of `-` stays in its 64 bits at `wide - 1`
+    2 procedure `of_wide`: an operand stays in its 64 bits at `wide - 1`
+under 0
+    0 procedure `whole`: the whole number stays in its 64 bits at `int(x * 1.0e18)`
+    1 procedure `whole`: `m` stays in -100 .. 100 at `int(x * 1.0e18)`
+under 0
+    0 procedure `index`: the result of `+` stays in its 64 bits at `a + 1`
+    1 procedure `index`: `xs[0]` stays in 0 .. 9 at `a + 1`
+    2 procedure `index`: the index lies in 0 .. 3 at `a`
+under 0
+    0 procedure `read`: the result of `+` stays in its 64 bits at `a + b`
+    1 procedure `read`: the index lies in 0 .. 3 at `a + b`
+    2 procedure `read`: `m` stays in -100 .. 100 at `xs[a + b]`
+under 0
+    0 procedure `real_`: `r` stays in 0.0 .. 500.0 at `x * 2.0`
+under 0
+    0 procedure `use`: `k` is assigned before it is read at `k`
+under 0
+    0 procedure `local_`: `k` stays in 0 .. 3 at `a`
+under 3
+    0 a condition of table `t`: the divisor is not zero at `b`
+    1 a condition of table `t`: the result of `/` stays in its 64 bits at `a / b`
+    2 a condition of table `t`: an operand stays in its 64 bits at `a / b`
+under 5
+    0 line `one` of table `t`: `k` stays in 0 .. 9 at `a`
+    1 line `one` of table `t`: `out` stays in 0 .. 9 at `k`
+    2 line `one` of table `t`: two actions write one value to `out` at `both(a)`
+    3 line `one` of table `t`: `k` stays in 0 .. 3 at `a`
+    4 line `one` of table `t`: an operand stays in its 64 bits at `k`
+    5 line `one` of table `t`: the result of `*` stays in its 64 bits at `k * 4`
+    6 line `one` of table `t`: `n` stays in 0 .. 9 at `k * 4`
+    7 line `one` of table `t`: invariant `small` is kept at `one`
+    8 line `one` of table `t`: invariant `apart` is kept at `one`
+under 4
+    0 line `two` of table `t`: `n` stays in 0 .. 9 at `a`
+    1 line `two` of table `t`: invariant `small` is kept at `two`
+    2 line `two` of table `t`: invariant `apart` is kept at `two`
+under 5
+    0 line `d` of table `t`: `k` stays in 0 .. 9 at `a`
+    1 line `d` of table `t`: `out` stays in 0 .. 9 at `k`
+    2 line `d` of table `t`: two actions write one value to `out` at `both(a)`
+"""
+
+
+def test_what_a_program_owes_is_named_and_placed() -> None:
+    program = program_of(FAULTY)
+    found = []
+    for debt in Debts(program, Start(program)).all():
+        found += [f"under {len(debt.hypotheses)}"] if debt.owed else []
+        for owed in debt.owed:
+            place = FAULTY[owed.written.start : owed.written.end] if owed.written.file else ""
+            place = place.split("|")[1].strip() if "||" in place else place
+            found.append(f"    {owed.number} {owed.name}" + f" at `{place}`" * bool(place))
+    assert found == OWED.splitlines()
