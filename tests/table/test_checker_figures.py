@@ -12,7 +12,7 @@ from rcsc.certify.owed import Debts
 from rcsc.certify.settle import Answer, Fails, Left, Settler, Shown, script, values_in
 from rcsc.certify.values import BOOL, FREE, INT, REAL, TRUTHS, Term, Terms, parts_first, spanned, truncated
 from rcsc.lang.model import Bool, Int, Real
-from tests.support.emitted import program_of
+from tests.support.programs.stages import program_of
 from tests.table.test_told import FAULTY
 
 TERMS = Terms()

@@ -8,7 +8,7 @@ from rcsc.solvers.options import Options
 from rcsc.table.decide import prove_table
 from rcsc.table.program import prove_program
 from rcsc.table.verdict import Overlap, TableVerdict, Undecided
-from tests.support.emitted import program_of
+from tests.support.programs.stages import program_of
 
 FAULTY = """\
 input a : int 0 .. 9
