@@ -37,8 +37,9 @@ from rcsc_cell.pictures.stick import Scene, pads, stick
 from rcsc_cell.pictures.things import NAMED, Block, Mark
 from rcsc_cell.pictures.views import ALONE, TOP
 from rcsc_cell.workstation.prepared import database_of
-from tests.compose.test_findings import LAST_ECHO, PUBLISHED, REPO, obligation_of
+from tests.compose.test_findings import LAST_ECHO, PUBLISHED, REPO
 from tests.support.browser import Browser
+from tests.support.proved import obligation_of
 
 SHIPPED = REPO / "tables" / "system.toml"
 SVG = "{http://www.w3.org/2000/svg}"
@@ -219,7 +220,7 @@ def found(tmp_path_factory: pytest.TempPathFactory) -> Found:
     key: ObligationKey = (Sort.PROPERTY, "", "not_so")
     findings, logs = {}, {}
     for level in FALSE:
-        obligation = obligation_of(made[level], key)
+        obligation = obligation_of(made[level], *key)
         trace = traces(made[level], [obligation], TraceSearch(most=2, legal=True))[key]
         assert isinstance(trace, Trace)
         findings[level] = of_trace(made[level], obligation, trace)

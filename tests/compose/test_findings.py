@@ -17,7 +17,7 @@ import rcsc.compose.counterexample.trace
 import rcsc.lang.interpret
 from rcsc.commands import run
 from rcsc.compose.contract.environment import leaves_under
-from rcsc.compose.contract.obligations import Obligation, ObligationKey, Sort, may_meet, obligations, pairs
+from rcsc.compose.contract.obligations import ObligationKey, Sort, may_meet
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.contract.variants import VARIANTS, defaults_reported, first_match, undeferred
 from rcsc.compose.counterexample.cycle_run import broken, seen_by_table
@@ -39,18 +39,17 @@ from rcsc.run.unproved import UnprovedExecutors, marked
 from rcsc.solvers.options import Options
 from rcsc.table.decide import prove_table
 from tests.support.programs.stages import shipped
-from tests.support.proved import shortest, time_line
+from tests.support.programs.systems import SYSTEM, small_level, small_system, small_text
+from tests.support.programs.texts import edit_file
+from tests.support.proved import every_obligation, obligation_of, shortest, time_line
 
 REPO = Path(__file__).parents[2]
 EXAMPLES = REPO / "tables" / "examples"
 PUBLISHED = EXAMPLES / "published" / "system.toml"
 LAST_ECHO = EXAMPLES / "later" / "last_echo.toml"
 FIRST_MATCH = EXAMPLES / "later" / "first_match.toml"
-SMALL = REPO / "tests" / "data" / "composed"
 CASES = sorted((REPO / "tests" / "findings").glob("*.json"))
 LEGAL = TraceSearch(most=4, legal=True)
-
-Edit = Callable[[str], str]
 
 
 @dataclass(frozen=True)
@@ -66,36 +65,11 @@ class Looked:
         return found
 
     def finding(self, key: ObligationKey) -> Finding:
-        return of_trace(self.ts, obligation_of(self.ts, key), self.trace(*key))
-
-
-def every(ts: TransitionSystem) -> tuple[Obligation, ...]:
-    one = ts.cycle(ts.havoc())
-    return (*obligations(ts, one), *pairs(one))
-
-
-def obligation_of(ts: TransitionSystem, key: ObligationKey) -> Obligation:
-    return next(obligation for obligation in every(ts) if obligation.key == key)
+        return of_trace(self.ts, obligation_of(self.ts, *key), self.trace(*key))
 
 
 def looked(ts: TransitionSystem, search: TraceSearch = LEGAL) -> Looked:
-    return Looked(ts, traces(ts, every(ts), search))
-
-
-def edited(source: Path, folder: Path, **edits: Edit) -> Path:
-    """A copy of a system's folder with some files edited."""
-    shutil.copytree(source.parent, folder, dirs_exist_ok=True)
-    for name, edit in edits.items():
-        path = folder / f"{name}.rcs"
-        before = path.read_text(encoding="utf-8")
-        after = edit(before)
-        assert after != before, f"the edit of {name} does nothing"
-        path.write_text(after, encoding="utf-8")
-    return folder / source.name
-
-
-def swap(old: str, new: str) -> Edit:
-    return lambda text: text.replace(old, new)
+    return Looked(ts, traces(ts, every_obligation(ts), search))
 
 
 @pytest.fixture(scope="module")
@@ -140,7 +114,7 @@ def test_every_hazard_of_the_published_table_is_found_with_its_shortest_run(publ
 )
 def test_no_shorter_run_shows_it(published: Looked, key: ObligationKey) -> None:
     shorter = replace(LEGAL, most=HAZARDS[key] - 1)
-    assert traces(published.ts, [obligation_of(published.ts, key)], shorter) == {}
+    assert traces(published.ts, [obligation_of(published.ts, *key)], shorter) == {}
 
 
 def test_the_level_around_it_is_the_published_table() -> None:
@@ -201,8 +175,8 @@ def test_the_contract_leaves_room_for_more() -> None:
     """Numbers that have gone round: what no level that began with this one can echo, the contract allows."""
     ts = transition_systems(LAST_ECHO)["upper"]
     key = (Sort.NEXT_NUMBER, "", "to_lower")
-    assert traces(ts, [obligation_of(ts, key)], LEGAL) == {}
-    wide = Looked(ts, traces(ts, [obligation_of(ts, key)], TraceSearch(most=4)))
+    assert traces(ts, [obligation_of(ts, *key)], LEGAL) == {}
+    wide = Looked(ts, traces(ts, [obligation_of(ts, *key)], TraceSearch(most=4)))
     assert list(unlawful(wide, wide.trace(*key)))
 
 
@@ -231,7 +205,7 @@ def test_a_run_does_not_go_on_behind_a_fault() -> None:
     names = {"start and start_again", "end and end_again", "to_lower", "to_lower.input_command"}
     wanted = [
         obligation
-        for obligation in every(twice)
+        for obligation in every_obligation(twice)
         if obligation.name in names and obligation.sort is not Sort.WAITS
     ]
     assert {obligation.name for obligation in wanted} == names
@@ -248,7 +222,7 @@ def test_what_a_faulty_cycle_would_have_left_is_not_looked_at() -> None:
     late = (*start.tests[:state], busy.tests[state], *start.tests[state + 1 :])
     added = replace(start, name=LineName("start_at_work"), tests=late)
     changed = replace(ts.program, tables=(replace(table, lines=(*table.lines, added)),))
-    obligations_of = every(ts.of(changed))
+    obligations_of = every_obligation(ts.of(changed))
     [wanted] = [
         obligation
         for obligation in obligations_of
@@ -261,21 +235,15 @@ def test_what_a_faulty_cycle_would_have_left_is_not_looked_at() -> None:
 def test_a_pair_of_lines_is_not_broken_by_another(published: Looked) -> None:
     step = published.trace(Sort.ONE_LINE, "acquire", "14 and 15").steps[-1]
     assert step.matched == ("14", "15")
-    assert broken(published.ts, obligation_of(published.ts, (Sort.ONE_LINE, "acquire", "14 and 15")), step)
-    assert not broken(
-        published.ts, obligation_of(published.ts, (Sort.ONE_LINE, "acquire", "10 and 14")), step
-    )
+    assert broken(published.ts, obligation_of(published.ts, Sort.ONE_LINE, "acquire", "14 and 15"), step)
+    assert not broken(published.ts, obligation_of(published.ts, Sort.ONE_LINE, "acquire", "10 and 14"), step)
 
 
 def test_a_run_can_begin_with_a_restart(tmp_path: Path) -> None:
     """No line leads to `f_state` any more: only a restart does, which takes what failed as failed."""
-
-    def never_failed(text: str) -> str:
-        text = text.replace("nextstate(f_state)", "nextstate(d_state)")
-        return text.replace("cur_state in {d_state, f_state} and ref", "cur_state = d_state and ref")
-
-    ts = transition_systems(edited(SMALL / "system.toml", tmp_path, upper=never_failed))["upper"]
-    obligation = obligation_of(ts, (Sort.ASSUMPTION, "work", "in_step"))
+    upper = small_text("upper", ("cur_state in {d_state, f_state} and ref", "cur_state = d_state and ref"))
+    ts = small_level(tmp_path, "upper", upper=upper.replace("nextstate(f_state)", "nextstate(d_state)"))
+    obligation = obligation_of(ts, Sort.ASSUMPTION, "work", "in_step")
     assert traces(ts, [obligation], LEGAL) == {}
     found = traces(ts, [obligation], replace(LEGAL, restarted=True))[obligation.key]
     assert isinstance(found, Trace)
@@ -289,7 +257,7 @@ def test_a_run_can_begin_with_a_restart(tmp_path: Path) -> None:
 
 def test_a_run_that_the_interpreter_does_not_do_is_a_bug(monkeypatch: pytest.MonkeyPatch) -> None:
     ts = transition_systems(LAST_ECHO)["upper"]
-    obligation = obligation_of(ts, (Sort.NUMBERED, "", "to_lower.input_command"))
+    obligation = obligation_of(ts, Sort.NUMBERED, "", "to_lower.input_command")
     monkeypatch.setattr(rcsc.compose.counterexample.trace, "broken", lambda *_: False)
     with pytest.raises(NotReproducedError) as raised:
         shortest(ts, obligation)
@@ -299,7 +267,7 @@ def test_a_run_that_the_interpreter_does_not_do_is_a_bug(monkeypatch: pytest.Mon
 
 def test_where_the_interpreter_parts_from_the_solver_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
     ts = transition_systems(LAST_ECHO)["upper"]
-    obligation = obligation_of(ts, (Sort.NUMBERED, "", "to_lower.input_command"))
+    obligation = obligation_of(ts, Sort.NUMBERED, "", "to_lower.input_command")
     true_cycle = rcsc.lang.interpret.cycle
 
     def other(*args: object) -> object:
@@ -315,19 +283,15 @@ def test_where_the_interpreter_parts_from_the_solver_is_said(monkeypatch: pytest
 
 def test_arithmetic_that_was_left_open_is_no_bug(tmp_path: Path) -> None:
     """`x * x` of a real may be anything in its bounds to the solver: its run is not believed, and no bug of rcsc's."""
-    path = edited(
-        SMALL / "system.toml",
-        tmp_path,
-        lower=lambda text: text.replace(
-            "input there : bool", "input there : bool\ninput x : real 0.0 .. 2.0"
-        ).replace(
-            "table go {",
-            "assume square monitored : x * x = x * x * 1.0 or x < 0.5\n\ntable go assuming square {",
-        ),
+    squares = "assume square monitored : x * x = x * x * 1.0 or x < 0.5\n\ntable go assuming square {"
+    lower = small_text(
+        "lower",
+        ("input there : bool", "input there : bool\ninput x : real 0.0 .. 2.0"),
+        ("table go {", squares),
     )
-    ts = transition_systems(path)["lower"]
+    ts = small_level(tmp_path, "lower", lower=lower)
     with pytest.raises(NotReproducedError) as raised:
-        shortest(ts, obligation_of(ts, (Sort.ASSUMPTION, "go", "square")))
+        shortest(ts, obligation_of(ts, Sort.ASSUMPTION, "go", "square"))
     assert raised.value.guessed
 
 
@@ -530,19 +494,15 @@ def test_numbers_taken_from_the_last_echo_lose_a_command() -> None:
 
 def test_the_same_numbers_in_order_lose_none() -> None:
     """The other example numbers its orders one after the other, and so does the small system."""
-    for path, level in ((FIRST_MATCH, "upper"), (SMALL / "system.toml", "upper")):
+    for path, level in ((FIRST_MATCH, "upper"), (SYSTEM, "upper")):
         made = transition_systems(path)
         upper = made[level].of(first_match(made[level].program))
         assert broken_together(upper, made["lower"], upper.links.below[0], replace(LEGAL, most=4)) is None
 
 
 def test_a_report_about_another_order_is_found_together(tmp_path: Path) -> None:
-    path = edited(
-        SMALL / "system.toml",
-        tmp_path,
-        lower=swap("ref_command_echo := command.input_command", "ref_command_echo := go"),
-    )
-    made = transition_systems(path)
+    other = small_text("lower", ("ref_command_echo := command.input_command", "ref_command_echo := go"))
+    made = transition_systems(small_system(tmp_path, lower=other))
     upper, lower = made["upper"], made["lower"]
     found = broken_together(upper, lower, upper.links.below[0], LEGAL)
     assert isinstance(found, Finding)
@@ -553,7 +513,7 @@ def test_what_falls_to_default_is_found_where_it_is_asked_for(published: Looked)
     key = (Sort.NO_DEFAULT, "acquire", "")
     assert key not in published.found
     ts = published.ts.of(defaults_reported(published.ts.program))
-    found = traces(ts, [obligation_of(ts, key)], LEGAL)[key]
+    found = traces(ts, [obligation_of(ts, *key)], LEGAL)[key]
     assert isinstance(found, Trace)
     assert found.steps[-1].line == "16"
 
@@ -612,30 +572,29 @@ def test_a_finding_thaws_as_it_was_frozen(published: Looked, tmp_path: Path) -> 
 
 def test_a_case_is_kept_once_the_table_is_mended(tmp_path: Path) -> None:
     """The cell that `helps` proposes, and numbers that are not the last echo's."""
-    for source, case, edits in (
+    for source, case, edit in (
         (FIRST_MATCH, "first_match_upper_pass_down_one_line_busy_and_start",
-         {"first_match": swap("| busy  |             |", "| busy  | false       |")}),
+         ("| busy  |             |", "| busy  | false       |")),
         (LAST_ECHO, "last_echo_lower_same_order_command",
-         {"last_echo": lambda text: text.replace("(lower.inc_command_echo + 1)", "(to_lower.inc_command + 1)")}),
+         ("(lower.inc_command_echo + 1)", "(to_lower.inc_command + 1)")),
     ):  # fmt: skip
         folder = tmp_path / source.stem / "examples" / "later"
         folder.parent.mkdir(parents=True)
         shutil.copy(REPO / "tables" / "rcsc.toml", tmp_path / source.stem / "rcsc.toml")
-        mended = edited(source, folder, **edits)
+        mended = shutil.copytree(source.parent, folder) / source.name
+        edit_file(mended.with_suffix(".rcs"), edit)
         kept = read_case(REPO / "tests" / "findings" / f"{case}.json")
         assert case_breaks(kept)
         assert not case_breaks(replace(kept, system=mended))
 
 
 def test_a_case_under_another_rule_is_to_stay_broken(tmp_path: Path) -> None:
-    plain = transition_systems(SMALL / "system.toml")["upper"]
+    plain = transition_systems(SYSTEM)["upper"]
     found = looked(plain.of(undeferred(plain.program)), replace(LEGAL, most=3))
     finding = found.finding((Sort.ASSUMPTION, "work", "in_step"))
     path = tmp_path / "case.json"
     made = {"upper": found.ts}
-    path.write_text(
-        frozen(finding, made, SMALL / "system.toml", path, ("without-deferral",)), encoding="utf-8"
-    )
+    path.write_text(frozen(finding, made, SYSTEM, path, ("without-deferral",)), encoding="utf-8")
     case = read_case(path)
     assert case.expects_broken
     assert case_breaks(case)
@@ -691,15 +650,11 @@ def test_the_cell_that_parts_two_lines_is_shown(published: Looked) -> None:
 
 def test_the_weakest_condition_holds_of_just_the_inputs_that_one_line_matches(tmp_path: Path) -> None:
     """In the place of `in_step`, read by the language itself, on every input of the table."""
-    program = transition_systems(SMALL / "system.toml")["upper"].program
+    program = transition_systems(SYSTEM)["upper"].program
     weakest = weakest_condition(program, table_of(program, "work"))
-    text = (SMALL / "upper.rcs").read_text(encoding="utf-8")
-    start = text.index("assume in_step")
-    stated = text[start : text.index("\n", start)]
-    path = edited(
-        SMALL / "system.toml", tmp_path, upper=swap(stated, f"assume in_step monitored : {weakest}")
-    )
-    changed = transition_systems(path)["upper"].program
+    [stated] = [row for row in small_text("upper").splitlines() if row.startswith("assume in_step")]
+    upper = small_text("upper", (stated, f"assume in_step monitored : {weakest}"))
+    changed = small_level(tmp_path, "upper", upper=upper).program
     table, [condition] = (
         table_of(changed, "work"),
         [assumption.condition for assumption in changed.assumptions],
@@ -740,7 +695,7 @@ def test_a_line_that_no_table_has_is_proposed_where_none_matches() -> None:
     """What section 9 says: additional lines would do, but would nearly double the table."""
     shipped_task = transition_systems(REPO / "tables" / "system.toml")["task"]
     ts = shipped_task.of(undeferred(shipped_task.program))
-    obligation = obligation_of(ts, (Sort.NO_DEFAULT, "acquire", ""))
+    obligation = obligation_of(ts, Sort.NO_DEFAULT, "acquire", "")
     trace = shortest(ts, obligation, most=3, legal=True)
     assert trace is not None
     finding = of_trace(ts, obligation, trace)

@@ -12,7 +12,6 @@ from random import Random
 import pytest
 
 from rcsc.commands import run
-from rcsc.compose.contract.environment import Links
 from rcsc.compose.contract.obligations import Obligation, Sort, obligations
 from rcsc.compose.contract.predicates import CLOSELY, Predicate
 from rcsc.compose.contract.properties import every_predicate, property_kept
@@ -38,20 +37,13 @@ from rcsc.solvers.options import Options
 from rcsc.solvers.smtlib import cvc5_refutes
 from rcsc.table.program import prove_program
 from tests.support.programs.stages import emitted, program_of, refused
+from tests.support.programs.systems import alone, small_level, small_text
+from tests.support.programs.texts import edit_file
 from tests.support.proved import ran, shortest, time_line
 
 REPO = Path(__file__).parents[2]
-SMALL = REPO / "tests" / "data" / "composed"
 SHIPPED = REPO / "tables" / "system.toml"
 LITTLE = Effort(walks=6, cycles=40)
-
-
-def alone(text: str) -> TransitionSystem:
-    """The one level of a text, whose inputs may have any value at any moment."""
-    program = program_of(text)
-    [level] = program.levels
-    free = tuple(str(v.name) for v in program.variables if v.kind is Kind.INPUT)
-    return TransitionSystem(program, level, Links(level.name, None, (), (), free))
 
 
 def stated(ts: TransitionSystem) -> dict[str, Obligation]:
@@ -414,10 +406,7 @@ def test_proofs_and_traces_are_what_enumeration_says(seed: int) -> None:
 
 def with_properties(folder: Path, level: str, text: str) -> TransitionSystem:
     """A level of the small system, with more in its program."""
-    shutil.copytree(SMALL, folder, dirs_exist_ok=True)
-    path = folder / f"{level}.rcs"
-    path.write_text(path.read_text(encoding="utf-8") + text, encoding="utf-8")
-    return transition_systems(folder / "system.toml")[level]
+    return small_level(folder, level, **{level: small_text(level) + text})
 
 
 KEPT = {
@@ -554,14 +543,9 @@ def test_prove_shows_what_breaks_as_the_executors_ran_it(
     assert "broken in cycle 2, as the interpreter, the Python and the C executors run it" in said.err
     [case] = cases.iterdir()
     assert run(["prove", "--case", str(case)]) == 1
-    path = tmp_path / "upper.rcs"
-    path.write_text(
-        path.read_text(encoding="utf-8").replace("go then to", "go then was to"), encoding="utf-8"
-    )
+    edit_file(tmp_path / "upper.rcs", ("go then to", "go then was to"))
     assert run(["prove", "--case", str(case)]) == 0
-    path.write_text(
-        path.read_text(encoding="utf-8").replace("property goes_on", "property other"), encoding="utf-8"
-    )
+    edit_file(tmp_path / "upper.rcs", ("property goes_on", "property other"))
     assert run(["prove", "--case", str(case)]) == 1
     assert "has no goal `property `goes_on``" in capsys.readouterr().err
 

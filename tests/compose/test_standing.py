@@ -15,8 +15,9 @@ from rcsc.compose.proof.standing import Known, KnownSystem, Outline, standing
 from rcsc.driver import outline
 from rcsc.host.cache import FOLDER, Cache
 from rcsc.host.files.plain import plain, read
+from tests.support.programs.systems import HOPED, small_system, small_text, solo_system
+from tests.support.programs.texts import edit_file, level
 
-SMALL = Path(__file__).parents[1] / "data" / "composed"
 KEPT = "assuming in_step (proved), kept by the levels together, system.toml"
 DECIDES = "is not known: `rcsc prove system.toml` decides it"
 DONE = "| 4    | false       | /= going  |       ||                | done       |"
@@ -28,7 +29,7 @@ Said = Callable[..., str]
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The small system, stood in."""
     monkeypatch.delenv("RCSC_CACHE_DIR", raising=False)
-    shutil.copytree(SMALL, tmp_path, dirs_exist_ok=True, ignore=shutil.ignore_patterns(".rcsc-cache"))
+    small_system(tmp_path)
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
@@ -54,15 +55,6 @@ def check(capfd: pytest.CaptureFixture[str]) -> Said:
 
 def prove(*args: str) -> int:
     return run(["prove", "system.toml", "--trace", "0", *args])
-
-
-def edit(name: str, *edits: tuple[str, str]) -> None:
-    path = Path(f"{name}.rcs")
-    text = path.read_text(encoding="utf-8")
-    for old, new in edits:
-        assert text.count(old) == 1, old
-        text = text.replace(old, new)
-    path.write_text(text, encoding="utf-8")
 
 
 def table(form: str, name: str = "work") -> dict[str, Any]:
@@ -107,11 +99,9 @@ def test_a_proof_is_of_its_content_alone(check: Said, name: str, old: str, new: 
     assert KEPT in check()
     path = Path("system.toml" if name == "system" else f"{name}.rcs")
     kept = path.read_text(encoding="utf-8")
-    assert kept.count(old) == 1
-    text = kept.replace(old, new)
+    edit_file(path, (old, new))
     if name == "system":
-        text = text.replace('"lower.report" = "upper.lower"', '"hand.report" = "upper.lower"')
-    path.write_text(text, encoding="utf-8")
+        edit_file(path, ('"lower.report" = "upper.lower"', '"hand.report" = "upper.lower"'))
     changed = check()
     assert "assuming in_step (monitored), " in changed
     assert changed.count(DECIDES) == 1
@@ -121,7 +111,7 @@ def test_a_proof_is_of_its_content_alone(check: Said, name: str, old: str, new: 
 
 @pytest.mark.usefixtures("proved_here")
 def test_words_that_mean_nothing_leave_a_proof_as_it_is(check: Said) -> None:
-    edit("lower", ("table go {", "# Another word.\n\ntable go {"))
+    edit_file(Path("lower.rcs"), ("table go {", "# Another word.\n\ntable go {"))
     assert KEPT in check()
 
 
@@ -150,8 +140,7 @@ def test_no_cache_and_no_levels_say_nothing(check: Said, tmp_path: Path) -> None
     assert "in_step (monitored)" in check("--no-cache", "upper.rcs")
     assert DECIDES not in check("--no-cache", "upper.rcs")
     (tmp_path / "other").mkdir()
-    text = Path("upper.rcs").read_text(encoding="utf-8")
-    Path("other/alone.rcs").write_text(text.replace("level upper", "level alone"), encoding="utf-8")
+    Path("other/alone.rcs").write_text(small_text("upper", ("level upper", "level alone")), encoding="utf-8")
     shutil.copy("words.rcs", "other/words.rcs")
     beside = check("other/alone.rcs")  # below a system that has no such level
     assert "in_step (monitored)" in beside
@@ -167,7 +156,7 @@ def test_an_unchanged_system_is_not_read_again(check: Said, monkeypatch: pytest.
 
     monkeypatch.setattr(outline, "_read", never)
     assert KEPT in check()
-    edit("lower", (DONE, DONE.replace("done     ", "executing")))
+    edit_file(Path("lower.rcs"), (DONE, DONE.replace("done     ", "executing")))
     assert run(["check", "upper.rcs"]) == 3  # it would have been
 
 
@@ -179,20 +168,10 @@ def test_a_variant_of_the_tables_is_not_kept(check: Said) -> None:
 
 # --- what is not proved -----------------------------------------------------------------------
 
-FAILED = next(
-    row
-    for row in (SMALL / "upper.rcs").read_text(encoding="utf-8").splitlines(keepends=True)
-    if row.startswith("  | 4 ")
-)
-HOPED = (
-    "table work assuming in_step",
-    "assume never_failed monitored : status_in /= failed\ntable work assuming in_step, never_failed",
-)
-
 
 @pytest.mark.usefixtures("proved_here")
 def test_what_was_found_not_to_be_proved_is_a_warning(check: Said) -> None:
-    edit("upper", HOPED, (FAILED, ""))
+    Path("upper.rcs").write_text(HOPED, encoding="utf-8")
     assert prove() == 1
     said = check()
     assert (
@@ -212,7 +191,10 @@ def test_what_was_found_not_to_be_proved_is_a_warning(check: Said) -> None:
 @pytest.mark.usefixtures("proved_here")
 def test_nothing_is_proved_of_levels_that_do_not_agree(check: Said) -> None:
     """The lower level echoes what it does not run: the proof of the upper one rests on that it does not."""
-    edit("lower", ("report.ref_command_echo := command.input_command", "report.ref_command_echo := pause"))
+    edit_file(
+        Path("lower.rcs"),
+        ("report.ref_command_echo := command.input_command", "report.ref_command_echo := pause"),
+    )
     assert prove() == 1
     said = check()
     assert (
@@ -236,7 +218,7 @@ def test_nothing_is_proved_of_levels_that_do_not_agree(check: Said) -> None:
 @pytest.mark.usefixtures("here")
 def test_what_the_tables_declare_is_not_called_proved_and_is_named_by_what_rests_on_it(check: Said) -> None:
     """What is assumed of an input is as true as somebody believes it, however much the levels prove from it."""
-    solo(
+    one_level(
         "input x : int 0 .. 9\nstate n : int 0 .. 9\nassume small assumed : x < 5\nassume kept monitored : n < 5\n"
         "property below : n < 5\n"
         "table t assuming small, kept {\n| line | x | n || n |\n| a | 0 .. 4 | < 5 || x |\n}"
@@ -255,7 +237,7 @@ def test_what_the_tables_declare_is_not_called_proved_and_is_named_by_what_rests
 def test_lines_that_never_run_because_of_what_is_declared_say_so(
     check: Said, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    solo(
+    one_level(
         "input x : int 0 .. 9\nassume small assumed : x < 5\ntable t assuming small {\n| line | x ||\n| a | < 5 ||\n| b | >= 5 ||\n}"
     )
     assert prove() == 0
@@ -267,13 +249,13 @@ def test_lines_that_never_run_because_of_what_is_declared_say_so(
 @pytest.mark.usefixtures("here")
 def test_what_rests_on_what_is_not_proved_is_conditional_and_says_on_what(check: Said) -> None:
     """Every verdict of a level whose index is safe only under an invariant that does not hold within the cycle."""
-    solo(
+    one_level(
         "input x : bool\nstate at : int 0 .. 9\nstate n : int 0 .. 9\nstate list : array[3] of bool\n"
         "invariant inside : at < 3\nassume fine monitored : n < 9\nproperty stays : n < 9\n"
         "procedure mark { list[at] := x }\nmodule spoil writes at { at := 5 }\nmodule mend writes at { at := 0 }\n"
         "table t assuming fine {\n| line | x | n || procedures |\n| a | true | < 9 || mark |\n| b | false | < 9 || |\n}",
-        "preprocess spoil",
-        "postprocess mend",
+        "spoil",
+        "mend",
     )
     assert prove() == 1
     said = check("solo.rcs", status=1)
@@ -287,8 +269,8 @@ def test_what_rests_on_what_is_not_proved_is_conditional_and_says_on_what(check:
 @pytest.mark.usefixtures("here")
 def test_what_was_not_looked_at_is_named(check: Said) -> None:
     for name in ("lower", "upper"):
-        text = Path(f"{name}.rcs").read_text(encoding="utf-8")
-        Path(f"{name}.rcs").write_text(text.replace("new_command", "fresh"), encoding="utf-8")
+        renamed = small_text(name).replace("new_command", "fresh")
+        Path(f"{name}.rcs").write_text(renamed, encoding="utf-8")
     assert prove() == 0
     said = check()
     missing = "level `upper`: not looked at: a command number is taken up once: there is no state `new_command : bool`"
@@ -301,14 +283,9 @@ def test_what_was_not_looked_at_is_named(check: Said) -> None:
     jsonschema.validate(json.loads(form), schema, jsonschema.Draft202012Validator)
 
 
-def solo(text: str, before: str = "", after: str = "") -> None:
-    """A system of one level without neighbours."""
-    Path("system.toml").write_text(
-        'name = "one"\ngenerated = ".rcsc-cache/g"\ndata = "system.toml"\ntick_ms = 40\n[[level]]\nname = "solo"\n[buffers]\n',
-        encoding="utf-8",
-    )
-    level = f"level solo {{ period 40 [ms] {before} table t {after} }}"
-    Path("solo.rcs").write_text(f"{text}\n{level}\n", encoding="utf-8")
+def one_level(text: str, before: str = "", after: str = "") -> None:
+    """A system of one level without neighbours, whose table is `t`."""
+    solo_system(Path(), f"{text}\n{level('solo', before=before, after=after)}")
 
 
 # --- properties ---------------------------------------------------------------------------------
@@ -319,7 +296,7 @@ def solo(text: str, before: str = "", after: str = "") -> None:
     ("words", "proved"), [("status_report in {done, executing, failed}", True), ("begun", False)]
 )
 def test_properties_that_the_levels_keep_are_said_to_be_proved(check: Said, words: str, proved: bool) -> None:
-    edit("upper", ("level upper {", f"property stated : {words}\nlevel upper {{"))
+    edit_file(Path("upper.rcs"), ("level upper {", f"property stated : {words}\nlevel upper {{"))
     note = "= note: proved of the levels together, system.toml"
     help_ = "= help: `rcsc prove` proves what a level does"
     before = check()
@@ -329,7 +306,7 @@ def test_properties_that_the_levels_keep_are_said_to_be_proved(check: Said, word
     assert (note in said, help_ in said) == (proved, not proved)
     assert "property `stated` is not proved here" in said
     assert ("= note: not proved: property `stated`" in said) is not proved
-    edit("upper", (f"stated : {words}", f"stated : {words} and begun = begun"))
+    edit_file(Path("upper.rcs"), (f"stated : {words}", f"stated : {words} and begun = begun"))
     assert note not in check()
 
 
@@ -345,11 +322,8 @@ def test_properties_that_the_levels_keep_are_said_to_be_proved(check: Said, word
     ],
 )  # fmt: skip
 def test_a_system_that_is_not_in_order_does_not_stop_a_check(edits: dict[str, tuple[str, str]]) -> None:
-    for name, (old, new) in edits.items():
-        path = Path("system.toml" if name == "system" else f"{name}.rcs")
-        text = path.read_text(encoding="utf-8")
-        assert text.count(old) == 1
-        path.write_text(text.replace(old, new), encoding="utf-8")
+    for name, edit in edits.items():
+        edit_file(Path("system.toml" if name == "system" else f"{name}.rcs"), edit)
     assert run(["check", "upper.rcs", "lower.rcs"]) in {0, 1}
 
 

@@ -38,6 +38,7 @@ from rcsc.run.signature import signature
 from rcsc.run.system import System, assemble
 from rcsc_cell.pictures.page import quoted
 from tests.support.programs.stages import emitted, shipped
+from tests.support.programs.texts import system
 
 REPO = Path(__file__).parents[2]
 
@@ -335,17 +336,6 @@ table walk {
 }
 level walker { period 40 [ms]  table walk }
 """
-SYSTEM = """name = "small"
-generated = "generated"
-data = "cell.toml"
-tick_ms = 40
-[[level]]
-name = "walker"
-[buffers]
-"outside.go" = "walker.go"
-"outside.far" = "walker.far"
-"walker.sent" = "outside.sent"
-"""
 
 
 class Outside:
@@ -356,7 +346,8 @@ class Outside:
 @pytest.fixture(scope="module")
 def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("walker")
-    (folder / "system.toml").write_text(SYSTEM, encoding="utf-8")
+    buffers = {"outside.go": "walker.go", "outside.far": "walker.far", "walker.sent": "outside.sent"}
+    (folder / "system.toml").write_text(system(["walker"], buffers), encoding="utf-8")
     (folder / "walker.rcs").write_text(WALKER, encoding="utf-8")
     assert write(emitted(shipped("walker.rcs", folder)), str(folder / "generated")) == ()
     return folder

@@ -15,32 +15,24 @@ import pytest
 from rcsc.diagnostics.codes import Code
 from rcsc.diff.changes.difference import ProgramDifference
 from rcsc.diff.compare import compare
-from rcsc.driver.compile import compile_
-from rcsc.driver.settings import Settings
-from rcsc.emit import TARGETS
 from rcsc.run.description import description
 from rcsc.run.system import Kind, assemble, signatures
 from rcsc.shell.commands import HELP, Commands
-from rcsc.shell.reload.refusal import Refused
 from rcsc.shell.reload.reload import Origin
 from rcsc.shell.reload.sources import kept, laid_out
-from rcsc.shell.session import Session, silent_queries
-from rcsc.solvers.options import Options
+from rcsc.shell.session import Session
 from rcsc_cell.cell.ready import plant
 from rcsc_cell.workstation.prepared import database_of
+from tests.support.programs.stages import compile_beside
+from tests.support.programs.texts import edit_file, edited, system
+from tests.support.shells import alone, do, refused, state
 
 REPO = Path(__file__).parents[2]
 SYSTEM = REPO / "tables" / "system.toml"
+GRIPPER = "gripper/gripper.rcs"
 RCSC = [sys.executable, "-c", "from rcsc.commands import main; main()", "shell"]
 MOVE = ["command.inc_command = 1", "command.input_command = move", "command.dest_locpt = 3"]
 DONE = "run until task.report.inc_command_echo = 1 and task.report.status_report = done"
-
-
-def alone(path: Path = SYSTEM, kind: Kind = "c") -> Commands:
-    """Levels with nothing outside and a database that knows nothing."""
-    said = description(path)
-    queries = silent_queries(said, signatures(said))
-    return Commands(Session(assemble(said, kind, queries), Origin(path, said, kind, queries)))
 
 
 def inhabited(kind: Kind = "c") -> Commands:
@@ -62,29 +54,6 @@ def project(tmp_path: Path) -> Path:
     shutil.copytree(REPO / "tables", tmp_path / "tables", ignore=shutil.ignore_patterns(".rcsc-cache"))
     shutil.copytree(REPO / "generated", tmp_path / "generated")
     return tmp_path / "tables" / "system.toml"
-
-
-def edit(system: Path, old: str, new: str) -> None:
-    gripper = system.parent / "gripper" / "gripper.rcs"
-    text = gripper.read_text(encoding="utf-8")
-    assert old in text
-    gripper.write_text(text.replace(old, new, 1), encoding="utf-8")
-
-
-def do(commands: Commands, *lines: str) -> list[str]:
-    """Does the lines; what the last one said."""
-    return [commands.do(line) for line in lines][-1]
-
-
-def refused(commands: Commands, line: str) -> Refused:
-    with pytest.raises(Refused) as caught:
-        commands.do(line)
-    return caught.value
-
-
-def state(commands: Commands) -> list[object]:
-    session = commands.session
-    return [session.system.tick, dict(session.memory.held), *[level.values for level in session.levels]]
 
 
 def script(text: str, *args: str, tmp_path: Path) -> subprocess.CompletedProcess[str]:
@@ -310,7 +279,10 @@ def test_a_procedure_a_module_an_owner_and_a_table_run_by_name(shell: Commands) 
 
 
 def test_parts_run_only_from_the_sources_that_the_executors_were_made_of(project: Path) -> None:
-    edit(project, "table position {", "procedure nothing {\n  waited := waited\n}\n\ntable position {")
+    edit_file(
+        project.parent / GRIPPER,
+        ("table position {", "procedure nothing {\n  waited := waited\n}\n\ntable position {"),
+    )
     commands = alone(project)
     assert refused(commands, "gripper.nothing").code is Code.SHELL_RELOAD
     do(commands, "reload gripper anyway", "gripper.nothing")
@@ -345,7 +317,7 @@ level gripper {"""
 
 def test_a_part_that_meets_what_the_proof_excludes_is_refused_and_changes_nothing(project: Path) -> None:
     commands = alone(project)
-    edit(project, "level gripper {", ALONE)
+    edit_file(project.parent / GRIPPER, ("level gripper {", ALONE))
     do(commands, "reload gripper", "level gripper", "waited = 149", "COUNTS", "expect waited = 150")
     before = state(commands)
     error = refused(commands, "one-more")
@@ -489,8 +461,11 @@ def test_reload_takes_proved_tables_in_the_present_state(project: Path, kind: Ki
     do(commands, "gripper.command.inc_command = 3", "gripper.command.input_command = grasp")
     do(commands, "gripper.command.force_n = 10", "step gripper")
     do(commands, "break gripper.waited = 140", "break gripper.grasp.4")
-    edit(project, "const most_waited = 150", "const most_waited = 200")
-    edit(project, "state failure : reason", "state failure : reason\nstate tries : int 3 .. 9 = 3")
+    edit_file(project.parent / GRIPPER, ("const most_waited = 150", "const most_waited = 200"))
+    edit_file(
+        project.parent / GRIPPER,
+        ("state failure : reason", "state failure : reason\nstate tries : int 3 .. 9 = 3"),
+    )
     said = do(commands, "reload gripper")
     assert (
         said[-1]
@@ -532,7 +507,7 @@ def test_reload_refuses_and_the_old_tables_run_on(project: Path, old: str, new: 
     commands = alone(project)
     do(commands, "step 2")
     before = state(commands)
-    edit(project, old, new)
+    edit_file(project.parent / GRIPPER, (old, new))
     if not why:
         said = do(commands, "reload gripper")
         assert (
@@ -549,12 +524,15 @@ def test_reload_refuses_and_the_old_tables_run_on(project: Path, old: str, new: 
 def test_reload_refuses_a_state_that_a_range_or_an_assumption_excludes(project: Path) -> None:
     commands = alone(project)
     do(commands, "step", "gripper.waited = 7")
-    edit(project, "const most_waited = 150", "const most_waited = 400")
+    edit_file(project.parent / GRIPPER, ("const most_waited = 150", "const most_waited = 400"))
     do(commands, "reload gripper", "gripper.waited = 300")
-    edit(project, "const most_waited = 400", "const most_waited = 150")
+    edit_file(project.parent / GRIPPER, ("const most_waited = 400", "const most_waited = 150"))
     assert "`waited` = 300 lies outside its new range 0 .. 150" in str(refused(commands, "reload gripper"))
     do(commands, "gripper.waited = 7", "reload gripper")
-    edit(project, "table position {", "assume calm monitored : waited /= 7\ntable position assuming calm {")
+    edit_file(
+        project.parent / GRIPPER,
+        ("table position {", "assume calm monitored : waited /= 7\ntable position assuming calm {"),
+    )
     do(commands, "reload gripper", "undo")  # it is PAUSE's table that runs next
     do(commands, "gripper.command.input_command = position")
     error = refused(commands, "reload gripper")
@@ -587,18 +565,6 @@ table walk {
 level walker { period 40 [ms]  preprocess sense  table walk }
 """
 ON = "|| to(end)    |", "|| to(start)  |"
-WALK = """\
-name = "small"
-generated = "generated"
-data = "cell.toml"
-tick_ms = 40
-[[level]]
-name = "walker"
-[buffers]
-"outside.go" = "walker.go"
-"outside.echo" = "walker.echo"
-"walker.sent" = "outside.order"
-"""
 OUT_OF_REACH = "out of reach of the present state: whatever the inputs, the next cycle does as before"
 WITHIN_REACH = "within reach of the present state, with some inputs: table `walk`, line `on`"
 
@@ -608,22 +574,19 @@ def walker(tmp_path: Path) -> Path:
     """A level with a deferred state; its source."""
     source = tmp_path / "walker.rcs"
     source.write_text(WALKER, encoding="utf-8")
-    (tmp_path / "system.toml").write_text(WALK, encoding="utf-8")
-    assert not compile_(
-        Settings((str(source),), Options()), tmp_path / "generated", TARGETS, only_check=False
-    ).report.failed
+    buffers = {"outside.go": "walker.go", "outside.echo": "walker.echo", "walker.sent": "outside.order"}
+    (tmp_path / "system.toml").write_text(system(["walker"], buffers), encoding="utf-8")
+    compile_beside(source)
     return source
+
+
+def write(source: Path, *edits: tuple[str, str], text: str = WALKER) -> None:
+    """Write the walker's program, with these edits."""
+    source.write_text(edited(text, *edits), encoding="utf-8")
 
 
 def walking(source: Path) -> Commands:
     return alone(source.parent / "system.toml", "python")
-
-
-def write(source: Path, *edits: tuple[str, str], text: str = WALKER) -> None:
-    for old, new in edits:
-        assert text.count(old) == 1, old
-        text = text.replace(old, new)
-    source.write_text(text, encoding="utf-8")
 
 
 def test_a_reload_that_changes_nothing_says_so_and_one_that_changes_no_meaning_too(walker: Path) -> None:
@@ -746,7 +709,7 @@ def test_a_pending_state_that_an_assumption_excludes_is_refused(walker: Path) ->
 
 
 def test_an_invariant_that_does_not_hold_of_the_present_state_is_refused(walker: Path) -> None:
-    text = WALKER.replace("state seen : bool", "state seen : bool\nstate count : int 0 .. 5")
+    text = edited(WALKER, ("state seen : bool", "state seen : bool\nstate count : int 0 .. 5"))
     commands = walking(walker)
     write(walker, text=text)
     do(commands, "reload", "count = 4")
@@ -809,14 +772,13 @@ def test_what_is_admitted_of_an_input_is_met_in_any_state(walker: Path) -> None:
 
 def test_extern_procedures_are_not_tried_out(walker: Path) -> None:
     extern = 'state told : bool\nextern procedure tell reads seen writes told python "tests.run.test_shell:outside_world" c "tell"\n'
-    text = WALKER.replace("procedure sense {", f"{extern}procedure sense {{").replace(
-        "preprocess sense", "preprocess sense, tell"
+    asks = (
+        ("procedure sense {", f"{extern}procedure sense {{"),
+        ("preprocess sense", "preprocess sense, tell"),
     )
+    text = edited(WALKER, *asks)
     write(walker, text=text)
-    made = compile_(
-        Settings((str(walker),), Options()), walker.parent / "generated", TARGETS, only_check=False
-    )
-    assert not made.report.failed, made.report.found
+    compile_beside(walker)
     commands = walking(walker)
     CALLED.clear()
     write(walker, ON, text=text)
@@ -834,19 +796,13 @@ def test_a_file_that_is_used_is_kept_too(walker: Path) -> None:
     (walker.parent / "words").mkdir()
     (walker.parent / "words" / "places.rcs").write_text(enum, encoding="utf-8")
     write(walker, text=f"use words/places\n{rest}")
-    assert not compile_(
-        Settings((str(walker),), Options()), walker.parent / "generated", TARGETS, only_check=False
-    ).report.failed
+    compile_beside(walker)
     commands = walking(walker)
-    (walker.parent / "words" / "places.rcs").write_text(
-        enum.replace("end }", "end, gone }"), encoding="utf-8"
-    )
+    edit_file(walker.parent / "words/places.rcs", ("end }", "end, gone }"))
     error = refused(commands, "reload")
     assert (error.code, "RCS401" in str(error)) == (Code.SHELL_RELOAD, True)  # a gap, in what was edited
     do(commands, "sense")  # what runs is known by what it was made of
-    (walker.parent / "words" / "places.rcs").write_text(
-        enum.replace("start, middle", "middle, start"), encoding="utf-8"
-    )
+    edit_file(walker.parent / "words/places.rcs", ("{ start, middle, end, gone }", "{ middle, start, end }"))
     assert "  enumeration `place`: start, middle, end -> middle, start, end" in do(commands, "reload")
 
 
@@ -855,13 +811,13 @@ def test_what_runs_is_not_tried_out_of_a_state_in_which_its_proof_does_not_hold(
     walker: Path, kind: Kind
 ) -> None:
     held = "state seen : bool\nstate kept : array[3] of bool\nstate i : int 0 .. 2000000000\n"
-    text = WALKER.replace("state seen : bool\n", f"{held}invariant inside : i <= 2\n")
-    text = text.replace("{ seen := go }", "{ seen := go  kept[i] := go }")
-    write(walker, text=text)
-    made = compile_(
-        Settings((str(walker),), Options()), walker.parent / "generated", TARGETS, only_check=False
+    text = edited(
+        WALKER,
+        ("state seen : bool\n", f"{held}invariant inside : i <= 2\n"),
+        ("{ seen := go }", "{ seen := go  kept[i] := go }"),
     )
-    assert not made.report.failed, made.report.found
+    write(walker, text=text)
+    compile_beside(walker)
     commands = alone(walker.parent / "system.toml", kind)
     do(commands, "i = 2000000000")
     guarded = ("kept[i] := go }", "if i <= 2 { kept[i] := go } }"), ("invariant inside : i <= 2\n", "")
@@ -876,13 +832,13 @@ def test_what_runs_is_not_tried_out_of_a_state_in_which_its_proof_does_not_hold(
 
 def test_a_part_that_has_no_whole_number_is_refused(walker: Path) -> None:
     held = "state x : real 0.0 .. 1.0e308\nstate whole : int 0 .. 9\ninvariant small : x <= 1.0\n"
-    text = WALKER.replace("procedure sense {", f"{held}procedure sense {{")
-    text = text.replace("{ seen := go }", "{ seen := go  whole := int(min(abs(x * 10.0 - x * 10.0), 9.0)) }")
-    write(walker, text=text)
-    made = compile_(
-        Settings((str(walker),), Options()), walker.parent / "generated", TARGETS, only_check=False
+    text = edited(
+        WALKER,
+        ("procedure sense {", f"{held}procedure sense {{"),
+        ("{ seen := go }", "{ seen := go  whole := int(min(abs(x * 10.0 - x * 10.0), 9.0)) }"),
     )
-    assert not made.report.failed, made.report.found
+    write(walker, text=text)
+    compile_beside(walker)
     commands = walking(walker)
     do(commands, "sense", "x = 1e308")
     before = state(commands)

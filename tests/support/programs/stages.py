@@ -6,6 +6,9 @@ from pathlib import Path
 from hypothesis import reject
 
 from rcsc.diagnostics.diagnostic import Diagnostic, Severity
+from rcsc.driver.compile import compile_
+from rcsc.driver.settings import Settings
+from rcsc.emit import TARGETS
 from rcsc.emit.c99 import emit_c
 from rcsc.emit.lower import lower
 from rcsc.emit.python import emit_python
@@ -85,3 +88,10 @@ def emitted(program: Program) -> dict[str, str]:
     """Return the generated files by path, the proof taken as given."""
     plan = lower(ProvedProgram(program, seal_of_proof()))
     return emit_c(plan) | emit_python(plan)
+
+
+def compile_beside(*sources: Path) -> None:
+    """Compile sources of one folder, which must be proved, into the folder `generated` beside them."""
+    settings = Settings(tuple(map(str, sources)), Options())
+    made = compile_(settings, sources[0].parent / "generated", TARGETS, only_check=False)
+    assert not made.report.failed, made.report.found

@@ -16,7 +16,7 @@ from rcsc.compose.proof.level import LevelProof, prove_level
 from rcsc.compose.proof.system import transition_systems
 from rcsc.lang.model import Kind
 from tests.support.programs.stages import program_of
-from tests.support.programs.texts import edited, system, table
+from tests.support.programs.texts import edited, system, table, without_row
 
 SMALL = Path(__file__).parents[2] / "data" / "composed"
 SYSTEM = SMALL / "system.toml"
@@ -60,6 +60,12 @@ ORDER_AFTER_ORDER = (
     ),
 )
 """Edits of the upper level: when the lower one is done it rests, and then gives the order again, for ever."""
+_HOPED = (
+    "table work assuming in_step",
+    "assume never_failed monitored : status_in /= failed\ntable work assuming in_step, never_failed",
+)
+HOPED = without_row(small_text("upper", _HOPED), "4")
+"""An upper level that assumes of the lower one that it never fails, which nobody proves."""
 
 
 # --- lower levels -------------------------------------------------------------------------------
