@@ -1,0 +1,236 @@
+"""What is stated of levels and asked about them, exactly: goals, what is missing for a goal, predicates, claims in words, questions."""
+
+from dataclasses import replace
+from itertools import combinations
+from pathlib import Path
+
+import pytest
+
+from rcsc.compose.contract.claims import CONTRACT, ENDING, RUNS, SAFE, Key, spelled
+from rcsc.compose.contract.obligations import Sort, Unstated, obligations, pairs, unstated
+from rcsc.compose.contract.properties import every_predicate
+from rcsc.compose.contract.transition import Cycle, TransitionSystem
+from rcsc.compose.invariant.confirm import Confirmation
+from rcsc.compose.proof.level import LevelProof, certificate
+from rcsc.compose.proof.termination import Flow
+from rcsc.lang.leaves import parts
+from rcsc.lang.meaning import spelled as spelled_expression
+from rcsc.lang.model import Bool, Int, OneTable, TableName
+from rcsc.solvers.smt import Answer, Limits, Solver
+from rcsc.symbolic import values
+from rcsc.symbolic.keyed import Keyed
+from tests.support.programs.systems import alone, going, lower_level, proved_level, small_level, small_text
+
+
+def any_cycle(ts: TransitionSystem) -> Cycle:
+    return ts.cycle(ts.havoc())
+
+
+@pytest.fixture(scope="module")
+def upper(tmp_path_factory: pytest.TempPathFactory) -> TransitionSystem:
+    return small_level(tmp_path_factory.mktemp("small"), "upper")
+
+
+@pytest.fixture(scope="module")
+def lower(tmp_path_factory: pytest.TempPathFactory) -> tuple[TransitionSystem, LevelProof]:
+    return proved_level(tmp_path_factory.mktemp("small"), "lower")
+
+
+# --- goals --------------------------------------------------------------------------------
+
+GOALS = """\
+SOME_LINE, table `rest`: some line matches
+ONE_LINE, table `rest`: no two lines match
+ASSUMPTION, table `work`: assumption `in_step`
+NO_DEFAULT, table `work`: DEFAULT is not reached
+ONE_LINE, table `work`: no two lines match
+ECHOES, table ``: the report echoes the command that it answers: `report`
+NUMBERED, table ``: the order changes only with its number: `to_lower.input_command`
+NEXT_NUMBER, table ``: numbers are used one after the other: `to_lower`
+WAITS, table ``: no other command replaces an order before its echo, but for a new command: `to_lower`
+PAUSES, table ``: a PAUSE is passed on in the cycle that takes it: `to_lower`
+ONCE, table ``: a command number is taken up once: `new_command`
+DEFERRED, table ``: no state is written directly while another is pending: `cur_state`
+"""
+
+
+def test_the_goals_of_a_level_are_stated_word_for_word(upper: TransitionSystem) -> None:
+    found = [
+        f"{one.sort.name}, table `{one.table}`: {one.shown}" for one in obligations(upper, any_cycle(upper))
+    ]
+    assert found == GOALS.splitlines()
+    assert all(type(part) is str for one in obligations(upper, any_cycle(upper)) for part in one.key[1:])
+    assert unstated(upper) == ()
+
+
+def test_pairs_of_lines_that_may_meet_are_stated_and_no_others(tmp_path: Path) -> None:
+    ts = small_level(tmp_path, "lower", lower=lower_level(going("2", there="false"), going("3")))
+    cycle = any_cycle(ts)
+    at = next(at for at in cycle.tables if at.table.name == "go")
+    [pair] = pairs(cycle)
+    assert pair.key == (Sort.ONE_LINE, "go", "2 and 3")
+    assert (pair.lines, pair.shown) == (("2", "3"), "lines `2` and `3` do not both match")
+    matches = {str(line.name): match for line, match in at.lines}
+    whole = values.follows(at.runs, values.negation(values.both(matches["2"], matches["3"])))
+    keyed, solver = Keyed(), Solver()
+    term = keyed.term(values.negation(values.equal(pair.holds, whole)))
+    solver.add(*keyed.ranges, term)
+    assert solver.check() is Answer.UNSATISFIABLE
+
+
+def without(sorts: tuple[Sort, ...], missing: str, table: str = "") -> tuple[Unstated, ...]:
+    return tuple(Unstated(sort, table, missing) for sort in sorts)
+
+
+def test_what_is_missing_for_a_goal_is_told_word_for_word(
+    upper: TransitionSystem, lower: tuple[TransitionSystem, LevelProof], tmp_path: Path
+) -> None:
+    no_superior = replace(upper, links=replace(upper.links, above=None))
+    assert unstated(no_superior) == without((Sort.WAITS, Sort.PAUSES, Sort.ENDS), "the level takes no orders")
+    assert unstated(replace(lower[0], links=replace(lower[0].links, above=None))) == ()
+    one = replace(upper, level=replace(upper.level, tables=OneTable(TableName("work"))))
+    assert unstated(one) == without((Sort.PAUSES,), "the level has one table for all commands")
+    unread = replace(upper, links=replace(upper.links, unread=("this", "that")))
+    assert [(one.sort, one.table, one.missing) for one in unstated(unread)] == [
+        (Sort.PROTOCOL, "", "this"),
+        (Sort.PROTOCOL, "", "that"),
+    ]
+    text = small_text("lower").replace("new_command", "fresh")
+    renamed = small_level(tmp_path / "renamed", "lower", lower=text)
+    assert unstated(renamed) == without((Sort.ONCE, Sort.ANSWERED), "there is no state `new_command : bool`")
+    blind = small_text(
+        "lower", ("| line | new_command | cur_state |", "| line | inc_command_seen | cur_state |")
+    )
+    blind = blind.replace("| true        |           |", "| 0 | |").replace("| false       |", "| > 0 |")
+    looks = small_level(tmp_path / "blind", "lower", lower=blind)
+    [left] = unstated(looks)
+    assert left == Unstated(Sort.ANSWERED, "go", "no line looks at `new_command`")
+    assert left.shown == "table `go`: no new command is passed over: no line looks at `new_command`"
+
+
+# --- claims in words ----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("key", "level", "there", "words"),
+    [
+        (("invariant", "", "low"), "a", True, "invariant `low`"),
+        (("invariant", "", "low"), "b", True, "level `a`: invariant `low`"),
+        (("assumption", "t", "near"), "b", True, "level `a`: table `t`: assumption `near`"),
+        (("invariant", "", "low"), "a", False, "invariant `low`, not looked at"),
+        ((CONTRACT, "", "order"), "a", True, "what it takes in `order` is as it assumes"),
+        (RUNS, "a", False, "the level was not looked at"),
+        (SAFE, "a", False, "every operation is defined and in range within a cycle"),
+        (ENDING, "b", False, "level `a`: that its commands end was not looked at"),
+    ],
+)
+def test_a_claim_is_spelled_word_for_word(key: Key, level: str, there: bool, words: str) -> None:
+    assert spelled(("a", key), level, [("a", key)] if there else []) == words
+    assert spelled(("a", key), level) == words.removesuffix(", not looked at")
+
+
+# --- what has a name of its own -----------------------------------------------------------
+
+
+def test_what_stood_in_a_buffer_before_a_restart_is_of_that_buffer_alone(upper: TransitionSystem) -> None:
+    """Each of several subordinates may have had another order: what is read of one says nothing of another."""
+    start = upper.restarted()
+    late = [set(values.variables([start[leaf]])) for leaf in start]
+    numbers = values.variables([start["to_lower.inc_command"]])
+    assert set(numbers) == {"to_lower.inc_command before restart", "lower.inc_command_echo before restart"}
+    alike = {"command.inc_command", "inc_command_seen"}, {"lower.inc_command_echo", "to_lower.inc_command"}
+    for (one, here), (two, there) in combinations(zip(start, late, strict=True), 2):
+        assert not here & there or {one, two} in alike
+
+
+ASK = 'extern procedure ask reads there writes raw python "no_such_module:ask" c "ask"'
+
+
+def test_what_an_extern_procedure_gives_in_one_cycle_is_not_what_it_gives_in_another(tmp_path: Path) -> None:
+    text = lower_level(
+        going("2", on="true"),
+        going("3", on="false", does="state(d_state)", status="done"),
+        declared="state raw : bool",
+        seen="on := raw",
+        parts=ASK,
+        after="answer, ask",
+    )
+    ts = small_level(tmp_path, "lower", lower=text)
+    cycle = any_cycle(ts)
+    asked = Confirmation((), (), cycle, cycle.cases, Keyed(), Limits())
+    flow = Flow(ts, asked, [])
+    turns = flow._turns(1, ())
+    given = [values.variables([turn.after["raw"]]) for turn in turns]
+    mine = [{name for name in one if name.startswith("raw from ask")} for one in given]
+    assert [len(one) for one in mine] == [1, 2, 3]  # one that is refused leaves what was given before
+
+
+# --- predicates ---------------------------------------------------------------------------
+
+STATED = """input i : int 0 .. 9
+state a : int 0 .. 9
+state c : int 0 .. 9
+state f : bool
+state e : bool
+invariant sums : a + c < 12
+invariant alike : a = c or e /= f
+property few : a in {1, 2} implies was f
+property later : was a <= c
+property parts : a / (c + 1) < 5
+property before : not (was a + was c > 3) or was c in {4, 5} or f
+procedure p { a := i  c := i }
+table t {
+  | line | when || procedures |
+  | one  | f    || p          |
+  | two  | not f ||           |
+}
+level l { period 40 [ms] table t }
+"""
+
+
+NUMBERS = (Int(0, 9), Int(0, 18), Int(12, 12), Int(3, 3))
+"""The types of variables, sums and constants in it."""
+
+
+def test_predicates_of_what_is_stated_are_these_and_no_others() -> None:
+    ts = alone(STATED)
+    cycle = any_cycle(ts)
+    found = every_predicate(ts, cycle, [one.holds for one in obligations(ts, cycle)])
+    assert [(one.leaf, one.other) for one in found] == [
+        ("f", ""), ("e", ""), ("(< (+ a c) int:12)", ""), ("a", "c"), ("e", "f"), ("(in a 1 2)", ""),
+        ("(> (+ a c) int:3)", ""), ("(in c 4 5)", ""),
+    ]  # fmt: skip
+    conditions = [one.condition for one in found if one.condition is not None]
+    assert [spelled_expression(one) for one in conditions] == [
+        one.leaf for one in found if one.leaf[0] == "("
+    ]
+    assert {part.type for one in conditions for part in parts(one)} == {Bool(), *NUMBERS}
+    assert all(one.kind == Bool() for one in found)
+
+
+def test_a_predicate_may_speak_of_all_that_matters() -> None:
+    ts = alone(
+        "state a : int 0 .. 9\nstate c : int 0 .. 9\ninvariant sums : a + c < 12\n"
+        "table t {\n| line | when ||\n| one | true ||\n}\nlevel l {\n  period 40 [ms]\n  table t\n}\n"
+    )
+    cycle = any_cycle(ts)
+    found = every_predicate(ts, cycle, [one.holds for one in obligations(ts, cycle)])
+    assert [one.leaf for one in found] == ["(< (+ a c) int:12)"]
+
+
+# --- questions of a certificate -----------------------------------------------------------
+
+
+def test_the_questions_of_a_certificate_are_named_and_are_about_values_in_range(
+    lower: tuple[TransitionSystem, LevelProof],
+) -> None:
+    asked = certificate(*lower)
+    assert [name for name in asked if not name.startswith(("lines", "ends"))] == [
+        "first", "restart", "step pause", "step go", "goals first", "goals restart",
+        "goals some_line", "goals one_line", "goals echoes", "goals once",
+    ]  # fmt: skip
+    for text in asked.values():
+        for line in text.splitlines():
+            if line.startswith("(declare-fun |command.inc_command") or "inc_command_seen ()" in line:
+                name = line.removeprefix("(declare-fun ").partition(" () ")[0]
+                assert f"(and (<= 0 {name}) (>= 65535 {name}))" in text
