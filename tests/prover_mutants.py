@@ -53,7 +53,7 @@ MODULES = tuple(
         "table/": "boxes partition confirm program relational decide",
         "procedures/": "discharge invariants obligations",
         "symbolic/": "effect encode evaluation execution trial values keyed measured",
-        "solvers/": "smt",
+        "solvers/": "search smt",
         "compose/proof/": "assume_guarantee context termination level ranking system",
         "compose/contract/": "claims environment obligations properties transition",
         "compose/invariant/": "confirm",

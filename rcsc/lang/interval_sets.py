@@ -1,6 +1,6 @@
-"""Sets of keys as intervals: what meets, joins, and is left; how many keys; how far one can be grown; the least there is."""
+"""Sets of keys as intervals: what meets, joins, and is left; how many keys."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 
 from rcsc.lang.model import Box
 from rcsc.lang.operator_table import MIRRORED, Comparison, Op
@@ -72,41 +72,3 @@ def holds(box: Box, key: int) -> bool:
 def size(box: Box) -> int:
     """How many keys it has."""
     return sum(high - low + 1 for low, high in box)
-
-
-def furthest(start: int, end: int, fits: Callable[[int], bool]) -> int:
-    """The greatest value up to `end` to which it fits; at `start` it does, and up to somewhere.
-
-    The end is tried first: what is grown often goes as far as its variable does, and that takes one question.
-    """
-    if start == end or fits(end):
-        return end
-    low, high = start, end - 1
-    while low < high:
-        middle = (low + high + 1) // 2
-        if fits(middle):
-            low = middle
-        else:
-            high = middle - 1
-    return low
-
-
-def lowest(low: int, known: int, up_to: Callable[[int, int], int | None]) -> int:
-    """The least value, of which one is known.
-
-    Args:
-        low: It is no less.
-        known: A value that there is.
-        up_to: Finds a value from a least one up to a limit, or None where there is none; the one known where nobody can tell.
-    """
-    limit = low  # where most are
-    while low < known:
-        found = up_to(low, limit)
-        if found is None:
-            low = limit + 1
-        elif found < known:
-            known = found
-        else:
-            break
-        limit = (low + known) // 2
-    return known

@@ -13,6 +13,7 @@ from typing import TypeVar
 from rcsc.lang.model import Kind, Real, Value, Variable, VariableName, value_of_key
 from rcsc.solvers import smt
 from rcsc.solvers.options import Options
+from rcsc.solvers.search import halved
 from rcsc.solvers.smt import Answer, Solver, Term
 from rcsc.symbolic import trial, values
 from rcsc.symbolic.encode import Frame, least_witness
@@ -142,13 +143,19 @@ class _Question:
         self.failures: list[Failure] = []
         self.unknown = 0
         self.solver: Solver | None = None
+        self._last: tuple[Answer, trial.Point | None] = (Answer.UNKNOWN, None)
 
     def _place(self, name: str) -> tuple[int, str]:
         return self.asker.order.get(name, len(self.asker.order)), name
 
     def answer(self) -> list[Failure]:
         """What is not shown, in the order owed."""
-        self._search(0, len(self.owed))
+        for at in halved(range(len(self.owed)), self._hold):
+            self._found(at, *self._last)
+            self.known.append(values.negation(self.bad[at]))
+            self.base.append(values.term_of(self.known[-1]))
+            if self.solver is not None:
+                self.solver.add(self.base[-1])
         return self.failures
 
     def all_hold(self) -> bool:
@@ -158,26 +165,16 @@ class _Question:
             return False
         return self._ask(values.term_of(bad)) is Answer.UNSATISFIABLE
 
-    def _search(self, first: int, last: int) -> None:
-        """Looks among the obligations `first .. last - 1`; those before hold, or were found."""
+    def _hold(self, places: Sequence[int]) -> bool:
+        """Whether these obligations hold, given that those before do or were found; open ones are done with, too."""
         if self.unknown > MOST_UNKNOWN:
-            self.failures += [Failure(obligation, Outcome.OPEN) for obligation in self.owed[first:last]]
-            return
-        bad = values.any_of(self.bad[first:last])
+            self.failures += [Failure(self.owed[at], Outcome.OPEN) for at in places]
+            return True
+        bad = values.any_of([self.bad[at] for at in places])
         tried = trial.found([*self.known, bad], self.variables) if self.reals else None
         answer = self._ask(values.term_of(bad)) if tried is None else Answer.SATISFIABLE
-        if answer is Answer.UNSATISFIABLE:
-            return
-        if last - first > 1:
-            middle = (first + last) // 2
-            self._search(first, middle)
-            self._search(middle, last)
-            return
-        self._found(first, answer, tried)
-        self.known.append(values.negation(self.bad[first]))
-        self.base.append(values.term_of(self.known[-1]))
-        if self.solver is not None:
-            self.solver.add(self.base[-1])
+        self._last = answer, tried
+        return answer is Answer.UNSATISFIABLE
 
     def _ask(self, bad: Term) -> Answer:
         """Whether it can be; doubles are quicker in a solver of their own."""

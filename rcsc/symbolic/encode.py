@@ -8,7 +8,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import partial
 
-from rcsc.lang.interval_sets import lowest
 from rcsc.lang.model import (
     Among,
     Apply,
@@ -29,6 +28,7 @@ from rcsc.lang.model import (
 )
 from rcsc.lang.operator_table import Comparison, Op, Operator, Signed, is_comparison, is_logic, truth_function
 from rcsc.solvers import smt
+from rcsc.solvers.search import lowest
 from rcsc.solvers.smt import Answer, Solver, Term
 
 

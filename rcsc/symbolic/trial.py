@@ -8,7 +8,6 @@ from functools import partial
 from random import Random
 
 from rcsc.lang.interpret import operated
-from rcsc.lang.interval_sets import lowest
 from rcsc.lang.model import (
     Bool,
     Op,
@@ -21,6 +20,7 @@ from rcsc.lang.model import (
     real_key,
     value_of_key,
 )
+from rcsc.solvers.search import lowest
 from rcsc.symbolic.values import Node, Shape, parts_first
 from rcsc.symbolic.values import variable as variable_of
 

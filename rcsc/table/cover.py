@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from itertools import pairwise, product
 from math import prod
 
-from rcsc.lang.interval_sets import furthest, joined, meet, size
+from rcsc.lang.interval_sets import joined, meet, size
 from rcsc.lang.model import (
     COMPARISONS,
     Bool,
@@ -29,6 +29,7 @@ from rcsc.lang.model import (
 )
 from rcsc.solvers import smt
 from rcsc.solvers.options import Options
+from rcsc.solvers.search import furthest, halved
 from rcsc.solvers.smt import Answer, Solver, Term
 from rcsc.symbolic import trial, values
 from rcsc.symbolic.encode import Frame, at_most_key, least_witness
@@ -204,22 +205,16 @@ class Space:
                 return False
             return not self.answered(bad, *self._inside(trial_))
 
-        def grow(names: list[str]) -> None:
+        def fills(names: Sequence[str]) -> bool:
             whole = {name: hull[name] for name in names}
-            if fits(whole):
+            fit = fits(whole)
+            if fit:
                 box.update(whole)
-            elif len(names) > 1:
-                middle = len(names) // 2
-                grow(names[:middle])
-                grow(names[middle:])
-            else:
-                [name] = names
-                classes = _within(cuts[name], hull[name])
-                box[name] = _widest(point[name], classes, lambda part: fits({name: part}))
+            return fit
 
-        names = [name for name, part in hull.items() if part != box[name]]
-        if names:
-            grow(names)
+        for name in halved([name for name, part in hull.items() if part != box[name]], fills):
+            classes = _within(cuts[name], hull[name])
+            box[name] = _widest(point[name], classes, lambda part, name=name: fits({name: part}))  # type: ignore[misc]  # bound early
         return box
 
     def _inside(self, box: Mapping[str, Box]) -> list[Term]:

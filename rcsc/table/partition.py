@@ -143,7 +143,7 @@ class Gaps(Generic[Axis]):
     """Looks for the least input that no line matches.
 
     It goes down the axes in order, each time into the first slice that the lines do not fill. Counting says which that is, so that
-    nothing is bisected (`rcsc.lang.interval_sets.lowest`): each question of a bisection would be such a search of its own.
+    nothing is bisected (`rcsc.solvers.search.lowest`): each question of a bisection would be such a search of its own.
 
     How many inputs lines fill together is counted by inclusion and exclusion. Lines no two of which overlap are counted as they are;
     of every other line what it adds to them: its size, less what it shares with each of them, less what it and another such line

@@ -1,6 +1,7 @@
 """Tables of boxes against brute force: overlaps, gaps, least witnesses, regions, counts, and repairs that repair."""
 
 import re
+from collections.abc import Sequence
 from itertools import combinations, pairwise, permutations, product
 from typing import Any, Literal
 
@@ -10,9 +11,10 @@ from hypothesis import strategies as st
 
 from rcsc.diagnostics.codes import Code
 from rcsc.lang.interpret import matching_lines
-from rcsc.lang.interval_sets import furthest, joined
+from rcsc.lang.interval_sets import joined
 from rcsc.lang.model import Program, key_bounds, key_of, value_of_key
 from rcsc.solvers.options import Options
+from rcsc.solvers.search import furthest, halved
 from rcsc.table import boxes, partition
 from rcsc.table.confirm import Agreement, confirm
 from rcsc.table.decide import prove_table
@@ -225,6 +227,19 @@ def test_furthest_is_the_last_that_fits_and_asks_little(start: int, length: int,
     assert furthest(start, end, fits) == last
     assert all(start < at <= end for at in asked)
     assert len(asked) <= (1 if last == end else 2 + length.bit_length())
+
+
+@given(st.integers(0, 40), st.sets(st.integers(0, 39), max_size=3))
+def test_halved_yields_what_stands_out_and_asks_little(count: int, odd: set[int]) -> None:
+    asked: list[range] = []
+
+    def settled(items: Sequence[int]) -> bool:
+        asked.append(range(items[0], items[-1] + 1))
+        return not odd.intersection(items)
+
+    standing_out = [at for at in range(count) if at in odd]
+    assert list(halved(range(count), settled)) == standing_out
+    assert len(asked) <= min(1, count) + 2 * len(standing_out) * count.bit_length()
 
 
 @given(st.sets(st.integers(0, 12)))

@@ -11,6 +11,7 @@ from rcsc.compose.contract.given import ExternAnswer, least, refused
 from rcsc.compose.contract.transition import Cycle
 from rcsc.lang.model import Bool, Op, Program, Scalar, Value, key_bounds, key_of, value_of_key
 from rcsc.solvers.sat import Sat
+from rcsc.solvers.search import halved, lowest
 from rcsc.symbolic import values
 from rcsc.symbolic.bits import Bits, Literal, key_of_bits
 from rcsc.symbolic.evaluation import ExternResults
@@ -99,8 +100,7 @@ class Simplest:
         """Fix the nodes' values: as many as possible as wanted, the least possible for the others."""
         every = zip(nodes, wanted, strict=True)
         met = [(node, value) for node, value in every if self.run.met(node) and not node.known]
-        kept = self._keep(met)
-        free = {node for node, _ in met} - kept
+        free = {node for node, _ in halved(met, self._keep)}
         return [
             self._least(node) if node in free else value for node, value in zip(nodes, wanted, strict=True)
         ]
@@ -126,29 +126,24 @@ class Simplest:
         ]
         return call.procedure, tuple(results)
 
-    def _keep(self, wanted: Sequence[tuple[Node, Value]]) -> set[Node]:
-        """Bisect what cannot be had together; return the nodes that keep their wanted value."""
-        if not wanted:
-            return set()
+    def _keep(self, wanted: Sequence[tuple[Node, Value]]) -> bool:
+        """Fix the nodes to their wanted values, if all of them can have theirs; return whether."""
         together = [self.run.has(node, value) for node, value in wanted]
-        if self.run.holds([*self.given, *together]):
-            self.given += together
-            return {node for node, _ in wanted}
-        middle = len(wanted) // 2
-        return self._keep(wanted[:middle]) | self._keep(wanted[middle:]) if middle else set()
+        can = self.run.holds([*self.given, *together])
+        self.given += together if can else []
+        return can
 
     def _least(self, node: Node) -> Value:
         """Return the least value that the node can have."""
         can = self.run.holds(self.given)
         assert can
-        low, high = key_bounds(node.kind)[0], self.run.key(node)
-        while low < high:
-            middle = (low + high) // 2
-            if self.run.holds([*self.given, self._at_most(node, middle)]):
-                high = self.run.key(node)
-            else:
-                low = middle + 1
-        value = value_of_key(node.kind, high)
+
+        def up_to(_low: int, limit: int) -> int | None:
+            there_is = self.run.holds([*self.given, self._at_most(node, limit)])
+            return self.run.key(node) if there_is else None
+
+        key = lowest(key_bounds(node.kind)[0], self.run.key(node), up_to)
+        value = value_of_key(node.kind, key)
         self.given.append(self.run.has(node, value))
         return value
 

@@ -15,6 +15,7 @@ from rcsc.compose.invariant.confirm import Confirmation, may
 from rcsc.compose.invariant.pdr import Clause
 from rcsc.lang.model import Bool, Int, Kind, Program, Real, Scalar, pending
 from rcsc.solvers import smt
+from rcsc.solvers.search import furthest
 from rcsc.solvers.smt import Answer, Term
 from rcsc.symbolic import values
 from rcsc.symbolic.keyed import KEY
@@ -277,11 +278,7 @@ def least_power(holds: Callable[[int], bool]) -> int | None:
     """Return the least of 0 .. SMALLEST of which it holds, given that it holds of all greater ones; None where of none."""
     if not holds(SMALLEST):
         return None
-    low, high = -1, SMALLEST  # holds of `high`, not of `low`
-    while high - low > 1:
-        middle = (low + high) // 2
-        low, high = (low, middle) if holds(middle) else (middle, high)
-    return high
+    return -furthest(-SMALLEST, 0, lambda power: holds(-power))
 
 
 def owned(program: Program) -> list[tuple[str, Scalar]]:

@@ -10,7 +10,8 @@ Source: house style, example 6 (pin each variable, in declared order, to the lea
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
-from rcsc.lang.interval_sets import complement, furthest, lowest
+from rcsc.lang.interval_sets import complement
+from rcsc.solvers.search import furthest, lowest
 from rcsc.table.regions.atoms import Atom, Clauses, Every, Formula, Some, Universe, clauses, every, some
 from rcsc.table.regions.linear import Simplex, integer_point
 from rcsc.table.regions.region import Answer, Bounds, Point

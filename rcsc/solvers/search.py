@@ -1,0 +1,62 @@
+"""Searches that ask little, by bisection: how far something can be grown, the least value there is, the items that stand out.
+
+Each is given the question to ask. Who answers it, a solver, an exact simplex or a trial, is the caller's choice.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import TypeVar
+
+Item = TypeVar("Item")
+
+
+def furthest(start: int, end: int, fits: Callable[[int], bool]) -> int:
+    """The greatest value up to `end` to which it fits; at `start` it does, and up to somewhere.
+
+    The end is tried first: what is grown often goes as far as its variable does, and that takes one question.
+    """
+    if start == end or fits(end):
+        return end
+    low, high = start, end - 1
+    while low < high:
+        middle = (low + high + 1) // 2
+        if fits(middle):
+            low = middle
+        else:
+            high = middle - 1
+    return low
+
+
+def lowest(low: int, known: int, up_to: Callable[[int, int], int | None]) -> int:
+    """The least value, of which one is known.
+
+    Args:
+        low: It is no less.
+        known: A value that there is.
+        up_to: Finds a value from a least one up to a limit, or None where there is none; the one known where nobody can tell.
+    """
+    limit = low  # where most are
+    while low < known:
+        found = up_to(low, limit)
+        if found is None:
+            low = limit + 1
+        elif found < known:
+            known = found
+        else:
+            break
+        limit = (low + known) // 2
+    return known
+
+
+def halved(items: Sequence[Item], settled: Callable[[Sequence[Item]], bool]) -> Iterator[Item]:
+    """Yield, in order, each item that is not settled even alone: all are asked about together, then halves of what is not settled.
+
+    Of 8 items with one that stands out that takes 7 questions. What follows an item is asked about when the next one is wanted.
+    """
+    if not items or settled(items):
+        return
+    middle = len(items) // 2
+    if not middle:
+        yield items[0]
+        return
+    yield from halved(items[:middle], settled)
+    yield from halved(items[middle:], settled)
