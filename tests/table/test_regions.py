@@ -45,8 +45,9 @@ from rcsc.lang.model import (
 from rcsc.table.regions.atoms import Universe, assumptions_of, lines_of
 from rcsc.table.regions.least import find, least, negated, whole, widest
 from rcsc.table.regions.linear import Simplex
-from rcsc.table.regions.region import Answer, Open, Search
+from rcsc.table.regions.region import Answer, Counted, Empty, Node, Only, Open, Outside, Search, Split
 from rcsc.table.regions.splitting import Tree
+from tests.support.programs.stages import program_of as compiled
 
 BOOL = Bool()
 SMALL = Int(0, 4)
@@ -378,3 +379,161 @@ def test_simplex_gives_a_point_or_a_sum_that_cannot_be(rows: list[tuple[tuple[in
         bound = sum(k * (simplex.high if k > 0 else simplex.low)[form] for form, k in multipliers)
         assert summed == [0, 0, 0]
         assert bound < 0
+
+
+# --- trees, node by node ------------------------------------------------------------------
+
+INPUTS = "input x : int 0 .. 20\ninput y : int 0 .. 20\ninput r : real -1.0 .. 1.0\ninput s : real -1.0 .. 1.0\ninput p : bool\n"
+TREES: dict[str, tuple[str, tuple[str, ...], str]] = {
+    "apart": (
+        "2 * x /= 3 * y + 1 and x + y <= 30",
+        (
+            "2 * x - 3 * y < 1 and r < s",
+            "2 * x - 3 * y > 1 and r < s",
+            "r > s",
+            "r = s and (x < 5 or y < 7)",
+            "r = s and x >= 5 and y >= 7",
+        ),
+        (
+            "1x, 1y, 2x -3y, 1r, 1s, 1r -1s, 1x 1y\n"
+            "6<=30; 5<=-1; 2<=0; line 0; 2<=1; outside 0; line 1; 5<=0; 0<=4; line 3; counted 21 (1,); "
+            "line 2; outside 0\n"
+            "0 [0]"
+        ),
+    ),
+    "default": (
+        "",
+        ("x + y < 9 and x /= 4", "x + y > 11 or x = 4 and y < 3", "DEFAULT"),
+        ("1x, 1y, 1x 1y\n2<=8; counted None (0,); line -1\n0 []"),
+    ),
+    "wrong": (
+        "",
+        (
+            "3 * x + 3 * y < 10",
+            "x + y > 4 and x < y",
+            "x + y > 5 and x >= y + 1",
+            "2 * x = 2 * y and x > 1",
+            "x * y = 7 and y < 3",
+        ),
+        (
+            "1x, 1y, 1x 1y, 1x -1y, 1(* x y)\n"
+            "2<=3; 0<=1; 1<=2; 4<=6; line 0; 4<=7; open; line 0; line 0; 1<=2; 3<=-1; "
+            "empty -1*0 1*1 1*3; 3<=0; empty -2*0 1*2 1*3; 4<=6; line 0; 4<=7; open; line 0; "
+            "empty -1*0 -1*1 1*2; 3<=-1; 1<=2; empty 2*1 -1*2 1*3; 2<=4; open; line 1; 3<=0; 0<=1; "
+            "empty 2*0 -1*2 -1*3; 1<=2; 4<=6; line 3; 4<=7; open; line 3; line 3; 1<=2; 2<=5; 4<=6; "
+            "open; 4<=7; line 4; open; 4<=6; line 2; 4<=7; open; line 2; 2<=5; empty -2*1 1*2 -1*3; "
+            "line 2\n"
+            "[(1, (3, 20)), (2, (4, 4)), (3, (-20, -1))]: [(0, 1), (1, 3), (2, 0)]\n"
+            "6 []"
+        ),
+    ),
+    "truths": (
+        "p or x < 9",
+        ("p = (x < 4)", "p /= (x < 4) and not (y in {2, 3, 9})", "p /= (x < 4) and -y in {-2, -3, -9}"),
+        (
+            "1p, 1x, 1y\n"
+            "2<=1; 0<=0; counted 21 (1,); counted 21 (1,); 2<=3; 0<=0; counted 21 (1,); counted 21 (1,); "
+            "2<=8; 0<=0; counted 21 (1,); counted 21 (1,); 2<=9; 0<=0; counted 21 (1,); counted 21 (1,); "
+            "0<=0; counted 21 (1,); counted 21 (1,)\n"
+            "0 []"
+        ),
+    ),
+    "rounded": (
+        "x in {1, 2, 5}",
+        ("2 * x + 4 * y <= 21", "2 * (y + x) + 2 * y > 20 and 3 * x > 1"),
+        ("1x, 1y, 1x 2y\n2<=10; line 0; 0<=0; outside 0; line 1\n0 [0]"),
+    ),
+    "between": (
+        "",
+        ("4 * x - 6 * y = 3", "x < y", "x >= y and (x > 9 or y > 9)", "x >= y and x <= 9 and y <= 9"),
+        ("1x, 1y, 2x -3y, 1x -1y\n3<=-1; line 1; 0<=9; counted 21 (1,); line 2\n0 []"),
+    ),
+    "fractions": (
+        "",
+        (
+            "5 * x + 3 * y < 22",
+            "5 * x + 3 * y > 23",
+            "7 * x - 4 * y < 3 and 5 * x + 3 * y = 22",
+            "7 * x - 4 * y > 4 and 5 * x + 3 * y = 23",
+        ),
+        (
+            "1x, 1y, 5x 3y, 7x -4y\n"
+            "2<=22; 2<=21; line 0; 3<=2; line 2; 0<=4; 1<=0; empty 5*0 3*1 -1*2; 0<=3; 1<=2; "
+            "empty 5*0 3*1 -1*2; 0<=2; empty 41*0 -4*2 -3*3; empty -5*0 -3*1 1*2; empty -5*0 -3*1 1*2; "
+            "empty -5*0 -3*1 1*2; 2<=23; 3<=4; 0<=2; 1<=4; empty 5*0 3*1 -1*2; 0<=1; open; "
+            "empty -5*0 -3*1 1*2; empty -41*0 4*2 3*3; line 3; line 1\n"
+            "[(0, (0, 1)), (1, (5, 20)), (2, (23, 23)), (3, (-80, 4))]: [(0, 1), (1, 6)]\n"
+            "0 []"
+        ),
+    ),
+    "fraction": (
+        "",
+        (
+            "2 * x + 3 * y < 11 or 3 * x - 2 * y > 2",
+            "2 * x + 3 * y >= 11 and 3 * x - 2 * y <= 2 and 5 * x + y /= 13",
+        ),
+        (
+            "1x, 1y, 2x 3y, 3x -2y, 5x 1y\n"
+            "2<=10; line 0; 3<=2; 4<=12; line 1; 4<=13; 0<=2; open; empty -13*0 1*3 2*4; line 1; line 0\n"
+            "[(0, (0, 2)), (2, (11, 100)), (3, (-40, 2)), (4, (13, 13))]: [(0, 2), (1, 3)]\n"
+            "0 []"
+        ),
+    ),
+    "crossing": (
+        "",
+        ("3 * x + 2 * y < 30 and x > y", "3 * x + 2 * y > 26 and y >= x", "x - y > 3", "x + y = 9"),
+        (
+            "1x, 1y, 3x 2y, 1x -1y, 1x 1y\n"
+            "3<=0; 2<=26; 4<=8; open; 4<=9; line 3; open; 4<=8; empty -2*2 1*3 5*4; 4<=9; "
+            "empty -2*2 1*3 5*4; line 1; 2<=29; 3<=3; 4<=8; line 0; 4<=9; open; line 0; 4<=8; open; "
+            "4<=9; 0<=6; empty 2*0 -1*3 -1*4; open; open; 3<=3; 4<=8; empty -1*1 -1*2 3*4; 4<=9; line 3; "
+            "0<=6; empty 5*0 -1*2 -2*3; open; 4<=8; empty -1*1 -1*2 3*4; 4<=9; empty -1*1 -1*2 3*4; "
+            "line 2\n"
+            "(0, 3): [(0, 5), (1, 4)]\n"
+            "(0, 2): [(0, 4), (1, 0)]\n"
+            "(2, 3): [(0, 7), (1, 2)]\n"
+            "[(2, (0, 26)), (3, (-20, 0)), (4, (0, 8))]: [(0, 0), (1, 0)]\n"
+            "[(2, (0, 26)), (3, (-20, 0)), (4, (10, 40))]: [(0, 5), (1, 5)]\n"
+            "[(0, (7, 20)), (2, (30, 100)), (3, (1, 3)), (4, (10, 40))]: [(0, 7), (1, 6)]\n"
+            "0 []"
+        ),
+    ),
+}
+
+
+def written(node: Node) -> str:
+    """A node of a tree in a few letters."""
+    match node:
+        case Split(form, cut):
+            return f"{form}<={cut}"
+        case Only(line):
+            return f"line {line}"
+        case Outside(assumption):
+            return f"outside {assumption}"
+        case Empty(multipliers):
+            return "empty " + " ".join(f"{k}*{form}" for form, k in multipliers)
+        case Counted(count, parts_):
+            return f"counted {count} {parts_}"
+        case _:
+            return type(node).__name__.lower()
+
+
+@pytest.mark.parametrize("name", TREES)
+def test_the_tree_is_this_one(name: str) -> None:
+    """Which bound is split first, and why each leaf holds: not only whether."""
+    assumed, lines, expected = TREES[name]
+    head = f"assume it assumed : {assumed}\ntable t assuming it {{\n" if assumed else "table t {\n"
+    rows = "".join(f"| l{number} | {line} ||\n" for number, line in enumerate(lines))
+    program = compiled(f"{INPUTS}{head}| line | when ||\n{rows}}}\n")
+    universe, search = searched(program)
+    forms = [" ".join(f"{k}{universe.columns[c].name}" for c, k in form) for form in universe.forms]
+    pairs = [f"{pair}: {sorted(point.items())}" for pair, point in search.overlaps.items()]
+    gaps = [f"{sorted(bounds.items())}: {sorted(point.items())}" for bounds, point in search.gaps]
+    said = [
+        ", ".join(forms),
+        "; ".join(map(written, search.nodes)),
+        *pairs,
+        *gaps,
+        f"{search.undecided} {sorted(search.used)}",
+    ]
+    assert "\n".join(said) == expected
