@@ -17,6 +17,7 @@ import pytest
 
 from rcsc import commands
 from rcsc.commands import run
+from tests.support.programs.texts import edited
 
 REPO = Path(__file__).parents[2]
 GAP = """\
@@ -29,7 +30,7 @@ table grip {
   | wide | > 40     || false |
 }
 """
-RIGHT = GAP.replace("| 20 .. 40 |", "| <= 40    |")
+RIGHT = edited(GAP, ("| 20 .. 40 |", "| <= 40    |"))
 
 
 @dataclass(frozen=True)
@@ -195,7 +196,7 @@ BAD_INPUTS = [
     ("RCS103", b"const a = " + b"(" * 400 + b"1" + b")" * 400),
     ("RCS104", b"#" * (16 * 1024 * 1024 + 1)),
     ("RCS205", b"use nothing\n"),
-    ("RCS102", GAP.replace("| held | 20 .. 40 || true  |", "| held | 20 .. 40 ||").encode()),
+    ("RCS102", edited(GAP, ("| held | 20 .. 40 || true  |", "| held | 20 .. 40 ||")).encode()),
 ]
 
 
@@ -361,7 +362,7 @@ def test_any_change_is_noticed(rcsc: Rcsc) -> None:
 def test_a_used_file_that_comes_to_stand_nearer_is_noticed(rcsc: Rcsc) -> None:
     write("rcsc.toml", 'name = "x"\n')
     write("types.rcs", "const limit = 40\n")
-    write("sub/grip.rcs", "use types\n" + RIGHT.replace("<= 40   ", "<= limit"))
+    write("sub/grip.rcs", "use types\n" + edited(RIGHT, ("<= 40   ", "<= limit")))
     assert rcsc("check", "sub/grip.rcs").status == 0
     assert "(earlier run)" in rcsc("check", "sub/grip.rcs").out
     write("sub/types.rcs", "const limit = 30\n")
@@ -387,9 +388,9 @@ def test_a_forged_cache_is_not_believed(rcsc: Rcsc, tmp_path: Path) -> None:
 
 def test_an_unchanged_table_is_not_proved_again_when_its_neighbour_changes(rcsc: Rcsc) -> None:
     write("one.rcs")
-    write("two.rcs", RIGHT.replace("grip", "other"))
+    write("two.rcs", edited(RIGHT, ("grip", "other")))
     assert rcsc("check").status == 0
-    write("two.rcs", "\n# moved down\n" + RIGHT.replace("grip", "other").replace("40", "41"))
+    write("two.rcs", "\n# moved down\n" + edited(RIGHT, ("grip", "other")).replace("40", "41"))
     shown = rcsc("check").out
     assert "(earlier run)" in shown.split("two.rcs")[0]
     assert "(earlier run)" not in shown.split("two.rcs")[1]
@@ -411,7 +412,7 @@ def test_compile_writes_and_checks_freshness(rcsc: Rcsc) -> None:
     made = tree()
     assert {"generated/python/grip.py", "generated/c/grip.c", "generated/c/grip.h"} <= made.keys()
     assert rcsc("compile", "grip.rcs", "--check").status == 0
-    write("grip.rcs", RIGHT.replace("true ", "false"))
+    write("grip.rcs", edited(RIGHT, ("true ", "false")))
     assert rcsc("compile", "grip.rcs", "--check").status == 1
     assert tree() == made
 
@@ -517,7 +518,7 @@ def test_what_is_compiled_together_can_be_linked_together(rcsc: Rcsc) -> None:
 
 
 def test_fmt(rcsc: Rcsc, monkeypatch: pytest.MonkeyPatch) -> None:
-    ragged = RIGHT.replace("| <= 40    ||", "|<= 40||")
+    ragged = edited(RIGHT, ("| <= 40    ||", "|<= 40||"))
     write("grip.rcs", ragged)
     ran = rcsc("fmt", "--check")
     assert ran.status == 1
@@ -619,7 +620,7 @@ def test_certify_names_what_it_did_not_check(rcsc: Rcsc) -> None:
         ran = rcsc("certify", "hard.rcs", "--certify", *more)
         assert ran.status == 0
         assert "certified: checked all 5 obligations" in ran.out
-    write("hard.rcs", HARD.replace("m <= n", "m <= n + 1"))
+    write("hard.rcs", edited(HARD, ("m <= n", "m <= n + 1")))
     ran = rcsc("certify", "hard.rcs", "--against", "a.json", "--certify")
     assert ran.status == 1
     assert "of another program" in ran.out

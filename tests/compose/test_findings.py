@@ -40,7 +40,7 @@ from rcsc.solvers.options import Options
 from rcsc.table.decide import prove_table
 from tests.support.programs.stages import shipped
 from tests.support.programs.systems import SYSTEM, small_level, small_system, small_text
-from tests.support.programs.texts import edit_file
+from tests.support.programs.texts import edit_file, edited
 from tests.support.proved import every_obligation, obligation_of, shortest, time_line
 
 REPO = Path(__file__).parents[2]
@@ -338,7 +338,9 @@ def test_an_executor_that_does_something_else_is_a_bug(published: Looked, tmp_pa
     module = tmp_path / "python" / "task.py"
     text = module.read_text(encoding="utf-8")
     assert "s.report_failure = s.failure" in text
-    module.write_text(text.replace("s.report_failure = s.failure", "s.report_failure = 0"), encoding="utf-8")
+    module.write_text(
+        edited(text, ("s.report_failure = s.failure", "s.report_failure = 0")), encoding="utf-8"
+    )
     finding = published.finding((Sort.ONE_LINE, "acquire", "14 and 15"))
     system = replace(description(PUBLISHED), generated=tmp_path)
     with pytest.raises(ExecutorsDifferError) as raised:
@@ -354,7 +356,7 @@ def test_a_level_that_ends_in_another_line_is_a_bug(published: Looked, tmp_path:
     source = tmp_path / "c" / "task.c"
     text = source.read_text(encoding="utf-8")
     assert "line = several ? (-2) : line;" in text
-    source.write_text(text.replace("line = several ? (-2) : line;", ""), encoding="utf-8")
+    source.write_text(edited(text, ("line = several ? (-2) : line;", "")), encoding="utf-8")
     finding = published.finding((Sort.ONE_LINE, "acquire", "14 and 15"))
     system = replace(description(PUBLISHED), generated=tmp_path)
     with pytest.raises(
@@ -757,7 +759,7 @@ def test_an_executor_that_differs_is_reported_side_by_side(
         made = true_make(programs, folder, altered=altered)  # type: ignore[arg-type]  # as it is called
         module = folder / "python" / "first_match.py"
         text = module.read_text(encoding="utf-8")
-        module.write_text(text.replace("s.cur_state = v_value", "s.cur_state = 0"), encoding="utf-8")
+        module.write_text(edited(text, ("s.cur_state = v_value", "s.cur_state = 0")), encoding="utf-8")
         return made
 
     monkeypatch.setattr(rcsc.compose.counterexample.explain, "make", tampered)

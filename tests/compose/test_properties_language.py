@@ -38,7 +38,7 @@ from rcsc.solvers.smtlib import cvc5_refutes
 from rcsc.table.program import prove_program
 from tests.support.programs.stages import emitted, program_of, refused
 from tests.support.programs.systems import alone, small_level, small_text
-from tests.support.programs.texts import edit_file
+from tests.support.programs.texts import edit_file, edited
 from tests.support.proved import ran, shortest, time_line
 
 REPO = Path(__file__).parents[2]
@@ -87,7 +87,7 @@ property four : upon upon not until
 def test_properties_are_laid_out_and_their_words_are_still_names() -> None:
     ragged = re.sub(r"(?<=\w) (?=[:=])", "   ", WORDS).replace(" then property", "\n   then\n property")
     assert ragged != WORDS
-    laid_out = WORDS.replace("\n# why", "\n\n# why")
+    laid_out = edited(WORDS, ("\n# why", "\n\n# why"))
     for text in (ragged, laid_out):
         parsed = parse(Source("case.rcs", text))
         assert isinstance(parsed, tree.File)
@@ -384,7 +384,7 @@ def enumerated(ts: TransitionSystem, starts: list[dict[str, Value]]) -> dict[str
 @pytest.mark.parametrize("seed", range(3))
 def test_proofs_and_traces_are_what_enumeration_says(seed: int) -> None:
     random = Random(seed)  # noqa: S311  # repeatable on purpose
-    text = GRIP.replace("grasps < 9", "grasps < 3").replace("0 .. 9", "0 .. 3")
+    text = edited(GRIP, ("grasps < 9", "grasps < 3"), ("0 .. 9", "0 .. 3"))
     written = [f"property p{at} : {some_property(random)}\n" for at in range(MANY)]
     ts = alone(text + "".join(written))
     start = dict(initial(ts.program))

@@ -39,12 +39,12 @@ from rcsc.lang.model import (
     spell,
     value_of_key,
 )
-from rcsc.lang.project import load
-from rcsc.lang.resolve import resolve
 from rcsc.relation.steps import UnansweredError
 from rcsc.solvers.options import Options
 from rcsc.solvers.smt import Answer, Solver
-from tests.support.programs.stages import program_of
+from tests.support.programs.examples import WALKER
+from tests.support.programs.stages import program_of, shipped
+from tests.support.programs.texts import edit_file, edited
 
 REPO = Path(__file__).parents[2]
 
@@ -76,22 +76,16 @@ def task(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Program]:
         shutil.copy(REPO / "tables" / name, folder / name)
     shutil.copytree(REPO / "tables/task", folder / "task")
 
-    def edited(name: str = "acquire.rcs", *edits: tuple[str, str]) -> Program:
+    def with_edits(name: str = "acquire.rcs", *edits: tuple[str, str]) -> Program:
         path = folder / "task" / name
-        kept = text = path.read_text(encoding="utf-8")
-        for old, new in edits:
-            assert text.count(old) == 1, old
-            text = text.replace(old, new)
-        path.write_text(text, encoding="utf-8")
+        kept = path.read_text(encoding="utf-8")
+        edit_file(path, *edits)
         try:
-            loaded = load([str(folder / "task/acquire.rcs")])
-            made = resolve(loaded.roots[0], loaded)
+            return shipped("task/acquire.rcs", folder)
         finally:
             path.write_text(kept, encoding="utf-8")
-        assert isinstance(made, Program), made
-        return made
 
-    return edited
+    return with_edits
 
 
 def line_of(name: str) -> str:
@@ -279,7 +273,7 @@ def drawn(random: Random) -> list[Row]:
     ]
 
 
-def edited(random: Random, rows: list[Row]) -> list[Row]:
+def shuffled(random: Random, rows: list[Row]) -> list[Row]:
     """A few random edits."""
     made = [list(row) for row in rows]
     for _ in range(random.randint(0, 3)):
@@ -372,7 +366,10 @@ def test_the_regions_are_those_that_every_input_shows(seed: int) -> None:
     for _ in range(5):
         rows = drawn(random)
         default = random.random() < 0.5
-        before, after = program_of(spelled(rows, default)), program_of(spelled(edited(random, rows), default))
+        before, after = (
+            program_of(spelled(rows, default)),
+            program_of(spelled(shuffled(random, rows), default)),
+        )
         assert disagreements(before, after, seen) == []
     assert seen["exact"] > seen["besides"]
 
@@ -398,7 +395,7 @@ table grip {
 
 
 def test_a_region_across_variables_is_said_as_a_condition() -> None:
-    found = differ(GRIP, GRIP.replace("width >= wanted", "width > wanted"))
+    found = differ(GRIP, edited(GRIP, ("width >= wanted", "width > wanted")))
     [change] = part(found, "grip").changes
     assert change.where.exact
     assert change.where.words == (("reported = done", "width <= 4"),)
@@ -409,11 +406,13 @@ def test_a_region_across_variables_is_said_as_a_condition() -> None:
 
 
 def test_a_line_across_variables_is_said_in_its_own_conditions() -> None:
-    text = GRIP.replace("| line | reported  | width ||", "| line | reported  | width - wanted ||").replace(
-        "int 0 .. 9", "int 0 .. 60"
+    text = edited(
+        GRIP,
+        ("| line | reported  | width ||", "| line | reported  | width - wanted ||"),
+        ("width : int 0 .. 9", "width : int 0 .. 60"),
+        ("wanted : int 0 .. 9", "wanted : int 0 .. 60"),
     )
-    text = text.replace("| <= 4  |", "| <= 4 |").replace("| > 4   ||", "| > 4 ||")
-    found = differ(text, text.replace("| 1     |", "| 3     |"))
+    found = differ(text, edited(text, ("| 1     |", "| 3     |")))
     [change] = part(found, "grip").changes
     assert (change.where.exact, change.where.words) == (True, (("reported = done",),))
     assert change.where.also == "(width - wanted) <= 4"
@@ -422,16 +421,16 @@ def test_a_line_across_variables_is_said_in_its_own_conditions() -> None:
 def test_an_effect_that_is_written_otherwise_but_is_the_same_is_the_same() -> None:
     found = differ(
         GRIP,
-        GRIP.replace("near := width >= wanted", "if width < wanted { near := false } else { near := true }"),
+        edited(
+            GRIP, ("near := width >= wanted", "if width < wanted { near := false } else { near := true }")
+        ),
     )
     assert not found.changed
     assert part(found, "look", "procedure").basis is Basis.SOLVER
 
 
 def test_a_gap_and_an_overlap_are_faults_in_their_own_regions() -> None:
-    found = differ(
-        GRIP, GRIP.replace("| <= 4  |", "| <= 3  |").replace("| > 4   |", "| in {3, 5, 6, 7, 8, 9} |")
-    )
+    found = differ(GRIP, edited(GRIP, ("| <= 4  |", "| <= 3  |"), ("| > 4   |", "| in {3, 5, 6, 7, 8, 9} |")))
     assert regions(part(found, "grip").changes) == {
         ("line `held`", "no line", ("reported = done", "width = 4")),
         ("line `held`", "several lines", ("reported = done", "width = 3")),
@@ -439,31 +438,33 @@ def test_a_gap_and_an_overlap_are_faults_in_their_own_regions() -> None:
 
 
 def test_a_region_that_reaches_past_the_assumptions_stays_one() -> None:
-    text = GRIP.replace("table grip {", "assume narrow assumed : width <= 7\ntable grip assuming narrow {")
-    [change] = part(differ(text, text.replace("| 2     |", "| 3     |")), "grip").changes
+    text = edited(GRIP, ("table grip {", "assume narrow assumed : width <= 7\ntable grip assuming narrow {"))
+    [change] = part(differ(text, edited(text, ("| 2     |", "| 3     |"))), "grip").changes
     assert change.relied_on
     assert regions((change,)) == {("line `wide`", "line `wide`", ("reported = done", "width >= 5"))}
 
 
 def test_an_input_outside_every_assumption_is_marked() -> None:
-    text = GRIP.replace("table grip {", "assume narrow assumed : width <= 7\ntable grip assuming narrow {")
-    one = text.replace("| wide | done      | > 4 ", "| wide | done      | in {5, 6, 7} ")
+    text = edited(GRIP, ("table grip {", "assume narrow assumed : width <= 7\ntable grip assuming narrow {"))
+    one = edited(text, ("| wide | done      | > 4 ", "| wide | done      | in {5, 6, 7} "))
     [change] = part(differ(text, one), "grip").changes
     assert (change.relied_on, change.after) == (False, "no line")
     assert regions((change,)) == {("line `wide`", "no line", ("reported = done", "width >= 8"))}
 
 
 def test_a_changed_assumption_is_a_region() -> None:
-    text = GRIP.replace("table grip {", "assume narrow assumed : width <= 7\ntable grip assuming narrow {")
-    found = differ(text, text.replace("width <= 7", "width <= 8"))
+    text = edited(GRIP, ("table grip {", "assume narrow assumed : width <= 7\ntable grip assuming narrow {"))
+    found = differ(text, edited(text, ("width <= 7", "width <= 8")))
     assert regions(part(found, "narrow", "assumption").changes) == {("false", "true", ("width = 8",))}
 
 
 def test_where_only_one_version_goes_wrong_is_a_change() -> None:
-    text = GRIP.replace("near := width >= wanted", "count := min(count + 1, 9)").replace(
-        "output order", "state count : int 0 .. 9\noutput order"
+    text = edited(
+        GRIP,
+        ("near := width >= wanted", "count := min(count + 1, 9)"),
+        ("output order", "state count : int 0 .. 9\noutput order"),
     )
-    found = differ(text, text.replace("min(count + 1, 9)", "count + 1"))
+    found = differ(text, edited(text, ("min(count + 1, 9)", "count + 1")))
     [change] = part(found, "grip").changes
     assert regions((change,)) == {
         ("line `held`", "line `held`", ("reported = done", "width <= 4", "count = 9"))
@@ -491,15 +492,14 @@ level l { period 40 [ms]  table t }
 
 
 def property_part(old: str, new: str, name: str = "rises") -> Part:
-    assert COUNTED.count(old) == 1
-    return part(differ(COUNTED, COUNTED.replace(old, new)), name, "property")
+    return part(differ(COUNTED, edited(COUNTED, (old, new))), name, "property")
 
 
 def test_a_property_that_says_the_same_in_other_words_is_the_same() -> None:
     made = property_part("count >= was count", "not was count > count")
     assert (made.changed, made.basis) == (False, Basis.SOLVER)
     assert property_part("count >= was count", "count >= was count # as it was").basis is Basis.DIGEST
-    found = differ(COUNTED, COUNTED.replace("{ begun, done }", "{ done, begun }"))
+    found = differ(COUNTED, edited(COUNTED, ("{ begun, done }", "{ done, begun }")))
     assert not part(found, "ends", "property").changed  # members are the same by name, here too
 
 
@@ -525,7 +525,7 @@ def test_a_property_that_is_new_or_gone_is_said_with_its_words() -> None:
 
 
 def test_a_condition_about_a_variable_of_another_kind_cannot_be_compared() -> None:
-    before = COUNTED.replace("level l", "assume low : width <= 8 and count <= 9\nlevel l")
+    before = edited(COUNTED, ("level l", "assume low : width <= 8 and count <= 9\nlevel l"))
     after = before.replace("input width : int 0 .. 9", "input width : real 0.0 .. 9.0")
     after = after.replace("until width = 0", "until width = 0.0")
     found = differ(before, after.replace("width <= 8 and", "width <= 8.0 and"))
@@ -538,7 +538,7 @@ def test_a_condition_about_a_variable_of_another_kind_cannot_be_compared() -> No
 
 
 def test_members_are_the_same_by_name_whatever_their_number() -> None:
-    found = differ(GRIP, GRIP.replace("{ executing, done }", "{ done, failed, executing }"))
+    found = differ(GRIP, edited(GRIP, ("{ executing, done }", "{ done, failed, executing }")))
     assert [
         (declaration.what, declaration.before, declaration.after)
         for declaration in found.declarations
@@ -546,7 +546,7 @@ def test_members_are_the_same_by_name_whatever_their_number() -> None:
     ] == [("enumeration `status`", "executing, done", "done, failed, executing")]
     assert part(found, "grip").changes == ()
     changed = differ(
-        GRIP, GRIP.replace("{ executing, done }", "{ done, executing }").replace("| 1     |", "| 3     |")
+        GRIP, edited(GRIP, ("{ executing, done }", "{ done, executing }"), ("| 1     |", "| 3     |"))
     )
     assert regions(part(changed, "grip").changes) == {
         ("line `held`", "line `held`", ("reported = done", "width <= 4"))
@@ -554,15 +554,17 @@ def test_members_are_the_same_by_name_whatever_their_number() -> None:
 
 
 def test_a_variable_of_another_kind_cannot_be_compared() -> None:
-    found = differ(GRIP, GRIP.replace("input width : int 0 .. 9", "input width : int 0 .. 9 [mm]").replace(
-        "input wanted : int 0 .. 9", "input wanted : int 0 .. 9 [mm]"))  # fmt: skip
+    in_mm = [
+        (f"input {name} : int 0 .. 9", f"input {name} : int 0 .. 9 [mm]") for name in ("width", "wanted")
+    ]
+    found = differ(GRIP, edited(GRIP, *in_mm))
     assert found.changed
     assert part(found, "grip").said == ("cannot be compared: `wanted`, `width` changed its kind",)
     assert part(found, "grip").basis is None
 
 
 def test_a_wider_range_is_a_changed_declaration_and_compares_where_both_have_values() -> None:
-    found = differ(GRIP, GRIP.replace("input width : int 0 .. 9", "input width : int 0 .. 12"))
+    found = differ(GRIP, edited(GRIP, ("input width : int 0 .. 9", "input width : int 0 .. 12")))
     assert [declaration.what for declaration in found.declarations] == ["variable `width`"]
     assert part(found, "grip").changes == ()
     assert part(found, "grip").basis is Basis.SOLVER
@@ -635,57 +637,49 @@ def worth(side: Program, what: str) -> list[str]:
 
 # --- extern procedures --------------------------------------------------------------------------------
 
-EXTERN = GRIP.replace(
-    "procedure look { near := width >= wanted }",
-    'extern procedure ask reads wanted writes near python "nowhere:ask" c "ask"\nprocedure look { seen := true; ask }',
-).replace("output order", "state seen : bool\noutput order")
+EXTERN = edited(
+    GRIP,
+    (
+        "procedure look { near := width >= wanted }",
+        'extern procedure ask reads wanted writes near python "nowhere:ask" c "ask"\nprocedure look { seen := true; ask }',
+    ),
+    ("output order", "state seen : bool\noutput order"),
+)
 
 
 def test_an_extern_procedure_is_taken_to_answer_the_same_to_the_same() -> None:
-    found = differ(EXTERN, EXTERN.replace("seen := true; ask", "seen := not false; ask; near := near"))
+    found = differ(EXTERN, edited(EXTERN, ("seen := true; ask", "seen := not false; ask; near := near")))
     assert not found.changed
     assert part(found, "grip").basis is Basis.SOLVER
-    other = differ(EXTERN, EXTERN.replace("; ask }", "; ask; near := not near }"))
+    other = differ(EXTERN, edited(EXTERN, ("; ask }", "; ask; near := not near }")))
     assert [v.leaf for v in part(other, "grip").changes[0].values] == ["near"]
 
 
 def test_what_is_written_before_an_extern_call_is_seen_since_the_cycle_may_end_there() -> None:
-    found = differ(EXTERN, EXTERN.replace("seen := true; ask", "ask; seen := true"))
+    found = differ(EXTERN, edited(EXTERN, ("seen := true; ask", "ask; seen := true")))
     [change] = part(found, "grip").changes
     assert [v.leaf for v in change.values] == ["extern calls"]
 
 
 # --- levels ---------------------------------------------------------------------------------------------
 
-LEVEL = """\
-enum place { start, middle, end }
-input go : bool
-input echo : int 0 .. 9
-state at : place = start deferred until echo = sent
-state seen : bool
-output sent : int 0 .. 9
-procedure to(where : place) { next at := where }
-procedure sense { seen := go }
-procedure send { sent := echo }
-table walk {
-  | line | at     | go    || procedures |
-  |------|--------|-------||------------|
-  | off  | start  | true  || to(middle) |
-  | on   | middle | true  || to(end)    |
-  | back | end    |       || to(start)  |
-  | rest | /= end | false ||            |
-}
-level walker {
-  period 40 [ms]
-  preprocess sense
-  table walk
-  postprocess send
-}
-"""
+SMALL = edited(
+    WALKER,
+    ("procedure sense { seen := go }\n", "procedure sense { seen := go }\nprocedure send { }\n"),
+    ("table walk }", "table walk  postprocess send }"),
+)
+LEVEL = edited(
+    SMALL,
+    ("echo : int 0 .. 2", "echo : int 0 .. 9"),
+    ("sent : int 0 .. 2", "sent : int 0 .. 9"),
+    ("next at := where  sent := (sent + 1) mod 3 }", "next at := where }"),
+    ("procedure send { }", "procedure send { sent := echo }"),
+    ("| at     | seen  ||", "| at     | go    ||"),
+)
 
 
 def test_new_steps_of_a_state_graph_come_with_the_shortest_trace() -> None:
-    found = differ(LEVEL, LEVEL.replace("|| to(end)    |", "|| to(start)  |"))
+    found = differ(LEVEL, edited(LEVEL, ("|| to(end)    |", "|| to(start)  |")))
     [traces] = found.traces
     assert [(t.before, t.after, t.trace) for t in traces.new] == [
         ("middle", "start", (("start", "off"), ("middle", "on"), ("start", "")))
@@ -697,7 +691,7 @@ def test_new_steps_of_a_state_graph_come_with_the_shortest_trace() -> None:
 
 def test_a_level_is_compared_by_what_runs_around_its_table() -> None:
     found = differ(
-        LEVEL, LEVEL.replace("seen := go", "seen := not go").replace("period 40 [ms]", "period 20 [ms]")
+        LEVEL, edited(LEVEL, ("seen := go", "seen := not go"), ("period 40 [ms]", "period 20 [ms]"))
     )
     assert part(found, "walker", "preprocess").changes
     assert part(found, "walker", "postprocess").basis is Basis.DIGEST
@@ -706,19 +700,13 @@ def test_a_level_is_compared_by_what_runs_around_its_table() -> None:
 
 
 def test_a_deferral_that_ends_otherwise_is_a_changed_condition() -> None:
-    found = differ(LEVEL, LEVEL.replace("deferred until echo = sent", "deferred until echo >= sent"))
+    found = differ(LEVEL, edited(LEVEL, ("deferred until echo = sent", "deferred until echo >= sent")))
     [change] = part(found, "at", "deferred value").changes
     assert (change.before, change.after) == ("false", "true")
 
 
 # --- from the state in which a level stands ---------------------------------------------------------
 
-SMALL = (
-    LEVEL.replace("int 0 .. 9", "int 0 .. 2")
-    .replace("| at     | go    ||", "| at     | seen  ||")
-    .replace("next at := where }", "next at := where\n  sent := (sent + 1) mod 3 }")
-    .replace("procedure send { sent := echo }", "procedure send { }")
-)
 EDITS: dict[str, tuple[tuple[str, str], ...]] = {
     "a step": (("to(end)    |", "to(start)  |"),),
     "members numbered anew": (
@@ -760,11 +748,7 @@ def parsed(kind: Scalar, word: str) -> Value:
 
 @pytest.mark.parametrize("edits", EDITS.values(), ids=EDITS)
 def test_out_of_reach_is_where_no_input_makes_a_difference(edits: tuple[tuple[str, str], ...]) -> None:
-    text = SMALL
-    for old, new in edits:
-        assert text.count(old) == 1, old
-        text = text.replace(old, new)
-    before, after = program_of(SMALL), program_of(text)
+    before, after = program_of(SMALL), program_of(edited(SMALL, *edits))
     found = compare("case", before, after, Options())
     kinds = {str(v.name): v.type for v in after.variables}
     taken = [v for v in after.variables if v.kind is Kind.INPUT]
@@ -788,7 +772,7 @@ def test_out_of_reach_is_where_no_input_makes_a_difference(edits: tuple[tuple[st
 
 
 def test_a_region_that_boxes_do_not_say_counts_as_met() -> None:
-    after = program_of(LEVEL.replace("|| to(end)    |", "|| to(start)  |"))
+    after = program_of(edited(LEVEL, ("|| to(end)    |", "|| to(start)  |")))
     found = compare("case", program_of(LEVEL), after, Options())
     level, [table, *_] = after.levels[0], found.parts
     [change] = table.changes
@@ -799,15 +783,19 @@ def test_a_region_that_boxes_do_not_say_counts_as_met() -> None:
 
 def test_a_state_is_known_where_some_line_is_for_it() -> None:
     made = program_of(
-        LEVEL.replace("  | back | end    |       || to(start)  |\n", "").replace(
-            "| rest | /= end | false ||            |\n",
-            "| rest | /= end | false || |\n  | lost | DEFAULT | || |\n",
+        edited(
+            LEVEL,
+            ("  | back | end    |       || to(start)  |\n", ""),
+            (
+                "| rest | /= end | false ||            |\n",
+                "| rest | /= end | false || |\n  | lost | DEFAULT | || |\n",
+            ),
         )
     )
     table = made.tables[0]
     assert [knows(made, table, "at", value, Options()) for value in range(3)] == [True, True, False]
     narrow = program_of(
-        LEVEL.replace("table walk {", "assume early monitored : at /= end\ntable walk assuming early {")
+        edited(LEVEL, ("table walk {", "assume early monitored : at /= end\ntable walk assuming early {"))
     )
     assert [knows(narrow, narrow.tables[0], "at", value, Options()) for value in range(3)] == [
         True,
@@ -836,9 +824,7 @@ def walked(made: Program) -> set[tuple[str, str]]:
 
 @pytest.mark.parametrize("edits", EDITS.values(), ids=EDITS)
 def test_lines_that_can_newly_follow_are_those_that_do(edits: tuple[tuple[str, str], ...]) -> None:
-    text = SMALL
-    for old, new in edits:
-        text = text.replace(old, new)
+    text = edited(SMALL, *edits)
     before, after = program_of(SMALL), program_of(text)
     found = compare("case", before, after, Options(), follow=True)
     names = {"back": "home"} if "| home |" in text else {}
@@ -856,7 +842,7 @@ def test_a_question_without_an_answer_leaves_the_steps_open(monkeypatch: pytest.
     found = compare(
         "case",
         program_of(LEVEL),
-        program_of(LEVEL.replace("to(end)    |", "to(start)  |")),
+        program_of(edited(LEVEL, ("to(end)    |", "to(start)  |"))),
         Options(),
         follow=True,
     )
@@ -872,7 +858,7 @@ def test_a_question_without_an_answer_leaves_the_steps_open(monkeypatch: pytest.
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "a.rcs").write_text(GRIP, encoding="utf-8")
-    (tmp_path / "b.rcs").write_text(GRIP.replace("| 1     |", "| 3     |"), encoding="utf-8")
+    (tmp_path / "b.rcs").write_text(edited(GRIP, ("| 1     |", "| 3     |")), encoding="utf-8")
     return tmp_path
 
 
@@ -922,7 +908,7 @@ def test_a_property_changes_the_exit_status_in_every_form(
 ) -> None:
     one, two = tmp_path / "one.rcs", tmp_path / "two.rcs"
     one.write_text(COUNTED, encoding="utf-8")
-    two.write_text(COUNTED.replace("count >= was count", "count > was count"), encoding="utf-8")
+    two.write_text(edited(COUNTED, ("count >= was count", "count > was count")), encoding="utf-8")
     for form, said in (
         ("text", "property `rises`  count >= was count -> count > was count\n    was true, is false"),
         ("json", '"count >= was count -> count > was count"'),
@@ -930,7 +916,7 @@ def test_a_property_changes_the_exit_status_in_every_form(
     ):
         assert run(["diff", str(one), str(two), "--format", form]) == 1
         assert said in capfd.readouterr().out
-    two.write_text(COUNTED.replace("count >= was count", "was count <= count"), encoding="utf-8")
+    two.write_text(edited(COUNTED, ("count >= was count", "was count <= count")), encoding="utf-8")
     assert run(["diff", str(one), str(two)]) == 0
     assert "property `rises`  proved: nothing changed" in capfd.readouterr().out
 
@@ -939,7 +925,7 @@ def test_the_command_shows_which_lines_can_follow_which(
     folder: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     (folder / "c.rcs").write_text(LEVEL, encoding="utf-8")
-    (folder / "d.rcs").write_text(LEVEL.replace("|| to(end)    |", "|| to(start)  |"), encoding="utf-8")
+    (folder / "d.rcs").write_text(edited(LEVEL, ("|| to(end)    |", "|| to(start)  |")), encoding="utf-8")
     assert run(["diff", "c.rcs", "d.rcs"]) == 1
     assert "from line to line" not in capfd.readouterr().out
     assert run(["diff", "c.rcs", "d.rcs", "--follow"]) == 1
@@ -1130,8 +1116,7 @@ def test_whatever_differs_is_told_or_proved_to_mean_the_same() -> None:
     ],
 )  # fmt: skip
 def test_what_no_region_shows_is_said(change: tuple[str, str], said: str) -> None:
-    assert change[0] in EVERYTHING
-    made = program_of(EVERYTHING.replace(*change))
+    made = program_of(edited(EVERYTHING, change))
     found = compare("case", program_of(EVERYTHING), made, Options())
     assert found.changed
     assert said in plain(list(rows(Difference("a", "b", (found,)))))
@@ -1168,8 +1153,7 @@ table other assuming odd {
     ],
 )
 def test_an_assumption_that_newly_stops_or_no_longer_does_is_said(old: str, new: str, said: str) -> None:
-    assert old in STOPPED
-    before, after = program_of(STOPPED), program_of(STOPPED.replace(old, new))
+    before, after = program_of(STOPPED), program_of(edited(STOPPED, (old, new)))
     for one, two, word in ((before, after, said), (after, before, said.replace("no longer", "newly"))):
         found = compare("case", one, two, Options())
         assert (found.changed, found.undecided) == (True, ())

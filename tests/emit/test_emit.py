@@ -36,6 +36,7 @@ from rcsc.testing.executors.externs import python_stand_ins
 from rcsc.testing.executors.symbols import symbols_of
 from tests.support.programs.examples import EXTERN, RICH
 from tests.support.programs.stages import emitted, program_of
+from tests.support.programs.texts import edited
 
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Wpedantic", "-Wtrigraphs", "-Wshadow", "-Werror")
 KEYWORDS = frozenset("""input state output table level procedure module owner extern enum record type unit const use assume
@@ -230,7 +231,7 @@ def clashes() -> str:
     """Names that are made the same by a prefix, a suffix, a case, an index, or what the executors call their own."""
     rows = "| line | line || procedures |\n| 0 | true || cycle |\n| x | false || x_t |\n"
     tables = "".join(f"table {name} {{\n{rows}}}\n" for name in CLASHING_TABLES)
-    return CLASHES.replace("{tables}", tables)
+    return edited(CLASHES, ("{tables}", tables))
 
 
 @pytest.mark.parametrize("cc", COMPILERS)
@@ -735,7 +736,7 @@ def test_c_computes_reals_as_python_does_or_says_that_it_does_not(cc: str, tmp_p
     values = drawn_reals()
     compiled(files, tmp_path, "-march=native" if platform.machine() == "x86_64" else "-O2", cc=cc)
     rows = ", ".join("{ " + ", ".join(one.hex() for one in row) + " }" for row in values)
-    (tmp_path / "main.c").write_text(DRIVER.replace("@VALUES@", rows))
+    (tmp_path / "main.c").write_text(edited(DRIVER, ("@VALUES@", rows)))
     right = as_python_computes(values, files)
     stopped = dict[str, set[int]]()
     for flags in (*OFTEN, *(OTHERWISE if platform.machine() == "x86_64" else ())):
@@ -765,9 +766,9 @@ def test_c_computes_reals_as_python_does_or_says_that_it_does_not(cc: str, tmp_p
 
 @pytest.mark.needs("arm-none-eabi-gcc", "qemu-system-arm")
 def test_reals_are_the_same_on_a_processor_without_them() -> None:
-    text = SUMS.replace("| o ||", "| n ||").replace("|   || p", "| < 90 || p")
-    text = "input n : int 0 .. 255\n" + text.replace(
-        "| p          |\n", "| p          |\n| b | >= 90 || p |\n"
+    text = edited(SUMS, ("| o ||", "| n ||"), ("|   || p", "| < 90 || p"))
+    text = "input n : int 0 .. 255\n" + edited(
+        text, ("| p          |\n", "| p          |\n| b | >= 90 || p |\n")
     )
     program = program_of(text)
     files = emitted(program)

@@ -14,6 +14,7 @@ from rcsc.testing.inputs.export import vectors_csv, vectors_json
 from rcsc.testing.inputs.snapshot import Missing, box_of, search_in
 from rcsc.testing.inputs.vectors import Vectors, atoms, vectors_of
 from tests.support.programs.stages import program_of, shipped
+from tests.support.programs.texts import edited
 
 COUPLED = """
 enum mode { idle, run, stop }
@@ -92,7 +93,7 @@ def test_acquire_has_a_pair_for_every_condition_that_the_protocol_leaves_open(re
 
 
 def test_what_the_ranges_exclude_is_said() -> None:
-    program = program_of(COUPLED.replace("<= 10", "<= 100"))
+    program = program_of(edited(COUPLED, ("<= 10", "<= 100")))
     found = vectors_of(search_in(program), program.tables[0])
     unshown = [(u.line, u.condition, u.reason) for u in found.unshown if u.condition]
     assert unshown == [("2", "<= 100", "ranges")]
@@ -100,14 +101,14 @@ def test_what_the_ranges_exclude_is_said() -> None:
 
 def test_what_an_assumption_excludes_is_said() -> None:
     assumption = "assume slow monitored : mode_in = idle implies width > 10\n\ntable t assuming slow {"
-    program = program_of(COUPLED.replace("table t {", assumption))
+    program = program_of(edited(COUPLED, ("table t {", assumption)))
     found = vectors_of(search_in(program), program.tables[0])
     reasons = {(u.line, u.condition): u.reason for u in found.unshown}
     assert reasons[("1", "> 10")] == "assumptions"
 
 
 def test_a_solver_is_asked_where_nothing_is_found() -> None:
-    text = COUPLED.replace("width < limit and (go or limit = 7)", "width * limit = 5963")
+    text = edited(COUPLED, ("width < limit and (go or limit = 7)", "width * limit = 5963"))
     program = program_of(text)
     assert [u.reason for u in vectors_of(search_in(program), program.tables[0]).unshown if u.line == "3"]
     asked: list[str] = []
@@ -117,7 +118,7 @@ def test_a_solver_is_asked_where_nothing_is_found() -> None:
         answer = {str(v.name): v.initial for v in of.variables} | {"width": 89, "limit": 67, "mode_in": 1}
         return answer if holds(expr, answer) else Missing.NONE  # type: ignore[arg-type]
 
-    wide = program_of(text.replace("0 .. 60", "0 .. 67"))
+    wide = program_of(edited(text, ("0 .. 60", "0 .. 67")))
     found = vectors_of(search_in(wide, solver), wide.tables[0])
     assert asked
     assert "3" in {v.line for v in found.vectors}

@@ -32,6 +32,7 @@ from rcsc.relation.same import Differs, Same, compare
 from rcsc.relation.steps import Steps
 from rcsc.solvers.options import Options
 from tests.support.programs.stages import program_of
+from tests.support.programs.texts import edited
 
 ROOT = Path(__file__).parents[2]
 OPTIONS = Options()
@@ -218,7 +219,7 @@ def test_what_is_not_seen_in_the_variables_afterwards_is_a_difference_too(
     text = FORMS["mermaid"].write(graph_of(one).graph)
     assert old in text
     assert said(one, text, "mermaid").found == ()
-    [found] = said(one, text.replace(old, new), "mermaid").found
+    [found] = said(one, edited(text, (old, new)), "mermaid").found
     assert found.code is Code.GRAPH_DIFFERS
 
 
@@ -303,7 +304,8 @@ def test_lines_follow_each_other_as_the_interpreter_runs_them(tmp_path: Path) ->
 
 def test_what_an_edge_need_not_show_follows_from_the_state(tmp_path: Path) -> None:
     one = found_in(
-        DOOR.replace("| 5    | open    |        |        |", "| 5    | open    |        | > 0    |"), tmp_path
+        edited(DOOR, ("| 5    | open    |        |        |", "| 5    | open    |        | > 0    |")),
+        tmp_path,
     )
     edges = {edge.line: edge for edge in graph_of(one, "at").graph.edges}
     assert (edges["5"].guard, edges["5"].shown) == ("seen > 0", "")  # the assumption says it
@@ -424,7 +426,7 @@ def test_units_arrays_values_and_whole_conditions_come_back(tmp_path: Path, form
 
 @pytest.mark.parametrize("actions", ["try_again; go(open)", "go(open); try_again", "go(open); go(stuck)"])
 def test_what_writes_the_state_last_decides(tmp_path: Path, actions: str) -> None:
-    one = found_in(DOOR.replace("rest; go(open)  ", actions), tmp_path)
+    one = found_in(edited(DOOR, ("rest; go(open)  ", actions)), tmp_path)
     verdict = said(one, FORMS["dot"].write(graph_of(one).graph), "dot")
     assert verdict.found == ()
     goals = {(edge.target, edge.decided) for edge in graph_of(one).graph.edges if edge.line == "3"}
@@ -439,12 +441,12 @@ def test_what_writes_the_state_last_decides(tmp_path: Path, actions: str) -> Non
 
 
 def test_lines_that_match_nothing_are_told(tmp_path: Path) -> None:
-    text = DOOR.replace(
-        "  | 6 ", "  | x    | open    |        | 0      ||                   |       |\n  | 6 "
+    text = edited(
+        DOOR, ("  | 6 ", "  | x    | open    |        | 0      ||                   |       |\n  | 6 ")
     )
     made = graph_of(
         found_in(
-            text.replace("| 5    | open    |        |        |", "| 5    | open    |        | > 0    |"),
+            edited(text, ("| 5    | open    |        |        |", "| 5    | open    |        | > 0    |")),
             tmp_path,
         ),
         "at",

@@ -27,6 +27,7 @@ from rcsc.lang.operator_table import divide
 from rcsc.lang.resolve import compile_text
 from tests import differential
 from tests.support.programs.stages import program_of
+from tests.support.programs.texts import edited
 
 
 def value_of(declared: str, text: str, **snapshot: Value) -> Value:
@@ -343,8 +344,9 @@ def test_cycles_of_drawn_programs_are_those_of_an_evaluator_of_its_own() -> None
     assert all(ended[fault] > 10 for fault in (0, 1, 2, 3, 5)), ended
 
 
-REFUSED = EXTERN.replace(
-    "table t {", "assume early monitored : a < 5\nprocedure ask { look(1) }\ntable t assuming early {"
+REFUSED = edited(
+    EXTERN,
+    ("table t {", "assume early monitored : a < 5\nprocedure ask { look(1) }\ntable t assuming early {"),
 )
 
 
@@ -360,7 +362,7 @@ REFUSED = EXTERN.replace(
 def test_a_cycle_that_an_extern_stops_tells_how_far_it_came(
     before: str, does: str, after: str, line: int, failed: tuple[str, ...]
 ) -> None:
-    text = REFUSED.replace("|| look(2) ", f"|| {does} ")
+    text = edited(REFUSED, ("|| look(2) ", f"|| {does} "))
     made = program_of(f"{text}level l {{ period 10 [ms] {before} table t {after} }}")
     out = cycle(made, made.levels[0], dict(initial(made)) | {"a": 9, "b": 9})  # which sum is no value of b
     assert (out.fault, out.fault_at, out.line_index, out.failed_assumptions) == (

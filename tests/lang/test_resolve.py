@@ -9,6 +9,7 @@ from rcsc.diagnostics.source import Source
 from rcsc.lang.model import Assign, Call, Int, Program, Real, Select, Test, ToElement, ToLeaf, VariableName
 from rcsc.lang.resolve import compile_text
 from tests.support.programs.stages import program_of
+from tests.support.programs.texts import edited
 
 # Each case: the text, and for every error in it its line, its code and the text of its span.
 CASES: dict[str, tuple[str, list[tuple[int, str, str]]]] = {
@@ -272,7 +273,7 @@ def test_what_chooses_the_table_stays_from_the_preprocess_on(  # the places that
     """Else a state that a cycle leaves would show another table than the one that ran; another level's lines do no harm."""
     text = CHOOSING.format(selector=selector, before=before, calls=calls, after=after)
     if selector != LATER:
-        text = text.replace("procedure r { next s := a }\n", "")
+        text = edited(text, ("procedure r { next s := a }\n", ""))
     found = compile_text(text)
     codes = [] if isinstance(found, Program) else [one.code.value for one in found]
     assert codes == ([] if steady else ["RCS214"])

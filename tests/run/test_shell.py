@@ -23,6 +23,7 @@ from rcsc.shell.reload.sources import kept, laid_out
 from rcsc.shell.session import Session
 from rcsc_cell.cell.ready import plant
 from rcsc_cell.workstation.prepared import database_of
+from tests.support.programs.examples import WALKER
 from tests.support.programs.stages import compile_beside
 from tests.support.programs.texts import edit_file, edited, system
 from tests.support.shells import alone, do, refused, state
@@ -546,24 +547,6 @@ def test_reload_refuses_a_state_that_a_range_or_an_assumption_excludes(project: 
 
 # --- reload is gated: what changed, and whether it is met at once ---
 
-WALKER = """\
-enum place { start, middle, end }
-input go : bool
-input echo : int 0 .. 2
-state at : place = start deferred until echo = sent
-state seen : bool
-output sent : int 0 .. 2
-procedure to(where : place) { next at := where  sent := (sent + 1) mod 3 }
-procedure sense { seen := go }
-table walk {
-  | line | at     | seen  || procedures |
-  | off  | start  | true  || to(middle) |
-  | on   | middle | true  || to(end)    |
-  | back | end    |       || to(start)  |
-  | rest | /= end | false ||            |
-}
-level walker { period 40 [ms]  preprocess sense  table walk }
-"""
 ON = "|| to(end)    |", "|| to(start)  |"
 OUT_OF_REACH = "out of reach of the present state: whatever the inputs, the next cycle does as before"
 WITHIN_REACH = "within reach of the present state, with some inputs: table `walk`, line `on`"

@@ -8,6 +8,7 @@ from rcsc.procedures.invariants import assumptions_satisfiable, at_first
 from rcsc.solvers.smt import Answer
 from rcsc.table.program import prove_program
 from tests.support.programs.stages import BOXES, errors, program_of, verdict_of
+from tests.support.programs.texts import edited
 
 COUNTER = """
 input up : bool
@@ -39,11 +40,11 @@ def test_an_invariant_is_kept_by_every_line() -> None:
     ],
 )
 def test_a_mutant_is_caught(old: str, new: str, code: str) -> None:
-    assert code in errors(verdict_of(COUNTER.replace(old, new)).findings)
+    assert code in errors(verdict_of(edited(COUNTER, (old, new))).findings)
 
 
 def test_the_state_before_the_line_is_the_witness() -> None:
-    [found] = verdict_of(COUNTER.replace("} }", "} m := max(m - 1, 1) }").replace("n < 7", "n < 0")).findings
+    [found] = verdict_of(edited(COUNTER, ("} }", "} m := max(m - 1, 1) }"), ("n < 7", "n < 0"))).findings
     assert found.code.value == "RCS417"
     values = dict(zip(found.witnesses[0].variables, found.witnesses[0].values, strict=True))
     assert values == {"up": "true", "n": "1", "m": "2"}
@@ -57,7 +58,7 @@ def test_an_assumption_that_the_initial_values_break_is_told_at_its_place() -> N
 
 
 def test_a_default_line_owes_the_invariant_too() -> None:
-    text = COUNTER.replace("| two  | false ||            |      |", "| two | DEFAULT || n := 5 | |")
+    text = edited(COUNTER, ("| two  | false ||            |      |", "| two | DEFAULT || n := 5 | |"))
     assert errors(verdict_of(text).findings) == ["RCS417"]
 
 
@@ -86,9 +87,9 @@ table t {
 }
 """
     assert errors(verdict_of(text).findings) == ["RCS417"]
-    more = text.replace("invariant", "invariant soon : x.next < 5 invariant") if ".next" in text else text
+    more = edited(text, ("invariant", "invariant soon : x.next < 5 invariant")) if ".next" in text else text
     assert more.count("invariant") == 1
-    assert errors(verdict_of(text.replace("until ack", "until false")).findings) == []
+    assert errors(verdict_of(edited(text, ("until ack", "until false"))).findings) == []
 
 
 EXTERN = """
@@ -131,8 +132,8 @@ def test_tables_rely_on_invariants_and_so_does_the_checker() -> None:
     assert errors(verdict.findings) == []
     assert verdict.certificate is not None
     assert certify(program, verdict.certificate).problems == ()
-    assert errors(verdict_of(RELYING.replace("invariant small : n < 5", "")).findings) == ["RCS401"]
-    assert errors(verdict_of(RELYING.replace("n < 5", "n < 6")).findings) == ["RCS401"]
+    assert errors(verdict_of(edited(RELYING, ("invariant small : n < 5", ""))).findings) == ["RCS401"]
+    assert errors(verdict_of(edited(RELYING, ("n < 5", "n < 6"))).findings) == ["RCS401"]
 
 
 ASSUMING = """
@@ -196,7 +197,7 @@ def test_an_assumption_that_claims_to_be_proved_is(one: str, wrong: list[str]) -
 def test_a_monitor_is_defined_for_every_input() -> None:
     monitored = ASSUMING.format(standing="monitored", one="a = 0 or 9 / a > 0", two="a >= 0")
     assert errors(verdict_of(monitored).findings) == []
-    assert errors(verdict_of(monitored.replace("a = 0 or ", "")).findings) == ["RCS411"]
+    assert errors(verdict_of(edited(monitored, ("a = 0 or ", ""))).findings) == ["RCS411"]
 
 
 def test_an_unknown_answer_leaves_assumptions_undecided(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -16,6 +16,7 @@ from rcsc.solvers.smt import Answer, Limits, Solver, Term
 from rcsc.symbolic.encode import within
 from rcsc.table.program import prove_program
 from tests.support.programs.stages import BOXES, codes, program_of, verdict_of
+from tests.support.programs.texts import edited
 
 VARIABLES = """
 enum colour { red, green, blue }
@@ -191,7 +192,7 @@ table t {
 """
     )
     assert "RCS413" not in codes(verdict_of(text).findings)
-    assert "RCS413" in codes(verdict_of(text.replace("n - 6", "n - 7")).findings)
+    assert "RCS413" in codes(verdict_of(edited(text, ("n - 6", "n - 7"))).findings)
 
 
 @pytest.mark.parametrize(
@@ -215,7 +216,7 @@ EACH = " or ".join(f"xs[{at}] * b <= 3 and a = {at}" for at in range(4))
 
 
 @pytest.mark.parametrize(
-    ("second", "wrong"), [(EACH, []), (EACH.replace("a = 2", "a > 2"), ["RCS401", "RCS402"])]
+    ("second", "wrong"), [(EACH, []), (edited(EACH, ("a = 2", "a > 2")), ["RCS401", "RCS402"])]
 )
 def test_the_solver_reads_an_array_at_a_changing_place(second: str, wrong: list[str]) -> None:
     program = (
@@ -238,7 +239,7 @@ table t {
 """
     )
     assert codes(verdict_of(text).findings) == []
-    assert codes(verdict_of(text.replace("not yes", "n = 0")).findings) == ["RCS415"]
+    assert codes(verdict_of(edited(text, ("not yes", "n = 0"))).findings) == ["RCS415"]
 
 
 def test_assumptions_are_used_and_must_be_defined_themselves() -> None:
@@ -253,8 +254,8 @@ table t assuming small {
 """
     )
     assert codes(verdict_of(text).findings) == []
-    assert codes(verdict_of(text.replace("assuming small ", "")).findings) == ["RCS412"]
-    [found] = verdict_of(text.replace("a < 4", "9 / a > 2")).findings
+    assert codes(verdict_of(edited(text, ("assuming small ", ""))).findings) == ["RCS412"]
+    [found] = verdict_of(edited(text, ("a < 4", "9 / a > 2"))).findings
     assert found.code is Code.DIVISION_BY_ZERO
     assert [(witness.table, witness.variables, witness.values) for witness in found.witnesses] == [
         ("", ("a",), ("0",))
@@ -294,7 +295,7 @@ table t {
     found = verdict_of(text)
     assert codes(found.findings) == ["RCS411"]
     assert [one.undecided for one in found.tables] == [True]
-    guarded = text.replace("| 100 / b |", "| when |").replace("> 20   ", "b > 0 and 100 / b > 20")
+    guarded = edited(text, ("| 100 / b |", "| when |"), ("> 20   ", "b > 0 and 100 / b > 20"))
     assert "RCS411" not in codes(verdict_of(guarded).findings)
 
 
@@ -335,7 +336,7 @@ procedure p { look if n < 9 { n := n + 1 } }
 """
     )
     assert codes(verdict_of(text).findings) == []
-    [found] = verdict_of(text.replace("if n < 9 ", "if a = 2 ")).findings
+    [found] = verdict_of(edited(text, ("if n < 9 ", "if a = 2 "))).findings
     assert dict(zip(found.witnesses[0].variables, found.witnesses[0].values, strict=True))["a"] == "2"
 
 
@@ -397,7 +398,7 @@ def test_one_query_shows_all_that_a_line_owes() -> None:
 LONG = "procedure p { for i in 0 .. 99 { n := 0 } }\n"
 LINE = "table t {\n| line | a || procedures |\n| all | >= 0 || p |\n}\n"
 LEVEL = (
-    LINE.replace("p |", "|").replace("{", "{{").replace("}", "}}")
+    edited(LINE, ("p |", "|")).replace("{", "{{").replace("}", "}}")
     + "level l {{ period 40 [ms] {} table t {} }}\n"
 )
 
@@ -426,7 +427,7 @@ def test_runs_that_are_too_long_to_follow_are_undecided(
 def test_long_loops_are_followed() -> None:
     text = "state k : int 0 .. 4096 procedure p { k := 0 for i in 1 .. 4096 { k := k + 1 } k := k - 4096 }"
     assert verdict_of(text).proved is not None
-    assert codes(verdict_of(text.replace("- 4096 }", "- 4095 k := k - 2 }")).findings) == ["RCS413"]
+    assert codes(verdict_of(edited(text, ("- 4096 }", "- 4095 k := k - 2 }"))).findings) == ["RCS413"]
 
 
 def test_only_the_tables_asked_for_are_proved() -> None:

@@ -13,6 +13,7 @@ from rcsc.lang.resolve import resolve
 from rcsc.solvers.options import Options
 from rcsc.table import program as proving
 from tests.support.programs.stages import codes, errors, verdict_of
+from tests.support.programs.texts import edited
 
 HEAD = """\
 input n : int 0 .. 9
@@ -71,7 +72,7 @@ def test_only_the_table_that_changed_is_proved_again(cache: Cache, proved: list[
     assert proved == ["one", "two"]
     run(HEAD + TABLES, cache)
     assert proved == ["one", "two"]
-    run(HEAD + TABLES.replace("< 5  ||", "< 6  ||").replace(">= 5", ">= 6"), cache)
+    run(HEAD + edited(TABLES, ("< 5  ||", "< 6  ||"), (">= 5", ">= 6")), cache)
     assert proved == ["one", "two", "two"]
 
 
@@ -82,7 +83,7 @@ def test_what_all_tables_share_is_part_of_each(
     cache: Cache, proved: list[str], change: tuple[str, str]
 ) -> None:
     run(HEAD + TABLES, cache)
-    run((HEAD + TABLES).replace(*change), cache)
+    run(edited(HEAD + TABLES, change), cache)
     assert proved == ["one", "two", "one", "two"]
 
 
@@ -97,7 +98,7 @@ def test_notes_move_with_their_table(cache: Cache, proved: list[str]) -> None:
 
 
 def test_nothing_is_kept_of_a_program_with_errors(cache: Cache, proved: list[str]) -> None:
-    broken = HEAD + TABLES.replace("| >= 5 ||", "| >= 6 ||")
+    broken = HEAD + edited(TABLES, ("| >= 5 ||", "| >= 6 ||"))
     first = run(broken, cache)
     assert set(codes(first.found)) == {"RCS401", "RCS407"}
     assert seen(run(broken, cache)) == seen(first)
@@ -105,7 +106,7 @@ def test_nothing_is_kept_of_a_program_with_errors(cache: Cache, proved: list[str
 
 
 def test_a_procedure_that_lines_guard_is_proved_by_itself_once_no_line_calls_it(cache: Cache) -> None:
-    calling, silent = HEAD + TABLES, HEAD + TABLES.replace("|| bump       |", "||            |")
+    calling, silent = HEAD + TABLES, HEAD + edited(TABLES, ("|| bump       |", "||            |"))
     assert run(calling, cache).proved is None
     assert errors(run(calling, cache).found) == []
     assert errors(run(silent, cache).found) == ["RCS413"]
@@ -135,7 +136,7 @@ def test_tables_kept_from_different_versions_do_not_excuse_a_procedure_together(
 
 
 def test_a_constant_that_an_action_uses_is_part_of_its_table(cache: Cache) -> None:
-    text = "const step = 1\n" + HEAD + TABLES.replace("|| bump       |", "|| s := s + step |")
-    assert errors(run(text.replace("procedure bump { s := s + 1 }", ""), cache).found) == []
-    wider = text.replace("procedure bump { s := s + 1 }", "").replace("step = 1", "step = 5")
+    text = "const step = 1\n" + HEAD + edited(TABLES, ("|| bump       |", "|| s := s + step |"))
+    assert errors(run(edited(text, ("procedure bump { s := s + 1 }", "")), cache).found) == []
+    wider = edited(text, ("procedure bump { s := s + 1 }", ""), ("step = 1", "step = 5"))
     assert errors(run(wider, cache).found) == ["RCS413"]

@@ -171,3 +171,24 @@ level top {
 }
 """
 """Every fault can be met: it is not proved. Outputs of each kind with a safe value, and some without."""
+
+
+WALKER = """\
+enum place { start, middle, end }
+input go : bool
+input echo : int 0 .. 2
+state at : place = start deferred until echo = sent
+state seen : bool
+output sent : int 0 .. 2
+procedure to(where : place) { next at := where  sent := (sent + 1) mod 3 }
+procedure sense { seen := go }
+table walk {
+  | line | at     | seen  || procedures |
+  | off  | start  | true  || to(middle) |
+  | on   | middle | true  || to(end)    |
+  | back | end    |       || to(start)  |
+  | rest | /= end | false ||            |
+}
+level walker { period 40 [ms]  preprocess sense  table walk }
+"""
+"""A level that goes from place to place, each step taken when its number is echoed: a deferred state."""
