@@ -152,7 +152,7 @@ atexit.register(_keeper.end)
 
 
 def leave(status: int) -> NoReturn:
-    """End this process without the interpreter's clearing up, which takes long where solvers hold much; for who was interrupted.
+    """End this process without the interpreter's clearing up, which takes long where much is held; for who has nothing more to do.
 
     What is still held is cleared away first.
     """
@@ -433,4 +433,8 @@ def start(made: "SpawnProcess") -> None:
 
 def _as_child(parent: int, target: Callable[..., None], args: tuple[Any, ...]) -> None:
     die_with(parent)
-    target(*args)
+    try:
+        target(*args)
+    except SystemExit as ended:
+        leave(ended.code if isinstance(ended.code, int) else 1)
+    leave(0)
