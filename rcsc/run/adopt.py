@@ -82,7 +82,7 @@ def adopt(sign: Signature, values: Values, stands: Mapping[int, Value] | None = 
 
     The order in the command buffer counts as seen, and has failed; each level below gets PAUSE with a number that no order had
     before: the next after the order that stands, which it may not have echoed yet; after what it echoed where none stands. What a
-    program has no variable for is left as it is.
+    program has no variable for, or one of another type, is left as it is.
 
     Args:
         sign: The level's program.
@@ -94,8 +94,9 @@ def adopt(sign: Signature, values: Values, stands: Mapping[int, Value] | None = 
         at = sign.index.get(name)
         if at is not None and member in sign.leaves[at].members:
             now[at] = sign.leaves[at].members.index(member)
-    if "inc_command_seen" in sign.index and "command.inc_command" in sign.index:
-        now[sign.index["inc_command_seen"]] = now[sign.index["command.inc_command"]]
+    seen, taken = sign.index.get("inc_command_seen"), sign.index.get("command.inc_command")
+    if seen is not None and taken is not None and _numbers(sign, seen, taken) and _admits(sign, seen, taken):
+        now[seen] = now[taken]
     for at, leaf in enumerate(sign.leaves):
         if leaf.kind == "output" and leaf.name.startswith(ORDER):
             now[at] = _order(sign, leaf.name, now, at, stands or {})
@@ -108,4 +109,19 @@ def _order(sign: Signature, name: str, now: list[Value], at: int, stands: Mappin
     if part == "input_command":
         return 0
     echo = sign.index.get(f"{record.removeprefix(ORDER)}.{ECHOES.get(part, '')}")
-    return now[at] if echo is None else (int(stands.get(at, now[echo])) + 1) % NUMBERS
+    if echo is None or not _numbers(sign, at, echo):
+        return now[at]
+    return (int(stands.get(at, now[echo])) + 1) % NUMBERS
+
+
+def _admits(sign: Signature, taker: int, giver: int) -> bool:
+    """Whether a number can have every value of another."""
+    to, of = sign.leaves[taker], sign.leaves[giver]
+    return (to.low or 0) <= (of.low or 0) and (of.high or 0) <= (to.high or 0)
+
+
+def _numbers(sign: Signature, *places: int) -> bool:
+    """Whether all these leaves are whole numbers: what has another type under such a name numbers nothing."""
+    return all(
+        sign.leaves[at].c_type not in {"bool", "double"} and not sign.leaves[at].members for at in places
+    )

@@ -1,6 +1,7 @@
 """Every command on small systems that are nobody's cell: an answer or a coded error, never a bug in rcsc."""
 
 import io
+import json
 import shutil
 import sys
 from pathlib import Path
@@ -8,6 +9,9 @@ from pathlib import Path
 import pytest
 
 from rcsc import commands
+from rcsc.run.adopt import adopt
+from rcsc.run.description import description
+from rcsc.run.system import assemble
 
 SOLO = """
 input go : bool
@@ -147,6 +151,118 @@ def test_the_shell_runs_what_is_no_cell(
     monkeypatch.setattr(sys, "stdin", io.StringIO("step 4\n"))
     assert commands.run(["shell", "--executor", "python"]) == 0
     assert "cycle 4" in capsys.readouterr().out
+
+
+# --- fields by the names of the protocol, of other types ---
+
+TYPED = """
+enum job {{ rest, drill }}
+enum status {{ done, executing }}
+record order {{
+  inc_command : {number}
+  input_command : {command}
+}}
+record answer {{
+  inc_command_echo : {echo}
+  ref_command_echo : {echoed}
+  status_report : {status}
+}}
+record robot {{ number : {back} }}
+record to_robot {{
+  number : {sent}
+  input_command : {wanted}
+}}
+input command : order
+input answered : answer
+input robot : robot
+state inc_command_seen : {seen} = {seen_initial}
+state cur_state : bool
+state status_report : int 0 .. 3
+output report : answer
+output ask : order
+output to_robot : to_robot
+output al : bool
+invariant seen_stays : inc_command_seen = {seen_initial}
+invariant sent_stays : to_robot.number = {sent_initial}
+invariant wanted_stays : to_robot.input_command = {wanted_initial}
+table t {{
+  | line | command.input_command = command.input_command || al   |
+  |------|-----------------------------------------------||------|
+  | all  | true                                          || true |
+}}
+level solo {{ period 40 [ms] table t }}
+"""
+NUMBERED = "int 0 .. 65535"
+USUAL = dict.fromkeys(("number", "echo", "back", "sent", "seen"), NUMBERED) | {
+    "command": "job", "echoed": "job", "status": "status", "wanted": "job"
+}  # fmt: skip
+INITIALS = {
+    NUMBERED: "0", "int 5 .. 9": "5", "bool": "false", "job": "rest", "status": "done", "real 5.0 .. 9.0": "5.0",
+}  # fmt: skip
+TO_ABOVE = '"boss.order" = "solo.command"\n"solo.report" = "boss.report"\n'
+TO_BELOW = '"solo.ask" = "hand.order"\n"hand.report" = "solo.answered"\n'
+
+
+def typed(folder: Path, wires: str, **kinds: str) -> None:
+    """A system of one level with fields of such types; compiled."""
+    types = USUAL | kinds
+    initials = {f"{name}_initial": INITIALS[types[name]] for name in ("seen", "sent", "wanted")}
+    text = TYPED.format(**types, **initials)
+    (folder / "solo.rcs").write_text(text, encoding="utf-8")
+    system = HEAD.format(name="typed", data="") + LEVEL.format(level="solo", program="solo")
+    (folder / "system.toml").write_text(f"{system}[buffers]\n{wires}", encoding="utf-8")
+    assert commands.run(["compile", str(folder), "--out", str(folder / "generated")]) == 0
+
+
+@pytest.mark.parametrize("wires", [TO_ABOVE, TO_BELOW], ids=["above", "below"])
+@pytest.mark.parametrize(
+    ("field", "kind", "said"),
+    [
+        ("number", "bool", "inc_command` counts orders, and is no whole number"),
+        ("echo", "real 5.0 .. 9.0", "inc_command_echo` counts orders, and is no whole number"),
+        ("command", "bool", "input_command`, and is of another type"),
+        ("command", NUMBERED, "input_command`, and is of another type"),
+        ("echoed", "status", "input_command`, and is of another type"),
+    ],
+)
+def test_what_cannot_be_an_order_and_its_report_is_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], wires: str, field: str, kind: str, said: str
+) -> None:
+    typed(tmp_path, wires, **{field: kind})
+    capsys.readouterr()
+    assert commands.run(["prove", str(tmp_path / "system.toml"), "--no-cache", "--jobs", "1"]) == 1
+    assert said in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "kinds",
+    [
+        {"seen": "bool"}, {"seen": "job"}, {"seen": "real 5.0 .. 9.0"}, {"seen": "int 5 .. 9"}, {"number": "int 5 .. 9"},
+        {"number": "real 5.0 .. 9.0"}, {"sent": "bool"}, {"back": "real 5.0 .. 9.0"}, {"sent": "job", "back": "job"},
+        {"wanted": "bool"}, {"wanted": "real 5.0 .. 9.0"},
+    ],
+    ids=str,
+)  # fmt: skip
+def test_a_restart_adopts_numbers_and_nothing_else(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], kinds: dict[str, str]
+) -> None:
+    """What `prove` says of a level after a restart is what restarts do: of what a level adopts, nothing is known."""
+    typed(tmp_path, "", **kinds)
+    capsys.readouterr()
+    assert commands.run(["prove", str(tmp_path / "system.toml"), "--no-cache", "--jobs", "1", "--json"]) in {
+        0,
+        1,
+    }
+    proof = json.loads(capsys.readouterr().out)
+    proved = {goal["name"]: goal["verdict"] == "proved" for goal in proof["levels"][0]["goals"]}
+    system = assemble(description(tmp_path / "system.toml"), "python", {}, ())
+    level = system.level("solo")
+    before = level.values
+    taken = level.sign.index["command.inc_command"]
+    adopted = adopt(level.sign, (*before[:taken], 9, *before[taken + 1 :]))
+    for name, leaf in (("seen_stays", "inc_command_seen"), ("sent_stays", "to_robot.number")):
+        at = level.sign.index[leaf]
+        assert proved[name] == (adopted[at] == before[at]), name
 
 
 def test_what_runs_a_cell_says_what_it_needs(

@@ -128,12 +128,12 @@ def links(system: Description, level: str, program: Program) -> Links:
             if above is not None:
                 raise BadDescription(f"`{level}` takes numbered orders in `{above.order}` and in `{record}`")
             numbered = tuple(leaf for leaf in order if leaf != f"{record}.{NUMBER}")
-            _whole(level, names, record, report)
+            _whole(level, program, record, report)
             above = Above(owner, record, report, owner not in levels, numbered)
             used |= {*order}
         elif f"{record}.{ECHO}" in names:
             order_record = _one(back, names, NUMBER, f"{level}.{record}", owner)
-            _whole(level, names, order_record, record)
+            _whole(level, program, order_record, record)
             below.append(Below(owner, order_record, record, owner not in levels))
             used |= {*leaves_under(program, record)}
     feeds = next((spec.feeds for spec in system.levels if spec.name == level), ())
@@ -214,17 +214,31 @@ def _unread(
     return tuple(found)
 
 
-def _whole(level: str, names: set[str], order: str, report: str) -> None:
-    """Check that a numbered order and the report on it have the other fields of the contract.
+def _whole(level: str, program: Program, order: str, report: str) -> None:
+    """Check that a numbered order and the report on it have the other fields of the contract, and that these can be compared.
 
     Raises:
-        BadDescription: One is missing.
+        BadDescription: One is missing, a number is none, or the report cannot repeat every command.
     """
+    kinds = {str(variable.name): variable.type for variable in program.variables}
     needed = f"{order}.{COMMAND}", f"{report}.{ECHOED}", f"{report}.{STATUS}"
-    missing = [f"`{level}.{name}`" for name in needed if name not in names]
+    missing = [f"`{level}.{name}`" for name in needed if name not in kinds]
     if missing:
         raise BadDescription(
             f"level `{level}`: `{order}` is numbered and `{report}` answers it, but there is no {', no '.join(missing)}"
+        )
+    for number in (f"{order}.{NUMBER}", f"{report}.{ECHO}"):
+        if not isinstance(kinds[number], Int):
+            raise BadDescription(f"level `{level}`: `{number}` counts orders, and is no whole number")
+    commanded, repeated = kinds[f"{order}.{COMMAND}"], kinds[f"{report}.{ECHOED}"]
+    alike = (
+        commanded.members == repeated.members
+        if isinstance(commanded, Enum) and isinstance(repeated, Enum)
+        else (type(commanded) is type(repeated))
+    )
+    if not alike:
+        raise BadDescription(
+            f"level `{level}`: `{report}.{ECHOED}` repeats `{order}.{COMMAND}`, and is of another type"
         )
 
 

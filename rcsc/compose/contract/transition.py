@@ -218,8 +218,9 @@ class TransitionSystem:
     def restarted(self) -> Leaves:
         """Return the states before the first cycle after a restart, as `run.adopt` makes them, whatever stood in the buffers.
 
-        A member that a state has no name for leaves it as it is initially, as there. An order has a number that no report can echo
-        yet: the one after the order that stands in the buffer, which may be late; after the echo where none stands.
+        A member that a state has no name for leaves it as it is initially, as there, and so does a number of another type. An order
+        has a number that no report can echo yet: the one after the order that stands in the buffer, which may be late; after the echo
+        where none stands.
         """
         start = self.initial()
         start |= {
@@ -229,7 +230,8 @@ class TransitionSystem:
             kind = self.kinds.get(name)
             if isinstance(kind, Enum) and member in kind.members:
                 start[name] = values.constant(kind, kind.members.index(member))
-        if SEEN in start and TAKEN in start:
+        both = self._numbers(SEEN, TAKEN)
+        if both and both[0].low <= both[1].low and both[1].high <= both[0].high:
             start[SEEN] = start[TAKEN]
         outputs = [
             str(v.name) for v in self.program.variables if v.kind is Kind.OUTPUT and v.name.startswith(ORDER)
@@ -239,10 +241,15 @@ class TransitionSystem:
             echo = f"{record.removeprefix(ORDER)}.{ECHOES.get(part, '')}"
             if part == COMMAND:
                 start[leaf] = values.constant(self.kinds[leaf], 0)
-            elif echo in start:
+            elif self._numbers(leaf, echo):
                 late = values.variable(f"{leaf} before restart", self.kinds[leaf])
                 start[leaf] = values.choice(values.equal(late, start[echo]), successor(start[echo]), late)
         return start
+
+    def _numbers(self, *leaves: str) -> tuple[Int, ...]:
+        """Return the types of the leaves, where there are all and all are whole numbers; else none."""
+        found = tuple(kind for kind in map(self.kinds.get, leaves) if isinstance(kind, Int))
+        return found if len(found) == len(leaves) else ()
 
     def of(self, program: Program) -> "TransitionSystem":
         """Return the same level with another program of the same leaves."""

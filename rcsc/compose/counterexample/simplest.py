@@ -71,6 +71,11 @@ class Bounded:
         """Whether anything stated or asked has the node in it."""
         return self._bits.met(node)
 
+    def meet(self, node: Node) -> None:
+        """Have the node among what is stated or asked, so that its value is one that it can have."""
+        self._bits.word(node)
+        self._hand_on()
+
     def key(self, node: Node) -> int:
         """Return the key of the node's value in the last model."""
         bits = [self._sat.value(literal) for literal in self._bits.word(node)]

@@ -224,10 +224,19 @@ class Unrolled:
         """Fix every leaf before the first cycle."""
         begun = dict(initial(self.ts.program))
         if self.search.restarted:
-            names = list(begun)
-            nodes = [self._start[name] for name in names]
-            known = [constant_of(node, begun[name]) for name, node in zip(names, nodes, strict=True)]
-            begun = dict(zip(names, settled.settle(nodes, known), strict=True))
+            # A state may be adopted from an input, and is as that is.
+            of_input = {self._start[name]: begun[name] for name in self.ts.inputs}
+            begun = {
+                name: constant_of(self._start[name], of_input.get(self._start[name], value))
+                for name, value in begun.items()
+            }
+            unmet = [name for name in begun if not self._run.met(self._start[name])]
+            for names in ([name for name in begun if name not in unmet], unmet):
+                nodes = [self._start[name] for name in names]
+                for node in nodes:
+                    self._run.meet(node)  # what nothing asked of is initial, where it can be
+                given = settled.settle(nodes, [begun[name] for name in names])
+                begun |= dict(zip(names, given, strict=True))
         return begun
 
     def _beside(self, trace: Trace) -> tuple[str, ...]:
