@@ -679,14 +679,14 @@ def altered(rng: random.Random, program: Program) -> Program:
 def _shorn(rng: random.Random, body: tuple[Statement, ...]) -> tuple[Statement, ...]:
     """The statements, some of them, or some of their guards, taken out."""
     found: list[Statement] = []
-    for one in body:
+    for statement in body:
         chance = rng.random()
-        if isinstance(one, If) and chance < 0.3:
-            found += one.then
-        elif isinstance(one, If) and chance < 0.4:
-            found.append(replace(one, then=one.orelse, orelse=one.then))
+        if isinstance(statement, If) and chance < 0.3:
+            found += statement.then
+        elif isinstance(statement, If) and chance < 0.4:
+            found.append(replace(statement, then=statement.orelse, orelse=statement.then))
         elif chance < 0.9:
-            found.append(one)
+            found.append(statement)
     return tuple(found)
 
 
@@ -749,48 +749,50 @@ class Attack:
         """Checks `count` true certificates and `count` false or doubtful ones."""
         programs = all_proved(self.rng)
         before, told = next(programs), 0
-        for number, one in enumerate(islice(programs, count)):
-            self.true(one)
-            (self.edited if number % 2 else self.damaged)(one, before)
-            before = one
+        for number, proved in enumerate(islice(programs, count)):
+            self.true(proved)
+            (self.edited if number % 2 else self.damaged)(proved, before)
+            before = proved
             for failure in self.failures[told:]:
                 tell(failure)
             told = len(self.failures)
             if not number % 500:
                 tell(f"{number}: {dict(self.counts)}, {len(self.failures)} failures")
 
-    def true(self, one: Proved) -> None:
+    def true(self, proved: Proved) -> None:
         """Its certificate is accepted, and it is right."""
         self.counts["true"] += 1
-        found = certify(one.program, one.certificate)
+        found = certify(proved.program, proved.certificate)
         if not found.whole:
             self.fail(
                 f"a true certificate is refused: {found.problems} {found.unchecked}",
-                one.text,
-                one.certificate,
+                proved.text,
+                proved.certificate,
             )
-        if self.counts["true"] % 10 == 1 and (why := wrong_with(stopping(one.program, one.certificate))):
-            self.fail(f"proved and certified, but: {why}", one.text, one.certificate)
+        if self.counts["true"] % 10 == 1 and (
+            why := wrong_with(stopping(proved.program, proved.certificate))
+        ):
+            self.fail(f"proved and certified, but: {why}", proved.text, proved.certificate)
 
-    def another(self, one: Proved) -> tuple[Program, str]:
+    def another(self, proved: Proved) -> tuple[Program, str]:
         """An edited program that says something else."""
         while True:
             by_text = self.rng.random() < 0.3
-            text = edit(self.rng, one.text) if by_text else one.text
-            program = small(compile_text(text)) if by_text else altered(self.rng, one.program)
-            if program is not None and digest(program) != digest(one.program):
+            text = edit(self.rng, proved.text) if by_text else proved.text
+            program = small(compile_text(text)) if by_text else altered(self.rng, proved.program)
+            if program is not None and digest(program) != digest(proved.program):
                 return program, text
 
-    def edited(self, one: Proved, other: Proved) -> None:
+    def edited(self, proved: Proved, other: Proved) -> None:
         """Another text under the certificate, or under another program's."""
-        program, text = self.another(one)
-        kept = other.certificate if self.rng.random() < 0.1 else one.certificate
+        program, text = self.another(proved)
+        kept = other.certificate if self.rng.random() < 0.1 else proved.certificate
         self.judge("edited", program, signed(program, kept) if self.rng.random() < 0.9 else kept, text)
 
-    def damaged(self, one: Proved, other: Proved) -> None:
+    def damaged(self, proved: Proved, other: Proved) -> None:
         """The certificate with something changed, of its program or of an edited one."""
-        program, text = self.another(one) if self.rng.random() < 0.5 else (one.program, one.text)
-        made = damage(self.rng, one.certificate, other.certificate)
+        program, text = self.another(proved) if self.rng.random() < 0.5 else (proved.program, proved.text)
+        made = damage(self.rng, proved.certificate, other.certificate)
         self.judge("damaged", program, signed(program, made) if self.rng.random() < 0.9 else made, text)
 
     def judge(self, kind: str, program: Program, certificate: dict[str, Any], text: str) -> None:

@@ -126,7 +126,7 @@ def by_check(fault: Fault) -> Answer:
         tables_with(fault, Path(name))
         root = str(Path(name) / fault.level / f"{fault.level}.rcs")
         report = check(Settings((root,), Options(solver="boxes"), use_cache=False))
-        codes = Counter(one.code.value for one in report.found if one.severity is Severity.ERROR)
+        codes = Counter(finding.code.value for finding in report.found if finding.severity is Severity.ERROR)
         return Answer(report.failed, ", ".join(codes) if report.failed else "")
 
 
@@ -304,16 +304,16 @@ def chosen(levels: Iterable[str], seed: int, each: int) -> list[Fault]:
 def matrix(judged: Iterable[Judged], names: tuple[str, ...]) -> Iterator[str]:
     """The table, a line a kind, and who alone caught what."""
     by_kind: dict[str, list[Judged]] = {}
-    for one in judged:
-        by_kind.setdefault(one.fault.kind, []).append(one)
-    everything = [one for many in by_kind.values() for one in many]
+    for verdict in judged:
+        by_kind.setdefault(verdict.fault.kind, []).append(verdict)
+    everything = [verdict for many in by_kind.values() for verdict in many]
     head = "".join(f"{name:>10}{'alone':>7}" for name in names)
     yield f"{'seeded fault':32}{'many':>5}{head}{'nobody':>8}"
     for kind, many in [*sorted(by_kind.items()), ("all", everything)]:
-        caught = Counter(name for one in many for name in one.catchers)
-        alone = Counter(one.catchers[0] for one in many if len(one.catchers) == 1)
+        caught = Counter(name for verdict in many for name in verdict.catchers)
+        alone = Counter(verdict.catchers[0] for verdict in many if len(verdict.catchers) == 1)
         cells = "".join(f"{caught[name]:>10}{alone[name]:>7}" for name in names)
-        yield f"{kind:32}{len(many):>5}{cells}{sum(not one.catchers for one in many):>8}"
+        yield f"{kind:32}{len(many):>5}{cells}{sum(not verdict.catchers for verdict in many):>8}"
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -331,11 +331,11 @@ def main(arguments: list[str] | None = None) -> int:
     sound = shipped(asked.levels) if "compose" in names else {}
     court = Court(Kept(asked.cache), sound, {name: ground(name) for name in names})
     judged = []
-    for one in _each(court, chosen(asked.levels, asked.seed, asked.each), asked.jobs):
-        judged.append(one)
+    for verdict in _each(court, chosen(asked.levels, asked.seed, asked.each), asked.jobs):
+        judged.append(verdict)
         if asked.list:
-            how = "; ".join(f"{name}: {one.answers[name].how}" for name in one.catchers) or "NOBODY"
-            sys.stdout.write(f"{one.fault.kind}: {one.fault.shown}\n    {how}\n")
+            how = "; ".join(f"{name}: {verdict.answers[name].how}" for name in verdict.catchers) or "NOBODY"
+            sys.stdout.write(f"{verdict.fault.kind}: {verdict.fault.shown}\n    {how}\n")
             sys.stdout.flush()
     sys.stdout.write("\n".join(matrix(judged, names)) + "\n")
     return 0

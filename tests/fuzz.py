@@ -238,13 +238,13 @@ def named(number: int, seed: int, taken: set[str]) -> differential.Built | tuple
     return differential.built(drawn, own)
 
 
-def strictly(one: differential.Built, folder: Path, cc: str) -> None:
+def strictly(built: differential.Built, folder: Path, cc: str) -> None:
     """Compiles the C of one program without a warning."""
-    for path, text in one.files.items():
+    for path, text in built.files.items():
         (folder / Path(path).name).write_text(text, encoding="utf-8")
-    command = [cc, *STRICT, "-c", one.symbols["source"], "-o", "strict.o"]
+    command = [cc, *STRICT, "-c", built.symbols["source"], "-o", "strict.o"]
     ran = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
-    assert ran.returncode == 0, "\n".join([*ran.stderr.splitlines()[:12], *one.drawn.text])
+    assert ran.returncode == 0, "\n".join([*ran.stderr.splitlines()[:12], *built.drawn.text])
 
 
 def names_campaign(runs: int, seed: int, compilers: Sequence[str]) -> Counter[str]:
@@ -256,7 +256,7 @@ def names_campaign(runs: int, seed: int, compilers: Sequence[str]) -> Counter[st
             number: named(number, seed, taken)
             for number in range(begin, min(begin + differential.BATCH, runs))
         }
-        whole = {number: one for number, one in batch.items() if isinstance(one, differential.Built)}
+        whole = {number: built for number, built in batch.items() if isinstance(built, differential.Built)}
         told.update(
             f"refused {' '.join(sorted(set(one)))}" for one in batch.values() if isinstance(one, tuple)
         )

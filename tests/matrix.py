@@ -208,7 +208,7 @@ def rows() -> Iterator[tuple[Bug, bool, dict[str, Finding]]]:
     for bug in BUGS:
         with tempfile.TemporaryDirectory(prefix="rcsc-matrix-") as folder:
             proved, found = findings(bug, Path(folder))
-        yield bug, proved, {one.property: one for one in found}
+        yield bug, proved, {finding.property: finding for finding in found}
 
 
 def main() -> int:

@@ -89,9 +89,9 @@ def _word(variable: Variable, value: Value) -> str:
 def main() -> None:
     """Prints the cycles."""
     print(f"{'cycle':>5}  {'line':5}{'cur_state':12}{'pending':12}{'command':10}{'status':11}failure")
-    for at, one in enumerate(empty_buffer(), 1):
+    for at, cycle in enumerate(empty_buffer(), 1):
         print(
-            f"{at:5}  {one.line:5}{one.cur_state:12}{one.pending:12}{one.output_command:10}{one.status_report:11}{one.failure}"
+            f"{at:5}  {cycle.line:5}{cycle.cur_state:12}{cycle.pending:12}{cycle.output_command:10}{cycle.status_report:11}{cycle.failure}"
         )
 
 

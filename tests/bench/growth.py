@@ -137,7 +137,7 @@ def costs(made: Hierarchy, effort: Effort | None = None) -> list[Cost]:
         seconds = time.perf_counter() - begun
         left = len(essential(proofs[level.name]))
         found.append(Cost(level.name, len(level.tables), seconds, questions.many, left))
-    assert any(one.open for one in found) or all(agreement.holds for agreement in agreements(known, proofs))
+    assert any(cost.open for cost in found) or all(agreement.holds for agreement in agreements(known, proofs))
     return found
 
 
@@ -151,12 +151,12 @@ def rows(sizes: Sequence[Sequence[int]]) -> Iterator[str]:
     for size in sizes:
         levels, tables = len(size), sum(size)
         found = costs(chain(size))
-        seconds, questions = sum(one.seconds for one in found), sum(one.questions for one in found)
+        seconds, questions = sum(cost.seconds for cost in found), sum(cost.questions for cost in found)
         ratio = ""
         if last is not None:
             ratio = f"{tables / last[0]:>8.2f} {seconds / last[1]:>9.2f} {questions / last[2]:>11.2f}"
         last = tables, seconds, questions
-        dearest, left = max(one.seconds for one in found), sum(one.open for one in found)
+        dearest, left = max(cost.seconds for cost in found), sum(cost.open for cost in found)
         yield f"{levels:>6} {tables:>6} {seconds:>8.1f} {questions:>9} {seconds / levels:>9.2f} {dearest:>14.2f} {left:>5} {ratio}"
 
 

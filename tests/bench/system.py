@@ -40,7 +40,7 @@ def stepped(run: Run) -> float:
     """Runs to the end; seconds, but for the plant's."""
     begun = time.perf_counter()
     assert [result.state for result in run.steps()] == ["done"] * 27
-    plants = [one.seconds for one in run.system.outside if isinstance(one, Timed)]
+    plants = [timed.seconds for timed in run.system.outside if isinstance(timed, Timed)]
     return time.perf_counter() - begun - sum(plants)
 
 

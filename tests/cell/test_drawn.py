@@ -84,16 +84,17 @@ class Page:
 
 def lines(svg: str, kind: str) -> list[list[tuple[float, float]]]:
     """The points of each line of a kind."""
-    found = [one for one in ET.fromstring(svg).iter() if one.get("class") == kind]  # noqa: S314  # our own text
+    found = [element for element in ET.fromstring(svg).iter() if element.get("class") == kind]  # noqa: S314  # our own text
     return [
-        [(float(x), float(y)) for x, y in (point.split(",") for point in one.attrib["points"].split())]
-        for one in found
+        [(float(x), float(y)) for x, y in (point.split(",") for point in element.attrib["points"].split())]
+        for element in found
     ]
 
 
 def marked(svg: str) -> list[str]:
     """The names of the places that are marked."""
-    return [str(one.text) for one in ET.fromstring(svg).iter(f"{SVG}text") if one.get("fill") == NAMED]  # noqa: S314  # likewise
+    texts = ET.fromstring(svg).iter(f"{SVG}text")  # noqa: S314  # likewise
+    return [str(text.text) for text in texts if text.get("fill") == NAMED]
 
 
 # --- as a user finds them ------------------------------------------------------------------
@@ -398,7 +399,7 @@ def test_every_cycle_of_a_log_is_framed(published: Path) -> None:
         for frame, values in zip(framed(path), list(level.track)[1:], strict=True):
             [box] = frame.boxes
             known = {leaf.name: leaf.shown(values[1][at]) for at, leaf in enumerate(level.sign.leaves)}
-            state = next(one for one in box.states if one.name == "cur_state")
+            state = next(shown for shown in box.states if shown.name == "cur_state")
             waits = known["cur_state.next"]
             assert (state.now, state.pending) == (
                 known["cur_state"], waits if waits != known["cur_state"] else ""

@@ -32,7 +32,7 @@ def held() -> Database:
 
 @pytest.fixture(scope="module")
 def model(held: Database) -> mujoco.MjModel:
-    return mujoco.MjModel.from_xml_string(mjcf(held, [one.body for one in lying(held)]))
+    return mujoco.MjModel.from_xml_string(mjcf(held, [part.body for part in lying(held)]))
 
 
 # --- the model ---
@@ -54,12 +54,12 @@ def test_nothing_is_welded_and_nothing_sticks(model: mujoco.MjModel) -> None:
 def test_parts_are_free_and_heavy(model: mujoco.MjModel, held: Database) -> None:
     assert model.opt.gravity.tolist() == [0.0, 0.0, -9.81]
     assert model.opt.disableflags == 0
-    for at, one in enumerate(lying(held)):
+    for at, part in enumerate(lying(held)):
         body = model.body(f"part{at}")
         assert model.joint(f"part{at}").type[0] == int(mujoco.mjtJoint.mjJNT_FREE)
         assert model.body_gravcomp[body.id] == 0.0
         assert model.dof_damping[model.joint(f"part{at}").dofadr[0]] == 0.0
-        volume = np.prod(np.array(one.body.size_mm) / 1000)
+        volume = np.prod(np.array(part.body.size_mm) / 1000)
         assert body.mass[0] == pytest.approx(volume * 2700.0)
 
 
@@ -218,6 +218,6 @@ def _above_the_buffer(held: Database) -> Physical:
     assert pose is not None
     joints = solve(pose, (1.4, *start[1:]))
     assert joints is not None
-    made = Physical(held, [one.body for one in lying(held)], joints)
+    made = Physical(held, [part.body for part in lying(held)], joints)
     made.advance(joints, Grip(False, 0.0, 0.0, 0.0), (20.0, 20.0))
     return made

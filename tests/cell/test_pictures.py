@@ -44,12 +44,12 @@ def cell(bodies: str) -> tuple[Any, Any]:
 def polygons(svg: str) -> list[Polygon]:
     """Corners and colours, the nearest last."""
     found = []
-    for one in ET.fromstring(svg).iter(f"{SVG}polygon"):  # noqa: S314  # our own text
-        if one.get("class") != "floor":
+    for element in ET.fromstring(svg).iter(f"{SVG}polygon"):  # noqa: S314  # our own text
+        if element.get("class") != "floor":
             points = np.array(
-                [[float(x) for x in point.split(",")] for point in one.attrib["points"].split()]
+                [[float(x) for x in point.split(",")] for point in element.attrib["points"].split()]
             )
-            fill = one.attrib["fill"]
+            fill = element.attrib["fill"]
             found.append((points, np.array([int(fill[at : at + 2], 16) for at in (1, 3, 5)], float)))
     return found
 
@@ -186,7 +186,7 @@ def test_only_the_groups_that_are_seen_are_drawn() -> None:
 def test_the_text_is_text_and_the_picture_the_same_again() -> None:
     model, data = cell('<geom type="sphere" size=".1"/>')
     svg = solid(model, data, text=["cycle <690> & more", "</text><script>"])
-    said = [one.text for one in ET.fromstring(svg).iter(f"{SVG}text")]  # noqa: S314  # our own text
+    said = [element.text for element in ET.fromstring(svg).iter(f"{SVG}text")]  # noqa: S314  # our own text
     assert said == ["cycle <690> & more", "</text><script>"]
     assert svg == solid(model, data, text=["cycle <690> & more", "</text><script>"])
 
@@ -214,10 +214,10 @@ HOME = tuple(radians(angle) for angle in (35.0, 59.0, -185.0, 0.0, -54.0, 15.0))
 
 def lines(svg: str, kind: str) -> list[list[tuple[float, float]]]:
     """The points of each line of a kind, picture by picture: top, perspective, front, side."""
-    found = [one for one in ET.fromstring(svg).iter() if one.get("class") == kind]  # noqa: S314  # our own text
+    found = [element for element in ET.fromstring(svg).iter() if element.get("class") == kind]  # noqa: S314  # our own text
     return [
-        [(float(x), float(y)) for x, y in (point.split(",") for point in one.attrib["points"].split())]
-        for one in found
+        [(float(x), float(y)) for x, y in (point.split(",") for point in element.attrib["points"].split())]
+        for element in found
     ]
 
 
@@ -281,7 +281,7 @@ def test_stations_and_the_trail_are_drawn_and_names_are_text() -> None:
     svg = stick(nine(plate(HOME)), 80.0, HOME, Scene((Outline("<a&b>", corners),), trail))
     assert lines(svg, "station")[0] == [pytest.approx(TOP.flat(corner), abs=0.06) for corner in corners]
     assert lines(svg, "trail")[0] == [pytest.approx(TOP.flat(point), abs=0.06) for point in trail]
-    assert "<a&b>" in [one.text for one in ET.fromstring(svg).iter(f"{SVG}text")]  # noqa: S314  # our own text
+    assert "<a&b>" in [element.text for element in ET.fromstring(svg).iter(f"{SVG}text")]  # noqa: S314  # our own text
 
 
 # --- plots ---

@@ -287,8 +287,8 @@ def test_a_reset_undoes_everything_that_faults_changed(held: Database, backend: 
     made = plant(held, backend)
     fresh = list(digests(made))
     mechanism = made.mechanism
-    for one in fields(Faults):
-        setattr(mechanism.faults, one.name, 1 if one.type is int else True)
+    for field in fields(Faults):
+        setattr(mechanism.faults, field.name, 1 if field.type is int else True)
     list(digests(made))
     mechanism.reset()
     assert mechanism.faults == Faults()
@@ -322,10 +322,10 @@ def test_fingers_push_as_hard_as_they_are_told(held: Database) -> None:
 
 def test_the_vise_centres_a_part_on_its_datum(held: Database) -> None:
     vise = held.stations["fixture"]
-    one = lying(held)[0]
+    part = lying(held)[0]
     turn: Rotation = vise.frame.turn
-    at = vise.frame.point((1.5, 0.5, 20.0 + one.body.size_mm[2] / 2))
-    made = Physical(held, [replace(one.body, at_mm=at, turn=turn)], home(held) or ())
+    at = vise.frame.point((1.5, 0.5, 20.0 + part.body.size_mm[2] / 2))
+    made = Physical(held, [replace(part.body, at_mm=at, turn=turn)], home(held) or ())
     for _ in range(40):
         made.advance(made.start, Grip(False, 0.0, 0.0, 0.0), (-6.0, -6.0))
     x, _, _ = vise.frame.inside(made.parts()[0].at_mm)

@@ -41,7 +41,7 @@ def test_every_property_has_a_bug_and_a_place() -> None:
 def test_a_seeded_bug_is_caught_by_its_property(bug: Bug, tmp_path: Path) -> None:
     assert run(replace(bug.episode, executor="c")).findings == ()  # which gives what Python gives
     _, found = findings(bug, tmp_path)
-    assert bug.property in {one.property for one in found}, found
+    assert bug.property in {finding.property for finding in found}, found
 
 
 def test_most_bugs_pass_the_proofs_of_their_tables(tmp_path: Path) -> None:

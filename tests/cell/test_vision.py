@@ -227,11 +227,11 @@ def test_the_projectors_seat_moves_the_range_and_not_the_normal() -> None:
     scene = Scene(TBOX, optics=replace(EXACT, peak_px=0.01, aim_rad=0.00085))
     scene.put(0, 0, 0)
     seen = [touch(scene, TBOX, seed) for seed in range(40)]
-    ranges = [one.range_mm for one in seen if one is not None]
+    ranges = [surface.range_mm for surface in seen if surface is not None]
     assert len(ranges) == 40
     assert 0.5 < np.std(ranges) < 1.1
-    assert max(abs(one - 460) for one in ranges) < 1.6
-    assert max(degrees(one.angle_rad()) for one in seen if one is not None) < 0.6
+    assert max(abs(span - 460) for span in ranges) < 1.6
+    assert max(degrees(surface.angle_rad()) for surface in seen if surface is not None) < 0.6
 
 
 # --- the sensor ---
@@ -295,7 +295,7 @@ def test_image_processing_cannot_know_the_world(module: ModuleType) -> None:
     names = set()
     for node in ast.walk(ast.parse(inspect.getsource(module))):
         if isinstance(node, ast.Import):
-            names |= {one.name for one in node.names}
+            names |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
             names.add(node.module or "")
     allowed = {"collections.abc", "dataclasses", "math", "numpy", "numpy.typing"}
@@ -350,11 +350,11 @@ def drawn(u: float, v: float, length: float, width: float, angle: float) -> Floa
 
 @given(st.floats(26, 34), st.floats(26, 34), st.floats(20, 32), st.floats(10, 17), st.floats(-pi / 2, pi / 2))
 def test_moments_of_a_drawn_rectangle(u: float, v: float, length: float, width: float, angle: float) -> None:
-    (one,) = blobs(drawn(u, v, length, width, angle), 0.6)
-    assert (one.column_px, one.row_px) == pytest.approx((u, v), abs=0.1)
-    assert one.area_px == pytest.approx(length * width, rel=0.03)
-    assert (one.length_px, one.width_px) == pytest.approx((length, width), abs=0.2)
-    assert degrees(between(one.angle_rad, angle)) == pytest.approx(0.0, abs=1.0)
+    (blob,) = blobs(drawn(u, v, length, width, angle), 0.6)
+    assert (blob.column_px, blob.row_px) == pytest.approx((u, v), abs=0.1)
+    assert blob.area_px == pytest.approx(length * width, rel=0.03)
+    assert (blob.length_px, blob.width_px) == pytest.approx((length, width), abs=0.2)
+    assert degrees(between(blob.angle_rad, angle)) == pytest.approx(0.0, abs=1.0)
 
 
 @pytest.mark.parametrize("angle", [0.0, pi / 2])

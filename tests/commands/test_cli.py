@@ -506,7 +506,7 @@ def test_what_is_compiled_together_can_be_linked_together(rcsc: Rcsc) -> None:
     write("a_c.rcs", told("b_c", more + same + same.replace(" f ", " g "), "f; g"))
     write("b_c.rcs", told("a", more))
     assert rcsc("compile").status == 0
-    everything = "".join(f'#include "{one.name}"\n' for one in sorted(Path("generated/c").glob("*.h")))
+    everything = "".join(f'#include "{path.name}"\n' for path in sorted(Path("generated/c").glob("*.h")))
     Path("generated/c/all.c").write_text(
         everything + "void m_f(uint8_t x, uint8_t *n) { *n = x; }\nint main(void) { return 0; }\n"
     )

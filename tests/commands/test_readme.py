@@ -178,7 +178,7 @@ def test_the_picture_of_the_robot_is_fresh_but_for_what_hangs_on_the_machine() -
     for colour in sorted(set(re.findall(r'fill="(#\w+)"', kept + drawn))):
         at = [
             sorted(
-                tuple(float(one) for one in points.replace(",", " ").split())
+                tuple(float(word) for word in points.replace(",", " ").split())
                 for points in re.findall(rf'<polygon[^>]*points="([^"]*)"[^>]*fill="{colour}"', svg)
             )
             for svg in (kept, drawn)

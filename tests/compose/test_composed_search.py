@@ -222,9 +222,11 @@ def test_what_is_known_where_a_branch_is_taken_is_not_carried_elsewhere() -> Non
     """Within `if r > 6` a square is at least 36; the same square elsewhere need not be."""
     r = values.variable("r", Real(0.0, 10.0))
     inside = values.narrowed(r, 6.0, 10.0)
-    large, any_ = (values.arithmetic(Op.MUL, (one, one), Real(0.0, 100.0)) for one in (inside, r))
+    large, any_ = (values.arithmetic(Op.MUL, (node, node), Real(0.0, 100.0)) for node in (inside, r))
     keyed, solver = Keyed(), Solver()
-    terms = [keyed.term(values.compare(Op.LT, one, values.constant(one.kind, 50.0))) for one in (large, any_)]
+    terms = [
+        keyed.term(values.compare(Op.LT, node, values.constant(node.kind, 50.0))) for node in (large, any_)
+    ]
     less = values.compare(Op.LT, any_, values.constant(any_.kind, 25.0))
     terms.append(keyed.term(less))
     solver.add(*keyed.ranges, *terms)

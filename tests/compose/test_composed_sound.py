@@ -51,7 +51,7 @@ from tests.support.proved import prove_system, ran, shortest
 
 
 def ending(proof: LevelProof, table: str) -> Ending:
-    return next(one for one in proof.endings if one.table == table)
+    return next(end for end in proof.endings if end.table == table)
 
 
 def lines_run(ts: TransitionSystem, cycles: int, **inputs: Value) -> list[tuple[str, str]]:
@@ -428,7 +428,7 @@ def test_levels_begin_with_what_each_assumes(
         for agreement in agreements(made, small)
         if agreement.level == "upper" and not agreement.outside
     ]
-    assert [one.holds for one in of_it] == [agree]
+    assert [promise.holds for promise in of_it] == [agree]
 
 
 # --- new commands --------------------------------------------------------------------------------
@@ -624,7 +624,7 @@ STARTS_BY_ASKING = small_text(
 def test_a_new_command_whose_line_is_cut_short_is_passed_over(tmp_path: Path) -> None:
     ts, proof = proved_level(tmp_path, "lower", lower=STARTS_BY_ASKING)
     assert proof.verdict(Sort.ANSWERED, "go", "new_command") is Verdict.NOT_PROVED
-    obligation = next(one for one in proof.open if one.sort is Sort.ANSWERED)
+    obligation = next(owed for owed in proof.open if owed.sort is Sort.ANSWERED)
     found = shortest(ts, obligation, 3)
     assert found is not None
     assert found.steps[-1].fault is Fault.EXTERN
@@ -646,7 +646,7 @@ STOPS = small_text(
 def test_a_new_command_is_passed_over_where_a_stopping_assumption_fails(tmp_path: Path) -> None:
     """Whether or not there are extern procedures."""
     ts, proof = proved_level(tmp_path, "lower", lower=STOPS)
-    obligation = next(one for one in proof.open if one.sort is Sort.ANSWERED)
+    obligation = next(owed for owed in proof.open if owed.sort is Sort.ANSWERED)
     found = shortest(ts, obligation, 3)
     assert found is not None
     assert (obligation.table, found.steps[-1].fault) == ("go", Fault.ASSUMPTION)
@@ -747,7 +747,7 @@ def test_what_breaks_where_invariants_are_broken_within_a_cycle_is_shown_by_a_ru
         ("input go", "state later : int 0 .. 1 deferred until go\ninput go"),
     )
     made = transition_systems(solo_system(tmp_path, text))["solo"]
-    obligation = next(one for one in prove_level(made, LITTLE).open if one.sort is Sort.DEFERRED)
+    obligation = next(owed for owed in prove_level(made, LITTLE).open if owed.sort is Sort.DEFERRED)
     trace = shortest(made, obligation, 3)
     assert trace is not None
     assert [step.line for step in trace.steps] == ["no"]
@@ -785,7 +785,7 @@ def test_what_a_line_breaks_and_the_postprocess_mends_is_shown_by_its_run(tmp_pa
         ("| false ||            |", "| false || away       |"),
     )
     made = transition_systems(solo_system(tmp_path, text))
-    [safe] = [one for one in prove_level(made["solo"], LITTLE).open if one.key == SAFE]
+    [safe] = [obligation for obligation in prove_level(made["solo"], LITTLE).open if obligation.key == SAFE]
     trace = shortest(made["solo"], safe, 3)
     assert trace is not None
     assert [step.line for step in trace.steps] == ["no"]
@@ -974,11 +974,11 @@ def test_what_is_assumed_of_state_alone_is_to_be_proved(tmp_path: Path) -> None:
     made, whole = transition_systems(path), prove_system(path, LITTLE)
     assert whole.of("solo", (Sort.ASSUMPTION, "t", "never")).verdict is Verdict.NOT_PROVED
     explanation = [
-        one
-        for one in explain(made, whole, TraceSettings(description(path), 4))
-        if one.obligation.sort is Sort.ASSUMPTION
+        explained
+        for explained in explain(made, whole, TraceSettings(description(path), 4))
+        if explained.obligation.sort is Sort.ASSUMPTION
     ]
-    assert [(one.finding is not None, one.beside) for one in explanation] == [(True, ())]
+    assert [(explained.finding is not None, explained.beside) for explained in explanation] == [(True, ())]
 
 
 # --- what is not recognised ------------------------------------------------------------------------
@@ -999,7 +999,7 @@ def test_no_goal_is_left_out_because_of_a_name(part: str, tmp_path: Path) -> Non
     path = small_system(tmp_path, **{name: re.sub(rf"\b{old}", new, small_text(name)) for name in files})
     whole = prove_system(path, LITTLE)
     left = next(one for one in whole.levels if one.level == level).unstated
-    assert {one.sort for one in left} >= sorts
+    assert {missing.sort for missing in left} >= sorts
     assert not whole.whole
     assert run(["prove", str(path), "--trace", "0", "--strict", "--no-cache"]) == 1
 
@@ -1083,8 +1083,8 @@ def test_what_two_levels_say_to_each_other_is_named_where_it_is_no_order(
     path = small_system(tmp_path)
     program, _ = loaded_program(path, "lower")
     variables = tuple(
-        replace(one, name=VariableName(renamed)) if one.name == "command.inc_command" else one
-        for one in program.variables
+        replace(variable, name=VariableName(renamed)) if variable.name == "command.inc_command" else variable
+        for variable in program.variables
     )
     found = links(description(path), "lower", replace(program, variables=variables))
     assert found.unread[0] == f"what `lower` and `upper` say to each other (`command`, `report`) {lacks}"

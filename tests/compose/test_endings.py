@@ -121,7 +121,7 @@ def test_what_has_to_stand_still_is_said(tmp_path: Path) -> None:
     )  # fmt: skip
     _, found = proved_level(tmp_path, "upper", upper=upper)
     assert found.open == ()
-    work = next(one for one in found.endings if one.table == "work")
+    work = next(end for end in found.endings if end.table == "work")
     assert (work.proved, work.still) == (True, ("which",))
 
 
@@ -135,7 +135,7 @@ def test_another_solver_says_that_it_ends(lower: str, tmp_path: Path) -> None:
     assert {"lines 1", "ends pause 1", "ends go 1", "ends go 2"} <= questions.keys()
     assert [name for name, text in questions.items() if not cvc5_refutes(text)] == []
     # what is claimed beyond what is found again is not confirmed
-    false = replace(proof, endings=tuple(replace(one, counted=()) for one in proof.endings))
+    false = replace(proof, endings=tuple(replace(end, counted=()) for end in proof.endings))
     claimed = certificate(ts, false)
     assert [name for name, text in claimed.items() if not cvc5_refutes(text)] == [
         "lines and endings as before"
@@ -214,7 +214,7 @@ def test_it_is_shown_drawn_and_frozen(tmp_path: Path, capsys: pytest.CaptureFixt
     page, log = tmp_path / "page.html", found / "upper_work_ends.mcap"
     assert run(["log", str(log), "--report", str(page)]) == 0
     assert "so it may go on for ever" in page.read_text(encoding="utf-8")
-    (case,) = (one for one in cases.iterdir() if "upper_work_ends" in one.name)
+    (case,) = (file for file in cases.iterdir() if "upper_work_ends" in file.name)
     assert run(["prove", "--case", str(case)]) == 1
     assert "RCS753" in capsys.readouterr().err
     edit_file(path.with_name("upper.rcs"), *((new, old) for old, new in ORDER_AFTER_ORDER))
@@ -314,13 +314,13 @@ def test_changes_of_state_are_counted_after_the_cycle_that_takes_the_command(
 ) -> None:
     """As often as an enumeration of all runs finds: but not in the cycle that takes it, as the first of a run does."""
     path = small_system(tmp_path, lower=flagged(small_text("lower")))
-    one = transition_systems(path)["lower"]
-    role, seen = Role(one.program, one.level, one.links), set[State]()
+    ts = transition_systems(path)["lower"]
+    role, seen = Role(ts.program, ts.level, ts.links), set[State]()
     explored(role, seen=seen)
     names = list(role.start)
     places = [names.index(name) for name in ("new_command", "first", "second", "third")]
     every = edges(role, seen)  # from behind some cycle on
-    found = {end.table: end.changes for end in prove_level(one, LITTLE).endings}
+    found = {end.table: end.changes for end in prove_level(ts, LITTLE).endings}
     for table in ("go", "pause"):
         steps = {
             (tuple(int(edge.start[at]) for at in places), tuple(int(edge.end[at]) for at in places))
@@ -350,9 +350,9 @@ def test_the_enumeration_sees_rounds_and_their_end(tmp_path: Path) -> None:
 
 
 def test_the_enumeration_sees_order_after_order_and_what_stands_still() -> None:
-    one = transition_systems(SYSTEM)["upper"]
-    assert "to_lower.inc_command" in one.kinds
-    assert gives_an_order(one, one.cycle(one.havoc())).op != "constant"
+    ts = transition_systems(SYSTEM)["upper"]
+    assert "to_lower.inc_command" in ts.kinds
+    assert gives_an_order(ts, ts.cycle(ts.havoc())).op != "constant"
     states: list[State] = [(0,), (1,)]
     there, back = ("in", True), ("in", False)
     round_ = [

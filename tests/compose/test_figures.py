@@ -56,10 +56,15 @@ DEFERRED, table ``: no state is written directly while another is pending: `cur_
 
 def test_the_goals_of_a_level_are_stated_word_for_word(upper: TransitionSystem) -> None:
     found = [
-        f"{one.sort.name}, table `{one.table}`: {one.shown}" for one in obligations(upper, any_cycle(upper))
+        f"{obligation.sort.name}, table `{obligation.table}`: {obligation.shown}"
+        for obligation in obligations(upper, any_cycle(upper))
     ]
     assert found == GOALS.splitlines()
-    assert all(type(part) is str for one in obligations(upper, any_cycle(upper)) for part in one.key[1:])
+    assert all(
+        type(part) is str
+        for obligation in obligations(upper, any_cycle(upper))
+        for part in obligation.key[1:]
+    )
     assert unstated(upper) == ()
 
 
@@ -88,10 +93,10 @@ def test_what_is_missing_for_a_goal_is_told_word_for_word(
     no_superior = replace(upper, links=replace(upper.links, above=None))
     assert unstated(no_superior) == without((Sort.WAITS, Sort.PAUSES, Sort.ENDS), "the level takes no orders")
     assert unstated(replace(lower[0], links=replace(lower[0].links, above=None))) == ()
-    one = replace(upper, level=replace(upper.level, tables=OneTable(TableName("work"))))
-    assert unstated(one) == without((Sort.PAUSES,), "the level has one table for all commands")
+    ts = replace(upper, level=replace(upper.level, tables=OneTable(TableName("work"))))
+    assert unstated(ts) == without((Sort.PAUSES,), "the level has one table for all commands")
     unread = replace(upper, links=replace(upper.links, unread=("this", "that")))
-    assert [(one.sort, one.table, one.missing) for one in unstated(unread)] == [
+    assert [(missing.sort, missing.table, missing.missing) for missing in unstated(unread)] == [
         (Sort.PROTOCOL, "", "this"),
         (Sort.PROTOCOL, "", "that"),
     ]
@@ -195,17 +200,17 @@ NUMBERS = (Int(0, 9), Int(0, 18), Int(12, 12), Int(3, 3))
 def test_predicates_of_what_is_stated_are_these_and_no_others() -> None:
     ts = alone(STATED)
     cycle = any_cycle(ts)
-    found = every_predicate(ts, cycle, [one.holds for one in obligations(ts, cycle)])
-    assert [(one.leaf, one.other) for one in found] == [
+    found = every_predicate(ts, cycle, [obligation.holds for obligation in obligations(ts, cycle)])
+    assert [(predicate.leaf, predicate.other) for predicate in found] == [
         ("f", ""), ("e", ""), ("(< (+ a c) int:12)", ""), ("a", "c"), ("e", "f"), ("(in a 1 2)", ""),
         ("(> (+ a c) int:3)", ""), ("(in c 4 5)", ""),
     ]  # fmt: skip
-    conditions = [one.condition for one in found if one.condition is not None]
-    assert [spelled_expression(one) for one in conditions] == [
-        one.leaf for one in found if one.leaf[0] == "("
+    conditions = [predicate.condition for predicate in found if predicate.condition is not None]
+    assert [spelled_expression(expr) for expr in conditions] == [
+        predicate.leaf for predicate in found if predicate.leaf[0] == "("
     ]
-    assert {part.type for one in conditions for part in parts(one)} == {Bool(), *NUMBERS}
-    assert all(one.kind == Bool() for one in found)
+    assert {part.type for expr in conditions for part in parts(expr)} == {Bool(), *NUMBERS}
+    assert all(predicate.kind == Bool() for predicate in found)
 
 
 def test_a_predicate_may_speak_of_all_that_matters() -> None:
@@ -214,8 +219,8 @@ def test_a_predicate_may_speak_of_all_that_matters() -> None:
         "table t {\n| line | when ||\n| one | true ||\n}\nlevel l {\n  period 40 [ms]\n  table t\n}\n"
     )
     cycle = any_cycle(ts)
-    found = every_predicate(ts, cycle, [one.holds for one in obligations(ts, cycle)])
-    assert [one.leaf for one in found] == ["(< (+ a c) int:12)"]
+    found = every_predicate(ts, cycle, [obligation.holds for obligation in obligations(ts, cycle)])
+    assert [predicate.leaf for predicate in found] == ["(< (+ a c) int:12)"]
 
 
 # --- questions of a certificate -----------------------------------------------------------

@@ -166,9 +166,9 @@ def unlawful(looked: Looked, trace: Trace) -> Iterator[str]:
 
 
 def test_what_is_shown_first_is_what_levels_can_do_that_begin_together(published: Looked) -> None:
-    found = [one for one in published.found.values() if isinstance(one, Trace)]
+    found = [trace for trace in published.found.values() if isinstance(trace, Trace)]
     assert len(found) > 8
-    assert [list(unlawful(published, one)) for one in found] == [[]] * len(found)
+    assert [list(unlawful(published, trace)) for trace in found] == [[]] * len(found)
 
 
 def test_the_contract_leaves_room_for_more() -> None:
@@ -525,7 +525,7 @@ def test_a_two_level_finding_is_a_log_of_both(tmp_path: Path) -> None:
     found = broken_together(made["upper"], made["lower"], made["upper"].links.below[0], LEGAL)
     assert isinstance(found, Finding)
     assert (
-        make([one.program for one in made.values()], tmp_path, altered=False) == ()
+        make([ts.program for ts in made.values()], tmp_path, altered=False) == ()
     )  # each table alone is proved
     system = replace(description(LAST_ECHO), generated=tmp_path)
     record(found, made, system, tmp_path / "a.mcap")

@@ -47,7 +47,7 @@ def _nothing_known() -> Iterator[None]:
 def roles(made: Hierarchy, folder: Path) -> dict[str, Role]:
     known = transition_systems(written(made, folder))
     odd = {level.name: dict(level.said).get("next") in ODD for level in made.levels}
-    return {name: Role(one.program, one.level, one.links, odd[name]) for name, one in known.items()}
+    return {name: Role(ts.program, ts.level, ts.links, odd[name]) for name, ts in known.items()}
 
 
 def said(made: Hierarchy, level: int, **pieces: str) -> Hierarchy:
@@ -312,8 +312,8 @@ def test_two_levels_see_a_cycle_that_stops_behind_a_restart(
 def test_the_questions_of_a_system_are_those_of_its_levels() -> None:
     """As many for a level above two as for one above one, and none for the whole: so that the cost adds up."""
     every = [costs(chain((2,) * many)) for many in (2, 3)]
-    assert {one.open for found in every for one in found} == {0}
-    two, three = ([one.questions for one in found] for found in every)
+    assert {cost.open for found in every for cost in found} == {0}
+    two, three = ([cost.questions for cost in found] for found in every)
     assert three == [two[0], *two]
     assert two[0] > two[1] > 0
 
@@ -321,7 +321,7 @@ def test_the_questions_of_a_system_are_those_of_its_levels() -> None:
 def test_enumerations_of_many_members_are_followed() -> None:
     """A level that orders one of 20 commands, and one that takes them; the first is asked no more than of a few."""
     few, many = costs(chain((3, 5))), costs(chain((3, 20)))
-    assert [one.open for one in (*few, *many)] == [0] * 4
+    assert [cost.open for cost in (*few, *many)] == [0] * 4
     assert many[0].questions < 1.1 * few[0].questions
     assert many[1].questions < 1.1 * 20 / 5 * few[1].questions  # in proportion, about
 

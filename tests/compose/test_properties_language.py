@@ -92,7 +92,7 @@ def test_properties_are_laid_out_and_their_words_are_still_names() -> None:
         parsed = parse(Source("case.rcs", text))
         assert isinstance(parsed, tree.File)
         assert format_file(parsed) == laid_out
-    assert [one.text for one in program_of(WORDS).properties] == [
+    assert [claim.text for claim in program_of(WORDS).properties] == [
         "was x = a implies property = was property + 1 and was (property = 2 or until)",
         "property = 3 then property = -was property - was (-property)",
         "until until not then",
@@ -138,13 +138,19 @@ def test_what_is_wrong_is_said_where_it_stands(text: str, found: list[tuple[str,
     before = "state n : int 0 .. 9\nstate go : bool\nstate long : int 0 .. 9 [m]\n"
     whole = before + text
     said = refused(whole)
-    places = [(one.code.value, whole[one.primary.span.start : one.primary.span.end].strip()) for one in said]
+    places = [
+        (finding.code.value, whole[finding.primary.span.start : finding.primary.span.end].strip())
+        for finding in said
+    ]
     assert places == found
 
 
 def test_an_error_in_a_property_does_not_hide_the_next_declaration() -> None:
     said = refused("property p : (\nproperty q : n = 1\nproperty r :: go\n")
-    assert [(one.code.value, one.primary.span.start) for one in said] == [("RCS101", 24), ("RCS101", 46)]
+    assert [(finding.code.value, finding.primary.span.start) for finding in said] == [
+        ("RCS101", 24),
+        ("RCS101", 46),
+    ]
 
 
 # --- what a table proved alone says of them ---------------------------------------------------
@@ -210,7 +216,9 @@ def test_nothing_is_generated_for_a_property() -> None:
     assert with_it != without
     assert emitted(with_it) == emitted(without)
     found = prove_program(with_it, Options(solver="boxes")).findings
-    assert [(one.code, one.severity) for one in found] == [(Code.PROPERTY_ELSEWHERE, Severity.NOTE)]
+    assert [(finding.code, finding.severity) for finding in found] == [
+        (Code.PROPERTY_ELSEWHERE, Severity.NOTE)
+    ]
 
 
 # --- what each means --------------------------------------------------------------------------
@@ -371,9 +379,11 @@ def enumerated(ts: TransitionSystem, starts: list[dict[str, Value]]) -> dict[str
             for taken in offers:
                 outcome = cycle(program, ts.level, {**before, **taken})
                 assert outcome.fault is Fault.OK
-                for one in program.properties:
-                    if one.name not in found and not property_kept(ts, one.name, before, outcome.snapshot):
-                        found[one.name] = depth
+                for claim in program.properties:
+                    if claim.name not in found and not property_kept(
+                        ts, claim.name, before, outcome.snapshot
+                    ):
+                        found[claim.name] = depth
                 if (key := tuple(outcome.snapshot.values())) not in seen:
                     seen.add(key)
                     following.append(outcome.snapshot)
@@ -398,7 +408,9 @@ def test_proofs_and_traces_are_what_enumeration_says(seed: int) -> None:
     proof = prove_level(ts, LITTLE)
     assert {name for name, proved in verdicts(proof).items() if proved} == true
     found = traces(ts, list(stated(ts).values()), TraceSearch(most=8))
-    assert {name: len(one.steps) for (_, _, name), one in found.items() if isinstance(one, Trace)} == least
+    assert {
+        name: len(trace.steps) for (_, _, name), trace in found.items() if isinstance(trace, Trace)
+    } == least
 
 
 # --- a level in its environment -----------------------------------------------------------------
@@ -486,10 +498,12 @@ def test_features_that_come_later_come_last(upper: TransitionSystem) -> None:
     ):
         few, more = (chosen(ts, closely) for closely in (0, CLOSELY))
         assert few == more[: len(few)]
-        assert len({one.name for one in more}) == len(more)
+        assert len({predicate.name for predicate in more}) == len(more)
     assert len(more) > len(few) > 1  # what a procedure decides by, behind what the property speaks of
     without = upper.of(replace(upper.program, properties=()))
-    assert "status_report" in {one.name for one in chosen(upper)} - {one.name for one in chosen(without)}
+    assert "status_report" in {predicate.name for predicate in chosen(upper)} - {
+        predicate.name for predicate in chosen(without)
+    }
 
 
 def chosen(ts: TransitionSystem, closely: int = 0) -> tuple[Predicate, ...]:
@@ -557,7 +571,7 @@ def test_no_walk_of_the_shipped_levels_breaks_what_they_state() -> None:
     made = transition_systems(SHIPPED)
     for level in ("task", "emove", "primitive"):
         ts = made[level]
-        names = [one.name for one in ts.program.properties]
+        names = [claim.name for claim in ts.program.properties]
         assert len(names) >= 4
         spoken: set[Value] = set()
         for seed in (40, 41):

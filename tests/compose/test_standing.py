@@ -371,7 +371,7 @@ def test_an_outline_comes_back_as_it_was(here: Path) -> None:
     assert standing_of(made).of_level("upper") is Known.UNKNOWN
     assert read(Outline, json.loads(json.dumps(plain(made)))) == made
     assert [one.name for one in made.levels] == ["upper", "lower"]
-    assert {level for one in made.assumed for level, _ in one.needs} == {"upper", "lower"}
+    assert {level for promise in made.assumed for level, _ in promise.needs} == {"upper", "lower"}
 
 
 def standing_of(made: Outline) -> KnownSystem:

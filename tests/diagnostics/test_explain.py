@@ -15,7 +15,9 @@ NOTES = {Code.DEFAULT_COVERS, Code.PROPERTY_ELSEWHERE}
 
 def told(text: str) -> list[Diagnostic]:
     return [
-        one for one in reported(text, Options()) if one.severity is not Severity.NOTE or one.code in NOTES
+        finding
+        for finding in reported(text, Options())
+        if finding.severity is not Severity.NOTE or finding.code in NOTES
     ]
 
 

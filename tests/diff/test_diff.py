@@ -56,7 +56,7 @@ def differ(before: str, after: str) -> ProgramDifference:
 
 
 def part(found: ProgramDifference, name: str, what: str = "table") -> Part:
-    return next(one for one in found.parts if (one.what, one.name) == (what, name))
+    return next(compared for compared in found.parts if (compared.what, compared.name) == (what, name))
 
 
 def regions(changes: tuple[Change, ...]) -> set[tuple[str, str, tuple[str, ...]]]:
@@ -106,7 +106,7 @@ def test_the_same_text_is_known_by_digest_and_no_solver_is_asked(
     monkeypatch.setattr(Solver, "check", lambda *_: pytest.fail("the solver was asked"))
     found = acquire(task, ("## ACQUIRE (OBJ [at A]), level TASK.", "## Another doc line."))
     assert not found.changed
-    assert {one.basis for one in found.parts} == {Basis.DIGEST}
+    assert {compared.basis for compared in found.parts} == {Basis.DIGEST}
 
 
 def test_a_narrowed_condition_gives_what_it_lost_to_default(task: Callable[..., Program]) -> None:
@@ -132,7 +132,7 @@ def test_a_narrowed_condition_gives_what_it_lost_to_default(task: Callable[..., 
         ("failure", ("procedures",), ("none", "state")),
     }
     assert changed.basis is Basis.SOLVER
-    assert [one.name for one in found.parts if one.changed] == ["acquire"]
+    assert [compared.name for compared in found.parts if compared.changed] == ["acquire"]
 
 
 def test_a_widened_condition_meets_another_line_where_both_now_match(task: Callable[..., Program]) -> None:
@@ -209,7 +209,7 @@ def test_a_constant_in_a_procedure_changes_every_line_that_calls_it(task: Callab
     common = (REPO / "tables/task/common.rcs").read_text(encoding="utf-8")
     assert common.count("  failure := loc\n") == 1, old
     found = acquire(task, ("  failure := loc\n", "  failure := cmd\n"), file="common.rcs")
-    assert {(one.what, one.name) for one in found.parts if one.changed} == {
+    assert {(compared.what, compared.name) for compared in found.parts if compared.changed} == {
         ("table", "acquire"), ("procedure", "loc_failure")
     }  # fmt: skip
     [change] = part(found, "acquire").changes
@@ -765,7 +765,7 @@ def test_out_of_reach_is_where_no_input_makes_a_difference(edits: tuple[tuple[st
         assert met or not other, said
         differs += other
         reached += bool(met)
-    parts = {one.what for one in found.parts if one.changed}
+    parts = {compared.what for compared in found.parts if compared.changed}
     if parts == {"table"}:
         assert 0 < differs == reached < 54  # a region that is reached makes a difference
     assert bool(reached) == found.changed
@@ -777,8 +777,8 @@ def test_a_region_that_boxes_do_not_say_counts_as_met() -> None:
     level, [table, *_] = after.levels[0], found.parts
     [change] = table.changes
     for where, met in ((change.where, False), (replace(change.where, exact=False), True)):
-        one = replace(found, parts=(replace(table, changes=(replace(change, where=where),)),))
-        assert bool(within_reach(one, after, level, initial(after), Options())) is met
+        difference = replace(found, parts=(replace(table, changes=(replace(change, where=where),)),))
+        assert bool(within_reach(difference, after, level, initial(after), Options())) is met
 
 
 def test_a_state_is_known_where_some_line_is_for_it() -> None:
@@ -846,8 +846,8 @@ def test_a_question_without_an_answer_leaves_the_steps_open(monkeypatch: pytest.
         Options(),
         follow=True,
     )
-    [one] = found.follows
-    assert (one.new, one.gone, one.decided) == ((), (), False)
+    [follows] = found.follows
+    assert (follows.new, follows.gone, follows.decided) == ((), (), False)
     assert "which line can follow which was not decided" in plain(rows(Difference("a", "b", (found,))))
 
 
@@ -1061,10 +1061,10 @@ def otherwise(value: object, owner: object, name: str) -> Iterator[object]:
         case Enum() if not isinstance(owner, Program):
             return  # it is declared elsewhere
         case _ if is_dataclass(value) and not isinstance(value, type):
-            for one in fields(value):
-                if one.compare and one.name not in WORDS:
-                    for other in otherwise(getattr(value, one.name), value, one.name):
-                        yield replace(value, **{one.name: other})
+            for field in fields(value):
+                if field.compare and field.name not in WORDS:
+                    for other in otherwise(getattr(value, field.name), value, field.name):
+                        yield replace(value, **{field.name: other})
             if name in {"deferred_until", "default"}:
                 yield None
 

@@ -516,7 +516,12 @@ def test_a_symbol_file_is_read_back_or_none_is_made(said: str, more: int, long: 
     text = f"record r{name} {{ f{name} : int 0 .. 9 }}\n## {said}{'word ' * more}\nstate s : array[2] of r{name}\n"
     program = compile_text(text + all_named(f"a{name}"), "case.rcs")
     if isinstance(program, tuple):
-        assert {one.code for one in program} <= {Code.UNPRINTED, Code.NUL_BYTE, Code.LONG_NAME, Code.SYNTAX}
+        assert {finding.code for finding in program} <= {
+            Code.UNPRINTED,
+            Code.NUL_BYTE,
+            Code.LONG_NAME,
+            Code.SYNTAX,
+        }
         assert long >= 990 or not said.isprintable()
         return
     [made] = [text for name, text in emitted(program).items() if name.endswith(".json")]

@@ -34,12 +34,12 @@ def test_a_program_whose_c_does_not_end_is_told_and_the_others_are_compared(
 ) -> None:
     compare, told = differential.compare, Counter[str]()
 
-    def misled(one: differential.Built, *rest: Any) -> None:
-        while one.program.name == "p2":
+    def misled(built: differential.Built, *rest: Any) -> None:
+        while built.program.name == "p2":
             pass
-        if one.program.name == "p4":
+        if built.program.name == "p4":
             os.kill(os.getpid(), signal.SIGKILL)
-        compare(one, *rest)
+        compare(built, *rest)
 
     monkeypatch.setattr(differential, "compare", misled)
     monkeypatch.setattr(differential, "LONGEST_CPU_S", 0.5)

@@ -37,20 +37,20 @@ def test_no_table_mutant_survives(path: str, repo: Path) -> None:
     assert BOXES.prover is not None
     for table in program.tables:
         judged = judge_table(search_in(program, BOXES.solver), table, BOXES.prover, SAMPLE)
-        counts = Counter(one.caught for one in judged)
-        assert counts[Caught.SURVIVED] == 0, [one for one in judged if one.caught is Caught.SURVIVED]
+        counts = Counter(mutant.caught for mutant in judged)
+        assert counts[Caught.SURVIVED] == 0, [mutant for mutant in judged if mutant.caught is Caught.SURVIVED]
         assert counts[Caught.PROVER] > len(judged) // 2
-        assert {one.change for one in judged} == {"drop", "widen", "narrow", "duplicate", "swap"}
+        assert {mutant.change for mutant in judged} == {"drop", "widen", "narrow", "duplicate", "swap"}
 
 
 def test_a_prover_that_notices_nothing_lets_mutants_live(repo: Path) -> None:
     program = shipped("tables/task/acquire.rcs", repo)
     table = program.tables[0]
     judged = judge_table(search_in(program), table, lambda _program, _table: Opinion(accepted=True))
-    doubled = [one for one in judged if one.change == "duplicate"]
-    assert not any(one.caught is Caught.PROVER for one in judged)
+    doubled = [mutant for mutant in judged if mutant.change == "duplicate"]
+    assert not any(mutant.caught is Caught.PROVER for mutant in judged)
     assert doubled  # without the prover they are told apart by a snapshot
-    assert all(one.caught is Caught.EXECUTORS for one in doubled)
+    assert all(mutant.caught is Caught.EXECUTORS for mutant in doubled)
 
 
 def test_a_difference_is_one_and_no_difference_is_none(repo: Path) -> None:
@@ -66,14 +66,14 @@ def test_a_difference_is_one_and_no_difference_is_none(repo: Path) -> None:
             assert matching_lines(table, found) != matching_lines(mutant.table, found)
 
 
-def differs_anywhere(program: Program, one: Table, other: Table) -> bool:
+def differs_anywhere(program: Program, table: Table, other: Table) -> bool:
     """By trying each leaf at each of its keys, from the initial state."""
     start = {str(v.name): v.initial for v in program.variables}
-    for variable in (v for v in program.variables if v.name in one.variables):
+    for variable in (v for v in program.variables if v.name in table.variables):
         low, high = key_bounds(variable.type)
         for key in range(low, high + 1):
             snapshot = {**start, str(variable.name): value_of_key(variable.type, key)}
-            if matching_lines(one, snapshot) != matching_lines(other, snapshot):
+            if matching_lines(table, snapshot) != matching_lines(other, snapshot):
                 return True
     return False
 
@@ -182,11 +182,11 @@ def test_the_check_of_the_masks_decides_every_mutant_of_a_mask_and_of_a_class(
         for code_mutant in code_mutants(source, len(program.tables[0].lines))
         if code_mutant.change == "mask"
     ]
-    judged = Counter(decides.decides(one) for one in every)
+    judged = Counter(decides.decides(mutant) for mutant in every)
     assert "classes[301]" in source
     assert judged[Noticed.MATCHER] > 2000
     # what is left undecided are numbers of no mask: of the bit scan for other compilers
-    assert {one.function for one in every if not decides.knows(one)} <= {
+    assert {mutant.function for mutant in every if not decides.knows(mutant)} <= {
         f"{program.name}_bit64",
         "case__bit64",
     }
@@ -242,7 +242,7 @@ def test_a_check_of_the_masks_that_calls_all_equal_is_found_out(monkeypatch: pyt
     program = program_of(f"input part : int 0 .. 3\noutput on : bool\ntable t {{\n{lines}\n}}\n")
     monkeypatch.setattr(Compared, "with_word", lambda *_: True)
     found = deep(program, emitted(program)).found
-    assert ["calls equal what the tests tell apart" in one.message for one in found] == [True]
+    assert ["calls equal what the tests tell apart" in finding.message for finding in found] == [True]
 
 
 def test_without_being_asked_no_model_checker_runs_and_no_c_is_mutated(

@@ -31,12 +31,12 @@ BOUND = {"x": 3, "y": -2, "z": 5}
 def larger(parts: list[Code]) -> Iterator[Code]:
     """Every operation on these, beside a name that is no part of them."""
     other = Name("z")
-    for one in parts:
+    for tree in parts:
         for op in MEANING:
-            yield from (Infix(op, (one, other)), Infix(op, (other, one)))
-        yield from (Prefix("not ", one), Prefix("-", one), Round(one))
-        yield from (Choice(one, other, other), Choice(other, one, other), Choice(other, other, one))
-        yield Element(Items((one, other)), Constant(0))
+            yield from (Infix(op, (tree, other)), Infix(op, (other, tree)))
+        yield from (Prefix("not ", tree), Prefix("-", tree), Round(tree))
+        yield from (Choice(tree, other, other), Choice(other, tree, other), Choice(other, other, tree))
+        yield Element(Items((tree, other)), Constant(0))
 
 
 SMALL = list(larger([Name("x"), Name("y")]))
@@ -84,7 +84,7 @@ def test_python_is_read_as_it_was_meant() -> None:
 
 def test_c_needs_no_knowledge_of_precedence() -> None:
     for tree in TREES:
-        if not any(isinstance(one, Choice | Element) for one in read(tree)):
+        if not any(isinstance(part, Choice | Element) for part in read(tree)):
             text = IN_C.code(in_other_words(tree)).replace("!", " not ")
             text = text.replace("&&", " and ").replace("||", " or ")
             assert eval(text.strip(), dict(BOUND)) == value(tree), tree  # noqa: S307 - our own text

@@ -87,8 +87,8 @@ def test_acquire_has_a_pair_for_every_condition_that_the_protocol_leaves_open(re
     found = vectors_of(search_in(program), program.tables[0])
     assert found.conditions > 60
     assert found.shown > 40
-    closed = [one for one in found.unshown if one.line != str(program.tables[0].default and "16")]
-    assert {one.reason for one in closed} == {"assumptions"}
+    closed = [vector for vector in found.unshown if vector.line != str(program.tables[0].default and "16")]
+    assert {vector.reason for vector in closed} == {"assumptions"}
     assert found.shown + len(closed) == found.conditions
 
 

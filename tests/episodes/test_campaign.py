@@ -72,7 +72,7 @@ def played(rig: Rig, count: int, pool: WorkerPool, path: Path, seed: int = 5) ->
 
 def alone(rig: Rig, count: int, seed: int = 5) -> dict[int, EpisodeRecord]:
     """The records without any worker pool."""
-    return {one.index: one for one in play(rig, digest(rig.system), seed, range(count))}
+    return {record.index: record for record in play(rig, digest(rig.system), seed, range(count))}
 
 
 # --- the same with any worker pool ---
@@ -120,13 +120,13 @@ def test_a_worker_that_dies_costs_its_own_episode_and_no_other(tmp_path: Path) -
     assert 1 < len(kills) < 9
     with processes(2) as pool:
         found = played(rig, 40, pool, tmp_path / "j")
-    assert {at for at, one in found.items() if one.end == "crash"} == kills
+    assert {at for at, record in found.items() if record.end == "crash"} == kills
     assert all(
         [finding.property for finding in found[at].findings] == ["the process survives"] for at in kills
     )
     expected = play(rig, digest(rig.system), 5, [at for at in range(40) if at not in kills])
     assert [found[at] for at in sorted(found) if at not in kills] == list(expected)
-    raised = [one for one in found.values() if one.end == "error:ArithmeticError"]
+    raised = [record for record in found.values() if record.end == "error:ArithmeticError"]
     assert raised
     assert raised[0].findings == (Finding("nothing is raised", 0, "ArithmeticError: seen nothing"),)
 
@@ -143,7 +143,7 @@ def test_what_hangs_is_stopped_and_so_is_what_cannot_be_stopped(tmp_path: Path) 
         assert hang
         with processes(1) as pool:
             found = played(rig, 16, pool, tmp_path / draw.__name__)
-        assert {at for at, one in found.items() if one.end == "hang"} == hang
+        assert {at for at, record in found.items() if record.end == "hang"} == hang
         assert all(
             found[at].findings == (Finding("the run ends in time", 0, "no end within 0.25 s"),) for at in hang
         )
@@ -370,13 +370,13 @@ with processes(2) as crew:
     finally:
         killed.kill()
         killed.wait()
-    workers = {int(one) for one in runs.read_text().split()}
+    workers = {int(word) for word in runs.read_text().split()}
     assert workers
     _until(lambda: not any(_runs(worker) for worker in workers))
     with Journal(path, header(slow(), 5)) as journal:
         kept = dict(journal.records)
     assert 30 <= len(kept) < 2000
-    assert kept == {one.index: one for one in play(CALM, digest(SYSTEM), 5, sorted(kept))}
+    assert kept == {record.index: record for record in play(CALM, digest(SYSTEM), 5, sorted(kept))}
 
 
 def slow() -> Rig:
@@ -443,10 +443,14 @@ EVERYTHING = Episode(
 )  # fmt: skip
 
 
-@pytest.mark.parametrize("name", [one.name for one in fields(Episode) if isinstance(one.default, tuple)])
+@pytest.mark.parametrize(
+    "name", [field.name for field in fields(Episode) if isinstance(field.default, tuple)]
+)
 def test_every_list_of_an_episode_loses_what_is_not_needed(name: str) -> None:
     lists = {
-        one.name: getattr(EVERYTHING, one.name) for one in fields(Episode) if isinstance(one.default, tuple)
+        field.name: getattr(EVERYTHING, field.name)
+        for field in fields(Episode)
+        if isinstance(field.default, tuple)
     }
     assert all(lists.values())
     least = shrink(
@@ -487,8 +491,8 @@ def test_what_is_needed_is_what_is_left(
         for held in (parts, faults, harmed)
     ]
 
-    def fails(one: Episode) -> bool:
-        held = (one.parts, one.faults, one.transport)
+    def fails(episode: Episode) -> bool:
+        held = (episode.parts, episode.faults, episode.transport)
         return all(set(want) <= set(has) for want, has in zip(needed, held, strict=True))
 
     least = shrink(Episode(parts=parts, faults=faults, transport=harmed, rows=fake.ROWS), fails, tries=10_000)
@@ -509,9 +513,9 @@ def test_windows_narrow_and_numbers_come_to_what_is_usual(first: int, length: in
         restarts=(Restart(900, "task"),),
     )
 
-    def fails(one: Episode) -> bool:
-        window = any(fault.first_tick <= tick <= fault.last_tick for fault in one.faults)
-        return window and any(part.x_mm >= least_mm for part in one.parts)
+    def fails(episode: Episode) -> bool:
+        window = any(fault.first_tick <= tick <= fault.last_tick for fault in episode.faults)
+        return window and any(part.x_mm >= least_mm for part in episode.parts)
 
     least = shrink(episode, fails, tries=10_000)
     assert fails(least)
@@ -532,9 +536,9 @@ def test_shrinking_asks_no_episode_twice_and_no_more_than_it_may() -> None:
     episode = Episode(parts=tuple(PARTS), faults=tuple(SWITCHES), rows=fake.ROWS * 3, transport=tuple(HARMED))
     asked: list[Episode] = []
 
-    def fails(one: Episode) -> bool:
-        asked.append(one)
-        return len(one.parts) >= 3 and len(one.rows) >= 2 and SWITCHES[2] in one.faults
+    def fails(episode: Episode) -> bool:
+        asked.append(episode)
+        return len(episode.parts) >= 3 and len(episode.rows) >= 2 and SWITCHES[2] in episode.faults
 
     full = shrink(episode, fails)
     assert (len(full.parts), len(full.rows), full.faults) == (3, 2, (SWITCHES[2],))
@@ -585,7 +589,7 @@ def test_a_counterexample_of_the_cell_is_small_replays_and_fails_again(tmp_path:
     with threads(1) as pool:
         [(choice, made)] = counterexamples(rig, 2, choices(records)[:1], pool)
     place = save(tmp_path, rig, 2, choice, made)
-    assert sorted(one.name for one in place.iterdir()) == [
+    assert sorted(path.name for path in place.iterdir()) == [
         "episode.json",
         "finding.json",
         "log.mcap",
@@ -670,10 +674,10 @@ def test_the_summary_counts_by_fault_and_does_not_know_the_order() -> None:
     ]  # fmt: skip
     assert (found.episodes, found.cycles, found.with_findings) == (4, 40, 3)
     assert found.ends == {"crash": 1, "done": 1, "failed:part_lost": 1, "failed:timeout": 1}
-    assert [(one.property, one.episodes, one.first, one.said) for one in found.broken] == [
+    assert [(broken.property, broken.episodes, broken.first, broken.said) for broken in found.broken] == [
         ("p", 2, 1, "said 1"), ("q", 1, 2, "said 2"), ("r", 1, 3, "said 3"),
     ]  # fmt: skip
-    assert [(one.ran, one.never) for one in found.reached] == [(("1",), ("2",)), (("1",), ())]
+    assert [(reached.ran, reached.never) for reached in found.reached] == [(("1",), ("2",)), (("1",), ())]
     text = as_text(found)
     assert "\ndrops         -       2       -\n" in text
     assert "level task: 1 of 2 lines reached\n  a never: 2\nlevel emove: 1 of 1" in text

@@ -31,23 +31,23 @@ def sound() -> Mapping[str, Standing]:
 def gripper(kind: str, old: str, new: str) -> Fault:
     """The one fault of the gripper controller of this kind that makes the one of the other."""
     return next(
-        one
-        for one in faults(TABLES, "gripper")[kind]
-        if old in one.old and (new in one.new if new else not one.new)
+        fault
+        for fault in faults(TABLES, "gripper")[kind]
+        if old in fault.old and (new in fault.new if new else not fault.new)
     )
 
 
 def test_every_fault_is_one_change_in_one_line() -> None:
     for level in LEVELS:
         for kind, found in faults(TABLES, level).items():
-            for one in found[:20]:
-                before = (TABLES / one.file).read_text(encoding="utf-8").split("\n")
-                after = one.text.split("\n")
-                assert before[one.number - 1] == one.old, kind
-                assert before[: one.number - 1] == after[: one.number - 1]
-                assert before[one.number :] == after[one.number - bool(not one.new) :]
-                assert one.level == level
-                assert one.kind == kind
+            for fault in found[:20]:
+                before = (TABLES / fault.file).read_text(encoding="utf-8").split("\n")
+                after = fault.text.split("\n")
+                assert before[fault.number - 1] == fault.old, kind
+                assert before[: fault.number - 1] == after[: fault.number - 1]
+                assert before[fault.number :] == after[fault.number - bool(not fault.new) :]
+                assert fault.level == level
+                assert fault.kind == kind
 
 
 def test_every_kind_is_there_and_there_are_more_than_two_hundred_in_turns() -> None:
@@ -55,13 +55,13 @@ def test_every_kind_is_there_and_there_are_more_than_two_hundred_in_turns() -> N
     assert {kind for found in every.values() for kind, ones in found.items() if ones} == set(KINDS)
     firsts = [list(islice(sample(TABLES, level, 1984), 50)) for level in LEVELS]
     assert sum(map(len, firsts)) == 250
-    assert len({(one.file, one.text) for one in chain.from_iterable(firsts)}) > 240
-    assert {one.kind for one in firsts[-1][: len(KINDS)]} == set(KINDS)  # of TASK, which has all
+    assert len({(fault.file, fault.text) for fault in chain.from_iterable(firsts)}) > 240
+    assert {fault.kind for fault in firsts[-1][: len(KINDS)]} == set(KINDS)  # of TASK, which has all
 
 
 def test_a_sample_hangs_on_its_seed_alone() -> None:
     def shown(seed: int) -> list[str]:
-        return [one.shown for one in islice(sample(TABLES, "task", seed), 40)]
+        return [fault.shown for fault in islice(sample(TABLES, "task", seed), 40)]
 
     assert shown(1) == shown(1) != shown(2)
 

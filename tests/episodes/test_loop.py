@@ -308,7 +308,7 @@ def test_a_script_is_what_rcsc_run_reads() -> None:
 def test_a_reader_never_sees_an_older_value_after_a_newer_one(
     harmed: list[TransportSpec], count: int
 ) -> None:
-    names = sorted({one.buffer for one in harmed} | {"task.report"})
+    names = sorted({transport.buffer for transport in harmed} | {"task.report"})
     buffers = Harmed(harmed)
     seen: dict[str, tuple[float, ...]] = {}
     for tick in range(count):

@@ -44,25 +44,29 @@ def shipped() -> dict[str, FoundTable]:
     """Every table of the system, by program and name."""
     found = tables(str(ROOT / "tables"))
     assert not isinstance(found, NotFound)
-    return {f"{one.program.name}.{one.table.name}": one for one in found if "examples" not in one.table.file}
+    return {
+        f"{entry.program.name}.{entry.table.name}": entry
+        for entry in found
+        if "examples" not in entry.table.file
+    }
 
 
 KEPT: dict[tuple[int, str], tuple[FoundTable, Derived]] = {}
 """Graphs already derived, by the identity of what was found, which is kept too."""
 
 
-def graph_of(one: FoundTable, state: str = "") -> Derived:
-    if (id(one), state) not in KEPT:
-        made = derive(one.program, one.table, one.loaded.files[one.table.file], OPTIONS, state)
+def graph_of(entry: FoundTable, state: str = "") -> Derived:
+    if (id(entry), state) not in KEPT:
+        made = derive(entry.program, entry.table, entry.loaded.files[entry.table.file], OPTIONS, state)
         assert isinstance(made, Derived), made
-        KEPT[id(one), state] = one, made
-    return KEPT[id(one), state][1]
+        KEPT[id(entry), state] = entry, made
+    return KEPT[id(entry), state][1]
 
 
-def said(one: FoundTable, text: str, form: str) -> Against:
+def said(entry: FoundTable, text: str, form: str) -> Against:
     """The verdict on the table that the graph's text says."""
     table = tabled(FORMS[form].read(text))
-    return against(one.loaded, one.root, one.program, one.table, table, OPTIONS)
+    return against(entry.loaded, entry.root, entry.program, entry.table, table, OPTIONS)
 
 
 def found_in(text: str, tmp_path: Path, name: str = "") -> FoundTable:
@@ -80,11 +84,11 @@ def test_every_table_of_the_system_comes_back_from_every_form_and_is_proved_the_
     shipped: dict[str, FoundTable],
 ) -> None:
     assert len(shipped) == 24
-    for name, one in shipped.items():
-        made = graph_of(one)
+    for name, entry in shipped.items():
+        made = graph_of(entry)
         texts = {tabled(FORMS[form].read(FORMS[form].write(made.graph))).text() for form in EVERY_FORM}
         assert len(texts) == 1, name  # the forms hold the same, so that one proof is enough
-        verdict = said(one, FORMS["dot"].write(made.graph), "dot")
+        verdict = said(entry, FORMS["dot"].write(made.graph), "dot")
         assert verdict.found == (), name
 
 
@@ -152,32 +156,32 @@ BREAKS = [
 def test_a_broken_graph_is_refuted_by_an_input(
     shipped: dict[str, FoundTable], form: str, old: str, new: str
 ) -> None:
-    one = shipped["task.acquire"]
-    text = FORMS[form].write(graph_of(one).graph)
+    entry = shipped["task.acquire"]
+    text = FORMS[form].write(graph_of(entry).graph)
     assert old in text
-    [found] = said(one, text.replace(old, new), form).found
+    [found] = said(entry, text.replace(old, new), form).found
     assert found.code is Code.GRAPH_DIFFERS
     assert found.witnesses[0].variables
 
 
 @pytest.mark.parametrize("form", EVERY_FORM)
 def test_a_dropped_edge_is_refuted(shipped: dict[str, FoundTable], form: str) -> None:
-    one = shipped["primitive.goto"]
-    lines = FORMS[form].write(graph_of(one).graph).splitlines(keepends=True)
+    entry = shipped["primitive.goto"]
+    lines = FORMS[form].write(graph_of(entry).graph).splitlines(keepends=True)
     at = next(at for at, line in enumerate(lines) if "robot_status_in = done and there = true" in line)
-    [found] = said(one, "".join(lines[:at] + lines[at + 1 :]), form).found
+    [found] = said(entry, "".join(lines[:at] + lines[at + 1 :]), form).found
     assert found.code is Code.GRAPH_DIFFERS
     assert "line `6`, the graph to line `10`" in found.message  # DEFAULT takes it
 
 
 def test_a_table_that_rests_on_other_assumptions_is_not_the_same(shipped: dict[str, FoundTable]) -> None:
-    one = shipped["task.acquire"]
+    entry = shipped["task.acquire"]
     text = (
         FORMS["mermaid"]
-        .write(graph_of(one).graph)
+        .write(graph_of(entry).graph)
         .replace("in_step, resting, acquire_states", "in_step, resting")
     )
-    [found] = said(one, text, "mermaid").found
+    [found] = said(entry, text, "mermaid").found
     assert (found.code, "acquire_states" in found.notes[0]) == (Code.GRAPH_DIFFERS, True)
 
 
@@ -215,11 +219,11 @@ OTHERWISE = [
 def test_what_is_not_seen_in_the_variables_afterwards_is_a_difference_too(
     tmp_path: Path, old: str, new: str
 ) -> None:
-    one = found_in(WRITES, tmp_path)
-    text = FORMS["mermaid"].write(graph_of(one).graph)
+    entry = found_in(WRITES, tmp_path)
+    text = FORMS["mermaid"].write(graph_of(entry).graph)
     assert old in text
-    assert said(one, text, "mermaid").found == ()
-    [found] = said(one, edited(text, (old, new)), "mermaid").found
+    assert said(entry, text, "mermaid").found == ()
+    [found] = said(entry, edited(text, (old, new)), "mermaid").found
     assert found.code is Code.GRAPH_DIFFERS
 
 
@@ -271,8 +275,8 @@ def admitted(program: Program, table: Table, now: Snapshot) -> bool:
 
 
 def test_steps_are_those_that_the_interpreter_takes(tmp_path: Path) -> None:
-    one = found_in(DOOR, tmp_path)
-    program, table = one.program, one.table
+    entry = found_in(DOOR, tmp_path)
+    program, table = entry.program, entry.table
     expected = set()
     for now in inputs(program, {"echo": 0, "motor": 0}):
         if now["at"] == now["at.next"] and admitted(program, table, now):
@@ -284,8 +288,8 @@ def test_steps_are_those_that_the_interpreter_takes(tmp_path: Path) -> None:
 
 
 def test_lines_follow_each_other_as_the_interpreter_runs_them(tmp_path: Path) -> None:
-    one = found_in(DOOR, tmp_path)
-    program, table = one.program, one.table
+    entry = found_in(DOOR, tmp_path)
+    program, table = entry.program, entry.table
     [level] = program.levels
     expected = set()
     for now in inputs(program, {"echo": 1, "motor": 0}):
@@ -303,11 +307,11 @@ def test_lines_follow_each_other_as_the_interpreter_runs_them(tmp_path: Path) ->
 
 
 def test_what_an_edge_need_not_show_follows_from_the_state(tmp_path: Path) -> None:
-    one = found_in(
+    entry = found_in(
         edited(DOOR, ("| 5    | open    |        |        |", "| 5    | open    |        | > 0    |")),
         tmp_path,
     )
-    edges = {edge.line: edge for edge in graph_of(one, "at").graph.edges}
+    edges = {edge.line: edge for edge in graph_of(entry, "at").graph.edges}
     assert (edges["5"].guard, edges["5"].shown) == ("seen > 0", "")  # the assumption says it
     assert edges["3"].shown == "seen = 3"
 
@@ -409,8 +413,8 @@ table crane {
 
 @pytest.mark.parametrize("form", EVERY_FORM)
 def test_units_arrays_values_and_whole_conditions_come_back(tmp_path: Path, form: str) -> None:
-    one = found_in(CRANE, tmp_path)
-    made = graph_of(one)
+    entry = found_in(CRANE, tmp_path)
+    made = graph_of(entry)
     edges = {edge.line: edge for edge in made.graph.edges}
     assert (edges["up"].target, edges["up"].decided) == ("high", "")
     assert "count(0, 2)" in edges["up"].effect
@@ -419,17 +423,17 @@ def test_units_arrays_values_and_whole_conditions_come_back(tmp_path: Path, form
         "next at := low" in edges["thin"].effect
     )  # it cancels what is pending: a loop alone would not say so
     assert edges["thin"].decided == "next at := low"
-    verdict = said(one, FORMS[form].write(made.graph), form)
+    verdict = said(entry, FORMS[form].write(made.graph), form)
     assert verdict.found == ()
     assert FORMS[form].read(FORMS[form].write(made.graph)).columns == made.graph.columns
 
 
 @pytest.mark.parametrize("actions", ["try_again; go(open)", "go(open); try_again", "go(open); go(stuck)"])
 def test_what_writes_the_state_last_decides(tmp_path: Path, actions: str) -> None:
-    one = found_in(edited(DOOR, ("rest; go(open)  ", actions)), tmp_path)
-    verdict = said(one, FORMS["dot"].write(graph_of(one).graph), "dot")
+    entry = found_in(edited(DOOR, ("rest; go(open)  ", actions)), tmp_path)
+    verdict = said(entry, FORMS["dot"].write(graph_of(entry).graph), "dot")
     assert verdict.found == ()
-    goals = {(edge.target, edge.decided) for edge in graph_of(one).graph.edges if edge.line == "3"}
+    goals = {(edge.target, edge.decided) for edge in graph_of(entry).graph.edges if edge.line == "3"}
     assert (
         goals
         == {
@@ -455,12 +459,12 @@ def test_lines_that_match_nothing_are_told(tmp_path: Path) -> None:
 
 
 def test_a_state_is_chosen_or_asked_for(tmp_path: Path) -> None:
-    one = found_in(DOOR, tmp_path)
-    assert graph_of(one).graph.state == "at"
-    assert {edge.source for edge in graph_of(one, "tries").graph.edges} <= {ANY, "0", "1", "2"}
-    file = one.loaded.files[one.table.file]
+    entry = found_in(DOOR, tmp_path)
+    assert graph_of(entry).graph.state == "at"
+    assert {edge.source for edge in graph_of(entry, "tries").graph.edges} <= {ANY, "0", "1", "2"}
+    file = entry.loaded.files[entry.table.file]
     for name in ("motor", "seen", "nothing", "at.next"):
-        refused = derive(one.program, one.table, file, OPTIONS, name)
+        refused = derive(entry.program, entry.table, file, OPTIONS, name)
         assert isinstance(refused, Diagnostic)
         assert refused.code is Code.GRAPH_NO_STATE
 
@@ -468,17 +472,17 @@ def test_a_state_is_chosen_or_asked_for(tmp_path: Path) -> None:
 def test_a_solver_without_time_draws_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from rcsc.solvers.smt import Answer, Solver
 
-    one = found_in(DOOR, tmp_path)
-    table = tabled(graph_of(one).graph)
+    entry = found_in(DOOR, tmp_path)
+    table = tabled(graph_of(entry).graph)
     monkeypatch.setattr(Solver, "check", lambda *_: Answer.UNKNOWN)
-    file = one.loaded.files[one.table.file]
+    file = entry.loaded.files[entry.table.file]
     for made in (
-        derive(one.program, one.table, file, OPTIONS),
-        derive_lines(one.program, one.table, file, OPTIONS),
+        derive(entry.program, entry.table, file, OPTIONS),
+        derive_lines(entry.program, entry.table, file, OPTIONS),
     ):
         assert isinstance(made, Diagnostic)
         assert made.code is Code.UNDECIDED
-    [found] = against(one.loaded, one.root, one.program, one.table, table, OPTIONS).found
+    [found] = against(entry.loaded, entry.root, entry.program, entry.table, table, OPTIONS).found
     assert found.code is Code.UNDECIDED
 
 
@@ -633,12 +637,12 @@ def test_no_damaged_graph_is_a_bug(shipped: dict[str, FoundTable], form: str) ->
 def test_a_table_takes_the_place_of_its_namesake_or_stands_behind_the_others(
     shipped: dict[str, FoundTable],
 ) -> None:
-    one = shipped["vision.flood_flash"]
-    file = one.loaded.files[one.table.file]
-    made = tabled(graph_of(one).graph).table
+    entry = shipped["vision.flood_flash"]
+    file = entry.loaded.files[entry.table.file]
+    made = tabled(graph_of(entry).graph).table
     before, after = (
         re.findall(r"^table (\w+)", text, re.MULTILINE)
-        for text in (one.loaded.sources[one.table.file].text, in_place(file, made))
+        for text in (entry.loaded.sources[entry.table.file].text, in_place(file, made))
     )
     assert before == after
     assert "## FLOOD-FLASH (OBJ, EXPECTED RANGE)" in in_place(file, made)
@@ -654,10 +658,12 @@ def test_the_drawing_shows_every_state_and_every_line_once_an_arrow(shipped: dic
     made = graph_of(shipped["task.acquire"])
     text = svg(made.graph, made.everywhere)
     root = ET.fromstring(text)  # noqa: S314  # made here
-    words = [one.text or "" for one in root.iter("{http://www.w3.org/2000/svg}text")]
+    words = [element.text or "" for element in root.iter("{http://www.w3.org/2000/svg}text")]
     assert {*made.graph.states, "any state", "acquire"} <= set(words)
     numbers = [
-        one.text for one in root.iter("{http://www.w3.org/2000/svg}text") if one.get("class") == "number"
+        element.text
+        for element in root.iter("{http://www.w3.org/2000/svg}text")
+        if element.get("class") == "number"
     ]
     assert sorted(map(str, numbers)) == sorted(edge.line for edge in made.graph.edges if edge.line != "16")
     assert "line 16 is DEFAULT, never reached; it would lead to f_state" in words
@@ -669,8 +675,12 @@ def test_no_label_hides_a_state_or_another_label(shipped: dict[str, FoundTable])
     for name, found in shipped.items():
         made = graph_of(found)
         root = ET.fromstring(svg(made.graph, made.everywhere))  # noqa: S314  # made here
-        papers = [box(one, "x", "y", "width", "height") for one in root.iter() if one.get("class") == "paper"]
-        circles = [circle(one) for one in root.iter() if one.get("class") == "state"]
+        papers = [
+            box(element, "x", "y", "width", "height")
+            for element in root.iter()
+            if element.get("class") == "paper"
+        ]
+        circles = [circle(element) for element in root.iter() if element.get("class") == "state"]
         assert papers
         assert circles
         for one, two in itertools.combinations(papers, 2):
@@ -682,13 +692,13 @@ def test_no_label_hides_a_state_or_another_label(shipped: dict[str, FoundTable])
 Rectangle = tuple[float, float, float, float]
 
 
-def box(one: ET.Element, *names: str) -> Rectangle:
-    x, y, width, height = (float(one.get(name, "")) for name in names)
+def box(element: ET.Element, *names: str) -> Rectangle:
+    x, y, width, height = (float(element.get(name, "")) for name in names)
     return x, y, x + width, y + height
 
 
-def circle(one: ET.Element) -> Rectangle:
-    x, y, rx, ry = (float(one.get(name, "")) for name in ("cx", "cy", "rx", "ry"))
+def circle(element: ET.Element) -> Rectangle:
+    x, y, rx, ry = (float(element.get(name, "")) for name in ("cx", "cy", "rx", "ry"))
     return x - 0.7 * rx, y - 0.7 * ry, x + 0.7 * rx, y + 0.7 * ry  # its corners are empty
 
 
@@ -703,12 +713,12 @@ def overlap(one: Rectangle, two: Rectangle) -> bool:
 
 
 def test_default_is_drawn_where_it_can_be_reached_and_a_choice_is_dashed(tmp_path: Path) -> None:
-    one = found_in(DOOR, tmp_path)
-    root = ET.fromstring(svg(graph_of(one).graph))  # noqa: S314  # made here
-    words = [one.text or "" for one in root.iter("{http://www.w3.org/2000/svg}text")]
+    entry = found_in(DOOR, tmp_path)
+    root = ET.fromstring(svg(graph_of(entry).graph))  # noqa: S314  # made here
+    words = [element.text or "" for element in root.iter("{http://www.w3.org/2000/svg}text")]
     assert "DEFAULT" in words  # in stuck, without the button or with `seen` past 1
     assert words.count("try_again says so") == 2  # to opening again, or to stuck
-    dashed = [one for one in root.iter() if one.get("class") == "arrow dashed"]
+    dashed = [element for element in root.iter() if element.get("class") == "arrow dashed"]
     assert len(dashed) == 3
 
 
@@ -726,8 +736,8 @@ def test_guards_are_short_for_the_eye(guard: str, shown: str) -> None:
 
 
 def test_the_graph_of_lines_is_drawn_and_makes_no_table(shipped: dict[str, FoundTable]) -> None:
-    one = shipped["vision.flood_flash"]
-    made = derive_lines(one.program, one.table, one.loaded.files[one.table.file], OPTIONS)
+    entry = shipped["vision.flood_flash"]
+    made = derive_lines(entry.program, entry.table, entry.loaded.files[entry.table.file], OPTIONS)
     assert isinstance(made, Derived)
     after = {(edge.source, edge.target) for edge in made.graph.edges}
     assert {(ANY, "1"), ("2", "3"), ("4", "6"), ("3", "7")} <= after
@@ -778,7 +788,7 @@ def test_a_folder_of_tables_is_drawn_into_a_folder(tmp_path: Path) -> None:
     )
     status, _, notes = run("graph", str(tmp_path), "-o", str(tmp_path / "out"))
     assert (status, "note[RCS771]: table `p`" in notes) == (0, True)
-    assert [one.name for one in (tmp_path / "out").iterdir()] == ["door_door.svg"]
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["door_door.svg"]
     status, _, _ = run("graph", f"{tmp_path}/door.rcs:door", "-o", str(tmp_path / "door.gv"))
     assert status == 0
     assert form_of((tmp_path / "door.gv").read_text(encoding="utf-8")) == "dot"

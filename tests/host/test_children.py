@@ -393,7 +393,7 @@ ALLOWED = {
 def imported(tree: ast.AST) -> Iterator[str]:
     for node in ast.walk(tree):
         names = (
-            [one.name for one in node.names] if isinstance(node, ast.Import)
+            [alias.name for alias in node.names] if isinstance(node, ast.Import)
             else [node.module or ""] if isinstance(node, ast.ImportFrom) else []
         )  # fmt: skip
         yield from (

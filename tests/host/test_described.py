@@ -322,10 +322,10 @@ def answered(folder: Path) -> tuple[str, ...]:
         refused: BadFile = error
     else:
         return ()
-    for one in refused.found:
-        assert one.code in (Code.BAD_SYSTEM, Code.BAD_DATA)
-        assert one.primary.span.file in refused.sources or "cannot be read" in one.message
-    return tuple(one.message for one in refused.found) or (str(refused),)
+    for finding in refused.found:
+        assert finding.code in (Code.BAD_SYSTEM, Code.BAD_DATA)
+        assert finding.primary.span.file in refused.sources or "cannot be read" in finding.message
+    return tuple(finding.message for finding in refused.found) or (str(refused),)
 
 
 SAMPLE = 80
@@ -389,7 +389,7 @@ def test_what_is_wrong_is_said_where_it_stands(
     place.write_text(toml(said), encoding="utf-8")
     with pytest.raises((BadDescription, BadData)) as raised:
         looked_at(tmp_path)
-    found = next(one for one in raised.value.found if message in one.message)
+    found = next(finding for finding in raised.value.found if message in finding.message)
     source = raised.value.sources[str(place)]
     line = source.line(source.position(found.primary.span.start).line)
     assert line.startswith(json.dumps("buffers" if value == "tasx" else path[0]))

@@ -120,7 +120,7 @@ def test_formats_of_bytes_are_named_where_they_are_known() -> None:
         name
         for name, tree in sources()
         for node in ast.walk(tree)
-        if isinstance(node, ast.Import) and any(one.name == "struct" for one in node.names)
+        if isinstance(node, ast.Import) and any(alias.name == "struct" for alias in node.names)
     }
     assert {name for name in naming if not name.startswith(tuple(FORMATS_OF_OURS))} == set()
 
@@ -852,7 +852,7 @@ def test_no_text_of_a_csv_file_is_a_formula() -> None:
     rows = list(
         csv.reader(io.StringIO(csv_text([FORMULAS, ["a,b", 'c"d', "e\nf", -1, -1.5, "", "a=1"]]), newline=""))
     )
-    assert [one[:1] for one in rows[0]] == ["'"] * len(FORMULAS)
+    assert [cell[:1] for cell in rows[0]] == ["'"] * len(FORMULAS)
     assert rows[1] == ["a,b", 'c"d', "e\nf", "-1", "-1.5", "", "a=1"]
 
 
@@ -896,4 +896,4 @@ def test_no_text_becomes_markup_in_a_page_or_a_drawing(text: str) -> None:
         "marker",
         "defs",
     }
-    assert {one.tag.rpartition("}")[2] for one in root.iter()} <= known
+    assert {element.tag.rpartition("}")[2] for element in root.iter()} <= known

@@ -41,7 +41,7 @@ class World:
     @property
     def ordered(self) -> bool:
         """Whether nothing in it may be no number."""
-        return all(math.isfinite(value) for one in self.inputs for value in one)
+        return all(math.isfinite(value) for point in self.inputs for value in point)
 
 
 def world(

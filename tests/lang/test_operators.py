@@ -453,7 +453,7 @@ def c_program() -> str:
     functions, calls, used = [], [], set[str]()
     for at, case in enumerate(CASES):
         spelled, reference = text.expr(case.locals()), writer.expr(case.locals())
-        used |= {one.helper for one in read(spelled) if isinstance(one, Invoke)} - {""}
+        used |= {invoked.helper for invoked in read(spelled) if isinstance(invoked, Invoke)} - {""}
         for who, body, types in (("c", IN_C.code(spelled), wide_type), ("r", reference, c_type)):
             params = ", ".join(f"{types(case.kind)} v_{name}" for name in ("a", "b")[: case.many])
             functions.append(f"static {c_word(case.made)} {who}_{at}({params}) {{ return {body}; }}")
@@ -467,8 +467,8 @@ def c_program() -> str:
             f"for (int i = 0; i < {len(ROWS[case])}; i++) {{ show_{c_word(case.made)}(c_{at}({given}), r_{at}({given})); }}"
         )
     helpers = [
-        f"static {one.head} {{\n" + "\n".join(IN_C.lines(one.body)) + "\n}"
-        for one in (helper(text.names.program, name) for name in sorted(used))
+        f"static {function.head} {{\n" + "\n".join(IN_C.lines(function.body)) + "\n}"
+        for function in (helper(text.names.program, name) for name in sorted(used))
     ]
     extremes = [EXTREMES.format(T=name) for name in ("int32_t", "int64_t", "ref_wide", "double")]
     head = ["#include <stdio.h>\n#include <stdint.h>\n#include <stdbool.h>\n#include <string.h>", SHOW]
@@ -583,7 +583,7 @@ def test_a_line_that_a_nan_does_not_match_leaves_it_to_default() -> None:
     )
     program = program_of(text)
     found = prove_program(program, Options()).findings
-    assert [one.code for one in found] == [Code.DEFAULT_REACHED]
+    assert [finding.code for finding in found] == [Code.DEFAULT_REACHED]
     assert matching_lines(program.tables[0], {"x": 1.7e308}) == []
 
 
@@ -614,8 +614,8 @@ def test_where_no_line_matches_what_is_no_number_an_input_is_tried(kind: str) ->
     assert isinstance(program, Program)
     found = prove_table(program, program.tables[0], Options(steps=20_000)).found
     [witness] = [
-        one.witnesses[0] if isinstance(one, Gap) else one.witness
-        for one in found
-        if isinstance(one, Gap | Overlap) and isinstance(one, wanted)
+        wrong.witnesses[0] if isinstance(wrong, Gap) else wrong.witness
+        for wrong in found
+        if isinstance(wrong, Gap | Overlap) and isinstance(wrong, wanted)
     ]
     assert len(matching_lines(program.tables[0], {"n": 0, **witness})) == (0 if wanted is Gap else 2)

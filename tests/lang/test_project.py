@@ -24,7 +24,7 @@ def _here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def codes(*paths: str, stdin: str | bytes | None = None) -> list[tuple[str, str]]:
-    return [(one.primary.span.file, one.code.value) for one in load(paths, stdin=stdin).found]
+    return [(finding.primary.span.file, finding.code.value) for finding in load(paths, stdin=stdin).found]
 
 
 # --- uses ---
@@ -41,23 +41,23 @@ def test_a_used_file_is_looked_for_beside_the_file_then_at_the_root(tmp_path: Pa
 def test_a_lone_file_has_its_own_folder_for_root(tmp_path: Path) -> None:
     write(tmp_path, types="", sub__a="use types")
     assert codes("sub/a.rcs") == [("sub/a.rcs", "RCS205")]
-    (one,) = load(["sub/a.rcs"]).found
-    assert one.help == ("looked for `sub/types.rcs`",)
+    (finding,) = load(["sub/a.rcs"]).found
+    assert finding.help == ("looked for `sub/types.rcs`",)
 
 
 def test_both_places_that_were_tried_are_named(tmp_path: Path) -> None:
     write(tmp_path, sub__a="use types")
     (tmp_path / "rcsc.toml").write_text("")
-    (one,) = load(["sub/a.rcs"]).found
-    assert one.help == ("looked for `sub/types.rcs` and `types.rcs`",)
-    assert (one.primary.span.start, one.primary.span.end) == (0, 9)
+    (finding,) = load(["sub/a.rcs"]).found
+    assert finding.help == ("looked for `sub/types.rcs` and `types.rcs`",)
+    assert (finding.primary.span.start, finding.primary.span.end) == (0, 9)
 
 
 def test_a_circle_of_files_is_told_with_its_path_where_it_closes(tmp_path: Path) -> None:
     write(tmp_path, a="use b", b="use c", c="use b")
-    (one,) = load(["a.rcs"]).found
-    assert (one.code.value, one.primary.span.file) == ("RCS204", "c.rcs")
-    assert "b.rcs -> c.rcs -> b.rcs" in one.message
+    (finding,) = load(["a.rcs"]).found
+    assert (finding.code.value, finding.primary.span.file) == ("RCS204", "c.rcs")
+    assert "b.rcs -> c.rcs -> b.rcs" in finding.message
 
 
 def test_a_file_that_uses_itself(tmp_path: Path) -> None:
@@ -91,7 +91,7 @@ def test_a_link_to_a_file_is_that_file(tmp_path: Path) -> None:
 def test_an_error_in_a_used_file_is_an_error_of_every_user(tmp_path: Path) -> None:
     write(tmp_path, a="use bad", b="use bad", bad="type =", good="type n = bool")
     loaded = load(["."])
-    assert [one.primary.span.file for one in loaded.found] == ["bad.rcs"]
+    assert [finding.primary.span.file for finding in loaded.found] == ["bad.rcs"]
     assert not isinstance(resolve("a.rcs", loaded), Program)
     assert not isinstance(resolve("b.rcs", loaded), Program)
     assert isinstance(resolve("good.rcs", loaded), Program)
@@ -172,8 +172,8 @@ def test_links_between_folders_are_followed_once(tmp_path: Path) -> None:
 
 def test_bytes_that_are_not_utf8(tmp_path: Path) -> None:
     (tmp_path / "a.rcs").write_bytes(b"type n\xff = bool")
-    (one,) = load(["a.rcs"]).found
-    assert (one.code.value, one.message) == ("RCS105", "`a.rcs` is not UTF-8 at byte 6")
+    (finding,) = load(["a.rcs"]).found
+    assert (finding.code.value, finding.message) == ("RCS105", "`a.rcs` is not UTF-8 at byte 6")
     assert codes("-", stdin=b"\xfe") == [("-", "RCS105")]
 
 
@@ -233,10 +233,10 @@ def test_a_project_file_that_is_not_right(tmp_path: Path, text: str, start: int)
     write(tmp_path, sub__a="use b", sub__b="")
     (tmp_path / "rcsc.toml").write_text(text)
     for path in ("sub/a.rcs", "sub", "."):
-        (one,) = load([path]).found
-        assert one.code.value == "RCS110"
-        assert one.primary.span.file.endswith("rcsc.toml")
-        assert text.startswith("a") or one.primary.span.start == start
+        (finding,) = load([path]).found
+        assert finding.code.value == "RCS110"
+        assert finding.primary.span.file.endswith("rcsc.toml")
+        assert text.startswith("a") or finding.primary.span.start == start
 
 
 def test_the_root_is_the_nearest_folder_with_a_project_file(tmp_path: Path) -> None:

@@ -208,11 +208,11 @@ def reported(text: str) -> list[tuple[int, str, str]]:
     found = compile_text(text)
     assert not isinstance(found, Program), "nothing was reported"
     source = Source("case.rcs", text)
-    for one in found:
-        assert one.message[0].islower() or not one.message[0].isalpha()
-        assert not one.message.endswith(".")
-        assert one.primary.span.file == "case.rcs"
-        assert all(label.span.file == "case.rcs" for label in one.related)
+    for finding in found:
+        assert finding.message[0].islower() or not finding.message[0].isalpha()
+        assert not finding.message.endswith(".")
+        assert finding.primary.span.file == "case.rcs"
+        assert all(label.span.file == "case.rcs" for label in finding.related)
     return [
         (source.position(d.primary.span.start).line, d.code.value, source.slice(d.primary.span))
         for d in found
@@ -275,7 +275,7 @@ def test_what_chooses_the_table_stays_from_the_preprocess_on(  # the places that
     if selector != LATER:
         text = edited(text, ("procedure r { next s := a }\n", ""))
     found = compile_text(text)
-    codes = [] if isinstance(found, Program) else [one.code.value for one in found]
+    codes = [] if isinstance(found, Program) else [finding.code.value for finding in found]
     assert codes == ([] if steady else ["RCS214"])
 
 
@@ -293,13 +293,13 @@ def test_an_error_in_a_constant_is_not_reported_again_where_it_is_used() -> None
 def _only(text: str) -> Diagnostic:
     found = compile_text(text)
     assert not isinstance(found, Program)
-    (one,) = found
-    return one
+    (finding,) = found
+    return finding
 
 
 def test_a_close_name_is_suggested() -> None:
-    one = _only("input width_mm : bool\nassume a : widht_mm")
-    assert one.help == ("did you mean `width_mm`?",)
+    finding = _only("input width_mm : bool\nassume a : widht_mm")
+    assert finding.help == ("did you mean `width_mm`?",)
 
 
 def test_the_first_of_two_places_is_related() -> None:
@@ -332,7 +332,7 @@ def test_records_and_arrays_come_to_leaves_in_declared_order() -> None:
 def test_a_record_is_copied_leaf_by_leaf() -> None:
     text = "record r { a : bool b : bool }\nstate s : array[2] of r\nstate t : r\nstate i : int 0 .. 1\n"
     whole, part = program_of(text + "procedure p { t := s[1] }\nprocedure q { s[i] := t }").procedures
-    assert [one.place for one in whole.body if isinstance(one, Assign)] == [
+    assert [statement.place for statement in whole.body if isinstance(statement, Assign)] == [
         ToLeaf(VariableName(name), kind.type)
         for name in ("t.a", "t.b")
         for kind in [program_of(text).variable(name)]

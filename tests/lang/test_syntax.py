@@ -81,7 +81,7 @@ procedure p {
     assert variable.doc == ("doc of x",)
     assert variable.comments == ("about x",)
     assert isinstance(procedure, tree.ProcedureDecl)
-    assert [one.comments for one in procedure.body] == [("before", "behind"), ("inside",)]
+    assert [statement.comments for statement in procedure.body] == [("before", "behind"), ("inside",)]
     assert parsed.trailing == ("the end",)
 
 
@@ -98,7 +98,7 @@ procedure p {
 def test_how_tightly_truth_functions_bind(written: str, kept: str) -> None:
     """Without parentheses where none are needed the expression is still the same."""
     found = [parse(Source("case.rcs", f"const c = {text}\n")) for text in (written, kept)]
-    values = [one.declarations[0].value for one in found if isinstance(one, tree.File)]  # type: ignore[union-attr]
+    values = [file.declarations[0].value for file in found if isinstance(file, tree.File)]  # type: ignore[union-attr]
     assert values[0] == values[1]
     assert spell_expr(values[0]) == kept
 

@@ -149,7 +149,7 @@ def test_other_tools_read_it(logged: Path, log: Log) -> None:
     with logged.open("rb") as file:
         reader = make_reader(file, validate_crcs=True)
         found = list(reader.iter_messages(topics=["/levels/gripper"]))
-        assert {one.name for one in reader.iter_metadata()} == {
+        assert {metadata.name for metadata in reader.iter_metadata()} == {
             "rcsc.system",
             "rcsc.programs",
             "rcsc.chain",
@@ -198,11 +198,11 @@ def test_a_planted_difference_is_named(logged: Path) -> None:
     moment = Replay(forged, REPO / "generated", "python").first_difference()
     assert moment is not None
     assert moment.tick == 77
-    [cycle] = [one for one in moment.cycles if one.differences]
-    [one] = cycle.differences
+    [cycle] = [replayed for replayed in moment.cycles if replayed.differences]
+    [difference] = cycle.differences
     members = level.sign.leaves[at].members
-    assert (cycle.level, one.name) == ("task", "report.status_report")
-    assert (one.then, one.now) == (members[int(values[at])], members[int(then)])
+    assert (cycle.level, difference.name) == ("task", "report.status_report")
+    assert (difference.then, difference.now) == (members[int(values[at])], members[int(then)])
 
 
 def test_a_cut_log_loses_at_most_a_chunk(tmp_path: Path, logged: Path, log: Log) -> None:
@@ -300,7 +300,7 @@ def test_what_other_tables_would_have_done(log: Log, edited: Path, logged: Path)
     assert moment is not None
     before = [again.go(tick).differs for tick in range(1, moment.tick)]
     assert not any(before)
-    [cycle] = [one for one in moment.cycles if one.differences]
+    [cycle] = [replayed for replayed in moment.cycles if replayed.differences]
     assert cycle.level == "gripper"
     assert moment.tick == 43  # published in tick 42 (the 41st from 0), taken in the next
     assert [(difference.name, difference.then, difference.now) for difference in cycle.differences] == [
@@ -326,7 +326,7 @@ def test_tables_with_other_lines_and_leaves(log: Log, edited: Path) -> None:
     moment = again.first_difference()
     assert moment is not None
     assert moment.tick == 1
-    [cycle] = [one for one in moment.cycles if one.differences]
+    [cycle] = [replayed for replayed in moment.cycles if replayed.differences]
     assert (cycle.line_then, cycle.line_now) == ("pause_gripper line 1", "pause_gripper line new_1")
     assert {(difference.name, difference.then, difference.now) for difference in cycle.differences} == {
         ("line", "1", "new_1"),

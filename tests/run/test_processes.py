@@ -421,8 +421,8 @@ def test_a_level_killed_at_any_step_goes_on(repo: Path, tmp_path: Path, busy: in
                 cycle(level, buffers)
                 level = level if which < 0.8 else None
             both: list[Outside] = [sent, stand_in]
-            for one in chance.sample(both, chance.randint(0, 2)):
-                for name, values in one.step(tick, again(buffers).latest).items():
+            for other in chance.sample(both, chance.randint(0, 2)):
+                for name, values in other.step(tick, again(buffers).latest).items():
                     buffers.publish(name, values)
             if sent.over:
                 break

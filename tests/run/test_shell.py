@@ -863,7 +863,7 @@ def test_sources_are_laid_out_in_their_folder_alone(tmp_path: Path, monkeypatch:
         with laid_out(held) as there:
             place = there.parents[1]
             written = {
-                str(one.relative_to(place)): one.read_bytes() for one in place.rglob("*") if one.is_file()
+                str(path.relative_to(place)): path.read_bytes() for path in place.rglob("*") if path.is_file()
             }
             assert there.read_text() == "use near use lib/far\ninput n : bool\n"
         assert written == {name: text for name, text in held.texts.items() if not os.path.isabs(name)}

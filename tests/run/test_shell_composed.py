@@ -104,7 +104,7 @@ def test_nothing_is_claimed_while_a_neighbour_runs_other_tables(system: Path) ->
     edit_file(system.with_name("upper.rcs"), SLOWER)
     edit_file(system.with_name("lower.rcs"), ("table go {", "# Edited, and not taken.\ntable go {"))
     assert prove(system) == 0
-    [said] = [one for one in do(commands, "diff upper") if "neighbours" in one]
+    [said] = [line for line in do(commands, "diff upper") if "neighbours" in line]
     assert said.endswith(": level `lower` runs other tables than its file holds")
     error = refused(commands, "reload upper proved")
     assert str(error).endswith(": level `lower` runs other tables than its file holds")
@@ -117,7 +117,7 @@ def test_nothing_is_claimed_while_a_neighbour_was_compiled_of_other_tables(syste
     commands = alone(system, "python")
     edit_file(system.with_name("upper.rcs"), SLOWER)
     assert prove(system) == 0
-    [said] = [one for one in do(commands, "diff upper") if "neighbours" in one]
+    [said] = [line for line in do(commands, "diff upper") if "neighbours" in line]
     assert said.endswith(": level `lower` runs other tables than its file holds")
     do(commands, "reload lower anyway")
     assert PROVED.format(system) in do(commands, "reload upper")
@@ -133,7 +133,7 @@ def test_a_neighbour_that_does_not_keep_what_is_assumed_is_named(system: Path) -
     assert prove(system) == 1
     edit_file(system.with_name("upper.rcs"), SLOWER)
     assert prove(system) == 1
-    [said] = [one for one in do(commands, "reload upper") if "neighbours" in one]
+    [said] = [line for line in do(commands, "reload upper") if "neighbours" in line]
     assert "level `upper` assumes that what `lower` reports under the number of the last" in said
     edit_file(system.with_name("lower.rcs"), ("table go {", "# Another word.\ntable go {"))
     assert refused(commands, "reload lower").code is Code.SHELL_NOT_COMPOSED

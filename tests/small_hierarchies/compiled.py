@@ -77,8 +77,8 @@ def compiled(program: Program, level: Level) -> Compiled:
     writer = _Writer(program, level)
     space: dict[str, Any] = {
         **{f"op_{op.name}": op.meaning for op in Op},
-        **{f"extern_{at}": one for at, one in enumerate(program.procedures)},
-        **{f"variable_{at}": one for at, one in enumerate(program.variables)},
+        **{f"extern_{at}": procedure for at, procedure in enumerate(program.procedures)},
+        **{f"variable_{at}": variable for at, variable in enumerate(program.variables)},
         "admitted": _admitted, "ExternError": ExternError, "Fault": Fault, "at": _at,
     }  # fmt: skip
     exec(compile("\n".join(writer.written()), f"<{level.name}>", "exec"), space)  # noqa: S102  # made here
@@ -108,7 +108,7 @@ class _Writer:
     def __post_init__(self) -> None:
         self.inputs = frozenset(str(v.name) for v in self.program.variables if v.kind is Kind.INPUT)
         self._places = {str(v.name): at for at, v in enumerate(self.program.variables)}
-        self._procedures = {str(one.name): at for at, one in enumerate(self.program.procedures)}
+        self._procedures = {str(procedure.name): at for at, procedure in enumerate(self.program.procedures)}
 
     def written(self) -> Iterator[str]:
         """All of it, line by line."""
@@ -121,7 +121,7 @@ class _Writer:
         yield from self._in_range()
         self._between = True
         conditions = [invariant.condition for invariant in self.program.invariants]
-        conditions += [one.condition for one in self.program.properties]
+        conditions += [stated.condition for stated in self.program.properties]
         for at, condition in enumerate(conditions):
             yield f"def stated_{at}(s, b):"
             yield f"  return bool({self._of(condition)})"
@@ -174,15 +174,18 @@ class _Writer:
 
     # --- statements ---
 
-    def _procedure(self, one: Procedure) -> Iterator[str]:
-        at = self._procedures[str(one.name)]
-        yield f"def p_{at}(s, r, x{''.join(f', l_{param.name}' for param in one.params)}):"
-        if one.extern is None:
-            yield from self._body(one.body, "  ")
+    def _procedure(self, procedure: Procedure) -> Iterator[str]:
+        at = self._procedures[str(procedure.name)]
+        yield f"def p_{at}(s, r, x{''.join(f', l_{param.name}' for param in procedure.params)}):"
+        if procedure.extern is None:
+            yield from self._body(procedure.body, "  ")
             return
-        args = [*(self._read(str(name)) for name in one.reads), *(f"l_{param.name}" for param in one.params)]
+        args = [
+            *(self._read(str(name)) for name in procedure.reads),
+            *(f"l_{param.name}" for param in procedure.params),
+        ]
         yield f"  given = x(extern_{at}, [{', '.join(args)}])"
-        for place, name in enumerate(one.writes):
+        for place, name in enumerate(procedure.writes):
             yield f"  value = admitted(variable_{self._places[str(name)]}, given[{place}])"
             yield f"  if value is None: raise ExternError({str(name)!r})"
             yield f"  s[{str(name)!r}] = value"

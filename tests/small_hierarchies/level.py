@@ -200,7 +200,9 @@ class Role:
     @cached_property
     def _stated(self) -> frozenset[str]:
         """What the program's properties read."""
-        return frozenset(str(name) for one in self.program.properties for name in read_by(one.condition))
+        return frozenset(
+            str(name) for stated in self.program.properties for name in read_by(stated.condition)
+        )
 
     @cached_property
     def watched(self) -> frozenset[str]:
@@ -388,7 +390,7 @@ class Role:
             fault = Fault.SEVERAL_LINES if matching else Fault.NO_LINE
             return Ran(str(table.name), "", fault, failed, middle, self._shown(now))
         line = next(
-            (one for one in table.lines if matching and one.name == matching[0]),
+            (row for row in table.lines if matching and row.name == matching[0]),
             table.default or table.lines[0],
         )
         try:

@@ -76,7 +76,7 @@ class Pair:
     @property
     def below(self) -> Below:
         """The subordinate, as the superior is linked to it."""
-        return next(one for one in self.upper.links.below if one.name == self.lower.links.level)
+        return next(below for below in self.upper.links.below if below.name == self.lower.links.level)
 
     @property
     def taken(self) -> tuple[str, str]:

@@ -104,7 +104,7 @@ def canonical(role: Role, state: Mapping[str, Value], but: str = "") -> dict[str
     for leaf in given_numbers(role):
         if role.links.above is not None and role.links.above.name != but:
             found[leaf] = names.setdefault(found[leaf], len(names))
-    for below in (one for one in role.links.below if one.name != but):
+    for below in (lower for lower in role.links.below if lower.name != but):
         sent, echo = f"{below.order}.inc_command", f"{below.report}.inc_command_echo"
         found[echo] = 0 if found[echo] == found[sent] else FAR
         found[sent] = 0
@@ -141,7 +141,7 @@ def wanted(role: Role) -> frozenset[Key]:
             found |= {(Sort.PAUSES, "", below.order)} if not isinstance(chosen, OneTable) else set()
     found |= {(Sort.DEFERRED, "", leaf) for leaf, _ in role.deferred}
     found |= {(Sort.INVARIANT, "", invariant.name) for invariant in role.program.invariants}
-    found |= {(Sort.PROPERTY, "", one.name) for one in role.program.properties}
+    found |= {(Sort.PROPERTY, "", stated.name) for stated in role.program.properties}
     return frozenset(found)
 
 
@@ -172,9 +172,9 @@ def _broken_stated(role: Role, before: Mapping[str, Value], after: Mapping[str, 
     """Invariants hold before the cycle and after it; properties of both."""
     stated = role.compiled.stated
     many = len(role.program.invariants)
-    for one, condition in zip(role.program.invariants, stated[:many], strict=True):
+    for invariant, condition in zip(role.program.invariants, stated[:many], strict=True):
         if not (_true(condition, before, before) and _true(condition, after, before)):
-            yield Sort.INVARIANT, "", one.name
+            yield Sort.INVARIANT, "", invariant.name
     for other, condition in zip(role.program.properties, stated[many:], strict=True):
         if not _true(condition, after, before):
             yield Sort.PROPERTY, "", other.name

@@ -109,7 +109,7 @@ def other_cell(lines: Sequence[str]) -> Edit:
         if row.default:
             continue
         for at in range(1, len(row.cells)):
-            others = dict.fromkeys(one.cells[at].strip() for one in table[1:] if not one.default)
+            others = dict.fromkeys(line.cells[at].strip() for line in table[1:] if not line.default)
             for cell in others:
                 if cell and row.cells[at].strip() and cell != row.cells[at].strip():
                     yield row.at, row.text(cells=[*row.cells[:at], f" {cell} ", *row.cells[at + 1 :]])
@@ -138,7 +138,7 @@ def _other_action(column: str) -> Callable[[Sequence[str]], Edit]:
             if column not in names:
                 continue
             at = names.index(column)
-            for entry in dict.fromkeys([*(one.actions[at].strip() for one in table[1:]), ""]):
+            for entry in dict.fromkeys([*(line.actions[at].strip() for line in table[1:]), ""]):
                 if entry != row.actions[at].strip():
                     yield row.at, row.text(actions=[*row.actions[:at], f" {entry} ", *row.actions[at + 1 :]])
 

@@ -119,10 +119,10 @@ def episodes(draw: st.DrawFn, backend: Backend = "kinematic") -> Episode:
     here = draw(st.one_of(st.tuples(parts(kind)), st.tuples(parts()), st.just(())))
     odd = draw(st.lists(st.one_of(faults(), harms(), restarts(), interruptions(), pushes()), max_size=3))
     if backend == "mujoco":
-        odd = [one for one in odd if not isinstance(one, Push)]
+        odd = [trouble for trouble in odd if not isinstance(trouble, Push)]
 
     def some(what: type) -> tuple[object, ...]:
-        return tuple(one for one in odd if isinstance(one, what))
+        return tuple(trouble for trouble in odd if isinstance(trouble, what))
 
     return Episode(
         backend,

@@ -153,7 +153,9 @@ def _columns() -> SearchStrategy[list[tree.Expr | None]]:
 
 @cache
 def _cells() -> SearchStrategy[tuple[tree.Statement, ...]]:
-    return st.lists(calls() | assignments(), max_size=2).map(lambda found: tuple(_bare(one) for one in found))
+    return st.lists(calls() | assignments(), max_size=2).map(
+        lambda found: tuple(_bare(statement) for statement in found)
+    )
 
 
 ACTIONS = st.lists(st.sampled_from(["procedures", "command_out", "status_out", "place"]), max_size=3)
@@ -184,12 +186,12 @@ def tables(draw: st.DrawFn) -> tree.TableDecl:
     )
 
 
-def _bare(one: tree.Statement) -> tree.Statement:
+def _bare(statement: tree.Statement) -> tree.Statement:
     """Without comments: a cell has none."""
-    if isinstance(one, tree.Call):
-        return tree.Call(one.name, one.args)
-    assert isinstance(one, tree.Assign)
-    return tree.Assign(one.place, one.value, one.deferred)
+    if isinstance(statement, tree.Call):
+        return tree.Call(statement.name, statement.args)
+    assert isinstance(statement, tree.Assign)
+    return tree.Assign(statement.place, statement.value, statement.deferred)
 
 
 def _condition(draw: st.DrawFn, heading: tree.Heading) -> tree.Condition:

@@ -152,8 +152,8 @@ def test_a_search_for_gaps_is_undecided_past_its_budget_where_it_may_look_in_vai
     program = program_of(families.box(40, 9, 1, "gap", widened))
     monkeypatch.setattr(partition, "BUDGET", 30)
     found = prove_table(program, program.tables[0], BOXES).found
-    assert any(isinstance(one, Gap) for one in found) is exact
-    assert any(isinstance(one, Undecided) for one in found) is not exact
+    assert any(isinstance(wrong, Gap) for wrong in found) is exact
+    assert any(isinstance(wrong, Undecided) for wrong in found) is not exact
 
 
 def test_a_report_of_very_many_overlaps_ends() -> None:
@@ -325,11 +325,11 @@ def test_a_table_is_not_decided_under_what_cannot_hold(column: str, claim: str, 
     program = program_of(HEAD + text)
     options = BOXES
     [whole] = prove_program(program, options).tables
-    assert any(isinstance(one, ContradictoryAssumptions) for one in whole.found) is not possible
-    assert not any(isinstance(one, Gap | Overlap | Undecided) for one in whole.found)
+    assert any(isinstance(wrong, ContradictoryAssumptions) for wrong in whole.found) is not possible
+    assert not any(isinstance(wrong, Gap | Overlap | Undecided) for wrong in whole.found)
     if "n" in re.findall(r"\w+", claim):  # what the table reads: found where it is decided
         alone = prove_table(program, program.tables[0], options).found
-        assert any(isinstance(one, ContradictoryAssumptions) for one in alone) is not possible
+        assert any(isinstance(wrong, ContradictoryAssumptions) for wrong in alone) is not possible
 
 
 @pytest.mark.parametrize("many", [False, True])

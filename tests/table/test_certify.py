@@ -136,7 +136,7 @@ def test_shipped_tables_are_certified(path: str, repo: Path) -> None:
     alone, asked = certify(program, certificate), certify(program, certificate, by_cvc5)
     assert alone.problems == ()
     assert asked.whole
-    assert set(asked.checked) == {*alone.checked, *(one.name for one in alone.unchecked)}
+    assert set(asked.checked) == {*alone.checked, *(claim.name for claim in alone.unchecked)}
 
 
 def test_a_certificate_of_another_table_is_refused() -> None:
@@ -245,7 +245,7 @@ def every_input(program: Program) -> list[dict[str, Any]]:
 
 def test_the_checker_imports_nothing_of_the_prover(repo: Path) -> None:
     trees = [
-        ast.parse(one.read_text(encoding="utf-8")) for one in sorted((repo / "rcsc/certify").glob("*.py"))
+        ast.parse(path.read_text(encoding="utf-8")) for path in sorted((repo / "rcsc/certify").glob("*.py"))
     ]
     froms = {node.module for tree in trees for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
     ours = {
@@ -429,7 +429,7 @@ def test_what_rests_on_an_obligation_that_is_not_checked_is_not_checked() -> Non
     )
     program = program_of(text)
     certificate = certificate_of(program)
-    left = {one.name for one in certify(program, certificate).unchecked}
+    left = {claim.name for claim in certify(program, certificate).unchecked}
     assert left == {
         "procedure `p`: `s` stays in 0 .. 1000000",
         "procedure `p`: an operand stays in its 64 bits",
@@ -453,12 +453,12 @@ def test_the_digest_is_of_every_field_that_equality_looks_at(owing: tuple[Progra
         if not is_dataclass(value) or isinstance(value, type):
             return []
         found = []
-        for one in fields(value):
-            part = getattr(value, one.name) if one.compare else None
-            found += [replace(value, **{one.name: other}) for other in changed(part)]
-            if one.compare and (type(value).__name__, one.name) not in seen:
-                seen.add((type(value).__name__, one.name))
-                found.append(replace(value, **{one.name: ("another",)}))
+        for field in fields(value):
+            part = getattr(value, field.name) if field.compare else None
+            found += [replace(value, **{field.name: other}) for other in changed(part)]
+            if field.compare and (type(value).__name__, field.name) not in seen:
+                seen.add((type(value).__name__, field.name))
+                found.append(replace(value, **{field.name: ("another",)}))
         return found
 
     others = changed(program)
@@ -577,7 +577,7 @@ def test_values_spans_and_questions_are_the_interpreters(text: str) -> None:
     start = Start(program)
     run = Run(start, "p")
     term = run.evaluate(expression(program))
-    owed = start.terms.every(start.terms.follows(one.path, one.good) for one in run.owed)
+    owed = start.terms.every(start.terms.follows(debt.path, debt.good) for debt in run.owed)
     span = Known((), ()).span(term)
     asked = 0
     for point in points(program):
@@ -794,8 +794,8 @@ def test_invariants_hold_where_outputs_show_their_safe_values(safe: str, right: 
 def test_an_expression_that_is_gone_lends_its_meaning_to_no_other() -> None:
     program = program_of(RELATED)
     start = Start(program)
-    for one in (*program.variables, *program.variables) * 20:
-        assert start.condition(Read(one.name, one.type)) is start.leaves[one.name]
+    for variable in (*program.variables, *program.variables) * 20:
+        assert start.condition(Read(variable.name, variable.type)) is start.leaves[variable.name]
 
 
 def test_obligations_of_one_name_are_each_asked() -> None:
@@ -813,8 +813,8 @@ def test_obligations_of_one_name_are_each_asked() -> None:
 
     left = certify(program, certificate, ask).unchecked
     assert len(left) == 2
-    assert {one.question for one in left} == set(asked)
-    assert len({one.name for one in left}) == 2
+    assert {claim.question for claim in left} == set(asked)
+    assert len({claim.name for claim in left}) == 2
 
 
 def test_a_long_run_is_followed_in_one_pass_and_work_has_an_end(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -847,7 +847,7 @@ def test_a_long_run_is_followed_in_one_pass_and_work_has_an_end(monkeypatch: pyt
     cut = certify(program, certificate)
     assert cut.problems == ()
     assert cut.unchecked
-    assert not {one.name for one in cut.unchecked} & set(cut.checked)
+    assert not {claim.name for claim in cut.unchecked} & set(cut.checked)
     assert cut == certify(program, certificate)
 
 
@@ -881,7 +881,7 @@ def test_a_run_leaves_what_the_interpreter_does_wherever_it_owes_nothing(body: s
     start = Start(program)
     run = Run(start, "p")
     run.call(start.procedures["p"], ())
-    owed = start.terms.every(start.terms.follows(one.path, one.good) for one in run.owed)
+    owed = start.terms.every(start.terms.follows(debt.path, debt.good) for debt in run.owed)
     types = {str(v.name): v.type for v in program.variables}
     drawn = random.Random(body)  # noqa: S311 - the same states in every run
     every = list(product(*(range(key_bounds(kind)[0], key_bounds(kind)[1] + 1) for kind in types.values())))

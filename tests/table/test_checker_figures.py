@@ -153,7 +153,7 @@ def test_terms_are_built_as_small_as_they_can_be() -> None:
     assert MAKE("/", double(1.0), double(4.0)) is double(0.25)
     assert MAKE("+", NUMBER, OTHER) is MAKE("+", NUMBER, OTHER)
     assert double(-0.0) is not double(0.0)
-    assert [len(parts_first(one)) for one in ASKED] == [7, 9, 11, 1]
+    assert [len(parts_first(term)) for term in ASKED] == [7, 9, 11, 1]
 
 
 # --- spans --------------------------------------------------------------------------------
@@ -224,7 +224,7 @@ def test_the_span_of_a_choice_is_cut_where_its_condition_cuts_it() -> None:
         (Term("=", (NUMBER, four), BOOL), (NUMBER, four), (-3, 9)),
         (TRUTH, (NUMBER, four), (-3, 9)),
     ]:
-        spans = [(one.low, one.high) for one in sides]
+        spans = [(term.low, term.high) for term in sides]
         assert spanned(Term("ite", (condition, *sides), INT), [TRUTHS, *spans]) == span
     choice = Term("ite", (TRUTH, NUMBER, OTHER), INT)
     assert spanned(choice, [(1, 1), (2, 3), (5, 7)]) == (2, 3)

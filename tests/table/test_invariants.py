@@ -53,7 +53,7 @@ def test_the_state_before_the_line_is_the_witness() -> None:
 
 def test_an_assumption_that_the_initial_values_break_is_told_at_its_place() -> None:
     program = program_of(RELYING + "assume far monitored : n > 3\n")
-    [found] = [one for one in at_first(program) if one.code is Code.ASSUMPTION_INITIAL]
+    [found] = [finding for finding in at_first(program) if finding.code is Code.ASSUMPTION_INITIAL]
     assert found.primary.span == program.assumptions[-1].span
 
 

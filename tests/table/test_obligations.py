@@ -126,8 +126,8 @@ def test_each_fault_is_found_at_its_place(statements: str, code: str) -> None:
     found = verdict_of(text).findings
     assert set(codes(found)) == {code}
     line = text.splitlines().index(statements) + 1
-    assert {Source("case.rcs", text).position(one.primary.span.start).line for one in found} == {line}
-    assert all(one.witnesses for one in found if one.code is not Code.USE_BEFORE_ASSIGNMENT)
+    assert {Source("case.rcs", text).position(finding.primary.span.start).line for finding in found} == {line}
+    assert all(finding.witnesses for finding in found if finding.code is not Code.USE_BEFORE_ASSIGNMENT)
 
 
 def test_the_witness_is_the_least_in_declared_order() -> None:
@@ -294,7 +294,7 @@ table t {
     )
     found = verdict_of(text)
     assert codes(found.findings) == ["RCS411"]
-    assert [one.undecided for one in found.tables] == [True]
+    assert [verdict.undecided for verdict in found.tables] == [True]
     guarded = edited(text, ("| 100 / b |", "| when |"), ("> 20   ", "b > 0 and 100 / b > 20"))
     assert "RCS411" not in codes(verdict_of(guarded).findings)
 
@@ -418,10 +418,10 @@ def test_runs_that_are_too_long_to_follow_are_undecided(
     monkeypatch.setattr("rcsc.symbolic.evaluation.MOST_STEPS", 50)
     found = verdict_of(VARIABLES + text)
     assert found.proved is None
-    [one] = found.findings
-    assert one.code is Code.UNDECIDED
-    assert what in one.message
-    assert (VARIABLES + text)[one.primary.span.start :].startswith(place)
+    [finding] = found.findings
+    assert finding.code is Code.UNDECIDED
+    assert what in finding.message
+    assert (VARIABLES + text)[finding.primary.span.start :].startswith(place)
 
 
 def test_long_loops_are_followed() -> None:

@@ -64,7 +64,7 @@ def run(text: str, cache: Cache | None) -> Proof:
 
 def seen(proof: Proof) -> list[tuple[object, ...]]:
     tables = [(table.table, table.verdict, table.method, table.assumptions) for table in proof.tables]
-    return [*tables, *((one,) for one in proof.found)]
+    return [*tables, *((finding,) for finding in proof.found)]
 
 
 def test_only_the_table_that_changed_is_proved_again(cache: Cache, proved: list[str]) -> None:
@@ -94,7 +94,7 @@ def test_notes_move_with_their_table(cache: Cache, proved: list[str]) -> None:
     assert proved == ["one", "two"]
     fresh = run(moved, None)
     assert seen(again) == seen(fresh)
-    assert any(one.code.value == "RCS407" for one in again.found)
+    assert any(finding.code.value == "RCS407" for finding in again.found)
 
 
 def test_nothing_is_kept_of_a_program_with_errors(cache: Cache, proved: list[str]) -> None:

@@ -171,7 +171,7 @@ def told(text: str, found: Diagnostic) -> list[str]:
 
 def test_every_kind_of_fault_is_told_word_for_word() -> None:
     found = prove_program(program_of(FAULTY), Options(solver="boxes")).findings
-    assert [line for one in found for line in told(FAULTY, one)] == TOLD.splitlines()
+    assert [line for finding in found for line in told(FAULTY, finding)] == TOLD.splitlines()
 
 
 # --- what nobody could tell ---------------------------------------------------------------
@@ -204,7 +204,7 @@ def verdict(more: str, assume: str) -> TableVerdict:
 )
 def test_what_is_undecided_is_told_word_for_word(more: str, assume: str, words: list[str]) -> None:
     found = verdict(more, assume)
-    assert [one.what for one in found.found if isinstance(one, Undecided)] == words
+    assert [undecided.what for undecided in found.found if isinstance(undecided, Undecided)] == words
 
 
 def test_assumptions_that_nobody_could_tell_of_are_told_word_for_word() -> None:
@@ -244,5 +244,5 @@ def test_the_first_twenty_overlaps_are_told_with_their_regions(many: int) -> Non
     lines = "".join(f"| l{at} | x + y = {at} ||\n| m{at} | x + y = {at} ||\n" for at in range(many))
     text = f"input x : int 0 .. 50\ninput y : int 0 .. 50\ntable t {{\n| line | when ||\n{lines}| d | DEFAULT ||\n}}\n"
     [found] = prove_program(program_of(text), Options(solver="boxes")).tables
-    regions = [one.region is not None for one in found.found if isinstance(one, Overlap)]
+    regions = [overlap.region is not None for overlap in found.found if isinstance(overlap, Overlap)]
     assert regions == [True] * min(many, 20) + [False] * max(0, many - 20)

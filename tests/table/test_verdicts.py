@@ -178,7 +178,7 @@ def brute(program: Program) -> set[object]:
     inputs = [one for one in every if all(holds(a.condition, one) for a in program.assumptions)]
     if not inputs:
         return {"contradiction"}
-    matched = [matching_lines(table, one) for one in inputs]
+    matched = [matching_lines(table, point) for point in inputs]
     found: set[object] = {pair for names in matched for pair in combinations(names, 2)}
     found |= {line.name for line in table.lines if all(line.name not in names for names in matched)}
     return found | ({"gap"} if [] in matched else set())
@@ -190,8 +190,8 @@ def told(program: Program, options: Options) -> tuple[set[object], list[object],
     [table] = verdict.tables
     names = [line.name for line in table.table.lines]
     found: set[object] = set()
-    for one in table.found:
-        match one:
+    for wrong in table.found:
+        match wrong:
             case Overlap(first, second):
                 found.add((names[first], names[second]))
             case DeadLine(line):
@@ -201,8 +201,8 @@ def told(program: Program, options: Options) -> tuple[set[object], list[object],
             case ContradictoryAssumptions():
                 found.add("contradiction")
             case _:
-                found.add(one)
-    gaps: list[object] = [one.witnesses[0] for one in table.found if isinstance(one, Gap)]
+                found.add(wrong)
+    gaps: list[object] = [gap.witnesses[0] for gap in table.found if isinstance(gap, Gap)]
     for witness in gaps:
         assert isinstance(witness, dict)
         snapshot = {name: values[0] for name, values in RANGES.items()} | witness
@@ -240,7 +240,7 @@ def test_a_line_that_an_invariant_kills_is_a_mistake(solver: Literal["boxes", "a
         "  | line | v ||\n  | l | true ||\n  | m | false ||\n}\n"
     )
     found = verdict_of(text, Options(solver=solver)).findings
-    assert [(one.code, one.severity) for one in found] == [(Code.DEAD_LINE, Severity.ERROR)]
+    assert [(finding.code, finding.severity) for finding in found] == [(Code.DEAD_LINE, Severity.ERROR)]
 
 
 def test_a_gap_between_related_lines_is_told_with_the_region_around_its_least_point() -> None:
