@@ -19,7 +19,7 @@ from rcsc.lang.model import Program
 from rcsc.lang.project import load
 from rcsc.lang.resolve import resolve
 from rcsc.solvers.options import Options
-from rcsc_cell.episodes.episode import Episode, FaultSpec, Finding, Interruption, PartSpec, Restart
+from rcsc_cell.episodes.episode import Episode, EpisodeFinding, FaultSpec, Interruption, PartSpec, Restart
 from rcsc_cell.episodes.loop import Loop
 from rcsc_cell.properties import PROPERTIES
 from tests.support.programs.stages import emitted
@@ -189,7 +189,7 @@ def seed(bug: Bug, folder: Path) -> bool:
     return not made.report.failed
 
 
-def findings(bug: Bug, folder: Path) -> tuple[bool, tuple[Finding, ...]]:
+def findings(bug: Bug, folder: Path) -> tuple[bool, tuple[EpisodeFinding, ...]]:
     """Whether the bug passes the proofs, and what the properties say of it until its own speaks."""
     system = project(folder)
     proved = seed(bug, folder)
@@ -203,7 +203,7 @@ def findings(bug: Bug, folder: Path) -> tuple[bool, tuple[Finding, ...]]:
     return proved, tuple(loop.findings)
 
 
-def rows() -> Iterator[tuple[Bug, bool, dict[str, Finding]]]:
+def rows() -> Iterator[tuple[Bug, bool, dict[str, EpisodeFinding]]]:
     """Each bug with what caught it."""
     for bug in BUGS:
         with tempfile.TemporaryDirectory(prefix="rcsc-matrix-") as folder:

@@ -46,14 +46,14 @@ import numpy as np
 from rcsc.certify.execution import Owed, Start
 from rcsc.certify.known import Known
 from rcsc.certify.owed import Debt, Debts
-from rcsc.certify.settle import Answer, Ask, Fails, Left, Outcome, Settler, Shown, values_in, variables
+from rcsc.certify.settle import Ask, CaseAnswer, Fails, Left, Outcome, Settler, Shown, values_in, variables
 from rcsc.certify.table import RejectedError, TableChecker
 from rcsc.certify.values import BOOL, INT, REAL, Term
 from rcsc.diagnostics.source import Span
 from rcsc.lang.meaning import digest, relying
 from rcsc.lang.model import AssumptionName, Bool, Program, Real, Scalar, Standing, Table, Value, key_bounds
 
-__all__ = ["Answer", "Ask", "Certified", "Unchecked", "certify", "check_certificate"]
+__all__ = ["Ask", "CaseAnswer", "Certified", "Unchecked", "certify", "check_certificate"]
 
 VERSION = 2
 MOST_WORK = 50_000_000

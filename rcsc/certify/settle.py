@@ -28,7 +28,7 @@ CASES_A_SPAN = 40
 _FIT = 2**62
 
 
-class Answer(Enum):
+class CaseAnswer(Enum):
     """What a solver says of a question: is there a case in which the obligation fails?"""
 
     NONE = auto()
@@ -36,7 +36,7 @@ class Answer(Enum):
     UNKNOWN = auto()
 
 
-Ask: TypeAlias = Callable[[str], Answer]
+Ask: TypeAlias = Callable[[str], CaseAnswer]
 """Puts a question in SMT-LIB to a solver that has no part in the proof."""
 Cases: TypeAlias = Mapping[Term, Any]
 """For each variable an array of its values, one a case."""
@@ -89,10 +89,10 @@ class Settler:
         if tried is not None:
             return tried
         question = script([*hypotheses, bad])
-        answer = Answer.UNKNOWN if self.ask is None else self.ask(question)
-        if answer is Answer.NONE:
+        answer = CaseAnswer.UNKNOWN if self.ask is None else self.ask(question)
+        if answer is CaseAnswer.NONE:
             return Shown()
-        return Fails(()) if answer is Answer.SOME else Left(question)
+        return Fails(()) if answer is CaseAnswer.SOME else Left(question)
 
     def _every_case(self, hypotheses: Sequence[Term], bad: Term, known: Known) -> Outcome | None:
         """All values of what the obligation speaks of, and of what hypotheses tie to that while these are few.

@@ -4,7 +4,7 @@ from textwrap import fill, indent
 
 import click
 
-from rcsc.diagnostics.codes import FAMILIES, Code, Explanation
+from rcsc.diagnostics.codes import FAMILIES, Code, CodeText
 
 
 @click.command(
@@ -32,7 +32,7 @@ def _page(code: Code) -> str:
     return "\n\n".join([f"{code.value}: {explanation.title}", *paragraphs, *_examples(explanation)]) + "\n"
 
 
-def _examples(explanation: Explanation) -> list[str]:
+def _examples(explanation: CodeText) -> list[str]:
     shown: list[str] = []
     if explanation.wrong:
         shown += ["This is reported:", _indented(explanation.wrong), fill(explanation.report, 90)]

@@ -23,7 +23,7 @@ _REPORT = re.compile(r"(?:error|warning|note): ")
 
 
 @dataclass(frozen=True, slots=True)
-class Explanation:
+class CodeText:
     """One entry of the catalogue, taken apart.
 
     Attributes:
@@ -58,14 +58,14 @@ class Code(StrEnum):
         return member
 
     @property
-    def explanation(self) -> Explanation:
+    def explanation(self) -> CodeText:
         """What `rcsc explain` says of the code."""
         title, *blocks = cleandoc(self.entry.partition(": ")[2]).split("\n\n")
         at = next((at for at, block in enumerate(blocks) if _REPORT.match(block)), None)
         if at is None:
-            return Explanation(title, "\n\n".join(blocks), "", "", "")
+            return CodeText(title, "\n\n".join(blocks), "", "", "")
         wrong, report, *right = blocks[at - 1 :]
-        return Explanation(
+        return CodeText(
             title, "\n\n".join(blocks[: at - 1]), _unindented(wrong), report, "".join(map(_unindented, right))
         )
 

@@ -35,14 +35,14 @@ OF_SEVERITY = {Severity.ERROR: Style.ERROR, Severity.WARNING: Style.WARNING, Sev
 
 
 @dataclass(frozen=True, slots=True)
-class Piece:
+class TextPiece:
     """A run of text in one style."""
 
     text: str
     style: Style = Style.PLAIN
 
 
-Row = tuple[Piece, ...]
+Row = tuple[TextPiece, ...]
 
 
 def full(diagnostic: Diagnostic, sources: Sources, columns: int = WIDEST_LINE) -> tuple[Row, ...]:
@@ -50,8 +50,8 @@ def full(diagnostic: Diagnostic, sources: Sources, columns: int = WIDEST_LINE) -
     style = OF_SEVERITY[diagnostic.severity]
     rows: list[Row] = [
         (
-            Piece(f"{diagnostic.severity.value}[{diagnostic.code.value}]", style),
-            Piece(f": {escape(diagnostic.message)}", Style.STRONG),
+            TextPiece(f"{diagnostic.severity.value}[{diagnostic.code.value}]", style),
+            TextPiece(f": {escape(diagnostic.message)}", Style.STRONG),
         )
     ]
     labels = (diagnostic.primary, *diagnostic.related)
@@ -125,7 +125,7 @@ def _snippets(
         groups.append((group[0], group))
     for index, (first, labels) in enumerate(groups):
         arrow = "-->" if index == 0 else ":::"
-        yield (Piece(f"{' ' * gutter}{arrow} ", Style.GUTTER), Piece(_place(first, sources)))
+        yield (TextPiece(f"{' ' * gutter}{arrow} ", Style.GUTTER), TextPiece(_place(first, sources)))
         source = sources.get(first.span.file)
         if source is not None and (source.text or any(label.message for label in labels)):
             marked = [(label, style if label is primary else Style.RELATED) for label in labels]
@@ -134,8 +134,8 @@ def _snippets(
 
 def _snippet(source: Source, marked: list[tuple[Label, Style]], gutter: int, columns: int) -> Iterator[Row]:
     """The lines that the labels point into, each followed by its marks."""
-    edge = Piece(f"{' ' * gutter} | ", Style.GUTTER)
-    yield (Piece(f"{' ' * gutter} |", Style.GUTTER),)
+    edge = TextPiece(f"{' ' * gutter} | ", Style.GUTTER)
+    yield (TextPiece(f"{' ' * gutter} |", Style.GUTTER),)
     numbered = sorted(
         ((source.position(label.span.start).line, label, style) for label, style in marked),
         key=lambda item: (item[0], item[1].span),
@@ -143,7 +143,7 @@ def _snippet(source: Source, marked: list[tuple[Label, Style]], gutter: int, col
     before = 0
     for number, group in groupby(numbered, key=lambda item: item[0]):
         if before and number > before + 1:
-            yield (Piece("...", Style.GUTTER),)
+            yield (TextPiece("...", Style.GUTTER),)
         before = number
         labels = [(label, style) for _, label, style in group]
         start = min(_cells_of(source, number, label)[0] for label, _ in labels)
@@ -151,7 +151,7 @@ def _snippet(source: Source, marked: list[tuple[Label, Style]], gutter: int, col
         room = max(20, columns - gutter - 3)
         shift = 0 if width(text) <= room else max(0, min(start - room // 4, width(text) - room))
         shown = clip(text, shift, room) + ("…" if width(text) > shift + room else "")
-        yield (Piece(f"{number:>{gutter}} | ", Style.GUTTER), Piece(shown))
+        yield (TextPiece(f"{number:>{gutter}} | ", Style.GUTTER), TextPiece(shown))
         for label, style in labels:
             yield (edge, *_marks(source, number, label, style, shift, room))
 
@@ -166,13 +166,13 @@ def _cells_of(source: Source, number: int, label: Label) -> tuple[int, int]:
 
 def _marks(
     source: Source, number: int, label: Label, style: Style, shift: int, room: int
-) -> tuple[Piece, ...]:
+) -> tuple[TextPiece, ...]:
     first, count = _cells_of(source, number, label)
     char = "-" if style is Style.RELATED else "^"
     at = max(0, first - shift)
     count = max(1, min(count, room - at))
     message = f" {escape(label.message)}" if label.message else ""
-    return (Piece(" " * at), Piece(char * count + message, style))
+    return (TextPiece(" " * at), TextPiece(char * count + message, style))
 
 
 # --- what is attached ----------------------------------------------------------------
@@ -180,9 +180,9 @@ def _marks(
 
 def _attached(gutter: int, word: str, text: str, style: Style) -> Row:
     return (
-        Piece(f"{' ' * gutter} = ", Style.GUTTER),
-        Piece(word, style),
-        Piece(f": {_hanging(text, gutter + len(word) + 5)}"),
+        TextPiece(f"{' ' * gutter} = ", Style.GUTTER),
+        TextPiece(word, style),
+        TextPiece(f": {_hanging(text, gutter + len(word) + 5)}"),
     )
 
 
@@ -200,18 +200,18 @@ def _witness(witness: WitnessColumn, gutter: int) -> Iterator[Row]:
     ]
     cells = [tuple(escape(cell) for cell in row) for row in columns]
     widths = [max(width(row[column]) for row in cells) for column in range(len(heads))]
-    edge = Piece(f"{' ' * gutter} | ", Style.GUTTER)
-    yield (Piece(f"{' ' * gutter} |", Style.GUTTER),)
-    yield (edge, Piece(_joined(cells[0], widths), Style.STRONG))
-    yield (edge, Piece("|" + "|".join("-" * (cells_ + 2) for cells_ in widths) + "|"))
+    edge = TextPiece(f"{' ' * gutter} | ", Style.GUTTER)
+    yield (TextPiece(f"{' ' * gutter} |", Style.GUTTER),)
+    yield (edge, TextPiece(_joined(cells[0], widths), Style.STRONG))
+    yield (edge, TextPiece("|" + "|".join("-" * (cells_ + 2) for cells_ in widths) + "|"))
     for row in cells[1:]:
         yield (
             edge,
-            Piece(f"| {pad(row[0], widths[0])} | "),
-            Piece(pad(row[1], widths[1]), Style.WITNESS),
-            Piece(" " + _joined(row[2:], widths[2:]) if row[2:] else " |"),
+            TextPiece(f"| {pad(row[0], widths[0])} | "),
+            TextPiece(pad(row[1], widths[1]), Style.WITNESS),
+            TextPiece(" " + _joined(row[2:], widths[2:]) if row[2:] else " |"),
         )
-    yield (Piece(f"{' ' * gutter} |", Style.GUTTER),)
+    yield (TextPiece(f"{' ' * gutter} |", Style.GUTTER),)
     if witness.region:
         yield _region(witness, gutter)
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from rcsc.diff.changes import parts
 from rcsc.diff.changes.align import aligned
-from rcsc.diff.changes.difference import Difference, Part, ProgramDifference, Traces
+from rcsc.diff.changes.difference import ComparedPart, Difference, ProgramDifference, Traces
 from rcsc.diff.changes.follows import follows
 from rcsc.diff.changes.tables import table_part
 from rcsc.diff.changes.traces import traces
@@ -36,7 +36,7 @@ def compare(
         *smt.troubles(),
     )
     undecided: list[str] = []
-    found: list[Part] = []
+    found: list[ComparedPart] = []
     for what, steps in _steps(versions):
         try:
             found += steps()
@@ -65,7 +65,7 @@ def compare(
     )
 
 
-def _steps(versions: Versions) -> Iterator[tuple[str, Callable[[], Iterable[Part]]]]:
+def _steps(versions: Versions) -> Iterator[tuple[str, Callable[[], Iterable[ComparedPart]]]]:
     """What is compared, one after the other, with what to call it where it cannot be decided."""
     one = {str(table.name): table for table in versions.before.tables}
     two = {str(table.name): table for table in versions.after.tables}
@@ -74,7 +74,7 @@ def _steps(versions: Versions) -> Iterator[tuple[str, Callable[[], Iterable[Part
             yield f"table `{name}`", lambda n=name: [table_part(versions, one[n], two[n])]  # type: ignore[misc]  # bound early
         else:
             said = ("gone",) if name in one else ("new",)
-            yield "", lambda n=name, s=said: [Part("table", n, s)]  # type: ignore[misc]  # bound early
+            yield "", lambda n=name, s=said: [ComparedPart("table", n, s)]  # type: ignore[misc]  # bound early
     yield "procedures", lambda: list(parts.procedures(versions))
     yield "levels", lambda: list(parts.levels(versions))
     yield "assumptions, invariants and properties", lambda: list(parts.conditions(versions))
@@ -84,7 +84,7 @@ _APART = frozenset({"table", "level", "property", "preprocess", "postprocess"})
 """Parts on which the stopping assumptions of another table do not rest."""
 
 
-def _with_stops(versions: Versions, found: Sequence[Part], *, everywhere: bool) -> list[Part]:
+def _with_stops(versions: Versions, found: Sequence[ComparedPart], *, everywhere: bool) -> list[ComparedPart]:
     """The parts, tables with which assumptions newly stop the cycle where they fail, or no longer do.
 
     Args:

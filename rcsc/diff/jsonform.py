@@ -6,7 +6,14 @@ In: a `Difference`. Out: a JSON value with all of it; the same difference gives 
 from typing import Any
 
 from rcsc import __version__
-from rcsc.diff.changes.difference import Change, Difference, Follows, Part, ProgramDifference, Transition
+from rcsc.diff.changes.difference import (
+    Change,
+    ComparedPart,
+    Difference,
+    Follows,
+    ProgramDifference,
+    Transition,
+)
 
 FORM = 1
 """Version of the JSON form; it rises when a member changes its meaning or goes away."""
@@ -55,7 +62,7 @@ def _follows_json(follows: Follows) -> Json:
     }
 
 
-def _part_json(part: Part) -> Json:
+def _part_json(part: ComparedPart) -> Json:
     return {
         "what": part.what,
         "name": part.name,

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import count
 
-from rcsc.diff.changes.difference import Change, Part, ProgramDifference
+from rcsc.diff.changes.difference import Change, ComparedPart, ProgramDifference
 from rcsc.diff.changes.tables import assumed
 from rcsc.lang.model import (
     Box,
@@ -45,7 +45,7 @@ class Met:
         change: None where what changed of the part is no region.
     """
 
-    part: Part
+    part: ComparedPart
     change: Change | None
 
 
@@ -91,14 +91,14 @@ def _declared(found: ProgramDifference) -> Iterator[Met]:
             defers = declaration.before.endswith(" deferred") != declaration.after.endswith(" deferred")
             if admits or defers:
                 yield Met(
-                    Part(
+                    ComparedPart(
                         "declaration of", declaration.what, (f"{declaration.before} -> {declaration.after}",)
                     ),
                     None,
                 )
 
 
-def _met(part: Part, cycle: "_Cycle | None") -> Iterator[Met]:
+def _met(part: ComparedPart, cycle: "_Cycle | None") -> Iterator[Met]:
     """What of a part is met; all of it where the cycle cannot be followed."""
     if part.said:
         yield Met(part, None)
@@ -134,7 +134,7 @@ class _Cycle:
     def _leaves(self, run: Run) -> dict[str, Node]:
         return {name: run.leaf(name) for name in self.kinds}
 
-    def reached(self, part: Part, change: Change) -> bool:
+    def reached(self, part: ComparedPart, change: Change) -> bool:
         """Whether some inputs lead into the region; in doubt they do."""
         if not change.where.exact:
             return True

@@ -6,16 +6,16 @@ In: a `Difference`. Out: the same things said in each form (JSON: `jsonform`); t
 from collections.abc import Iterator, Sequence
 
 from rcsc.diagnostics.printable import escape
-from rcsc.diagnostics.render import Piece, Row, Style
+from rcsc.diagnostics.render import Row, Style, TextPiece
 from rcsc.diff.changes.align import Declaration
 from rcsc.diff.changes.difference import (
     Basis,
     Change,
+    ComparedPart,
     Difference,
     Follows,
-    Part,
+    PartSort,
     ProgramDifference,
-    Sort,
     Traces,
     Transition,
     Value,
@@ -76,14 +76,19 @@ def _besides(where: Where) -> str:
     return "" if where.exact else f"{len(where.boxes)} boxes of more"
 
 
-def _title(part: Part, change: Change) -> str:
-    if change.sort is Sort.CONDITION:
+def _title(part: ComparedPart, change: Change) -> str:
+    if change.sort is PartSort.CONDITION:
         return f"was {change.before}, is {change.after}"
     if part.what != "table":
         return "another effect"
     if change.before == change.after:
         return f"{change.before}: another effect"
-    said = {Sort.EFFECT: "another effect", Sort.LINE: "the same effect", Sort.FAULT: "", Sort.CONDITION: ""}
+    said = {
+        PartSort.EFFECT: "another effect",
+        PartSort.LINE: "the same effect",
+        PartSort.FAULT: "",
+        PartSort.CONDITION: "",
+    }
     return f"{change.before} -> {change.after}" + (f": {said[change.sort]}" if said[change.sort] else "")
 
 
@@ -98,7 +103,7 @@ def _left(value: Value) -> str:
     return general or at or "is left otherwise"
 
 
-def proof(part: Part) -> str:
+def proof(part: ComparedPart) -> str:
     """What it rests on that nothing else changed."""
     if part.basis is Basis.DIGEST:
         return "the same, by digest"
@@ -108,7 +113,7 @@ def proof(part: Part) -> str:
     return "not compared"
 
 
-def _shown(part: Part) -> bool:
+def _shown(part: ComparedPart) -> bool:
     return part.changed or bool(part.moved) or part.basis is Basis.SOLVER
 
 
@@ -128,21 +133,21 @@ def _trace(step: Transition) -> str:
 def rows(found: Difference, *, quiet: bool = False) -> Iterator[Row]:
     """As text in styled pieces."""
     if not quiet:
-        yield (Piece(f"{escape(found.before)} -> {escape(found.after)}", Style.STRONG),)
+        yield (TextPiece(f"{escape(found.before)} -> {escape(found.after)}", Style.STRONG),)
     for said in found.said:
-        yield (Piece(f"  {escape(said)}", Style.WARNING),)
+        yield (TextPiece(f"  {escape(said)}", Style.WARNING),)
     for program in found.programs:
         if program.changed or program.undecided or any(_shown(part) for part in program.parts):
             yield from _program(program)
     if not quiet:
         style = Style.ERROR if found.undecided else Style.WARNING if found.changed else Style.HELP
-        yield (Piece(escape(headline(found)), style),)
+        yield (TextPiece(escape(headline(found)), style),)
 
 
 def _program(program: ProgramDifference) -> Iterator[Row]:
-    yield (Piece(escape(program.name), Style.STRONG),)
+    yield (TextPiece(escape(program.name), Style.STRONG),)
     for declaration in program.declarations:
-        yield (Piece(f"  {declaration.what}: {_declared(declaration)}", Style.WARNING),)
+        yield (TextPiece(f"  {declaration.what}: {_declared(declaration)}", Style.WARNING),)
     for part in program.parts:
         if _shown(part):
             yield from _part(part)
@@ -151,7 +156,7 @@ def _program(program: ProgramDifference) -> Iterator[Row]:
     for follows in program.follows:
         yield from _followed(follows)
     for what in program.undecided:
-        yield (Piece(f"  not decided: {what}", Style.ERROR),)
+        yield (TextPiece(f"  not decided: {what}", Style.ERROR),)
 
 
 def _declared(one: Declaration) -> str:
@@ -160,51 +165,51 @@ def _declared(one: Declaration) -> str:
     return f"{one.before} -> {one.after}"
 
 
-def _part(part: Part) -> Iterator[Row]:
-    title = Piece(f"  {part.what} `{part.name}`", Style.STRONG)
+def _part(part: ComparedPart) -> Iterator[Row]:
+    title = TextPiece(f"  {part.what} `{part.name}`", Style.STRONG)
     if not part.changed and not part.moved:
-        yield (title, Piece(f"  {proof(part)}", Style.HELP))
+        yield (title, TextPiece(f"  {proof(part)}", Style.HELP))
         return
-    yield (title, Piece(f"  {', '.join(part.said)}", Style.WARNING))
+    yield (title, TextPiece(f"  {', '.join(part.said)}", Style.WARNING))
     for change in (*part.changes, *part.moved):
         yield from _change(part, change)
     if part.basis is not None and not (part.said and not part.changes):
-        yield (Piece(f"    {proof(part)}", Style.HELP),)
+        yield (TextPiece(f"    {proof(part)}", Style.HELP),)
 
 
-def _change(part: Part, change: Change) -> Iterator[Row]:
-    style = Style.NOTE if change.sort is Sort.LINE else Style.WARNING
+def _change(part: ComparedPart, change: Change) -> Iterator[Row]:
+    style = Style.NOTE if change.sort is PartSort.LINE else Style.WARNING
     about = ", ".join(
         one for one in (_inputs(change.where), "" if change.relied_on else "outside the assumptions") if one
     )
-    yield (Piece(f"    {_title(part, change)}", style), Piece(f"  ({about})" if about else ""))
+    yield (TextPiece(f"    {_title(part, change)}", style), TextPiece(f"  ({about})" if about else ""))
     for box in _boxes(change.where):
-        yield (Piece("      where  "), Piece(box, Style.WITNESS))
+        yield (TextPiece("      where  "), TextPiece(box, Style.WITNESS))
     if _besides(change.where):
-        yield (Piece(f"      {_besides(change.where)}", Style.WITNESS),)
-    if change.witness and change.sort is not Sort.LINE:
+        yield (TextPiece(f"      {_besides(change.where)}", Style.WITNESS),)
+    if change.witness and change.sort is not PartSort.LINE:
         yield (
-            Piece(
+            TextPiece(
                 f"      {'least' if change.least else 'input'}  {', '.join(f'{name} = {value}' for name, value in change.witness)}"
             ),
         )
     for value in change.values:
         heading = f"  [{', '.join(value.headings)}]" if value.headings else ""
-        yield (Piece(f"      {value.leaf or 'the run'}: {_left(value)}{heading}"),)
+        yield (TextPiece(f"      {value.leaf or 'the run'}: {_left(value)}{heading}"),)
 
 
 def _followed(follows: Follows) -> Iterator[Row]:
     where = f"  level `{follows.level}`, table `{follows.table}`"
     if not follows.decided:
-        yield (Piece(f"{where}: which line can follow which was not decided", Style.NOTE),)
+        yield (TextPiece(f"{where}: which line can follow which was not decided", Style.NOTE),)
     for word, pairs, style in (
         ("newly possible", follows.new, Style.WARNING),
         ("no longer possible", follows.gone, Style.NOTE),
     ):
         if pairs:
-            yield (Piece(f"{where}: {_count(len(pairs), 'step')} from line to line {word}", style),)
+            yield (TextPiece(f"{where}: {_count(len(pairs), 'step')} from line to line {word}", style),)
             for line, then in _by_line(pairs).items():
-                yield (Piece(f"    {line} -> {', '.join(then)}"),)
+                yield (TextPiece(f"    {line} -> {', '.join(then)}"),)
 
 
 def _by_line(pairs: Sequence[tuple[str, str]]) -> dict[str, list[str]]:
@@ -220,17 +225,19 @@ def _traced(traces: Traces) -> Iterator[Row]:
         if not steps:
             continue
         yield (
-            Piece(f"  level `{traces.level}`: {_count(len(steps), 'step')} {word} in its state graph", style),
+            TextPiece(
+                f"  level `{traces.level}`: {_count(len(steps), 'step')} {word} in its state graph", style
+            ),
         )
         shown, more = _steps(steps)
         for step in shown:
             yield (
-                Piece(f"    {step.variable}: {step.before} -> {step.after}", style),
-                Piece(f"  by {', '.join(step.by)}"),
+                TextPiece(f"    {step.variable}: {step.before} -> {step.after}", style),
+                TextPiece(f"  by {', '.join(step.by)}"),
             )
-            yield (Piece(f"      trace  {_trace(step)}"),)
+            yield (TextPiece(f"      trace  {_trace(step)}"),)
         if more:
-            yield (Piece(f"    and {more} more, most from states that no trace of the table reaches"),)
+            yield (TextPiece(f"    and {more} more, most from states that no trace of the table reaches"),)
 
 
 # --- Markdown ------------------------------------------------------------------------------
@@ -271,7 +278,7 @@ def _program_marked(program: ProgramDifference) -> Iterator[str]:
         yield from _follows_marked(follows)
 
 
-def _part_marked(part: Part) -> Iterator[str]:
+def _part_marked(part: ComparedPart) -> Iterator[str]:
     said = f": {_cell(', '.join(part.said))}" if part.said else ""
     yield from (f"**{_cell(part.what)} {_code(part.name)}**{said}", "")
     if part.changes:
@@ -299,7 +306,7 @@ def _part_marked(part: Part) -> Iterator[str]:
         )
 
 
-def _row(part: Part, change: Change) -> str:
+def _row(part: ComparedPart, change: Change) -> str:
     where = "<br>".join(_cell(box) for box in _boxes(change.where))
     besides = _besides(change.where)
     left = "<br>".join(f"{_code(value.leaf or 'the run')}: {_cell(_left(value))}" for value in change.values)
@@ -313,9 +320,9 @@ def _row(part: Part, change: Change) -> str:
     return f"| {' | '.join(cells)} |"
 
 
-def _details(part: Part, change: Change) -> Iterator[str]:
+def _details(part: ComparedPart, change: Change) -> Iterator[str]:
     title = _cell(_title(part, change))
-    if change.sort is Sort.LINE:
+    if change.sort is PartSort.LINE:
         said = f"{'; '.join(_boxes(change.where))} {_besides(change.where)}"
         yield f"- {title}: {_cell(said)}".rstrip()
     elif change.witness:

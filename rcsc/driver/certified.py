@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from rcsc import certify as checker
-from rcsc.certify import Answer, Certified
+from rcsc.certify import CaseAnswer, Certified
 from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label, Severity
 from rcsc.diagnostics.report import Report
@@ -139,9 +139,9 @@ def _kept_questions(outcome: Certified, folder: Path) -> list[Diagnostic]:
     return []
 
 
-def _cvc5(question: str) -> Answer:
+def _cvc5(question: str) -> CaseAnswer:
     """cvc5's answer, which has no part in the proof."""
-    return {"unsat": Answer.NONE, "sat": Answer.SOME}.get(cvc5_says(question), Answer.UNKNOWN)
+    return {"unsat": CaseAnswer.NONE, "sat": CaseAnswer.SOME}.get(cvc5_says(question), CaseAnswer.UNKNOWN)
 
 
 def _refused(file: str, message: str, code: Code = Code.CERTIFICATE) -> Diagnostic:

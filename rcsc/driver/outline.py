@@ -1,6 +1,6 @@
 """What a system is made of, as its files have it: read anew only when one of them changes.
 
-In: a system's description and the cache. Out: an `Outline` and what is known of it, or nothing where the system is not in order;
+In: a system's description and the cache. Out: an `SystemOutline` and what is known of it, or nothing where the system is not in order;
 `rcsc prove` says why.
 """
 
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from rcsc.compose.proof.standing import (
     KnownSystem,
     LevelOutline,
-    Outline,
+    SystemOutline,
     TableOutline,
     any_kept,
     standing,
@@ -38,11 +38,11 @@ def known(system: Path, cache: Cache) -> KnownSystem | None:
 class _Outlined:
     """An outline, and what stood at every place that was looked at for it."""
 
-    outline: Outline
+    outline: SystemOutline
     looked_at: dict[str, str]
 
 
-def outlined(system: Path, cache: Cache) -> Outline | None:
+def outlined(system: Path, cache: Cache) -> SystemOutline | None:
     """The system's outline; `system` is absolute."""
     kept = cache.load(_Outlined, str(system))
     if kept is not None and as_before(kept.looked_at) is not None:
@@ -76,7 +76,7 @@ def _read(system: Path) -> "tuple[dict[str, TransitionSystem], dict[str, str]] |
     return (made, looked_at) if looked_at[str(system)] == digest_at(str(system)) else None
 
 
-def outline(made: "Mapping[str, TransitionSystem]") -> Outline:
+def outline(made: "Mapping[str, TransitionSystem]") -> SystemOutline:
     """What levels are made of."""
     from rcsc.compose.contract.obligations import run_by
     from rcsc.compose.proof.assume_guarantee import promises
@@ -94,7 +94,7 @@ def outline(made: "Mapping[str, TransitionSystem]") -> Outline:
         )
         for name, one in made.items()
     )
-    return Outline(levels, tuple(promises(made)))
+    return SystemOutline(levels, tuple(promises(made)))
 
 
 def _table(table: "Table") -> TableOutline:

@@ -61,7 +61,7 @@ class Proof:
 
 
 @dataclass(frozen=True, slots=True)
-class Effort:
+class TestEffort:
     """How much `rcsc test` tries.
 
     Attributes:

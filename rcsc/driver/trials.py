@@ -11,7 +11,7 @@ from rcsc.diagnostics.diagnostic import Diagnostic, Label
 from rcsc.diagnostics.source import Span
 from rcsc.driver.compile import planned
 from rcsc.driver.pipeline import proved
-from rcsc.driver.settings import Conclusion, Effort, Settings
+from rcsc.driver.settings import Conclusion, Settings, TestEffort
 from rcsc.emit import emitted
 from rcsc.host.files import write_atomically
 from rcsc.lang.model import Expr, Program, Snapshot, Table
@@ -28,7 +28,7 @@ from rcsc.testing.mutants import Opinion
 from rcsc.testing.suite import Proofs, SuiteOptions, run_suite
 
 
-def test(settings: Settings, effort: Effort) -> Conclusion:
+def test(settings: Settings, effort: TestEffort) -> Conclusion:
     """Prove every table, then test its executors against its meaning, and write vectors if asked."""
     made = proved(settings)
     report = made.report()
@@ -55,7 +55,7 @@ def _try_out(
     program: Program,
     files: Mapping[str, str],
     options: Options,
-    effort: Effort,
+    effort: TestEffort,
     progress: Callable[[str], None],
 ) -> tuple[tuple[Diagnostic, ...], str]:
     """Run the suite on one program; what it found, and what it counted."""

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator
 from typing import TypeAlias, assert_never
 
 from rcsc.emit.ctext import SHORT, CText, c_type, locals_of, type_bounds, wide_type
-from rcsc.emit.identifiers import FAILED_BITS, Scope, comment, guard, names_of, parameter_word
+from rcsc.emit.identifiers import FAILED_BITS, NameScope, comment, guard, names_of, parameter_word
 from rcsc.emit.plan import WORD, Coded, Cuts, Direct, Group, Index, Matcher, Plan, PlanTable, Truth, joined
 from rcsc.emit.rendering import render
 from rcsc.emit.symbols import symbols, unit_text
@@ -204,7 +204,7 @@ class _Maker:
     def _parameters(self, extern: Procedure) -> Iterator[tuple[str, str]]:
         """Types, up to the name, and names."""
         kinds = {v.name: v.type for v in self.program.variables}
-        word = Scope().fresh
+        word = NameScope().fresh
         yield from ((f"{c_type(kinds[name])} ", word(parameter_word(name))) for name in extern.reads)
         yield from (
             (f"{wide_type(param.type)} ", word(parameter_word(param.name))) for param in extern.params

@@ -3,7 +3,7 @@
 In: a program. Out: `Names`. A name of a table can never become code: names are ASCII words, all generated ones carry the program's
 name in front, and texts that go into comments are cleaned here.
 
-Each namespace is a `Scope`: it begins with what is reserved in it (`rcsc.lang.reserved`) and takes every name given in it, whatever it
+Each namespace is a `NameScope`: it begins with what is reserved in it (`rcsc.lang.reserved`) and takes every name given in it, whatever it
 names. A name that is free stays as it was written; the others get what makes them different. A table, level or procedure has one
 *stem* in both languages: it is chosen so that all names made of it are free in both.
 """
@@ -82,7 +82,7 @@ def comment(text: str) -> str:
 
 
 @dataclass(slots=True)
-class Scope:
+class NameScope:
     """A namespace: the names in it, reserved ones first."""
 
     names: set[str] = field(default_factory=set)
@@ -116,7 +116,7 @@ class Scope:
         raise AssertionError(word)
 
 
-Claims = Callable[[str], Iterable[tuple[Scope, str]]]
+Claims = Callable[[str], Iterable[tuple[NameScope, str]]]
 
 
 def _variants(name: str) -> Iterator[str]:
@@ -161,8 +161,8 @@ class Names:
     classes: dict[str, str]
     class_members: dict[str, tuple[str, ...]]
     failed: tuple[str, ...]
-    c: Scope
-    module: Scope
+    c: NameScope
+    module: NameScope
 
 
 def failed_words(monitored: int) -> tuple[str, ...]:
@@ -175,9 +175,9 @@ def names_of(program: Program) -> Names:
     """All names, made unique in declared order."""
     file, p = _program_words(program)
     failed = failed_words(len(checked(program)))
-    c, module = _file_scope(program, p), Scope(set(_MODULE))
+    c, module = _file_scope(program, p), NameScope(set(_MODULE))
     stems = _Stems(p, c, module)
-    members = {r.name: Scope().all((f.name, c_word(f.name)) for f in r.fields) for r in program.records}
+    members = {r.name: NameScope().all((f.name, c_word(f.name)) for f in r.fields) for r in program.records}
     roots, paths = _paths(program, members, failed)
     tables = stems.of(
         (t.name for t in program.tables), ("{p}_{x}_line", "{p}_{x}_lines", "{p}_{x}_step", "{p}_run_{x}"),
@@ -213,10 +213,10 @@ def guard(p: str) -> str:
     return f"{capitals(p)}_H"
 
 
-def _file_scope(program: Program, p: str) -> Scope:
+def _file_scope(program: Program, p: str) -> NameScope:
     externs = {procedure.extern.c for procedure in program.procedures if procedure.extern is not None}
     own = {f"{p}_{end}" for end in (*OWN, "exact", "bit32", "bit64")}
-    return Scope(set(reserved.C_COMPOSED | C_WORDS) | externs | own | {guard(p)})
+    return NameScope(set(reserved.C_COMPOSED | C_WORDS) | externs | own | {guard(p)})
 
 
 @dataclass(frozen=True, slots=True)
@@ -224,8 +224,8 @@ class _Stems:
     """Stems of one program: each makes names in both languages."""
 
     program: str
-    c: Scope
-    module: Scope
+    c: NameScope
+    module: NameScope
 
     def of(self, names: Iterable[str], in_c: tuple[str, ...], in_python: tuple[str, ...]) -> dict[str, str]:
         """A stem for each name.
@@ -236,11 +236,11 @@ class _Stems:
             in_python: Forms of the Python names.
         """
 
-        def claims(stem: str) -> Iterator[tuple[Scope, str]]:
+        def claims(stem: str) -> Iterator[tuple[NameScope, str]]:
             for scope, forms in ((self.c, in_c), (self.module, in_python)):
                 yield from ((scope, form.format(p=self.program, x=stem)) for form in forms)
 
-        return Scope().all(((str(name), _stem(name)) for name in names), claims)
+        return NameScope().all(((str(name), _stem(name)) for name in names), claims)
 
 
 def _stem(name: str) -> str:
@@ -250,12 +250,12 @@ def _stem(name: str) -> str:
 
 
 def _attributes(program: Program, failed: tuple[str, ...]) -> dict[str, str]:
-    taken = Scope({*TRACE, *failed, "copy_in", "copy_out"})
+    taken = NameScope({*TRACE, *failed, "copy_in", "copy_out"})
     flat = ((str(v.name), _flat(str(v.name))) for v in program.variables)
     return taken.all((name, _unlike(python_word(word), taken)) for name, word in flat)
 
 
-def _unlike(word: str, scope: Scope) -> str:
+def _unlike(word: str, scope: NameScope) -> str:
     """The word, told apart from what the scope reserves as a keyword would be."""
     return f"{word}_" if word in scope.names else word
 
@@ -264,7 +264,7 @@ def _flat(name: str) -> str:
     return re.sub(r"[.\[]", "_", name.replace("]", ""))
 
 
-def _constants(program: Program, p: str, scope: Scope) -> dict[str, tuple[str, ...]]:
+def _constants(program: Program, p: str, scope: NameScope) -> dict[str, tuple[str, ...]]:
     """`PROGRAM_ENUM_MEMBER`, with `_` after it where macros of a library begin like that."""
     tail = "_" if p.upper().split("_")[0] in reserved.C_FAMILIES else ""
     return {
@@ -279,8 +279,8 @@ def _constants(program: Program, p: str, scope: Scope) -> dict[str, tuple[str, .
 def _class_members(program: Program) -> dict[str, tuple[str, ...]]:
     made = {}
     for enum in program.enums:
-        words = ((m, _unlike(python_word(m), Scope(set(reserved.PYTHON_MEMBERS)))) for m in enum.members)
-        made[enum.name] = tuple(Scope(set(reserved.PYTHON_MEMBERS)).all(words).values())
+        words = ((m, _unlike(python_word(m), NameScope(set(reserved.PYTHON_MEMBERS)))) for m in enum.members)
+        made[enum.name] = tuple(NameScope(set(reserved.PYTHON_MEMBERS)).all(words).values())
     return made
 
 
@@ -288,7 +288,7 @@ def _paths(
     program: Program, members: dict[str, dict[str, str]], failed: tuple[str, ...]
 ) -> tuple[dict[str, str], dict[str, tuple[str, ...]]]:
     """What the struct calls each declared variable, and the place of each leaf; the pending leaf of `x` is `x_next`."""
-    taken = Scope({*TRACE, *failed})
+    taken = NameScope({*TRACE, *failed})
     roots = taken.all((d.name, _unlike(c_word(d.name), taken)) for d in program.declared)
     variables = {str(v.name) for v in program.variables}
     paths: dict[str, tuple[str, ...]] = {}

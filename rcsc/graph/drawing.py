@@ -12,7 +12,7 @@ from functools import partial
 from html import escape
 
 from rcsc.graph.formats.state_graph import ANY, LINES, Edge, StateGraph
-from rcsc.graph.layout import Arrow, LayoutBox, Placed, Point, place
+from rcsc.graph.layout import Arrangement, Arrow, LayoutBox, Point, place
 from rcsc.lang.operator_table import LOGIC, Op
 
 _FONT_PX, _ROW_PX, _LETTER_PX = 11, 14, 6.62  # a letter of a monospaced font is 0.602 of its size wide
@@ -231,7 +231,7 @@ def _arrow(sheaf: Sheaf) -> Arrow:
     )
 
 
-def _sheet(picture: Picture, placed: Placed, boxes: list[LayoutBox], origin: Point) -> Iterator[str]:
+def _sheet(picture: Picture, placed: Arrangement, boxes: list[LayoutBox], origin: Point) -> Iterator[str]:
     yield f'<g transform="translate({origin[0]:.0f} {origin[1]:.0f})">'
     for sheaf, (points, tip) in zip(picture.sheaves, placed.curves, strict=True):
         yield from _curve(points, tip, dashed=sheaf.dashed)

@@ -46,7 +46,7 @@ class Arrow:
 
 
 @dataclass(frozen=True, slots=True)
-class Placed:
+class Arrangement:
     """A layout; x goes right and y down, in pixels.
 
     Attributes:
@@ -62,7 +62,7 @@ class Placed:
     labels: tuple[Point | None, ...]
 
 
-def place(boxes: Sequence[LayoutBox], arrows: Sequence[Arrow]) -> Placed:
+def place(boxes: Sequence[LayoutBox], arrows: Sequence[Arrow]) -> Arrangement:
     """The layout of the boxes and arrows, in ranks from top to bottom.
 
     Raises:
@@ -77,7 +77,7 @@ def place(boxes: Sequence[LayoutBox], arrows: Sequence[Arrow]) -> Placed:
 
     by_name = {one["name"]: one for one in said["objects"]}
     found = sorted(said.get("edges", []), key=lambda one: int(one["id"][1:]))
-    return Placed(
+    return Arrangement(
         right - left,
         top - bottom,
         tuple(point(by_name[f"n{at}"]["pos"]) for at in range(len(boxes))),

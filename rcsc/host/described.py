@@ -77,7 +77,7 @@ class Text:
 
 
 @dataclass(frozen=True, slots=True)
-class Name:
+class FileName:
     """A name that may stand in the name of a file: it leads to no other folder."""
 
     shown = f"a name of at most {MOST_FILE_CHARACTERS} letters, digits, `_`, `-` and `.`, not beginning with `.` or `-`"
@@ -154,7 +154,7 @@ class Either:
         return ", or ".join(kind.shown for kind in self.kinds)
 
 
-Kind: TypeAlias = Number | Text | Name | Word | Member | Flag | Listing | Entries | Record | Either
+Kind: TypeAlias = Number | Text | FileName | Word | Member | Flag | Listing | Entries | Record | Either
 
 
 def shown_path(path: KeyPath) -> str:
@@ -251,7 +251,7 @@ class Document:
                 yield from ((key, value[key], every[key]) for key in value.keys() & every.keys())
             case Either(kinds):
                 yield from self._parts(next(one for one in kinds if fits(one, value)), value, path)
-            case Number() | Text() | Name() | Word() | Member() | Flag():
+            case Number() | Text() | FileName() | Word() | Member() | Flag():
                 return
             case _:
                 assert_never(kind)
@@ -265,7 +265,7 @@ def fits(kind: Kind, value: Any) -> bool:
             return number and (isinstance(value, int) or isfinite(value)) and low <= value <= high
         case Text():
             return isinstance(value, str) and bool(value.strip())
-        case Name():
+        case FileName():
             return is_file_name(value)
         case Word():
             return is_identifier(value)

@@ -9,7 +9,7 @@ from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.diagnostic import Diagnostic, Label, WitnessColumn
 from rcsc.diagnostics.source import Span
 from rcsc.lang.model import spell
-from rcsc.procedures.discharge import Failure, Outcome
+from rcsc.procedures.discharge import Discharge, Failure
 
 MOST_WITNESSES = 3
 
@@ -39,7 +39,7 @@ class Cause:
 def diagnostic(code: Code, span: Span, message: str, cause: Cause) -> Diagnostic:
     """One cause as it is reported."""
     failing = [
-        one for one in zip(cause.failures, cause.where, strict=True) if one[0].outcome is Outcome.FAILS
+        one for one in zip(cause.failures, cause.where, strict=True) if one[0].outcome is Discharge.FAILS
     ]
     if not failing:
         said = f"could not be decided whether this holds: {message}"

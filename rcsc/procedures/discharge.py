@@ -37,7 +37,7 @@ class Tally:
     queries: int = 0
 
 
-class Outcome(Enum):
+class Discharge(Enum):
     """What became of an obligation that is not shown."""
 
     FAILS = auto()
@@ -53,7 +53,7 @@ class Failure:
     """
 
     obligation: Obligation
-    outcome: Outcome
+    outcome: Discharge
     witness: tuple[tuple[Variable, Value], ...] = ()
 
 
@@ -82,7 +82,7 @@ class Asker:
         try:
             return _Question(self, obligations, base(), wanted).answer()
         except smt.troubles():
-            return [Failure(obligation, Outcome.OPEN) for obligation in obligations]
+            return [Failure(obligation, Discharge.OPEN) for obligation in obligations]
 
     def all_hold(self, obligations: Sequence[Obligation], base: Callable[[], Sequence[Node]]) -> bool:
         """Whether all of them are shown wherever `base` holds, by one question; left open is not shown."""
@@ -168,7 +168,7 @@ class _Question:
     def _hold(self, places: Sequence[int]) -> bool:
         """Whether these obligations hold, given that those before do or were found; open ones are done with, too."""
         if self.unknown > MOST_UNKNOWN:
-            self.failures += [Failure(self.owed[at], Outcome.OPEN) for at in places]
+            self.failures += [Failure(self.owed[at], Discharge.OPEN) for at in places]
             return True
         bad = values.any_of([self.bad[at] for at in places])
         tried = trial.found([*self.known, bad], self.variables) if self.reals else None
@@ -202,10 +202,10 @@ class _Question:
     def _found(self, at: int, answer: Answer, tried: trial.Point | None) -> None:
         if answer is Answer.UNKNOWN:
             self.unknown += 1
-            self.failures.append(Failure(self.owed[at], Outcome.OPEN))
+            self.failures.append(Failure(self.owed[at], Discharge.OPEN))
             return
         witness = self._witness(self.bad[at], tried) if self.wanted(self.owed[at]) else ()
-        self.failures.append(Failure(self.owed[at], Outcome.FAILS, witness))
+        self.failures.append(Failure(self.owed[at], Discharge.FAILS, witness))
 
     def _witness(self, bad: Node, tried: trial.Point | None) -> tuple[tuple[Variable, Value], ...]:
         shown = [

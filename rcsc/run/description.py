@@ -16,10 +16,10 @@ from rcsc.host.described import (
     BadFile,
     Document,
     Entries,
+    FileName,
     KeyPath,
     Listing,
     Member,
-    Name,
     Number,
     Record,
     Text,
@@ -41,7 +41,7 @@ FEED = Record({"into": Member(), "query": Word(), "keys": Listing(Member())})
 LEVEL = Record({"name": Word()}, {"program": Word(), "feed": Listing(FEED)})
 SYSTEM = Record(
     {
-        "name": Name(),
+        "name": FileName(),
         "generated": Text(),
         "tick_ms": Number(1, LONGEST_MS, whole=True),
         "level": Listing(LEVEL, least=1),

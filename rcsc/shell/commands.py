@@ -11,7 +11,7 @@ from rcsc.diagnostics.codes import Code
 from rcsc.run.levels import RunningLevel
 from rcsc.shell import typed_names
 from rcsc.shell.parts import call_of, part_names
-from rcsc.shell.queries import Question, asked
+from rcsc.shell.queries import StateQuery, asked
 from rcsc.shell.reload.refusal import Refused
 from rcsc.shell.session import MOST_CYCLES, Session
 from rcsc.shell.typed_names import NamedLine
@@ -266,7 +266,9 @@ class Commands:
     # --- conditions ---
 
     def _break(self, rest: str) -> Said:
-        what: Question | NamedLine | None = typed_names.line_of(rest, self.session.levels, self.session.level)
+        what: StateQuery | NamedLine | None = typed_names.line_of(
+            rest, self.session.levels, self.session.level
+        )
         stop = self.session.stops.add(what or self.session.question(rest))
         return [f"breakpoint {stop.number}: {stop.text}"]
 

@@ -1,6 +1,6 @@
 """What `undo` goes back to: the whole system as it was before each of the last cycles.
 
-In: a system. Out: `Moment`s. Values and buffers are tuples, kept as they are; what stands outside is copied.
+In: a system. Out: `KeptMoment`s. Values and buffers are tuples, kept as they are; what stands outside is copied.
 """
 
 import copy
@@ -30,7 +30,7 @@ class Memory:
 
 
 @dataclass(frozen=True, slots=True)
-class Moment:
+class KeptMoment:
     """The whole system at one time.
 
     Attributes:
@@ -55,9 +55,9 @@ class Moment:
         )
 
 
-def kept(system: System, memory: Memory, answers: Mapping[tuple[object, ...], Values]) -> Moment:
+def kept(system: System, memory: Memory, answers: Mapping[tuple[object, ...], Values]) -> KeptMoment:
     """The system as it is now."""
-    return Moment(
+    return KeptMoment(
         system.tick,
         system.levels,
         tuple(level.values for level in system.levels),
@@ -67,7 +67,7 @@ def kept(system: System, memory: Memory, answers: Mapping[tuple[object, ...], Va
     )
 
 
-def put_back(moment: Moment, system: System, memory: Memory) -> None:
+def put_back(moment: KeptMoment, system: System, memory: Memory) -> None:
     """Makes the system what it was."""
     system.tick, system.levels, system.outside = moment.tick, moment.levels, moment.outside
     memory.held = dict(moment.buffers)

@@ -49,7 +49,7 @@ _CALL = re.compile(r"(?P<name>[\w.\-]+)\s*(?:\((?P<inside>.*)\)|(?P<after>[^()]*
 
 
 @dataclass(frozen=True, slots=True)
-class Ran:
+class PartRun:
     """What a part did.
 
     Attributes:
@@ -88,7 +88,7 @@ def call_of(text: str) -> tuple[str, tuple[str, ...]] | None:
     return match["name"], tuple(inside)
 
 
-def run_part(running: RunningLevel, program: Program, name: str, args: Sequence[str]) -> Ran:
+def run_part(running: RunningLevel, program: Program, name: str, args: Sequence[str]) -> PartRun:
     """Runs the part of that name on the level's present values.
 
     Raises:
@@ -118,7 +118,7 @@ def run_part(running: RunningLevel, program: Program, name: str, args: Sequence[
             f"`{meant}` divides by zero, leaves an array or takes the whole number of a NaN: nothing was changed",
         ) from error
     _within(part, running, meant)
-    return Ran((*(part.now[one] for one in names), *part.trace), said)
+    return PartRun((*(part.now[one] for one in names), *part.trace), said)
 
 
 def _run(part: _Part, name: str, args: Sequence[str]) -> str:

@@ -1,6 +1,6 @@
 """Questions to the running system: `task.cur_state = state_3 and primitive.travelled_mm > 40`.
 
-In: a text, and the levels as they are. Out: a `Question` that can be asked after every cycle. The language is comparison, `and`,
+In: a text, and the levels as they are. Out: a `StateQuery` that can be asked after every cycle. The language is comparison, `and`,
 `or`, `not`, parentheses, leaves, numbers and members; `=` and `/=` are read as in tables, `==` and `!=` too. Nothing is
 ever handed to Python to evaluate.
 """
@@ -33,7 +33,7 @@ MOST_NESTED = 50
 
 
 @dataclass(frozen=True, slots=True)
-class Question:
+class StateQuery:
     """A condition on the levels.
 
     Attributes:
@@ -65,7 +65,7 @@ class _Operand:
     members: tuple[str, ...] = ()
 
 
-def question(text: str, levels: Sequence[RunningLevel], chosen: RunningLevel) -> Question:
+def question(text: str, levels: Sequence[RunningLevel], chosen: RunningLevel) -> StateQuery:
     """What the text asks.
 
     Raises:
@@ -75,7 +75,7 @@ def question(text: str, levels: Sequence[RunningLevel], chosen: RunningLevel) ->
     holds = reading.either(0)
     if reading.tokens:
         raise reading.bad(f"`{reading.tokens[0]}` is not expected")
-    return Question(text.strip(), chosen.name, holds, tuple(reading.leaves))
+    return StateQuery(text.strip(), chosen.name, holds, tuple(reading.leaves))
 
 
 def _tokens(text: str) -> list[str]:
@@ -227,6 +227,6 @@ class _Reading:
         return one
 
 
-def asked(one: Question, levels: Sequence[RunningLevel]) -> bool:
+def asked(one: StateQuery, levels: Sequence[RunningLevel]) -> bool:
     """Whether it holds now."""
     return one.holds(by_name(levels))

@@ -18,7 +18,7 @@ from rcsc.run.signature import Signature, Value, Values
 from rcsc.run.system import StateTableError, System
 from rcsc.shell import history, typed_names
 from rcsc.shell.parts import run_part
-from rcsc.shell.queries import Question, question
+from rcsc.shell.queries import StateQuery, question
 from rcsc.shell.reload.composed import held_by, together
 from rcsc.shell.reload.gate import Judged, Running, judge
 from rcsc.shell.reload.refusal import Refused
@@ -50,7 +50,7 @@ class Session:
         self.chosen = system.levels[0].name
         self.stops = Stops()
         self.interrupted = False
-        self._past: deque[history.Moment] = deque(maxlen=history.MOST)
+        self._past: deque[history.KeptMoment] = deque(maxlen=history.MOST)
         self._answers: dict[tuple[object, ...], Values] = {}
         # By identity, as after a reload another level has the name; the level is kept, so that its number stays its own.
         self._programs: dict[int, tuple[RunningLevel, Program]] = {}
@@ -80,7 +80,7 @@ class Session:
         """What the description says of a level."""
         return next(level for level in self.system.description.levels if level.name == name)
 
-    def question(self, text: str) -> Question:
+    def question(self, text: str) -> StateQuery:
         """What a condition asks.
 
         Raises:
@@ -141,14 +141,14 @@ class Session:
         level.values = _spoken(level, ran.values)
         return [f"{level.name}: {ran.said}", *self.changed()]
 
-    def run(self, most: int, until: Question | NamedLine | None = None) -> str:
+    def run(self, most: int, until: StateQuery | NamedLine | None = None) -> str:
         """Cycles until the condition holds, a breakpoint is met, or there were enough; why it ended.
 
         Raises:
             Refused: As `cycle`.
         """
         self.stops.look(self.levels)
-        if isinstance(until, Question) and stands(until, self.levels):
+        if isinstance(until, StateQuery) and stands(until, self.levels):
             return f"cycle {self.system.tick}: `{until.text}` holds"
         for _ in range(most):
             self.cycle()

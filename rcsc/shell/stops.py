@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from rcsc.run.levels import RunningLevel
-from rcsc.shell.queries import Question, asked, question
+from rcsc.shell.queries import StateQuery, asked, question
 from rcsc.shell.reload.refusal import Refused
 from rcsc.shell.typed_names import NamedLine, level_of, line_of, unknown
 
@@ -20,23 +20,23 @@ class Stop:
     """
 
     number: int
-    what: Question | NamedLine
+    what: StateQuery | NamedLine
     stood: bool = False
 
     @property
     def text(self) -> str:
         """As it was given."""
-        return self.what.text if isinstance(self.what, Question) else str(self.what)
+        return self.what.text if isinstance(self.what, StateQuery) else str(self.what)
 
 
-def stands(what: Question | NamedLine, levels: Levels) -> bool:
+def stands(what: StateQuery | NamedLine, levels: Levels) -> bool:
     """Whether the condition holds, or the line was the level's last."""
-    return asked(what, levels) if isinstance(what, Question) else what.matched(level_of(what.level, levels))
+    return asked(what, levels) if isinstance(what, StateQuery) else what.matched(level_of(what.level, levels))
 
 
-def reached(what: Question | NamedLine) -> str:
+def reached(what: StateQuery | NamedLine) -> str:
     """What was come to, in words."""
-    return f"`{what.text}` holds" if isinstance(what, Question) else f"line {what}"
+    return f"`{what.text}` holds" if isinstance(what, StateQuery) else f"line {what}"
 
 
 @dataclass(slots=True)
@@ -46,7 +46,7 @@ class Stops:
     every: list[Stop] = field(default_factory=list)
     _numbered: int = 0
 
-    def add(self, what: Question | NamedLine) -> Stop:
+    def add(self, what: StateQuery | NamedLine) -> Stop:
         """A new one."""
         self._numbered += 1
         self.every.append(Stop(self._numbered, what))
@@ -79,7 +79,7 @@ class Stops:
 
 
 def _again(stop: Stop, levels: Levels) -> None:
-    if isinstance(stop.what, Question):
+    if isinstance(stop.what, StateQuery):
         stop.what = question(stop.what.text, levels, level_of(stop.what.chosen, levels))
     elif line_of(str(stop.what), levels, levels[0]) is None:
         raise unknown(str(stop.what), "line", ())

@@ -19,7 +19,7 @@ from rcsc.lang.model import AssumptionName, Box, Program, Snapshot, Table, Table
 from rcsc.procedures.invariants import assumed_of
 from rcsc.table.partition import MANY, parting
 from rcsc.table.regions.atoms import Universe
-from rcsc.table.regions.region import Counted, Empty, Node, Only, Open, Outside, Rests, Split
+from rcsc.table.regions.region import Counted, Empty, Node, Only, Open, OutsideAssumption, Rests, Split
 
 VERSION = 2
 Certificate: TypeAlias = Mapping[str, object]
@@ -122,7 +122,7 @@ def _shown(node: Node) -> list[object]:
             return ["s", form, cut]
         case Empty(multipliers):
             return ["e", [list(pair) for pair in multipliers]]
-        case Outside(assumption):
+        case OutsideAssumption(assumption):
             return ["a", assumption]
         case Only(line):
             return ["l", line]

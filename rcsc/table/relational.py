@@ -33,8 +33,7 @@ from rcsc.table.certificate import must_cover, tree_certificate
 from rcsc.table.confirm import TableSolver, shown
 from rcsc.table.regions.atoms import Formula, Universe, assumptions_of, lines_of, some
 from rcsc.table.regions.least import find, inside, least, negated, whole, widest
-from rcsc.table.regions.region import Answer as Unsettled
-from rcsc.table.regions.region import Bounds, Point, Question, Rests, Search
+from rcsc.table.regions.region import Bounds, NoWitness, Point, Question, Rests, Search
 from rcsc.table.regions.splitting import Tree
 from rcsc.table.verdict import ContradictoryAssumptions, DeadLine, Found, Gap, Overlap, Region, Undecided
 
@@ -180,7 +179,7 @@ class _Decision:
             keys = [(singles[column], key_of(v.type, value)) for v, column, value in here]
             pinned = [self.universe.atom(form, ((key, key),)) for form, key in keys]
             point = least(self.universe, [*pinned, *self.assumed], self.columns)
-            if not isinstance(point, Unsettled):
+            if not isinstance(point, NoWitness):
                 return [Gap((self.snapshot(point),), (None,))]
         return self.gap(Search())
 
@@ -190,7 +189,7 @@ class _Decision:
             self.universe,
             self.clauses,
             [self.assumptions[at] for at in kept],
-            (lambda _: Unsettled.UNKNOWN) if alone else self.oracle,
+            (lambda _: NoWitness.UNKNOWN) if alone else self.oracle,
             default=not must_cover(self.table),
             budget=budget,
             first_only=alone,
@@ -212,10 +211,10 @@ class _Decision:
                 kept, search = fewer, again
         return kept, search
 
-    def oracle(self, asked: Question) -> Snapshot | Unsettled:
+    def oracle(self, asked: Question) -> Snapshot | NoWitness:
         """Z3's answer about a region, as the tree asks it."""
         if len(asked.candidates) > _MOST_CANDIDATES or smt.spent():
-            return Unsettled.UNKNOWN
+            return NoWitness.UNKNOWN
         columns, forms = self.universe.columns, self.universe.forms
         bounds = {
             tuple((columns[column].name, k) for column, k in forms[form]): (low, high)
@@ -230,16 +229,16 @@ class _Decision:
         if answer is Answer.SATISFIABLE:
             leaves = z3.frame.leaves
             return {str(v.name): z3.solver.value(leaves[v.name], v.type) for v in self.program.variables}
-        return Unsettled.NONE if answer is Answer.UNSATISFIABLE else Unsettled.UNKNOWN
+        return NoWitness.NONE if answer is Answer.UNSATISFIABLE else NoWitness.UNKNOWN
 
     # --- findings ----------------------------------------------------------------------
 
     def satisfiable(self, formulas: Sequence[Formula], *terms: Term) -> Answer:
         """Whether the formulas can hold together under no assumption but what they say."""
         point = find(self.universe, formulas)
-        if point is Unsettled.UNKNOWN:
+        if point is NoWitness.UNKNOWN:
             return self.asked.holds(*terms)
-        return Answer.UNSATISFIABLE if isinstance(point, Unsettled) else Answer.SATISFIABLE
+        return Answer.UNSATISFIABLE if isinstance(point, NoWitness) else Answer.SATISFIABLE
 
     def overlaps(self, search: Search) -> list[Found]:
         """Every overlapping pair with its least witness."""
@@ -261,7 +260,7 @@ class _Decision:
         """A pair of lines that overlaps, at its least input."""
         both = [self.lines[first], self.lines[second]]
         point = least(self.universe, [*both, *self.assumed], self.columns)
-        if isinstance(point, Unsettled):
+        if isinstance(point, NoWitness):
             seen = [one for one in self.tried if {first, second} <= set(self.matching(one))]
             witness = self.witness(seen, lambda z3: (z3.line(first), z3.line(second)))
             pair = f"lines `{self.table.lines[first].name}` and `{self.table.lines[second].name}`"
@@ -279,7 +278,7 @@ class _Decision:
             points = [
                 least(self.universe, inside(self.universe, part), self.columns) for part, _ in search.gaps
             ]
-            settled = [point for point in points if not isinstance(point, Unsettled)]
+            settled = [point for point in points if not isinstance(point, NoWitness)]
             if len(settled) == len(points):
                 point = min(settled, key=lambda one: [one[column] for column in self.columns])
                 few = len(self.lines) <= _MOST_LINES_GROWN
@@ -301,15 +300,15 @@ class _Decision:
         found: list[Found] = []
         for at, line in enumerate(self.lines):
             point = find(self.universe, [line, *self.assumed])
-            if isinstance(point, Unsettled):
+            if isinstance(point, NoWitness):
                 answer = Answer.UNSATISFIABLE
-                if point is Unsettled.UNKNOWN and any(at in self.matching(one) for one in self.tried):
+                if point is NoWitness.UNKNOWN and any(at in self.matching(one) for one in self.tried):
                     answer = Answer.SATISFIABLE
-                elif point is Unsettled.UNKNOWN:
+                elif point is NoWitness.UNKNOWN:
                     answer = self.asked.holds(self.asked.line(at))
                 if answer is Answer.UNSATISFIABLE:
                     assuming = len(sure) < len(self.assumed)
-                    assuming = assuming and find(self.universe, [line, *sure]) is not Unsettled.NONE
+                    assuming = assuming and find(self.universe, [line, *sure]) is not NoWitness.NONE
                     found.append(DeadLine(at, assuming))
                 elif answer is Answer.UNKNOWN:
                     found.append(Undecided(f"whether line `{self.table.lines[at].name}` can match"))
@@ -342,7 +341,7 @@ class _Decision:
 
         def holds(box: list[Formula]) -> bool:
             return all(
-                find(self.universe, [*box, *self.assumed, *formulas]) is Unsettled.NONE for formulas in never
+                find(self.universe, [*box, *self.assumed, *formulas]) is NoWitness.NONE for formulas in never
             )
 
         box = widest(self.universe, point, self.columns, holds)

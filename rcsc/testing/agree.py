@@ -15,10 +15,10 @@ from rcsc.lang.interpret import Fault, Outcome, cycle, holds, matching_lines, ru
 from rcsc.lang.model import LineName, Program, Snapshot, Table, Value
 from rcsc.testing.executors.edges import may_be_matched
 from rcsc.testing.executors.externs import begin
-from rcsc.testing.executors.native import Native, Result
+from rcsc.testing.executors.native import Native, NativeRun
 from rcsc.testing.executors.reference_file import all_lines, fault_named, monitored
-from rcsc.testing.executors.sessions import Seen, Session, differences
-from rcsc.testing.executors.targets import Target
+from rcsc.testing.executors.sessions import Seen, Stimuli, differences
+from rcsc.testing.executors.targets import ComparedFunction
 
 NONE, SEVERAL = -1, -2
 WHOLE = 1
@@ -38,12 +38,12 @@ class Disagreement:
     executor: str
     function: str
     cycle: int
-    session: Session
+    session: Stimuli
     words: tuple[str, ...]
 
 
 @dataclass(slots=True)
-class Compared:
+class AgreementCount:
     """What was compared so far.
 
     Attributes:
@@ -59,7 +59,7 @@ class Compared:
     broken: int = 0
     faults: Counter[int] = field(default_factory=Counter)
     lines: dict[str, Counter[str]] = field(default_factory=dict)
-    kept: list[tuple[int, int, Session, list[Seen]]] = field(default_factory=list)
+    kept: list[tuple[int, int, Stimuli, list[Seen]]] = field(default_factory=list)
     matched: list[tuple[int, list[Snapshot]]] = field(default_factory=list)
 
     @property
@@ -76,13 +76,13 @@ class Compared:
 class PythonRuns(Protocol):
     """What the emitted Python does; see `executors.python`."""
 
-    def run(self, target: Target, session: Session) -> list[Seen]:
+    def run(self, target: ComparedFunction, session: Stimuli) -> list[Seen]:
         """Runs a session."""
 
     def initial(self) -> dict[str, Value]:
         """A new state's leaves."""
 
-    def line(self, target: Target, snapshot: Snapshot) -> int:
+    def line(self, target: ComparedFunction, snapshot: Snapshot) -> int:
         """What the emitted `line` function gives."""
 
 
@@ -93,14 +93,14 @@ class Executors:
     program: Program
     native: Native
     python: PythonRuns
-    targets: tuple[Target, ...]
+    targets: tuple[ComparedFunction, ...]
 
-    def number(self, target: Target) -> int:
+    def number(self, target: ComparedFunction) -> int:
         """Number of the target's function in the shim; the reference's is one more."""
         return 2 * self.targets.index(target)
 
 
-def interpreter(program: Program, target: Target) -> Callable[[Snapshot], Outcome]:
+def interpreter(program: Program, target: ComparedFunction) -> Callable[[Snapshot], Outcome]:
     """The interpreter's meaning of a step or a cycle."""
     if target.kind == "step":
         table = program.tables[target.number]
@@ -118,7 +118,7 @@ def seen_by_interpreter(outcome: Outcome) -> Seen:
     return Seen(int(outcome.fault), at, line, failed, outcome.snapshot)
 
 
-def seen_in_c(program: Program, native: Native, result: Result) -> Seen:
+def seen_in_c(program: Program, native: Native, result: NativeRun) -> Seen:
     """A row of the C executor in the common words."""
     names = monitored(program)
     at = fault_named(program, native.symbols, result.fault, result.fault_at)
@@ -127,18 +127,18 @@ def seen_in_c(program: Program, native: Native, result: Result) -> Seen:
     return Seen(result.fault, at, line, failed, result.snapshot)
 
 
-def rows_of(session: Session) -> list[Snapshot]:
+def rows_of(session: Stimuli) -> list[Snapshot]:
     """One row a cycle for the shim: the start with that cycle's readings."""
     return [{**session.start, **readings} for readings in session.readings]
 
 
-def keeps_invariants(program: Program, session: Session) -> bool:
+def keeps_invariants(program: Program, session: Stimuli) -> bool:
     """Whether the start can be a state of the program as far as its invariants say."""
     return all(holds(invariant.condition, session.start) for invariant in program.invariants)
 
 
 def run_session(
-    executors: Executors, target: Target, session: Session, compared: Compared
+    executors: Executors, target: ComparedFunction, session: Stimuli, compared: AgreementCount
 ) -> Disagreement | None:
     """Runs one session in all executors.
 
@@ -169,7 +169,7 @@ def run_session(
     return None
 
 
-def run_init(executors: Executors, target: Target) -> Disagreement | None:
+def run_init(executors: Executors, target: ComparedFunction) -> Disagreement | None:
     """Compares the initial states."""
     start = {str(v.name): v.initial for v in executors.program.variables}
     [row] = executors.native.run(executors.number(target), WHOLE, [start])
@@ -177,11 +177,11 @@ def run_init(executors: Executors, target: Target) -> Disagreement | None:
         right, seen = (Seen(0, "", NONE, (), values) for values in (start, snapshot))
         words = differences(executors.program, right, seen)
         if words:
-            return Disagreement(name, target.function, 1, Session(start, ()), words)
+            return Disagreement(name, target.function, 1, Stimuli(start, ()), words)
     return None
 
 
-def _count(program: Program, target: Target, compared: Compared, seen: Seen) -> None:
+def _count(program: Program, target: ComparedFunction, compared: AgreementCount, seen: Seen) -> None:
     compared.cycles += 1
     compared.faults[seen.fault] += 1
     compared.broken += bool(seen.failed)
@@ -201,7 +201,7 @@ def line_number(table: Table, names: Sequence[LineName]) -> int:
 
 
 def run_lines(
-    executors: Executors, target: Target, snapshots: Sequence[Snapshot], compared: Compared
+    executors: Executors, target: ComparedFunction, snapshots: Sequence[Snapshot], compared: AgreementCount
 ) -> Disagreement | None:
     """Compares the matchers on snapshots in which the table may be matched; assumptions that only tell may fail."""
     table = executors.program.tables[target.number]
@@ -219,13 +219,15 @@ def run_lines(
         for name, seen in others.items():
             if seen != right:
                 words = (f"line {seen} where {right} is right",)
-                return Disagreement(name, target.function, 1, Session(snapshot, ()), words)
+                return Disagreement(name, target.function, 1, Stimuli(snapshot, ()), words)
         compared.matches += 1
     compared.matched.append((number, list(snapshots)))
     return None
 
 
-def run_sanitized(executors: Executors, compared: Compared) -> Disagreement | BuildFailed | Absent | None:
+def run_sanitized(
+    executors: Executors, compared: AgreementCount
+) -> Disagreement | BuildFailed | Absent | None:
     """All sessions again in the program with sanitizers, which stop it at the first finding."""
     made = executors.native.run_checked(compared.sessions_again())
     if not isinstance(made, list):

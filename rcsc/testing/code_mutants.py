@@ -26,7 +26,7 @@ from rcsc.testing.executors.externs import STAND_INS
 from rcsc.testing.executors.native import COMPILE_S, Native
 from rcsc.testing.executors.shim import shim_c
 from rcsc.testing.executors.symbols import Symbols
-from rcsc.testing.executors.targets import Target, targets
+from rcsc.testing.executors.targets import ComparedFunction, targets
 from rcsc.testing.matchers.matcher import Checked, Compared, check_matcher
 from rcsc.testing.matchers.matcher_text import matcher_text, numbers
 
@@ -343,7 +343,7 @@ class Judge:
             found = Noticed.UNDECIDED if said is Noticed.UNDECIDED else found
         return found
 
-    def shown(self, files: Mapping[str, str], target: Target) -> Noticed:
+    def shown(self, files: Mapping[str, str], target: ComparedFunction) -> Noticed:
         """What the check of the matcher says of a changed function, else ESBMC."""
         if target.kind == "line":
             table = self.program.tables[target.number]

@@ -7,9 +7,16 @@ from collections.abc import Callable, Iterator
 from random import Random
 
 from rcsc.lang.model import Program, Table
-from rcsc.testing.agree import Compared, Disagreement, Executors, keeps_invariants, run_lines, run_session
-from rcsc.testing.executors.sessions import Session
-from rcsc.testing.executors.targets import Target
+from rcsc.testing.agree import (
+    AgreementCount,
+    Disagreement,
+    Executors,
+    keeps_invariants,
+    run_lines,
+    run_session,
+)
+from rcsc.testing.executors.sessions import Stimuli
+from rcsc.testing.executors.targets import ComparedFunction
 from rcsc.testing.inputs.sampling import declarations, session, snapshot
 
 TRIES = 10
@@ -18,7 +25,7 @@ TOGETHER = 8
 """Snapshots that go through a matcher at once."""
 
 
-def table_of(program: Program, target: Target) -> Table | None:
+def table_of(program: Program, target: ComparedFunction) -> Table | None:
     """The table whose lines the inputs should aim at."""
     if target.kind != "cycle":
         return program.tables[target.number]
@@ -27,7 +34,11 @@ def table_of(program: Program, target: Target) -> Table | None:
 
 
 def search_sessions(
-    executors: Executors, target: Target, compared: Compared, examples: int, most_cycles: int = 8
+    executors: Executors,
+    target: ComparedFunction,
+    compared: AgreementCount,
+    examples: int,
+    most_cycles: int = 8,
 ) -> Disagreement | None:
     """Runs drawn sessions of a step or a cycle.
 
@@ -54,14 +65,16 @@ def search_sessions(
     return None
 
 
-def _differs(executors: Executors, target: Target, one: Session, compared: Compared) -> Disagreement | None:
+def _differs(
+    executors: Executors, target: ComparedFunction, one: Stimuli, compared: AgreementCount
+) -> Disagreement | None:
     if not keeps_invariants(executors.program, one):
         return None
     return run_session(executors, target, one, compared)
 
 
 def search_lines(
-    executors: Executors, target: Target, compared: Compared, examples: int
+    executors: Executors, target: ComparedFunction, compared: AgreementCount, examples: int
 ) -> Disagreement | None:
     """Runs drawn snapshots through a matcher, some at a time."""
     program = executors.program
@@ -75,7 +88,7 @@ def search_lines(
 
 
 def simplest(
-    program: Program, found: Disagreement, differs: Callable[[Session], Disagreement | None]
+    program: Program, found: Disagreement, differs: Callable[[Stimuli], Disagreement | None]
 ) -> Disagreement:
     """A disagreement with as few cycles, and as few values that are not initial, as can be had one by one."""
     for one in _shorter(found):
@@ -84,14 +97,14 @@ def simplest(
         name = str(variable.name)
         start = {**found.session.start, name: variable.initial}
         changed = tuple({**r, name: variable.initial} if name in r else r for r in found.session.readings)
-        found = differs(Session(start, changed)) or found
+        found = differs(Stimuli(start, changed)) or found
     return found
 
 
-def _shorter(found: Disagreement) -> Iterator[Session]:
+def _shorter(found: Disagreement) -> Iterator[Stimuli]:
     """The session cut after the cycle that differs, then its last cycles alone."""
     start, kept = found.session.start, found.session.readings[: found.cycle]
-    yield Session(start, kept)
+    yield Stimuli(start, kept)
     for count in (4, 2, 1):
         if count < len(kept):
-            yield Session(start, kept[-count:])
+            yield Stimuli(start, kept[-count:])

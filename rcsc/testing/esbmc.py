@@ -22,7 +22,7 @@ from rcsc.lang.model import Program, Real
 from rcsc.testing.executors.externs import STAND_INS, externs
 from rcsc.testing.executors.reference_file import monitored, reference_c
 from rcsc.testing.executors.symbols import Symbols
-from rcsc.testing.executors.targets import Target, call_of, is_matcher, reference_of
+from rcsc.testing.executors.targets import ComparedFunction, call_of, is_matcher, reference_of
 from rcsc.testing.matchers.matcher_text import ShapeError, function_body
 
 CHECKS = (
@@ -142,7 +142,7 @@ def _trace_claims(program: Program, symbols: Symbols) -> Iterator[str]:
         yield f'__ESBMC_assert({failed}, "assumption {number}");'
 
 
-def harness(program: Program, symbols: Symbols, target: Target) -> str:
+def harness(program: Program, symbols: Symbols, target: ComparedFunction) -> str:
     """The C text that states what is to be proved of one function."""
     struct, name = symbols.struct, reference_of(target)
     top = [f'#include "{symbols.header}"', reference_c(program, symbols), SAME, *_arbitrary(program, symbols)]
@@ -167,7 +167,9 @@ STEP = re.compile(
 KNOWN = "__ESBMC_assume(ref_ranges(&a, 0)); __ESBMC_assume(ref_invariants(&a));"
 
 
-def part_harness(program: Program, symbols: Symbols, target: Target, part: str, function: str) -> str:
+def part_harness(
+    program: Program, symbols: Symbols, target: ComparedFunction, part: str, function: str
+) -> str:
     """What is to be proved of one part of a step: `admit`, `settle` or `run`.
 
     `run` begins from what the reference's own admission and deferral leave, so that both sides compute on the
@@ -194,7 +196,7 @@ def part_harness(program: Program, symbols: Symbols, target: Target, part: str, 
     return "\n".join([*top, *body, "return 0; }"]) + "\n"
 
 
-def too_large(program: Program, target: Target) -> bool:
+def too_large(program: Program, target: ComparedFunction) -> bool:
     """Whether ESBMC is not asked about a function, for the size of its tables."""
     table = program.tables[target.number] if target.kind in ("line", "batch", "step") else None
     lines = max((len(one.lines) for one in ((table,) if table else program.tables)), default=0)
@@ -202,7 +204,11 @@ def too_large(program: Program, target: Target) -> bool:
 
 
 def prove_function(
-    program: Program, symbols: Symbols, files: Mapping[str, str], target: Target, timeout_s: float = 60.0
+    program: Program,
+    symbols: Symbols,
+    files: Mapping[str, str],
+    target: ComparedFunction,
+    timeout_s: float = 60.0,
 ) -> EsbmcVerdict:
     """Asks ESBMC about one function; about a step that is too large as a whole, part by part.
 
@@ -221,7 +227,7 @@ def prove_function(
     return ask(files, target.function, text, timeout_s, with_sources=True)
 
 
-def step_parts(symbols: Symbols, files: Mapping[str, str], target: Target) -> dict[str, str] | None:
+def step_parts(symbols: Symbols, files: Mapping[str, str], target: ComparedFunction) -> dict[str, str] | None:
     """The three functions that a step runs in turn, read from its text; None if it does anything else."""
     source = next(text for path, text in files.items() if Path(path).name == symbols.source)
     try:
@@ -236,7 +242,7 @@ def _prove_parts(
     program: Program,
     symbols: Symbols,
     files: Mapping[str, str],
-    target: Target,
+    target: ComparedFunction,
     parts: Mapping[str, str],
     timeout_s: float,
 ) -> EsbmcVerdict:

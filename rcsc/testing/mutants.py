@@ -64,7 +64,7 @@ class TableMutant:
 
 
 @dataclass(frozen=True, slots=True)
-class Judged:
+class JudgedMutant:
     """What became of one mutant."""
 
     change: str
@@ -244,7 +244,9 @@ def _only(
     return answer
 
 
-def judge(search: InputSearch, table: Table, mutant: TableMutant, before: Opinion, prover: Prover) -> Judged:
+def judge(
+    search: InputSearch, table: Table, mutant: TableMutant, before: Opinion, prover: Prover
+) -> JudgedMutant:
     """What becomes of one mutant.
 
     Args:
@@ -258,21 +260,21 @@ def judge(search: InputSearch, table: Table, mutant: TableMutant, before: Opinio
     tables = tuple(mutant.table if t.name == table.name else t for t in program.tables)
     after = prover(replace(program, tables=tables), mutant.table)
     if not after.accepted:
-        return Judged(mutant.change, mutant.where, Caught.PROVER)
+        return JudgedMutant(mutant.change, mutant.where, Caught.PROVER)
     if after.default != before.default:
-        return Judged(mutant.change, mutant.where, Caught.DEFAULT)
+        return JudgedMutant(mutant.change, mutant.where, Caught.DEFAULT)
     found = difference(search, table, mutant)
     if found is Missing.NONE:
-        return Judged(mutant.change, mutant.where, Caught.EQUIVALENT)
+        return JudgedMutant(mutant.change, mutant.where, Caught.EQUIVALENT)
     if isinstance(found, Missing):
-        return Judged(mutant.change, mutant.where, Caught.UNDECIDED)
+        return JudgedMutant(mutant.change, mutant.where, Caught.UNDECIDED)
     parted = matching_lines(table, found) != matching_lines(mutant.table, found)
-    return Judged(mutant.change, mutant.where, Caught.EXECUTORS if parted else Caught.SURVIVED)
+    return JudgedMutant(mutant.change, mutant.where, Caught.EXECUTORS if parted else Caught.SURVIVED)
 
 
 def judge_table(
     search: InputSearch, table: Table, prover: Prover, sample: int | None = None, seed: int = 1984
-) -> tuple[Judged, ...]:
+) -> tuple[JudgedMutant, ...]:
     """Judges the table's mutants: all of them, or a sample by seed.
 
     Args:

@@ -14,7 +14,7 @@ from rcsc.diagnostics.source import Span
 from rcsc.host.tools import Absent, BuildFailed
 from rcsc.lang.model import Line, Program, Snapshot, Table
 from rcsc.testing.agree import (
-    Compared,
+    AgreementCount,
     Disagreement,
     Executors,
     keeps_invariants,
@@ -30,9 +30,9 @@ from rcsc.testing.executors.externs import PythonStandIns, python_stand_ins, wit
 from rcsc.testing.executors.native import Native, build
 from rcsc.testing.executors.python import python_executor
 from rcsc.testing.executors.reference_file import all_lines, inputs
-from rcsc.testing.executors.sessions import Session, described
+from rcsc.testing.executors.sessions import Stimuli, described
 from rcsc.testing.executors.symbols import Symbols, symbols_of
-from rcsc.testing.executors.targets import Target, is_matcher, targets
+from rcsc.testing.executors.targets import ComparedFunction, is_matcher, targets
 from rcsc.testing.figures import ProgramFigures, SuiteResult, TableFigures, counted, tally
 from rcsc.testing.inputs.snapshot import Solver, search_in
 from rcsc.testing.inputs.vectors import Vectors, vectors_of
@@ -106,11 +106,11 @@ class Suite:
     options: SuiteOptions
     proofs: Proofs
     executors: Executors
-    compared: Compared = field(default_factory=Compared)
+    compared: AgreementCount = field(default_factory=AgreementCount)
     found: list[Diagnostic] = field(default_factory=list)
     checked: dict[str, Checked] = field(default_factory=dict)
 
-    def table(self, target: Target) -> Table | None:
+    def table(self, target: ComparedFunction) -> Table | None:
         """The table of a matcher or step."""
         return None if target.kind in ("cycle", "init") else self.program.tables[target.number]
 
@@ -129,14 +129,14 @@ class Suite:
             if found is not None:
                 self.found.append(_disagreement(self.program, found, table))
 
-    def lines(self, target: Target, snapshots: Sequence[Snapshot]) -> Disagreement | None:
+    def lines(self, target: ComparedFunction, snapshots: Sequence[Snapshot]) -> Disagreement | None:
         """A matcher on the vectors and on drawn snapshots."""
         from rcsc.testing.differential_search import search_lines
 
         found = run_lines(self.executors, target, snapshots, self.compared)
         return found or search_lines(self.executors, target, self.compared, self.options.examples)
 
-    def steps(self, target: Target, snapshots: Sequence[Snapshot]) -> Disagreement | None:
+    def steps(self, target: ComparedFunction, snapshots: Sequence[Snapshot]) -> Disagreement | None:
         """A step from the vectors, a step or cycle in drawn sessions."""
         from rcsc.testing.differential_search import search_sessions
 
@@ -146,10 +146,10 @@ class Suite:
             self.executors, target, self.compared, options.examples, options.cycles
         )
 
-    def one_step(self, target: Target, snapshot: Snapshot) -> Disagreement | None:
+    def one_step(self, target: ComparedFunction, snapshot: Snapshot) -> Disagreement | None:
         """One step from a vector."""
         readings = {str(v.name): snapshot[v.name] for v in inputs(self.program)}
-        session = Session(snapshot, (readings,))
+        session = Stimuli(snapshot, (readings,))
         if not keeps_invariants(self.program, session):
             return None
         return run_session(self.executors, target, session, self.compared)

@@ -15,7 +15,7 @@ from rcsc.run.system import Kind
 from rcsc_cell.cell.ready import plant
 from rcsc_cell.database.ask import Database
 from rcsc_cell.episodes.witness import Timed
-from rcsc_cell.workstation.prepared import Run, prepare
+from rcsc_cell.workstation.prepared import ScriptDraft, prepare
 
 SYSTEM = Path(__file__).parents[2] / "tables" / "system.toml"
 ROUNDS = 5
@@ -26,7 +26,7 @@ def kinematic(database: Database) -> list[Timed]:
     return [Timed(plant(database, "kinematic"))]
 
 
-def finished(kind: Kind, log: Path | None) -> tuple[float, Run]:
+def finished(kind: Kind, log: Path | None) -> tuple[float, ScriptDraft]:
     """Seconds of the steps without the plant's, and the run."""
     run = prepare(SYSTEM, "make_boxt", kind, kinematic)
     if log is None:
@@ -36,7 +36,7 @@ def finished(kind: Kind, log: Path | None) -> tuple[float, Run]:
         return stepped(run), run
 
 
-def stepped(run: Run) -> float:
+def stepped(run: ScriptDraft) -> float:
     """Runs to the end; seconds, but for the plant's."""
     begun = time.perf_counter()
     assert [result.state for result in run.steps()] == ["done"] * 27

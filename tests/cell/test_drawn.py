@@ -24,7 +24,7 @@ from rcsc.host.files.names import BadName
 from rcsc.run.description import description
 from rcsc.run.log.finding import LoggedCycle, LoggedFinding, finding_facts, finding_of
 from rcsc.run.log.read import Log, read
-from rcsc.run.log.ticks import Frame, frames
+from rcsc.run.log.ticks import LoggedTick, frames
 from rcsc.run.log.write import Recorder
 from rcsc.run.system import signatures
 from rcsc_cell.cell.arm import skeleton, solve
@@ -386,7 +386,7 @@ def test_what_a_log_says_of_a_finding_comes_back(finding: LoggedFinding) -> None
     assert finding_of(finding_facts(finding)) == finding
 
 
-def framed(log: Path) -> list[Frame]:
+def framed(log: Path) -> list[LoggedTick]:
     return list(frames(read(log)))
 
 

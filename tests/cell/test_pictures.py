@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 from rcsc_cell.cell.arm import LIMITS_DEG, plate, skeleton
 from rcsc_cell.database.pose import nine
 from rcsc_cell.pictures.plot import plot, ticks
-from rcsc_cell.pictures.report import Figure, Frame, Matched, Placement, ReportRow, Story, page, report
+from rcsc_cell.pictures.report import CellPicture, Figure, Matched, Placement, ReportRow, Story, page, report
 from rcsc_cell.pictures.solid import OVERVIEW, View, solid
 from rcsc_cell.pictures.stick import Scene, pads, stick
 from rcsc_cell.pictures.things import Outline
@@ -366,8 +366,8 @@ def story() -> Story:
         "MAKE <BOXT>",
         (ReportRow(1, "MOVE A & B", "done", 15), ReportRow(2, "PAUSE", "failed", 7, "the part <slipped>")),
         (
-            Frame(0, "as it <began>", solid(model, data)),
-            Frame(22, "the end", stick(nine(plate(HOME)), 80.0, HOME)),
+            CellPicture(0, "as it <began>", solid(model, data)),
+            CellPicture(22, "the end", stick(nine(plate(HOME)), 80.0, HOME)),
         ),
         {"plate[2] (mm)": [(at * 0.04, 300 + 50 * sin(at * 0.1) * cos(at)) for at in range(300)]},
         (

@@ -34,7 +34,7 @@ from rcsc_cell.workstation.orders import (
     VISE_ORDER,
     VISE_REPORT,
 )
-from rcsc_cell.workstation.prepared import Run, prepare
+from rcsc_cell.workstation.prepared import ScriptDraft, prepare
 from rcsc_cell.workstation.script import ScriptRow
 from rcsc_cell.workstation.station import ANSWER_TICKS, PAUSE_TICKS, Workstation, workstation
 from rcsc_cell.workstation.stopped import NotResumed, go_on, keep, stopped_path
@@ -62,18 +62,18 @@ def outside(database: Database) -> list[Timed]:
     return [Timed(plant(database, "kinematic"))]
 
 
-def plant_of(made: Run) -> Plant:
+def plant_of(made: ScriptDraft) -> Plant:
     """The plant of a run."""
     [timed] = [one for one in made.system.outside if isinstance(one, Timed)]
     return timed.inner
 
 
-def begun(rows: tuple[ScriptRow, ...] | str = "go.csv") -> Run:
+def begun(rows: tuple[ScriptRow, ...] | str = "go.csv") -> ScriptDraft:
     """A run of the project's script."""
     return prepare(Path("tables/system.toml"), rows, "python", outside)
 
 
-def stopped_at_vise() -> Run:
+def stopped_at_vise() -> ScriptDraft:
     """A run whose second row failed because the jaws were stuck."""
     made = begun()
     plant_of(made).faults.vise_stuck = True
@@ -82,7 +82,7 @@ def stopped_at_vise() -> Run:
     return made
 
 
-def stopped_by_robot() -> Run:
+def stopped_by_robot() -> ScriptDraft:
     """A run whose third row failed in TASK."""
     made = begun()
     for result in made.steps():
@@ -133,7 +133,7 @@ def test_no_vise_at_all_is_a_failure_and_no_waiting_for_ever() -> None:
     assert last.ticks == ANSWER_TICKS
 
 
-def machining() -> Run:
+def machining() -> ScriptDraft:
     """The vise closes and the machine works; a part is taken to be there."""
     rows = (
         ScriptRow(1, "", vise={"right": False, "left": False}),
@@ -402,7 +402,7 @@ def test_a_machine_that_goes_on_for_ever_is_given_up() -> None:
 
 @pytest.mark.usefixtures("project")
 @pytest.mark.parametrize("stop", [stopped_at_vise, stopped_by_robot])
-def test_another_process_goes_on_to_the_end(stop: Callable[[], Run]) -> None:
+def test_another_process_goes_on_to_the_end(stop: Callable[[], ScriptDraft]) -> None:
     made = stop()
     at = made.station.at + 1
     keep(made, "go.csv")

@@ -16,7 +16,7 @@ from rcsc.compose.contract.obligations import Obligation
 from rcsc.compose.contract.predicates import Predicate
 from rcsc.compose.contract.transition import Cycle, TransitionSystem
 from rcsc.compose.invariant.cubes import Masks, Pair, Reached, shown
-from rcsc.compose.invariant.search import Effort, Invariant, search
+from rcsc.compose.invariant.search import Effort, FoundInvariant, search
 from rcsc.compose.proof import level as level_proof
 from rcsc.compose.proof.context import RepeatedLine
 from rcsc.compose.proof.kept import keep, recall
@@ -473,7 +473,7 @@ def test_what_z3_does_not_confirm_is_not_proved(monkeypatch: pytest.MonkeyPatch,
         cycle: Cycle,
         wanted: Sequence[Obligation],
         effort: Effort,
-    ) -> Invariant:
+    ) -> FoundInvariant:
         found = search(ts, firsts, cycle, wanted, effort)
         names = [predicate.name for predicate in found.predicates]
         at = names.index("cur_state")

@@ -11,7 +11,7 @@ from rcsc.compose.counterexample.lasso import Lasso, lassos
 from rcsc.compose.counterexample.trace import NotReproducedError, TraceSearch
 from rcsc.compose.proof.context import gives_an_order
 from rcsc.compose.proof.level import certificate, prove_level
-from rcsc.compose.proof.ranking import Counted, least_power, parts
+from rcsc.compose.proof.ranking import RisingLine, least_power, parts
 from rcsc.compose.proof.system import transition_systems
 from rcsc.compose.proof.termination import Ending, longest
 from rcsc.lang.model import Int, Op, Real
@@ -70,7 +70,7 @@ def test_a_counter_that_another_line_sets_back_is_none(tmp_path: Path) -> None:
 
 def test_a_line_that_counts_is_shown_to_stop(tmp_path: Path) -> None:
     found = ending(tmp_path, counting(9))
-    assert (found.proved, found.counted, found.still) == (True, (Counted("2", "c"),), ())
+    assert (found.proved, found.counted, found.still) == (True, (RisingLine("2", "c"),), ())
 
 
 def test_a_counter_that_rises_only_now_and_then_is_none(tmp_path: Path) -> None:

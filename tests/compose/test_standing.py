@@ -11,7 +11,7 @@ import jsonschema
 import pytest
 
 from rcsc.commands import run
-from rcsc.compose.proof.standing import Known, KnownSystem, Outline, standing
+from rcsc.compose.proof.standing import Known, KnownSystem, SystemOutline, standing
 from rcsc.driver import outline
 from rcsc.host.cache import FOLDER, Cache
 from rcsc.host.files.plain import plain, read
@@ -369,10 +369,10 @@ def test_an_outline_comes_back_as_it_was(here: Path) -> None:
     assert found is not None
     made = outline.outline(found[0])
     assert standing_of(made).of_level("upper") is Known.UNKNOWN
-    assert read(Outline, json.loads(json.dumps(plain(made)))) == made
+    assert read(SystemOutline, json.loads(json.dumps(plain(made)))) == made
     assert [one.name for one in made.levels] == ["upper", "lower"]
     assert {level for promise in made.assumed for level, _ in promise.needs} == {"upper", "lower"}
 
 
-def standing_of(made: Outline) -> KnownSystem:
+def standing_of(made: SystemOutline) -> KnownSystem:
     return standing(Cache(Path("nowhere"), b"secret", "tool"), made)

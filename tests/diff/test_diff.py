@@ -15,7 +15,7 @@ import pytest
 
 from rcsc.commands import run
 from rcsc.diagnostics.render import plain
-from rcsc.diff.changes.difference import Basis, Change, Difference, Part, ProgramDifference, Sort
+from rcsc.diff.changes.difference import Basis, Change, ComparedPart, Difference, PartSort, ProgramDifference
 from rcsc.diff.compare import compare
 from rcsc.diff.present import knows, within_reach
 from rcsc.diff.text import rows
@@ -55,7 +55,7 @@ def differ(before: str, after: str) -> ProgramDifference:
     return found
 
 
-def part(found: ProgramDifference, name: str, what: str = "table") -> Part:
+def part(found: ProgramDifference, name: str, what: str = "table") -> ComparedPart:
     return next(compared for compared in found.parts if (compared.what, compared.name) == (what, name))
 
 
@@ -123,7 +123,7 @@ def test_a_narrowed_condition_gives_what_it_lost_to_default(task: Callable[..., 
         )
     }
     [change] = changed.changes
-    assert change.sort is Sort.EFFECT
+    assert change.sort is PartSort.EFFECT
     assert change.where.inputs == (32, 5184)
     assert dict(change.witness)["status_in"] == "executing"
     assert {(v.leaf, v.headings, v.at) for v in change.values} == {
@@ -151,7 +151,7 @@ def test_a_widened_condition_meets_another_line_where_both_now_match(task: Calla
             ),
         )
     }
-    assert changed.changes[0].sort is Sort.FAULT
+    assert changed.changes[0].sort is PartSort.FAULT
     assert changed.changes[0].where.inputs == (16, 5184)
 
 
@@ -187,7 +187,7 @@ def test_a_line_split_in_two_with_the_same_effect_is_told_apart(task: Callable[.
     found = acquire(task, (ten, low + rest))
     assert not found.changed
     [moved] = part(found, "acquire").moved
-    assert (moved.before, moved.after, moved.sort) == ("line `10`", "line `10b`", Sort.LINE)
+    assert (moved.before, moved.after, moved.sort) == ("line `10`", "line `10b`", PartSort.LINE)
     assert moved.where.inputs == (6 * 16, 5184)
     assert "cur_state in {state_3, state_4, state_5, state_6, state_7, state_8}" in moved.where.words[0]
 
@@ -338,9 +338,9 @@ def disagreements(before: Program, after: Program, seen: Counter[str]) -> list[s
         two = outcome(after, after.tables[0], snapshot)
         sort = None
         if one[1] != two[1] or (one[1] is None and one != two):
-            sort = Sort.FAULT if one[1] is None or two[1] is None else Sort.EFFECT
+            sort = PartSort.FAULT if one[1] is None or two[1] is None else PartSort.EFFECT
         elif one[0] != two[0]:
-            sort = Sort.LINE
+            sort = PartSort.LINE
         says = set()
         for change in (*claimed.changes, *claimed.moved):
             if (bare(change.before), bare(change.after)) == (one[0], two[0]):
@@ -491,7 +491,7 @@ level l { period 40 [ms]  table t }
 """
 
 
-def property_part(old: str, new: str, name: str = "rises") -> Part:
+def property_part(old: str, new: str, name: str = "rises") -> ComparedPart:
     return part(differ(COUNTED, edited(COUNTED, (old, new))), name, "property")
 
 
@@ -507,7 +507,7 @@ def test_a_property_that_says_something_else_is_a_region_over_two_cycles() -> No
     made = property_part("count >= was count", "count >= was count or width = 0")
     assert made.said == ("count >= was count -> count >= was count or width = 0",)
     [change] = made.changes
-    assert (change.sort, change.before, change.after) == (Sort.CONDITION, "false", "true")
+    assert (change.sort, change.before, change.after) == (PartSort.CONDITION, "false", "true")
     assert change.where.inputs == (45, 1000)  # width = 0, and 45 of 100 pairs that fall
     assert dict(change.witness) == {"width": "0", "count": "0", "was count": "1"}
 

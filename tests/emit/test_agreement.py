@@ -21,7 +21,7 @@ from rcsc.lang.model import Admit, Kind, Program, Real, Snapshot, Value, Variabl
 from rcsc.run.executors import CExecutor, PythonExecutor
 from rcsc.run.executors import build as build_executors
 from rcsc.run.signature import signature
-from rcsc.testing.agree import Compared, Disagreement, Executors, run_init, run_sanitized
+from rcsc.testing.agree import AgreementCount, Disagreement, Executors, run_init, run_sanitized
 from rcsc.testing.differential_search import search_lines, search_sessions
 from rcsc.testing.esbmc import EsbmcAnswer, prove_function
 from rcsc.testing.executors.equality import same_value
@@ -39,7 +39,7 @@ pytestmark = pytest.mark.skipif(not isinstance(c_compiler(), str), reason="no C 
 
 QUICK = SuiteOptions(examples=30, esbmc_s=0.0, cortex=False, mutants=0)
 Change = Callable[[str], str]
-Everything = tuple[list[Disagreement], Compared, Absent | BuildFailed | Disagreement | None]
+Everything = tuple[list[Disagreement], AgreementCount, Absent | BuildFailed | Disagreement | None]
 """What was found, what was compared, what the sanitizers say."""
 
 
@@ -65,7 +65,7 @@ def executors_of(
 
 
 def found_of(
-    executors: Executors, compared: Compared, examples: int, kind: str = ""
+    executors: Executors, compared: AgreementCount, examples: int, kind: str = ""
 ) -> Iterator[Disagreement]:
     """What the executors' functions (of one kind, or all) do otherwise on drawn inputs."""
     for target in executors.targets:
@@ -82,7 +82,7 @@ def found_of(
 
 def disagreements(program: Program, c: Change = unchanged, examples: int = 60) -> Everything:
     """All that is found, and what the sanitizers say."""
-    compared = Compared()
+    compared = AgreementCount()
     with executors_of(program, c, checked=True) as executors:
         found = list(found_of(executors, compared, examples))
         return found, compared, run_sanitized(executors, compared)
@@ -93,7 +93,7 @@ def first(
 ) -> Disagreement | None:
     """What is found first in the functions of a kind."""
     with executors_of(program_of(text), c, python) as executors:
-        return next(found_of(executors, Compared(), 300, kind), None)
+        return next(found_of(executors, AgreementCount(), 300, kind), None)
 
 
 @pytest.fixture(scope="module")
@@ -136,7 +136,7 @@ def test_all_executors_stop_where_safety_rests_on_an_assumption_that_fails() -> 
 def test_what_a_cycle_that_ends_in_a_fault_leaves() -> None:
     """The manual's "What a fault leaves", of every executor: they leave the same."""
     program = verdict_of(FAULTED).program
-    compared = Compared()
+    compared = AgreementCount()
     with executors_of(program) as executors:
         assert list(found_of(executors, compared, 120)) == []
         kinds = {executors.number(target): target.kind for target in executors.targets}
@@ -333,7 +333,7 @@ def test_undefined_behaviour_is_found_though_the_result_is_right() -> None:
     planted = swap(
         "    s->fault = 0;\n", "    s->fault = 0;\n    { volatile int n = 2147483647; n = n + 1; }\n"
     )
-    compared = Compared()
+    compared = AgreementCount()
     with executors_of(program_of(RICH), planted, checked=True) as executors:
         assert list(found_of(executors, compared, 10, "step")) == []
         sanitized = run_sanitized(executors, compared)

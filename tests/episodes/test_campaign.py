@@ -43,8 +43,8 @@ from rcsc_cell.episodes.episode import (
     FAULTS,
     SYSTEM,
     Episode,
+    EpisodeFinding,
     FaultSpec,
-    Finding,
     Interruption,
     PartSpec,
     Push,
@@ -128,7 +128,7 @@ def test_a_worker_that_dies_costs_its_own_episode_and_no_other(tmp_path: Path) -
     assert [found[at] for at in sorted(found) if at not in kills] == list(expected)
     raised = [record for record in found.values() if record.end == "error:ArithmeticError"]
     assert raised
-    assert raised[0].findings == (Finding("nothing is raised", 0, "ArithmeticError: seen nothing"),)
+    assert raised[0].findings == (EpisodeFinding("nothing is raised", 0, "ArithmeticError: seen nothing"),)
 
 
 def _faults(rig: Rig, index: int, seed: int = 5) -> list[str]:
@@ -145,7 +145,8 @@ def test_what_hangs_is_stopped_and_so_is_what_cannot_be_stopped(tmp_path: Path) 
             found = played(rig, 16, pool, tmp_path / draw.__name__)
         assert {at for at, record in found.items() if record.end == "hang"} == hang
         assert all(
-            found[at].findings == (Finding("the run ends in time", 0, "no end within 0.25 s"),) for at in hang
+            found[at].findings == (EpisodeFinding("the run ends in time", 0, "no end within 0.25 s"),)
+            for at in hang
         )
 
 
@@ -557,7 +558,7 @@ def test_shrinking_asks_no_episode_twice_and_no_more_than_it_may() -> None:
 def _record(
     index: int, *faults: str, found: Sequence[str] = (), end: str = "done", lines: int = 0
 ) -> EpisodeRecord:
-    findings = tuple(Finding(name, 3, f"said {index}") for name in found)
+    findings = tuple(EpisodeFinding(name, 3, f"said {index}") for name in found)
     return EpisodeRecord(index, faults, end, 10, findings, lines, "")
 
 

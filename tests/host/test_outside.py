@@ -32,7 +32,7 @@ from rcsc.host.files.names import BadName, identifier, inside, within
 from rcsc.host.files.read import Malformed, Said, content, json_of, toml_of, xml_of
 from rcsc.run.description import BadDescription, description
 from rcsc.run.log.read import UnreadableLog, read
-from rcsc.run.log.records import MOST_CHUNK, Checked, Seal, records
+from rcsc.run.log.records import MOST_CHUNK, ChainCheck, Seal, records
 from rcsc.run.log.write import Recorder
 from rcsc.run.signature import signature
 from rcsc.run.system import System, assemble
@@ -374,8 +374,8 @@ def log(project: Path) -> Path:
 # --- logs: whole, and as they were recorded ----------------------------------------------------
 
 
-def checked(path: Path) -> Checked:
-    found = Checked()
+def checked(path: Path) -> ChainCheck:
+    found = ChainCheck()
     for _ in records(path, found):
         pass
     return found
@@ -635,7 +635,7 @@ def test_no_log_unpacks_to_more_than_its_size_allows(
 ) -> None:
     path = tmp_path / "bomb.mcap"
     path.write_bytes(BOMBS[case]())
-    found = Checked()
+    found = ChainCheck()
     assert sum(1 for _ in records(path, found)) <= 2000 + path.stat().st_size // 16
     assert found.seal is not Seal.WHOLE
     assert run(["log", str(path)]) == 1

@@ -13,7 +13,7 @@ from rcsc.diagnostics.codes import Code
 from rcsc.diagnostics.source import Source, Span
 from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.format import format_file
-from rcsc.lang.syntax.lalr import Node, Tables
+from rcsc.lang.syntax.lalr import ParseNode, Tables
 from rcsc.lang.syntax.parse import MOST_ERRORS, parse
 from rcsc.lang.syntax.spell import spell_expr
 from tests.support.strategies_syntax import expressions, files
@@ -257,7 +257,7 @@ def by_lark(found: Any) -> object:
 
 def by_tables(found: Any) -> object:
     """A tree of ours likewise."""
-    if isinstance(found, Node):
+    if isinstance(found, ParseNode):
         return found.data, (found.start_pos, found.end_pos), [by_tables(child) for child in found.children]
     return found.type, str(found), found.start_pos, found.end_pos
 

@@ -23,7 +23,7 @@ from rcsc.run.description import BadDescription, Description, LevelSpec, Wire, d
 from rcsc.run.processes import serve, supervisor
 from rcsc.run.processes.block import FOLDER, PREFIX, Block
 from rcsc.run.processes.clocks import LONGEST_NAP_S, MOST_WAIT_S, Clocks, Turn
-from rcsc.run.processes.memory import TRIES, Absent, Layout, SharedMemoryBuffers, layout
+from rcsc.run.processes.memory import TRIES, Layout, NotShared, SharedMemoryBuffers, layout
 from rcsc.run.processes.serve import Factory, begin, cycle
 from rcsc.run.processes.supervisor import Supervisor, run_processes
 from rcsc.run.signature import Leaf, Signature, Value, Values, signature
@@ -110,7 +110,7 @@ def test_a_value_is_there_after_it_is_published(buffers: SharedMemoryBuffers) ->
 
 
 def test_a_commit_gives_checkpoint_and_outputs_together(buffers: SharedMemoryBuffers) -> None:
-    assert again(buffers).checkpoint("wide") is Absent.BLANK
+    assert again(buffers).checkpoint("wide") is NotShared.BLANK
     buffers.commit("wide", complete(3))
     assert again(buffers).checkpoint("wide") == complete(3)
     assert again(buffers).latest("wide.out") == pattern(3)
@@ -120,7 +120,7 @@ def test_an_output_without_a_cycle_is_no_checkpoint(buffers: SharedMemoryBuffers
     buffers.commit("wide", complete(3))
     buffers.publish("wide.out", pattern(9))
     assert again(buffers).latest("wide.out") == pattern(9)
-    assert again(buffers).checkpoint("wide") is Absent.LOST
+    assert again(buffers).checkpoint("wide") is NotShared.LOST
 
 
 def test_another_layout_is_not_believed(buffers: SharedMemoryBuffers) -> None:
@@ -128,7 +128,7 @@ def test_another_layout_is_not_believed(buffers: SharedMemoryBuffers) -> None:
     laid = Layout(buffers.layout.regions, buffers.layout.places, buffers.layout.size, buffers.layout.seed + 1)
     other = SharedMemoryBuffers(buffers.block, laid)
     assert other.latest("wide.out") is None
-    assert other.checkpoint("wide") is Absent.LOST
+    assert other.checkpoint("wide") is NotShared.LOST
 
 
 def test_a_buffer_that_does_not_fit_is_refused(repo: Path) -> None:
@@ -207,7 +207,7 @@ def test_garbage_is_never_believed(data: st.DataObject) -> None:
             at = data.draw(st.integers(0, buffers.layout.size - 1))
             put = data.draw(st.binary(min_size=1, max_size=400))[: buffers.layout.size - at]
             buffers.block.write(at, put)
-        assert again(buffers).checkpoint("wide") in {complete(1), Absent.LOST}
+        assert again(buffers).checkpoint("wide") in {complete(1), NotShared.LOST}
         assert again(buffers).latest("wide.out") in {pattern(1), None}
         assert again(buffers).latest("far.out") in {pattern(1), None}
         assert buffers.latest("wide.out") in {pattern(1), None}
@@ -223,13 +223,13 @@ def test_a_damaged_word_does_not_bring_back_what_was_before(buffers: SharedMemor
     for byte in range(8):
         for value in range(256):
             buffers.block.write(at, word[:byte] + bytes([value]) + word[byte + 1 :])
-            assert again(buffers).checkpoint("wide") in {complete(1), Absent.LOST}
+            assert again(buffers).checkpoint("wide") in {complete(1), NotShared.LOST}
 
 
 def test_a_block_of_noise_holds_nothing(buffers: SharedMemoryBuffers) -> None:
     for seed in range(200):
         buffers.block.write(0, seeded(seed).randbytes(buffers.layout.size))
-        assert again(buffers).checkpoint("wide") is Absent.LOST
+        assert again(buffers).checkpoint("wide") is NotShared.LOST
         assert again(buffers).latest("far.out") is None
 
 

@@ -3,9 +3,9 @@
 from pathlib import Path
 from typing import ClassVar
 
-from rcsc_cell.episodes.episode import SYSTEM, Episode, Outcome, PartSpec, script
+from rcsc_cell.episodes.episode import SYSTEM, Episode, EpisodeOutcome, PartSpec, script
 from rcsc_cell.episodes.loop import Loop, run
-from rcsc_cell.properties.cycle import Cycle
+from rcsc_cell.properties.cycle import CycleState
 
 KEPT = Path(__file__).parents[2] / ".rcsc-cache" / "loop"
 TBOX = (PartSpec("tbox", "buffer", 20.0, -30.0, 10.0),)
@@ -18,10 +18,10 @@ class Trace:
     name: ClassVar[str] = "trace"
     place: ClassVar[str] = "section 10"
 
-    def __init__(self, _: Cycle) -> None:
+    def __init__(self, _: CycleState) -> None:
         self.ran: list[tuple[str, ...]] = []
 
-    def watch(self, cycle: Cycle) -> str | None:
+    def watch(self, cycle: CycleState) -> str | None:
         self.ran.append(tuple(f"{level.name} {level.table} {level.line}" for level in cycle.ran))
         return None
 
@@ -35,7 +35,7 @@ def trace(episode: Episode, system: Path = SYSTEM) -> list[tuple[str, ...]]:
     return made.ran
 
 
-def keep(episode: Episode, outcome: Outcome) -> str:
+def keep(episode: Episode, outcome: EpisodeOutcome) -> str:
     """Keeps what does not hold, as an episode, a script and a log; what to say of it."""
     folder = KEPT / f"{outcome.digest[:12]}"
     folder.mkdir(parents=True, exist_ok=True)

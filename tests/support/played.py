@@ -15,7 +15,7 @@ from random import Random
 
 from rcsc_cell.campaign.rig import known_lines
 from rcsc_cell.cell.ready import Backend
-from rcsc_cell.episodes.episode import SYSTEM, Episode, FaultSpec, Finding, Outcome, PartSpec
+from rcsc_cell.episodes.episode import SYSTEM, Episode, EpisodeFinding, EpisodeOutcome, FaultSpec, PartSpec
 from rcsc_cell.episodes.loop import run as run_in_cell
 from rcsc_cell.workstation.script import RowEnd
 
@@ -58,7 +58,7 @@ def stuck(seed: int, backend: Backend) -> Episode:
     return replace(episode, faults=(FaultSpec(STUCK, 0, 9),)) if seed % 8 == 0 else episode
 
 
-def play(episode: Episode, system: Path, log: Path | None = None) -> Outcome:
+def play(episode: Episode, system: Path, log: Path | None = None) -> EpisodeOutcome:
     """What the switches say."""
     _note()
     if log is not None:
@@ -78,22 +78,26 @@ def play(episode: Episode, system: Path, log: Path | None = None) -> Outcome:
     rows = tuple(RowEnd(at, row, "done", "", 10) for at, row in enumerate(episode.rows, 1))
     lines = known_lines(system)[: 3 + len(rows)]
     sum_ = hashlib.sha256(episode.to_json().encode()).hexdigest()
-    found = [Finding(HELD, fault.first_tick, "it fell") for fault in episode.faults if fault.name == BREAKS]
-    return Outcome(
+    found = [
+        EpisodeFinding(HELD, fault.first_tick, "it fell") for fault in episode.faults if fault.name == BREAKS
+    ]
+    return EpisodeOutcome(
         rows, tuple(found), "failed:part_lost" if found else "done", 10 * len(rows), frozenset(lines), sum_
     )
 
 
-def dawdle(episode: Episode, system: Path, log: Path | None = None) -> Outcome:
+def dawdle(episode: Episode, system: Path, log: Path | None = None) -> EpisodeOutcome:
     """As `play`, slowly enough to be killed in the middle."""
     time.sleep(0.01)
     return play(episode, system, log)
 
 
-def dislike(episode: Episode, system: Path = SYSTEM, log: Path | None = None) -> Outcome:
+def dislike(episode: Episode, system: Path = SYSTEM, log: Path | None = None) -> EpisodeOutcome:
     """The cell's own run, with a property that no cell keeps: no row fails."""
     outcome = run_in_cell(episode, system, log)
-    bad = [Finding("no row fails", row.ticks, row.reason) for row in outcome.rows if row.state == "failed"]
+    bad = [
+        EpisodeFinding("no row fails", row.ticks, row.reason) for row in outcome.rows if row.state == "failed"
+    ]
     return replace(outcome, findings=tuple(bad[:1]))
 
 

@@ -15,7 +15,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rcsc.certify import Answer, certify, check_certificate
+from rcsc.certify import CaseAnswer, certify, check_certificate
 from rcsc.certify.execution import Run, Start
 from rcsc.certify.known import Known
 from rcsc.certify.settle import script, values_in
@@ -35,9 +35,9 @@ from tests.support.programs.stages import program_of, shipped
 from tests.support.programs.texts import edited
 
 
-def by_cvc5(question: str) -> Answer:
+def by_cvc5(question: str) -> CaseAnswer:
     """cvc5's answer."""
-    return {"unsat": Answer.NONE, "sat": Answer.SOME}.get(cvc5_says(question), Answer.UNKNOWN)
+    return {"unsat": CaseAnswer.NONE, "sat": CaseAnswer.SOME}.get(cvc5_says(question), CaseAnswer.UNKNOWN)
 
 
 BOXES = """
@@ -417,8 +417,8 @@ def test_what_is_not_checked_is_named_and_no_part_of_what_is() -> None:
     assert cvc5_says(left.question) == "unsat"
     assert not {left.name} & set(certify(program, certificate).checked)
     assert certify(program, certificate, by_cvc5).whole
-    assert certify(program, certificate, lambda _: Answer.UNKNOWN).unchecked == (left,)
-    assert certify(program, certificate, lambda _: Answer.SOME).problems
+    assert certify(program, certificate, lambda _: CaseAnswer.UNKNOWN).unchecked == (left,)
+    assert certify(program, certificate, lambda _: CaseAnswer.SOME).problems
 
 
 def test_what_rests_on_an_obligation_that_is_not_checked_is_not_checked() -> None:
@@ -807,9 +807,9 @@ def test_obligations_of_one_name_are_each_asked() -> None:
     certificate = certificate_of(program)
     asked: list[str] = []
 
-    def ask(question: str) -> Answer:
+    def ask(question: str) -> CaseAnswer:
         asked.append(question)
-        return Answer.UNKNOWN
+        return CaseAnswer.UNKNOWN
 
     left = certify(program, certificate, ask).unchecked
     assert len(left) == 2

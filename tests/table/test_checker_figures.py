@@ -9,7 +9,7 @@ import pytest
 from rcsc.certify.execution import Start
 from rcsc.certify.known import Known
 from rcsc.certify.owed import Debts
-from rcsc.certify.settle import Answer, Fails, Left, Settler, Shown, script, values_in
+from rcsc.certify.settle import CaseAnswer, Fails, Left, Settler, Shown, script, values_in
 from rcsc.certify.values import BOOL, FREE, INT, REAL, TRUTHS, Term, Terms, parts_first, spanned, truncated
 from rcsc.lang.model import Bool, Int, Real
 from tests.support.programs.stages import program_of
@@ -334,7 +334,7 @@ def test_what_is_kept_lies_in_its_place_once_that_is_shown() -> None:
 # --- settling -----------------------------------------------------------------------------
 
 
-def settled(hypotheses: list[Term], good: Term, ask: Answer | None = None) -> tuple[object, int]:
+def settled(hypotheses: list[Term], good: Term, ask: CaseAnswer | None = None) -> tuple[object, int]:
     """What becomes of an obligation, and the work."""
     asked = None if ask is None else (lambda _: ask)
     settler = Settler(TERMS, asked, {"b": 0, "n": 0, "m": 0, "x": 0.0})
@@ -366,9 +366,9 @@ def test_obligations_are_settled_as_they_can_be_and_what_it_took_is_counted() ->
     assert settled([], TERMS.negation(TERMS.every(minus_one)))[0] == Fails((("x", -1.0),))
     found, work = settled([], FAR)
     assert (found, work) == (Left(script([TERMS.negation(FAR)])), 41)
-    assert settled([], FAR, Answer.UNKNOWN) == (found, work)
-    assert settled([], FAR, Answer.NONE) == (Shown(), work)
-    assert settled([], FAR, Answer.SOME) == (Fails(()), work)
+    assert settled([], FAR, CaseAnswer.UNKNOWN) == (found, work)
+    assert settled([], FAR, CaseAnswer.NONE) == (Shown(), work)
+    assert settled([], FAR, CaseAnswer.SOME) == (Fails(()), work)
 
 
 # --- what is owed -------------------------------------------------------------------------

@@ -45,7 +45,17 @@ from rcsc.lang.model import (
 from rcsc.table.regions.atoms import Universe, assumptions_of, lines_of
 from rcsc.table.regions.least import find, least, negated, whole, widest
 from rcsc.table.regions.linear import Simplex
-from rcsc.table.regions.region import Answer, Counted, Empty, Node, Only, Open, Outside, Search, Split
+from rcsc.table.regions.region import (
+    Counted,
+    Empty,
+    Node,
+    NoWitness,
+    Only,
+    Open,
+    OutsideAssumption,
+    Search,
+    Split,
+)
 from rcsc.table.regions.splitting import Tree
 from tests.support.programs.stages import program_of as compiled
 
@@ -123,7 +133,7 @@ def searched(program: Program) -> tuple[Universe, Search]:
     lines = lines_of(universe, table)
     assumptions = assumptions_of(universe, program, table)
     default = table.default is not None and not table.default.unreachable
-    return universe, Tree(universe, lines, assumptions, lambda _: Answer.UNKNOWN, default=default).run()
+    return universe, Tree(universe, lines, assumptions, lambda _: NoWitness.UNKNOWN, default=default).run()
 
 
 MEANING: dict[Op, Callable[[Value, Value], Value]] = {
@@ -244,12 +254,14 @@ def test_least_point_is_the_first_of_brute_force(lines: list[list[Expr]], assume
     point = least(universe, wanted, columns)
     expected = next((p for p in inputs(program) if matches(table.lines[0], p)), None)
     if expected is None:
-        assert point is Answer.NONE
+        assert point is NoWitness.NONE
     else:
-        assert not isinstance(point, Answer)
+        assert not isinstance(point, NoWitness)
         assert [point[c] for c in columns] == [int(v) for v in expected.values()]
         refuted = negated(universe, whole(lines_of(universe, table)[0]))
-        box = widest(universe, point, columns, lambda atoms: find(universe, [*atoms, refuted]) is Answer.NONE)
+        box = widest(
+            universe, point, columns, lambda atoms: find(universe, [*atoms, refuted]) is NoWitness.NONE
+        )
         inside = [
             dict(zip(expected, values, strict=True))
             for values in itertools.product(*(range(box[c][0], box[c][1] + 1) for c in columns))
@@ -350,7 +362,7 @@ def test_past_the_budget_nothing_is_proved() -> None:
     program = program_of(orders(5))
     universe = Universe()
     lines = lines_of(universe, program.tables[0])
-    search = Tree(universe, lines, (), lambda _: Answer.UNKNOWN, default=False, budget=50).run()
+    search = Tree(universe, lines, (), lambda _: NoWitness.UNKNOWN, default=False, budget=50).run()
     assert search.undecided
     assert not search.proved
 
@@ -508,7 +520,7 @@ def written(node: Node) -> str:
             return f"{form}<={cut}"
         case Only(line):
             return f"line {line}"
-        case Outside(assumption):
+        case OutsideAssumption(assumption):
             return f"outside {assumption}"
         case Empty(multipliers):
             return "empty " + " ".join(f"{k}*{form}" for form, k in multipliers)

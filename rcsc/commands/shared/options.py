@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 import click
 
-from rcsc.commands.shared.show import Color, Form, Output, Progress
+from rcsc.commands.shared.show import Color, Output, OutputForm, Progress
 from rcsc.driver.settings import Settings
 from rcsc.solvers.options import Options
 
@@ -102,7 +102,7 @@ def showing(command: Command) -> Command:
     @click.option(
         "--format",
         "form",
-        type=click.Choice([form.value for form in Form]),
+        type=click.Choice([form.value for form in OutputForm]),
         default=None,
         help="text (default), line (one line a finding), json, sarif (2.1.0) or github (annotations).",
     )
@@ -130,7 +130,7 @@ def showing(command: Command) -> Command:
     def wrapped(
         *args: Any, form: str | None, file: Path | None, color: str, quiet: bool, **kwargs: Any
     ) -> int:
-        output = Output(Form(form or "text"), file, Color(color), quiet)
+        output = Output(OutputForm(form or "text"), file, Color(color), quiet)
         return command(*args, output=output, **kwargs)
 
     return wrapped

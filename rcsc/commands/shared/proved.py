@@ -9,7 +9,7 @@ from rcsc.compose.contract.obligations import Sort
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.proof.context import Context
 from rcsc.compose.proof.level import LevelProof, certificate
-from rcsc.compose.proof.ranking import Counted
+from rcsc.compose.proof.ranking import RisingLine
 from rcsc.compose.proof.system import SystemProof
 from rcsc.compose.proof.termination import Ending
 from rcsc.diagnostics import report
@@ -119,7 +119,7 @@ def _ends(one: Ending) -> str:
     return said
 
 
-def _counted(one: Counted) -> str:
+def _counted(one: RisingLine) -> str:
     by = "" if one.least is None else f" by at least {one.least:.2g}"
     return f"line `{one.line}` runs as long as `{one.counter}` rises{by}"
 

@@ -17,7 +17,7 @@ from rcsc.diagnostics.diagnostic import Severity
 from rcsc.diagnostics.github import annotations
 from rcsc.diagnostics.jsonform import report_to_json
 from rcsc.diagnostics.printable import escape, pad, width
-from rcsc.diagnostics.render import OF_SEVERITY, Piece, Row, Style, full, one_line, paint, plain
+from rcsc.diagnostics.render import OF_SEVERITY, Row, Style, TextPiece, full, one_line, paint, plain
 from rcsc.diagnostics.report import (
     NOT_PROVED,
     InSystem,
@@ -32,7 +32,7 @@ from rcsc.diagnostics.sarif import sarif
 from rcsc.host.files import write_atomically
 
 
-class Form(StrEnum):
+class OutputForm(StrEnum):
     """How a report is shown."""
 
     TEXT = "text"
@@ -59,7 +59,7 @@ class Output:
         quiet: Leave out the summary.
     """
 
-    form: Form = Form.TEXT
+    form: OutputForm = OutputForm.TEXT
     file: Path | None = None
     color: Color = Color.AUTO
     quiet: bool = False
@@ -157,16 +157,16 @@ def _text(report: Report, _command: str, output: Output, closing: str) -> str:
     if not output.quiet:
         rows += summary(report)
         if closing:
-            rows.append((Piece(closing, Style.STRONG),))
+            rows.append((TextPiece(closing, Style.STRONG),))
     return paint(rows) if coloured else plain(rows)
 
 
-_FORMS: dict[Form, Callable[[Report, str, Output, str], str]] = {
-    Form.TEXT: _text,
-    Form.LINE: _lines,
-    Form.JSON: _json,
-    Form.SARIF: _sarif,
-    Form.GITHUB: _github,
+_FORMS: dict[OutputForm, Callable[[Report, str, Output, str], str]] = {
+    OutputForm.TEXT: _text,
+    OutputForm.LINE: _lines,
+    OutputForm.JSON: _json,
+    OutputForm.SARIF: _sarif,
+    OutputForm.GITHUB: _github,
 }
 
 
@@ -193,18 +193,18 @@ def summary(report: Report) -> Iterator[Row]:
     names = max((width(escape(table.table)) for table in report.tables), default=0)
     words = max((9, *(len(table.verdict.value) for table in report.tables)))
     for file, tables in groupby(report.tables, key=lambda table: table.file):
-        yield (Piece(escape(file), Style.STRONG),)
+        yield (TextPiece(escape(file), Style.STRONG),)
         for table in tables:
             yield (
-                Piece(f"  {pad(escape(table.table), names)}  "),
-                Piece(pad(table.verdict.value, words), _OF_VERDICT[table.verdict]),
-                Piece(f"  {backing(table)}"),
+                TextPiece(f"  {pad(escape(table.table), names)}  "),
+                TextPiece(pad(table.verdict.value, words), _OF_VERDICT[table.verdict]),
+                TextPiece(f"  {backing(table)}"),
             )
     for system in report.systems:
         if system.wanted:
-            yield (Piece(_of_system(system), Style.NOTE),)
+            yield (TextPiece(_of_system(system), Style.NOTE),)
         elif system.missing:
-            yield (Piece(_missing(system), Style.NOTE),)
+            yield (TextPiece(_missing(system), Style.NOTE),)
     if report.tables or report.found:
         yield tuple(_counts(report))
 
@@ -265,26 +265,26 @@ def _missing(one: SystemReport) -> str:
     return f"{escape(one.system)} is {one.standing}: {escape(named(one.missing))}"
 
 
-def _counts(report: Report) -> Iterator[Piece]:
+def _counts(report: Report) -> Iterator[TextPiece]:
     if report.tables:
         yield from _verdicts(report)
     for number, severity in enumerate(Severity):
         count = report.count(severity)
         noun = severity.value if count == 1 else f"{severity.value}s"
-        yield Piece(", " if number else "")
-        yield Piece(f"{count} {noun}", OF_SEVERITY[severity] if count else Style.PLAIN)
+        yield TextPiece(", " if number else "")
+        yield TextPiece(f"{count} {noun}", OF_SEVERITY[severity] if count else Style.PLAIN)
 
 
-def _verdicts(report: Report) -> Iterator[Piece]:
+def _verdicts(report: Report) -> Iterator[TextPiece]:
     always = (Verdict.PROVED, Verdict.REFUTED, Verdict.UNDECIDED)
     of = dict.fromkeys(always, 0) | dict(Counter(table.verdict for table in report.tables))
     noun = "table" if len(report.tables) == 1 else "tables"
-    yield Piece(f"{len(report.tables)} {noun}: ")
+    yield TextPiece(f"{len(report.tables)} {noun}: ")
     for number, (verdict, count) in enumerate(of.items()):
         style = _OF_VERDICT[verdict] if count else Style.PLAIN
-        yield Piece(f"{', ' if number else ''}")
-        yield Piece(f"{count} {verdict.value}", style)
-    yield Piece("; ")
+        yield TextPiece(f"{', ' if number else ''}")
+        yield TextPiece(f"{count} {verdict.value}", style)
+    yield TextPiece("; ")
 
 
 class Progress:

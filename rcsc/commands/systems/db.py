@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 from rcsc.commands.shared.options import showing
-from rcsc.commands.shared.show import Form, Output
+from rcsc.commands.shared.show import Output, OutputForm
 from rcsc.commands.shared.show import show as show_report
 from rcsc.commands.shared.systems import DATABASE, SYSTEM, system_path
 from rcsc.diagnostics.coded import CodedError
@@ -57,10 +57,10 @@ def check(system: Path | None, output: Output) -> int:
         _built(system, None, writes=False)
         report = _report(None)
     except CodedError as error:
-        if output.form is Form.TEXT and output.file is None:
+        if output.form is OutputForm.TEXT and output.file is None:
             raise
         report = _report(error)
-    if output.form is Form.TEXT and output.file is None:
+    if output.form is OutputForm.TEXT and output.file is None:
         click.echo("the data is in order")
     else:
         show_report(report, "db check", output)

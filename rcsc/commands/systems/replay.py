@@ -9,7 +9,7 @@ from rcsc.commands.shared.logs import FILE, SHOWN, refuse, told
 from rcsc.diagnostics.codes import Code
 from rcsc.run.log.queries import predicate
 from rcsc.run.log.read import Log, read
-from rcsc.run.log.replay import Cycle, Moment, Replay, find
+from rcsc.run.log.replay import Replay, ReplayedCycle, ReplayMoment, find
 from rcsc.run.log.states import TRACED, begun_in_words, fault_in_words, words
 
 
@@ -74,7 +74,7 @@ def _wanted(found: Log, at: int | None, find_: str | None) -> int | None:
     return at if find_ is None else find(found, predicate(find_, found), at) or 0
 
 
-def _show_moment(again: Replay, moment: Moment, level: str | None) -> None:
+def _show_moment(again: Replay, moment: ReplayMoment, level: str | None) -> None:
 
     click.echo(f"cycle {moment.tick}, {moment.tick * again.log.tick_ms} ms")
     for cycle in moment.cycles:
@@ -88,7 +88,7 @@ def _show_moment(again: Replay, moment: Moment, level: str | None) -> None:
                 click.echo(f"    {name} = {said}")
 
 
-def _differs(file: Path, again: Replay, moment: Moment) -> int:
+def _differs(file: Path, again: Replay, moment: ReplayMoment) -> int:
     first = next(cycle for cycle in moment.cycles if cycle.differences)
     leaf = _leading(first)
     said = f"`{leaf.name}` was `{leaf.then}` and is `{leaf.now}`"
@@ -101,7 +101,7 @@ def _differs(file: Path, again: Replay, moment: Moment) -> int:
     )
 
 
-def _leading(cycle: Cycle) -> Any:
+def _leading(cycle: ReplayedCycle) -> Any:
     """The difference that is named: a leaf's, where there is one."""
     return next(
         (difference for difference in cycle.differences if difference.name not in TRACED),
@@ -109,7 +109,7 @@ def _leading(cycle: Cycle) -> Any:
     )
 
 
-def _notes(cycle: Cycle) -> tuple[str, ...]:
+def _notes(cycle: ReplayedCycle) -> tuple[str, ...]:
     lines = f"{cycle.level}: {cycle.line_then} matched then, {cycle.line_now} now"
     shown = [
         f"{cycle.level}.{difference.name}: {difference.then} then, {difference.now} now"

@@ -26,7 +26,7 @@ from rcsc_cell.cell.reach import checked
 from rcsc_cell.cell.ready import Backend, plant
 from rcsc_cell.episodes.witness import Timed, Witness, names
 from rcsc_cell.pictures.report import report
-from rcsc_cell.workstation.prepared import Run, prepare
+from rcsc_cell.workstation.prepared import ScriptDraft, prepare
 from rcsc_cell.workstation.script import BadScript
 from rcsc_cell.workstation.stopped import forget, go_on, keep
 
@@ -149,7 +149,7 @@ def _run(asked: RunOptions, processes: bool, from_row: int | None, resumes: bool
     return _closing(witness, asked, seconds, log)
 
 
-def _place(made: Run, from_row: int | None, resumes: bool) -> None:
+def _place(made: ScriptDraft, from_row: int | None, resumes: bool) -> None:
     """Puts the run where it is to begin.
 
     Raises:
@@ -181,7 +181,7 @@ def _command(script: str, system: Path | None, database: Path | None, executor: 
 
 
 @contextlib.contextmanager
-def _recorded(made: Run, asked: RunOptions) -> Iterator[Path]:
+def _recorded(made: ScriptDraft, asked: RunOptions) -> Iterator[Path]:
     """Writes the log; its path."""
     path = (
         asked.log
@@ -241,7 +241,7 @@ class _Pace:
         time.sleep(max(0.0, self._next - time.monotonic()))
 
 
-def _watch(made: Run, asked: RunOptions) -> float:
+def _watch(made: ScriptDraft, asked: RunOptions) -> float:
     """Runs to the end, and says what becomes of each row; the seconds that it took."""
     begun = time.perf_counter()
     for result in made.steps():
@@ -256,7 +256,7 @@ def _say(number: int, text: str, state: str, ticks: int) -> None:
     sys.stdout.flush()
 
 
-def _apart(made: Run, asked: RunOptions) -> int:
+def _apart(made: ScriptDraft, asked: RunOptions) -> int:
     """The same with a process for each level."""
     with scratch("run") as folder:
         rows = _rows_apart(asked, made.station.at, folder / "results")
@@ -352,7 +352,7 @@ def _figures(witness: Witness, seconds: float) -> Iterator[str]:
     )
 
 
-def _kept(made: Run, asked: RunOptions) -> str:
+def _kept(made: ScriptDraft, asked: RunOptions) -> str:
     """Keeps a run that stopped, forgets one that came to its end; what to do about it."""
     if made.station.stopped is None:
         if made.station.over:

@@ -6,7 +6,7 @@ import click
 
 from rcsc.commands.shared.options import PATHS, proving, settings_of, showing
 from rcsc.commands.shared.show import Output, finish
-from rcsc.driver.settings import Effort
+from rcsc.driver.settings import TestEffort
 from rcsc.driver.trials import test
 from rcsc.solvers.options import Options
 
@@ -47,6 +47,6 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
     imported or linked. Needs a C compiler.
     """
     esbmc_s = (60.0 if deep else 0.0) if esbmc is None else esbmc
-    effort = Effort(examples, deep=deep, esbmc_s=esbmc_s, cortex=cortex, mutants=mutants, vectors=vectors)
+    effort = TestEffort(examples, deep=deep, esbmc_s=esbmc_s, cortex=cortex, mutants=mutants, vectors=vectors)
     made = test(settings_of(options, use_cache, output, paths), effort)
     return finish(made.report, "test", output, made.closing)

@@ -1,6 +1,6 @@
 """Looks for the invariant of a level: first with the predicates that most levels need, then, for what is left, with more.
 
-In: a transition system, its cycles and obligations. Out: an `Invariant`, which is not to be trusted before it is confirmed (`confirm`).
+In: a transition system, its cycles and obligations. Out: a `FoundInvariant`, to be trusted only once confirmed (`confirm`).
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -46,7 +46,7 @@ class Effort:
 
 
 @dataclass(frozen=True, slots=True)
-class Invariant:
+class FoundInvariant:
     """What a search found: clauses, and what they do not prove.
 
     Attributes:
@@ -68,7 +68,7 @@ class Invariant:
 
 def search(
     ts: TransitionSystem, firsts: Sequence[Cycle], cycle: Cycle, wanted: Sequence[Obligation], effort: Effort
-) -> Invariant:
+) -> FoundInvariant:
     """Find an invariant from which as many obligations follow as possible.
 
     Raises:
@@ -77,7 +77,7 @@ def search(
     matter = [at for at, obligation in enumerate(wanted) if _matters(ts, obligation)]
     reads = read(ts, cycle, wanted)
     states, ran = _walked(ts, effort)
-    found = Invariant(open=frozenset(matter), states=states, ran=ran)
+    found = FoundInvariant(open=frozenset(matter), states=states, ran=ran)
     for closely in range(CLOSELY + 1):
         chosen = every_predicate(ts, cycle, reads, closely)
         if closely and len(chosen) == len(found.predicates):
@@ -93,9 +93,9 @@ def strengthened(
     ts: TransitionSystem,
     firsts: Sequence[Cycle],
     cycle: Cycle,
-    found: Invariant,
+    found: FoundInvariant,
     wanted: Sequence[Node],
-) -> Invariant:
+) -> FoundInvariant:
     """Add clauses from which as many as possible of these conditions on a later cycle follow.
 
     Raises:
@@ -113,9 +113,9 @@ def _with(  # what a search is of
     ts: TransitionSystem,
     firsts: Sequence[Cycle],
     cycle: Cycle,
-    before: Invariant,
+    before: FoundInvariant,
     left: Sequence[int],
-) -> Invariant:
+) -> FoundInvariant:
     """Search once more, from the invariant known so far, for the obligations that are left."""
     posed = [Posed(chosen, one, _conditions(ts, one, left)) for one in (*firsts, cycle)]
     made, left_open = _searched(ts, chosen, posed, before, left)
@@ -126,9 +126,9 @@ def _searched(
     ts: TransitionSystem,
     chosen: tuple[Predicate, ...],
     posed: Sequence[Posed],
-    before: Invariant,
+    before: FoundInvariant,
     left: Iterable[int],
-) -> tuple[Invariant, set[int]]:
+) -> tuple[FoundInvariant, set[int]]:
     walked = dict.fromkeys(point(ts, chosen, state) for state in before.states)
     reached = Reached.of(walked, len(chosen))
     weights = [2 if predicate.parts else int(predicate.size > 2) for predicate in chosen]

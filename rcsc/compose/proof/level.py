@@ -17,7 +17,7 @@ from rcsc.compose.contract.predicates import Predicate
 from rcsc.compose.contract.transition import Cycle, TransitionSystem
 from rcsc.compose.invariant.confirm import Confirmation, answer
 from rcsc.compose.invariant.pdr import Clause
-from rcsc.compose.invariant.search import LIMITS, Effort, Invariant, search, strengthened
+from rcsc.compose.invariant.search import LIMITS, Effort, FoundInvariant, search, strengthened
 from rcsc.compose.proof.context import Context, context, never_run
 from rcsc.compose.proof.termination import Ending, Flow, no_answers
 from rcsc.solvers import smt
@@ -117,7 +117,7 @@ def prove_level(ts: TransitionSystem, effort: Effort | None = None) -> LevelProo
                 seen, ends = context(ts, asked, found.clauses, found.ran), tuple(flow.endings())
             _uncut(cut_before)
     except (GaveUpError, NotConfirmedError):
-        found, seen, ends = Invariant(), None, ()
+        found, seen, ends = FoundInvariant(), None, ()
         verdicts = [(obligation, Verdict.UNDECIDED) for obligation in wanted]
     return LevelProof(
         ts.level.name,
@@ -175,7 +175,7 @@ def _firsts(ts: TransitionSystem) -> dict[str, Cycle]:
 
 
 def _verdicts(
-    ts: TransitionSystem, inference: Confirmation, found: Invariant, wanted: tuple[Obligation, ...]
+    ts: TransitionSystem, inference: Confirmation, found: FoundInvariant, wanted: tuple[Obligation, ...]
 ) -> Iterable[tuple[Obligation, Verdict]]:
     """Decide each obligation: can a first cycle, or a cycle from the invariant, break it?"""
     keyed = inference.keyed

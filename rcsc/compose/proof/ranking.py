@@ -31,7 +31,7 @@ Part = frozenset[int]
 
 
 @dataclass(frozen=True, slots=True)
-class Counted:
+class RisingLine:
     """A line that stops because a number of the level rises each time: a real by at least `least`."""
 
     line: str
@@ -66,7 +66,7 @@ class Turn:
 
 
 @dataclass(frozen=True, slots=True)
-class Stopped:
+class StoppingLines:
     """What was found of the lines of one table.
 
     Attributes:
@@ -75,7 +75,7 @@ class Stopped:
         endless: Lines of which it is not shown that they stop, even if all inputs stand still.
     """
 
-    counted: tuple[Counted, ...]
+    counted: tuple[RisingLine, ...]
     still: tuple[str, ...]
     endless: tuple[str, ...]
 
@@ -86,7 +86,7 @@ Turns: TypeAlias = Callable[[tuple[str, ...]], tuple[Turn, Turn, Turn]]
 
 def lines_that_stop(
     program: Program, asked: Confirmation, clauses: Sequence[Clause], turns: Turns
-) -> Stopped:
+) -> StoppingLines:
     """Show that lines stop, with as few constant inputs as possible; follow reals only where something is left without."""
     first = found = _Ranking(program, asked, clauses, turns(()))
     still: tuple[str, ...] = ()
@@ -107,7 +107,7 @@ def lines_that_stop(
     asked.rested_on += rested_on
     endless = tuple(str(first.turn.at.lines[line][0].name) for line in sorted(found.endless))
     one_each = {counted.line: counted for counted in reversed(found.counted)}
-    return Stopped(tuple(reversed(one_each.values())), () if endless else still, endless)
+    return StoppingLines(tuple(reversed(one_each.values())), () if endless else still, endless)
 
 
 def inputs(program: Program) -> tuple[str, ...]:
@@ -160,7 +160,7 @@ class _Ranking:
         ]
         self.solver = asked.known(clauses)
         self.solver.add(*asked.keyed.ranges, *stay)
-        self.counted: list[Counted] = []
+        self.counted: list[RisingLine] = []
         always, self.always = smt.truth(True), set(_every_step(len(self.now)))
         self.open = set(range(len(self.now))) if weaker is None else weaker.endless
         if weaker is None:
@@ -249,7 +249,7 @@ class _Ranking:
         self.solver.pop()
         return None if answer is Answer.UNSATISFIABLE else seen
 
-    def _rising(self, line: int, part: Part, runs: Term, among: list[KeptNumber]) -> Iterator[Counted]:
+    def _rising(self, line: int, part: Part, runs: Term, among: list[KeptNumber]) -> Iterator[RisingLine]:
         """Yield the numbers that always rise with the line and never fall within the part."""
         others = smt.any_of([self.now[other] for other in sorted(part)])
         name = str(self.turn.at.lines[line][0].name)
@@ -259,9 +259,9 @@ class _Ranking:
             if isinstance(number.kind, Real):
                 least = self._least_rise(runs, number, number.kind.high - number.kind.low)
                 if least is not None:
-                    yield Counted(name, number.name, least)
+                    yield RisingLine(name, number.name, least)
             elif not may(self.solver, runs, smt.at_most(number.after, number.before, KEY)):
-                yield Counted(name, number.name)
+                yield RisingLine(name, number.name)
 
     def _least_rise(self, runs: Term, number: KeptNumber, width: float) -> float | None:
         """Return how much the real rises at least; None where that is not shown to be anything."""

@@ -1,6 +1,6 @@
 """What kept proofs say of the levels together, read without a solver, a search or a cycle.
 
-In: what a system is made of (`Outline`) and a cache. Out: `KnownSystem`. A proof is filed under a digest of all that it is about (the
+In: what a system is made of (`SystemOutline`) and a cache. Out: `KnownSystem`. A proof is filed under a digest of all that it is about (the
 program as resolved, the level, its links), so that it is never taken for one of other content. What a level assumes of a neighbour has
 to be proved of that neighbour, as it is now, before anything is called proved of the levels together.
 """
@@ -131,7 +131,7 @@ class LevelOutline:
 
 
 @dataclass(frozen=True, slots=True)
-class Outline:
+class SystemOutline:
     """A system, as its files have it."""
 
     levels: tuple[LevelOutline, ...]
@@ -151,7 +151,7 @@ class KnownSystem:
         closed: What follows of each claim over the whole chain.
     """
 
-    outline: Outline
+    outline: SystemOutline
     known: Mapping[str, Verdicts]
     closed: Mapping[Need, Closed] = field(init=False)
 
@@ -250,7 +250,7 @@ class KnownSystem:
         )
 
 
-def standing(cache: Cache, outline: Outline) -> KnownSystem:
+def standing(cache: Cache, outline: SystemOutline) -> KnownSystem:
     """Return what the cache knows of a system."""
     found = {level.name: verdicts_of(cache, level.content) for level in outline.levels}
     return KnownSystem(outline, {name: verdicts for name, verdicts in found.items() if verdicts is not None})

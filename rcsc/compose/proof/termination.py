@@ -30,7 +30,7 @@ from rcsc.compose.contract.transition import Cycle, Leaves, TableAt, TransitionS
 from rcsc.compose.invariant.confirm import Confirmation, may
 from rcsc.compose.invariant.pdr import Clause
 from rcsc.compose.proof.context import gives_an_order, of_lines
-from rcsc.compose.proof.ranking import Counted, Turn, lines_that_stop, parts
+from rcsc.compose.proof.ranking import RisingLine, Turn, lines_that_stop, parts
 from rcsc.lang.model import Bool, Enum, Kind, OneTable, Read, pending
 from rcsc.solvers import smt
 from rcsc.solvers.smt import Answer
@@ -60,7 +60,7 @@ class Ending:
 
     table: str
     changes: int | None
-    counted: tuple[Counted, ...] = ()
+    counted: tuple[RisingLine, ...] = ()
     still: tuple[str, ...] = ()
     endless: tuple[str, ...] = ()
 

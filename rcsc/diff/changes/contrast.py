@@ -7,7 +7,7 @@ make the others hard; a leaf that is not decided raises, and nothing is called p
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from rcsc.diff.changes.difference import Change, Sort, Value, Where
+from rcsc.diff.changes.difference import Change, PartSort, Value, Where
 from rcsc.diff.changes.spell import number, said
 from rcsc.diff.changes.versions import MOST_BOXES, MOST_BOXES_ACROSS, Doing, Hit, Versions, is_across, is_hard
 from rcsc.lang.interpret import UNDEFINED, ExternError
@@ -165,7 +165,7 @@ def contrast(versions: Versions, region: Node, pair: tuple[Doing, Doing]) -> Con
 
 
 def changes(
-    versions: Versions, sort: Sort, labels: tuple[str, str], region: Node, relied: Node = TRUE,
+    versions: Versions, sort: PartSort, labels: tuple[str, str], region: Node, relied: Node = TRUE,
     against: Contrast | None = None,
 ) -> list[Change]:  # fmt: skip
     """A region as changes: where some version's assumptions hold, and the rest apart.

@@ -13,7 +13,7 @@ from rcsc.lang.model import Value as Scalars
 from rcsc.table.verdict import Region
 
 
-class Sort(StrEnum):
+class PartSort(StrEnum):
     """What a change is of."""
 
     EFFECT = "effect"  # the procedures, command out or status differ
@@ -78,7 +78,7 @@ class Change:
         relied_on: Whether the assumptions of one version at least hold somewhere in it; else nobody proved anything of it.
     """
 
-    sort: Sort
+    sort: PartSort
     before: str
     after: str
     where: Where
@@ -90,7 +90,7 @@ class Change:
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class ComparedPart:
     """One table, procedure, level or condition that both versions have, or one alone.
 
     Attributes:
@@ -178,7 +178,7 @@ class ProgramDifference:
 
     name: str
     declarations: tuple[Declaration, ...] = ()
-    parts: tuple[Part, ...] = ()
+    parts: tuple[ComparedPart, ...] = ()
     traces: tuple[Traces, ...] = ()
     undecided: tuple[str, ...] = ()
     follows: tuple[Follows, ...] = ()
@@ -214,7 +214,7 @@ class Difference:
         """Whether something was left open."""
         return any(program.undecided for program in self.programs)
 
-    def parts(self) -> Iterator[tuple[ProgramDifference, Part]]:
+    def parts(self) -> Iterator[tuple[ProgramDifference, ComparedPart]]:
         """Every part with its program."""
         for program in self.programs:
             for part in program.parts:

@@ -1,6 +1,6 @@
 """Two versions of what is no table: procedures, what a level runs around its table, conditions with a name, periods.
 
-In: versions. Out: `Part`s.
+In: versions. Out: `ComparedPart`s.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -11,7 +11,7 @@ from itertools import product
 from typing import Any
 
 from rcsc.diff.changes.contrast import changes, contrast
-from rcsc.diff.changes.difference import Basis, Change, Part, Sort
+from rcsc.diff.changes.difference import Basis, Change, ComparedPart, PartSort
 from rcsc.diff.changes.spell import number
 from rcsc.diff.changes.versions import Doing, Runner, Versions
 from rcsc.lang.interpret import call, execute
@@ -41,7 +41,7 @@ from rcsc.symbolic.effect import Effect, Meaning
 from rcsc.symbolic.values import FALSE, TRUE, Node
 
 
-def procedures(versions: Versions) -> Iterator[Part]:
+def procedures(versions: Versions) -> Iterator[ComparedPart]:
     """Every procedure that both versions have, called with the same arguments.
 
     Raises:
@@ -53,16 +53,16 @@ def procedures(versions: Versions) -> Iterator[Part]:
             yield _procedure(versions, procedure, later[name])
 
 
-def _procedure(versions: Versions, one: Procedure, two: Procedure) -> Part:
+def _procedure(versions: Versions, one: Procedure, two: Procedure) -> ComparedPart:
     name, (first, second) = str(one.name), versions.digests
     if first.procedure(name) == second.procedure(name):
-        return Part("procedure", name, basis=Basis.DIGEST)
+        return ComparedPart("procedure", name, basis=Basis.DIGEST)
     calls: list[Statement] = [Call(ProcedureName(name))]
     apart = sorted(versions.aligned.apart & (first.touched(calls, ()) | second.touched(calls, ())))
     if apart:
-        return Part("procedure", name, (f"cannot be compared: `{apart[0]}` changed its kind",))
+        return ComparedPart("procedure", name, (f"cannot be compared: `{apart[0]}` changed its kind",))
     if [(p.name, _kind(p.type)) for p in one.params] != [(p.name, _kind(p.type)) for p in two.params]:
-        return Part("procedure", name, ("its parameters changed",))
+        return ComparedPart("procedure", name, ("its parameters changed",))
     args = [
         values.variable(
             p.name if p.name not in versions.kinds else f"argument {p.name}", _narrower(p.type, q.type)
@@ -100,19 +100,19 @@ def _run(body: list[Statement], program: Program, now: dict[str, Value]) -> None
 
 def _effects(
     versions: Versions, what: str, name: str, pair: tuple[Effect, Effect], runners: tuple[Runner, Runner]
-) -> Part:
+) -> ComparedPart:
     """Where two effects differ, all inputs free."""
     before = versions.queries
     one, two = (Doing(name, effect, run, {}) for effect, run in zip(pair, runners, strict=True))
     made = contrast(versions, TRUE, (one, two))
-    found = changes(versions, Sort.EFFECT, (name, name), TRUE, TRUE, made) if made.differ else []
-    return Part(what, name, (), tuple(found), (), Basis.SOLVER, versions.queries - before)
+    found = changes(versions, PartSort.EFFECT, (name, name), TRUE, TRUE, made) if made.differ else []
+    return ComparedPart(what, name, (), tuple(found), (), Basis.SOLVER, versions.queries - before)
 
 
 # --- levels ----------------------------------------------------------------------------------
 
 
-def levels(versions: Versions) -> Iterator[Part]:
+def levels(versions: Versions) -> Iterator[ComparedPart]:
     """Every level that both versions have: period, which table runs when, and what runs before and after it.
 
     Raises:
@@ -122,13 +122,13 @@ def levels(versions: Versions) -> Iterator[Part]:
     for one in versions.before.levels:
         two = later.get(one.name)
         if two is None:
-            yield Part("level", one.name, ("gone",))
+            yield ComparedPart("level", one.name, ("gone",))
             continue
-        yield Part("level", one.name, tuple(_level(one, two)), basis=Basis.DIGEST)
+        yield ComparedPart("level", one.name, tuple(_level(one, two)), basis=Basis.DIGEST)
         yield _sequence(versions, "preprocess", one.name, (one.preprocess, two.preprocess))
         yield _sequence(versions, "postprocess", one.name, (one.postprocess, two.postprocess))
     known = {level.name for level in versions.before.levels}
-    yield from (Part("level", name, ("new",)) for name in later if name not in known)
+    yield from (ComparedPart("level", name, ("new",)) for name in later if name not in known)
 
 
 def _level(one: Level, two: Level) -> Iterator[str]:
@@ -156,15 +156,15 @@ def _selector(level: Level) -> Expr | None:
 
 def _sequence(
     versions: Versions, what: str, level: str, names: tuple[tuple[str, ...], tuple[str, ...]]
-) -> Part:
+) -> ComparedPart:
     """What runs before a level's table, or after it, as one run."""
     bodies: list[list[Statement]] = [[Call(ProcedureName(name)) for name in part] for part in names]
     first, second = versions.digests
     if first.body(bodies[0]) == second.body(bodies[1]):
-        return Part(what, level, basis=Basis.DIGEST)
+        return ComparedPart(what, level, basis=Basis.DIGEST)
     apart = sorted(versions.aligned.apart & (first.touched(bodies[0], ()) | second.touched(bodies[1], ())))
     if apart:
-        return Part(what, level, (f"cannot be compared: `{apart[0]}` changed its kind",))
+        return ComparedPart(what, level, (f"cannot be compared: `{apart[0]}` changed its kind",))
     one, two = (m.effect(body) for m, body in zip(versions.meanings(), bodies, strict=True))
     return _effects(versions, what, level, (one, two), (partial(_run, bodies[0]), partial(_run, bodies[1])))
 
@@ -191,7 +191,7 @@ _WORDS = {"doc": "", "text": "", "box": None}
 """Fields that say again, for people or for the prover, what others say."""
 
 
-def unsaid(versions: Versions, said: Iterable[str]) -> Iterator[Part]:
+def unsaid(versions: Versions, said: Iterable[str]) -> Iterator[ComparedPart]:
     """Whatever of the two programs differs, by a walk over all fields, and is neither said yet nor compared.
 
     Procedures that only one version has are left out: what they do shows where they are called.
@@ -213,11 +213,11 @@ def unsaid(versions: Versions, said: Iterable[str]) -> Iterator[Part]:
                 continue  # itself, or a part of it
             if name not in one or name not in two:
                 if what != "procedure":
-                    yield Part(what, name, ("new" if name not in one else "gone",))
+                    yield ComparedPart(what, name, ("new" if name not in one else "gone",))
             elif _rest_of(one[name], compared) != _rest_of(two[name], compared):
-                yield Part(what, name, ("declared otherwise",))
+                yield ComparedPart(what, name, ("declared otherwise",))
         if [name for name in one if name in two] != [name for name in two if name in one]:
-            yield Part("order", field.name, ("declared in another order",))
+            yield ComparedPart("order", field.name, ("declared in another order",))
 
 
 def _rest_of(member: Any, compared: Mapping[str, object]) -> str:
@@ -242,7 +242,7 @@ def _bare(value: Any, *, whole: bool = False) -> Any:
 # --- conditions --------------------------------------------------------------------------------
 
 
-def conditions(versions: Versions) -> Iterator[Part]:
+def conditions(versions: Versions) -> Iterator[ComparedPart]:
     """Assumptions, invariants, properties, and when deferred values are taken.
 
     Raises:
@@ -257,7 +257,7 @@ def conditions(versions: Versions) -> Iterator[Part]:
         for name in dict.fromkeys((*one, *two)):
             if name not in two or name not in one:
                 if what != "deferred value":  # the declaration says so
-                    yield Part(what, name, ("gone" if name not in two else "new",))
+                    yield ComparedPart(what, name, ("gone" if name not in two else "new",))
             else:
                 yield _condition(versions, what, name, (one[name], two[name]))
     yield from _properties(versions)
@@ -266,16 +266,16 @@ def conditions(versions: Versions) -> Iterator[Part]:
         was = standing.get(str(assumption.name), assumption.standing)
         if was is not assumption.standing:
             said = f"{was.value}, now {assumption.standing.value}"
-            yield Part("standing of assumption", str(assumption.name), (said,))
+            yield ComparedPart("standing of assumption", str(assumption.name), (said,))
 
 
-def _properties(versions: Versions) -> Iterator[Part]:
+def _properties(versions: Versions) -> Iterator[ComparedPart]:
     """Each property, with its words where it is new, gone, or says something else."""
     one, two = ({p.name: p for p in made.properties} for made in (versions.before, versions.after))
     for name in dict.fromkeys((*one, *two)):
         if name not in two or name not in one:
             only = one[name] if name in one else two[name]
-            yield Part("property", name, (f"{'gone' if name in one else 'new'}: {_words(only)}",))
+            yield ComparedPart("property", name, (f"{'gone' if name in one else 'new'}: {_words(only)}",))
             continue
         part = _condition(versions, "property", name, (one[name].condition, two[name].condition))
         said = (f"{_words(one[name])} -> {_words(two[name])}",) if part.changes else part.said
@@ -295,13 +295,13 @@ def _deferred(program: Program) -> dict[str, Expr]:
     return {str(v.name): v.deferred_until for v in program.variables if v.deferred_until is not None}
 
 
-def _condition(versions: Versions, what: str, name: str, pair: tuple[Expr, Expr]) -> Part:
+def _condition(versions: Versions, what: str, name: str, pair: tuple[Expr, Expr]) -> ComparedPart:
     """Where a condition was true and is not now, and the other way."""
     if repr(pair[0]) == repr(pair[1]):
-        return Part(what, name, basis=Basis.DIGEST)
+        return ComparedPart(what, name, basis=Basis.DIGEST)
     read = {leaf.removeprefix(BEFORE) for condition in pair for leaf in read_by(condition)}
     if apart := sorted(versions.aligned.apart & read):
-        return Part(what, name, (f"cannot be compared: `{apart[0]}` changed its kind",))
+        return ComparedPart(what, name, (f"cannot be compared: `{apart[0]}` changed its kind",))
     before = versions.queries
     one, two = (
         _worth(meaning, condition, undefined="false" if what == "property" else "undefined")
@@ -311,8 +311,8 @@ def _condition(versions: Versions, what: str, name: str, pair: tuple[Expr, Expr]
     for first, second in product(one, two):
         if first != second:
             region = versions.shared.one(values.both(one[first], two[second]))
-            found += changes(versions, Sort.CONDITION, (first, second), region)
-    return Part(what, name, (), tuple(found), (), Basis.SOLVER, versions.queries - before)
+            found += changes(versions, PartSort.CONDITION, (first, second), region)
+    return ComparedPart(what, name, (), tuple(found), (), Basis.SOLVER, versions.queries - before)
 
 
 def _worth(meaning: Meaning, condition: Expr, undefined: str) -> dict[str, Node]:

@@ -1,6 +1,6 @@
 """Two versions of one table: where another line, another effect, or none or several lines.
 
-In: two tables over shared leaves. Out: a `Part`. Inputs at which the versions differ are found one pair of lines after the
+In: two tables over shared leaves. Out: a `ComparedPart`. Inputs at which the versions differ are found one pair of lines after the
 other; when the solver finds no more, that is the proof that nothing else changed.
 """
 
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import partial
 
 from rcsc.diff.changes.contrast import Contrast, changes, contrast
-from rcsc.diff.changes.difference import Basis, Change, Part, Sort
+from rcsc.diff.changes.difference import Basis, Change, ComparedPart, PartSort
 from rcsc.diff.changes.versions import Doing, Versions, is_hard
 from rcsc.lang.interpret import execute, matching_lines
 from rcsc.lang.leaves import everything, written_by
@@ -23,7 +23,7 @@ UNDEFINED = "a condition that is undefined"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Outcome:
+class InputOutcome:
     """What can become of an input.
 
     Attributes:
@@ -46,7 +46,7 @@ class Outcome:
         return self.actions is None, self.name
 
 
-def table_part(versions: Versions, one: Table, two: Table) -> Part:
+def table_part(versions: Versions, one: Table, two: Table) -> ComparedPart:
     """What changed between two versions of a table.
 
     Raises:
@@ -55,11 +55,11 @@ def table_part(versions: Versions, one: Table, two: Table) -> Part:
     """
     name = str(two.name)
     if versions.digests[0].table(one) == versions.digests[1].table(two):
-        return Part("table", name, basis=Basis.DIGEST)
+        return ComparedPart("table", name, basis=Basis.DIGEST)
     apart = sorted(versions.aligned.apart & (_touched(versions, 0, one) | _touched(versions, 1, two)))
     if apart:
         said = (f"cannot be compared: {', '.join(f'`{leaf}`' for leaf in apart)} changed its kind",)
-        return Part("table", name, (*said, *_claims(one, two)))
+        return ComparedPart("table", name, (*said, *_claims(one, two)))
     return _Comparison(versions, one, two).part()
 
 
@@ -120,7 +120,7 @@ class _Comparison:
             )
         )
 
-    def part(self) -> Part:
+    def part(self) -> ComparedPart:
         """Everything that changed."""
         versions, before = self.versions, self.versions.queries
         changed: list[Change] = []
@@ -135,14 +135,14 @@ class _Comparison:
             pairs, key=lambda both: (first.index(both[0].key), second.index(both[1].key))
         ):
             for change in self._compared(outcome, two):
-                (moved if change.sort is Sort.LINE else changed).append(change)
+                (moved if change.sort is PartSort.LINE else changed).append(change)
         space = versions.space(*(out.when for outs in self.outcomes for out in outs.values()))
-        return Part(
+        return ComparedPart(
             "table", str(self.tables[1].name), tuple(_claims(*self.tables)), tuple(changed), tuple(moved), Basis.SOLVER,
             versions.queries - before, space.volume(space.nodes),
         )  # fmt: skip
 
-    def _bodies_differ(self, one: Outcome, two: Outcome) -> bool:
+    def _bodies_differ(self, one: InputOutcome, two: InputOutcome) -> bool:
         """Whether a line's actions, and all that they call, are not word for word the same."""
         if one.actions is None or two.actions is None:
             return False
@@ -152,7 +152,9 @@ class _Comparison:
         )
         return first != second
 
-    def _pairs(self, kept: list[tuple[Outcome, Outcome]]) -> list[tuple[Outcome, Outcome]]:
+    def _pairs(
+        self, kept: list[tuple[InputOutcome, InputOutcome]]
+    ) -> list[tuple[InputOutcome, InputOutcome]]:
         """Every pair of outcomes with different names that some input has."""
         versions = self.versions
         space = versions.space(*(out.when for outs in self.outcomes for out in outs.values()))
@@ -170,7 +172,7 @@ class _Comparison:
         versions.queries += space.queries
         return found
 
-    def _compared(self, one: Outcome, two: Outcome) -> list[Change]:
+    def _compared(self, one: InputOutcome, two: InputOutcome) -> list[Change]:
         """What changed where one version has the first outcome and the other the second."""
         versions = self.versions
         both = versions.shared.one(values.both(one.when, two.when))
@@ -178,7 +180,7 @@ class _Comparison:
             versions.stated[both] = versions.shared.one(values.both(one.holds, two.holds))
         labels = one.label, two.label
         if one.actions is None or two.actions is None:
-            return self._confirmed(changes(versions, Sort.FAULT, labels, both, self.relied), one, two)
+            return self._confirmed(changes(versions, PartSort.FAULT, labels, both, self.relied), one, two)
         doing = [
             Doing(out.label, meaning.effect(_body(out.actions), (one.holds, two.holds)), partial(_run, _body(out.actions)),
                   _headings(program, out.actions))
@@ -187,7 +189,7 @@ class _Comparison:
             )
         ]  # fmt: skip
         made = contrast(versions, both, (doing[0], doing[1]))
-        found = changes(versions, Sort.EFFECT, labels, both, self.relied, made) if made.differ else []
+        found = changes(versions, PartSort.EFFECT, labels, both, self.relied, made) if made.differ else []
         if one.key != two.key:
             found += self._moved(labels, both, made)
         return self._confirmed(found, one, two)
@@ -196,13 +198,13 @@ class _Comparison:
         """Where another line has the same effect; not looked for where doubles are computed with."""
         versions = self.versions
         if not made.differ:
-            return changes(versions, Sort.LINE, labels, both)
+            return changes(versions, PartSort.LINE, labels, both)
         alike = versions.shared.one(values.both(both, values.negation(made.node)))
         if is_hard(alike) or not versions.possible(alike):
             return []
-        return changes(versions, Sort.LINE, labels, alike)
+        return changes(versions, PartSort.LINE, labels, alike)
 
-    def _confirmed(self, found: list[Change], one: Outcome, two: Outcome) -> list[Change]:
+    def _confirmed(self, found: list[Change], one: InputOutcome, two: InputOutcome) -> list[Change]:
         """Each witness put to the reference meaning: it must match as is said.
 
         Raises:
@@ -216,7 +218,7 @@ class _Comparison:
                     self._match(program, table, out, change)
         return found
 
-    def _match(self, program: Program, table: Table, out: Outcome, change: Change) -> None:
+    def _match(self, program: Program, table: Table, out: InputOutcome, change: Change) -> None:
         now = self.versions.snapshot(program, dict(change.point))
         seen = matching_lines(table, now)
         default = table.default
@@ -237,24 +239,24 @@ def assumed(program: Program, table: Table, meaning: Meaning) -> Node:
     return values.all_of(meaning.condition(condition) for condition in conditions)
 
 
-def _outcomes(table: Table, meaning: Meaning) -> Iterable[Outcome]:
+def _outcomes(table: Table, meaning: Meaning) -> Iterable[InputOutcome]:
     """Everything that can become of an input: exactly one of them does."""
     lines = meaning.lines(table)
     fine = values.all_of(values.negation(bad) for bad in meaning.bad)
     many, one = several(lines), meaning.shared.one
     alone = values.both(fine, values.negation(many))
     for line, holds in zip(table.lines, lines, strict=True):
-        yield Outcome(
+        yield InputOutcome(
             str(line.name), f"line `{line.name}`", one(values.both(alone, holds)), one(holds), line.actions
         )
     nothing = one(values.both(fine, values.negation(values.any_of(lines))))
     default = table.default
     if default is None:
-        yield Outcome(NO_LINE, NO_LINE, nothing)
+        yield InputOutcome(NO_LINE, NO_LINE, nothing)
     else:
-        yield Outcome(str(default.name), f"DEFAULT `{default.name}`", nothing, TRUE, default.actions)
-    yield Outcome(SEVERAL_LINES, SEVERAL_LINES, one(values.both(fine, many)))
-    yield Outcome(UNDEFINED, UNDEFINED, one(values.negation(fine)))
+        yield InputOutcome(str(default.name), f"DEFAULT `{default.name}`", nothing, TRUE, default.actions)
+    yield InputOutcome(SEVERAL_LINES, SEVERAL_LINES, one(values.both(fine, many)))
+    yield InputOutcome(UNDEFINED, UNDEFINED, one(values.negation(fine)))
 
 
 def _body(actions: tuple[Action, ...] | None) -> list[Statement]:

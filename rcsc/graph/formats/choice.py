@@ -8,7 +8,7 @@ from rcsc.graph.formats.state_graph import StateGraph
 
 
 @dataclass(frozen=True, slots=True)
-class Form:
+class GraphForm:
     """One form.
 
     Attributes:
@@ -21,10 +21,10 @@ class Form:
     endings: tuple[str, ...]
 
 
-FORMS: Mapping[str, Form] = {
-    "dot": Form(dot.write, dot.read, (".dot", ".gv")),
-    "mermaid": Form(mermaid.write, mermaid.read, (".mmd", ".mermaid")),
-    "scxml": Form(scxml.write, scxml.read, (".scxml", ".xml")),
+FORMS: Mapping[str, GraphForm] = {
+    "dot": GraphForm(dot.write, dot.read, (".dot", ".gv")),
+    "mermaid": GraphForm(mermaid.write, mermaid.read, (".mmd", ".mermaid")),
+    "scxml": GraphForm(scxml.write, scxml.read, (".scxml", ".xml")),
 }
 
 

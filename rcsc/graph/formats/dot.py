@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import pairwise
 
-from rcsc.graph.formats.reading import Drawn, UnreadableError, finished
+from rcsc.graph.formats.reading import ReadArrow, UnreadableError, finished
 from rcsc.graph.formats.state_graph import ANY, LINES, Edge, StateGraph, header
 
 MOST_WIDE = 44
@@ -115,7 +115,7 @@ class _Reader:
     at: int = 0
     depth: int = 0
     said: dict[str, str] = field(default_factory=dict)
-    drawn: list[Drawn] = field(default_factory=list)
+    drawn: list[ReadArrow] = field(default_factory=list)
 
     def graph(self) -> None:
         """The whole text."""
@@ -167,7 +167,7 @@ class _Reader:
             self._port()
         said = self._attributes()
         self.drawn += [
-            Drawn(one.text, two.text, said, one.offset)
+            ReadArrow(one.text, two.text, said, one.offset)
             for one, two in pairwise(ends)
             if one.text  # the nameless point before the initial state
         ]

@@ -8,7 +8,7 @@ and the name of the table. Composite states and notes are not read.
 import re
 from dataclasses import dataclass, field
 
-from rcsc.graph.formats.reading import Drawn, UnreadableError, finished
+from rcsc.graph.formats.reading import ReadArrow, UnreadableError, finished
 from rcsc.graph.formats.state_graph import ANY, HEADER, Edge, StateGraph, header
 
 _ANY_NAME = "any state"
@@ -62,7 +62,7 @@ def read(text: str) -> StateGraph:
     return finished(
         read_.said,
         [
-            Drawn(ends.get(d.source, d.source), ends.get(d.target, d.target), d.said, d.offset)
+            ReadArrow(ends.get(d.source, d.source), ends.get(d.target, d.target), d.said, d.offset)
             for d in read_.drawn
         ],
     )
@@ -73,7 +73,7 @@ class _Read:
     """What the lines so far say: of the graph, of its arrows, and what states are shown as, by their names."""
 
     said: dict[str, str] = field(default_factory=dict)
-    drawn: list[Drawn] = field(default_factory=list)
+    drawn: list[ReadArrow] = field(default_factory=list)
     names: dict[str, str] = field(default_factory=dict)
     begun: bool = False
 
@@ -107,7 +107,7 @@ class _Read:
         elif target == "[*]":
             raise UnreadableError("a table has no end: a level runs its table in every cycle", offset)
         else:
-            self.drawn.append(Drawn(source, target, _transition(text, offset), offset))
+            self.drawn.append(ReadArrow(source, target, _transition(text, offset), offset))
 
 
 def _transition(text: str, offset: int) -> dict[str, str]:

@@ -29,7 +29,7 @@ MOST_ARROWS = 4096
 
 
 @dataclass(frozen=True, slots=True)
-class Drawn:
+class ReadArrow:
     """An arrow as a form has it: its ends, and words about it (`line`, `when`, `does`, `decided`, `default`)."""
 
     source: str
@@ -52,7 +52,7 @@ class Drawn:
         )
 
 
-def finished(said: Mapping[str, str], drawn: list[Drawn]) -> StateGraph:
+def finished(said: Mapping[str, str], drawn: list[ReadArrow]) -> StateGraph:
     """The graph of what was read; UnreadableError where it is no graph of a table."""
     if not drawn:
         raise UnreadableError("the graph has no edge")

@@ -9,7 +9,7 @@ import re
 from typing import TYPE_CHECKING
 from xml.sax.saxutils import quoteattr
 
-from rcsc.graph.formats.reading import Drawn, UnreadableError, finished
+from rcsc.graph.formats.reading import ReadArrow, UnreadableError, finished
 from rcsc.graph.formats.state_graph import ANY, Edge, StateGraph, header
 from rcsc.host.files.read import Malformed, xml_of
 
@@ -94,7 +94,7 @@ class _Reader:
             match.start()
             for match in re.finditer(r"<transition\b", re.sub(r"<!--.*?-->", _blank, text, flags=re.DOTALL))
         ]
-        self.drawn: list[Drawn] = []
+        self.drawn: list[ReadArrow] = []
 
     def state(self, state: "Element", name: str) -> None:
         """The transitions of a state and of those within it, in the order of the text."""
@@ -110,7 +110,7 @@ class _Reader:
                 "when": element.get("cond", "")
             }
             offset = self.places[at] if at < len(self.places) else 0
-            self.drawn.append(Drawn(name, element.get("target") or name, said, offset))
+            self.drawn.append(ReadArrow(name, element.get("target") or name, said, offset))
 
 
 def _blank(match: re.Match[str]) -> str:

@@ -7,7 +7,7 @@ from rcsc.diagnostics.source import Span
 from rcsc.lang.operator_table import LOGIC
 from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.comments import Comments, split, words
-from rcsc.lang.syntax.lalr import Node
+from rcsc.lang.syntax.lalr import ParseNode
 
 
 class Rows(Protocol):
@@ -28,7 +28,7 @@ class Build:
 
     # --- pieces ---
 
-    def _span(self, node: Node) -> Span:
+    def _span(self, node: ParseNode) -> Span:
         if node.start_pos < 0:
             return Span(self.file, 0, 0)
         return Span(self.file, node.start_pos, node.end_pos)
@@ -36,22 +36,22 @@ class Build:
     def _name(self, token: Any) -> tree.Name:
         return tree.Name(str(token), Span(self.file, token.start_pos, token.end_pos))
 
-    def _names(self, node: Node | None) -> tuple[tree.Name, ...]:
+    def _names(self, node: ParseNode | None) -> tuple[tree.Name, ...]:
         return tuple(self._name(token) for token in node.children) if node is not None else ()
 
-    def _head(self, node: Node) -> dict[str, Any]:
+    def _head(self, node: ParseNode) -> dict[str, Any]:
         """Span, comments and doc lines of a declaration."""
         plain, doc = split(self.comments.take(node.start_pos))
         return {"span": self._span(node), "comments": plain, "doc": doc}
 
-    def _above(self, node: Node) -> dict[str, Any]:
+    def _above(self, node: ParseNode) -> dict[str, Any]:
         """Span and comments of a statement or an arm."""
         comments = self.comments.take(node.start_pos)
         return {"span": self._span(node), "comments": tuple(words(text) for text in comments)}
 
     @staticmethod
     def _rule(item: Any) -> str:
-        return item.data if isinstance(item, Node) else ""
+        return item.data if isinstance(item, ParseNode) else ""
 
     def _find(self, items: list[Any], rule: str) -> Any:
         return next((item for item in items if self._rule(item) == rule), None)
@@ -61,42 +61,42 @@ class Build:
 
     # --- declarations ---
 
-    def declaration(self, node: Node) -> tree.Declaration:
+    def declaration(self, node: ParseNode) -> tree.Declaration:
         """Any declaration."""
         built: tree.Declaration = getattr(self, f"_{node.data}")(node)
         return built
 
-    def _use(self, node: Node) -> tree.Use:
+    def _use(self, node: ParseNode) -> tree.Use:
         head = self._head(node)
         head.pop("doc")
         return tree.Use("/".join(str(token) for token in node.children[0].children if token != "/"), **head)
 
-    def _const_decl(self, node: Node) -> tree.ConstDecl:
+    def _const_decl(self, node: ParseNode) -> tree.ConstDecl:
         head = self._head(node)
         return tree.ConstDecl(self._name(node.children[0]), self.expr(node.children[2]), **head)
 
-    def _enum_decl(self, node: Node) -> tree.EnumDecl:
+    def _enum_decl(self, node: ParseNode) -> tree.EnumDecl:
         head = self._head(node)
         name, *members = node.children
         return tree.EnumDecl(self._name(name), tuple(self._name(member) for member in members), **head)
 
-    def _type_decl(self, node: Node) -> tree.TypeDecl:
+    def _type_decl(self, node: ParseNode) -> tree.TypeDecl:
         head = self._head(node)
         return tree.TypeDecl(self._name(node.children[0]), self.type(node.children[2]), **head)
 
-    def _record_decl(self, node: Node) -> tree.RecordDecl:
+    def _record_decl(self, node: ParseNode) -> tree.RecordDecl:
         head = self._head(node)
         name, *fields = node.children
         return tree.RecordDecl(self._name(name), tuple(self._field(field) for field in fields), **head)
 
-    def _field(self, node: Node) -> tree.FieldDecl:
+    def _field(self, node: ParseNode) -> tree.FieldDecl:
         head = self._head(node)
         return tree.FieldDecl(self._name(node.children[0]), self.type(node.children[1]), **head)
 
-    def _unit_decl(self, node: Node) -> tree.UnitDecl:
+    def _unit_decl(self, node: ParseNode) -> tree.UnitDecl:
         return tree.UnitDecl(self._name(node.children[0]), **self._head(node))
 
-    def _variable_decl(self, node: Node) -> tree.VariableDecl:
+    def _variable_decl(self, node: ParseNode) -> tree.VariableDecl:
         head = self._head(node)
         kind, name, declared, *rest = node.children
         admit, equal, safe = (self._kind(rest, word) for word in ("ADMIT", "EQUAL", "SAFE"))
@@ -109,34 +109,34 @@ class Build:
             str(kind), self._name(name), self.type(declared), initial, str(admit or ""), until, shown, **head
         )
 
-    def _assume_decl(self, node: Node) -> tree.AssumeDecl:
+    def _assume_decl(self, node: ParseNode) -> tree.AssumeDecl:
         head = self._head(node)
         standing = self._kind(node.children, "STANDING")
         return tree.AssumeDecl(
             self._name(node.children[0]), self.expr(node.children[-1]), str(standing or ""), **head
         )
 
-    def _invariant_decl(self, node: Node) -> tree.InvariantDecl:
+    def _invariant_decl(self, node: ParseNode) -> tree.InvariantDecl:
         head = self._head(node)
         return tree.InvariantDecl(self._name(node.children[0]), self.expr(node.children[1]), **head)
 
-    def _property_decl(self, node: Node) -> tree.PropertyDecl:
+    def _property_decl(self, node: ParseNode) -> tree.PropertyDecl:
         head = self._head(node)
         name, condition, *last = node.children
         word = self._rule(last[0]) if last else ""  # the rule is called as the word is
         other = self.expr(last[0].children[0]) if last else None
         return tree.PropertyDecl(self._name(name), self.expr(condition), word, other, **head)
 
-    def _procedure_decl(self, node: Node) -> tree.ProcedureDecl:
+    def _procedure_decl(self, node: ParseNode) -> tree.ProcedureDecl:
         return self._procedure(node, "procedure")
 
-    def _module_decl(self, node: Node) -> tree.ProcedureDecl:
+    def _module_decl(self, node: ParseNode) -> tree.ProcedureDecl:
         return self._procedure(node, "module")
 
-    def _extern_decl(self, node: Node) -> tree.ProcedureDecl:
+    def _extern_decl(self, node: ParseNode) -> tree.ProcedureDecl:
         return self._procedure(node, "extern")
 
-    def _procedure(self, node: Node, kind: str) -> tree.ProcedureDecl:
+    def _procedure(self, node: ParseNode, kind: str) -> tree.ProcedureDecl:
         head = self._head(node)
         parts = node.children[1:]
         params, body = self._find(parts, "parameters"), self._find(parts, "block")
@@ -157,13 +157,13 @@ class Build:
             **head,
         )
 
-    def _owner_decl(self, node: Node) -> tree.OwnerDecl:
+    def _owner_decl(self, node: ParseNode) -> tree.OwnerDecl:
         head = self._head(node)
         return tree.OwnerDecl(
             self._name(node.children[0]), self._names(self._find(node.children, "names")), **head
         )
 
-    def _table_decl(self, node: Node) -> tree.TableDecl:
+    def _table_decl(self, node: ParseNode) -> tree.TableDecl:
         head = self._head(node)
         assuming = self._names(self._find(node.children, "names"))
         assert self.rows is not None
@@ -171,7 +171,7 @@ class Build:
         conditions, actions, lines = self.rows.table(rows)
         return tree.TableDecl(self._name(node.children[0]), assuming, conditions, actions, lines, **head)
 
-    def _level_decl(self, node: Node) -> tree.LevelDecl:
+    def _level_decl(self, node: ParseNode) -> tree.LevelDecl:
         head = self._head(node)
         parts = node.children[1:]
         period, before = self._find(parts, "period"), self._find(parts, "preprocess")
@@ -193,7 +193,7 @@ class Build:
 
     # --- types and units ---
 
-    def type(self, node: Node) -> tree.TypeExpr:
+    def type(self, node: ParseNode) -> tree.TypeExpr:
         """Any type."""
         span = self._span(node)
         match node.data:
@@ -220,12 +220,12 @@ class Build:
         node = self._find(items, "unit")
         if node is None:
             return None
-        product, *divisors = [item for item in node.children if isinstance(item, Node)]
-        factors = [self._factor(f, 1) for f in product.children if isinstance(f, Node)]
+        product, *divisors = [item for item in node.children if isinstance(item, ParseNode)]
+        factors = [self._factor(f, 1) for f in product.children if isinstance(f, ParseNode)]
         factors += [self._factor(f, -1) for f in divisors]
         return tree.Unit(tuple(factor for factor in factors if factor is not None), self._span(node))
 
-    def _factor(self, node: Node, sign: int) -> tree.UnitFactor | None:
+    def _factor(self, node: ParseNode, sign: int) -> tree.UnitFactor | None:
         if node.data == "unit_one":
             return None
         names = [item for item in node.children if item.type in ("NAME", "INT")]
@@ -234,7 +234,7 @@ class Build:
 
     # --- expressions ---
 
-    def expr(self, node: Node) -> tree.Expr:
+    def expr(self, node: ParseNode) -> tree.Expr:
         """Any expression."""
         rule, span, parts = node.data, self._span(node), node.children
         if rule in LOGIC:  # the rule is called as the word is
@@ -287,18 +287,18 @@ class Build:
 
     # --- cells ---
 
-    def cell(self, node: Node) -> Any:
+    def cell(self, node: ParseNode) -> Any:
         """A condition, an expression or a list of actions, by the start rule that parsed it."""
         part = node.children[0]
         match node.data:
             case "cell":
                 return self._condition(part)
             case "actions":
-                return tuple(self.statement(item) for item in node.children if isinstance(item, Node))
+                return tuple(self.statement(item) for item in node.children if isinstance(item, ParseNode))
             case _:
                 return self.expr(part)
 
-    def _condition(self, node: Node) -> tree.Condition:
+    def _condition(self, node: ParseNode) -> tree.Condition:
         span, parts = self._span(node), node.children
         match node.data:
             case "equals":
@@ -312,11 +312,11 @@ class Build:
 
     # --- statements ---
 
-    def block(self, node: Node) -> tuple[tree.Statement, ...]:
+    def block(self, node: ParseNode) -> tuple[tree.Statement, ...]:
         """The statements between braces."""
-        return tuple(self.statement(item) for item in node.children if isinstance(item, Node))
+        return tuple(self.statement(item) for item in node.children if isinstance(item, ParseNode))
 
-    def statement(self, node: Node) -> tree.Statement:
+    def statement(self, node: ParseNode) -> tree.Statement:
         """Any statement."""
         built: tree.Statement = getattr(self, f"_{node.data}_statement")(node.children, self._above(node))
         return built
@@ -344,7 +344,7 @@ class Build:
         last = self._find(parts[1:], "block")
         return tree.Case(self.expr(parts[0]), arms, None if last is None else self.block(last), **above)
 
-    def _arm(self, node: Node) -> tree.Arm:
+    def _arm(self, node: ParseNode) -> tree.Arm:
         above = self._above(node)
         values = tuple(self.expr(part) for part in node.children[:-1])
         return tree.Arm(values, self.block(node.children[-1]), **above)

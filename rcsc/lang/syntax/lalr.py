@@ -13,7 +13,7 @@ from typing import Any
 END = "$END"
 
 
-class Leaf(str):
+class ParseLeaf(str):
     """A terminal: its text, its name and where it stands."""
 
     __slots__ = ("end_pos", "start_pos", "type")
@@ -23,7 +23,7 @@ class Leaf(str):
 
 
 @dataclass(slots=True)
-class Node:
+class ParseNode:
     """A rule's name, what it matched (nodes and leaves), and where; both positions are -1 where it matched nothing."""
 
     data: str
@@ -91,7 +91,7 @@ class Tables:
         self._skipped = f"(?:{'|'.join(ignored)})*+"
         self._skip = re.compile(self._skipped).match
 
-    def parse(self, text: str, start: str) -> Node | None:
+    def parse(self, text: str, start: str) -> ParseNode | None:
         """The tree of a text by a start rule; None where it has none."""
         states, last, position = self._states, self._ends[start], 0
         stack, values, begins, ends = [self._starts[start]], list[Any](), list[int](), list[int]()
@@ -101,7 +101,7 @@ class Tables:
             if found is not None:
                 kind = found.lastgroup or ""
                 begin, position = found.span(kind)
-                leaf = Leaf(text[begin:position])
+                leaf = ParseLeaf(text[begin:position])
                 if kind in words.special:
                     kind = words.special[kind].get(leaf, kind)
             elif self._skip(text, position).end() == len(text):  # type: ignore[union-attr]  # it matches always
@@ -188,7 +188,7 @@ def _reduce(
 ) -> None:
     """Takes the symbols of a rule from the stacks and puts there what it makes of them; the state after it is left to do."""
     if not rule.size:
-        values.append([] if not rule.name else Node(rule.name, [], -1, -1))
+        values.append([] if not rule.name else ParseNode(rule.name, [], -1, -1))
         begins.append(-1)
         ends.append(-1)
         return
@@ -202,7 +202,7 @@ def _reduce(
     values.append(
         parts[0]
         if rule.alone and len(parts) == 1
-        else Node(rule.name, parts, begin, end)
+        else ParseNode(rule.name, parts, begin, end)
         if rule.name
         else parts
     )

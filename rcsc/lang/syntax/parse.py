@@ -18,7 +18,7 @@ from rcsc.lang.syntax import screen, tree
 from rcsc.lang.syntax.build import Build
 from rcsc.lang.syntax.comments import Comments, words
 from rcsc.lang.syntax.expected import expected
-from rcsc.lang.syntax.lalr import Leaf, Node, Tables
+from rcsc.lang.syntax.lalr import ParseLeaf, ParseNode, Tables
 from rcsc.lang.syntax.rows import ACTION_WORDS, NAME, Cell, Cells, cut, is_separator
 
 MOST_ERRORS = 20
@@ -39,7 +39,7 @@ def _tables() -> Tables:
     return Tables(_parser())
 
 
-def _parsed(text: str, start: str) -> Node:
+def _parsed(text: str, start: str) -> ParseNode:
     """The parse tree of a text by one of the start rules.
 
     Raises:
@@ -74,7 +74,7 @@ def parse(source: Source) -> tree.File | tuple[Diagnostic, ...]:
     return tree.File(declarations, tuple(words(text) for text in comments.rest()), source.name)
 
 
-def _deep_in(root: Node) -> tuple[int, int] | None:
+def _deep_in(root: ParseNode) -> tuple[int, int] | None:
     """Start and end of the first node that lies too deep; what follows may then call itself at each depth."""
     waiting = [(root, 0)]
     while waiting:
@@ -82,7 +82,7 @@ def _deep_in(root: Node) -> tuple[int, int] | None:
         if depth > screen.DEEPEST:
             return node.start_pos, node.start_pos + 1
         deeper = depth + (node.data not in ("block", "arm"))
-        waiting.extend((child, deeper) for child in reversed(node.children) if isinstance(child, Node))
+        waiting.extend((child, deeper) for child in reversed(node.children) if isinstance(child, ParseNode))
     return None
 
 
@@ -91,7 +91,7 @@ class _Pieces:
     """The declarations of one text, parsed together or, after an error, from keyword to keyword."""
 
     source: Source
-    nodes: list[Node] = field(default_factory=list)
+    nodes: list[ParseNode] = field(default_factory=list)
 
     def parse(self) -> list[Diagnostic]:
         """Fills `nodes`; what was wrong."""
@@ -151,7 +151,7 @@ class _Rows:
     memory: dict[tuple[str, str], Any] = field(default_factory=dict)
 
     def table(
-        self, rows: list[Leaf]
+        self, rows: list[ParseLeaf]
     ) -> tuple[tuple[tree.Heading, ...], tuple[tree.Heading, ...], tuple[tree.Row, ...]]:
         """Condition headings, action headings and lines of a table."""
         head = self._cut(rows[0])
@@ -164,7 +164,7 @@ class _Rows:
         lines = [self._row(row, head, conditions, actions) for row in rows[1:] if not is_separator(str(row))]
         return conditions, actions, tuple(line for line in lines if line is not None)
 
-    def _cut(self, row: Leaf) -> Cells | None:
+    def _cut(self, row: ParseLeaf) -> Cells | None:
         start = row.start_pos
         cells = cut(str(row), start)
         if isinstance(cells, str):
@@ -183,7 +183,11 @@ class _Rows:
         return tree.Heading(subject, "", span)
 
     def _row(
-        self, row: Leaf, head: Cells, conditions: tuple[tree.Heading, ...], actions: tuple[tree.Heading, ...]
+        self,
+        row: ParseLeaf,
+        head: Cells,
+        conditions: tuple[tree.Heading, ...],
+        actions: tuple[tree.Heading, ...],
     ) -> tree.Row | None:
         cells = self._cut(row)
         if cells is None or not self._even(row, cells, head):
@@ -217,7 +221,7 @@ class _Rows:
             tuple(words(text) for text in self.comments.take(start)),
         )
 
-    def _even(self, row: Leaf, cells: Cells, head: Cells) -> bool:
+    def _even(self, row: ParseLeaf, cells: Cells, head: Cells) -> bool:
         for side, got, want in (
             ("conditions", cells.conditions, head.conditions),
             ("actions", cells.actions, head.actions),

@@ -14,7 +14,7 @@ from rcsc.host.files import csv_text as csv_lines
 from rcsc.host.files import written_whole
 from rcsc.run.log.queries import named_columns
 from rcsc.run.log.read import Log, LoggedLevel
-from rcsc.run.log.states import Column, columns, line_of, plain
+from rcsc.run.log.states import LogColumn, columns, line_of, plain
 from rcsc.run.signature import Value, Values
 
 Rows = Iterator[tuple[int, Mapping[str, Values]]]
@@ -101,7 +101,7 @@ def json_text(log: Log) -> str:
 
 
 def _cycle(
-    log: Log, known: Mapping[str, tuple[Column, ...]], tick: int, held: Mapping[str, Values]
+    log: Log, known: Mapping[str, tuple[LogColumn, ...]], tick: int, held: Mapping[str, Values]
 ) -> dict[str, object]:
     return {
         "tick": tick,

@@ -12,7 +12,7 @@ from rcsc.host.files import written_whole
 from rcsc.run.log.export import rows
 from rcsc.run.log.queries import BadExpression, named_columns, nearest
 from rcsc.run.log.read import Log
-from rcsc.run.log.states import Column
+from rcsc.run.log.states import LogColumn
 from rcsc.run.signature import Value
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ class _Series:
     """One column over all ticks; members as their numbers."""
 
     name: str
-    column: Column
+    column: LogColumn
     values: list[float]
 
     @property
@@ -90,7 +90,7 @@ def _series(log: Log, names: Sequence[str]) -> list[_Series]:
     return made
 
 
-def _number(column: Column, value: Value | str) -> float:
+def _number(column: LogColumn, value: Value | str) -> float:
     if isinstance(value, str):
         return float(column.members.index(value)) if value in column.members else -1.0
     return float(value)

@@ -14,7 +14,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from rcsc.run.log.read import Log
-from rcsc.run.log.states import Column, columns
+from rcsc.run.log.states import LogColumn, columns
 from rcsc.run.signature import Value, Values
 
 Moment = Mapping[str, Values]
@@ -66,7 +66,7 @@ def predicate(text: str, log: Log) -> Predicate:
         ) from error
 
 
-def named_columns(log: Log) -> dict[str, tuple[str, Column]]:
+def named_columns(log: Log) -> dict[str, tuple[str, LogColumn]]:
     """Every column of a log by `level.name`, with its level."""
     return {
         f"{level.name}.{column.name}": (level.name, column)
@@ -84,7 +84,7 @@ def nearest(name: str, known: Mapping[str, object]) -> str:
 class _Building:
     """Predicates from syntax."""
 
-    def __init__(self, known: Mapping[str, tuple[str, Column]]) -> None:
+    def __init__(self, known: Mapping[str, tuple[str, LogColumn]]) -> None:
         self._known = known
 
     def predicate(self, node: ast.expr) -> Predicate:

@@ -16,7 +16,7 @@ from rcsc.host.files.names import identifier, shown
 from rcsc.run.adopt import Begun
 from rcsc.run.description import Description, wire_of
 from rcsc.run.log.finding import FINDING, LoggedFinding, finding_of
-from rcsc.run.log.records import Checked, Seal, records
+from rcsc.run.log.records import ChainCheck, Seal, records
 from rcsc.run.log.schema import (
     BUFFERS,
     LEVELS,
@@ -135,7 +135,7 @@ class Log:
     programs: Mapping[str, str]
     levels: tuple[LoggedLevel, ...]
     buffers: Mapping[str, Track]
-    checked: Checked
+    checked: ChainCheck
     finding: LoggedFinding | None = None
 
     @property
@@ -185,7 +185,7 @@ def read(path: Path) -> Log:
     Raises:
         UnreadableLog: It cannot be read, or is none.
     """
-    checked = Checked()
+    checked = ChainCheck()
     made = _Reading(checked)
     try:
         for record in records(path, checked):
@@ -202,7 +202,7 @@ def read(path: Path) -> Log:
 class _Reading:
     """What was read so far."""
 
-    checked: Checked
+    checked: ChainCheck
     metadata: dict[str, dict[str, str]] = field(default_factory=dict)
     signs: dict[str, Signature] = field(default_factory=dict)
     tracks: dict[int, Track] = field(default_factory=dict)

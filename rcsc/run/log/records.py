@@ -58,7 +58,7 @@ class Seal(Enum):
 
 
 @dataclass(slots=True)
-class Checked:
+class ChainCheck:
     """What was read of a file, and what its chain said.
 
     Attributes:
@@ -133,7 +133,7 @@ class _Frames:
             self.sealed.update(taken)
 
 
-def records(path: Path, checked: Checked) -> Iterator[McapRecord]:
+def records(path: Path, checked: ChainCheck) -> Iterator[McapRecord]:
     """Give every record that the chain covers, or every one of a log without a chain.
 
     Args:
@@ -160,7 +160,7 @@ def records(path: Path, checked: Checked) -> Iterator[McapRecord]:
             yield from unpacking.all_of(waiting, checked)
 
 
-def _framed(frames: _Frames, checked: Checked) -> Iterator[McapRecord | None]:
+def _framed(frames: _Frames, checked: ChainCheck) -> Iterator[McapRecord | None]:
     """Every record of the file itself; None where the chain was looked at and holds."""
     checked.seal = Seal.CUT
     try:
@@ -191,7 +191,9 @@ def _framed(frames: _Frames, checked: Checked) -> Iterator[McapRecord | None]:
         checked.seal, checked.why = Seal.CHANGED, str(error)
 
 
-def _sealed(frames: _Frames, frame: bytes, record: Metadata, checked: Checked) -> Iterator[McapRecord | None]:
+def _sealed(
+    frames: _Frames, frame: bytes, record: Metadata, checked: ChainCheck
+) -> Iterator[McapRecord | None]:
     """Whatever comes after the seal, and whether the seal is that of the whole file."""
     said = record.metadata.get(DIGEST, "")
     if record.metadata != {DIGEST: said} or frame.count(said.encode()) != 1 or len(said) != len(OPEN):
@@ -240,7 +242,7 @@ class _Unpacking:
     taken: int = 0
     stopped: bool = False
 
-    def all_of(self, several: list[McapRecord], checked: Checked) -> Iterator[McapRecord]:
+    def all_of(self, several: list[McapRecord], checked: ChainCheck) -> Iterator[McapRecord]:
         """The records, those in chunks for the chunks."""
         try:
             for mcap_record in several:

@@ -28,7 +28,7 @@ _ASIDE = frozenset({"table", "line", "assumptions_failed"})
 
 
 @dataclass(frozen=True, slots=True)
-class Difference:
+class ReplayDifference:
     """A leaf, or what else a cycle leaves, that is not what it was; in the tables' words."""
 
     name: str
@@ -37,7 +37,7 @@ class Difference:
 
 
 @dataclass(frozen=True, slots=True)
-class Cycle:
+class ReplayedCycle:
     """One level's cycle, then and now.
 
     Attributes:
@@ -48,18 +48,18 @@ class Cycle:
     level: str
     line_then: str
     line_now: str
-    differences: tuple[Difference, ...]
+    differences: tuple[ReplayDifference, ...]
     recorded: Values
     now: Values
     restarted: Begun | None = None
 
 
 @dataclass(frozen=True, slots=True)
-class Moment:
+class ReplayMoment:
     """All levels that ran in a tick."""
 
     tick: int
-    cycles: tuple[Cycle, ...]
+    cycles: tuple[ReplayedCycle, ...]
 
     @property
     def differs(self) -> bool:
@@ -97,7 +97,7 @@ class _Again:
         gone = (leaf.name for leaf in then.leaves if leaf.name not in self.sign.index)
         self.lacking = dict.fromkeys(f"{self.logged.name}.{name}" for name in gone)
 
-    def cycle(self, at: int, answers: Answers) -> Cycle | None:
+    def cycle(self, at: int, answers: Answers) -> ReplayedCycle | None:
         """Run the cycle whose record has this place; None for the state that recording started from."""
         if at < 1:
             return None
@@ -109,7 +109,7 @@ class _Again:
         self.executor.cycle()
         now = self.executor.values()
         equal = self.same and self.packed.pack(*now) == track.packed[at]
-        return Cycle(
+        return ReplayedCycle(
             self.logged.name,
             _line(self.logged.sign, self.logged.level, recorded),
             _line(self.sign, self.level, now),
@@ -139,11 +139,11 @@ class _Again:
                 self.lacking[f"{self.logged.name}.{then.name} = {then.shown(start[source])}"] = None
         put_checked(self.logged.name, self.sign, self.executor, tuple(values))
 
-    def _differences(self, recorded: Values, now: Values) -> tuple[Difference, ...]:
+    def _differences(self, recorded: Values, now: Values) -> tuple[ReplayDifference, ...]:
         then_words = words(self.logged.sign, self.logged.level, recorded)
         now_words = words(self.sign, self.level, now)
         found = tuple(
-            Difference(name, said, now_words[name])
+            ReplayDifference(name, said, now_words[name])
             for name, said in then_words.items()
             if name in now_words and now_words[name] != said
         )
@@ -197,7 +197,7 @@ class Replay:
         )
         self.tick = self.log.first
 
-    def go(self, tick: int) -> Moment:
+    def go(self, tick: int) -> ReplayMoment:
         """Run the cycles of a tick again.
 
         Raises:
@@ -211,14 +211,14 @@ class Replay:
             for level in self._levels
             if (at := level.logged.track.place(tick)) >= 0 and level.logged.track.ticks[at] == tick
         )
-        return Moment(tick, tuple(cycle for cycle in found if cycle is not None))
+        return ReplayMoment(tick, tuple(cycle for cycle in found if cycle is not None))
 
     def _answers(self, tick: int, level: str) -> Answers:
         """What extern procedures gave in a cycle of a finding; where the log keeps none, they are called."""
         told = None if self.log.finding is None else self.log.finding.cycles.get((tick, level))
         return () if told is None else told.answers
 
-    def forward(self) -> Moment:
+    def forward(self) -> ReplayMoment:
         """The next tick.
 
         Raises:
@@ -226,7 +226,7 @@ class Replay:
         """
         return self.go(self.tick + 1)
 
-    def back(self) -> Moment:
+    def back(self) -> ReplayMoment:
         """The tick before.
 
         Raises:
@@ -234,7 +234,7 @@ class Replay:
         """
         return self.go(self.tick - 1)
 
-    def moments(self) -> Iterator[Moment]:
+    def moments(self) -> Iterator[ReplayMoment]:
         """Every tick from the first."""
         return (self.go(tick) for tick in self.log.ticks)
 
@@ -243,7 +243,7 @@ class Replay:
         """What the log has and these tables have not, as far as it was run: it was not compared, or stood at its initial value."""
         return tuple(one for level in self._levels for one in level.lacking)
 
-    def first_difference(self) -> Moment | None:
+    def first_difference(self) -> ReplayMoment | None:
         """The first tick in which a level leaves something else than was recorded; None for none."""
         return next((moment for moment in self.moments() if moment.differs), None)
 

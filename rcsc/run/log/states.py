@@ -78,7 +78,7 @@ def plain(value: Value) -> Value | str:
 
 
 @dataclass(frozen=True, slots=True)
-class Column:
+class LogColumn:
     """One thing that is read off a level's values.
 
     Attributes:
@@ -93,27 +93,27 @@ class Column:
     read: Callable[[Values], Value | str]
 
 
-def columns(sign: Signature, level: LevelSign) -> tuple[Column, ...]:
+def columns(sign: Signature, level: LevelSign) -> tuple[LogColumn, ...]:
     """Every column of a level: what the cycle did, then the leaves in declared order."""
     leaves = tuple(_leaf(sign, at) for at in range(len(sign.leaves)))
     taken = {leaf.name for leaf in sign.leaves}
     return (*(column for column in _trace(sign, level) if column.name not in taken), *leaves)
 
 
-def _leaf(sign: Signature, at: int) -> Column:
+def _leaf(sign: Signature, at: int) -> LogColumn:
     leaf = sign.leaves[at]
     if leaf.members:
-        return Column(leaf.name, leaf.members, "", leaf.unit, lambda values: leaf.shown(values[at]))
-    return Column(leaf.name, (), leaf.c_type, leaf.unit, lambda values: values[at])
+        return LogColumn(leaf.name, leaf.members, "", leaf.unit, lambda values: leaf.shown(values[at]))
+    return LogColumn(leaf.name, (), leaf.c_type, leaf.unit, lambda values: values[at])
 
 
-def _trace(sign: Signature, level: LevelSign) -> tuple[Column, ...]:
+def _trace(sign: Signature, level: LevelSign) -> tuple[LogColumn, ...]:
     tables = (level.table,) if level.table else tuple(dict.fromkeys(level.tables.values()))
     lines = tuple(dict.fromkeys(line for table in tables for line in sign.tables.get(table, ())))
     return (
-        Column("table", tables, "", "", lambda values: sign.table_of(level, values)),
-        Column("line", ("", *lines), "", "", lambda values: line_of(sign, level, values)),
-        Column("fault", FAULTS, "", "", lambda values: fault_of(sign, values)),
-        Column("fault_at", (), "", "", lambda values: refused_of(sign, values)),
-        Column("assumptions_failed", (), "", "", lambda values: failed_of(sign, values)),
+        LogColumn("table", tables, "", "", lambda values: sign.table_of(level, values)),
+        LogColumn("line", ("", *lines), "", "", lambda values: line_of(sign, level, values)),
+        LogColumn("fault", FAULTS, "", "", lambda values: fault_of(sign, values)),
+        LogColumn("fault_at", (), "", "", lambda values: refused_of(sign, values)),
+        LogColumn("assumptions_failed", (), "", "", lambda values: failed_of(sign, values)),
     )

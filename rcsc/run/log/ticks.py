@@ -1,6 +1,6 @@
 """A recorded run, tick by tick, as its levels saw it: the order that each took, its report, its orders and the reports that it saw.
 
-In: a log. Out: `Frame`s, in the words of the tables. What an order and a report are is told by their fields (Haynes et al.
+In: a log. Out: `LoggedTick`s, in the words of the tables. What an order and a report are is told by their fields (Haynes et al.
 1984, section 9): an order has `inc_command` and `input_command`, a report `inc_command_echo`, `ref_command_echo` and
 `status_report`. A level sees a report before it orders: so the report is set against the order that stood before the cycle.
 """
@@ -130,18 +130,18 @@ class LevelTick:
 
 
 @dataclass(frozen=True, slots=True)
-class Frame:
+class LoggedTick:
     """A tick: every level of the log, from the top down."""
 
     tick: int
     boxes: tuple[LevelTick, ...]
 
 
-def frames(log: Log) -> Iterator[Frame]:
+def frames(log: Log) -> Iterator[LoggedTick]:
     """Every tick of a log."""
     wires = _wires(log)
     for tick in log.ticks:
-        yield Frame(tick, tuple(_box(log, level, tick, wires) for level in log.levels))
+        yield LoggedTick(tick, tuple(_box(log, level, tick, wires) for level in log.levels))
 
 
 def _wires(log: Log) -> dict[str, str]:

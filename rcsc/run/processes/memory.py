@@ -37,7 +37,7 @@ STEP = 0x9E37_79B9_7F4A_7C15
 STAMPS = 1 << 64
 
 
-class Absent(Enum):
+class NotShared(Enum):
     """Why there is no checkpoint."""
 
     BLANK = auto()  # the level has never run
@@ -45,7 +45,7 @@ class Absent(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Region:
+class SharedRegion:
     """What one process writes in one commit.
 
     Attributes:
@@ -64,7 +64,7 @@ class Region:
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class BufferPlace:
     """A buffer: part of a region's payload.
 
     Attributes:
@@ -87,8 +87,8 @@ class Layout:
         seed: Of the checksums, from the layout itself: what another layout wrote is not believed.
     """
 
-    regions: Mapping[str, Region]
-    places: Mapping[str, Place]
+    regions: Mapping[str, SharedRegion]
+    places: Mapping[str, BufferPlace]
     size: int
     seed: int
 
@@ -113,7 +113,7 @@ def layout(system: Description, signs: Mapping[str, Signature]) -> Layout:
         BadDescription: A buffer joins what does not fit, or nothing that is a level.
     """
     payloads = {level.name: signs[level.name].packed for level in system.levels}
-    places: dict[str, Place] = {}
+    places: dict[str, BufferPlace] = {}
     for wire in system.wires:
         owner, _, variable = wire.source.partition(".")
         taker, _, taken = wire.target.partition(".")
@@ -128,10 +128,10 @@ def layout(system: Description, signs: Mapping[str, Signature]) -> Layout:
         packed = struct.Struct(f"<{text}")
         if owner in signs:
             bit = 1 << sum(one.region == owner for one in places.values())
-            places[wire.source] = Place(owner, first, packed, bit)
+            places[wire.source] = BufferPlace(owner, first, packed, bit)
         else:
             payloads[wire.source] = packed
-            places[wire.source] = Place(wire.source, 0, packed, 1)
+            places[wire.source] = BufferPlace(wire.source, 0, packed, 1)
     if any(place.bit >= CHECKPOINT for place in places.values()):
         raise BadDescription(f"a level gives more than {MOST_BUFFERS} buffers")
     return _laid(payloads, places)
@@ -147,11 +147,11 @@ def _record(sign: Signature, variable: str) -> tuple[int, str]:
     return struct.calcsize("<" + "".join(formats[: run.start])), "".join(formats[run.start : run.stop])
 
 
-def _laid(payloads: Mapping[str, struct.Struct], places: Mapping[str, Place]) -> Layout:
+def _laid(payloads: Mapping[str, struct.Struct], places: Mapping[str, BufferPlace]) -> Layout:
     regions, at = {}, 0
     for name, packed in payloads.items():
         slot = -(-(HEAD.size + packed.size) // LINE) * LINE
-        regions[name] = Region(at, packed, slot)
+        regions[name] = SharedRegion(at, packed, slot)
         at += LINE + 2 * slot
     said = [(name, region.at, region.packed.format) for name, region in regions.items()]
     said += [(name, place.first, place.packed.format) for name, place in places.items()]
@@ -223,14 +223,14 @@ class SharedMemoryBuffers:
         """
         self._commit(level, CHECKPOINT | (CHECKPOINT - 1), self.layout.regions[level].packed.pack(*values))
 
-    def checkpoint(self, level: str) -> Values | Absent:
+    def checkpoint(self, level: str) -> Values | NotShared:
         """All leaves and the trace after the level's last cycle."""
         self._images.pop(level, None)
         held = self._image(level)
         if held is not None and held.mask & CHECKPOINT:
             values: Values = self.layout.regions[level].packed.unpack(held.payload)
             return values
-        return Absent.BLANK if held is not None and held.mask == 0 else Absent.LOST
+        return NotShared.BLANK if held is not None and held.mask == 0 else NotShared.LOST
 
     def close(self) -> None:
         """Lets go of the block."""
@@ -264,7 +264,7 @@ class SharedMemoryBuffers:
                 return None
         return known
 
-    def _slot(self, region: Region, stamp: int) -> Image | None:
+    def _slot(self, region: SharedRegion, stamp: int) -> Image | None:
         at = region.place(stamp)
         image = self.block.read(at, HEAD.size + region.packed.size)
         # The stamp before and after says that no writer was here; the checksum, that one had been, in whatever order

@@ -20,7 +20,7 @@ from rcsc.run.description import Description
 from rcsc.run.executors import CExecutor, PythonExecutor, build
 from rcsc.run.levels import RunningLevel, StateTableError, running_level
 from rcsc.run.processes.clocks import Clocks, Turn
-from rcsc.run.processes.memory import Absent, SharedMemoryBuffers, layout
+from rcsc.run.processes.memory import NotShared, SharedMemoryBuffers, layout
 from rcsc.run.signature import Signature, Values
 from rcsc.run.system import Kind, Outside, signatures
 
@@ -42,7 +42,7 @@ class Transport(Buffers, Protocol):
         """Makes this the level's checkpoint, and publishes every buffer that it gives, in one step."""
         ...
 
-    def checkpoint(self, level: str) -> Values | Absent:
+    def checkpoint(self, level: str) -> Values | NotShared:
         """All leaves and the trace after the level's last cycle."""
         ...
 
@@ -112,9 +112,9 @@ class Paced:
 def begin(level: RunningLevel, transport: Transport) -> None:
     """Goes on from the last committed cycle; where that is lost, or ended in a fault, starts safely."""
     held = transport.checkpoint(level.name)
-    if held is Absent.BLANK:
+    if held is NotShared.BLANK:
         return
-    if isinstance(held, Absent) or fault_of(level.sign, held):
+    if isinstance(held, NotShared) or fault_of(level.sign, held):
         restart(level, transport)
     else:
         restart(level, transport, held)

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any, Self
 from rcsc.host import children
 from rcsc.run.description import Description
 from rcsc.run.processes.clocks import Clocks
-from rcsc.run.processes.memory import Absent, SharedMemoryBuffers, layout
+from rcsc.run.processes.memory import NotShared, SharedMemoryBuffers, layout
 from rcsc.run.processes.serve import FAULTY, MOST_TOLD, REFUSED, Factory, Setting, serve_level, serve_outside
 from rcsc.run.system import Kind, StateTableError, signatures
 from rcsc.run.unproved import refuse_unproved
@@ -218,7 +218,7 @@ class Supervisor:
 
     def _said(self, name: str) -> str:
         values = self.buffers.checkpoint(name)
-        if isinstance(values, Absent):
+        if isinstance(values, NotShared):
             return f"level `{name}`: a fault"
         return f"level `{name}`: {self._signs[name].fault_said(values)}"
 

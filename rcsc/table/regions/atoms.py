@@ -65,7 +65,7 @@ TRUE, FALSE = Every(()), Some(())
 
 
 @dataclass(frozen=True, slots=True)
-class Column:
+class FormColumn:
     """What a form is made of: the term, its name in certificates, the bounds of its key."""
 
     name: str
@@ -95,7 +95,7 @@ class Universe:
     """
 
     def __init__(self) -> None:
-        self.columns: list[Column] = []
+        self.columns: list[FormColumn] = []
         self.forms: list[Form] = []
         self.low: list[int] = []
         self.high: list[int] = []
@@ -110,7 +110,7 @@ class Universe:
         if known is None:
             known = self._column[name] = len(self.columns)
             low, high = key_bounds(term.type)
-            self.columns.append(Column(name, term, low, high))
+            self.columns.append(FormColumn(name, term, low, high))
             self.single.append(self.form(((known, 1),)))
         return known
 

@@ -14,14 +14,14 @@ from rcsc.lang.interval_sets import complement
 from rcsc.solvers.search import furthest, lowest
 from rcsc.table.regions.atoms import Atom, Clauses, Every, Formula, Some, Universe, clauses, every, some
 from rcsc.table.regions.linear import Simplex, integer_point
-from rcsc.table.regions.region import Answer, Bounds, Point
+from rcsc.table.regions.region import Bounds, NoWitness, Point
 from rcsc.table.regions.splitting import Tree
 
 _ROUNDS = 200
 """Systems looked at for an integer point before the tree of regions looks for it."""
 
 
-def find(universe: Universe, parts: Sequence[Formula], budget: int = 2_000) -> Point | Answer:
+def find(universe: Universe, parts: Sequence[Formula], budget: int = 2_000) -> Point | NoWitness:
     """A point at which all parts hold; `NONE` when there is none, `UNKNOWN` past the budget."""
     wanted = clauses(parts)
     if not wanted.rest and not wanted.impossible and all(len(box) == 1 for _, box in wanted.boxes):
@@ -33,7 +33,7 @@ def find(universe: Universe, parts: Sequence[Formula], budget: int = 2_000) -> P
         universe,
         (),
         (wanted,),
-        lambda _: Answer.UNKNOWN,
+        lambda _: NoWitness.UNKNOWN,
         default=False,
         budget=budget,
         first_only=True,
@@ -41,10 +41,10 @@ def find(universe: Universe, parts: Sequence[Formula], budget: int = 2_000) -> P
     found = tree.run()
     if found.gaps:
         return found.gaps[0][1]
-    return Answer.UNKNOWN if found.undecided else Answer.NONE
+    return NoWitness.UNKNOWN if found.undecided else NoWitness.NONE
 
 
-def _corner(universe: Universe, bounds: Mapping[int, Bounds]) -> Point | Answer:
+def _corner(universe: Universe, bounds: Mapping[int, Bounds]) -> Point | NoWitness:
     """A point within the bounds on forms, of leaves only, all put to one system.
 
     First each bound on several columns is drawn in by half the sum of its coefficients: a point of what is
@@ -53,7 +53,7 @@ def _corner(universe: Universe, bounds: Mapping[int, Bounds]) -> Point | Answer:
     """
     forms, singles = universe.forms, universe.single
     if any(universe.columns[column].opaque for form in bounds for column, _ in forms[form]):
-        return Answer.UNKNOWN
+        return NoWitness.UNKNOWN
     used = sorted({column for form in bounds if len(forms[form]) > 1 for column, _ in forms[form]})
     system = _system(universe, bounds, used, draw_in=True)
     if system.refute() is None:
@@ -67,7 +67,7 @@ def _corner(universe: Universe, bounds: Mapping[int, Bounds]) -> Point | Answer:
     system = _system(universe, bounds, used, draw_in=False)
     found = integer_point(system, [singles[column] for column in used], _ROUNDS)
     if found is None:
-        return Answer.NONE
+        return NoWitness.NONE
     return _completed(universe, bounds, {column: int(found.value(singles[column])) for column in used})
 
 
@@ -97,7 +97,7 @@ def _completed(universe: Universe, bounds: Mapping[int, Bounds], at: Mapping[int
     }
 
 
-def least(universe: Universe, parts: Sequence[Formula], columns: Sequence[int]) -> Point | Answer:
+def least(universe: Universe, parts: Sequence[Formula], columns: Sequence[int]) -> Point | NoWitness:
     """The least point at which all parts hold: first in the first of `columns`, and so on."""
     best = find(universe, parts)
     pinned, undecided = list(parts), False
@@ -105,17 +105,17 @@ def least(universe: Universe, parts: Sequence[Formula], columns: Sequence[int]) 
     def up_to(column: int, low: int, limit: int) -> int | None:
         nonlocal best, undecided
         trial = find(universe, [*pinned, universe.atom(universe.single[column], ((low, limit),))])
-        undecided = trial is Answer.UNKNOWN
-        best = best if isinstance(trial, Answer) else trial
-        return None if trial is Answer.NONE or isinstance(best, Answer) else best[column]
+        undecided = trial is NoWitness.UNKNOWN
+        best = best if isinstance(trial, NoWitness) else trial
+        return None if trial is NoWitness.NONE or isinstance(best, NoWitness) else best[column]
 
     for column in columns:
-        if isinstance(best, Answer):
+        if isinstance(best, NoWitness):
             return best
         form = universe.single[column]
         key = lowest(universe.low[form], best[column], partial(up_to, column))
         if undecided:
-            return Answer.UNKNOWN
+            return NoWitness.UNKNOWN
         pinned.append(universe.atom(form, ((key, key),)))
     return best
 

@@ -35,7 +35,7 @@ class Empty:
 
 
 @dataclass(frozen=True, slots=True)
-class Outside:
+class OutsideAssumption:
     """The assumption (its position in the table's list) is false all over the region."""
 
     assumption: int
@@ -72,17 +72,17 @@ class Open:
     """Not proved: the region holds a finding, or nobody could decide it."""
 
 
-Node: TypeAlias = Split | Empty | Outside | Only | Counted | Rests | Open
+Node: TypeAlias = Split | Empty | OutsideAssumption | Only | Counted | Rests | Open
 
 
-class Answer(Enum):
+class NoWitness(Enum):
     """What a solver says of a conjunction, where it gives no witness."""
 
     NONE = auto()
     UNKNOWN = auto()
 
 
-Oracle: TypeAlias = Callable[["Question"], "Snapshot | Answer"]
+Oracle: TypeAlias = Callable[["Question"], "Snapshot | NoWitness"]
 
 
 @dataclass(frozen=True, slots=True)

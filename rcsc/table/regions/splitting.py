@@ -20,16 +20,16 @@ from rcsc.table.partition import Boxes, Cell, Gaps, common, parting
 from rcsc.table.regions.atoms import Clauses, Universe
 from rcsc.table.regions.linear import Multipliers, Simplex
 from rcsc.table.regions.region import (
-    Answer,
     Bounds,
     Candidate,
     Counted,
     Empty,
     Node,
+    NoWitness,
     Only,
     Open,
     Oracle,
-    Outside,
+    OutsideAssumption,
     Point,
     Question,
     Region,
@@ -85,7 +85,7 @@ class Tree:
         )
         for i, clause in enumerate(assumptions):
             if clause.impossible and self.root.known is None:
-                self.root.known = Outside(i)
+                self.root.known = OutsideAssumption(i)
 
     def run(self) -> Search:
         """Decide every region, in preorder."""
@@ -102,7 +102,7 @@ class Tree:
     def _decide(self, region: Region) -> tuple[Node, list[Region]]:
         """A leaf, or a split and its two regions."""
         if region.known is not None:
-            if isinstance(region.known, Outside):
+            if isinstance(region.known, OutsideAssumption):
                 self.search.used.add(region.known.assumption)
             return region.known, []
         if self.default and len(region.lines) <= 1:
@@ -154,10 +154,10 @@ class Tree:
             return Open()
         bounds = tuple((form, low, high) for form, (low, high) in sorted(region.bounds.items()))
         answer = self.oracle(Question(bounds, tuple(line.index for line in region.lines)))
-        if answer is Answer.NONE:
+        if answer is NoWitness.NONE:
             self.search.used.update(assumption.index for assumption in self.root.open)
             return Rests()
-        if isinstance(answer, Answer):
+        if isinstance(answer, NoWitness):
             self.search.undecided += 1
         else:
             self.search.witnesses.append(answer)
@@ -289,7 +289,7 @@ class Tree:
         for assumption in region.open:
             kept = assumption.within(form, low, high)
             if kept is None:
-                side.known = side.known or Outside(assumption.index)
+                side.known = side.known or OutsideAssumption(assumption.index)
             elif not kept.holds:
                 side.open.append(kept)
         return side

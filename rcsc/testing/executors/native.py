@@ -27,7 +27,7 @@ COMPILE_S = 300.0
 
 
 @dataclass(frozen=True, slots=True)
-class Result:
+class NativeRun:
     """What one run left behind.
 
     Attributes:
@@ -85,7 +85,7 @@ class Native:
             found.extend(to_word(v.type, snapshot[v.name]) for v in self.program.variables)
         return found
 
-    def run(self, which: int, mode: int, snapshots: Sequence[Snapshot]) -> list[Result]:
+    def run(self, which: int, mode: int, snapshots: Sequence[Snapshot]) -> list[NativeRun]:
         """Runs a session of function `which` in the shared object; see `shim`."""
         given, width = self.rows(snapshots), words(self.program)
         made = array("q", bytes(8 * width * len(snapshots)))
@@ -94,7 +94,7 @@ class Native:
         self.library.rcsc_session(which, mode, ctypes.c_int64(len(snapshots)), *address)
         return self.results(made)
 
-    def results(self, made: "array[int]") -> list[Result]:
+    def results(self, made: "array[int]") -> list[NativeRun]:
         """Rows of words as results."""
         width, count = words(self.program), len(monitored(self.program))
         leaves = [
@@ -104,7 +104,7 @@ class Native:
 
     def run_checked(
         self, sessions: Sequence[tuple[int, int, Sequence[Snapshot]]]
-    ) -> list[list[Result]] | BuildFailed | Absent:
+    ) -> list[list[NativeRun]] | BuildFailed | Absent:
         """The same sessions in the sanitized program; any finding of the sanitizers stops it."""
         if self.checked is None:
             return Absent("the C compiler has no address and undefined behaviour sanitizers")
@@ -120,7 +120,7 @@ class Native:
         made.frombytes((place / "out.bin").read_bytes())
         return self._parted(made, [len(snapshots) for _, _, snapshots in sessions])
 
-    def _parted(self, made: "array[int]", lengths: Sequence[int]) -> list[list[Result]]:
+    def _parted(self, made: "array[int]", lengths: Sequence[int]) -> list[list[NativeRun]]:
         found, results = [], self.results(made)
         at = 0
         for length in lengths:
@@ -129,12 +129,12 @@ class Native:
         return found
 
 
-def _result(leaves: Sequence[tuple[str, Scalar, bool]], count: int, row: Sequence[int]) -> Result:
+def _result(leaves: Sequence[tuple[str, Scalar, bool]], count: int, row: Sequence[int]) -> NativeRun:
     """A row as a result; of a leaf its name, its type, and whether C holds it in 64 bits without a sign."""
     failed = tuple(at for at in range(count) if row[TRACE_WORDS + at])
     given = zip(leaves, row[TRACE_WORDS + count :], strict=True)
     snapshot = {name: of_word(kind, word, unsigned) for (name, kind, unsigned), word in given}
-    return Result(row[0], row[1], row[2], row[3], failed, snapshot)
+    return NativeRun(row[0], row[1], row[2], row[3], failed, snapshot)
 
 
 def build(

@@ -14,23 +14,23 @@ from rcsc.lang.interpret import Fault
 from rcsc.lang.model import Program, Snapshot, Value
 from rcsc.testing.executors.externs import PythonStandIns
 from rcsc.testing.executors.reference_file import fault_named, monitored
-from rcsc.testing.executors.sessions import Seen, Session
+from rcsc.testing.executors.sessions import Seen, Stimuli
 from rcsc.testing.executors.symbols import Symbols
-from rcsc.testing.executors.targets import Target
+from rcsc.testing.executors.targets import ComparedFunction
 
 RAISED = -1
 """Stands for a fault code where the executor raised an exception, which none may."""
 
 
 @dataclass(frozen=True, slots=True)
-class PythonExecutor:
+class PythonUnderTest:
     """The emitted module of one program."""
 
     program: Program
     symbols: Symbols
     module: ModuleType
 
-    def function(self, target: Target) -> Any:
+    def function(self, target: ComparedFunction) -> Any:
         """The Python function of a target: the C name without the program's."""
         return getattr(self.module, target.function.removeprefix(f"{self.symbols.program}_"))
 
@@ -53,7 +53,7 @@ class PythonExecutor:
         """A new state's leaves."""
         return self.leaves(getattr(self.module, self.symbols.state_class)())
 
-    def run(self, target: Target, session: Session) -> list[Seen]:
+    def run(self, target: ComparedFunction, session: Stimuli) -> list[Seen]:
         """Runs a session; the state is carried from cycle to cycle."""
         function, state = self.function(target), self.state(session.start)
         found = []
@@ -76,7 +76,7 @@ class PythonExecutor:
             at = f"returned {fault}, kept {state.fault}"
         return Seen(fault, at, line, failed, self.leaves(state))
 
-    def line(self, target: Target, snapshot: Snapshot) -> int:
+    def line(self, target: ComparedFunction, snapshot: Snapshot) -> int:
         """What the emitted `line` or `lines` function gives."""
         if target.kind == "batch":
             one, other = self.function(target)([self.state(snapshot), self.state(snapshot)])
@@ -86,7 +86,7 @@ class PythonExecutor:
 
 def python_executor(
     program: Program, symbols: Symbols, files: Mapping[str, str], stand_ins: PythonStandIns | None = None
-) -> PythonExecutor:
+) -> PythonUnderTest:
     """The emitted Python of a program, ready to run.
 
     Args:
@@ -97,4 +97,4 @@ def python_executor(
     """
     text = next(text for path, text in files.items() if Path(path).name == symbols.module)
     module = (stand_ins or PythonStandIns(program, {})).load(text, f"rcsc_tested_{symbols.program}")
-    return PythonExecutor(program, symbols, module)
+    return PythonUnderTest(program, symbols, module)

@@ -13,7 +13,7 @@ MOST_DIFFERENCES = 6
 
 
 @dataclass(frozen=True, slots=True)
-class Session:
+class Stimuli:
     """A start and what the world says in each cycle after it.
 
     Attributes:
@@ -67,7 +67,7 @@ def said(program: Program, name: str, value: Value) -> str:
         return repr(value)
 
 
-def described(program: Program, session: Session) -> tuple[str, ...]:
+def described(program: Program, session: Stimuli) -> tuple[str, ...]:
     """The session in words: what differs from the initial values, then the readings that change."""
     initial = {str(v.name): v.initial for v in program.variables}
     lines = ["start: " + _changes(program, initial, session.start)]

@@ -14,7 +14,7 @@ from rcsc.lang.model import Kind, Program, Real
 from rcsc.testing.executors.externs import externs
 from rcsc.testing.executors.reference_file import monitored, reference_c
 from rcsc.testing.executors.symbols import Symbols
-from rcsc.testing.executors.targets import Target, call_of, reference_of, targets
+from rcsc.testing.executors.targets import ComparedFunction, call_of, reference_of, targets
 
 TRACE_WORDS = 4
 """Result, fault, fault_at, line; then one word an assumption that is checked, then the leaves."""
@@ -75,7 +75,7 @@ def _copy(program: Program, symbols: Symbols) -> Iterator[str]:
     yield "}"
 
 
-def _executor(program: Program, symbols: Symbols, target: Target) -> Iterator[str]:
+def _executor(program: Program, symbols: Symbols, target: ComparedFunction) -> Iterator[str]:
     trace = symbols.trace
     yield from call_of(symbols, target, "s")
     yield "out[0] = result; out[1] = result;"
@@ -86,7 +86,7 @@ def _executor(program: Program, symbols: Symbols, target: Target) -> Iterator[st
             yield f"out[{TRACE_WORDS + at}] = {trace.failed('(*s)', at)} ? 1 : 0;"
 
 
-def _reference(program: Program, target: Target) -> Iterator[str]:
+def _reference(program: Program, target: ComparedFunction) -> Iterator[str]:
     name = reference_of(target)
     if target.kind not in ("step", "cycle"):
         yield f"out[0] = {name}(s); out[1] = out[0];"

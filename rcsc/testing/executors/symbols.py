@@ -27,7 +27,7 @@ class LeafSymbol:
 
 
 @dataclass(frozen=True, slots=True)
-class Trace:
+class TracePlaces:
     """The places of the trace in the struct; `who` is a C expression of the struct."""
 
     line_path: str = "line"
@@ -78,7 +78,7 @@ class Symbols:
     batches: Mapping[str, str]
     cycles: Mapping[str, str]
     positions: Mapping[str, int] = field(default_factory=dict)
-    trace: Trace = Trace()
+    trace: TracePlaces = TracePlaces()
     module: str = ""
     state_class: str = ""
 
@@ -141,5 +141,5 @@ def _symbols(document: Mapping[str, Any]) -> Symbols:
         positions={name: at for at, name in enumerate(leaves)},
         module=document["python"]["module"],
         state_class=document["python"]["class"],
-        trace=Trace(failed_paths=tuple(document.get("failed", Trace().failed_paths))),
+        trace=TracePlaces(failed_paths=tuple(document.get("failed", TracePlaces().failed_paths))),
     )

@@ -11,7 +11,7 @@ from rcsc.testing.executors.symbols import Symbols
 
 
 @dataclass(frozen=True, slots=True)
-class Target:
+class ComparedFunction:
     """An emitted function and the reference that it must equal.
 
     Attributes:
@@ -24,25 +24,25 @@ class Target:
     number: int
 
 
-def targets(program: Program, symbols: Symbols) -> Iterator[Target]:
+def targets(program: Program, symbols: Symbols) -> Iterator[ComparedFunction]:
     """Every emitted function that has a reference, matchers first."""
     for number, table in enumerate(program.tables):
-        yield Target(symbols.lines[table.name], "line", number)
+        yield ComparedFunction(symbols.lines[table.name], "line", number)
     for number, table in enumerate(program.tables):
-        yield Target(symbols.batches[table.name], "batch", number)
+        yield ComparedFunction(symbols.batches[table.name], "batch", number)
     for number, table in enumerate(program.tables):
-        yield Target(symbols.steps[table.name], "step", number)
+        yield ComparedFunction(symbols.steps[table.name], "step", number)
     for number, level in enumerate(program.levels):
-        yield Target(symbols.cycles[level.name], "cycle", number)
-    yield Target(symbols.init, "init", 0)
+        yield ComparedFunction(symbols.cycles[level.name], "cycle", number)
+    yield ComparedFunction(symbols.init, "init", 0)
 
 
-def is_matcher(target: Target) -> bool:
+def is_matcher(target: ComparedFunction) -> bool:
     """Whether the function only says which line matches."""
     return target.kind in ("line", "batch")
 
 
-def call_of(symbols: Symbols, target: Target, place: str) -> list[str]:
+def call_of(symbols: Symbols, target: ComparedFunction, place: str) -> list[str]:
     """C statements that call the function on the struct at `place` and leave its result in `result`."""
     if target.kind == "batch":
         copies = f"const {symbols.struct} pair[2] = {{*({place}), *({place})}}; int32_t got[2] = {{-9, -8}};"
@@ -53,7 +53,7 @@ def call_of(symbols: Symbols, target: Target, place: str) -> list[str]:
     return [f"const int32_t result = {target.function}({place});"]
 
 
-def reference_of(target: Target) -> str:
+def reference_of(target: ComparedFunction) -> str:
     """Name of the reference's function."""
     names = {"step": f"ref_t{target.number}_step", "cycle": f"ref_l{target.number}_cycle", "init": "ref_init"}
     return names.get(target.kind, f"ref_t{target.number}_line")

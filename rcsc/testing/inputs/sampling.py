@@ -22,7 +22,7 @@ from rcsc.lang.model import (
 )
 from rcsc.testing.executors.edges import companions, leaf_edges, outside
 from rcsc.testing.executors.reference_file import monitored
-from rcsc.testing.executors.sessions import Session
+from rcsc.testing.executors.sessions import Stimuli
 
 BROKEN = 0.2  # how often an assumption that is checked is aimed at, to break it
 TRIES = 40  # values of what an assumption reads, of which the first that break it are taken
@@ -139,11 +139,11 @@ def _readings(
     return found
 
 
-def session(known: Declarations, table: Table | None, most: int, random: Random) -> Session:
+def session(known: Declarations, table: Table | None, most: int, random: Random) -> Stimuli:
     """A start state and one to `most` cycles of inputs that change; a third of the sessions has wild inputs."""
     start = snapshot(known, table, random)
     wild = random.random() < WILD
     cycles: list[Snapshot] = []
     for _ in range(random.randint(1, most)):
         cycles.append(_readings(known, table, random, cycles[-1] if cycles else {}, wild))
-    return Session(start, tuple(cycles))
+    return Stimuli(start, tuple(cycles))

@@ -24,7 +24,7 @@ from rcsc_cell.campaign.runner import death
 from rcsc_cell.campaign.shrink import MOST_TRIES, shrink
 from rcsc_cell.campaign.work import SURVIVES, TRIES, Shrunk, attempt, logged, shrunk
 from rcsc_cell.campaign.worker_pool import Crashed, WorkerPool
-from rcsc_cell.episodes.episode import Episode, Outcome, script
+from rcsc_cell.episodes.episode import Episode, EpisodeOutcome, script
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor, Future
@@ -112,7 +112,7 @@ def _carefully(rig: Rig, seed: int, choice: Choice, pool: WorkerPool) -> Shrunk:
         return Shrunk(least, found, b"")
 
 
-def _survived(rig: Rig, episode: Episode, pool: WorkerPool) -> Outcome:
+def _survived(rig: Rig, episode: Episode, pool: WorkerPool) -> EpisodeOutcome:
     begun_s = time.monotonic()
     try:
         return pool.call(attempt, rig, episode)
@@ -181,7 +181,7 @@ def saved_episode(path: Path) -> Episode:
         raise BadEpisode(f"{file}: {error}") from error
 
 
-def again(path: Path, rig: Rig | None = None, executor: Kind | None = None) -> Outcome:
+def again(path: Path, rig: Rig | None = None, executor: Kind | None = None) -> EpisodeOutcome:
     """Runs a saved episode; what it raises is a finding, too. A regression case passes when there is none.
 
     Args:

@@ -20,7 +20,7 @@ from rcsc.diagnostics.codes import Code
 from rcsc.host.files.plain import read
 from rcsc.host.files.read import json_of
 from rcsc_cell.campaign.rig import Rig, digest
-from rcsc_cell.episodes.episode import Finding
+from rcsc_cell.episodes.episode import EpisodeFinding
 
 FORM = 1
 """Of the file; another is not read."""
@@ -64,7 +64,7 @@ class EpisodeRecord:
     faults: tuple[str, ...]
     end: str
     ticks: int
-    findings: tuple[Finding, ...]
+    findings: tuple[EpisodeFinding, ...]
     lines: int
     digest: str
 
@@ -219,7 +219,7 @@ class _Line:
 def _read(path: Path, number: int, line: bytes) -> EpisodeRecord:
     try:
         said: _Line = read(_Line, json_of(line))
-        found = tuple(Finding(*finding) for finding in said.findings)
+        found = tuple(EpisodeFinding(*finding) for finding in said.findings)
         if (
             min(said.index, said.ticks, *(finding.tick for finding in found), 0) < 0
             or len(said.lines) > MOST_DIGITS

@@ -11,7 +11,7 @@ from rcsc.run.description import description
 from rcsc.run.log.schema import fingerprints
 from rcsc.run.system import Kind, signatures
 from rcsc_cell.cell.ready import Backend
-from rcsc_cell.episodes.episode import SYSTEM, Episode, Outcome
+from rcsc_cell.episodes.episode import SYSTEM, Episode, EpisodeOutcome
 from rcsc_cell.episodes.loop import run
 from rcsc_cell.episodes.sampling import draw
 
@@ -39,7 +39,7 @@ class Rig:
     system: Path = SYSTEM
     limit_s: float = 120.0
     draw: Callable[[int, Backend], Episode] = draw
-    run: Callable[[Episode, Path, Path | None], Outcome] = run
+    run: Callable[[Episode, Path, Path | None], EpisodeOutcome] = run
 
     def episode(self, seed: int, index: int) -> Episode:
         """Episode `index` of the campaign of `seed`."""

@@ -16,7 +16,7 @@ from rcsc_cell.campaign.journal import EpisodeRecord, Journal
 from rcsc_cell.campaign.rig import Rig, digest
 from rcsc_cell.campaign.work import CRASH, ENDS, HANG, SURVIVES, no_end, odd, play
 from rcsc_cell.campaign.worker_pool import WorkerPool, WorkersGone
-from rcsc_cell.episodes.episode import Finding, Outcome
+from rcsc_cell.episodes.episode import EpisodeFinding, EpisodeOutcome
 from rcsc_cell.episodes.part_faults import fault_classes
 
 Chunk: TypeAlias = tuple[int, ...]
@@ -123,8 +123,8 @@ class _Round:
         return EpisodeRecord(index, faults, outcome.end, 0, outcome.findings, 0, "")
 
 
-def death(rig: Rig, took_s: float) -> Outcome:
+def death(rig: Rig, took_s: float) -> EpisodeOutcome:
     """What became of an episode that a worker died of after so long: one past the limit was ended for that."""
     if took_s > rig.limit_s:
-        return odd(HANG, Finding(ENDS, 0, no_end(rig)))
-    return odd(CRASH, Finding(SURVIVES, 0, "the process that ran it died"))
+        return odd(HANG, EpisodeFinding(ENDS, 0, no_end(rig)))
+    return odd(CRASH, EpisodeFinding(SURVIVES, 0, "the process that ran it died"))

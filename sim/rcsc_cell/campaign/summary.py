@@ -29,7 +29,7 @@ class Broken:
 
 
 @dataclass(frozen=True, slots=True)
-class Reached:
+class LinesReached:
     """Which lines of a table ran in some episode."""
 
     level: str
@@ -54,7 +54,7 @@ class Summary:
     by_fault: Mapping[str, Mapping[str, int]]
     ends: Mapping[str, int]
     broken: tuple[Broken, ...]
-    reached: tuple[Reached, ...]
+    reached: tuple[LinesReached, ...]
 
 
 def summary(records: Iterable[EpisodeRecord], lines: Sequence[LineName], faults: Sequence[str]) -> Summary:
@@ -95,13 +95,13 @@ def _broken(records: Iterable[EpisodeRecord]) -> tuple[Broken, ...]:
     return tuple(sorted(found, key=lambda one: (-one.episodes, one.property)))
 
 
-def _reached(ran: int, lines: Sequence[LineName]) -> tuple[Reached, ...]:
+def _reached(ran: int, lines: Sequence[LineName]) -> tuple[LinesReached, ...]:
     tables: dict[tuple[str, str], tuple[list[str], list[str]]] = {}
     for at, (level, table, line) in enumerate(lines):
         did, did_not = tables.setdefault((level, table), ([], []))
         (did if ran >> at & 1 else did_not).append(line)
     return tuple(
-        Reached(level, table, tuple(did), tuple(not_)) for (level, table), (did, not_) in tables.items()
+        LinesReached(level, table, tuple(did), tuple(not_)) for (level, table), (did, not_) in tables.items()
     )
 
 
@@ -153,9 +153,9 @@ def _properties(broken: Iterable[Broken]) -> list[str]:
     return [head, *(f"{one.property:{longest}}  {one.episodes:8}  {one.first}: {one.said}" for one in found)]
 
 
-def _coverage(reached: Iterable[Reached]) -> list[str]:
+def _coverage(reached: Iterable[LinesReached]) -> list[str]:
     lines = []
-    by_level: dict[str, list[Reached]] = {}
+    by_level: dict[str, list[LinesReached]] = {}
     for one in reached:
         by_level.setdefault(one.level, []).append(one)
     for level, tables in by_level.items():

@@ -25,7 +25,7 @@ from rcsc_cell.campaign.journal import EpisodeRecord
 from rcsc_cell.campaign.rig import Rig, digest, mask
 from rcsc_cell.campaign.shrink import MOST_TRIES, shrink
 from rcsc_cell.database.build import BadData
-from rcsc_cell.episodes.episode import Episode, Finding, Outcome
+from rcsc_cell.episodes.episode import Episode, EpisodeFinding, EpisodeOutcome
 from rcsc_cell.episodes.part_faults import fault_classes
 
 CRASH, HANG, ERROR = "crash", "hang", "error"
@@ -56,7 +56,7 @@ class Shrunk:
     """
 
     episode: Episode
-    found: Finding
+    found: EpisodeFinding
     log: bytes
 
 
@@ -90,7 +90,7 @@ def _record(rig: Rig, index: int, episode: Episode) -> EpisodeRecord:
     )
 
 
-def attempt(rig: Rig, episode: Episode, log: Path | None = None) -> Outcome:
+def attempt(rig: Rig, episode: Episode, log: Path | None = None) -> EpisodeOutcome:
     """Runs an episode; what it raises, and that it does not end, are findings.
 
     Raises:
@@ -100,12 +100,12 @@ def attempt(rig: Rig, episode: Episode, log: Path | None = None) -> Outcome:
         with within(rig.limit_s):
             return rig.run(episode, rig.system, log)
     except _OutOfTime:
-        return odd(HANG, Finding(ENDS, 0, no_end(rig)))
+        return odd(HANG, EpisodeFinding(ENDS, 0, no_end(rig)))
     except (BadDescription, BadData, NotBuilt):
         raise
     except Exception as error:  # noqa: BLE001  # whatever it is, it is this episode's finding
         kind = type(error).__name__
-        return odd(f"{ERROR}:{kind}", Finding(RAISES, 0, f"{kind}: {error}"[:300]))
+        return odd(f"{ERROR}:{kind}", EpisodeFinding(RAISES, 0, f"{kind}: {error}"[:300]))
 
 
 def no_end(rig: Rig) -> str:
@@ -113,9 +113,9 @@ def no_end(rig: Rig) -> str:
     return f"no end within {rig.limit_s:g} s"
 
 
-def odd(end: str, finding: Finding) -> Outcome:
+def odd(end: str, finding: EpisodeFinding) -> EpisodeOutcome:
     """What became of an episode that has no outcome of its own."""
-    return Outcome((), (finding,), end, 0, frozenset(), "")
+    return EpisodeOutcome((), (finding,), end, 0, frozenset(), "")
 
 
 def shrunk(rig: Rig, wanted: str, seed: int, index: int, name: str) -> Shrunk:
@@ -141,7 +141,7 @@ def logged(rig: Rig, episode: Episode, name: str) -> Shrunk:
         outcome = attempt(rig, episode, path)
         found = next(
             (finding for finding in outcome.findings if finding.property == name),
-            Finding(name, 0, outcome.end),
+            EpisodeFinding(name, 0, outcome.end),
         )
         return Shrunk(episode, found, path.read_bytes() if path.is_file() else b"")
 

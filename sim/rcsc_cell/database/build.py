@@ -186,7 +186,7 @@ class At:
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class Location:
     """Where a thing of the data is: axes that stand on a station, or on the floor under the robot.
 
     Attributes:
@@ -197,12 +197,12 @@ class Place:
     frame: Pose
     hand: Pose
 
-    def moved(self, x_mm: float, y_mm: float, z_mm: float) -> "Place":
+    def moved(self, x_mm: float, y_mm: float, z_mm: float) -> "Location":
         """The same, beside or above, along the station's axes."""
         to = self.frame.point((x_mm, y_mm, z_mm))
         by = [a - b for a, b in zip(to, self.frame.at_mm, strict=True)]
         at = self.hand.at_mm
-        return Place(self.frame, Pose(self.hand.turn, (at[0] + by[0], at[1] + by[1], at[2] + by[2])))
+        return Location(self.frame, Pose(self.hand.turn, (at[0] + by[0], at[1] + by[1], at[2] + by[2])))
 
     def plate(self, tool_mm: float) -> Pose:
         """The wrist plate of a hand that is there."""
@@ -441,10 +441,10 @@ class _Rows:
             else 0.0
         )
 
-    def _place(self, at: Mapping[str, float], station: str | None, where: At) -> Place:
+    def _place(self, at: Mapping[str, float], station: str | None, where: At) -> Location:
         frame = self._frame(station, where)
         turn = product(about_z(float(at["yaw"])), product(DOWN, about_y(float(at.get("tilt", 0.0)))))
-        return Place(frame, frame @ Pose(turn, (float(at["x"]), float(at["y"]), float(at["z"]))))
+        return Location(frame, frame @ Pose(turn, (float(at["x"]), float(at["y"]), float(at["z"]))))
 
     def _places(self) -> Iterator[tuple[Any, ...]]:
         for name, one in self.said["location"].items():
@@ -453,7 +453,7 @@ class _Rows:
             for sector, (x_mm, y_mm) in enumerate(one.get("sectors", [[0.0, 0.0]])):
                 yield self._row(name, one, sector, reference.moved(float(x_mm), float(y_mm), 0.0))
 
-    def _row(self, name: str, one: Mapping[str, Any], sector: int, place: Place) -> tuple[Any, ...]:
+    def _row(self, name: str, one: Mapping[str, Any], sector: int, place: Location) -> tuple[Any, ...]:
         key = self.numbers[name], sector
         where = At(f"location `{name}`, sector {sector}", ("location", name))
         fine = "fine" if one.get("via") or one.get("approach") else "fast"
@@ -470,11 +470,11 @@ class _Rows:
         self._within("route", ways, where)
         return *key, *ways
 
-    def _path(self, place: Place, said: Sequence[Any], where: At) -> list[Place]:
+    def _path(self, place: Location, said: Sequence[Any], where: At) -> list[Location]:
         """What the robot comes or goes through: a height, an offset, or another location."""
         return [self._through(place, one, where) for one in said]
 
-    def _through(self, place: Place, said: str | float | list[float], where: At) -> Place:
+    def _through(self, place: Location, said: str | float | list[float], where: At) -> Location:
         if isinstance(said, str):
             other = self.said["location"].get(said)
             if other is None:
@@ -486,7 +486,7 @@ class _Rows:
             return place.moved(x_mm, y_mm, z_mm)
         return place.moved(0.0, 0.0, float(said))
 
-    def _viewpoint(self, place: Place, one: Mapping[str, Any], where: At) -> Place:
+    def _viewpoint(self, place: Location, one: Mapping[str, Any], where: At) -> Location:
         """From where the camera, not the hand, would stand over the place: vision's second look is centred on the part."""
         looks = self.said["location"].get(one.get("vupos", ""))
         if not one.get("vision") or looks is None:
@@ -494,7 +494,7 @@ class _Rows:
         from_ = self._place(looks["at"], looks.get("station"), where)
         camera_x, camera_y, _ = map(float, self.said["robot"]["camera_mm"])
         above = from_.hand.point((-camera_x, -camera_y, 0.0))
-        return Place(from_.frame, Pose(from_.hand.turn, above))
+        return Location(from_.frame, Pose(from_.hand.turn, above))
 
     def _reached(self, plate: Pose, where: At, role: str) -> None:
         robot = self.said["robot"]
@@ -504,7 +504,7 @@ class _Rows:
         if not robot["height_mm"][0] <= z_mm <= robot["height_mm"][1]:
             self.wrong(where, f"the {role} is {z_mm:.0f} mm high, out of reach")
 
-    def _point(self, where: At, key: tuple[int, int], role: str, place: Place, trajectory: str) -> int:
+    def _point(self, where: At, key: tuple[int, int], role: str, place: Location, trajectory: str) -> int:
         plate = place.plate(self.tool_mm)
         self._reached(plate, where, role)
         motions = self.said["trajectory"]

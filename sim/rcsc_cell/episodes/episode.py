@@ -193,7 +193,7 @@ LISTS = ("interruptions", "pushes", "rows", "faults", "transport", "restarts", "
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class EpisodeFinding:
     """A property that did not hold, first in this tick."""
 
     property: str
@@ -202,7 +202,7 @@ class Finding:
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class EpisodeOutcome:
     """What became of an episode.
 
     Attributes:
@@ -212,7 +212,7 @@ class Outcome:
     """
 
     rows: tuple[RowEnd, ...]
-    findings: tuple[Finding, ...]
+    findings: tuple[EpisodeFinding, ...]
     end: str
     ticks: int
     lines: frozenset[tuple[str, str, str]]

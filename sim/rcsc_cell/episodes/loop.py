@@ -1,6 +1,6 @@
 """The cell in the loop: levels on generated executors over a plant, with what goes wrong, watched by properties, cycle by cycle.
 
-In: an episode, or one that grows while it runs. Out: an `Outcome`. Everything that is random comes of the episode's seed.
+In: an episode, or one that grows while it runs. Out: an `EpisodeOutcome`. Everything that is random comes of the episode's seed.
 """
 
 import hashlib
@@ -19,10 +19,10 @@ from rcsc_cell.cell.ready import plant
 from rcsc_cell.episodes.episode import (
     SYSTEM,
     Episode,
+    EpisodeFinding,
+    EpisodeOutcome,
     FaultSpec,
-    Finding,
     Interruption,
-    Outcome,
     Push,
     Restart,
     TransportSpec,
@@ -31,7 +31,7 @@ from rcsc_cell.episodes.setting import commands, operator_of, ready
 from rcsc_cell.episodes.setting import lying as lying_at
 from rcsc_cell.episodes.transport import Harmed
 from rcsc_cell.properties import PROPERTIES
-from rcsc_cell.properties.cycle import Command, Cycle, Made
+from rcsc_cell.properties.cycle import Command, CycleState, Made
 from rcsc_cell.workstation.script import BadScript
 
 MOST_TICKS_A_ROW = 2500
@@ -67,7 +67,7 @@ class Loop:
     ) -> None:
         self.episode = episode
         self.refused = ""
-        self.findings: list[Finding] = []
+        self.findings: list[EpisodeFinding] = []
         self.lines: set[tuple[str, str, str]] = set()
         self._seen: set[tuple[str, int, int]] = set()
         self._digest, self._end, self._cool = hashlib.blake2b(digest_size=16), "", COOL_TICKS
@@ -97,7 +97,7 @@ class Loop:
             self.system.watch.append(self._recorder)
         self.system.watch.append(self._after)
         twins = executors(said, signs, episode.executor)
-        self.cycle = Cycle(
+        self.cycle = CycleState(
             self.database,
             self.plant,
             {level.name: level for level in levels},
@@ -117,7 +117,7 @@ class Loop:
         """Whether everything was sent and answered, and has cooled down."""
         return bool(self._end) or (self.operator.over and self._cool <= 0)
 
-    def finish(self) -> Outcome:
+    def finish(self) -> EpisodeOutcome:
         """Runs to the end.
 
         Raises:
@@ -159,7 +159,7 @@ class Loop:
             self._end = "state-table error"
             self._find("no state-table error", str(error))
 
-    def outcome(self) -> Outcome:
+    def outcome(self) -> EpisodeOutcome:
         """What has become of it so far; the log is closed."""
         if self._recorder is not None:
             self._recorder.close()
@@ -168,7 +168,7 @@ class Loop:
             level = next(one for one in sign.levels if one.name == name)
             called = level.table or level.tables.get(table, "?")
             self.lines.add((name, called, sign.tables[called][line] if called in sign.tables else ""))
-        return Outcome(
+        return EpisodeOutcome(
             tuple(self.operator.ends),
             tuple(self.findings),
             self._end or self._ended(),
@@ -331,10 +331,10 @@ class Loop:
 
     def _find(self, name: str, said: str) -> None:
         if all(finding.property != name for finding in self.findings):
-            self.findings.append(Finding(name, self.system.tick, said))
+            self.findings.append(EpisodeFinding(name, self.system.tick, said))
 
 
-def run(episode: Episode, system: Path = SYSTEM, log: Path | None = None) -> Outcome:
+def run(episode: Episode, system: Path = SYSTEM, log: Path | None = None) -> EpisodeOutcome:
     """Runs it to its end, with every property watching.
 
     Args:

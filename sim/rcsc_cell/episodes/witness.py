@@ -19,12 +19,12 @@ from rcsc_cell.cell.plant import Latest, Plant
 from rcsc_cell.database.ask import Database
 from rcsc_cell.database.build import depth_mm
 from rcsc_cell.database.pose import Vector, minus, pose_of
-from rcsc_cell.pictures.report import Figure, Frame, Matched, Placement, ReportRow, Story
+from rcsc_cell.pictures.report import CellPicture, Figure, Matched, Placement, ReportRow, Story
 from rcsc_cell.pictures.solid import solid
 from rcsc_cell.pictures.stick import Scene, pads, stick
 from rcsc_cell.pictures.things import outline
-from rcsc_cell.workstation.prepared import Run
-from rcsc_cell.workstation.station import Result
+from rcsc_cell.workstation.prepared import ScriptDraft
+from rcsc_cell.workstation.station import RowResult
 
 if TYPE_CHECKING:
     from rcsc_cell.live import Live
@@ -66,7 +66,7 @@ class Timed:
 
 
 @dataclass(frozen=True, slots=True)
-class Placed:
+class PartPlace:
     """Where a part should lie, and where it lies: its middle, in mm."""
 
     part: str
@@ -92,13 +92,13 @@ class Witness:
         margins_deg: The least so far.
     """
 
-    run: Run
+    run: ScriptDraft
     timed: Timed
     live: "Live | None" = None
     film: bool = False
     margins_deg: tuple[float, ...] = (360.0,) * 6
     seconds: float = 0.0
-    frames: list[Frame] = field(default_factory=list)
+    frames: list[CellPicture] = field(default_factory=list)
     series: dict[str, list[tuple[float, float]]] = field(default_factory=dict)
     matched: Counter[tuple[str, str, str]] = field(default_factory=Counter)
     _row: int = -1
@@ -135,7 +135,7 @@ class Witness:
         since = system.tick - self._drawn
         if since >= LONG_APART or (at != self._row and since >= FRAMES_APART):
             self._drawn, self._row = system.tick, at
-            self.frames.append(Frame(system.tick, self._caption(), self.picture()))
+            self.frames.append(CellPicture(system.tick, self._caption(), self.picture()))
 
     def _caption(self) -> str:
         at = min(self.run.station.at, len(self.run.station.rows) - 1)
@@ -189,7 +189,7 @@ class Witness:
 
     # --- what became of it ---
 
-    def placed(self) -> tuple[Placed, ...]:
+    def placed(self) -> tuple[PartPlace, ...]:
         """Every part that the script put somewhere and did not take again."""
         return placements(self.run.station.results, self.run.database, self.plant)
 
@@ -243,7 +243,7 @@ def names(system: System) -> tuple[str, ...]:
     return tuple(f"{level.name}.{leaf.name}" for level in system.levels for leaf in level.sign.leaves)
 
 
-def placements(results: list[Result], database: Database, plant: Plant) -> tuple[Placed, ...]:
+def placements(results: list[RowResult], database: Database, plant: Plant) -> tuple[PartPlace, ...]:
     """Where parts that rows put somewhere should lie, and the nearest part of the kind; the last row counts."""
     put: dict[str, tuple[str, int]] = {}
     held = ""
@@ -262,7 +262,7 @@ def placements(results: list[Result], database: Database, plant: Plant) -> tuple
     )
 
 
-def _nearest(place: str, part: str, sector: int, database: Database, plant: Plant) -> list[Placed]:
+def _nearest(place: str, part: str, sector: int, database: Database, plant: Plant) -> list[PartPlace]:
     number = database.objects[part]
     upright = _upright(place, sector, number, database)
     there = [
@@ -272,8 +272,8 @@ def _nearest(place: str, part: str, sector: int, database: Database, plant: Plan
     ]
     if upright is None or not there:
         return []
-    closest: Callable[[Vector], float] = lambda at: Placed(part, place, upright, at).error_mm  # noqa: E731  # a key
-    return [Placed(part, f"{place}({sector})" if sector else place, upright, min(there, key=closest))]
+    closest: Callable[[Vector], float] = lambda at: PartPlace(part, place, upright, at).error_mm  # noqa: E731  # a key
+    return [PartPlace(part, f"{place}({sector})" if sector else place, upright, min(there, key=closest))]
 
 
 def _upright(place: str, sector: int, number: int, database: Database) -> Vector | None:

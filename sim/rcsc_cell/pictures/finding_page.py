@@ -11,9 +11,9 @@ from pathlib import Path
 from rcsc.host.files import write_atomically
 from rcsc.run.log.finding import LoggedFinding
 from rcsc.run.log.read import Log
-from rcsc.run.log.ticks import Frame, frames
+from rcsc.run.log.ticks import LoggedTick, frames
 from rcsc_cell.pictures.page import PAGES
-from rcsc_cell.pictures.scene import Drawn, DrawnCell
+from rcsc_cell.pictures.scene import DrawnCell, DrawnScene
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,11 +26,11 @@ class _Tick:
         drawn: The cell; None where there is none.
     """
 
-    frame: Frame
+    frame: LoggedTick
     ms: int
     mark: str
     broken: bool
-    drawn: Drawn | None
+    drawn: DrawnScene | None
 
 
 def trace(path: Path, log: Log, finding: LoggedFinding, cell: DrawnCell | None, why_not: str = "") -> None:
@@ -63,7 +63,7 @@ def page(log: Log, finding: LoggedFinding, cell: DrawnCell | None, why_not: str 
 _SIGNS: Mapping[bool, str] = {True: "\N{CHECK MARK}", False: "\N{BALLOT X}"}
 
 
-def _tick(frame: Frame, log: Log, finding: LoggedFinding, cell: DrawnCell | None) -> _Tick:
+def _tick(frame: LoggedTick, log: Log, finding: LoggedFinding, cell: DrawnCell | None) -> _Tick:
     broken = frame.tick == finding.broken_at
     mark = "broken here" if broken else "what comes of it" if frame.tick > finding.broken_at else ""
     drawn = None if cell is None else cell.drawn(frame.tick)

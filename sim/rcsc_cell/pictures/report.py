@@ -26,7 +26,7 @@ class ReportRow:
 
 
 @dataclass(frozen=True, slots=True)
-class Frame:
+class CellPicture:
     """A picture of the cell at a tick; `svg` is a document of `rcsc_cell.pictures`."""
 
     tick: int
@@ -81,7 +81,7 @@ class Story:
 
     title: str
     rows: Sequence[ReportRow] = ()
-    frames: Sequence[Frame] = ()
+    frames: Sequence[CellPicture] = ()
     series: Mapping[str, Sequence[tuple[float, float]]] = field(default_factory=dict)
     matched: Sequence[Matched] = ()
     timing: Sequence[Figure] = ()

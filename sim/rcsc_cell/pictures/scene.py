@@ -27,7 +27,7 @@ PLATE, OPENING = ".plate", ".opening_mm"
 
 
 @dataclass(frozen=True, slots=True)
-class Drawn:
+class DrawnScene:
     """The cell in a tick: an SVG document, and what is to be said about it, a sentence each."""
 
     svg: str
@@ -80,7 +80,7 @@ class DrawnCell:
     data: str
     rest: Joints
 
-    def drawn(self, tick: int) -> Drawn:
+    def drawn(self, tick: int) -> DrawnScene:
         """The cell as of a tick."""
         held = {level.name: level.track.latest(tick) for level in self.log.levels}
         states = {name: values for name, values in held.items() if values is not None}
@@ -102,7 +102,7 @@ class DrawnCell:
         )
         outlines = tuple(map(outline, self.database.stations.values()))
         scene = Scene(outlines, (), self.database.hand.tool_mm, blocks, marks)
-        return Drawn(
+        return DrawnScene(
             stick(plate, self._opening_mm(states), joints, scene, ALONE),
             (said, *self._told(named), *(f"`{other.name}` is marked." for other in others)),
         )

@@ -1,6 +1,6 @@
 """Convex solids as corners and flat faces.
 
-In: one of MuJoCo's shapes and its size. Out: a `Shape` about the shape's own origin. Lengths are metres.
+In: one of MuJoCo's shapes and its size. Out: a `Solid` about the shape's own origin. Lengths are metres.
 """
 
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ _BOX_FACES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 
 
 
 @dataclass(frozen=True, slots=True)
-class Shape:
+class Solid:
     """A convex solid.
 
     Attributes:
@@ -37,27 +37,27 @@ class Shape:
 
 
 @lru_cache(maxsize=512)
-def box(x: float, y: float, z: float) -> Shape:
+def box(x: float, y: float, z: float) -> Solid:
     """A box of these half sides."""
     corners = np.array(list(product((-x, x), (-y, y), (-z, z))))
     return _shape(corners, _BOX_FACES)
 
 
 @lru_cache(maxsize=512)
-def cylinder(radius: float, half: float) -> Shape:
+def cylinder(radius: float, half: float) -> Solid:
     """A cylinder along z, from -half to half."""
     return _rings(((radius, -half), (radius, half)))
 
 
 @lru_cache(maxsize=512)
-def capsule(radius: float, half: float) -> Shape:
+def capsule(radius: float, half: float) -> Solid:
     """A cylinder along z with half balls at its ends; a ball where `half` is 0."""
     above = [(radius * np.cos(angle), half + radius * np.sin(angle)) for angle in np.radians(_RISE)]
     below = [(wide, -high) for wide, high in reversed(above)]
     return _rings((*below[: None if half > 0.0 else -1], *above))  # a ball has one equator
 
 
-def _rings(rings: tuple[tuple[float, float], ...]) -> Shape:
+def _rings(rings: tuple[tuple[float, float], ...]) -> Solid:
     """The solid between rings of such a radius at such a height, from the lowest up."""
     turn = np.arange(SIDES) * (2 * np.pi / SIDES)
     circle = np.stack((np.cos(turn), np.sin(turn)), axis=1)
@@ -71,9 +71,9 @@ def _rings(rings: tuple[tuple[float, float], ...]) -> Shape:
     return _shape(corners, faces)
 
 
-def _shape(corners: Floats, faces: "list[tuple[int, ...]] | tuple[tuple[int, ...], ...]") -> Shape:
+def _shape(corners: Floats, faces: "list[tuple[int, ...]] | tuple[tuple[int, ...], ...]") -> Solid:
     most = max(map(len, faces))
     padded = np.array([(*face, *(face[-1],) * (most - len(face))) for face in faces])
     first, second = (corners[padded[:, at + 1]] - corners[padded[:, at]] for at in (0, 1))
     normals = np.cross(first, second)
-    return Shape(corners, padded, normals / np.linalg.norm(normals, axis=1, keepdims=True))
+    return Solid(corners, padded, normals / np.linalg.norm(normals, axis=1, keepdims=True))

@@ -14,7 +14,7 @@ import mujoco
 import numpy as np
 
 from rcsc_cell.pictures.order import Faces, painted
-from rcsc_cell.pictures.shapes import Floats, Integers, Shape, box, capsule, cylinder
+from rcsc_cell.pictures.shapes import Floats, Integers, Solid, box, capsule, cylinder
 
 DRAWN_GROUPS = (0, 1, 2)
 NEAR_M = 0.05
@@ -127,7 +127,7 @@ def _bodies(model: Any, data: Any, camera: _Camera) -> Iterator[str]:
         yield from _polygons(_scene(shapes, places), np.array(colours), camera)
 
 
-def _shape(kind: int, size: list[float]) -> Shape | None:
+def _shape(kind: int, size: list[float]) -> Solid | None:
     """The solid of a geom; None for what is not drawn."""
     match mujoco.mjtGeom(kind):
         case mujoco.mjtGeom.mjGEOM_BOX:
@@ -148,7 +148,7 @@ def _colour(model: Any, geom: int) -> Floats:
     return np.array(rgba[:3], dtype=np.float64)
 
 
-def _scene(shapes: Sequence[Shape], places: Sequence[tuple[Floats, Floats]]) -> Faces:
+def _scene(shapes: Sequence[Solid], places: Sequence[tuple[Floats, Floats]]) -> Faces:
     corners = [len(shape.corners) for shape in shapes]
     faces = [len(shape.faces) for shape in shapes]
     first_corner = np.cumsum([0, *corners[:-1]])

@@ -1,6 +1,6 @@
 """What a property sees: the system after a cycle, the cell as it is in truth, and the command under way.
 
-In: a running system and its plant. Out: a `Cycle`, made anew in every tick by `rcsc_cell.episodes.loop`. Truth (where parts are, what
+In: a running system and its plant. Out: a `CycleState`, made anew in every tick by `rcsc_cell.episodes.loop`. Truth (where parts are, what
 touches what) is for those who judge a run alone; nothing of it reaches a level.
 """
 
@@ -58,7 +58,7 @@ class Command:
 
 
 @dataclass(slots=True)
-class Cycle:
+class CycleState:
     """The state after a cycle.
 
     Attributes:
@@ -164,9 +164,9 @@ class Property(Protocol):
     name: ClassVar[str]
     place: ClassVar[str]
 
-    def __init__(self, cycle: Cycle) -> None: ...
+    def __init__(self, cycle: CycleState) -> None: ...
 
-    def watch(self, cycle: Cycle) -> str | None:
+    def watch(self, cycle: CycleState) -> str | None:
         """What is wrong in this cycle; None for nothing."""
         ...
 

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from rcsc_cell.cell.mujoco_model import DENSITY_KG_M3
 from rcsc_cell.database.ask import Database
-from rcsc_cell.properties.cycle import Command, Cycle
+from rcsc_cell.properties.cycle import Command, CycleState
 
 ROBOT = frozenset({"move", "loc", "robot"})
 HAND = frozenset({"move", "loc", "pic", "grip"})
@@ -64,12 +64,12 @@ class RightReason:
     name: ClassVar[str] = "right reason"
     place: ClassVar[str] = "section 8.1, lines 2, 3 and 10 to 13 of Fig. 8, and Fig. 9"
 
-    def __init__(self, cycle: Cycle) -> None:
+    def __init__(self, cycle: CycleState) -> None:
         self._objects = cycle.objects()
         self._restarted = self._odd = False
         self._begun: Command | None = None
 
-    def watch(self, cycle: Cycle) -> str | None:
+    def watch(self, cycle: CycleState) -> str | None:
         """The reason that nothing explains, or the command that should have failed."""
         self._restarted = self._restarted or bool(cycle.restarted)
         command = cycle.command
@@ -89,7 +89,7 @@ class RightReason:
             else f"`{command.name}` failed with `{reason}`"
         )
 
-    def _explained(self, cycle: Cycle, command: Command, reason: str) -> bool:
+    def _explained(self, cycle: CycleState, command: Command, reason: str) -> bool:
         if reason == "buf":
             return command.obj in cycle.counts and cycle.counts[command.obj] == 0
         if reason == "nothing_gripped":
@@ -107,7 +107,7 @@ class RightReason:
             return True
         return reason in ("loc", "pic") and command.name in TAKES and self._odd
 
-    def _part_is_odd(self, cycle: Cycle, command: Command) -> bool:
+    def _part_is_odd(self, cycle: CycleState, command: Command) -> bool:
         """Whether what lies at the source is anything but one part of the kind, of the database's size, with room for the fingers."""
         if not command.source or command.obj not in self._objects:
             return True
@@ -172,12 +172,12 @@ class StillAfterFail:
     name: ClassVar[str] = "still after FAIL"
     place: ClassVar[str] = "section 8.1, line 14 of Fig. 8: the lower level is commanded to PAUSE"
 
-    def __init__(self, cycle: Cycle) -> None:
+    def __init__(self, cycle: CycleState) -> None:
         self._since: int | None = None
         self._command: Command | None = None
         self._joints, self._opening_mm = cycle.joints, cycle.opening_mm
 
-    def watch(self, cycle: Cycle) -> str | None:
+    def watch(self, cycle: CycleState) -> str | None:
         """What moved."""
         command = cycle.command
         if command is not self._command:
@@ -192,7 +192,7 @@ class StillAfterFail:
             return None
         return self._moved(cycle)
 
-    def _moved(self, cycle: Cycle) -> str | None:
+    def _moved(self, cycle: CycleState) -> str | None:
         turned_rad = max(abs(a - b) for a, b in zip(self._joints, cycle.joints, strict=True))
         if turned_rad > STILL_RAD:
             return f"a joint has turned by {turned_rad:.3f} rad"

@@ -7,7 +7,7 @@ from rcsc_cell.cell.arm import LIMITS, plate
 from rcsc_cell.cell.plant import CYCLE_S
 from rcsc_cell.cell.robot import JUMP_RAD
 from rcsc_cell.database.ask import Database
-from rcsc_cell.properties.cycle import LETS_GO, Cycle
+from rcsc_cell.properties.cycle import LETS_GO, CycleState
 
 FINGERS = ("pad_", "finger_")
 FURNITURE = ("vise_bed", "jaw_", "wall_")
@@ -36,10 +36,10 @@ class OnlyAllowedContact:
     name: ClassVar[str] = "only allowed contact"
     place: ClassVar[str] = "sections 4.3 and 4.4: approach and departure keep clear of what stands about"
 
-    def __init__(self, _: Cycle) -> None:
+    def __init__(self, _: CycleState) -> None:
         self._seen: frozenset[tuple[str, str]] = frozenset()
 
-    def watch(self, cycle: Cycle) -> str | None:
+    def watch(self, cycle: CycleState) -> str | None:
         """What touched what."""
         if cycle.touching == self._seen:
             return None
@@ -55,7 +55,7 @@ def _fallen(first: str, second: str) -> bool:
     return {_kind(first), _kind(second)} in ({"part", "floor"}, {"part"})
 
 
-def _let_go(cycle: Cycle) -> bool:
+def _let_go(cycle: CycleState) -> bool:
     """Whether a fault did, or RELEASE, which lets go wherever the hand is."""
     released = cycle.command is not None and cycle.command.name == "release"
     return released or cycle.was_active(LETS_GO, 0)
@@ -79,11 +79,11 @@ class ForceWithin:
     name: ClassVar[str] = "grip force"
     place: ClassVar[str] = "sections 6.5 (100 lb) and 7.2"
 
-    def __init__(self, _: Cycle) -> None:
+    def __init__(self, _: CycleState) -> None:
         self._most_n = 0.0
         self._key = (-1, -1)
 
-    def watch(self, cycle: Cycle) -> str | None:
+    def watch(self, cycle: CycleState) -> str | None:
         """How hard they pressed."""
         primitive = cycle.levels["primitive"]
         key = int(primitive.value("command.obj_ptr")), int(primitive.value("command.grasp"))
@@ -103,13 +103,13 @@ class JointsWithin:
     name: ClassVar[str] = "joints within limits"
     place: ClassVar[str] = "sections 6.1, 6.2 and 7.1"
 
-    def __init__(self, cycle: Cycle) -> None:
+    def __init__(self, cycle: CycleState) -> None:
         self._before = cycle.joints
         self._at = plate(cycle.joints).at_mm
         self._gap = -CATCHES_UP_TICKS
         self._most_mm = _fastest_mm_s(cycle.database) * SPEED_SHARE * CYCLE_S + SPEED_MM_S * CYCLE_S
 
-    def watch(self, cycle: Cycle) -> str | None:
+    def watch(self, cycle: CycleState) -> str | None:
         """Which joint, and how far or how fast."""
         if ORDERS in cycle.harmed:
             self._gap = cycle.tick

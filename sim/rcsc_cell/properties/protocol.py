@@ -5,7 +5,7 @@ from typing import ClassVar
 from rcsc.run.levels import RunningLevel
 from rcsc.run.signature import Signature, Values
 from rcsc_cell.cell.robot import REST_RAD
-from rcsc_cell.properties.cycle import Command, Cycle
+from rcsc_cell.properties.cycle import Command, CycleState
 
 BOUND_TICKS = {"pause": 60, "acquire": 900, "move": 1100, "release": 500, "clear": 700, "transfer": 1500}
 """Within which each command ends, in cycles of 40 ms, whatever goes wrong with robot, hand and camera. The longest seen in campaigns are
@@ -25,10 +25,10 @@ class NoStateTableError:
     name: ClassVar[str] = "no state-table error"
     place: ClassVar[str] = "section 8.1, line 16 of Fig. 8"
 
-    def __init__(self, _: Cycle) -> None:
+    def __init__(self, _: CycleState) -> None:
         pass
 
-    def watch(self, cycle: Cycle) -> str | None:
+    def watch(self, cycle: CycleState) -> str | None:
         """Which level met which fault."""
         for level in cycle.ran:
             if level.fault:
@@ -42,10 +42,10 @@ class AssumptionsHold:
     name: ClassVar[str] = "assumptions hold"
     place: ClassVar[str] = "section 9"
 
-    def __init__(self, _: Cycle) -> None:
+    def __init__(self, _: CycleState) -> None:
         pass
 
-    def watch(self, cycle: Cycle) -> str | None:
+    def watch(self, cycle: CycleState) -> str | None:
         """Which assumptions failed, and where."""
         for level in cycle.ran:
             bits = int(level.values[-1])
@@ -61,11 +61,11 @@ class EndsInBound:
     name: ClassVar[str] = "ends in DONE or FAIL"
     place: ClassVar[str] = "section 3, Fig. 5: feedback status from the level below"
 
-    def __init__(self, _: Cycle) -> None:
+    def __init__(self, _: CycleState) -> None:
         self._left = 0
         self._command: Command | None = None
 
-    def watch(self, cycle: Cycle) -> str | None:
+    def watch(self, cycle: CycleState) -> str | None:
         """That it did not."""
         if cycle.command is not self._command:
             self._command = cycle.command
@@ -86,11 +86,11 @@ class AnsweredOnce:
     name: ClassVar[str] = "answered once"
     place: ClassVar[str] = "sections 8.1 (lines 9 and 14 of Fig. 8) and 9"
 
-    def __init__(self, cycle: Cycle) -> None:
+    def __init__(self, cycle: CycleState) -> None:
         self._said: tuple[int, str] | None = None
         self._joints, self._stirred = cycle.joints, -STIRRED_TICKS
 
-    def watch(self, cycle: Cycle) -> str | None:
+    def watch(self, cycle: CycleState) -> str | None:
         """What it was, and what it became."""
         if (
             cycle.active
@@ -123,10 +123,10 @@ class ReplaysExactly:
     name: ClassVar[str] = "replays exactly"
     place: ClassVar[str] = "section 10: a log of the machine state, to be stepped"
 
-    def __init__(self, cycle: Cycle) -> None:
+    def __init__(self, cycle: CycleState) -> None:
         self._inputs = {level.name: _input_runs(level.sign) for level in cycle.levels.values()}
 
-    def watch(self, cycle: Cycle) -> str | None:
+    def watch(self, cycle: CycleState) -> str | None:
         """The first leaf that differs."""
         for level in cycle.ran:
             twin, count = cycle.twins[level.name], len(level.sign.leaves)

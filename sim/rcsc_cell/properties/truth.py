@@ -5,7 +5,7 @@ from typing import ClassVar
 
 from rcsc_cell.cell.arm import plate
 from rcsc_cell.database.ask import Database, Station
-from rcsc_cell.properties.cycle import COUNTED, LETS_GO, Command, Cycle
+from rcsc_cell.properties.cycle import COUNTED, LETS_GO, Command, CycleState
 
 PLATE_MM = 3.0
 """The plate is this near to the point of a location: the robot's own tolerance of 1 mm, and what a clamped part pushes it aside."""
@@ -45,7 +45,7 @@ class DoneTrue:
     place: ClassVar[str] = "sections 3.1 to 3.5 and 6.5"
     lets_go: ClassVar[frozenset[str]] = LETS_GO
 
-    def __init__(self, cycle: Cycle) -> None:
+    def __init__(self, cycle: CycleState) -> None:
         self._in_hand: int | None = None
         self._taken = 0  # when the command was given that took it
         self._let_go = (0.0, 0.0, 0.0)
@@ -55,7 +55,7 @@ class DoneTrue:
         self._before = cycle.joints
         self._forgot: int | None = None  # when TASK lost its state, until the hand is empty
 
-    def watch(self, cycle: Cycle) -> str | None:
+    def watch(self, cycle: CycleState) -> str | None:
         """In which way it is not."""
         self._follow(cycle)
         before, self._before = self._before, cycle.joints
@@ -69,7 +69,7 @@ class DoneTrue:
             or self._put(cycle, cycle.command)
         )
 
-    def _follow(self, cycle: Cycle) -> None:
+    def _follow(self, cycle: CycleState) -> None:
         """Which part was in the fingers last, and whether a fault took it out of them."""
         believed = cycle.shown("task", "obj_now_in_gripper") != "null_obj"
         if "task" in cycle.restarted:
@@ -89,7 +89,7 @@ class DoneTrue:
                 self._excused, self._in_hand = False, None
             self._begun = cycle.command
 
-    def _robot(self, cycle: Cycle, command: Command) -> str | None:
+    def _robot(self, cycle: CycleState, command: Command) -> str | None:
         """Whether the plate is at the location where the command ends."""
         location = _ends_at(cycle, command)
         if not location or command.name == "acquire":
@@ -101,14 +101,14 @@ class DoneTrue:
         off_mm = min(dist((x, y, z + up), at) for up in self._lifts(cycle))
         return f"the plate is {off_mm:.1f} mm off" if off_mm > PLATE_MM else None
 
-    def _lifts(self, cycle: Cycle) -> tuple[float, ...]:
+    def _lifts(self, cycle: CycleState) -> tuple[float, ...]:
         """How much higher than the location the pads may be, in mm: as the part wants it that is in the hand, or was."""
         if self._in_hand is None:
             return (0.0,)
         kind = self._objects[self._in_hand]
         return (0.0, float(cycle.database.part(cycle.database.objects[kind])[3]))
 
-    def _hand(self, cycle: Cycle, command: Command) -> str | None:
+    def _hand(self, cycle: CycleState, command: Command) -> str | None:
         """Whether what TASK believes to hold is in the fingers."""
         believed = cycle.shown("task", "obj_now_in_gripper")
         if self._excused:
@@ -131,7 +131,7 @@ class DoneTrue:
         seen = bool(cycle.database.place(command.source)[1]) and command.name in MOVES
         return f"the hand holds a `{kind}`, not a `{believed}`" if seen and kind != believed else None
 
-    def _put(self, cycle: Cycle, command: Command) -> str | None:
+    def _put(self, cycle: CycleState, command: Command) -> str | None:
         """Whether what was put down lies where it was to be."""
         if command.name not in PUTS or self._excused or self._in_hand is None:
             return None
@@ -154,7 +154,7 @@ class CountsTrue:
     lets_go: ClassVar[frozenset[str]] = LETS_GO
     changed_pickup: ClassVar[bool] = CHANGED_PICKUP
 
-    def __init__(self, cycle: Cycle) -> None:
+    def __init__(self, cycle: CycleState) -> None:
         self._tables = _buffers(cycle.database)
         self._objects = cycle.objects()
         self._begun: Command | None = None
@@ -162,7 +162,7 @@ class CountsTrue:
         self._excused = False
         self._forgot = -CLOSING_TICKS
 
-    def watch(self, cycle: Cycle) -> str | None:
+    def watch(self, cycle: CycleState) -> str | None:
         """Which count is wrong."""
         if "task" in cycle.restarted:
             self._excused, self._forgot = True, cycle.tick  # it has forgotten what it counted
@@ -189,7 +189,7 @@ class CountsTrue:
         wrong = [name for name in COUNTED if now[name] != self._was[name]]
         return f"`{wrong[0]}`: TASK counts {now[wrong[0]] - self._was[wrong[0]]:+} more" if wrong else None
 
-    def _difference(self, cycle: Cycle) -> dict[str, int]:
+    def _difference(self, cycle: CycleState) -> dict[str, int]:
         """By how many TASK counts more than lie there."""
         return {
             name: count
@@ -201,7 +201,7 @@ class CountsTrue:
         }
 
 
-def _at_rest(cycle: Cycle, before: tuple[float, ...]) -> str | None:
+def _at_rest(cycle: CycleState, before: tuple[float, ...]) -> str | None:
     """PAUSE is done: robot and hand are told to rest, and the robot does."""
     if cycle.shown("primitive", "to_robot.input_command") != "hold":
         return "the robot is not told to hold"
@@ -209,13 +209,13 @@ def _at_rest(cycle: Cycle, before: tuple[float, ...]) -> str | None:
     return f"a joint moved by {moved_rad:.4f} rad" if moved_rad > REST_RAD else None
 
 
-def _picking(cycle: Cycle) -> bool:
+def _picking(cycle: CycleState) -> bool:
     """Whether PICKUP is under way."""
     executing = cycle.shown("task", "report.status_report") == "executing"
     return executing and cycle.shown("task", "to_emove.input_command") == "pickup"
 
 
-def _ends_at(cycle: Cycle, command: Command) -> int:
+def _ends_at(cycle: CycleState, command: Command) -> int:
     """The location at which the robot ends; 0 where the command leaves it where it is."""
     match command.name:
         case "acquire":
@@ -239,7 +239,7 @@ def _buffers(database: Database) -> tuple[Station, ...]:
     return tuple(found)
 
 
-def _lies_on(cycle: Cycle, part: int, tables: tuple[Station, ...]) -> bool:
+def _lies_on(cycle: CycleState, part: int, tables: tuple[Station, ...]) -> bool:
     pose = cycle.parts[part]
     low = cycle.bodies[part].lowest_mm(pose)
     return any(table.below(pose.at_mm) and low - table.frame.at_mm[2] < ON_TABLE_MM for table in tables)

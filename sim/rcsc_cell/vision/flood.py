@@ -28,7 +28,7 @@ class Features:
 
 
 @dataclass(frozen=True, slots=True)
-class Shape:
+class Patch:
     """A patch in mm, as if it were at the expected range.
 
     Attributes:
@@ -92,10 +92,10 @@ def reflectance(image: FloodImage, expected_range_mm: float, optics: Optics) -> 
     return even
 
 
-def shape(blob: Blob, expected_range_mm: float, optics: Optics) -> Shape:
+def shape(blob: Blob, expected_range_mm: float, optics: Optics) -> Patch:
     """A patch in mm at the expected range."""
     scale_mm = expected_range_mm / optics.focal_px
-    return Shape(
+    return Patch(
         (blob.column_px - optics.width_px / 2) * scale_mm,
         (optics.height_px / 2 - blob.row_px) * scale_mm,
         blob.length_px * scale_mm,
@@ -105,7 +105,7 @@ def shape(blob: Blob, expected_range_mm: float, optics: Optics) -> Shape:
     )
 
 
-def choose(shapes: Iterable[Shape], wanted: Features, expected_range_mm: float) -> FoundPart | None:
+def choose(shapes: Iterable[Patch], wanted: Features, expected_range_mm: float) -> FoundPart | None:
     """The matching of section 5.1.
 
     Raises:
@@ -125,7 +125,7 @@ def choose(shapes: Iterable[Shape], wanted: Features, expected_range_mm: float) 
     return FoundPart(best.x_mm, best.y_mm, best.roll_rad, range_mm, score)
 
 
-def mismatch(seen: Shape, wanted: Features) -> float:
+def mismatch(seen: Patch, wanted: Features) -> float:
     """Relative differences of area, length and width, added."""
     length_mm = max(wanted.length_mm, wanted.width_mm)
     width_mm = min(wanted.length_mm, wanted.width_mm)

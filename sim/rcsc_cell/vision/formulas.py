@@ -11,7 +11,7 @@ from math import cos, hypot, pi, sin, sqrt
 import numpy as np
 
 from rcsc_cell.vision.blobs import half_turn
-from rcsc_cell.vision.flood import Features, FoundPart, Shape, choose
+from rcsc_cell.vision.flood import Features, FoundPart, Patch, choose
 from rcsc_cell.vision.line import LEAST_POINTS, Surface, surface
 from rcsc_cell.vision.optics import STANDARD, Floats, Optics
 
@@ -82,7 +82,7 @@ def _inside(top: Top, optics: Optics) -> bool:
     return right * scale < optics.width_px / 2 - MARGIN_PX and up * scale < optics.height_px / 2 - MARGIN_PX
 
 
-def _seen(top: Top, expected_range_mm: float, error: Sequence[float], optics: Optics) -> Shape:
+def _seen(top: Top, expected_range_mm: float, error: Sequence[float], optics: Optics) -> Patch:
     """A top's patch at the expected range, with errors of place along and across, of turn and of area.
 
     Each pixel of the border is off by e on its own. For sides l and w in pixels, the border's first moments give a middle
@@ -103,7 +103,7 @@ def _seen(top: Top, expected_range_mm: float, error: Sequence[float], optics: Op
     length, width = long - abs(lost_along), short - abs(lost_across)
     area = length * width + error[3] * edge_px * sqrt(2 * (long + short))
     mm = expected_range_mm / optics.focal_px
-    return Shape(
+    return Patch(
         (top.x_mm * scale + along * c - across * s) * mm,
         (top.y_mm * scale + along * s + across * c) * mm,
         length * mm,

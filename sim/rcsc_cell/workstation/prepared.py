@@ -1,6 +1,6 @@
 """A cell ready to run: system, database, workstation and what else stands outside the levels.
 
-In: the description's path, a script. Out: a `Run` that is stepped to its end.
+In: the description's path, a script. Out: a `ScriptDraft` that is stepped to its end.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -14,14 +14,14 @@ from rcsc.run.system import Kind, Outside, System, assemble, signatures
 from rcsc_cell.database.ask import Database, fresh, open_database
 from rcsc_cell.database.build import Limit, build, digest
 from rcsc_cell.workstation.script import ROBOT, ScriptRow, read_script
-from rcsc_cell.workstation.station import Result, Workstation, workstation
+from rcsc_cell.workstation.station import RowResult, Workstation, workstation
 
 MOST_TICKS = 100_000
 """Ticks after which a run is given up: more than an hour of control time."""
 
 
 @dataclass(slots=True)
-class Run:
+class ScriptDraft:
     """A script in the making.
 
     Attributes:
@@ -32,7 +32,7 @@ class Run:
     station: Workstation
     database: Database
 
-    def steps(self, most: int = MOST_TICKS) -> Iterator[Result]:
+    def steps(self, most: int = MOST_TICKS) -> Iterator[RowResult]:
         """Runs to the end of the script, or to what stops it and until TASK has paused; each result as it comes.
 
         Raises:
@@ -191,7 +191,7 @@ def prepare(
     kind: Kind,
     outside: Callable[[Database], Iterable[Outside]],
     database: Path | None = None,
-) -> Run:
+) -> ScriptDraft:
     """A cell ready for its first tick.
 
     Args:
@@ -210,4 +210,4 @@ def prepare(
     held = database_of(system, signs, database)
     script = read_script(script_path(rows, path)) if isinstance(rows, str) else rows
     station = workstation(script, held.locations, signs["task"], safe_places(held))
-    return Run(assemble(system, kind, held.queries, [station, *outside(held)]), station, held)
+    return ScriptDraft(assemble(system, kind, held.queries, [station, *outside(held)]), station, held)

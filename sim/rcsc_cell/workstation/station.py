@@ -41,7 +41,7 @@ RUNNING: Now = ("running", "")
 
 
 @dataclass(frozen=True, slots=True)
-class Result:
+class RowResult:
     """What became of a row."""
 
     row: ScriptRow
@@ -81,7 +81,7 @@ class Workstation:
     report: tuple[Leaf, ...]
     cell: CellState = field(default_factory=CellState)
     at: int = 0
-    results: list[Result] = field(default_factory=list)
+    results: list[RowResult] = field(default_factory=list)
     trouble: str = ""
     progress: Progress = field(default_factory=Progress)
     safe: Mapping[str, str] = field(default_factory=dict)
@@ -122,7 +122,7 @@ class Workstation:
         return self._paused < 0
 
     @property
-    def stopped(self) -> Result | None:
+    def stopped(self) -> RowResult | None:
         """The result that stopped the script."""
         last = self.results[-1] if self.results else None
         return last if last is not None and last.state != "done" and last.row is self.rows[self.at] else None
@@ -204,7 +204,7 @@ class Workstation:
         return rest(row, self.progress, held, self.safe)
 
     def _end(self, row: ScriptRow, tick: int, state: State, reason: str) -> None:
-        self.results.append(Result(row, state, reason, self._since, tick - self._since))
+        self.results.append(RowResult(row, state, reason, self._since, tick - self._since))
         if state == "done":
             self.cell = after(self._before, row)
             self.at += 1

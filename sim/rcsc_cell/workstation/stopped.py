@@ -24,7 +24,7 @@ from rcsc.run.levels import BadState, RunningLevel
 from rcsc.run.signature import generated_files
 from rcsc.run.system import Outside
 from rcsc_cell.workstation.orders import BETWEEN, KINDS
-from rcsc_cell.workstation.prepared import Run
+from rcsc_cell.workstation.prepared import ScriptDraft
 from rcsc_cell.workstation.script import ScriptRow
 from rcsc_cell.workstation.station import Workstation
 
@@ -66,7 +66,7 @@ def stopped_path(system: Description) -> Path:
     return system.database.parent / ".rcsc-cache" / f"{system.name}.stopped.json"
 
 
-def keep(run: Run, script: str) -> Path:
+def keep(run: ScriptDraft, script: str) -> Path:
     """Writes where the run stands.
 
     Args:
@@ -104,7 +104,7 @@ def forget(system: Description) -> None:
         stopped_path(system).unlink(missing_ok=True)
 
 
-def go_on(run: Run) -> None:
+def go_on(run: ScriptDraft) -> None:
     """Puts a run that has not begun where the stopped one stood; its row is tried again.
 
     Raises:
@@ -181,7 +181,7 @@ def _read(path: Path) -> _Stopped:
         ) from error
 
 
-def _same(run: Run, said: _Stopped) -> None:
+def _same(run: ScriptDraft, said: _Stopped) -> None:
     """Whether it is this script, these executors and this cell."""
     if said.rows != rows_digest(run.station.rows):
         raise NotResumed(
@@ -200,7 +200,7 @@ def _same(run: Run, said: _Stopped) -> None:
         )
 
 
-def _put(run: Run, said: _Stopped) -> None:
+def _put(run: ScriptDraft, said: _Stopped) -> None:
     """Raises: ValueError, struct.error: Something in it is no state of this cell; NotResumed: a level cannot go on from its own."""
     system, outside = run.system, dict(_restorable(run.system.outside))
     if said.levels.keys() != {level.name for level in system.levels}:
@@ -233,7 +233,7 @@ def _values(level: RunningLevel, said: Sequence[Any]) -> tuple[Any, ...]:
     return tuple(said)
 
 
-def _buffers(run: Run) -> Iterator[str]:
+def _buffers(run: ScriptDraft) -> Iterator[str]:
     """Names of all buffers that something may have been published in."""
     yield from dict.fromkeys(wire.source for wire in run.system.description.wires)
     yield from BETWEEN
