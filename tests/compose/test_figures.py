@@ -6,20 +6,31 @@ from pathlib import Path
 
 import pytest
 
-from rcsc.compose.contract.claims import CONTRACT, ENDING, RUNS, SAFE, Key, spelled
+from rcsc.compose.contract.claims import CONTRACT, ENDING, RUNS, SAFE, Claim, Key, Promise, Verdict, spelled
+from rcsc.compose.contract.environment import Above, links
 from rcsc.compose.contract.obligations import Sort, Unstated, obligations, pairs, unstated
 from rcsc.compose.contract.properties import every_predicate
 from rcsc.compose.contract.transition import Cycle, TransitionSystem
 from rcsc.compose.invariant.confirm import Confirmation
-from rcsc.compose.proof.level import LevelProof, certificate
+from rcsc.compose.proof.assume_guarantee import of_level, promises
+from rcsc.compose.proof.level import LevelProof, _of_possible, certificate
 from rcsc.compose.proof.termination import Flow
 from rcsc.lang.leaves import parts
 from rcsc.lang.meaning import spelled as spelled_expression
-from rcsc.lang.model import Bool, Int, OneTable, TableName
+from rcsc.lang.model import Bool, Int, OneTable, TableName, VariableName
+from rcsc.run.description import BadDescription, Description, Wire, description
 from rcsc.solvers.smt import Answer, Limits, Solver
 from rcsc.symbolic import values
 from rcsc.symbolic.keyed import Keyed
-from tests.support.programs.systems import alone, going, lower_level, proved_level, small_level, small_text
+from tests.support.programs.systems import (
+    SYSTEM,
+    alone,
+    going,
+    lower_level,
+    proved_level,
+    small_level,
+    small_text,
+)
 
 
 def any_cycle(ts: TransitionSystem) -> Cycle:
@@ -132,6 +143,126 @@ def test_what_is_missing_for_a_goal_is_told_word_for_word(
 def test_a_claim_is_spelled_word_for_word(key: Key, level: str, there: bool, words: str) -> None:
     assert spelled(("a", key), level, [("a", key)] if there else []) == words
     assert spelled(("a", key), level) == words.removesuffix(", not looked at")
+
+
+RUNNING = """\
+the level runs as its tables say, : proved
+    rests on every operation is defined and in range,,; the contract,,command; some line matches,pause,; no two lines match,pause,; \
+some line matches,go,; no two lines match,go,
+every operation is defined and in range, : proved
+    rests on nothing
+"""
+RESTING = """\
+some line matches, pause: proved
+no two lines match, pause: proved
+some line matches, go: proved
+no two lines match, go: proved
+the report echoes the command that it answers, : proved
+a command number is taken up once, : proved
+does nothing when it matches again, : proved
+the command ends, pause: proved
+the command ends, go: not proved
+"""
+
+
+def test_claims_of_a_level_rest_on_these_and_no_others(lower: tuple[TransitionSystem, LevelProof]) -> None:
+    found = []
+    for (sort, table, _), claim in of_level(*lower):
+        on = "; ".join(",".join(map(str, key)) for level, key in claim.rests_on if level == "lower")
+        rests = "" if claim.rests_on == (("lower", RUNS),) else f"    rests on {on or 'nothing'}"
+        found += [f"{sort}, {table}: {claim.verdict}", rests][: 1 + bool(rests)]
+        assert claim.trusts == ()
+    ends = ["every command ends, : proved", "    rests on the command ends,pause,; the command ends,go,"]
+    assert found == [*RUNNING.splitlines(), *RESTING.splitlines(), *ends]
+
+
+def test_what_levels_assume_of_each_other_is_told_word_for_word(
+    upper: TransitionSystem, lower: tuple[TransitionSystem, LevelProof]
+) -> None:
+    numbered: tuple[Key, ...] = (
+        (Sort.NUMBERED, "", "to_lower.input_command"),
+        (Sort.NEXT_NUMBER, "", "to_lower"),
+    )
+    kept = tuple(("upper", key) for key in numbered)
+    orders = "while the number of `command` stays, so do `command.input_command`"
+    reports = "what `lower` reports under the number of the last order is about that order"
+    from_outside = Promise("upper", "command", orders, "`station` stands outside the levels", outside=True)
+    echoed = f"proved of `lower`: {Sort.ECHOES.value}; both begin with the same order"
+    echoes = (("lower", (Sort.ECHOES.value, "", "report")),)
+    from_below = Promise("upper", "lower", reports, echoed, echoes, kept)
+    from_above = Promise("lower", "command", orders, f"proved of `upper`: {Sort.NUMBERED.value}", kept)
+    assert list(promises({"upper": upper, "lower": lower[0]})) == [from_outside, from_below, from_above]
+    [below] = upper.links.below
+    left = replace(upper, links=replace(upper.links, below=(replace(below, outside=True),)))
+    own = Promise("upper", "lower", reports, "`lower` stands outside the levels", own=kept, outside=True)
+    assert list(promises({"upper": left})) == [from_outside, own]
+    assert own.claim == (
+        ("upper", (CONTRACT, "", "lower")),
+        Claim(Verdict.PROVED, kept, ("`lower` keeps to the protocol",)),
+    )
+
+
+# --- buffers ------------------------------------------------------------------------------
+
+
+def wired(*wires: tuple[str, str]) -> Description:
+    """The small system with other buffers."""
+    return replace(description(SYSTEM), wires=tuple(Wire(*one) for one in wires))
+
+
+WIRES = (("upper.to_lower", "lower.command"), ("lower.report", "upper.lower"))
+
+
+def test_a_buffer_may_end_within_a_record(lower: tuple[TransitionSystem, LevelProof]) -> None:
+    program = lower[0].program
+    inside = tuple(
+        replace(one, name=VariableName(f"taken.{one.name}")) if one.name.startswith("command.") else one
+        for one in program.variables
+    )
+    system = wired(("upper.to_lower", "lower.taken.command"), WIRES[1])
+    found = links(system, "lower", replace(program, variables=inside))
+    assert found.above == Above(
+        "upper", "taken.command", "report", outside=False, numbered=("taken.command.input_command",)
+    )
+    assert (found.below, found.free, found.unread) == ((), ("there",), ())
+
+
+@pytest.mark.parametrize(
+    ("level", "wires", "words"),
+    [
+        (
+            "lower",
+            WIRES[:1],
+            "`lower.command` needs one buffer to `upper` with `inc_command_echo`, and has 0",
+        ),
+        ("upper", WIRES[1:], "`upper.lower` needs one buffer to `lower` with `inc_command`, and has 0"),
+    ],
+)
+def test_what_is_wrong_with_buffers_is_told_word_for_word(
+    level: str,
+    wires: tuple[tuple[str, str], ...],
+    words: str,
+    upper: TransitionSystem,
+    lower: tuple[TransitionSystem, LevelProof],
+) -> None:
+    program = {"upper": upper, "lower": lower[0]}[level].program
+    with pytest.raises(BadDescription) as told:
+        links(wired(*wires), level, program)
+    assert str(told.value) == words
+
+
+@pytest.mark.parametrize(
+    ("answers", "verdict"),
+    [
+        ({Answer.SATISFIABLE}, Verdict.TRUSTED),
+        ({Answer.SATISFIABLE, Answer.UNKNOWN}, Verdict.UNDECIDED),
+        ({Answer.UNKNOWN, Answer.UNSATISFIABLE, Answer.SATISFIABLE}, Verdict.NOT_PROVED),
+    ],
+)
+def test_what_is_declared_is_trusted_only_where_every_sort_of_cycle_is_possible(
+    answers: set[Answer], verdict: Verdict
+) -> None:
+    assert _of_possible(answers) is verdict
 
 
 # --- what has a name of its own -----------------------------------------------------------

@@ -44,7 +44,7 @@ from rcsc.lang.model import (
 )
 from rcsc.table.regions.atoms import Universe, assumptions_of, lines_of
 from rcsc.table.regions.least import find, least, negated, whole, widest
-from rcsc.table.regions.linear import Simplex
+from rcsc.table.regions.linear import Simplex, integer_point
 from rcsc.table.regions.region import (
     Counted,
     Empty,
@@ -391,6 +391,39 @@ def test_simplex_gives_a_point_or_a_sum_that_cannot_be(rows: list[tuple[tuple[in
         bound = sum(k * (simplex.high if k > 0 else simplex.low)[form] for form, k in multipliers)
         assert summed == [0, 0, 0]
         assert bound < 0
+
+
+@given(
+    st.lists(
+        st.tuples(st.tuples(*[st.integers(-3, 3)] * 2), st.integers(-9, 9), st.integers(0, 3)), max_size=4
+    )
+)
+def test_a_point_of_integers_is_found_wherever_there_is_one(
+    rows: list[tuple[tuple[int, ...], int, int]],
+) -> None:
+    simplex = Simplex()
+    for form in range(2):
+        simplex.add_column(form, -4, 5)
+    for form, (ks, low, width) in enumerate(rows, start=2):
+        simplex.add_form(form, [(c, k) for c, k in enumerate(ks) if k], low, low + width)
+    there = [
+        point
+        for point in itertools.product(range(-4, 6), repeat=2)
+        if all(low <= sum(map(operator.mul, ks, point)) <= low + width for ks, low, width in rows)
+    ]
+    found = integer_point(simplex, range(2), 200)
+    assert (found is None) == (not there)
+    if found is not None:
+        assert tuple(int(found.value(form)) for form in range(2)) in there
+
+
+def test_looking_for_a_point_of_integers_has_an_end() -> None:
+    simplex = Simplex()
+    for form in range(2):
+        simplex.add_column(form, 0, 10**6)
+    simplex.add_form(2, [(0, 3), (1, -3)], 1, 2)
+    with pytest.raises(TimeoutError):
+        integer_point(simplex, range(2), 20)
 
 
 # --- trees, node by node ------------------------------------------------------------------

@@ -1,0 +1,271 @@
+"""Nodes of a symbolic run, exactly: their bounds, what folds, what a condition tells of them, and points at which conditions hold."""
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from itertools import combinations_with_replacement, islice, product
+
+import pytest
+
+from rcsc.lang.model import Bool, Enum, Int, Kind, Real, Scalar, Variable, VariableName
+from rcsc.lang.operator_table import Op
+from rcsc.procedures.discharge import MOST_CHOICES, fewest
+from rcsc.solvers import smt
+from rcsc.solvers.smt import Answer, Solver
+from rcsc.symbolic import trial, values
+from rcsc.symbolic.values import FALSE, TRUE, Fact, Node
+
+SPANS = list(combinations_with_replacement(range(-2, 4), 2))
+TRUTHS = (0, 1)
+
+
+def number(name: str, low: int, high: int) -> Node:
+    return values.variable(name, Int(low, high))
+
+
+def whole(value: int) -> Node:
+    return values.constant(Int(value, value), value)
+
+
+def double(value: float) -> Node:
+    return values.constant(Real(value, value), value)
+
+
+N, M = number("n", -3, 9), number("m", 0, 5)
+X, Y = values.variable("x", Real(-1.5, 2.0)), values.variable("y", Real(0.5, 4.0))
+B, C = values.variable("b", Bool()), values.variable("c", Bool())
+
+
+def ends(node: Node) -> tuple[float, float]:
+    return node.low, node.high
+
+
+# --- truth --------------------------------------------------------------------------------
+
+
+def test_a_truth_that_nothing_decides_lies_between_false_and_true() -> None:
+    open_ = [
+        values.negation(B), values.both(B, C), values.either(B, C), values.follows(B, C), values.any_of([B, C]),
+        values.compare(Op.LT, N, M), values.compare(Op.EQ, N, M), values.compare(Op.NE, N, M), values.choice(B, C, values.negation(C)),
+        values.logic(Op.XOR, B, C), values.compare(Op.GE, X, Y),
+    ]  # fmt: skip
+    assert [ends(one) for one in open_] == [TRUTHS] * len(open_)
+    assert {type(one.kind) for one in open_} == {Bool}
+
+
+def test_a_truth_that_is_decided_is_a_constant() -> None:
+    assert values.negation(values.negation(B)) is B
+    assert values.negation(TRUE) is values.both(B, FALSE) is values.both(FALSE, B) is FALSE
+    assert values.both(B, TRUE) is values.both(TRUE, B) is values.both(B, B) is B
+    assert values.either(B, TRUE) is values.follows(FALSE, B) is values.all_of([]) is TRUE
+    assert values.either(B, FALSE) is values.follows(TRUE, B) is B
+    assert values.any_of([]) is FALSE
+
+
+MEANT: dict[Op, Callable[[int, int], bool]] = {
+    Op.LT: lambda a, b: a < b,
+    Op.LE: lambda a, b: a <= b,
+    Op.GT: lambda a, b: a > b,
+    Op.GE: lambda a, b: a >= b,
+    Op.EQ: lambda a, b: a == b,
+    Op.NE: lambda a, b: a != b,
+}
+
+
+def hull(found: Iterable[int]) -> tuple[int, int]:
+    every = list(found)
+    return min(every), max(every)
+
+
+@pytest.mark.parametrize("op", MEANT)
+def test_a_comparison_is_decided_exactly_where_the_bounds_do(op: Op) -> None:
+    for one, two in product(SPANS, SPANS):
+        pairs = product(range(one[0], one[1] + 1), range(two[0], two[1] + 1))
+        found = values.compare(op, number("n", *one), number("m", *two))  # type: ignore[arg-type]  # a comparison
+        assert ends(found) == hull(MEANT[op](a, b) for a, b in pairs)
+
+
+def test_a_value_is_compared_with_itself_whatever_is_known_of_it() -> None:
+    cut = values.narrowed(N, 2, 5)
+    assert (
+        values.compare(Op.LE, N, cut) is values.compare(Op.EQ, cut, N) is values.compare(Op.GE, N, N) is TRUE
+    )
+    assert (
+        values.compare(Op.LT, N, cut) is values.compare(Op.NE, cut, N) is values.compare(Op.GT, N, N) is FALSE
+    )
+
+
+# --- numbers ------------------------------------------------------------------------------
+
+
+def test_bounds_of_numbers_are_exact() -> None:
+    kind = Int(-100, 100)
+    assert ends(values.choice(B, N, M)) == (-3, 9)
+    assert ends(values.choice(B, M, N)) == (-3, 9)
+    assert ends(values.arithmetic(Op.ADD, (N, M), kind)) == (-3, 14)
+    assert ends(values.arithmetic(Op.SUB, (N, M), kind)) == (-8, 9)
+    assert ends(values.arithmetic(Op.TO_REAL, (N,), Real(-100.0, 100.0))) == (-3.0, 9.0)
+    assert ends(values.arithmetic(Op.TO_INT, (X,), kind)) == (-1, 2)
+    assert ends(values.arithmetic(Op.MUL, (X, Y), Real(-9.0, 9.0))) == (-6.0, 8.0)
+    nan = values.variable("z", Real(-math.inf, math.inf))
+    low, high = ends(values.arithmetic(Op.TO_INT, (nan,), kind))
+    assert low == -high < -(2**1023)
+    assert not nan.ordered
+    assert values.compare(Op.EQ, nan, nan).op == Op.EQ
+
+
+def test_what_can_have_one_value_only_is_folded_and_a_zero_with_a_sign_is_not() -> None:
+    assert values.arithmetic(Op.ADD, (whole(2), whole(3)), Int(0, 9)).op == values.CONSTANT
+    assert values.arithmetic(Op.MOD, (whole(-7), whole(3)), Int(-9, 9)).low == -1
+    assert values.arithmetic(Op.MUL, (N, whole(0)), Int(-9, 9)).op == values.CONSTANT
+    assert values.arithmetic(Op.MUL, (double(0.5), double(0.5)), Real(0.0, 9.0)).low == 0.25
+    zero = values.arithmetic(Op.MUL, (X, double(0.0)), Real(-9.0, 9.0))
+    assert zero.op == Op.MUL
+    assert values.choice(TRUE, N, M) is values.choice(B, N, N) is N
+    assert values.choice(FALSE, N, M) is M
+    assert values.choice(B, whole(3), whole(3)).op == values.CONSTANT
+
+
+def test_what_is_narrowed_lies_within_both_bounds() -> None:
+    cut = values.narrowed(N, 2, 20)
+    assert (ends(cut), cut.op, values.root(cut)) == ((2, 9), values.NARROWED, N)
+    again = values.narrowed(cut, -5, 4)
+    assert (ends(again), again.args) == ((2, 4), (N,))
+    assert values.narrowed(N, -9, 20) is values.narrowed(N, 10, 12) is N
+    assert (values.narrowed(N, 9, 12).op, values.narrowed(N, 9, 12).low) == (values.CONSTANT, 9)
+
+
+# --- what a condition tells ---------------------------------------------------------------
+
+
+def told(condition: Node, *, holds: bool = True) -> dict[str, Fact]:
+    facts: dict[Node, Fact] = {}
+    values.learn(condition, facts, holds=holds)
+    return {node.name: fact for node, fact in facts.items() if node.name}
+
+
+@pytest.mark.parametrize("op", MEANT)
+@pytest.mark.parametrize("holds", [True, False])
+def test_a_comparison_tells_exactly_what_both_sides_can_be(op: Op, holds: bool) -> None:
+    for one, two in product(SPANS, SPANS):
+        condition = values.compare(op, number("n", *one), number("m", *two))  # type: ignore[arg-type]  # a comparison
+        if condition.known:
+            continue
+        pairs = [
+            (a, b)
+            for a, b in product(range(one[0], one[1] + 1), range(two[0], two[1] + 1))
+            if MEANT[op](a, b) == holds
+        ]
+        facts = {"n": one, "m": two} | told(condition, holds=holds)
+        assert facts == {"n": hull(a for a, _ in pairs), "m": hull(b for _, b in pairs)}
+
+
+LOW, HIGH = values.compare(Op.LE, N, whole(2)), values.compare(Op.GE, N, whole(6))
+TOLD: list[tuple[Node, bool, dict[str, Fact]]] = [
+    (B, True, {"b": (1, 1)}),
+    (B, False, {"b": (0, 0)}),
+    (values.negation(B), True, {"b": (0, 0)}),
+    (values.both(B, LOW), True, {"b": (1, 1), "n": (-3, 2)}),
+    (values.both(LOW, B), False, {}),
+    (values.either(LOW, B), True, {}),
+    (values.either(LOW, values.compare(Op.EQ, N, whole(4))), True, {"n": (-3, 4)}),
+    (values.either(values.compare(Op.EQ, N, whole(4)), LOW), True, {"n": (-3, 4)}),
+    (values.either(values.compare(Op.EQ, N, whole(4)), HIGH), True, {"n": (4, 9)}),
+    (values.any_of([values.compare(Op.EQ, N, whole(at)) for at in (4, 2, 7)]), True, {"n": (2, 7)}),
+    (values.either(LOW, HIGH), False, {"n": (3, 5)}),
+    (values.compare(Op.LT, X, double(1.0)), True, {"x": (-1.5, math.nextafter(1.0, -math.inf))}),
+    (values.compare(Op.LT, double(1.0), X), True, {"x": (math.nextafter(1.0, math.inf), 2.0)}),
+    (values.compare(Op.LE, X, double(1.0)), True, {"x": (-1.5, 1.0)}),
+    (values.compare(Op.LE, X, double(1.0)), False, {"x": (math.nextafter(1.0, math.inf), 2.0)}),
+    (values.compare(Op.EQ, X, double(2.0)), False, {"x": (-1.5, math.nextafter(2.0, -math.inf))}),
+    (values.compare(Op.EQ, X, double(-1.5)), False, {"x": (math.nextafter(-1.5, math.inf), 2.0)}),
+]
+
+
+@pytest.mark.parametrize(("condition", "holds", "facts"), TOLD)
+def test_a_condition_tells_exactly_this(condition: Node, holds: bool, facts: dict[str, Fact]) -> None:
+    assert told(condition, holds=holds) == facts
+
+
+def test_a_comparison_with_what_may_be_no_number_tells_nothing_where_it_fails() -> None:
+    nan = values.variable("z", Real(-math.inf, math.inf))
+    assert told(values.compare(Op.LE, nan, double(1.0)), holds=False) == {}
+    assert told(values.compare(Op.LE, nan, double(1.0))) == {"z": (-math.inf, 1.0)}
+
+
+# --- points -------------------------------------------------------------------------------
+
+
+def test_a_point_that_is_found_is_as_low_as_each_variable_goes() -> None:
+    high = values.compare(Op.GE, values.arithmetic(Op.ADD, (N, M), Int(-9, 20)), whole(11))
+    found = trial.found([high, values.compare(Op.GT, X, double(0.0))], [N, M, X])
+    assert found == {"n": 6, "m": 5, "x": 5e-324}
+    assert trial.found([values.compare(Op.LT, N, whole(-2)), values.both(B, C)], [N, B, C]) == {
+        "n": -3,
+        "b": True,
+        "c": True,
+    }
+    assert trial.found([values.both(LOW, HIGH)], [N]) is None
+
+
+def test_the_points_that_are_tried_are_always_the_same() -> None:
+    kinds: dict[str, Scalar] = {"i": Int(-1, 9), "r": Real(-1.0, 8.0), "p": Bool()}
+    variables = [Variable(VariableName(name), Kind.INPUT, kind, 0) for name, kind in kinds.items()]
+    assert [tuple(point.values()) for point in islice(trial.points(variables), 14)] == [
+        (-1, -1.0, False), (9, 8.0, True), (5, -5e-324, True), (6, -4.764695354403358e-270, True), (0, 3.433094301431438e-234, False),
+        (6, -5e-324, True), (7, 1.9342033348625816e-295, False), (0, 5e-324, True), (4, 8.0, False), (7, -6.830223911462031e-100, True),
+        (-1, -1.3240943950134792e-154, False), (6, 5e-324, True), (3, 0.7045219569892054, False), (6, -1.0, False),
+    ]  # fmt: skip
+
+
+def test_a_point_is_found_where_a_choice_hangs_on_it() -> None:
+    chosen = values.choice(values.compare(Op.GE, M, whole(3)), N, whole(20))
+    conditions = [values.compare(Op.LE, chosen, whole(4)), values.compare(Op.GT, N, whole(-2))]
+    assert trial.found(conditions, [N, M]) == {"n": -1, "m": 3}
+
+
+def test_a_question_as_large_as_may_be_is_tried_and_a_larger_one_is_not(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    conditions = [values.compare(Op.GE, N, whole(2))]
+    size = len(list(values.parts_first(*conditions)))
+    monkeypatch.setattr(trial, "MOST_NODES", size)
+    assert trial.found(conditions, [N]) == {"n": 2}
+    monkeypatch.setattr(trial, "MOST_NODES", size - 1)
+    assert trial.found(conditions, [N]) is None
+
+
+@pytest.mark.parametrize(("many", "asked"), [(3, 7), (6, 63), (7, MOST_CHOICES + 7), (9, MOST_CHOICES + 9)])
+def test_as_many_choices_are_tried_as_may_be_and_then_one_after_the_other_is_spared(
+    many: int, asked: int
+) -> None:
+    """All are needed: every smaller choice is tried, as long as those are not too many."""
+    tried: list[Sequence[int]] = []
+
+    def suffice(chosen: Sequence[int]) -> bool:
+        tried.append(chosen)
+        return len(chosen) == many
+
+    assert fewest(range(many), suffice) == tuple(range(many))
+    assert len(tried) == asked
+
+
+# --- solvers ------------------------------------------------------------------------------
+
+
+def test_questions_are_counted_and_remembered_where_it_is_asked_for() -> None:
+    for remembers in (False, True):
+        solver = Solver(remembers=remembers) if remembers else Solver()
+        one = smt.variable("p", Bool())
+        solver.add(one)
+        assert solver.check() is Answer.SATISFIABLE
+        assert solver.check(smt.negation(one)) is Answer.UNSATISFIABLE
+        assert solver.queries == 2
+        assert bool(solver.refuted) == remembers
+
+
+def test_members_are_compared_as_their_places() -> None:
+    kind = Enum("colour", ("red", "green", "blue"))
+    colour = values.variable("k", kind)
+    assert ends(colour) == (0, 2)
+    assert told(values.among(colour, [1, 2])) == {"k": (1, 2)}
+    assert told(values.negation(values.among(colour, [0]))) == {"k": (1, 2)}
