@@ -35,11 +35,9 @@ class BuildFailed:
     text: str
 
 
-def run_command(
-    command: Sequence[str], folder: Path, timeout_s: float, memory_mb: int | None = None, stdin: bytes = b""
-) -> Ran:
+def run_command(command: Sequence[str], folder: Path, timeout_s: float, memory_mb: int | None = None) -> Ran:
     """Runs `command` in `folder`; its whole process group is ended at the time limit."""
-    return run(command, folder, timeout_s=timeout_s, memory_mb=memory_mb, stdin=stdin)
+    return run(command, folder, timeout_s=timeout_s, memory_mb=memory_mb)
 
 
 def write_c(files: Mapping[str, str], place: Path) -> list[str]:

@@ -331,7 +331,7 @@ def settle(program: Program, snapshot: dict[str, Value]) -> None:
 
 def run_table(program: Program, table: Table, snapshot: Snapshot) -> Outcome:
     """One step of a table outside any level."""
-    return _cycle(program, lambda _: table, (), (), snapshot)
+    return _shown(program, _cycle(program, lambda _: table, (), (), snapshot))
 
 
 def cycle(program: Program, level: Level, snapshot: Snapshot) -> Outcome:
@@ -343,25 +343,18 @@ def cycle(program: Program, level: Level, snapshot: Snapshot) -> Outcome:
             return by_name[level.tables.table]
         return by_name[dict(level.tables.tables)[evaluate(level.tables.selector, now)]]
 
-    return _cycle(program, chosen, level.preprocess, level.postprocess, snapshot)
+    return _shown(program, _cycle(program, chosen, level.preprocess, level.postprocess, snapshot))
 
 
-def _cycle(
-    program: Program,
-    chosen: Callable[[Snapshot], Table],
-    preprocess: tuple[str, ...],
-    postprocess: tuple[str, ...],
-    snapshot: Snapshot,
-) -> Outcome:
-    """One cycle; after a fault the outputs that have a safe value show it."""
-    outcome = _attempt(program, chosen, preprocess, postprocess, snapshot)
+def _shown(program: Program, outcome: Outcome) -> Outcome:
+    """The outcome of a cycle; after a fault the outputs that have a safe value show it."""
     if outcome.fault is Fault.OK:
         return outcome
     shown = {str(v.name): v.safe for v in program.variables if v.safe is not None}
     return replace(outcome, snapshot={**outcome.snapshot, **shown})
 
 
-def _attempt(
+def _cycle(
     program: Program,
     chosen: Callable[[Snapshot], Table],
     preprocess: tuple[str, ...],

@@ -163,6 +163,25 @@ def spell(kind: Scalar, value: Value) -> str:
             return repr(float(value))
 
 
+def value_of_text(kind: Scalar, text: str) -> Value | None:
+    """The value that is spelled so; None where the type has none such."""
+    try:
+        value: Value
+        match kind:
+            case Bool():
+                value = ("false", "true").index(text) == 1
+            case Enum(members=members):
+                value = members.index(text)
+            case Int():
+                value = int(text)
+            case Real():
+                value = float(text)
+        low, high = key_bounds(kind)
+        return value if low <= key_of(kind, value) <= high else None
+    except (ValueError, OverflowError):
+        return None
+
+
 # --- variables -----------------------------------------------------------------------
 
 

@@ -24,9 +24,7 @@ from rcsc.lang.interpret import (
 from rcsc.lang.meaning import with_stops
 from rcsc.lang.model import (
     AssumptionName,
-    Bool,
     Enum,
-    Int,
     Level,
     OneTable,
     Procedure,
@@ -37,6 +35,7 @@ from rcsc.lang.model import (
     key_bounds,
     key_of,
     spell,
+    value_of_text,
 )
 from rcsc.run.levels import RunningLevel
 from rcsc.run.signature import Values
@@ -215,21 +214,11 @@ def _arguments(procedure: Procedure, given: Sequence[str]) -> list[Value]:
 
 def _argument(name: str, kind: Scalar, text: str) -> Value:
     """The value that a text means for a parameter."""
-    try:
-        value: Value
-        if isinstance(kind, Bool):
-            value = ("false", "true").index(text) == 1
-        elif isinstance(kind, Enum):
-            value = kind.members.index(found(text, kind.members) or text)
-        else:
-            value = int(text) if isinstance(kind, Int) else float(text)
-        low, high = key_bounds(kind)
-        if low <= key_of(kind, value) <= high:
-            return value
-    except (ValueError, OverflowError):
-        pass
     members = kind.members if isinstance(kind, Enum) else ()
-    raise Refused(Code.SHELL_VALUE, f"`{text}` is no value of parameter `{name}`", *near(text, members))
+    value = value_of_text(kind, found(text, members) or text)
+    if value is None:
+        raise Refused(Code.SHELL_VALUE, f"`{text}` is no value of parameter `{name}`", *near(text, members))
+    return value
 
 
 def _within(part: _Part, running: RunningLevel, name: str) -> None:

@@ -22,6 +22,7 @@ from rcsc.testing.executors.reference_file import reference_c
 from rcsc.testing.executors.symbols import Symbols
 
 MOST_INPUTS = 1 << 20
+TIMEOUT_S = 120.0
 MACHINE = (
     "-M",
     "mps2-an385",
@@ -176,7 +177,6 @@ def run_cortex(
     files: Mapping[str, str],
     number: int,
     most: int = MOST_INPUTS,
-    timeout_s: float = 120.0,
 ) -> CortexRun | Absent | BuildFailed:
     """Builds and runs one table's image.
 
@@ -186,7 +186,6 @@ def run_cortex(
         files: The emitted files, text by path.
         number: Position of the table in the program.
         most: How many of its inputs are run at most; edges where they are not all.
-        timeout_s: For the emulation, in seconds.
     """
     tools = cortex_tools()
     if isinstance(tools, Absent):
@@ -196,10 +195,10 @@ def run_cortex(
         (place / "rcsc.ld").write_text(LINKER, "utf-8")
         (place / "image.c").write_text(image_c(program, symbols, number, most), "utf-8")
         sources = ["image.c", *write_c(files, place)]
-        built = run_command([tools[0], *FLAGS, *LINK, "-o", "image.elf", *sources], place, timeout_s)
+        built = run_command([tools[0], *FLAGS, *LINK, "-o", "image.elf", *sources], place, TIMEOUT_S)
         if built.status != 0:
             return BuildFailed(f"the image for the target was not built: {built.err.strip()[:400]}")
-        ran = run_command([tools[1], *MACHINE, "-kernel", "image.elf"], place, timeout_s)
+        ran = run_command([tools[1], *MACHINE, "-kernel", "image.elf"], place, TIMEOUT_S)
     said = SAID.search(ran.out)
     if said is None:
         return BuildFailed(

@@ -29,7 +29,7 @@ from rcsc.diagnostics.codes import Code
 from rcsc.host.files.names import shown
 from rcsc.host.files.read import content, json_of
 from rcsc.lang.interpret import initial
-from rcsc.lang.model import Bool, Enum, Program, Real, Scalar, Value, key_bounds, key_of, spell
+from rcsc.lang.model import Program, Scalar, Value, spell, value_of_text
 from rcsc.lang.project import project_root
 from rcsc.run.description import BadDescription
 from rcsc.symbolic import values
@@ -282,20 +282,10 @@ def _values(ts: TransitionSystem, said: Mapping[str, str]) -> dict[str, Value]:
 
 def _value(name: str, kind: Scalar, text: str) -> Value:
     """Read a value as `spell` writes it."""
-    try:
-        value: Value
-        if isinstance(kind, Bool):
-            value = {"false": False, "true": True}[text]
-        elif isinstance(kind, Enum):
-            value = kind.members.index(text)
-        else:
-            value = float(text) if isinstance(kind, Real) else int(text)
-        low, high = key_bounds(kind)
-        if low <= key_of(kind, value) <= high:
-            return value
-    except (KeyError, ValueError):
-        pass
-    raise BadCaseError(f"`{name}` cannot be `{text}`")
+    value = value_of_text(kind, text)
+    if value is None:
+        raise BadCaseError(f"`{name}` cannot be `{text}`")
+    return value
 
 
 def _is_broken(made: Mapping[str, TransitionSystem], case: FrozenCase, steps: list[CycleRun]) -> bool:

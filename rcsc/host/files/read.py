@@ -59,10 +59,7 @@ def content(path: Path, most: int = MOST_BYTES) -> bytes:
     with opened(path) as file:
         if os.fstat(file.fileno()).st_size > most:
             raise Malformed(f"has more than {_size(most)}")
-        found = file.read(most + 1)
-    if len(found) > most:
-        raise Malformed(f"has more than {_size(most)}")
-    return found
+        return piped(file, most)
 
 
 def opened(path: Path) -> BinaryIO:
