@@ -34,7 +34,7 @@ from rcsc.compose.proof.system import NoProgramError, transition_systems
 from rcsc.diagnostics.diagnostic import Severity
 from rcsc.driver.check import check
 from rcsc.driver.settings import Settings
-from rcsc.emit.write import write
+from rcsc.emit.generated import write
 from rcsc.lang.model import Program
 from rcsc.lang.project import load
 from rcsc.lang.resolve import resolve

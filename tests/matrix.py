@@ -14,7 +14,7 @@ from pathlib import Path
 from rcsc.driver.compile import compile_
 from rcsc.driver.settings import Settings
 from rcsc.emit import TARGETS
-from rcsc.emit.write import write
+from rcsc.emit.generated import write
 from rcsc.lang.model import Program
 from rcsc.lang.project import load
 from rcsc.lang.resolve import resolve

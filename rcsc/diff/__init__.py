@@ -12,6 +12,6 @@ Trusted: `symbolic` and Z3, as for a proof; what a solver did not decide is list
 it costs: about the proof of both versions; parts that are equal as text cost nothing.
 
 Modules, in the order the data flows: `sides` finds what is to be compared (`revision` lays out an old one), `compare`
-gives the difference, which `changes` computes; `text` and `jsonform` show it, `present` says what of it a level meets
+gives the difference, which `changes` computes; `rows` and `jsonform` show it, `present` says what of it a level meets
 that runs.
 """

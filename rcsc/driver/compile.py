@@ -9,9 +9,9 @@ from rcsc.diagnostics.source import Span
 from rcsc.driver.pipeline import Proved, proved
 from rcsc.driver.settings import Conclusion, Settings
 from rcsc.emit import TARGETS, Target, emitted
+from rcsc.emit.generated import stale, write
 from rcsc.emit.lower import lower
 from rcsc.emit.plan import Plan
-from rcsc.emit.write import stale, write
 from rcsc.lang.model import ProvedProgram
 from rcsc.lang.project import project_root
 

@@ -26,9 +26,9 @@ Nothing is emitted that was not proved: `lower` takes what only the prover makes
 bytes on every machine: no time, version or absolute path is in them. Trusted: all of it, for what the executors do;
 `rcsc test` holds them against the interpreter, and with `--deep` has the C proved.
 
-Modules, in the order the data flows: `lower` makes a `plan`; `identifiers` spells every name; `tree` is a small tree
-of code, which C and Python share, and its spelling in each; `text` and `ctext` make it of expressions and statements,
-`c99` and `python` of whole files, by the templates of `rendering`; `symbols` makes the symbol file; `write` writes
+Modules, in the order the data flows: `lower` makes a `plan`; `identifiers` spells every name; `code_tree` is a small tree
+of code, which C and Python share, and its spelling in each; `translate` and `ctext` make it of expressions and statements,
+`c99` and `python` of whole files, by the templates of `rendering`; `symbols` makes the symbol file; `generated` writes
 them or says whether they are fresh. `TARGETS` names the languages: another one is a module, and its line here.
 """
 

@@ -3,13 +3,7 @@
 from collections.abc import Iterable, Iterator
 from typing import TypeAlias, assert_never
 
-from rcsc.emit.ctext import SHORT, CText, c_type, locals_of, type_bounds, wide_type
-from rcsc.emit.identifiers import FAILED_BITS, NameScope, comment, guard, names_of, parameter_word
-from rcsc.emit.plan import WORD, Coded, Cuts, Direct, Group, Index, Matcher, Plan, PlanTable, Truth, joined
-from rcsc.emit.rendering import render
-from rcsc.emit.symbols import symbols, unit_text
-from rcsc.emit.text import FAULT, FAULT_AT, FAULTED, FAULTLESS, LINE, STATE, constant, local
-from rcsc.emit.tree import (
+from rcsc.emit.code_tree import (
     IN_C,
     Body,
     Branch,
@@ -37,6 +31,12 @@ from rcsc.emit.tree import (
     read,
     when,
 )
+from rcsc.emit.ctext import SHORT, CText, c_type, locals_of, type_bounds, wide_type
+from rcsc.emit.identifiers import FAILED_BITS, NameScope, comment, guard, names_of, parameter_word
+from rcsc.emit.plan import WORD, Coded, Cuts, Direct, Group, Index, Matcher, Plan, PlanTable, Truth, joined
+from rcsc.emit.rendering import render
+from rcsc.emit.symbols import symbols, unit_text
+from rcsc.emit.translate import FAULT, FAULT_AT, FAULTED, FAULTLESS, LINE, STATE, constant, local
 from rcsc.lang import model
 from rcsc.lang.interpret import Fault
 from rcsc.lang.leaves import everything

@@ -9,8 +9,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal, assert_never
 
-from rcsc.emit.text import FAULTLESS, Text, constant, local
-from rcsc.emit.tree import (
+from rcsc.emit.code_tree import (
     Body,
     Branch,
     Cast,
@@ -30,6 +29,7 @@ from rcsc.emit.tree import (
     infix,
     when,
 )
+from rcsc.emit.translate import FAULTLESS, Text, constant, local
 from rcsc.lang import model
 from rcsc.lang.leaves import everything
 from rcsc.lang.model import I64_MAX, I64_MIN, Bool, Enum, Expr, Int, Op, Real, Scalar, Value

@@ -5,11 +5,7 @@ from itertools import groupby
 from math import prod
 from typing import assert_never
 
-from rcsc.emit.identifiers import FAILED_BITS, comment, names_of
-from rcsc.emit.plan import WORD, Coded, Cuts, Direct, Group, Index, Plan, PlanTable, Truth, grouped
-from rcsc.emit.rendering import render
-from rcsc.emit.text import FAULT, FAULT_AT, FAULTED, FAULTLESS, LINE, STATE, PyText, constant, local
-from rcsc.emit.tree import (
+from rcsc.emit.code_tree import (
     IN_PYTHON,
     Body,
     Branch,
@@ -34,6 +30,10 @@ from rcsc.emit.tree import (
     infix,
     when,
 )
+from rcsc.emit.identifiers import FAILED_BITS, comment, names_of
+from rcsc.emit.plan import WORD, Coded, Cuts, Direct, Group, Index, Plan, PlanTable, Truth, grouped
+from rcsc.emit.rendering import render
+from rcsc.emit.translate import FAULT, FAULT_AT, FAULTED, FAULTLESS, LINE, STATE, PyText, constant, local
 from rcsc.lang import model
 from rcsc.lang.interpret import Fault
 from rcsc.lang.model import Bool, Procedure, Real, Variable, key_bounds, pending

@@ -5,7 +5,7 @@ from functools import cache
 
 import jinja2
 
-from rcsc.emit.tree import IN_C, IN_PYTHON
+from rcsc.emit.code_tree import IN_C, IN_PYTHON
 
 
 @cache

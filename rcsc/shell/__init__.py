@@ -22,6 +22,6 @@ next cycle does what it did before, or `anyway` is said.
 
 Source: Haynes et al. 1984, sections 2 and 10. Modules, in the order the data flows: `terminal` reads lines,
 `commands` makes calls of them, `typed_names` and `queries` read names and conditions; a `session` does them on a
-running system, with `parts` (a procedure, a table, a step by itself), `stops` (breakpoints), `history` (undo) and
+running system, with `part_runs` (a procedure, a table, a step by itself), `stops` (breakpoints), `history` (undo) and
 `reload` (new tables).
 """

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from rcsc.diagnostics.codes import Code
 from rcsc.run.levels import RunningLevel
 from rcsc.shell import typed_names
-from rcsc.shell.parts import call_of, part_names
+from rcsc.shell.part_runs import call_of, part_names
 from rcsc.shell.queries import StateQuery, asked
 from rcsc.shell.reload.refusal import Refused
 from rcsc.shell.session import MOST_CYCLES, Session

@@ -17,7 +17,7 @@ from rcsc.run.log.schema import fingerprints
 from rcsc.run.signature import Signature, Value, Values
 from rcsc.run.system import StateTableError, System
 from rcsc.shell import history, typed_names
-from rcsc.shell.parts import run_part
+from rcsc.shell.part_runs import run_part
 from rcsc.shell.queries import StateQuery, question
 from rcsc.shell.reload.composed import held_by, together
 from rcsc.shell.reload.gate import Judged, Running, judge

@@ -30,6 +30,6 @@ undecided, and fails.
 
 Modules, in the order the data flows: `program` (a whole program), `decide` (which way), `partition` (lines that are
 boxes, of a table or of a region), `boxes`, `relational`, `confirm` (Z3), `cover` (where a condition holds), `verdict`
-(findings as data), `certificate` (which `rcsc.certify` checks anew), `spell` (keys as cells), `repair` (proved before
+(findings as data), `certificate` (which `rcsc.certify` checks anew), `cells` (keys as cells), `repair` (proved before
 shown), `diagnose`.
 """

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from rcsc.lang.interval_sets import meet, size
 from rcsc.lang.model import Box, Program, Scalar, Table, key_bounds
-from rcsc.table import boxes, spell
+from rcsc.table import boxes, cells
 from rcsc.table.partition import BudgetError, Gaps
 from rcsc.table.verdict import Gap, Overlap
 
@@ -55,7 +55,7 @@ def _narrowed(
             return None
     before = mine.get(name, whole)
     left = _minus(before, theirs.get(name, whole))
-    cell = spell.cell(kinds[name], left) if left else None
+    cell = cells.cell(kinds[name], left) if left else None
     if not cell or meet(left, theirs.get(name, whole)):
         return None
     return _Change(one, name, cell, size(before) - size(left))
@@ -91,7 +91,7 @@ def closing_line(program: Program, table: Table, found: Gap) -> str | None:
     for column in table.columns:
         name = column.variable
         box = region.get(name) if name is not None else None
-        cell = "" if box is None or name is None else spell.cell(kinds[name], box)
+        cell = "" if box is None or name is None else cells.cell(kinds[name], box)
         if cell is None:
             return None
         cells.append(cell)

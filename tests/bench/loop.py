@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rcsc.run.levels import RunningLevel
-from rcsc.run.log.write import Recorder
+from rcsc.run.log.recorder import Recorder
 from rcsc.run.system import Kind, System
 from rcsc_cell.cell.ready import Backend, plant
 from rcsc_cell.database.ask import Database

@@ -10,7 +10,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from rcsc.run.log.write import Recorder
+from rcsc.run.log.recorder import Recorder
 from rcsc.run.system import Kind
 from rcsc_cell.cell.ready import plant
 from rcsc_cell.database.ask import Database

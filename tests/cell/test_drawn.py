@@ -17,15 +17,15 @@ from rcsc.commands import run
 from rcsc.compose.contract.obligations import ObligationKey, Sort
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.counterexample.finding import Finding, of_trace
-from rcsc.compose.counterexample.replay import _begun, part_of, record
+from rcsc.compose.counterexample.rerun import _begun, part_of, record
 from rcsc.compose.counterexample.trace import Trace, TraceSearch, traces
 from rcsc.compose.proof.system import transition_systems
 from rcsc.host.files.names import BadName
 from rcsc.run.description import description
 from rcsc.run.log.finding import LoggedCycle, LoggedFinding, finding_facts, finding_of
 from rcsc.run.log.read import Log, read
+from rcsc.run.log.recorder import Recorder
 from rcsc.run.log.ticks import LoggedTick, frames
-from rcsc.run.log.write import Recorder
 from rcsc.run.system import signatures
 from rcsc_cell.cell.arm import skeleton, solve
 from rcsc_cell.cell.reach import home

@@ -25,7 +25,7 @@ from rcsc.compose.counterexample.finding import Finding, of_trace, rows
 from rcsc.compose.counterexample.frozen import BadCaseError, case_breaks, frozen, read_case
 from rcsc.compose.counterexample.pair import broken_together
 from rcsc.compose.counterexample.repair import helps, weakest_condition
-from rcsc.compose.counterexample.replay import ExecutorsDifferError, make, record
+from rcsc.compose.counterexample.rerun import ExecutorsDifferError, make, record
 from rcsc.compose.counterexample.trace import NotReproducedError, Trace, TraceResult, TraceSearch, traces
 from rcsc.compose.proof.system import transition_systems
 from rcsc.host.files.write import UNPROVED

@@ -18,7 +18,7 @@ from rcsc.diagnostics.render import plain
 from rcsc.diff.changes.difference import Basis, Change, ComparedPart, Difference, PartSort, ProgramDifference
 from rcsc.diff.compare import compare
 from rcsc.diff.present import knows, within_reach
-from rcsc.diff.text import rows
+from rcsc.diff.rows import rows
 from rcsc.lang.interpret import cycle, evaluate, execute, initial, matching_lines
 from rcsc.lang.model import (
     Bool,

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rcsc.emit.write import write
+from rcsc.emit.generated import write
 from rcsc.host.tools import Absent, BuildFailed, c_compiler
 from rcsc.lang.interpret import Fault, admit, call, initial, run_table, settle, unfit
 from rcsc.lang.model import Admit, Kind, Program, Real, Snapshot, Value, Variable, key_bounds

@@ -23,9 +23,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rcsc.diagnostics.codes import Code
+from rcsc.emit.generated import write
 from rcsc.emit.identifiers import C_WORDS, PYTHON_WORDS, comment
 from rcsc.emit.rendering import environment
-from rcsc.emit.write import write
 from rcsc.host.files.read import Said, json_of
 from rcsc.lang import reserved
 from rcsc.lang.interpret import Fault, initial, run_table

@@ -23,8 +23,8 @@ from mcap.writer import Writer
 
 from rcsc.commands import run
 from rcsc.compose.counterexample.frozen import BadCaseError, read_case
-from rcsc.diff import text as forms
-from rcsc.emit.write import write
+from rcsc.diff import rows as forms
+from rcsc.emit.generated import write
 from rcsc.graph.drawing import svg
 from rcsc.graph.formats.state_graph import Edge, StateGraph
 from rcsc.host.files import csv_text
@@ -32,8 +32,8 @@ from rcsc.host.files.names import BadName, identifier, inside, within
 from rcsc.host.files.read import Malformed, Said, content, json_of, toml_of, xml_of
 from rcsc.run.description import BadDescription, description
 from rcsc.run.log.read import UnreadableLog, read
+from rcsc.run.log.recorder import Recorder
 from rcsc.run.log.records import MOST_CHUNK, ChainCheck, Seal, records
-from rcsc.run.log.write import Recorder
 from rcsc.run.signature import signature
 from rcsc.run.system import System, assemble
 from rcsc_cell.pictures.page import quoted
@@ -54,7 +54,7 @@ PARSERS = {
 FORMATS_OF_OURS = {
     "rcsc/lang/model.py", "rcsc/solvers/smt.py", "rcsc/solvers/smtlib.py", "rcsc/testing/executors/native.py",
     "rcsc/testing/executors/externs.py",  # doubles as bits
-    "rcsc/run/signature.py", "rcsc/run/executors.py", "rcsc/run/log/read.py", "rcsc/run/log/write.py",  # `FORMATS` by checked types
+    "rcsc/run/signature.py", "rcsc/run/executors.py", "rcsc/run/log/read.py", "rcsc/run/log/recorder.py",  # `FORMATS` by checked types
     "rcsc/run/log/records.py", "rcsc/run/log/replay.py", "rcsc/run/processes/memory.py", "rcsc/run/processes/block.py",
     "rcsc/run/processes/serve.py", "rcsc/run/answers.py", "rcsc/run/levels.py", "rcsc/run/system.py",
     "sim/rcsc_cell/workstation/stopped.py", "rcsc/certify", "sim/rcsc_cell/episodes/loop.py", "sim/rcsc_cell/campaign/work.py",
@@ -704,7 +704,7 @@ def test_a_field_is_matched_to_its_end() -> None:
 # --- written whole or not at all -----------------------------------------------------------------
 
 SCRATCH = (
-    "rcsc/compose/counterexample/replay.py", "rcsc/shell/reload/sources.py", "rcsc/run/executors.py",
+    "rcsc/compose/counterexample/rerun.py", "rcsc/shell/reload/sources.py", "rcsc/run/executors.py",
     "rcsc/diff/revision.py", "rcsc/testing/executors/native.py", "rcsc/testing/cortex.py", "rcsc/testing/esbmc.py",
     "rcsc/testing/matchers/matcher.py", "rcsc/host/tools.py", "rcsc/testing/code_mutants.py", "sim/rcsc_cell/episodes/processes.py",
     "sim/rcsc_cell/episodes/setting.py",
@@ -712,7 +712,7 @@ SCRATCH = (
 """Who writes into temporary folders that end with the process."""
 STREAMS = (
     "rcsc/host/files/write.py",
-    "rcsc/run/log/write.py",
+    "rcsc/run/log/recorder.py",
     "sim/rcsc_cell/campaign/journal.py",
     "rcsc/shell/terminal.py",
     "rcsc/run/processes/block.py",

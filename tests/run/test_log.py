@@ -23,10 +23,10 @@ from rcsc.run.levels import Query
 from rcsc.run.log.export import coverage, csv_text, json_text
 from rcsc.run.log.queries import BadExpression, predicate
 from rcsc.run.log.read import Log, UnreadableLog, read
+from rcsc.run.log.recorder import CHUNK_MS, Recorder
 from rcsc.run.log.records import CHAIN, SEAL
 from rcsc.run.log.replay import Replay, find
 from rcsc.run.log.states import words
-from rcsc.run.log.write import CHUNK_MS, Recorder
 from rcsc.run.signature import Values
 from rcsc.run.system import Kind, StateTableError, System, assemble
 from tests.support.programs.stages import emitted, program_of

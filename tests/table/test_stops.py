@@ -19,8 +19,8 @@ from rcsc.diagnostics.report import TableReport
 from rcsc.driver.compile import compile_
 from rcsc.driver.settings import Settings
 from rcsc.emit import TARGETS, emit_c, emit_python
+from rcsc.emit.generated import write
 from rcsc.emit.lower import lower
-from rcsc.emit.write import write
 from rcsc.host.files.plain import plain, read
 from rcsc.lang.interpret import Fault, cycle, evaluate, initial, run_table, unfit
 from rcsc.lang.meaning import with_stops

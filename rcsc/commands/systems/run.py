@@ -19,7 +19,7 @@ from rcsc.host.cache import open_cache
 from rcsc.host.children import scratch
 from rcsc.host.files.read import content, json_of
 from rcsc.run.description import BadDescription, description
-from rcsc.run.log.write import Recorder
+from rcsc.run.log.recorder import Recorder
 from rcsc.run.processes.serve import Factory
 from rcsc.run.processes.supervisor import Supervisor, run_processes
 from rcsc_cell.cell.reach import checked

@@ -16,8 +16,8 @@ from rcsc.diff.changes.difference import Difference
 from rcsc.diff.compare import difference
 from rcsc.diff.jsonform import to_json
 from rcsc.diff.revision import NotComparedError
+from rcsc.diff.rows import markdown, rows
 from rcsc.diff.sides import Given, Side, given, read, revisions
-from rcsc.diff.text import markdown, rows
 from rcsc.solvers.options import Options
 
 SAME, CHANGED, ERROR = 0, 1, 2

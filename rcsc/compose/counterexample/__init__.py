@@ -15,6 +15,6 @@ Cost: a SAT question for each obligation and cycle (at most `--trace` cycles), m
 for each level that has a finding.
 
 Modules, in the order the data flows: `simplest` (bounded runs, simplest models), `cycle_run` (one cycle by the interpreter, and what it
-breaks), `trace`, `lasso`, `pair`, `finding` (time lines), `replay` (executors, log), `frozen`, `repair` (what would mend the table),
+breaks), `trace`, `lasso`, `pair`, `finding` (time lines), `rerun` (executors, log), `frozen`, `repair` (what would mend the table),
 `explain` (all that is open).
 """

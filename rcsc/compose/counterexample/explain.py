@@ -14,7 +14,7 @@ from rcsc.compose.counterexample.finding import Finding, of_trace
 from rcsc.compose.counterexample.lasso import Lasso, lassos, obligation_of
 from rcsc.compose.counterexample.pair import broken_together
 from rcsc.compose.counterexample.repair import helps
-from rcsc.compose.counterexample.replay import ExecutorsDifferError, make, only_in_python, record
+from rcsc.compose.counterexample.rerun import ExecutorsDifferError, make, only_in_python, record
 from rcsc.compose.counterexample.trace import NotReproducedError, TraceResult, TraceSearch, traces
 from rcsc.compose.proof.level import LevelProof, essential
 from rcsc.compose.proof.system import SystemProof

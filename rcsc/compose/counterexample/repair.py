@@ -12,7 +12,7 @@ from rcsc.compose.counterexample.cycle_run import CycleRun, seen_by_table
 from rcsc.compose.counterexample.finding import Finding
 from rcsc.lang.interpret import matching_lines
 from rcsc.lang.model import Box, Program, Scalar, Snapshot, Table, key_of
-from rcsc.table import boxes, spell
+from rcsc.table import boxes, cells
 from rcsc.table.partition import BudgetError, Gaps
 from rcsc.table.repair import closing_line, parting_cell
 from rcsc.table.verdict import Gap, Overlap, Region
@@ -85,7 +85,7 @@ def weakest_condition(program: Program, table: Table) -> str:
 
 def _conditions(program: Program, region: Region) -> str:
     kinds: dict[str, Scalar] = {str(v.name): v.type for v in program.variables}
-    return " and ".join(spell.region(kinds, region)) or "true"
+    return " and ".join(cells.region(kinds, region)) or "true"
 
 
 def _while(program: Program, table: Table, matching: list[int]) -> str:

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from rcsc.diff.changes.difference import Change, PartSort, Value, Where
-from rcsc.diff.changes.spell import number, said
+from rcsc.diff.changes.value_text import number, said
 from rcsc.diff.changes.versions import MOST_BOXES, MOST_BOXES_ACROSS, Doing, Hit, Versions, is_across, is_hard
 from rcsc.lang.interpret import UNDEFINED, ExternError
 from rcsc.lang.model import Program

@@ -12,7 +12,7 @@ from typing import Any
 
 from rcsc.diff.changes.contrast import changes, contrast
 from rcsc.diff.changes.difference import Basis, Change, ComparedPart, PartSort
-from rcsc.diff.changes.spell import number
+from rcsc.diff.changes.value_text import number
 from rcsc.diff.changes.versions import Doing, Runner, Versions
 from rcsc.lang.interpret import call, execute
 from rcsc.lang.leaves import read_by

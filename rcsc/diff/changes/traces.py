@@ -10,8 +10,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 from rcsc.diff.changes.difference import Traces, Transition
-from rcsc.diff.changes.spell import number
 from rcsc.diff.changes.tables import assumed
+from rcsc.diff.changes.value_text import number
 from rcsc.diff.changes.versions import Versions, run_by
 from rcsc.lang.interpret import initial
 from rcsc.lang.model import Default, Level, Line, Scalar, Table, key_bounds, pending

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from rcsc.diff.changes.align import Aligned
 from rcsc.diff.changes.difference import Where
-from rcsc.diff.changes.spell import number, said
+from rcsc.diff.changes.value_text import number, said
 from rcsc.lang.digest import Digests
 from rcsc.lang.interpret import initial
 from rcsc.lang.model import (
@@ -31,8 +31,8 @@ from rcsc.solvers.options import Options
 from rcsc.symbolic import trial, values
 from rcsc.symbolic.effect import Effect, Meaning, Shared
 from rcsc.symbolic.values import CONSTANT, Node
+from rcsc.table.cells import region
 from rcsc.table.cover import Cover, Space
-from rcsc.table.spell import region
 from rcsc.table.verdict import Region
 
 MOST_BOXES = 16

@@ -1,6 +1,6 @@
 """A log, read: the whole one, or what a kill left of it.
 
-In: an MCAP file that `rcsc.run.log.write` wrote. Out: a `Log`: for each level its signature and what every cycle left. A log may come from
+In: an MCAP file of `rcsc.run.log.recorder`. Out: a `Log`: for each level its signature and what every cycle left. A log may come from
 anybody: whatever it names is checked against what it may be.
 """
 

@@ -16,7 +16,7 @@ from rcsc.diagnostics.render import plain
 from rcsc.diff.changes.difference import Difference, ProgramDifference
 from rcsc.diff.compare import compare
 from rcsc.diff.present import Met, knows, within_reach
-from rcsc.diff.text import headline, rows
+from rcsc.diff.rows import headline, rows
 from rcsc.lang.interpret import admit, call, evaluate, holds, matching_lines, settle
 from rcsc.lang.leaves import read_by
 from rcsc.lang.model import Enum, Expr, Kind, Level, OneTable, Program, Table, Value, pending, spell

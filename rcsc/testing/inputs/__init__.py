@@ -17,6 +17,6 @@ Nothing here is trusted: an input that leads nowhere costs a test, and what no v
 report.
 
 Modules, in the order the data flows: `snapshot` finds an input in which conditions hold or fail, `vectors` makes
-MC/DC vectors of them (`spell` words their conditions, `export` writes them for users), `sampling` draws inputs by
+MC/DC vectors of them (`condition_text` words their conditions, `export` writes them for users), `sampling` draws inputs by
 seed.
 """

@@ -15,8 +15,8 @@ from itertools import product
 from rcsc.lang.interpret import holds, matching_lines
 from rcsc.lang.model import Apply, Expr, Line, Program, Snapshot, Table, Test, pending
 from rcsc.lang.operator_table import Op, is_logic
+from rcsc.testing.inputs.condition_text import words
 from rcsc.testing.inputs.snapshot import InputSearch, Missing, Wanted, conjunction, expr_of
-from rcsc.testing.inputs.spell import words
 
 MOST_ATOMS = 8  # of one `when` cell; its truth table is enumerated
 

@@ -9,7 +9,7 @@ from dataclasses import fields, replace
 from pathlib import Path
 
 from rcsc.run.levels import RunningLevel, running_level
-from rcsc.run.log.write import Recorder
+from rcsc.run.log.recorder import Recorder
 from rcsc.run.signature import Values
 from rcsc.run.system import StateTableError, System, executors
 from rcsc_cell.cell.faults import Faults

@@ -6,8 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import assert_never
 
-from rcsc.emit.identifiers import Names
-from rcsc.emit.tree import (
+from rcsc.emit.code_tree import (
     Body,
     Branch,
     Cast,
@@ -27,6 +26,7 @@ from rcsc.emit.tree import (
     Stmt,
     infix,
 )
+from rcsc.emit.identifiers import Names
 from rcsc.lang import model
 from rcsc.lang.model import Expr, Int, Op, Real, Scalar, Statement, Value
 from rcsc.lang.operator_table import Operator

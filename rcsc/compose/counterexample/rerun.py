@@ -156,7 +156,7 @@ def record(
     if path is None:
         deque(cycles, maxlen=0)
         return
-    from rcsc.run.log.write import Recorder
+    from rcsc.run.log.recorder import Recorder
 
     with Recorder(running, path, _logged(finding, made, altered)) as recorder:
         for ran in cycles:
