@@ -265,6 +265,49 @@ def test_what_is_declared_is_trusted_only_where_every_sort_of_cycle_is_possible(
     assert _of_possible(answers) is verdict
 
 
+def test_every_neighbour_that_is_not_understood_is_named(upper: TransitionSystem) -> None:
+    """Also where one that is understood comes before it."""
+    program = upper.program
+    renamed = {"lower.inc_command_echo": "lower.echo", "to_lower.inc_command": "to_lower.number"}
+    variables = tuple(
+        replace(leaf, name=VariableName(renamed.get(leaf.name, leaf.name))) for leaf in program.variables
+    )
+    found = links(description(SYSTEM), "upper", replace(program, variables=variables))
+    assert found.above is not None
+    assert found.below == ()
+    said = "what `upper` and `lower` say to each other (`lower`, `to_lower`) has no `inc_command`, `inc_command_echo`"
+    assert found.unread == (said,)
+
+
+# --- from table to table ------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("then", "round_"),
+    [
+        ("which := go", set()),
+        ("which := pause", set()),
+        ("if which = pause { which := go } else { which := pause }", {0, 1}),
+    ],
+)
+def test_tables_go_round_only_where_each_may_follow_the_other(
+    then: str, round_: set[int], tmp_path: Path
+) -> None:
+    """What selects them is a state: it only goes on, stays, or comes back."""
+    text = small_text(
+        "lower",
+        ("state cur_state", "state which : lower_command\nstate cur_state"),
+        ("module receive reads command,", "module receive reads command, which,"),
+        ("writes new_command,", "writes new_command, which,"),
+        ("inc_command_seen := command.inc_command\n", f"inc_command_seen := command.inc_command\n  {then}\n"),
+        ("by command.input_command", "by which"),
+    )
+    ts = small_level(tmp_path, "lower", lower=text)
+    cycle = any_cycle(ts)
+    flow = Flow(ts, Confirmation((), (), cycle, cycle.cases, Keyed(), Limits()), [])
+    assert flow._tables_round() == round_
+
+
 # --- what has a name of its own -----------------------------------------------------------
 
 

@@ -3,15 +3,18 @@
 import math
 from collections.abc import Callable, Iterable, Sequence
 from itertools import combinations_with_replacement, islice, product
+from types import SimpleNamespace
 
 import pytest
+import z3
 
-from rcsc.lang.model import Bool, Enum, Int, Kind, Real, Scalar, Variable, VariableName
+from rcsc.lang.model import Among, Bool, Enum, Int, Kind, Read, Real, Scalar, Variable, VariableName
 from rcsc.lang.operator_table import Op
 from rcsc.procedures.discharge import MOST_CHOICES, fewest
 from rcsc.solvers import smt
-from rcsc.solvers.smt import Answer, Solver
+from rcsc.solvers.smt import Answer, Limits, Solver
 from rcsc.symbolic import trial, values
+from rcsc.symbolic.encode import declared, encode
 from rcsc.symbolic.values import FALSE, TRUE, Fact, Node
 
 SPANS = list(combinations_with_replacement(range(-2, 4), 2))
@@ -269,3 +272,47 @@ def test_members_are_compared_as_their_places() -> None:
     assert ends(colour) == (0, 2)
     assert told(values.among(colour, [1, 2])) == {"k": (1, 2)}
     assert told(values.negation(values.among(colour, [0]))) == {"k": (1, 2)}
+
+
+def test_a_question_is_asked_again_with_four_times_the_patience_until_the_processor_was_its_own(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Other processes take the time: it passes, and this one has used little of it."""
+    clock, used, given = [0.0], [0.0], list[float]()
+    solver = Solver(Limits(steps=1000, cpu_s=2.0))
+
+    class Asked:
+        """Z3 as it is while it has no time: it never answers."""
+
+        def check(self, *_: object) -> object:
+            clock[0] += 2.0 * 4 ** len(given)
+            used[0] += 1.9 if len(given) == 3 else 0.1
+            return z3.unknown
+
+        def reason_unknown(self) -> str:
+            return "timeout"
+
+        def set(self, name: str, value: float) -> None:
+            if name == "timeout":
+                given.append(value)
+
+        def statistics(self) -> list[object]:
+            return []
+
+    monkeypatch.setattr(solver, "_solver", Asked())
+    monkeypatch.setattr(smt, "time", SimpleNamespace(monotonic=lambda: clock[0], thread_time=lambda: used[0]))
+    before = smt.cut_short()
+    assert solver.check() is Answer.UNKNOWN
+    assert given == [8_000, 32_000, 128_000]
+    assert smt.cut_short() == before + 1
+
+
+@pytest.mark.parametrize(("value", "there"), [(1.5, True), (2.0, True), (1.0, False), (-0.0, True)])
+def test_members_of_a_set_of_doubles_are_these(value: float, there: bool) -> None:
+    kind = Real(-9.0, 9.0)
+    variable = Variable(VariableName("x"), Kind.INPUT, kind, 0.0)
+    frame, _ = declared([variable])
+    solver = Solver()
+    solver.add(encode(Among(Read(variable.name, kind), (0.0, 1.5, 2.0), Bool()), frame))
+    solver.add(smt.equal(frame.leaves[variable.name], smt.literal(kind, value), kind))
+    assert solver.check() is (Answer.SATISFIABLE if there else Answer.UNSATISFIABLE)

@@ -1,17 +1,21 @@
 """What the checker of certificates computes, exactly: questions, columns, spans, facts, what is owed, and the work that it took."""
 
+import json
 from collections.abc import Callable, Iterable, Sequence
 from itertools import combinations_with_replacement, product
 
 import numpy as np
 import pytest
 
+from rcsc.certify import certify
 from rcsc.certify.execution import Start
 from rcsc.certify.known import Known
 from rcsc.certify.owed import Debts
 from rcsc.certify.settle import CaseAnswer, Fails, Left, Settler, Shown, script, values_in
 from rcsc.certify.values import BOOL, FREE, INT, REAL, TRUTHS, Term, Terms, parts_first, spanned, truncated
 from rcsc.lang.model import Bool, Int, Real
+from rcsc.solvers.options import Options
+from rcsc.table.program import prove_program
 from tests.support.programs.stages import program_of
 from tests.table.test_told import FAULTY
 
@@ -432,6 +436,9 @@ under 0
 under 0
     0 procedure `use`: `k` is assigned before it is read at `k`
 under 0
+    0 procedure `unset`: `j` is assigned before it is read at `j`
+    1 procedure `unset`: `m` stays in -100 .. 100 at `j`
+under 0
     0 procedure `local_`: `k` stays in 0 .. 3 at `a`
 under 3
     0 a condition of table `t`: the divisor is not zero at `b`
@@ -468,3 +475,41 @@ def test_what_a_program_owes_is_named_and_placed() -> None:
             place = place.split("|")[1].strip() if "||" in place else place
             found.append(f"    {owed.number} {owed.name}" + f" at `{place}`" * bool(place))
     assert found == OWED.splitlines()
+
+
+LONG = """
+input a : int 0 .. 9
+state n : int 0 .. 9
+invariant low : n <= 9
+procedure begin { n := 1 n := 2 n := 3 }
+procedure alone { n := 1 n := 2 n := 3 }
+table t {
+  | line | a    || procedures |
+  | one  | < 5  || begin      |
+  | two  | >= 5 ||            |
+}
+level l {
+  period 40 [ms]
+  preprocess begin
+  table t
+}
+"""
+
+
+def test_what_is_too_long_to_follow_is_named_and_placed(monkeypatch: pytest.MonkeyPatch) -> None:
+    program = program_of(LONG)
+    verdict = prove_program(program, Options())
+    assert verdict.certificate is not None
+    monkeypatch.setattr("rcsc.certify.execution.MOST_STEPS", 2)
+    found = certify(program, json.loads(json.dumps(verdict.certificate)))
+    assert found.problems == ()
+    written = [(one.name, LONG[one.written.start : one.written.end], one.question) for one in found.unchecked]
+    many = ": what it owes has too many steps to be followed"
+    assert [
+        (name, place.split("|")[0 if "|" not in place[:2] else 1].strip(), asked)
+        for name, place, asked in written
+    ] == [
+        (f"`preprocess` of level `l`{many}", "l", ""),
+        (f"procedure `alone`{many}", "alone", ""),
+        (f"line `one` of table `t`{many}", "one", ""),
+    ]

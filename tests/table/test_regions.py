@@ -42,6 +42,7 @@ from rcsc.lang.model import (
     key_bounds,
     value_of_key,
 )
+from rcsc.table.regions import splitting
 from rcsc.table.regions.atoms import Universe, assumptions_of, lines_of
 from rcsc.table.regions.least import find, least, negated, whole, widest
 from rcsc.table.regions.linear import Simplex, integer_point
@@ -582,3 +583,15 @@ def test_the_tree_is_this_one(name: str) -> None:
         f"{search.undecided} {sorted(search.used)}",
     ]
     assert "\n".join(said) == expected
+
+
+@pytest.mark.parametrize(
+    ("rounds", "undecided", "nodes"), [(0, 2, 11), (1, 2, 15), (2, 2, 19), (3, 1, 23), (4, 1, 25), (5, 0, 27)]
+)
+def test_a_vertex_is_rounded_so_often_and_not_more(
+    rounds: int, undecided: int, nodes: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(splitting, "_ROUNDS", rounds)
+    rows = "".join(f"| l{number} | {line} ||\n" for number, line in enumerate(TREES["fractions"][1]))
+    _, search = searched(compiled(f"{INPUTS}table t {{\n| line | when ||\n{rows}}}\n"))
+    assert (search.undecided, len(search.nodes)) == (undecided, nodes)

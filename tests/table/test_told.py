@@ -1,12 +1,18 @@
 """What is told of programs that are wrong, to the letter: messages, places, notes, help, and the least witnesses."""
 
+from typing import Any
+
 import pytest
 
 from rcsc.diagnostics.diagnostic import Diagnostic
+from rcsc.procedures.discharge import Asker, Discharge
 from rcsc.solvers import smt
 from rcsc.solvers.options import Options
+from rcsc.symbolic.execution import Run
+from rcsc.table import relational
 from rcsc.table.decide import prove_table
 from rcsc.table.program import prove_program
+from rcsc.table.regions.splitting import Tree
 from rcsc.table.verdict import Overlap, TableVerdict, Undecided
 from tests.support.programs.stages import program_of
 
@@ -41,6 +47,7 @@ procedure index { xs[a] := a + 1 }
 procedure read { m := xs[a + b] }
 procedure real_ { r := x * 2.0 }
 procedure use { local k : int 0 .. 9 if yes { k := 1 } m := k }
+procedure unset { local j : int 0 .. 9 m := j }
 procedure first { n := a }
 procedure twice(k : int 0 .. 3) { n := k * 4 }
 procedure local_ { local k : int 0 .. 3 := a }
@@ -116,6 +123,8 @@ RCS413 error `x * 2.0`: the value can lie outside 0.0 .. 500.0, the range of `r`
 RCS414 error `k`: `k` can be read before it is assigned
     help: give the local a first value where it is declared
     : yes = false
+RCS414 error `j`: `j` can be read before it is assigned
+    help: give the local a first value where it is declared
 RCS413 error `a`: the value can lie outside 0 .. 3, the range of `k`
     help: guard the assignment with `if`, use `min` or `max`, or widen the variable's range
     : a = 4
@@ -246,3 +255,30 @@ def test_the_first_twenty_overlaps_are_told_with_their_regions(many: int) -> Non
     [found] = prove_program(program_of(text), Options(solver="boxes")).tables
     regions = [overlap.region is not None for overlap in found.found if isinstance(overlap, Overlap)]
     assert regions == [True] * min(many, 20) + [False] * max(0, many - 20)
+
+
+def test_a_tree_has_a_budget_of_nodes(monkeypatch: pytest.MonkeyPatch) -> None:
+    budgets: list[int] = []
+
+    def tree(*given: Any, budget: int, **more: Any) -> Tree:
+        budgets.append(budget)
+        return Tree(*given, budget=budget, **more)
+
+    monkeypatch.setattr(relational, "Tree", tree)
+    text = "input x : int 0 .. 9\ninput y : int 0 .. 9\ntable t {\n| line | when ||\n| a | x < y ||\n| b | x >= y ||\n}\n"
+    assert prove_program(program_of(text), Options()).proved is not None
+    assert budgets == [60_000]
+
+
+def test_what_the_solver_does_not_answer_is_left_open() -> None:
+    program = program_of(
+        "input a : int 0 .. 1000000\ninput b : int 0 .. 1000000\nstate s : int 0 .. 9\n"
+        "procedure p { if a > 2 and b > 2 and a * b = 999999999989 { s := a mod 100 } }\n"
+    )
+    run = Run({}, {v.name: v.type for v in program.variables}, {})
+    run.execute(program.procedures[0].body)
+    asker = Asker(Options(steps=1), {})
+    left = asker.unshown(run.obligations, list, lambda _: True)
+    assert [(one.outcome, one.witness) for one in left] == [(Discharge.OPEN, ())] * len(run.obligations)
+    assert left
+    assert not asker.all_hold(run.obligations, list)
