@@ -87,14 +87,14 @@ def closing_line(program: Program, table: Table, found: Gap) -> str | None:
     if region is None or not boxes.applies(table):
         return None
     kinds: dict[str, Scalar] = {v.name: v.type for v in program.variables}
-    cells = []
+    texts = []
     for column in table.columns:
         name = column.variable
         box = region.get(name) if name is not None else None
         cell = "" if box is None or name is None else cells.cell(kinds[name], box)
         if cell is None:
             return None
-        cells.append(cell)
+        texts.append(cell)
     if not set(region) <= {str(c.variable) for c in table.columns} & set(map(str, table.variables)):
         return None  # bounds of what only an assumption reads
     decided = boxes.TableBoxes.of(program, table)
@@ -102,7 +102,7 @@ def closing_line(program: Program, table: Table, found: Gap) -> str | None:
     pairs = list(decided.overlaps())
     if any(len(decided.lines) - 1 in pair for pair in pairs):
         return None
-    row = " | ".join(["new", *cells])
+    row = " | ".join(["new", *texts])
     try:
         closes = not Gaps.of(decided, disjoint=not pairs).missing()
     except BudgetError:
