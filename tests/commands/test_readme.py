@@ -117,30 +117,12 @@ def test_the_programs_of_the_readme_print_what_it_says(
     capfd.readouterr()
     [source] = blocks("README.md", "c")
     (scratch / "main.c").write_text(source, encoding="utf-8")
-    subprocess.run(
-        [
-            "cc",
-            "-std=c99",
-            "-Wall",
-            "-Wextra",
-            "-Werror",
-            "-Igenerated/c",
-            "main.c",
-            "generated/c/gripper.c",
-            "-o",
-            "robot",
-        ],
-        check=True,
-    )
+    build = "cc -std=c99 -Wall -Wextra -Werror -Igenerated/c main.c generated/c/gripper.c -o robot"
+    subprocess.run(build.split(), check=True)
     [program] = blocks("README.md", "python")
     for command in (["./robot"], [sys.executable, "-c", program]):
-        ran = subprocess.run(
-            command,
-            env=os.environ | {"PYTHONPATH": "generated/python"},
-            capture_output=True,
-            text=True,
-            check=True,
-        )
+        env = os.environ | {"PYTHONPATH": "generated/python"}
+        ran = subprocess.run(command, env=env, capture_output=True, text=True, check=True)
         assert ran.stdout == f"{said[1]}\n"
 
 

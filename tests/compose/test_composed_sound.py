@@ -9,7 +9,7 @@ from random import Random
 import pytest
 
 from rcsc.commands import run
-from rcsc.compose.contract.claims import CONTRACT, ENDING, FOUND, RUNS, SAFE, Claim, Key, closed
+from rcsc.compose.contract.claims import CONTRACT, ENDING, FOUND, RUNS, SAFE, Claim, Key, Need, closed
 from rcsc.compose.contract.environment import links
 from rcsc.compose.contract.obligations import Sort, unstated
 from rcsc.compose.contract.properties import invariant_kept, property_kept
@@ -802,39 +802,44 @@ def test_a_fault_of_one_level_shows_in_the_verdicts_of_its_neighbours(tmp_path: 
     assert not whole.whole
 
 
+def drawn_claims(random: Random) -> dict[Need, Claim]:
+    """Some claims that rest on others, and on some that nobody made."""
+    needs: list[Need] = [("level", ("sort", "", str(at))) for at in range(7)]
+    verdicts = [Verdict.PROVED] * 3 + [Verdict.TRUSTED, Verdict.NOT_PROVED, Verdict.UNDECIDED]
+    return {
+        need: Claim(
+            random.choice(verdicts),
+            tuple(random.sample(needs, random.choice((0, 1, 1, 2)))),
+            (need[1][2],) if random.random() < 0.2 else (),
+        )
+        for need in needs[: random.randint(4, 7)]
+    }
+
+
+def reached_from(need: Need, made: dict[Need, Claim]) -> set[Need]:
+    """What the claim rests on by any way, and itself."""
+    reached, waiting = set[Need](), [need]
+    while waiting:
+        here = waiting.pop()
+        if here not in reached:
+            reached.add(here)
+            waiting += made[here].rests_on if here in made else ()
+    return reached
+
+
 def test_claims_close_over_what_they_rest_on() -> None:
     """Against the meaning: proved is what reaches nothing that is not found, by any way through the claims."""
     random = Random(7)  # noqa: S311  # repeatable on purpose
     for _ in range(300):
-        needs = [("level", ("sort", "", str(at))) for at in range(7)]
-        made = {
-            need: Claim(
-                random.choice(
-                    (
-                        Verdict.PROVED,
-                        Verdict.PROVED,
-                        Verdict.PROVED,
-                        Verdict.TRUSTED,
-                        Verdict.NOT_PROVED,
-                        Verdict.UNDECIDED,
-                    )
-                ),
-                tuple(random.sample(needs, random.choice((0, 1, 1, 2)))),
-                (need[1][2],) if random.random() < 0.2 else (),
-            )
-            for need in needs[: random.randint(4, 7)]
-        }
+        made = drawn_claims(random)
         for need, found in closed(made).items():
-            reached, waiting = set(), [need]
-            while waiting:
-                one = waiting.pop()
-                if one not in reached:
-                    reached.add(one)
-                    waiting += made[one].rests_on if one in made else ()
-            bad = {one for one in reached if one not in made or made[one].verdict not in FOUND}
+            reached = reached_from(need, made)
+            bad = {other for other in reached if other not in made or made[other].verdict not in FOUND}
             assert found.proved == (not bad)
             assert set(found.lacks) == bad - {need}
-            assert set(found.trusts) == {text for one in reached if one in made for text in made[one].trusts}
+            assert set(found.trusts) == {
+                text for other in reached if other in made for text in made[other].trusts
+            }
 
 
 # --- what the tables say of what comes from outside ------------------------------------------------

@@ -626,7 +626,7 @@ def test_lines_are_counted(log: Log) -> None:
     assert set(acquire.never) == {line for line, count in acquire.lines.items() if count == 0}
 
 
-def test_the_commands(tmp_path: Path, logged: Path) -> None:
+def test_the_command_that_shows_a_log(tmp_path: Path, logged: Path) -> None:
     shown = run("log", logged)
     assert shown.return_value == 0
     assert f"{TICKS} ticks of 40 ms" in shown.output
@@ -634,27 +634,28 @@ def test_the_commands(tmp_path: Path, logged: Path) -> None:
     outs = [tmp_path / f"run.{end}" for end in ("csv", "json")]
     assert run("log", logged, "--csv", outs[0], "--json", outs[1]).return_value == 0
     assert all(out.stat().st_size > 1000 for out in outs)
-    for args in (
-        ["--plot", "task.cur_state"],
-        ["-o", "x.svg"],
-        ["--plot", "task.cur_state", "-o", tmp_path / "x.txt"],
-    ):
+    plot = ["--plot", "task.cur_state"]
+    for args in (plot, ["-o", "x.svg"], [*plot, "-o", tmp_path / "x.txt"]):
         assert run("log", logged, *args).exit_code != 0
-    generated = ["--generated", REPO / "generated", "--executor", "python"]
-    whole = run("replay", logged, *generated)
+
+
+def test_the_command_that_replays_a_log(tmp_path: Path, logged: Path) -> None:
+    def replayed(*args: object) -> Result:
+        return run("replay", logged, "--generated", REPO / "generated", "--executor", "python", *args)
+
+    whole, sealed = replayed(), f"sealed: all {logged.stat().st_size} bytes are as they were recorded"
     assert (whole.return_value, whole.output) == (
         0,
-        f"{TICKS} ticks replayed: nothing differs; sealed: all {logged.stat().st_size} bytes are as they were recorded\n",
+        f"{TICKS} ticks replayed: nothing differs; {sealed}\n",
     )
-    one = run("replay", logged, *generated, "--at", 30, "--show", "gripper")
-    assert one.return_value == 0
-    assert "gripper: " in one.output
-    assert "    command.opening_mm = " in one.output
-    sought = run("replay", logged, *generated, "--find", "task.command.inc_command == 2")
-    assert sought.output.startswith("cycle 27, ")
-    assert run("replay", logged, *generated, "--find", "task.fault == none and false").return_value == 1
-    assert run("replay", logged, *generated, "--find", "task.nothing").exit_code != 0
-    assert run("replay", logged, *generated, "--at", TICKS + 1).exit_code != 0
+    moment = replayed("--at", 30, "--show", "gripper")
+    assert moment.return_value == 0
+    assert "gripper: " in moment.output
+    assert "    command.opening_mm = " in moment.output
+    assert replayed("--find", "task.command.inc_command == 2").output.startswith("cycle 27, ")
+    assert replayed("--find", "task.fault == none and false").return_value == 1
+    assert replayed("--find", "task.nothing").exit_code != 0
+    assert replayed("--at", TICKS + 1).exit_code != 0
     missing = run("replay", logged, "--generated", tmp_path / "none")
     assert missing.return_value == 1
     assert "RCS704" in missing.output

@@ -226,64 +226,56 @@ def levels(draw: st.DrawFn) -> tree.LevelDecl:
     )
 
 
-@cache
-def declarations() -> SearchStrategy[tree.Declaration]:
-    """Any declaration."""
+_HEAD: dict[str, SearchStrategy[tuple[str, ...]]] = {"comments": WORDS, "doc": DOCS}
+
+
+def _names_of_things() -> SearchStrategy[tree.Declaration]:
+    """What says a name of a file, a unit, a constant, a type or an owner."""
     some_names = st.lists(NAMES, min_size=1, max_size=3).map(tuple)
+    fields = st.lists(st.builds(tree.FieldDecl, NAMES, types(), **_HEAD), min_size=1, max_size=2)
+    return st.one_of(
+        st.builds(tree.Use, st.sampled_from(["types", "task/vars"]), comments=WORDS),
+        st.builds(tree.UnitDecl, NAMES, **_HEAD),
+        st.builds(tree.ConstDecl, NAMES, expressions(), **_HEAD),
+        st.builds(tree.EnumDecl, NAMES, some_names, **_HEAD),
+        st.builds(tree.TypeDecl, NAMES, types(), **_HEAD),
+        st.builds(tree.RecordDecl, NAMES, fields.map(tuple), **_HEAD),
+        st.builds(tree.OwnerDecl, NAMES, some_names | st.just(()), **_HEAD),
+    )
+
+
+def _variables_and_claims() -> SearchStrategy[tree.Declaration]:
+    """Variables, and what is assumed of them or stated."""
+    kinds, refusals = st.sampled_from(["input", "state", "output"]), st.sampled_from(["", "clamp", "reject"])
+    may_be, standings = st.none() | expressions(), st.sampled_from(["", "assumed", "monitored", "proved"])
+    words = st.sampled_from(["then", "until"])
+    return st.one_of(
+        st.builds(tree.VariableDecl, kinds, NAMES, types(), may_be, refusals, may_be, may_be, **_HEAD),
+        st.builds(tree.AssumeDecl, NAMES, expressions(), standings, **_HEAD),
+        st.builds(tree.InvariantDecl, NAMES, expressions(), **_HEAD),
+        st.builds(tree.PropertyDecl, NAMES, expressions(), **_HEAD),
+        st.builds(tree.PropertyDecl, NAMES, expressions(), words, expressions(), **_HEAD),
+    )
+
+
+def _procedures() -> SearchStrategy[tree.Declaration]:
+    """Procedures, modules, and extern procedures."""
     params = st.lists(st.builds(tree.Parameter, NAMES, types()), max_size=2).map(tuple)
     body = st.lists(statements(), max_size=3).map(tuple)
     touched = st.lists(places(), max_size=2).map(tuple)
-    head = {"comments": WORDS, "doc": DOCS}
-    field = st.builds(tree.FieldDecl, NAMES, types(), **head)
+    module = {"reads": touched, "writes": touched, "body": body}
+    code = st.sampled_from(["", "pkg.mod:fn"]), st.sampled_from(["", "c_fn"])
     return st.one_of(
-        st.builds(tree.Use, st.sampled_from(["types", "task/vars"]), comments=WORDS),
-        st.builds(tree.UnitDecl, NAMES, **head),
-        st.builds(tree.ConstDecl, NAMES, expressions(), **head),
-        st.builds(tree.EnumDecl, NAMES, some_names, **head),
-        st.builds(tree.TypeDecl, NAMES, types(), **head),
-        st.builds(tree.RecordDecl, NAMES, st.lists(field, min_size=1, max_size=2).map(tuple), **head),
-        st.builds(
-            tree.VariableDecl,
-            st.sampled_from(["input", "state", "output"]),
-            NAMES,
-            types(),
-            st.none() | expressions(),
-            st.sampled_from(["", "clamp", "reject"]),
-            st.none() | expressions(),
-            st.none() | expressions(),
-            **head,
-        ),
-        st.builds(
-            tree.AssumeDecl,
-            NAMES,
-            expressions(),
-            st.sampled_from(["", "assumed", "monitored", "proved"]),
-            **head,
-        ),
-        st.builds(tree.InvariantDecl, NAMES, expressions(), **head),
-        st.builds(tree.PropertyDecl, NAMES, expressions(), **head),
-        st.builds(
-            tree.PropertyDecl, NAMES, expressions(), st.sampled_from(["then", "until"]), expressions(), **head
-        ),
-        st.builds(tree.ProcedureDecl, st.just("procedure"), NAMES, params, body=body, **head),
-        st.builds(
-            tree.ProcedureDecl, st.just("module"), NAMES, reads=touched, writes=touched, body=body, **head
-        ),
-        st.builds(
-            tree.ProcedureDecl,
-            st.just("extern"),
-            NAMES,
-            params,
-            touched,
-            touched,
-            st.sampled_from(["", "pkg.mod:fn"]),
-            st.sampled_from(["", "c_fn"]),
-            **head,
-        ),
-        st.builds(tree.OwnerDecl, NAMES, some_names | st.just(()), **head),
-        tables(),
-        levels(),
+        st.builds(tree.ProcedureDecl, st.just("procedure"), NAMES, params, body=body, **_HEAD),
+        st.builds(tree.ProcedureDecl, st.just("module"), NAMES, **module, **_HEAD),
+        st.builds(tree.ProcedureDecl, st.just("extern"), NAMES, params, touched, touched, *code, **_HEAD),
     )
+
+
+@cache
+def declarations() -> SearchStrategy[tree.Declaration]:
+    """Any declaration."""
+    return st.one_of(_names_of_things(), _variables_and_claims(), _procedures(), tables(), levels())
 
 
 @cache

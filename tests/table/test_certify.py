@@ -20,7 +20,7 @@ from rcsc.certify.execution import Run, Start
 from rcsc.certify.known import Known
 from rcsc.certify.settle import script, values_in
 from rcsc.certify.table import TableChecker
-from rcsc.certify.values import INT, Term, parts_first, spanned
+from rcsc.certify.values import INT, Term, Terms, parts_first, spanned
 from rcsc.lang.interpret import call, evaluate, holds, matching_lines
 from rcsc.lang.meaning import digest
 from rcsc.lang.model import AssumptionName, Program, Read, Table, Value, key_bounds, key_of, value_of_key
@@ -569,10 +569,14 @@ def expression(program: Program) -> Any:
     return statement.value  # type: ignore[union-attr]  # an assignment
 
 
+def equals(terms: Terms, term: Term, value: Value) -> Term:
+    """The condition that the term has this value."""
+    return terms.make("=", term, terms.constant(term.sort, value))
+
+
 @pytest.mark.parametrize("text", [*NUMBERS, *DOUBLES])
 def test_values_spans_and_questions_are_the_interpreters(text: str) -> None:
-    whole = text in NUMBERS
-    kind = "int -9223372036854775808 .. 9223372036854775807" if whole else "real -1e308 .. 1e308"
+    kind = "int -9223372036854775808 .. 9223372036854775807" if text in NUMBERS else "real -1e308 .. 1e308"
     program = program_of(f"{WIDE}state s : {kind}\nprocedure p {{ s := {text} }}\n")
     start = Start(program)
     run = Run(start, "p")
@@ -587,22 +591,17 @@ def test_values_spans_and_questions_are_the_interpreters(text: str) -> None:
         }
         if not values_in(owed, cases, 1)[0]:
             continue
-        expected = evaluate(expression(program), point)
-        found, nothing = values_in(term, cases, 1)[0], isinstance(expected, float) and isnan(expected)
-        assert found == expected or (nothing and isnan(found)), point
-        if not nothing:
-            assert span is None or span[0] <= expected <= span[1], point
-        else:
+        expected, found = evaluate(expression(program), point), values_in(term, cases, 1)[0]
+        if isinstance(expected, float) and isnan(expected):
+            assert isnan(found), point
             assert span is None, point
-        if asked < 3 and not nothing:
+            continue
+        assert found == expected, point
+        assert span is None or span[0] <= expected <= span[1], point
+        if asked < 3:
             asked += 1
-            fixed = [
-                start.terms.make("=", leaf, start.terms.constant(leaf.sort, point[leaf.name]))
-                for leaf in cases
-            ]
-            other = start.terms.negation(
-                start.terms.make("=", term, start.terms.constant(term.sort, expected))
-            )
+            fixed = [equals(start.terms, leaf, point[leaf.name]) for leaf in cases]
+            other = start.terms.negation(equals(start.terms, term, expected))
             assert cvc5_says(script([*fixed, other])) == "unsat", point
     assert asked == 3 or text in {"c * c", "a * c"}
 
@@ -817,13 +816,15 @@ def test_obligations_of_one_name_are_each_asked() -> None:
     assert len({claim.name for claim in left}) == 2
 
 
-def test_a_long_run_is_followed_in_one_pass_and_work_has_an_end(monkeypatch: pytest.MonkeyPatch) -> None:
-    def text(count: int, step: str) -> str:
-        return (
-            f"input a : int 0 .. 9\nstate s : int 0 .. 999\nprocedure p {{ {' '.join([step] * count)} }}\n"
-            "table t {\n| line | a || procedures |\n| one | < 4 || p |\n| two | >= 4 || |\n}\n"
-        )
+def with_steps(count: int, step: str) -> Program:
+    """A program whose procedure takes the same step so many times."""
+    return program_of(
+        f"input a : int 0 .. 9\nstate s : int 0 .. 999\nprocedure p {{ {' '.join([step] * count)} }}\n"
+        "table t {\n| line | a || procedures |\n| one | < 4 || p |\n| two | >= 4 || |\n}\n"
+    )
 
+
+def test_a_long_run_is_followed_in_one_pass(monkeypatch: pytest.MonkeyPatch) -> None:
     looked: list[Term] = []
     found = Known._found
 
@@ -834,13 +835,16 @@ def test_a_long_run_is_followed_in_one_pass_and_work_has_an_end(monkeypatch: pyt
     monkeypatch.setattr(Known, "_found", counted)
     counts = []
     for count in (50, 100):
-        program = program_of(text(count, "s := s / 2 + a"))
+        program = with_steps(count, "s := s / 2 + a")
         certificate = certificate_of(program)
         looked.clear()
         assert certify(program, certificate).whole
         counts.append(len(looked))
     assert counts[1] < 2.5 * counts[0]
-    program = program_of(text(30, "if s > a { s := s / 2 + a }"))
+
+
+def test_work_has_an_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    program = with_steps(30, "if s > a { s := s / 2 + a }")
     certificate = certificate_of(program)
     assert certify(program, certificate).whole
     monkeypatch.setattr("rcsc.certify.MOST_WORK", 2_000)
@@ -942,6 +946,29 @@ SOME_FORMS = [
 ]  # fmt: skip
 
 
+POINTS = [dict(zip(SOME_VALUES, values, strict=True)) for values in product(*SOME_VALUES.values())]
+
+
+def cuts(form: dict[str, int], at: list[int]) -> list[int]:
+    """Where the form may be split, whose values at the points are given; zero and one below for a difference of reals."""
+    between_reals = form in ({"r": 1, "s": -1}, {"r": -1, "s": 1})
+    return [*sorted(set(at))[:-1], *([-1, 0] if between_reals else [])]
+
+
+def split(start: Start, form: dict[str, int], cut: int) -> TableChecker:
+    """Check the certificate of the program's table that splits at one form, and leaves both sides to be asked."""
+    names = list(form)
+    entry = {
+        "assumptions": [str(assumption.name) for assumption in start.program.assumptions],
+        "columns": names,
+        "forms": [[[number, form[name]] for number, name in enumerate(names)]],
+        "tree": [["s", 0, cut], ["z"], ["z"]],
+    }
+    checker = TableChecker(start, start.program.tables[0], entry)
+    checker.check()
+    return checker
+
+
 @given(
     st.lists(st.sampled_from(SOME_CONDITIONS), min_size=3, max_size=3),
     st.sampled_from(["", "| d | DEFAULT ||\n", "| d | DEFAULT unreachable ||\n"]),
@@ -957,36 +984,20 @@ def test_each_region_that_is_left_is_asked_of_all_its_inputs(
     text = MIXED.format(*lines, assumption=claim, default=default)
     program = program_of(edited(text, ("table t", "table t assuming it")) if assumed else text)
     start, table = Start(program), program.tables[0]
-    types = {str(v.name): v.type for v in program.variables}
-    points = [dict(zip(SOME_VALUES, values, strict=True)) for values in product(*SOME_VALUES.values())]
-    at = [sum(k * key_of(types[name], point[name]) for name, k in form.items()) for point in points]
-    cut = data.draw(
-        st.sampled_from(
-            [*sorted(set(at))[:-1], *([-1, 0] if form in ({"r": 1, "s": -1}, {"r": -1, "s": 1}) else [])]
-        )
-    )
-    names = list(form)
-    entry = {
-        "assumptions": [str(assumption.name) for assumption in program.assumptions],
-        "columns": names,
-        "forms": [[[number, form[name]] for number, name in enumerate(names)]],
-        "tree": [["s", 0, cut], ["z"], ["z"]],
-    }
-    checker = TableChecker(start, table, entry)
-    checker.check()
-    cases = {start.leaves[name]: np.array([point[name] for point in points]) for name in SOME_VALUES}
+    kinds = {name: program.variable(name).type for name in form}
+    at = [sum(k * key_of(kinds[name], point[name]) for name, k in form.items()) for point in POINTS]
+    cut = data.draw(st.sampled_from(cuts(form, at)))
+    checker = split(start, form, cut)
+    cases = {start.leaves[name]: np.array([point[name] for point in POINTS]) for name in SOME_VALUES}
     for debt, side in zip(checker.questions, (True, False), strict=True):
         [owed] = debt.owed
         known, good = (
-            np.broadcast_to(values_in(term, cases, len(points)), len(points))
+            np.broadcast_to(values_in(term, cases, len(POINTS)), len(POINTS))
             for term in (start.terms.every(debt.hypotheses), owed.good)
         )
-        for number, point in enumerate(points):
-            inside = (at[number] <= cut) == side and all(
-                holds(a.condition, point) for a in program.assumptions
-            )
+        for number, point in enumerate(POINTS):
             matching = len(matching_lines(table, point))
-            if inside:
+            if (at[number] <= cut) == side and all(holds(a.condition, point) for a in program.assumptions):
                 assert known[number], point
                 assert good[number] == (matching == 1 or (matching == 0 and not checker.cover)), point
             elif "r" not in form or len(form) == 1:
