@@ -29,6 +29,7 @@ from rcsc.emit.code_tree import (
     Stmt,
     infix,
     read,
+    repeated,
     when,
 )
 from rcsc.emit.ctext import SHORT, CText, c_type, locals_of, type_bounds, wide_type
@@ -371,9 +372,9 @@ class _Maker:
         body = tuple(self._match(table, name))
         unread = () if _of_state(body) else (_unused(STATE),)
         yield Function(doc, f"int32_t {self.p}_{name}_line(const {self.p}_t *s)", (*unread, *body))
-        i = Name("i")
+        i, n = Name("i"), Name("n")
         line = Invoke(f"{self.p}_{name}_line", (Prefix("&", Element(Name("in"), i)),))
-        each = Frame("for (i = 0u; i < n; i = i + 1u) {", (Set(Element(Name("out"), i), line),), "}")
+        each = _counted(i, n, Set(Element(Name("out"), i), line))
         head = f"void {self.p}_{name}_lines(const {self.p}_t *in, int32_t *out, uint32_t n)"
         doc = f"The same for n inputs at once, table {table.table.name}."
         yield Function(doc, head, (Let("uint32_t", "i"), each))
@@ -475,7 +476,7 @@ class _Maker:
             Set(seen, infix("|", seen, some)),
             Set(FOUND, Choice(found, at, FOUND)),
         )
-        yield Frame(f"for (w = 0u; w < {matcher.words}u; w = w + 1u) {{", body, "}")
+        yield _counted(w, Constant(matcher.words, "uint32_t"), *body)
         yield Set(Name("none"), Constant(matcher.lines) if matcher.default else Round(NONE))
         yield Set(FOUND, Choice(infix("==", seen, zero), Name("none"), FOUND))
         yield Set(FOUND, Choice(infix("!=", several, zero), Round(SEVERAL), FOUND))
@@ -506,14 +507,15 @@ class _Maker:
         cases: list[Stmt] = []
         for number, line in enumerate(table.lines):
             body = self.text.block([action.statement for action in line.actions])
-            cases.append(Frame(f"case {number}: /* {comment(line.source)} */", (*body, Line("break;"))))
+            head = "case ", Constant(number), f": /* {comment(line.source)} */"
+            cases.append(Frame(head, (*body, Line("break;"))))
         none, several = Set(FAULT, Constant(Fault.NO_LINE)), Set(FAULT, Constant(Fault.SEVERAL_LINES))
         return (
             Set(LINE, Invoke(f"{self.p}_{name}_line", (STATE,))),
-            Line("switch (s->line) {"),
+            Frame(("switch (", LINE, ") {")),
             *cases,
-            Frame("case (-1):", (none, Line("break;"))),
-            Frame("default:", (Set(LINE, NONE), several, Line("break;"))),
+            Frame(("case ", Round(NONE), ":"), (none, Line("break;"))),
+            Frame(("default:",), (Set(LINE, NONE), several, Line("break;"))),
             Line("}"),
         )
 
@@ -553,7 +555,8 @@ class _Maker:
             for value, table_name in level.tables.tables
         )
         yield Branch(
-            tuple(arms), (Line(f"s->fault = {Fault.NO_LINE:d}; /* no table for it: proved impossible */"),)
+            tuple(arms),
+            (Frame((FAULT, " = ", Constant(Fault.NO_LINE), "; /* no table for it: proved impossible */")),),
         )
 
     def _init(self) -> Function:
@@ -564,6 +567,12 @@ class _Maker:
 
 
 # --- small things --------------------------------------------------------------------
+
+
+def _counted(count: Name, end: Code, *body: Stmt) -> Frame:
+    """A loop from 0 up to the end, which is left out."""
+    zero, one = Constant(0, "uint32_t"), Constant(1, "uint32_t")
+    return repeated(Set(count, zero), infix("<", count, end), Set(count, infix("+", count, one)), *body)
 
 
 def _unused(name: Name) -> Do:
@@ -649,9 +658,9 @@ def _masks(matcher: Matcher) -> Iterator[Stmt]:
     words = "" if matcher.words <= 1 else f"[{matcher.words}]"
     masks = [joined(group) for group in matcher.groups]
     members = (Line(f"uint{bits}_t t{at}[{len(entries)}]{words};") for at, entries in enumerate(masks))
-    yield Frame("static const struct {", tuple(members))
-    rows = (Frame("{", tuple(_rows(entries, matcher.words, bits)), "},") for entries in masks)
-    yield Frame("} t = {", tuple(rows), "};")
+    yield Frame(("static const struct {",), tuple(members))
+    rows = (Frame(("{",), tuple(_rows(entries, matcher.words, bits)), "},") for entries in masks)
+    yield Frame(("} t = {",), tuple(rows), "};")
 
 
 def _rows(entries: Iterable[int], words: int, bits: int) -> Iterator[Line]:
@@ -679,14 +688,14 @@ def _codes(index: Coded) -> Body:
     """The class of `value`, looked up."""
     head = f"static const uint{8 if index.count <= 256 else 16}_t classes[{len(index.classes)}] = {{"
     rows = tuple(_wrapped(Constant(one, "uint32_t") for one in index.classes))
-    return Frame(head, rows, "};"), Leave(Element(Name("classes"), Name("value")))
+    return Frame((head,), rows, "};"), Leave(Element(Name("classes"), Name("value")))
 
 
 def _search(index: Cuts, wide: str) -> Iterator[Stmt]:
     """How many cuts are at most `value`, in a number of steps that depends on nothing."""
     count, cuts = Constant(len(index.cuts), "uint32_t"), Name("cuts")
     rows = tuple(_wrapped(constant(index.type, cut) for cut in index.cuts))
-    yield Frame(f"static const {wide} cuts[{len(index.cuts)}] = {{", rows, "};")
+    yield Frame((f"static const {wide} cuts[{len(index.cuts)}] = {{",), rows, "};")
     yield Let("uint32_t", "at", Constant(0, "uint32_t"))
     step = 1 << len(index.cuts).bit_length() - 1
     while step:

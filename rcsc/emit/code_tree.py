@@ -1,7 +1,8 @@
 """A small tree of code: expressions and statements that C and Python share, and how each language spells them.
 
 `ctext`, `c99`, `pytext` and `python` build it; what is asked of code (names that are read, helpers that are called, reals, what may be
-cast) is asked of the tree. What only one language has stands in a `Frame` or a `Line`. A template prints blocks by the filters `c` and
+cast) is asked of the tree. What only one language has stands in a `Frame`, whose words are text and whose code is a tree,
+or in a `Line`. A template prints blocks by the filters `c` and
 `python`.
 """
 
@@ -168,10 +169,10 @@ class Loop:
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """What only one of the languages has: a line, a block inside, perhaps a line after it."""
+    """What only one of the languages has: a line of its words and of code, perhaps a block inside and a line after it."""
 
-    head: str
-    body: "Body"
+    head: tuple["str | Code", ...]
+    body: "Body" = ()
     tail: str = ""
 
 
@@ -198,6 +199,12 @@ class Function:
 def infix(op: str, *operands: Code) -> Infix:
     """An operation on these."""
     return Infix(op, operands)
+
+
+def repeated(begin: Set, goes: Code, step: Set, *body: Stmt) -> Frame:
+    """C's `for`."""
+    first, then = (infix("=", one.place, one.value) for one in (begin, step))
+    return Frame(("for (", first, "; ", goes, "; ", then, ") {"), body, "}")
 
 
 def when(condition: Code, *body: Stmt) -> Branch:
@@ -301,8 +308,8 @@ class Language(ABC):
                         yield from self.lines(orelse, indent + 1)
                     yield from (pad + close for close in self.heads[3:] if close)
                 case Frame(head=head, body=inner, tail=tail):
-                    yield pad + head
-                    yield from self.lines(inner, indent + 1)
+                    yield pad + "".join(part if isinstance(part, str) else self.code(part) for part in head)
+                    yield from self.lines(inner, indent + 1) if inner else ()
                     yield from (pad + text for text in (tail,) if text)
                 case Line(text=text):
                     yield pad + text
@@ -328,7 +335,7 @@ class C(Language):
     """C99: every operation inside another is in parentheses, but for a product in a sum."""
 
     state, end = "s->", ";"
-    levels = MappingProxyType({"*": 1})
+    levels = MappingProxyType({"=": -1, "*": 1})
     heads = ("if ({}) {{", "}} else if ({}) {{", "} else {", "}")
 
     def constant(self, one: Constant) -> str:
@@ -370,13 +377,11 @@ class C(Language):
                 wide = one.low >= 0 and one.high > I64_MAX
                 step = Set(count, infix("+", count, Constant(1, "uint64_t" if wide else "int64_t")))
         if one.high < (U64_MAX if wide else I64_MAX):
-            first, then = self.lines((begin, step), 0)
-            goes = self.code(infix("&&", infix("<=", count, high), *guard))
-            return (Frame(f"for ({first} {goes}; {then.rstrip(';')}) {{", one.body, "}"),)
+            return (repeated(begin, infix("&&", infix("<=", count, high), *guard), step, *one.body),)
         more = Name(f"more_{name.removeprefix('v_')}")
         inner = (*one.body, Set(more, infix("<", count, high)), when(more, step))
-        again = Frame(f"while ({self.code(infix('&&', more, *guard))}) {{", inner, "}")
-        return (Frame("{", (Let("bool", more.text, Constant(1, "bool")), begin, again), "}"),)
+        again = Frame(("while (", infix("&&", more, *guard), ") {"), inner, "}")
+        return (Frame(("{",), (Let("bool", more.text, Constant(1, "bool")), begin, again), "}"),)
 
 
 class Python(Language):
@@ -415,7 +420,8 @@ class Python(Language):
             case Let(name=name, value=value):
                 return (Set(Name(name), value),) if value is not None else ()
             case Loop(name=name, low=low, high=high, body=body):
-                return (Frame(f"for {name} in range({low}, {high + 1}):", body),)
+                within = Invoke("range", (Constant(low), Constant(high + 1)))
+                return (Frame(("for ", Name(name), " in ", within, ":"), body or (Line("pass"),)),)
 
 
 IN_C, IN_PYTHON = C(), Python()

@@ -303,7 +303,7 @@ class CText(Text):
         arms = self.arms(subject, statement)
         orelse = self.block(statement.orelse) if statement.orelse else (Line("/* nothing */"),)
         self._nested -= 1
-        return (Frame("{", (let, Branch(arms, orelse)), "}"),)
+        return (Frame(("{",), (let, Branch(arms, orelse)), "}"),)
 
 
 def locals_of(procedure: model.Procedure) -> Iterator[tuple[str, Scalar]]:

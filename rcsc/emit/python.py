@@ -202,11 +202,8 @@ class _Maker:
         begin = Invoke("_begin" if self.plan.defensive else "_admit", (STATE,))
         shown = any(variable.safe is not None for variable in self.program.variables)
         safe = (when(FAULTED, _run("_safe")),) if shown else ()
-        run = Frame("try:", (_run("_settle"), *body))
-        refused = Frame(
-            "except _Refused as refused:",
-            (Line(f"s.fault, s.fault_at = {Fault.EXTERN:d}, refused.position"),),
-        )
+        run = Frame(("try:",), (_run("_settle"), *body))
+        refused = Frame(("except _Refused as refused:",), (_faulted(Fault.EXTERN, Name("refused.position")),))
         return _on_state(doc, name, Set(FAULT, begin), when(FAULTLESS, run, refused), *safe, Leave(FAULT))
 
     # --- tables ---
@@ -255,8 +252,8 @@ class _Maker:
         masks = Infix("&", tuple(ands)) if ands else Constant((1 << matcher.lines) - 1)
         if matcher.lines <= WORD:  # small masks are found fastest in a dictionary, large ones by their length
             found = self._constant(f"{upper}_ONE", (f"_one_of({tail}),",))
-            yield Frame("try:", (Leave(Element(Element(found, Constant(0)), masks)),))
-            yield Frame("except KeyError:", (Leave(Constant(-2)),))
+            yield Frame(("try:",), (Leave(Element(Element(found, Constant(0)), masks)),))
+            yield Frame(("except KeyError:",), (Leave(Constant(-2)),))
             return
         yield Set(Name("m"), masks)
         yield Leave(Name(f"m.bit_length() - 1 if m and not m & (m - 1) else _line_of(m, {tail})"))
@@ -294,11 +291,11 @@ class _Maker:
         for place in table.monitored:
             assumption = self.program.assumptions[self.plan.monitored[place]]
             word, bit = divmod(place, FAILED_BITS)
-            ended = Line(f"s.fault, s.fault_at = {Fault.ASSUMPTION:d}, {place}")
-            test = IN_PYTHON.code(Prefix("not ", self.text.expr(assumption.condition)))
-            mark = Line(f"s.{self.names.failed[word]} |= 1 << {bit}")
-            stop = (when(FAULTLESS, ended),) if place in table.stops else ()
-            yield Frame(f"if {test}:  # {comment(assumption.name)}", (mark, *stop))
+            test = Prefix("not ", self.text.expr(assumption.condition))
+            mark = Frame((Place((self.names.failed[word],)), f" |= 1 << {bit}"))
+            ended = when(FAULTLESS, _faulted(Fault.ASSUMPTION, Constant(place)))
+            stop = (ended,) if place in table.stops else ()
+            yield Frame(("if ", test, f":  # {comment(assumption.name)}"), (mark, *stop))
         if table.stops:
             yield when(FAULTED, Line("return"))
         line = Name("line")
@@ -333,6 +330,10 @@ def _on_state(doc: str, name: str, *body: Stmt) -> Function:
 
 def _run(name: str) -> Do:
     return Do(Invoke(name, (STATE,)))
+
+
+def _faulted(fault: Fault, at: Code) -> Frame:
+    return Frame((FAULT, ", ", FAULT_AT, " = ", Constant(fault), ", ", at))
 
 
 def _refused(position: int) -> Leave:
