@@ -1092,6 +1092,9 @@ class Code(StrEnum):
     What is compiled together can be linked together and stands in one folder. So two programs may not give one name in C to two things
     (table `b_c` of `a.rcs` and table `c` of `a_b.rcs` both make `a_b_c_step`), nor be compiled to one file (`a-b.rcs` and `a_b.rcs`),
     and functions of yours that have one name in C take the same types. Rename one of them.
+
+    A file that stands in the folder already is overwritten only if a program of the same name was compiled to it: not what another
+    program left there, and nothing that was not made by rcsc. Choose another folder with `--out`, or delete what nothing needs.
     """
     EXTERN_NAME = """RCS504: an extern procedure's name does not fit
 
