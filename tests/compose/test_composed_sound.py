@@ -586,7 +586,7 @@ def test_the_prover_calls_no_code_of_the_user(tmp_path: Path, monkeypatch: pytes
     """Not where it proves, nor where it looks for runs, nor where it runs them, freezes them and runs the case."""
     (tmp_path / "of_the_user.py").write_text("import os\nos._exit(0)\n", encoding="utf-8")
     monkeypatch.syspath_prepend(str(tmp_path))
-    text = asks(*RESULTS["a number"]).replace("no_such_module", "of_the_user")
+    text = edited(asks(*RESULTS["a number"]), ("no_such_module", "of_the_user"))
     path = solo_system(tmp_path, text)
     found, kept = tmp_path / "found", tmp_path / "cases"
     assert run(["prove", str(path), "--log", str(found), "--freeze", str(kept), "--jobs", "2"]) == 1
@@ -594,7 +594,7 @@ def test_the_prover_calls_no_code_of_the_user(tmp_path: Path, monkeypatch: pytes
     assert run(["replay", str(log), "--generated", str(found / "generated")]) == 0
     [case] = kept.glob("*.json")
     assert run(["prove", "--case", str(case)]) == 1  # as it expects the property to be kept
-    path.with_name("solo.rcs").write_text(text.replace("a := go; ext;", "ext; a := go;"), encoding="utf-8")
+    edit_file(path.with_name("solo.rcs"), ("a := go; ext;", "ext; a := go;"))
     assert run(["prove", "--case", str(case)]) == 0
 
 

@@ -16,7 +16,7 @@ from rcsc.driver import outline
 from rcsc.host.cache import FOLDER, Cache
 from rcsc.host.files.plain import plain, read
 from tests.support.programs.systems import HOPED, small_system, small_text, solo_system
-from tests.support.programs.texts import edit_file, level
+from tests.support.programs.texts import edit_file, level, table
 
 KEPT = "assuming in_step (proved), kept by the levels together, system.toml"
 DECIDES = "is not known: `rcsc prove system.toml` decides it"
@@ -57,7 +57,7 @@ def prove(*args: str) -> int:
     return run(["prove", "system.toml", "--trace", "0", *args])
 
 
-def table(form: str, name: str = "work") -> dict[str, Any]:
+def reported_table(form: str, name: str = "work") -> dict[str, Any]:
     found: dict[str, Any] = next(one for one in json.loads(form)["tables"] if one["table"] == name)
     return found
 
@@ -75,8 +75,8 @@ def test_an_assumption_is_proved_where_the_levels_together_are(check: Said) -> N
     assert DECIDES not in check()
     assert KEPT in check()  # from what the last check kept
     form = check("--json", "upper.rcs")
-    assert table(form)["assumptions"] == [{"name": "in_step", "standing": "proved"}]
-    assert table(form)["together"]["proved"] == ["in_step"]
+    assert reported_table(form)["assumptions"] == [{"name": "in_step", "standing": "proved"}]
+    assert reported_table(form)["together"]["proved"] == ["in_step"]
     assert json.loads(form)["systems"] == [
         {"system": "system.toml", "standing": "proved", "wanted": False, "missing": []}
     ]
@@ -183,7 +183,7 @@ def test_what_was_found_not_to_be_proved_is_a_warning(check: Said) -> None:
     assert "in_step (proved)" in said
     form = check("--json", "upper.rcs")
     assert json.loads(form)["systems"][0]["standing"] == "not proved"
-    assert table(form)["together"]["not_proved"] == ["never_failed"]
+    assert reported_table(form)["together"]["not_proved"] == ["never_failed"]
     assert "::warning file=upper.rcs," in check("--github", "upper.rcs")
     assert "RCS751" not in check("lower.rcs")  # another level's
 
@@ -203,7 +203,7 @@ def test_nothing_is_proved_of_levels_that_do_not_agree(check: Said) -> None:
     )
     assert "level `lower`: the report echoes the command that it answers `report`" in said
     form = json.loads(check("--json", "upper.rcs"))
-    assert table(json.dumps(form))["together"]["conditional"] == ["in_step"]
+    assert reported_table(json.dumps(form))["together"]["conditional"] == ["in_step"]
     assert form["systems"][0] | {"missing": []} == {
         "system": "system.toml", "standing": "not proved", "wanted": False, "missing": [],
     }  # fmt: skip
@@ -220,15 +220,15 @@ def test_what_the_tables_declare_is_not_called_proved_and_is_named_by_what_rests
     """What is assumed of an input is as true as somebody believes it, however much the levels prove from it."""
     one_level(
         "input x : int 0 .. 9\nstate n : int 0 .. 9\nassume small assumed : x < 5\nassume kept monitored : n < 5\n"
-        "property below : n < 5\n"
-        "table t assuming small, kept {\n| line | x | n || n |\n| a | 0 .. 4 | < 5 || x |\n}"
+        "property below : n < 5\n",
+        table("t", "line | x | n || n", "a | 0 .. 4 | < 5 || x", assuming="small, kept"),
     )
     assert prove() == 0
     said = check("solo.rcs")
     trusting = "system.toml, trusting assumption `small` of level `solo`"
     assert f"assuming small (assumed), kept (proved), kept by the levels together, {trusting}, " in said
     assert f"= note: proved of the levels together, {trusting}" in said
-    found = table(check("--json", "solo.rcs"), "t")
+    found = reported_table(check("--json", "solo.rcs"), "t")
     assert found["together"]["proved"] == ["kept"]
     assert found["together"]["trusts"] == ["assumption `small` of level `solo`"]
 
@@ -238,7 +238,8 @@ def test_lines_that_never_run_because_of_what_is_declared_say_so(
     check: Said, capfd: pytest.CaptureFixture[str]
 ) -> None:
     one_level(
-        "input x : int 0 .. 9\nassume small assumed : x < 5\ntable t assuming small {\n| line | x ||\n| a | < 5 ||\n| b | >= 5 ||\n}"
+        "input x : int 0 .. 9\nassume small assumed : x < 5\n",
+        table("t", "line | x ||", "a | < 5 ||", "b | >= 5 ||", assuming="small"),
     )
     assert prove() == 0
     trusting = "trusting assumption `small` of level `solo`"
@@ -252,8 +253,14 @@ def test_what_rests_on_what_is_not_proved_is_conditional_and_says_on_what(check:
     one_level(
         "input x : bool\nstate at : int 0 .. 9\nstate n : int 0 .. 9\nstate list : array[3] of bool\n"
         "invariant inside : at < 3\nassume fine monitored : n < 9\nproperty stays : n < 9\n"
-        "procedure mark { list[at] := x }\nmodule spoil writes at { at := 5 }\nmodule mend writes at { at := 0 }\n"
-        "table t assuming fine {\n| line | x | n || procedures |\n| a | true | < 9 || mark |\n| b | false | < 9 || |\n}",
+        "procedure mark { list[at] := x }\nmodule spoil writes at { at := 5 }\nmodule mend writes at { at := 0 }\n",
+        table(
+            "t",
+            "line | x | n || procedures",
+            "a | true | < 9 || mark",
+            "b | false | < 9 || ",
+            assuming="fine",
+        ),
         "spoil",
         "mend",
     )
@@ -283,9 +290,9 @@ def test_what_was_not_looked_at_is_named(check: Said) -> None:
     jsonschema.validate(json.loads(form), schema, jsonschema.Draft202012Validator)
 
 
-def one_level(text: str, before: str = "", after: str = "") -> None:
-    """A system of one level without neighbours, whose table is `t`."""
-    solo_system(Path(), f"{text}\n{level('solo', before=before, after=after)}")
+def one_level(declared: str, rows: str, before: str = "", after: str = "") -> None:
+    """A system of one level without neighbours, by its declarations and its table `t`."""
+    solo_system(Path(), f"{declared}{rows}{level('solo', before=before, after=after)}")
 
 
 # --- properties ---------------------------------------------------------------------------------
@@ -358,7 +365,7 @@ def test_a_default_that_no_run_of_the_system_reaches_is_said_to_be_so(check: Sai
     assert prove() == 0
     assert "= note: none of them comes in system.toml: proved of the levels together" in check()
     assert "line 7 never reached in system.toml" in check()
-    assert table(check("--json", "upper.rcs"))["together"]["unreached"] == ["7"]
+    assert reported_table(check("--json", "upper.rcs"))["together"]["unreached"] == ["7"]
 
 
 # --- what follows from what -------------------------------------------------------------------

@@ -112,7 +112,7 @@ def test_the_same_text_is_known_by_digest_and_no_solver_is_asked(
 def test_a_narrowed_condition_gives_what_it_lost_to_default(task: Callable[..., Program]) -> None:
     nine = line_of("9")
     found = acquire(
-        task, (nine, nine.replace("| pause          |           |", "| pause          | done      |"))
+        task, (nine, edited(nine, ("| pause          |           |", "| pause          | done      |")))
     )
     changed = part(found, "acquire")
     assert regions(changed.changes) == {
@@ -137,7 +137,7 @@ def test_a_narrowed_condition_gives_what_it_lost_to_default(task: Callable[..., 
 
 def test_a_widened_condition_meets_another_line_where_both_now_match(task: Callable[..., Program]) -> None:
     five = line_of("5")
-    wide = five.replace("| done      | state_4 ", "| /= executing | state_4 ")
+    wide = edited(five, ("| done      | state_4 ", "| /= executing | state_4 "))
     changed = part(acquire(task, (five, wide)), "acquire")
     assert regions(changed.changes) == {
         (
@@ -163,7 +163,7 @@ def test_two_lines_that_change_places_mean_the_same(task: Callable[..., Program]
 
 
 def test_a_renamed_line_is_another_line_with_the_same_effect(task: Callable[..., Program]) -> None:
-    found = acquire(task, (line_of("7"), line_of("7").replace("| 7    |", "| 7a   |")))
+    found = acquire(task, (line_of("7"), edited(line_of("7"), ("| 7    |", "| 7a   |"))))
     assert not found.changed
     assert regions(part(found, "acquire").moved) == {
         (
@@ -177,13 +177,9 @@ def test_a_renamed_line_is_another_line_with_the_same_effect(task: Callable[...,
 def test_a_line_split_in_two_with_the_same_effect_is_told_apart(task: Callable[..., Program]) -> None:
     ten = line_of("10")
     cell = "| /= f_state                              |"
-    assert cell in ten
-    low = ten.replace(cell, "| in {d_state, state_2} |")
-    rest = (
-        ten.replace("| 10   |", "| 10b  |")
-        .replace(cell, "| not_of |")
-        .replace("not_of", "in {state_3, state_4, state_5, state_6, state_7, state_8}")
-    )
+    others = "| in {state_3, state_4, state_5, state_6, state_7, state_8} |"
+    low = edited(ten, (cell, "| in {d_state, state_2} |"))
+    rest = edited(ten, ("| 10   |", "| 10b  |"), (cell, others))
     found = acquire(task, (ten, low + rest))
     assert not found.changed
     [moved] = part(found, "acquire").moved
@@ -196,7 +192,7 @@ def test_a_constant_in_a_line_changes_its_effect_and_the_steps_of_the_state_grap
     task: Callable[..., Program],
 ) -> None:
     six = line_of("6")
-    found = acquire(task, (six, six.replace("nextstate(state_3)", "nextstate(state_4)")))
+    found = acquire(task, (six, edited(six, ("nextstate(state_3)", "nextstate(state_4)"))))
     [change] = part(found, "acquire").changes
     assert [(v.leaf, v.before, v.after) for v in change.values] == [("cur_state.next", "state_3", "state_4")]
     assert change.where.words == (
@@ -526,9 +522,13 @@ def test_a_property_that_is_new_or_gone_is_said_with_its_words() -> None:
 
 def test_a_condition_about_a_variable_of_another_kind_cannot_be_compared() -> None:
     before = edited(COUNTED, ("level l", "assume low : width <= 8 and count <= 9\nlevel l"))
-    after = before.replace("input width : int 0 .. 9", "input width : real 0.0 .. 9.0")
-    after = after.replace("until width = 0", "until width = 0.0")
-    found = differ(before, after.replace("width <= 8 and", "width <= 8.0 and"))
+    after = edited(
+        before,
+        ("input width : int 0 .. 9", "input width : real 0.0 .. 9.0"),
+        ("until width = 0", "until width = 0.0"),
+        ("width <= 8 and", "width <= 8.0 and"),
+    )
+    found = differ(before, after)
     for name, what in (("ends", "property"), ("low", "assumption")):
         assert part(found, name, what).said == ("cannot be compared: `width` changed its kind",)
     assert not part(found, "rises", "property").changed
@@ -962,9 +962,9 @@ def test_two_revisions_and_the_files_as_they_are(folder: Path, capfd: pytest.Cap
     git("init", "-q")
     git("add", ".")
     git("commit", "-qm", "one")
-    (inner / "grip.rcs").write_text(rest.replace("| 1     |", "| 3     |"), encoding="utf-8")
+    (inner / "grip.rcs").write_text(edited(rest, ("| 1     |", "| 3     |")), encoding="utf-8")
     git("commit", "-qam", "two")
-    (inner / "grip.rcs").write_text(rest.replace("| 2     |", "| 3     |"), encoding="utf-8")
+    (inner / "grip.rcs").write_text(edited(rest, ("| 2     |", "| 3     |")), encoding="utf-8")
     before = (inner / "grip.rcs").read_text(encoding="utf-8")
     assert run(["diff", "--rev", "HEAD~1..HEAD", "cell"]) == 1
     first = capfd.readouterr().out

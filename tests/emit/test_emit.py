@@ -36,7 +36,7 @@ from rcsc.testing.executors.externs import python_stand_ins
 from rcsc.testing.executors.symbols import symbols_of
 from tests.support.programs.examples import EXTERN, RICH
 from tests.support.programs.stages import emitted, program_of
-from tests.support.programs.texts import edited
+from tests.support.programs.texts import edited, table
 
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Wpedantic", "-Wtrigraphs", "-Wshadow", "-Werror")
 KEYWORDS = frozenset("""input state output table level procedure module owner extern enum record type unit const use assume
@@ -102,9 +102,9 @@ TABLE = "{head}table t {{\n| line | a || procedures |\n| x | true || {done} |\n|
 A = "input a : bool\n"
 
 
-def table(done: str = "") -> str:
+def one_table(done: str = "") -> str:
     """Two lines, of which the first does something."""
-    return f"table t {{\n| line | a || procedures |\n| x | true || {done} |\n| y | false || |\n}}\n"
+    return table("t", "line | a || procedures", f"x | true || {done}", "y | false || ")
 
 
 def several(form: str, words: list[str]) -> str:
@@ -119,7 +119,9 @@ def with_parameters(words: list[str]) -> str:
         f"procedure p{at}({x} : int 0 .. 3) {{ local {y} : int 0 .. 6 := {x} + 1; o := {y} }}\n"
         for at, (x, y) in enumerate(pairs)
     )
-    return A + "output o : int 0 .. 9\n" + text + table("; ".join(f"p{at}(2)" for at, _ in enumerate(pairs)))
+    return (
+        A + "output o : int 0 .. 9\n" + text + one_table("; ".join(f"p{at}(2)" for at, _ in enumerate(pairs)))
+    )
 
 
 def with_levels(words: list[str]) -> str:
@@ -130,22 +132,24 @@ def with_levels(words: list[str]) -> str:
 
 
 ROLES: dict[str, Callable[[list[str]], str]] = {
-    "input": lambda w: A + several("input @ : int 0 .. 9\n", w) + table(),
+    "input": lambda w: A + several("input @ : int 0 .. 9\n", w) + one_table(),
     "deferred state": lambda w: (
-        A + several("state @ : int 0 .. 9 deferred until a\n", w) + table(several("next @ := 3; ", w)[:-2])
+        A
+        + several("state @ : int 0 .. 9 deferred until a\n", w)
+        + one_table(several("next @ := 3; ", w)[:-2])
     ),
-    "enumeration": lambda w: A + several("enum @ { m_@ }\ninput v_@ : @\n", w) + table(),
+    "enumeration": lambda w: A + several("enum @ { m_@ }\ninput v_@ : @\n", w) + one_table(),
     "member": lambda w: (
-        f"enum e {{ {', '.join(w)} }}\ninput v : e\noutput o : e\n" + A + table(f"o := {w[-1]}")
+        f"enum e {{ {', '.join(w)} }}\ninput v : e\noutput o : e\n" + A + one_table(f"o := {w[-1]}")
     ),
-    "record": lambda w: A + several("record @ { f : bool }\ninput v_@ : @\n", w) + table(),
+    "record": lambda w: A + several("record @ { f : bool }\ninput v_@ : @\n", w) + one_table(),
     "field": lambda w: (
         A
         + f"record r {{ {several('@ : int 0 .. 9 ', w)} }}\noutput o : r\n"
-        + table(several("o.@ := 3; ", w)[:-2])
+        + one_table(several("o.@ := 3; ", w)[:-2])
     ),
     "procedure": lambda w: (
-        A + "output o : int 0 .. 9\n" + several("procedure @ { o := 3 }\n", w) + table("; ".join(w))
+        A + "output o : int 0 .. 9\n" + several("procedure @ { o := 3 }\n", w) + one_table("; ".join(w))
     ),
     "parameter and local": with_parameters,
     "table and level": with_levels,

@@ -67,10 +67,10 @@ def test_procedures_of_levels_keep_invariants_as_a_whole() -> None:
         "procedure first { n := 5 } procedure second { m := 6 } level l { preprocess first, second table t }"
     )
     assert errors(verdict_of(COUNTER + level).findings) == []
-    assert errors(verdict_of(COUNTER + level.replace("first, second", "first")).findings) == ["RCS417"]
-    behind = level.replace("preprocess first, second table t", "table t postprocess first, second")
+    assert errors(verdict_of(COUNTER + edited(level, ("first, second", "first"))).findings) == ["RCS417"]
+    behind = edited(level, ("preprocess first, second table t", "table t postprocess first, second"))
     assert errors(verdict_of(COUNTER + behind).findings) == []
-    assert errors(verdict_of(COUNTER + behind.replace("m := 6", "m := 5")).findings) == ["RCS417"]
+    assert errors(verdict_of(COUNTER + edited(behind, ("m := 6", "m := 5"))).findings) == ["RCS417"]
 
 
 def test_deferred_values_keep_invariants() -> None:

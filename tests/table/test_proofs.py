@@ -13,7 +13,7 @@ from rcsc.lang.resolve import resolve
 from rcsc.solvers.options import Options
 from rcsc.table import program as proving
 from tests.support.programs.stages import codes, errors, verdict_of
-from tests.support.programs.texts import edited
+from tests.support.programs.texts import edited, table
 
 HEAD = """\
 input n : int 0 .. 9
@@ -119,13 +119,8 @@ def test_a_procedure_run_by_a_level_is_not_excused_by_the_lines_that_guard_it() 
 
 
 def guarded(name: str, procedure: str) -> str:
-    return f"""\
-table {name} {{
-  | line | s    || procedures |
-  | a    | < 9  || {procedure} |
-  | b    | >= 9 ||             |
-}}
-"""
+    """A table that calls the procedure only where `s` can still grow."""
+    return table(name, "line | s || procedures", f"a | < 9 || {procedure}", "b | >= 9 || ")
 
 
 def test_tables_kept_from_different_versions_do_not_excuse_a_procedure_together(cache: Cache) -> None:

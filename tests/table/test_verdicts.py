@@ -22,6 +22,7 @@ from rcsc.solvers.options import Options
 from rcsc.table.program import prove_program
 from rcsc.table.verdict import ContradictoryAssumptions, DeadLine, Gap, Overlap, Undecided
 from tests.support.programs.stages import drawn_program, program_of, verdict_of
+from tests.support.programs.texts import table
 
 HERE = {
     "lib": "state a : int 0 .. 9\ninput g : bool\ntable t {\n  | line | a ||\n  | l | <= 4 ||\n  | h | 5 .. 8 ||\n}\n",
@@ -225,9 +226,10 @@ def test_every_way_of_deciding_finds_what_trying_all_inputs_finds(text: str) -> 
 @pytest.mark.parametrize("solver", ["boxes", "auto", "both"])
 def test_what_an_assumption_kills_is_told(solver: Literal["boxes", "auto", "both"]) -> None:
     """Boxes prove both tables without the assumption, under which a line, and DEFAULT, are dead."""
-    head = "input v : bool\nassume up assumed : v\ntable t assuming up {\n  | line | v ||\n  | l | true ||\n"
-    for last, code in (("  | m | false ||\n", Code.DEAD_LINE), ("  | d | DEFAULT ||\n", Code.DEFAULT_DEAD)):
-        [found] = verdict_of(f"{head}{last}}}\n", Options(solver=solver)).findings
+    head = "input v : bool\nassume up assumed : v\n"
+    for last, code in (("m | false ||", Code.DEAD_LINE), ("d | DEFAULT ||", Code.DEFAULT_DEAD)):
+        text = head + table("t", "line | v ||", "l | true ||", last, assuming="up")
+        [found] = verdict_of(text, Options(solver=solver)).findings
         assert found.code is code
         assert found.notes == ("under `up`",)
         assert found.severity is Severity.WARNING  # where the assumption fails it may match
@@ -235,34 +237,28 @@ def test_what_an_assumption_kills_is_told(solver: Literal["boxes", "auto", "both
 
 @pytest.mark.parametrize("solver", ["boxes", "auto", "both"])
 def test_a_line_that_an_invariant_kills_is_a_mistake(solver: Literal["boxes", "auto", "both"]) -> None:
-    text = (
-        "state v : bool = true\ninput w : bool\ninvariant up : v\nassume w_up assumed : w\ntable t assuming w_up {\n"
-        "  | line | v ||\n  | l | true ||\n  | m | false ||\n}\n"
-    )
+    head = "state v : bool = true\ninput w : bool\ninvariant up : v\nassume w_up assumed : w\n"
+    text = head + table("t", "line | v ||", "l | true ||", "m | false ||", assuming="w_up")
     found = verdict_of(text, Options(solver=solver)).findings
     assert [(finding.code, finding.severity) for finding in found] == [(Code.DEAD_LINE, Severity.ERROR)]
 
 
 def test_a_gap_between_related_lines_is_told_with_the_region_around_its_least_point() -> None:
-    text = (
-        "input x : int 0 .. 9\ninput y : int 0 .. 9\n"
-        "table t {\n  | line | when ||\n  | l | x < y ||\n  | m | x > y + 1 ||\n}\n"
-    )
+    head = "input x : int 0 .. 9\ninput y : int 0 .. 9\n"
+    text = head + table("t", "line | when ||", "l | x < y ||", "m | x > y + 1 ||")
     [gap] = [one for one in verdict_of(text, Options()).tables[0].found if isinstance(one, Gap)]
     assert gap.witnesses == ({"x": 0, "y": 0},)
     assert gap.regions[0] is not None
 
 
 def test_the_zeros_of_both_signs_are_one_value_to_the_solver() -> None:
-    text = "input r : real -1.0 .. 1.0\ntable t {\n  | line | r * 0.0 ||\n  | l | = 0.0 ||\n}\n"
+    text = "input r : real -1.0 .. 1.0\n" + table("t", "line | r * 0.0 ||", "l | = 0.0 ||")
     assert verdict_of(text, Options()).tables[0].found == ()
 
 
 def test_what_an_unproved_invariant_kills_says_so() -> None:
-    text = (
-        "state n : int 0 .. 9 = 1\ninput v : bool\ninvariant small : n <= 4\n"
-        "table t {\n  | line | n || n |\n  | l | <= 4 || 9 |\n  | d | DEFAULT || 1 |\n}\n"
-    )
+    head = "state n : int 0 .. 9 = 1\ninput v : bool\ninvariant small : n <= 4\n"
+    text = head + table("t", "line | n || n", "l | <= 4 || 9", "d | DEFAULT || 1")
     notes = {finding.code: finding.notes for finding in verdict_of(text, Options()).findings}
     assert notes[Code.DEFAULT_DEAD] == ("under `small` (not proved)",)
 

@@ -29,6 +29,8 @@ def edit_file(path: Path, *edits: tuple[str, str]) -> None:
 def table(name: str, *rows: str, assuming: str = "") -> str:
     """Return a table's declaration; rows are without their outer bars, the heading is the first.
 
+    A row that ends in `||` has no columns of actions; one that ends in `|| ` has one, which is empty there.
+
     >>> print(table("t", "line | a || b", "low | < 5 || true", assuming="calm"))
     table t assuming calm {
     | line | a || b |
