@@ -41,6 +41,8 @@ STOPPED = FAULTS.index("assumption failed")
 
 
 MOST_SYMBOL_BYTES, MOST_LEAVES, MOST_LEVELS, LONGEST_PERIOD_MS = 64 * MIB, 1_000_000, 100_000, 2**31 - 1
+MOST_MEMBERS = {"uint8_t": 2**8, "uint16_t": 2**16}
+"""Of an enumeration, by the type in C that its values have."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -303,6 +305,8 @@ def _leaf(said: Said) -> Leaf:
     )
     if not _fits(c_type, initial) or (members and not 0 <= (initial or 0) < len(members)):
         raise Malformed(f"{said.where}.initial is no `{c_type}` of it")
+    if len(members) > MOST_MEMBERS.get(c_type, 0):
+        raise Malformed(f"{said.where} has {len(members)} members, more than a `{c_type}` can tell apart")
     assert initial is not None
     return Leaf(
         said.member("name"),

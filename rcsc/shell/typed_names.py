@@ -154,10 +154,16 @@ def value_of(leaf: Leaf, text: str) -> Value:
         ) from error
 
 
+MOST_MEMBERS = 40
+"""Of an enumeration that a message names."""
+
+
 def kind_of(leaf: Leaf) -> str:
     """What a leaf may be, in words."""
     if leaf.members:
-        return f"one of {', '.join(leaf.members)}"
+        more = len(leaf.members) - MOST_MEMBERS
+        others = f" and {more} more" if more > 0 else ""
+        return f"one of {', '.join(leaf.members[:MOST_MEMBERS])}{others}"
     if leaf.c_type == "bool":
         return "false or true"
     unit = f" [{leaf.unit}]" if leaf.unit else ""

@@ -36,6 +36,7 @@ from rcsc.run.log.recorder import Recorder
 from rcsc.run.log.records import MOST_CHUNK, ChainCheck, Seal, records
 from rcsc.run.signature import signature
 from rcsc.run.system import System, assemble
+from rcsc.shell.typed_names import kind_of
 from rcsc_cell.pictures.page import quoted
 from tests.support.programs.stages import emitted, shipped
 from tests.support.programs.texts import system
@@ -693,6 +694,25 @@ def test_nothing_in_a_symbol_file_becomes_code(
             path.write_text(json.dumps(_with(said, place, text)), encoding="utf-8")
             with pytest.raises(ValueError, match="no symbol file"):
                 signature(path)
+
+
+def test_an_enumeration_has_no_more_members_than_its_type_tells_apart(project: Path, tmp_path: Path) -> None:
+    said = json.loads((project / "generated" / "c" / "walker.json").read_text(encoding="utf-8"))
+    path = tmp_path / "walker.json"
+    for c_type, most in (("uint8_t", 2**8), ("uint16_t", 2**16), ("uint64_t", 0)):
+        said["leaves"][0] |= {"c_type": c_type, "initial": 0}
+        for count in {most, most + 1} - {0}:
+            said["leaves"][0]["members"] = [f"m{number}" for number in range(count)]
+            path.write_text(json.dumps(said), encoding="utf-8")
+            if count == most:
+                leaf = signature(path).leaves[0]
+                assert len(kind_of(leaf)) < 400
+                assert kind_of(leaf).endswith(f" and {most - 40} more")
+            else:
+                with pytest.raises(
+                    ValueError, match=f"has {count} members, more than a `{c_type}` can tell apart"
+                ):
+                    signature(path)
 
 
 def test_a_field_is_matched_to_its_end() -> None:
