@@ -17,6 +17,7 @@ from rcsc.emit.plan import (
     Truth,
     grouped,
 )
+from rcsc.lang.interval_sets import holds
 from rcsc.lang.meaning import checked
 from rcsc.lang.model import (
     Bool,
@@ -141,7 +142,7 @@ def _leaf_probe(variable: Variable, stated: list[tuple[int, Box]], everyone: int
     for at, box in stated:
         bit = 1 << at
         for place, start in enumerate(starts):
-            if not any(first <= start <= last for first, last in box):
+            if not holds(box, start):
                 excluded[place] |= bit
     return Probe(index, tuple(everyone & ~mask for mask in excluded))
 

@@ -1,5 +1,6 @@
 """Sets of keys in a table's own words: a cell that would say the same."""
 
+from rcsc.lang.interval_sets import holds
 from rcsc.lang.model import Bool, Box, Enum, Scalar, key_bounds, spell, value_of_key
 from rcsc.table.verdict import Region
 
@@ -17,7 +18,7 @@ def cell(kind: Scalar, box: Box) -> str | None:
         for key in range(first, min(last, first + 64) + 1)
     ]
     if isinstance(kind, Bool | Enum):
-        outside = [key for key in range(low, high + 1) if not any(a <= key <= b for a, b in box)]
+        outside = [key for key in range(low, high + 1) if not holds(box, key)]
         if len(words) == 1:
             return words[0]
         if len(outside) == 1:

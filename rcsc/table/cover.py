@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from itertools import pairwise, product
 from math import prod
 
-from rcsc.lang.interval_sets import joined, meet, size
+from rcsc.lang.interval_sets import holds, joined, meet, size
 from rcsc.lang.model import (
     COMPARISONS,
     Bool,
@@ -254,7 +254,7 @@ def _within(starts: list[int], part: Box) -> list[tuple[int, int]]:
     """The classes in a part of the variable's values, which cuts no class."""
     edges = sorted({*(start for start in starts), *(low for low, _ in part), *(high + 1 for _, high in part)})
     pairs = [(low, high - 1) for low, high in pairwise(edges)]
-    return [pair for pair in pairs if any(low <= pair[0] <= high for low, high in part)]
+    return [pair for pair in pairs if holds(part, pair[0])]
 
 
 def _widest(at: int, classes: list[tuple[int, int]], fits: Callable[[Box], bool]) -> Box:

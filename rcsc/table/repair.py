@@ -5,7 +5,7 @@ In: a finding of a box table. Out: a sentence, or nothing.
 
 from dataclasses import dataclass
 
-from rcsc.lang.interval_sets import meet, size
+from rcsc.lang.interval_sets import complement, meet, size
 from rcsc.lang.model import Box, Program, Scalar, Table, key_bounds
 from rcsc.table import boxes, cells
 from rcsc.table.partition import BudgetError, Gaps
@@ -54,7 +54,7 @@ def _narrowed(
         if another != name and not _within(mine.get(another, everything), theirs.get(another, everything)):
             return None
     before = mine.get(name, whole)
-    left = _minus(before, theirs.get(name, whole))
+    left = meet(before, complement(theirs.get(name, whole), *whole[0]))
     cell = cells.cell(kinds[name], left) if left else None
     if not cell or meet(left, theirs.get(name, whole)):
         return None
@@ -63,22 +63,6 @@ def _narrowed(
 
 def _within(inner: Box, outer: Box) -> bool:
     return meet(inner, outer) == inner
-
-
-def _minus(box: Box, taken: Box) -> Box:
-    """The keys of `box` that are not in `taken`."""
-    left: list[tuple[int, int]] = []
-    for low, high in box:
-        at = low
-        for first, last in taken:
-            if last < at or first > high:
-                continue
-            if first > at:
-                left.append((at, first - 1))
-            at = max(at, last + 1)
-        if at <= high:
-            left.append((at, high))
-    return tuple(left)
 
 
 def closing_line(program: Program, table: Table, found: Gap) -> str | None:

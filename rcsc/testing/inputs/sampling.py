@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from random import Random
 
 from rcsc.lang.interpret import evaluate
+from rcsc.lang.interval_sets import holds
 from rcsc.lang.leaves import read_by
 from rcsc.lang.model import (
     Expr,
@@ -78,7 +79,7 @@ def _aim(known: Declarations, line: Line, drawn: dict[str, int], random: Random)
     for test in line.tests:
         if test is not None and test.box:
             name = str(test.variables[0])
-            if not any(low <= drawn[name] <= high for low, high in test.box):
+            if not holds(test.box, drawn[name]):
                 low, high = random.choice(test.box)
                 inside = [key for key in known.edges[name] if low <= key <= high]
                 drawn[name] = random.choice(inside or [low, high])
