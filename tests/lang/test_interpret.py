@@ -24,7 +24,6 @@ from rcsc.lang.interpret import (
 )
 from rcsc.lang.model import Apply, Program, Value
 from rcsc.lang.operator_table import divide
-from rcsc.lang.resolve import compile_text
 from tests import differential
 from tests.support.programs.stages import program_of
 from tests.support.programs.texts import edited
@@ -40,12 +39,11 @@ def value_of(declared: str, text: str, **snapshot: Value) -> Value:
 
 
 WIDE = "int -9223372036854775808 .. 9223372036854775807"
-DIVIDED = compile_text(f"input a : {WIDE}\ninput b : {WIDE}\nassume d : a / b = 0\nassume m : a mod b = 0")
+DIVIDED = program_of(f"input a : {WIDE}\ninput b : {WIDE}\nassume d : a / b = 0\nassume m : a mod b = 0")
 
 
 @given(st.integers(-(2**63), 2**63 - 1), st.integers(-(2**63), 2**63 - 1).filter(bool))
 def test_quotients_round_toward_zero_and_remainders_have_the_sign_of_the_dividend(a: int, b: int) -> None:
-    assert isinstance(DIVIDED, Program)
     sides = [
         assumption.condition.args[0]
         for assumption in DIVIDED.assumptions

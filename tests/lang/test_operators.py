@@ -41,7 +41,6 @@ from rcsc.lang.model import (
     Int,
     Literal,
     Op,
-    Program,
     ReadLocal,
     Real,
     Scalar,
@@ -49,7 +48,6 @@ from rcsc.lang.model import (
     real_key,
 )
 from rcsc.lang.operator_table import LOGIC, Arithmetic, Comparison, Core, is_comparison
-from rcsc.lang.resolve import compile_text
 from rcsc.solvers import smt
 from rcsc.solvers.options import Options
 from rcsc.solvers.sat import Sat
@@ -606,12 +604,11 @@ NO_NUMBER = {  # two lines, of which none matches what is no number, or both do
 @pytest.mark.parametrize("kind", NO_NUMBER)
 def test_where_no_line_matches_what_is_no_number_an_input_is_tried(kind: str) -> None:
     """Whatever Z3 can tell within so few steps: doubles are slow for it."""
-    one, two, wanted = NO_NUMBER[kind]
-    program = compile_text(
+    first, second, wanted = NO_NUMBER[kind]
+    program = program_of(
         "input n : int 0 .. 3\ninput x : real -10.0 .. 10.0\ninput y : real -10.0 .. 10.0\nassume low monitored : x <= y + 20.0\n"
-        f"table t assuming low {{\n| line | when ||\n| a | {one} ||\n| b | {two} ||\n}}\n"
+        f"table t assuming low {{\n| line | when ||\n| a | {first} ||\n| b | {second} ||\n}}\n"
     )
-    assert isinstance(program, Program)
     found = prove_table(program, program.tables[0], Options(steps=20_000)).found
     [witness] = [
         wrong.witnesses[0] if isinstance(wrong, Gap) else wrong.witness

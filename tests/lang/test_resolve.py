@@ -8,7 +8,7 @@ from rcsc.diagnostics.diagnostic import Diagnostic
 from rcsc.diagnostics.source import Source
 from rcsc.lang.model import Assign, Call, Int, Program, Real, Select, Test, ToElement, ToLeaf, VariableName
 from rcsc.lang.resolve import compile_text
-from tests.support.programs.stages import program_of
+from tests.support.programs.stages import program_of, refused
 from tests.support.programs.texts import edited
 
 # Each case: the text, and for every error in it its line, its code and the text of its span.
@@ -205,8 +205,7 @@ CASES: dict[str, tuple[str, list[tuple[int, str, str]]]] = {
 
 
 def reported(text: str) -> list[tuple[int, str, str]]:
-    found = compile_text(text)
-    assert not isinstance(found, Program), "nothing was reported"
+    found = refused(text)
     source = Source("case.rcs", text)
     for finding in found:
         assert finding.message[0].islower() or not finding.message[0].isalpha()
@@ -291,9 +290,7 @@ def test_an_error_in_a_constant_is_not_reported_again_where_it_is_used() -> None
 
 
 def _only(text: str) -> Diagnostic:
-    found = compile_text(text)
-    assert not isinstance(found, Program)
-    (finding,) = found
+    (finding,) = refused(text)
     return finding
 
 
