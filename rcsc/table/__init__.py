@@ -25,6 +25,9 @@ Tests across variables, and assumptions, take a tree of regions (`regions`), and
 without `rcsc certify`: `partition`, `boxes`, `relational`, `regions` and what they rest on; by default Z3 confirms
 every table that is cheap enough, and a disagreement is a bug in rcsc.
 
+Two searches find a least witness. For boxes `partition` counts, which tells the first slice with a gap without a
+question; everywhere else a solver or a simplex is asked, and `rcsc.solvers.search` bisects with few questions.
+
 What it costs: pairs of lines and slices of keys for boxes, a budget in steps for the rest; what is over it is
 undecided, and fails.
 
