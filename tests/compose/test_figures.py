@@ -12,7 +12,7 @@ from rcsc.compose.contract.obligations import Sort, Unstated, obligations, pairs
 from rcsc.compose.contract.properties import every_predicate
 from rcsc.compose.contract.transition import Cycle, TransitionSystem
 from rcsc.compose.invariant.confirm import Confirmation
-from rcsc.compose.proof.assume_guarantee import of_level, promises
+from rcsc.compose.proof.assume_guarantee import _of_ending, of_level, promises
 from rcsc.compose.proof.level import LevelProof, _of_possible, certificate
 from rcsc.compose.proof.termination import Flow
 from rcsc.lang.leaves import parts
@@ -200,6 +200,18 @@ def test_what_levels_assume_of_each_other_is_told_word_for_word(
         ("upper", (CONTRACT, "", "lower")),
         Claim(Verdict.PROVED, kept, ("`lower` keeps to the protocol",)),
     )
+
+
+def test_an_ending_rests_on_those_of_levels_below_and_trusts_those_that_are_none(
+    upper: TransitionSystem,
+) -> None:
+    inside = _of_ending(upper, ("lower",), Verdict.PROVED)
+    still = "the values in `lower` of level `upper` stand still meanwhile"
+    assert inside == Claim(Verdict.PROVED, (("upper", RUNS), ("lower", ENDING)), (still,))
+    [below] = upper.links.below
+    left = replace(upper, links=replace(upper.links, below=(replace(below, outside=True),)))
+    answers = "`lower` answers every order that is not replaced, and stays so"
+    assert _of_ending(left, (), Verdict.PROVED) == Claim(Verdict.PROVED, (("upper", RUNS),), (answers,))
 
 
 # --- buffers ------------------------------------------------------------------------------

@@ -15,6 +15,8 @@ from rcsc.solvers import smt
 from rcsc.solvers.smt import Answer, Limits, Solver
 from rcsc.symbolic import trial, values
 from rcsc.symbolic.encode import declared, encode
+from rcsc.symbolic.keyed import KEY
+from rcsc.symbolic.measured import Measured
 from rcsc.symbolic.values import FALSE, TRUE, Fact, Node
 
 SPANS = list(combinations_with_replacement(range(-2, 4), 2))
@@ -316,3 +318,13 @@ def test_members_of_a_set_of_doubles_are_these(value: float, there: bool) -> Non
     solver.add(encode(Among(Read(variable.name, kind), (0.0, 1.5, 2.0), Bool()), frame))
     solver.add(smt.equal(frame.leaves[variable.name], smt.literal(kind, value), kind))
     assert solver.check() is (Answer.SATISFIABLE if there else Answer.UNSATISFIABLE)
+
+
+def test_a_double_that_is_divided_is_followed_as_far_as_it_is_rounded() -> None:
+    measured = Measured()
+    quarter = measured.term(values.arithmetic(Op.DIV, (X, double(4.0)), Real(-9.0, 9.0)))
+    solver = Solver()
+    solver.add(*measured.ranges, smt.equal(measured.term(X), smt.fraction(1.0), KEY))
+    near = [smt.at_most(smt.fraction(end), quarter, KEY) for end in (0.2499, 0.2501)]
+    assert solver.check(near[0], smt.negation(near[1])) is Answer.SATISFIABLE
+    assert solver.check(smt.negation(near[0])) is solver.check(near[1]) is Answer.UNSATISFIABLE

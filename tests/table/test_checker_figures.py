@@ -3,6 +3,7 @@
 import json
 from collections.abc import Callable, Iterable, Sequence
 from itertools import combinations_with_replacement, product
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from rcsc.certify.known import Known
 from rcsc.certify.owed import Debts
 from rcsc.certify.settle import CaseAnswer, Fails, Left, Settler, Shown, script, values_in
 from rcsc.certify.values import BOOL, FREE, INT, REAL, TRUTHS, Term, Terms, parts_first, spanned, truncated
-from rcsc.lang.model import Bool, Int, Real
+from rcsc.lang.model import Bool, Int, Program, Real
 from rcsc.solvers.options import Options
 from rcsc.table.program import prove_program
 from tests.support.programs.stages import program_of
@@ -513,3 +514,41 @@ def test_what_is_too_long_to_follow_is_named_and_placed(monkeypatch: pytest.Monk
         (f"procedure `alone`{many}", "alone", ""),
         (f"line `one` of table `t`{many}", "one", ""),
     ]
+
+
+SPELLED = {
+    "a literal": ["true"],
+    "a comparison and a literal": ["(x + y < 4) = true", "(x + y < 4) /= true"],
+    "what is not apart": ["not (x + y /= 3)", "x + y /= 3"],
+    "a truth and a comparison": ["p = (x < 4)", "p /= (x < 4)"],
+    "a comparison and a truth": ["(x + y < 4) = p", "(x + y < 4) /= p"],
+    "no member": ["not (x in {2, 3, 9})", "x in {2, 3, 9}"],
+}
+
+
+def entry_of(lines: list[str]) -> tuple[Program, dict[str, Any]]:
+    rows = "".join(f"| l{at} | {line} ||\n" for at, line in enumerate(lines))
+    text = f"input x : int 0 .. 20\ninput y : int 0 .. 20\ninput p : bool\ntable t {{\n| line | when ||\n{rows}}}\n"
+    program = program_of(text)
+    made: dict[str, Any] = json.loads(json.dumps(prove_program(program, Options()).certificate))
+    return program, made
+
+
+@pytest.mark.parametrize("case", SPELLED)
+def test_a_tree_is_checked_however_its_conditions_are_spelled(case: str) -> None:
+    program, certificate = entry_of(SPELLED[case])
+    found = certify(program, certificate)
+    assert (found.problems, found.unchecked) == ((), ())
+    assert found.checked[-1] == "table `t`: exactly one line matches"
+
+
+def test_what_is_wrong_with_a_tree_is_told_word_for_word() -> None:
+    program, certificate = entry_of(SPELLED["what is not apart"])
+    [entry] = certificate["tables"]
+    for tree, words in [
+        (entry["tree"][:-1], "the tree leaves a region out"),
+        ([*entry["tree"], ["l", 0]], "the tree has more nodes than regions"),
+        ([["l", 0]], "a leaf does not hold: ['l', 0]"),
+    ]:
+        cut = certificate | {"tables": [entry | {"tree": tree}]}
+        assert certify(program, cut).problems == (f"table `t`: {words}",)
