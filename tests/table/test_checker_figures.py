@@ -519,6 +519,8 @@ def test_what_is_too_long_to_follow_is_named_and_placed(monkeypatch: pytest.Monk
 SPELLED = {
     "a literal": ["true"],
     "a comparison and a literal": ["(x + y < 4) = true", "(x + y < 4) /= true"],
+    "what never holds": ["x - x < 0 and y < 3 or y > 2", "y <= 2"],
+    "nothing between": ["x + y < 3 and x + y > 5 or y < 2", "y >= 2"],
     "what is not apart": ["not (x + y /= 3)", "x + y /= 3"],
     "a truth and a comparison": ["p = (x < 4)", "p /= (x < 4)"],
     "a comparison and a truth": ["(x + y < 4) = p", "(x + y < 4) /= p"],
@@ -552,3 +554,12 @@ def test_what_is_wrong_with_a_tree_is_told_word_for_word() -> None:
     ]:
         cut = certificate | {"tables": [entry | {"tree": tree}]}
         assert certify(program, cut).problems == (f"table `t`: {words}",)
+
+
+def test_several_cells_may_be_about_one_form() -> None:
+    program = program_of(
+        "input x : int 0 .. 20\ntable t {\n| line | x | x + 1 | when ||\n| one | < 9 | > 3 | x < 30 ||\n"
+        "| two | < 9 | <= 3 | ||\n| three | >= 9 | | x >= 7 ||\n}\n"
+    )
+    found = certify(program, json.loads(json.dumps(prove_program(program, Options()).certificate)))
+    assert (found.problems, found.unchecked) == ((), ())

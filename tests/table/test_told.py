@@ -282,3 +282,22 @@ def test_what_the_solver_does_not_answer_is_left_open() -> None:
     assert [(one.outcome, one.witness) for one in left] == [(Discharge.OPEN, ())] * len(run.obligations)
     assert left
     assert not asker.all_hold(run.obligations, list)
+
+
+def test_a_line_that_breaks_an_invariant_where_its_extern_fails_is_told_so() -> None:
+    text = (
+        "input a : int 0 .. 9\nstate n : int 0 .. 9\nstate late : int 0 .. 9\ninvariant few : n <= 5\n"
+        'extern procedure seen writes late python "m:seen" c "seen"\n'
+        "procedure over { n := 9 }\nprocedure back { n := 0 }\n"
+        "table t {\n| line | a || procedures |\n| one | < 5 || over; seen; back |\n| two | >= 5 || |\n}\n"
+    )
+    found = prove_program(program_of(text), Options(solver="boxes")).findings
+    said = "line `one` of table `t`, where `seen` fails, can break invariant `few`"
+    assert [finding.message for finding in found] == [said]
+
+
+def test_z3_finds_the_overlap_of_two_lines_of_which_a_third_is_apart() -> None:
+    text = "input a : int 0 .. 9\ntable t {\n| line | a ||\n| x | < 5 ||\n| y | 4 .. 7 ||\n| z | > 7 ||\n}\n"
+    [found] = prove_program(program_of(text), Options(solver="both")).tables
+    assert [type(one) for one in found.found] == [Overlap]
+    assert found.backing.confirmed_by_z3
