@@ -351,3 +351,14 @@ def test_without_the_crossing_lines_no_two_overlap(monkeypatch: pytest.MonkeyPat
             assert {at: set(partition.bits_of(mask)) for at, mask in near.items()} == {
                 at: others for at, others in wanted.items() if others
             }
+
+
+def test_a_gap_is_found_where_overlaps_are_not_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """After a part that is searched in vain: what was learnt there is of those lines alone."""
+    monkeypatch.setattr(partition.Counting, "_count", lambda *_: False)
+    rows = ("false | 0 .. 2", "false | 1 .. 3", "true | 0 .. 1", "true | 1 .. 2")
+    lines = "".join(f"| l{at} | {row} ||\n" for at, row in enumerate(rows))
+    program = program_of(f"input a : bool\ninput b : int 0 .. 3\ntable t {{\n| line | a | b ||\n{lines}}}\n")
+    [found] = prove_program(program, Options(solver="boxes")).tables
+    [gap] = [one for one in found.found if isinstance(one, Gap)]
+    assert gap.witnesses == ({"a": True, "b": 3},)
