@@ -986,6 +986,16 @@ def test_what_is_assumed_of_state_alone_is_to_be_proved(tmp_path: Path) -> None:
     assert [(explained.finding is not None, explained.beside) for explained in explanation] == [(True, ())]
 
 
+@pytest.mark.parametrize("how", ["assumed", "monitored"])
+def test_nothing_is_called_monitored_that_no_executor_checks(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], how: str
+) -> None:
+    text = BELIEVES.format(says="not y").replace(" assumed ", f" {how} ")
+    assert run(["prove", str(solo_system(tmp_path, text)), "--no-cache", "--jobs", "1"]) == 1
+    said = next(line.split() for line in capsys.readouterr().out.splitlines() if " never " in line)
+    assert said == ["t", "never", f"{how}:", "not", "proved", "of", "the", "levels", "together"]
+
+
 # --- what is not recognised ------------------------------------------------------------------------
 
 

@@ -144,7 +144,7 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
         _write(certificate, made, proof)
     if not as_json:
         for one in proof.levels:
-            _say_level(proof, one)
+            _say_level(made[one.level], proof, one)
         if invariants:
             _say_invariants(proof)
         _say_agreements(proof)
@@ -212,8 +212,9 @@ def _refused(made: dict[str, TransitionSystem], proof: SystemProof, *, quiet: bo
     return refused
 
 
-def _say_level(whole: SystemProof, proof: LevelProof) -> None:
+def _say_level(ts: TransitionSystem, whole: SystemProof, proof: LevelProof) -> None:
     """One level: its assumptions first, then what else is proved of it, each with what it rests on that is not."""
+    declared = {str(assumption.name): assumption.standing.value for assumption in ts.program.assumptions}
     found_before = ", by an earlier run" if proof.cached else ""
     click.echo(click.style(f"level {proof.level}", bold=True) + f"  {proof.seconds:.1f} s{found_before}")
     for sort in Sort:
@@ -221,9 +222,10 @@ def _say_level(whole: SystemProof, proof: LevelProof) -> None:
         if sort is Sort.ASSUMPTION:
             for obligation in found:
                 said = standing(whole, proof.level, obligation.key)
-                monitored = "" if whole.of(proof.level, obligation.key).proved else "monitored: "
+                proved = whole.of(proof.level, obligation.key).proved
+                as_declared = "" if proved else f"{declared[obligation.name]}: "
                 together = " of the levels together" if said in {"not proved", "undecided"} else ""
-                click.echo(f"  {obligation.table:28} {obligation.name:24} {monitored}{said}{together}")
+                click.echo(f"  {obligation.table:28} {obligation.name:24} {as_declared}{said}{together}")
         elif sort in {Sort.INVARIANT, Sort.PROPERTY}:
             for obligation in found:
                 click.echo(
