@@ -49,8 +49,8 @@ MODULES = tuple(
     for room, names in {
         "lang/": "interpret interval_sets operator_table",
         "certify/": "__init__ known owed execution settle table values",
-        "table/regions/": "atoms linear region splitting",
-        "table/": "boxes partition confirm program relational decide",
+        "table/regions/": "atoms linear partition region splitting",
+        "table/": "boxes confirm program relational decide",
         "procedures/": "discharge invariants obligations",
         "symbolic/": "effect encode evaluation execution trial values keyed measured",
         "solvers/": "search smt",
@@ -82,7 +82,7 @@ CAUGHT, SURVIVED, UNTESTED = "caught", "survived", "no test"
 Tell = Callable[[Mapping[str, Any]], None]
 """Hands what is known so far from a fork to its parent."""
 Function = str
-"""A function by module and qualified name, `rcsc.table.partition:Gaps.grown`."""
+"""A function by module and qualified name, `rcsc.table.regions.partition:Gaps.grown`."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,17 +22,16 @@ disjoint in pairs, and their sizes add up to the size of the input space. Here 4
 ((), 'boxes', True)
 
 Tests across variables, and assumptions, take a tree of regions (`regions`), and Z3 for what is not linear. Trusted,
-without `rcsc certify`: `partition`, `boxes`, `relational`, `regions` and what they rest on; by default Z3 confirms
+without `rcsc certify`: `boxes`, `relational`, `regions` and what they rest on; by default Z3 confirms
 every table that is cheap enough, and a disagreement is a bug in rcsc.
 
-Two searches find a least witness. For boxes `partition` counts, which tells the first slice with a gap without a
+Two searches find a least witness. For boxes `regions.partition` counts, which tells the first slice with a gap without a
 question; everywhere else a solver or a simplex is asked, and `rcsc.solvers.search` bisects with few questions.
 
 What it costs: pairs of lines and slices of keys for boxes, a budget in steps for the rest; what is over it is
 undecided, and fails.
 
-Modules, in the order the data flows: `program` (a whole program), `decide` (which way), `partition` (lines that are
-boxes, of a table or of a region), `boxes`, `relational`, `confirm` (Z3), `cover` (where a condition holds), `verdict`
-(findings as data), `certificate` (which `rcsc.certify` checks anew), `cells` (keys as cells), `repair` (proved before
-shown), `diagnose`.
+Modules, in the order the data flows: `program` (a whole program), `decide` (which way), `boxes`, `relational`,
+`confirm` (Z3), `cover` (where a condition holds), `verdict` (findings as data), `certificate` (which `rcsc.certify`
+checks anew), `cells` (keys as cells), `repair` (proved before shown), `diagnose`.
 """

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 from rcsc.lang.interval_sets import meet
 from rcsc.lang.model import Box, Program, Table, key_bounds, value_of_key
-from rcsc.table.partition import Boxes, BudgetError, Gaps, common
+from rcsc.table.regions.partition import Boxes, BudgetError, Gaps, common
 from rcsc.table.verdict import Gap, Overlap, Region, Witness
 
 MOST_GAPS = 3

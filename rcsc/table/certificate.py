@@ -17,8 +17,8 @@ from rcsc.lang.leaves import read_by
 from rcsc.lang.meaning import digest
 from rcsc.lang.model import AssumptionName, Box, Program, Snapshot, Table, TableName, Test, key_bounds
 from rcsc.procedures.invariants import assumed_of
-from rcsc.table.partition import MANY, parting
 from rcsc.table.regions.atoms import Universe
+from rcsc.table.regions.partition import MANY, parting
 from rcsc.table.regions.region import Counted, Empty, Node, Only, Open, OutsideAssumption, Rests, Split
 
 VERSION = 2

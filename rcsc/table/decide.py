@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 from rcsc.lang.leaves import read_by
 from rcsc.lang.model import AssumptionName, Backing, Program, Table
 from rcsc.solvers.options import Options
-from rcsc.table import boxes, partition
+from rcsc.table import boxes
 from rcsc.table.certificate import box_certificate, must_cover
+from rcsc.table.regions import partition
 from rcsc.table.verdict import DeadLine, Found, Gap, Overlap, SolversDisagree, TableVerdict, Undecided
 
 if TYPE_CHECKING:

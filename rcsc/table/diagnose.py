@@ -8,8 +8,8 @@ from rcsc.diagnostics.diagnostic import Diagnostic, Label, MatchedLine, Severity
 from rcsc.lang.interval_sets import size
 from rcsc.lang.model import Program, Scalar, Table, key_bounds, spell
 from rcsc.table import cells as words
-from rcsc.table import partition
 from rcsc.table.certificate import must_cover
+from rcsc.table.regions import partition
 from rcsc.table.repair import closing_line, parting_cell
 from rcsc.table.verdict import (
     ContradictoryAssumptions,

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from rcsc.lang.interval_sets import complement, meet, size
 from rcsc.lang.model import Box, Program, Scalar, Table, key_bounds
 from rcsc.table import boxes, cells
-from rcsc.table.partition import BudgetError, Gaps
+from rcsc.table.regions.partition import BudgetError, Gaps
 from rcsc.table.verdict import Gap, Overlap
 
 

@@ -16,7 +16,7 @@ from rcsc.lang.syntax.format import format_file
 from rcsc.lang.syntax.lalr import ParseNode, Tables
 from rcsc.lang.syntax.parse import MOST_ERRORS, parse
 from rcsc.lang.syntax.spell import spell_expr
-from tests.support.strategies_syntax import expressions, files
+from tests.support.programs.arbitrary import expressions, files
 
 REPO = Path(__file__).parents[2]
 SHIPPED = sorted((REPO / "tables").rglob("*.rcs"))

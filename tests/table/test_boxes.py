@@ -15,11 +15,12 @@ from rcsc.lang.interval_sets import joined
 from rcsc.lang.model import Program, key_bounds, key_of, value_of_key
 from rcsc.solvers.options import Options
 from rcsc.solvers.search import furthest, halved
-from rcsc.table import boxes, partition
+from rcsc.table import boxes
 from rcsc.table.confirm import Agreement, confirm
 from rcsc.table.decide import prove_table
 from rcsc.table.diagnose import diagnostics
 from rcsc.table.program import prove_program
+from rcsc.table.regions import partition
 from rcsc.table.repair import closing_line, parting_cell
 from rcsc.table.verdict import ContradictoryAssumptions, DeadLine, Gap, Overlap, Region, Undecided
 from tests.bench import families

@@ -13,7 +13,7 @@ from rcsc.compose.counterexample.finding import Finding
 from rcsc.lang.interpret import matching_lines
 from rcsc.lang.model import Box, Program, Scalar, Snapshot, Table, key_of
 from rcsc.table import boxes, cells
-from rcsc.table.partition import BudgetError, Gaps
+from rcsc.table.regions.partition import BudgetError, Gaps
 from rcsc.table.repair import closing_line, parting_cell
 from rcsc.table.verdict import Gap, Overlap, Region
 

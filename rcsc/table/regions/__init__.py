@@ -4,7 +4,7 @@ An *atom* is `form in intervals`, where a form is a sum of leaves with rational 
 and stands for itself. A *region* is a part of the input space with what is left of the conditions in it. A tree
 splits the space until each leaf says why it needs no more: no point is left (`linear`, an exact simplex), one line
 holds throughout and the others nowhere, or the lines left are boxes that part each other and fill the region
-(`rcsc.table.partition`, as for tables of boxes).
+(`partition`, which decides tables of boxes, too).
 
 For `distance_mm - tolerance_mm <= 0` beside `> 0` one split on the form `distance_mm - tolerance_mm` leaves two
 regions with one line each:
@@ -29,5 +29,6 @@ The tree is the certificate: `rcsc.certify` walks it again with arithmetic of it
 this room. What it costs: splits, which are counted and bounded; points and witnesses are found by bisection over
 keys, with the simplex as the oracle.
 
-Modules, in the order the data flows: `atoms`, `linear`, `region`, `splitting`, `least`.
+Modules, in the order the data flows: `atoms`, `linear`, `partition`, `region`, `splitting`,
+`least`.
 """

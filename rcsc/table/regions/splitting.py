@@ -7,7 +7,7 @@ rational point is in it, its lines are boxes that can be counted, or one line ho
 Linear arithmetic is asked only where no line or several are left, or where a split leaves a
 line on both sides; a solver only where a term is not linear or rounding to integers does not end.
 
-`linear` says what is empty, `rcsc.table.partition` counts boxes.
+`linear` says what is empty, `rcsc.table.regions.partition` counts boxes.
 """
 
 from bisect import bisect_right
@@ -16,9 +16,9 @@ from itertools import combinations
 from math import prod
 
 from rcsc.lang.interval_sets import meet
-from rcsc.table.partition import Boxes, Cell, Gaps, common, parting
 from rcsc.table.regions.atoms import Clauses, Universe
 from rcsc.table.regions.linear import Multipliers, Simplex
+from rcsc.table.regions.partition import Boxes, Cell, Gaps, common, parting
 from rcsc.table.regions.region import (
     Bounds,
     Candidate,

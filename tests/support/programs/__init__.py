@@ -15,4 +15,5 @@ A test that needs a program writes its text, or names one of `examples`, and tak
 `examples`: programs that several rooms use.
 `texts`: parts of a text (a table, a level, the description of a system), and edits that are sure to be made.
 `systems`: a system of two levels, with other texts in some of its files, and one of a single level.
+`arbitrary`: any program at all, as trees.
 """
