@@ -21,7 +21,7 @@ from rcsc.compose.counterexample.trace import Trace
 from rcsc.compose.invariant.cubes import Reached
 from rcsc.compose.proof.assume_guarantee import agreements
 from rcsc.compose.proof.level import LevelProof, Verdict, certificate, essential, prove_level
-from rcsc.compose.proof.system import NoProgramError, SystemProof, transition_systems
+from rcsc.compose.proof.system import NoProgramError, SystemProof, transition_systems, transition_systems_of
 from rcsc.lang.interpret import Fault, cycle, initial
 from rcsc.lang.model import Kind, Real
 from rcsc.run.adopt import adopt
@@ -200,6 +200,14 @@ def test_a_level_without_tables_is_refused(tmp_path: Path) -> None:
     (tmp_path / "lower.rcs").unlink()
     with pytest.raises(NoProgramError, match="no program `lower`"):
         transition_systems(path)
+
+
+def test_a_program_without_the_level_is_refused(tmp_path: Path) -> None:
+    path = small_system(tmp_path)
+    programs = {name: ts.program for name, ts in transition_systems(path).items()}
+    programs["lower"] = replace(programs["lower"], levels=())
+    with pytest.raises(NoProgramError, match="program `lower` has no level `lower`"):
+        transition_systems_of(description(path), programs)
 
 
 # --- the translation ------------------------------------------------------------------------

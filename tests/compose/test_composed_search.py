@@ -2,6 +2,8 @@
 
 import json
 from collections.abc import Callable, Sequence
+from concurrent.futures import Future
+from contextlib import nullcontext
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
@@ -12,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rcsc.commands import run
-from rcsc.compose.contract.obligations import Obligation
+from rcsc.compose.contract.obligations import Obligation, obligations
 from rcsc.compose.contract.predicates import Predicate
 from rcsc.compose.contract.transition import Cycle, TransitionSystem
 from rcsc.compose.invariant.cubes import Masks, Pair, Reached, shown
@@ -22,8 +24,9 @@ from rcsc.compose.proof.context import RepeatedLine
 from rcsc.compose.proof.kept import keep, recall
 from rcsc.compose.proof.level import LevelProof, Verdict, prove_level
 from rcsc.compose.proof.ranking import parts
-from rcsc.compose.proof.system import prove_transition_systems, transition_systems
+from rcsc.compose.proof.system import _proved, prove_transition_systems, transition_systems
 from rcsc.compose.proof.termination import Phase, longest
+from rcsc.host import children
 from rcsc.host.cache import Cache
 from rcsc.lang.model import Bool, Enum, Int, Op, Real, Scalar, real_key
 from rcsc.lang.operator_table import Arithmetic, divide
@@ -193,6 +196,15 @@ def test_a_real_stands_by_the_rank_of_its_double() -> None:
     more = keyed.term(values.compare(Op.LT, values.constant(r.kind, 0.5), r))
     solver.add(*keyed.ranges, more)
     assert solver.check() is Answer.SATISFIABLE
+
+
+@pytest.mark.parametrize("value", [-3.25, 0.0, 5e-324, 0.1, 7.0])
+def test_the_value_of_a_double_is_the_double(value: float) -> None:
+    kind = Real(-10.0, 10.0)
+    x, solver = smt.variable("x", kind), Solver()
+    solver.add(smt.equal(x, smt.literal(kind, value), kind))
+    assert solver.check() is Answer.SATISFIABLE
+    assert solver.value(x, kind) == value
 
 
 @pytest.mark.parametrize("key", [0, 1])
@@ -441,6 +453,40 @@ def test_a_system_is_not_proved_twice(cache: Cache, monkeypatch: pytest.MonkeyPa
     assert all(level.cached for level in again.levels)
     with pytest.raises(AssertionError):
         prove_transition_systems(made, LITTLE, 1, tuple(made), None, None)
+
+
+class Here:
+    """A pool whose work is done where it is given."""
+
+    def submit(self, done: Callable[..., LevelProof], *args: object) -> Future[LevelProof]:
+        """Do it at once."""
+        found: Future[LevelProof] = Future()
+        found.set_result(done(*args))
+        return found
+
+
+def test_levels_that_are_proved_in_processes_come_back_with_what_they_owe(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    made = transition_systems(SYSTEM)
+    owed = {name: obligations(ts, ts.cycle(ts.havoc())) for name, ts in made.items()}
+
+    def proof(ts: TransitionSystem, effort: Effort) -> LevelProof:
+        assert (ts, effort) == (made[ts.level.name], LITTLE)
+        told = (Verdict.UNDECIDED, *[Verdict.PROVED] * len(owed[ts.level.name]))
+        found = tuple(zip(owed[ts.level.name], told, strict=False))
+        return LevelProof(ts.level.name, found, (), (), 0, 0, 0.0)
+
+    monkeypatch.setattr("rcsc.compose.proof.system.prove_level", proof)
+    monkeypatch.setattr(children, "pool", lambda _: nullcontext(Here()))
+    proofs = prove_transition_systems(made, LITTLE, 2, tuple(made)).levels
+    assert [one.level for one in proofs] == list(made)
+    for one in proofs:
+        assert [obligation.key for obligation, _ in one.found] == [owing.key for owing in owed[one.level]]
+        assert [verdict for _, verdict in one.found].index(Verdict.UNDECIDED) == 0
+        assert any(obligation.holds is not values.TRUE for obligation, _ in one.found)
+        sent = _proved(made[one.level], LITTLE)
+        assert {obligation.holds for obligation, _ in sent.found} == {values.TRUE}
 
 
 def test_levels_are_said_as_they_are_done_where_it_is_asked_for(

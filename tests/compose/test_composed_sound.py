@@ -654,8 +654,12 @@ def test_a_new_command_is_passed_over_where_a_stopping_assumption_fails(tmp_path
 
 def test_what_is_trusted_of_a_restart_is_named_of_both_levels(tmp_path: Path) -> None:
     """The cycle after it may not stop: else an older report follows the one that stood."""
-    whole = prove_system(small_system(tmp_path, lower=STOPS), LITTLE)
+    path = small_system(tmp_path, lower=STOPS)
+    whole = prove_system(path, LITTLE)
     words = "assumption `loaded` of level `lower` does not fail in the first cycle after a restart"
+    proof = next(one for one in whole.levels if one.level == "lower")
+    claimed = of_level(transition_systems(path)["lower"], proof)
+    assert [key for key, claim in claimed if words in claim.trusts] == [(Sort.ECHOES, "", "report")]
     echoes = whole.of("lower", (Sort.ECHOES, "", "report"))
     assert echoes.found
     assert words in echoes.trusts
@@ -1109,6 +1113,12 @@ def test_what_lines_write_is_what_all_their_actions_do(tmp_path: Path) -> None:
     assert of_lines(small_level(tmp_path, "upper")) == {
         "begun", "cur_state.next", "status_report", "to_lower.input_command",
     }  # fmt: skip
+    directly = small_text(
+        "upper",
+        ("state new_command", "state tries : int 0 .. 9\nstate new_command"),
+        ("|| begin; nextstate(going) | go ", "|| begin; tries := 1; nextstate(going) | go "),
+    )
+    assert "tries" in of_lines(small_level(tmp_path / "directly", "upper", upper=directly))
 
 
 # --- what is shown -----------------------------------------------------------------------------------

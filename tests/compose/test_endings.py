@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -9,9 +10,10 @@ from rcsc.commands import run
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.counterexample.lasso import Lasso, lassos
 from rcsc.compose.counterexample.trace import NotReproducedError, TraceSearch
+from rcsc.compose.proof import ranking
 from rcsc.compose.proof.context import gives_an_order
 from rcsc.compose.proof.level import certificate, prove_level
-from rcsc.compose.proof.ranking import RisingLine, least_power, parts
+from rcsc.compose.proof.ranking import RisingLine, inputs, least_power, parts
 from rcsc.compose.proof.system import transition_systems
 from rcsc.compose.proof.termination import Ending, longest
 from rcsc.lang.model import Int, Op, Real
@@ -123,6 +125,28 @@ def test_what_has_to_stand_still_is_said(tmp_path: Path) -> None:
     assert found.open == ()
     work = next(end for end in found.endings if end.table == "work")
     assert (work.proved, work.still) == (True, ("which",))
+
+
+def test_as_few_inputs_stand_still_as_will_do(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each is tried without, knowing what a look at all of them left."""
+    ts = small_level(tmp_path, "lower")
+    asked = SimpleNamespace(rested_on=[])
+    looked: list[SimpleNamespace] = []
+
+    def look(
+        program: object, of: object, clauses: object, still: tuple[str, ...], weaker: object = None
+    ) -> object:
+        assert (program, of, clauses) == (ts.program, asked, ())
+        assert weaker is (looked[0] if looked else None)
+        looked.append(SimpleNamespace(still=still, endless={"there"} - set(still), counted=[], solver=still))
+        return looked[-1]
+
+    monkeypatch.setattr(ranking, "_Ranking", look)
+    found = ranking.lines_that_stop(ts.program, asked, (), lambda still: still)  # type: ignore[arg-type,return-value]  # what stands for them
+    assert inputs(ts.program) == ("command", "there")
+    assert [one.still for one in looked] == [(), ("command", "there"), ("there",), ()]
+    assert (found.still, found.endless) == (("there",), ())
+    assert asked.rested_on == [(), ("there",)]
 
 
 # --- another solver -----------------------------------------------------------------------------
@@ -264,6 +288,14 @@ def test_sums_are_followed_as_far_as_they_are_rounded() -> None:
     tiny = arithmetic(Op.ADD, x, number(1e-20))
     assert not refuted(values.compare(Op.LE, tiny, x))  # it may be lost
     assert refuted(values.compare(Op.LT, arithmetic(Op.SUB, x, x), number(0.0)))  # the sign is not
+
+
+def test_a_whole_number_made_a_real_is_as_large() -> None:
+    n = values.variable("n", Int(0, 9))
+    x = values.arithmetic(Op.TO_REAL, (n,), REAL)
+    large = values.compare(Op.LE, values.constant(Int(0, 9), 3), n)
+    assert refuted(values.both(large, values.compare(Op.LT, x, number(2.5))))
+    assert not refuted(values.both(large, values.compare(Op.LT, x, number(3.5))))
 
 
 def test_a_rounded_tenth_is_not_taken_for_a_tenth() -> None:

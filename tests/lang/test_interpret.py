@@ -119,6 +119,21 @@ def test_statements_run_in_order() -> None:
     assert after(text, "p", 9, s=1) == {"s": 0, "n": 2, "a[0]": 0, "a[1]": 9, "a[2]": 10, "a[3]": 12}
 
 
+def test_a_case_may_be_about_an_argument() -> None:
+    text = "state n : int 0 .. 9\nprocedure p(k : int 0 .. 9) { case k { 1, 2 { n := 3 } else { n := 4 } } }"
+    assert [after(text, "p", k)["n"] for k in (1, 2, 5)] == [3, 3, 4]
+
+
+def test_a_local_begins_without_a_value_each_time_that_it_is_declared() -> None:
+    text = (
+        "state n : int 0 .. 9\nprocedure p(k : int 0 .. 9) "
+        "{ for i in 1 .. 2 { local m : int 0 .. 9  if i <= k { m := i }  n := m } }"
+    )
+    assert after(text, "p", 2)["n"] == 2
+    with pytest.raises(KeyError):
+        after(text, "p", 1)
+
+
 def test_arguments_are_values() -> None:
     text = (
         "state n : int 0 .. 9\nprocedure p { n := 1 q(n) }\nprocedure q(k : int 0 .. 9) { n := 5 n := n - k }"

@@ -606,6 +606,18 @@ def test_values_spans_and_questions_are_the_interpreters(text: str) -> None:
     assert asked == 3 or text in {"c * c", "a * c"}
 
 
+def test_whether_a_double_has_a_whole_number_in_64_bits_is_asked_of_doubles() -> None:
+    text = "input x : real -1e30 .. 1e30\nstate s : int -9 .. 9\nprocedure p { s := int(x) }\n"
+    program = program_of(text)
+    start = Start(program)
+    run = Run(start, "p")
+    run.evaluate(expression(program))
+    [owed] = run.owed
+    for x, said in ((-(2.0**63), "unsat"), (-(2.0**64), "sat")):
+        here = equals(start.terms, start.leaves["x"], x)
+        assert cvc5_says(script([here, start.terms.negation(owed.good)])) == said
+
+
 TOLD = [
     "a < 3", "not (a < 3)", "c > a", "not (c <= a and a > 2)", "a in {1, 4} or a = 2", "not (a in {-7, 9})", "a = c",
     "a /= -7", "c >= a and a >= 5", "x < y", "not (x < y)", "not (y * y - y * y < 1.0)",
@@ -738,6 +750,15 @@ def test_a_condition_of_one_leaf_that_is_undefined_for_some_value_is_certified()
     certificate = certificate_of(program)
     assert certificate["tables"][0]["columns"] != ["a"]
     assert certify(program, certificate).whole
+
+
+def test_a_procedure_that_only_a_procedure_calls_owes_nothing_by_itself() -> None:
+    program = program_of(
+        "input a : int 0 .. 9\nstate s : int 0 .. 9\nprocedure more(k : int 0 .. 9) { s := k + 4 }\n"
+        "procedure p { more(5) }\n"
+        "table t {\n| line | a || procedures |\n| one | < 4 || p |\n| two | >= 4 || |\n}\n"
+    )
+    assert certify(program, certificate_of(program)).whole
 
 
 def test_a_condition_of_one_leaf_that_is_defined_is_tried_at_every_value() -> None:

@@ -5,11 +5,13 @@ from typing import Any
 import pytest
 
 from rcsc.diagnostics.diagnostic import Diagnostic
+from rcsc.lang.model import Backing
 from rcsc.procedures.discharge import Asker, Discharge
 from rcsc.solvers import smt
 from rcsc.solvers.options import Options
 from rcsc.symbolic.execution import Run
 from rcsc.table import relational
+from rcsc.table.confirm import Agreement, confirm
 from rcsc.table.decide import prove_table
 from rcsc.table.program import prove_program
 from rcsc.table.regions.splitting import Tree
@@ -229,6 +231,24 @@ def test_what_z3_does_not_confirm_is_told_word_for_word() -> None:
     [found] = prove_program(program_of(text), Options(solver="both", steps=1)).tables
     assert found.found == (Undecided("Z3 gave no answer within its limits"),)
     assert not found.backing.confirmed_by_z3
+
+
+def test_boxes_alone_are_asked_where_it_is_wanted() -> None:
+    text = "input a : bool\ntable t {\n| line | a ||\n| x | true ||\n| y | false ||\n}\n"
+    program = program_of(text)
+    found = prove_table(program, program.tables[0], Options(solver="boxes"))
+    assert (found.found, found.backing) == ((), Backing("boxes", confirmed_by_z3=False))
+
+
+def test_z3_sees_two_lines_meet_wherever_they_stand() -> None:
+    """Here the last two do: were none found, it would object."""
+    text = "input a : int 0 .. 9\ntable t {\n| line | a ||\n| x | < 3 ||\n| y | 3 .. 6 ||\n| z | >= 6 ||\n}\n"
+    program = program_of(text)
+    table, options = program.tables[0], Options(solver="both")
+    assert confirm(program, table, (), options) is Agreement.DISAGREES
+    found = prove_table(program, table, options)
+    assert [type(one) for one in found.found] == [Overlap]
+    assert found.backing.confirmed_by_z3
 
 
 def test_a_table_with_a_condition_that_is_not_defined_is_left_open_at_no_cost() -> None:
