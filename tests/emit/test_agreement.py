@@ -484,7 +484,7 @@ table t {{
         (2, "do_pong(s, INT64_C(2))", "do_pong(s, INT64_C(3))", EsbmcAnswer.REFUTED),  # other arguments
         (2, "case__do_pong(s, INT64_C(2));", ";", EsbmcAnswer.REFUTED),  # a call less
         (2, "s->fault = 4;", "s->fault = 0;", EsbmcAnswer.REFUTED),  # what is refused is taken
-        (30, "", "", EsbmcAnswer.TOO_LARGE),  # more calls than are recorded: not known, and said so
+        (16, "", "", EsbmcAnswer.TOO_LARGE),  # more calls than are recorded: not known, and said so
     ],
 )
 def test_esbmc_knows_nothing_of_what_an_extern_gives(
