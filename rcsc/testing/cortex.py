@@ -190,6 +190,8 @@ def run_cortex(
     tools = cortex_tools()
     if isinstance(tools, Absent):
         return tools
+    if any(symbols.c_type(variable.name) == "uint64_t" for variable in program.variables):
+        return Absent("the reference needs more than the 64 bits with a sign that there are on the target")
     table = program.tables[number]
     with scratch("cortex") as place:
         (place / "rcsc.ld").write_text(LINKER, "utf-8")

@@ -632,6 +632,39 @@ def test_a_new_command_whose_line_is_cut_short_is_passed_over(tmp_path: Path) ->
     assert finding.ticks[-1]["lower"].line == "4"  # done, though it never began
 
 
+@pytest.mark.parametrize("cell", ["", "in {true, false}", "new_command"])
+def test_a_cell_that_lets_both_values_of_the_flag_pass_looks_for_no_command(
+    cell: str, tmp_path: Path
+) -> None:
+    lower = small_text(
+        "lower",
+        ("| 1    | true        |           |", "| 1 | true | /= d_state |"),
+        (
+            "| 4    | false       | /= going  |       ||                | done       |",
+            f"| 4 | {cell} | d_state | || | done |\n| 5 | false | f_state | || | done |",
+        ),
+    )
+    _, proof = proved_level(tmp_path, "lower", lower=lower)
+    assert proof.verdict(Sort.ANSWERED, "go", "new_command") is Verdict.NOT_PROVED
+
+
+SHOWS_A_SAFE_VALUE = small_text(
+    "lower",
+    (
+        "output report : lower_report",
+        "output report : lower_report\noutput open : bool safe true\nproperty shut : not open",
+    ),
+)
+"""A cycle that refuses an input leaves `open`; no cycle that takes its inputs does."""
+
+
+def test_a_property_trusts_that_no_input_is_refused_where_an_output_has_a_safe_value(tmp_path: Path) -> None:
+    whole = prove_system(small_system(tmp_path, lower=SHOWS_A_SAFE_VALUE), LITTLE)
+    found = whole.of("lower", (Sort.PROPERTY, "", "shut"))
+    assert found.proved
+    assert "no input of level `lower` is refused: its outputs would show their safe values" in found.trusts
+
+
 STOPS = small_text(
     "lower",
     ("input there", "input load : int 0 .. 2\nassume loaded monitored : load /= 0\ninput there"),

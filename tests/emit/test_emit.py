@@ -27,6 +27,7 @@ from rcsc.emit.generated import write
 from rcsc.emit.identifiers import C_WORDS, PYTHON_WORDS, comment
 from rcsc.emit.rendering import environment
 from rcsc.host.files.read import Said, json_of
+from rcsc.host.tools import Absent
 from rcsc.lang import reserved
 from rcsc.lang.interpret import Fault, initial, run_table
 from rcsc.lang.resolve import compile_text
@@ -784,6 +785,15 @@ def test_reals_are_the_same_on_a_processor_without_them() -> None:
     ran = run_cortex(program, symbols_of(program, files), files, 0)
     assert isinstance(ran, CortexRun), ran
     assert (ran.differ, ran.steps) == (0, 256)
+
+
+@pytest.mark.needs("arm-none-eabi-gcc", "qemu-system-arm")
+def test_the_emulated_target_is_not_asked_what_its_reference_cannot_compute() -> None:
+    """Its reference has no integers of more than 64 bits, and would call right C wrong."""
+    rows = "| line | n || o |\n| a | < 5 || true |\n| b | >= 5 || false |"
+    program = program_of(f"input n : int 0 .. {2**64 - 1}\noutput o : bool\ntable t {{\n{rows}\n}}\n")
+    files = emitted(program)
+    assert isinstance(run_cortex(program, symbols_of(program, files), files, 0), Absent)
 
 
 def test_only_programs_with_reals_test_the_arithmetic() -> None:

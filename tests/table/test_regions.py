@@ -5,6 +5,7 @@ import operator
 import random
 from collections.abc import Callable, Sequence
 from fractions import Fraction
+from functools import reduce
 
 import pytest
 from hypothesis import given
@@ -59,6 +60,7 @@ from rcsc.table.regions.region import (
 )
 from rcsc.table.regions.splitting import Tree
 from tests.support.programs.stages import program_of as compiled
+from tests.support.programs.stages import verdict_of
 
 BOOL = Bool()
 SMALL = Int(0, 4)
@@ -595,3 +597,12 @@ def test_a_vertex_is_rounded_so_often_and_not_more(
     rows = "".join(f"| l{number} | {line} ||\n" for number, line in enumerate(TREES["fractions"][1]))
     _, search = searched(compiled(f"{INPUTS}table t {{\n| line | when ||\n{rows}}}\n"))
     assert (search.undecided, len(search.nodes)) == (undecided, nodes)
+
+
+@pytest.mark.parametrize("word", ["xor", "="])
+def test_a_condition_that_would_be_too_long_written_out_is_left_to_the_solver(word: str) -> None:
+    """Each `xor` doubles what negations are pushed into: forty would never end."""
+    many = reduce(lambda whole, at: f"({whole}) {word} (a < b + {at})", range(1, 40), "a < b")
+    rows = f"| line | when ||\n| l | {many} ||\n| m | not ({many}) ||"
+    verdict = verdict_of(f"input a : int 0 .. 9\ninput b : int 0 .. 9\ntable t {{\n{rows}\n}}\n")
+    assert [finding.code for finding in verdict.findings] == []

@@ -236,7 +236,7 @@ def _own(ts: TransitionSystem, cycle: Cycle) -> Iterator[Obligation]:
         once = values.follows(command_stays(ts, cycle), values.negation(rises))
         yield Obligation(Sort.ONCE, "", FLAG, once)
         for at in cycle.tables:
-            overlooking = _overlooking(at)
+            overlooking = _overlooking(ts, cycle, at)
             ends = bool(at.table.stops) or asks(ts.program)
             if overlooking or (overlooking is not None and ends):
                 yield _answered(ts, cycle, at, overlooking)
@@ -318,14 +318,30 @@ def asks(program: Program) -> bool:
     return any(procedure.extern is not None for procedure in program.procedures)
 
 
-def _overlooking(at: TableAt) -> tuple[Node, ...] | None:
-    """List the conditions of lines that match without looking for a new command; None where no line looks. DEFAULT never looks."""
-    looks = [looks_for(FLAG, line) for line in at.table.lines]
-    if not any(looks):
+def _overlooking(ts: TransitionSystem, cycle: Cycle, at: TableAt) -> tuple[Node, ...] | None:
+    """List when lines match without looking for a new command: with the flag up and with the flag down, all else alike.
+
+    None where no line reads the flag. DEFAULT never looks.
+    """
+    if not any(looks_for(FLAG, line) for line in at.table.lines):
         return None
-    blind = [match for match, one in zip(at.matches, looks, strict=True) if not one]
+    up, down = (ts.matches(cycle, at.table, {FLAG: flag}) for flag in (values.TRUE, values.FALSE))
+    blind = [
+        values.both(*alike)
+        for line, *alike in zip(at.table.lines, up, down, strict=True)
+        if not _asks_for(FLAG, line)
+    ]
     default = at.table.default
     return (*blind, *([] if default is None or default.unreachable else [at.none]))
+
+
+def _asks_for(flag: str, line: Line) -> bool:
+    """Return whether a cell of the line has one value of the flag, and nothing else."""
+    whole = ((0, 1),)
+    return any(
+        test is not None and test.box not in (None, whole) and [*map(str, test.variables)] == [flag]
+        for test in line.tests
+    )
 
 
 def looks_for(leaf: str, line: Line) -> bool:

@@ -6,6 +6,7 @@ selected table and postprocess, exactly as `interpret.cycle` does; what the envi
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 
 from rcsc.compose.contract.environment import COMMAND, NUMBER, Below, Links
 from rcsc.lang.interpret import Fault, evaluate
@@ -141,6 +142,10 @@ class Cycle:
     def goes_on(self) -> Node:
         """One line matches, or DEFAULT runs, where a table is matched: the cycle does not end in a fault that the proofs exclude."""
         return values.all_of(values.follows(at.runs, at.one_line) for at in self.tables)
+
+
+def _matches(run: Run, line: Line) -> Node:
+    return values.all_of(run.evaluate(test.condition) for test in line.tests if test is not None)
 
 
 @dataclass(frozen=True, slots=True)
@@ -371,11 +376,13 @@ class TransitionSystem:
                 for assumption in self.program.assumptions
                 if assumption.name in table.assumptions
             }
-            matches = tuple(
-                values.all_of(run.evaluate(test.condition) for test in line.tests if test is not None)
-                for line in table.lines
-            )
+            matches = tuple(map(partial(_matches, run), table.lines))
             yield TableAt(table, values.both(selected, goes_on), matches, assumptions, selected)
+
+    def matches(self, cycle: Cycle, table: Table, instead: Leaves) -> tuple[Node, ...]:
+        """Return when each line of a table would match in a cycle that came to it with these leaves instead of its own."""
+        run = Run(self.procedures, self.kinds, {**cycle.middle, **instead})
+        return tuple(map(partial(_matches, run), table.lines))
 
     def _lines(self, run: Run, tables: tuple[TableAt, ...]) -> None:
         """Run the first matching line of the chosen table."""

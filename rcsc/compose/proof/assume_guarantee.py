@@ -60,7 +60,11 @@ def of_level(ts: TransitionSystem, proof: LevelProof) -> Iterator[tuple[Key, Cla
     runs = ((name, RUNS),)
     yield from _of_runs(ts, proof)
     for obligation, verdict in proof.found:
-        trusts = tuple(_of_a_restart(ts, proof)) if obligation.sort is Sort.ECHOES else ()
+        trusts: tuple[str, ...] = ()
+        if obligation.sort is Sort.ECHOES:
+            trusts = tuple(_of_a_restart(ts, proof))
+        elif obligation.sort is Sort.PROPERTY:
+            trusts = tuple(_of_a_refusal(ts, name))
         if obligation.key != SAFE:
             yield obligation.key, Claim(verdict, runs, trusts)
     if proof.context is not None:
@@ -74,6 +78,12 @@ def of_level(ts: TransitionSystem, proof: LevelProof) -> Iterator[tuple[Key, Cla
     if proof.endings:
         every = tuple((name, (Sort.ENDS, ending.table, "")) for ending in proof.endings)
         yield ENDING, Claim(Verdict.PROVED, every)
+
+
+def _of_a_refusal(ts: TransitionSystem, level: str) -> Iterator[str]:
+    """List what keeps a property from being broken by a safe value: a cycle that refuses an input is none of the contract's."""
+    if ts.inputs and any(variable.safe is not None for variable in ts.program.variables):
+        yield f"no input of level `{level}` is refused: its outputs would show their safe values"
 
 
 def _of_a_restart(ts: TransitionSystem, proof: LevelProof) -> Iterator[str]:

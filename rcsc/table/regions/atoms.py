@@ -32,7 +32,16 @@ from rcsc.lang.model import (
     key_bounds,
     key_of,
 )
-from rcsc.lang.operator_table import OPPOSITE, Comparison, Op, Signed, is_comparison, is_logic, truth_function
+from rcsc.lang.operator_table import (
+    OPPOSITE,
+    UNDECIDED,
+    Comparison,
+    Op,
+    Signed,
+    is_comparison,
+    is_logic,
+    truth_function,
+)
 
 Form: TypeAlias = tuple[tuple[int, int], ...]
 """Columns and their coefficients: sorted, none zero, the first positive, greatest divisor 1."""
@@ -147,6 +156,8 @@ class Universe:
                 return TRUE if bool(value) == wanted else FALSE
             case Apply(op=Op.NOT, args=(part,)):
                 return self.of(part, not wanted)
+            case Apply(op=op) if is_logic(op) and _written_out(condition) > MOST_WRITTEN_OUT:
+                return self._truth(condition, wanted)
             case Apply(op=op, args=(left, right)) if is_logic(op):
                 return self._truths(op, left, right)(wanted)
             case Apply(op=op, args=(left, right)) if is_comparison(op):
@@ -165,6 +176,8 @@ class Universe:
 
     def _comparison(self, whole: Expr, left: Expr, right: Expr, op: Comparison, wanted: bool) -> Formula:
         if isinstance(left.type, Bool) and not (_is_plain(left) and _is_plain(right)):
+            if _written_out(whole) > MOST_WRITTEN_OUT:
+                return self._truth(whole, wanted)
             return self._truths(op, left, right)(True)
         if not (_is_finite(left) and _is_finite(right)):
             return self._truth(whole, wanted)
@@ -268,6 +281,23 @@ def assumptions_of(universe: Universe, program: Program, table: Table) -> list[C
     """Every assumption that the table may use, in the table's order, as clauses."""
     conditions = {assumption.name: assumption.condition for assumption in program.assumptions}
     return [clauses((universe.of(conditions[name]),)) for name in table.assumptions]
+
+
+MOST_WRITTEN_OUT = 4096
+"""Atoms of a condition; one that would need more stands for itself, and is left to the solver."""
+
+
+def _written_out(condition: Expr) -> int:
+    """How many atoms a condition has with negations pushed into them: twice as many at each `xor` and each equality of truths."""
+    match condition:
+        case Apply(op=Op.NOT, args=(part,)):
+            return _written_out(part)
+        case Apply(op=op, args=(left, right)) if is_logic(op):
+            return (_written_out(left) + _written_out(right)) * (1 if len(UNDECIDED[op]) == 1 else 2)
+        case Apply(op=op, args=(left, right)) if is_comparison(op) and isinstance(left.type, Bool):
+            return 2 * (_written_out(left) + _written_out(right))
+        case _:
+            return 1
 
 
 def _is_plain(expr: Expr) -> bool:
