@@ -184,6 +184,10 @@ CASES: dict[str, tuple[str, list[tuple[int, str, str]]]] = {
         "type a = array[4096] of array[4096] of bool",
         [(1, "RCS312", "array[4096] of array[4096] of bool")],
     ),
+    "loop between units": (
+        "procedure p { for i in 0 [mm] .. 3 [s] { } }",
+        [(1, "RCS302", "for i in 0 [mm] .. 3 [s] { }")],
+    ),
     "long loop": ("procedure p { for i in 0 .. 4096 { } }", [(1, "RCS313", "for i in 0 .. 4096 { }")]),
     "many statements": (
         "state n : bool\nprocedure p { for i in 1 .. 4096 { for j in 1 .. 4096 { n := true } } }",

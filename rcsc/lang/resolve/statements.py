@@ -264,6 +264,8 @@ class Statements:
         if not (isinstance(low.expr.type, Int) and isinstance(high.expr.type, Int)):
             self.scope.report(Code.KIND, "a loop counts whole numbers", written.span)
             return ()
+        if common_unit(self.scope, (low, high), written.span) is None:
+            return ()
         first, last = int(ends[0]), int(ends[1])
         if last - first >= MOST_ROUNDS:
             self.scope.report(Code.LOOP_TOO_LONG, f"a loop has at most {MOST_ROUNDS} rounds", written.span)
