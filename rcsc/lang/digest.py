@@ -78,20 +78,20 @@ class Digests:
 
     def procedure(self, name: str) -> str:
         """Of a procedure and all that it calls."""
-        one = self.procedures[name]
-        return repr(one.params) + self.body([Call(one.name)])
+        procedure = self.procedures[name]
+        return repr(procedure.params) + self.body([Call(procedure.name)])
 
     def touched(self, body: Iterable[Statement], conditions: Iterable[Expr]) -> set[str]:
         """Leaves that statements, all that they call, and conditions read or write."""
         called = [self.procedures[name] for name in self.closure(body)]
-        found = {str(leaf) for condition in conditions for leaf in read_by(condition)}
+        leaves = {str(leaf) for condition in conditions for leaf in read_by(condition)}
         for part in (body, *(procedure.body for procedure in called)):
             for statement in everything(part):
-                found.update(written_by(statement))
-                found.update(leaf for expr in expressions(statement) for leaf in read_by(expr))
+                leaves.update(written_by(statement))
+                leaves.update(leaf for expr in expressions(statement) for leaf in read_by(expr))
         for procedure in called:
-            found.update((*procedure.reads, *procedure.writes))
-        return found
+            leaves.update((*procedure.reads, *procedure.writes))
+        return leaves
 
     def closure(self, body: Iterable[Statement]) -> list[str]:
         """The procedures that run when the statements do, sorted."""

@@ -208,7 +208,7 @@ def _assign(
 
 def call(program: Program, name: str, args: list[Value], snapshot: dict[str, Value]) -> None:
     """Runs one procedure; `snapshot` is changed in place."""
-    procedure = next(one for one in program.procedures if one.name == name)
+    procedure = next(procedure for procedure in program.procedures if procedure.name == name)
     if procedure.extern is not None:
         _call_extern(program, procedure, args, snapshot)
         return
@@ -283,8 +283,8 @@ def _exactly(kind: type[int | float], value: Any) -> Value | None:
     if kind is int and isinstance(value, int):
         return value
     try:
-        made = kind(value)
-        return made if made == value else None
+        exact = kind(value)
+        return exact if exact == value else None
     except (TypeError, ValueError, OverflowError):
         return None
 
@@ -375,10 +375,10 @@ def _cycle(
         stopped = next((name for name in failed if name in table.stops), None)
         if stopped is not None:
             return Outcome(now, None, -1, Fault.ASSUMPTION, failed, stopped)
-        found = _match(table, now)
-        if isinstance(found, Fault):
-            return Outcome(now, None, -1, found, failed)
-        line, index, actions = found
+        matched = _match(table, now)
+        if isinstance(matched, Fault):
+            return Outcome(now, None, -1, matched, failed)
+        line, index, actions = matched
         execute(program, [action.statement for action in actions], now, {})
         for name in postprocess:
             call(program, name, [], now)

@@ -6,21 +6,21 @@ from rcsc.lang.model import Box
 from rcsc.lang.operator_table import MIRRORED, Comparison, Op
 
 
-def meet(one: Box, two: Box) -> Box:
+def meet(left: Box, right: Box) -> Box:
     """The keys in both."""
-    parts = ((max(a, c), min(b, d)) for a, b in one for c, d in two)
+    parts = ((max(a, c), min(b, d)) for a, b in left for c, d in right)
     return tuple(sorted(part for part in parts if part[0] <= part[1]))
 
 
 def joined(intervals: Iterable[tuple[int, int]]) -> Box:
     """The keys in any of the intervals."""
-    found: list[tuple[int, int]] = []
+    merged: list[tuple[int, int]] = []
     for low, high in sorted(interval for interval in intervals if interval[0] <= interval[1]):
-        if found and low <= found[-1][1] + 1:
-            found[-1] = (found[-1][0], max(found[-1][1], high))
+        if merged and low <= merged[-1][1] + 1:
+            merged[-1] = (merged[-1][0], max(merged[-1][1], high))
         else:
-            found.append((low, high))
-    return tuple(found)
+            merged.append((low, high))
+    return tuple(merged)
 
 
 def complement(box: Box, low: int, high: int) -> Box:

@@ -68,8 +68,12 @@ def one_earlier(expr: Expr) -> Expr:
     """The same expression of the values after the cycle before (`model.earlier`)."""
     if isinstance(expr, Read):
         return replace(expr, name=earlier(expr.name))
-    found = rebuilt(expr, one_earlier)
-    return replace(found, leaves=tuple(map(earlier, found.leaves))) if isinstance(found, Select) else found
+    renamed = rebuilt(expr, one_earlier)
+    return (
+        replace(renamed, leaves=tuple(map(earlier, renamed.leaves)))
+        if isinstance(renamed, Select)
+        else renamed
+    )
 
 
 def expressions(statement: Statement) -> Iterator[Expr]:

@@ -45,7 +45,7 @@ def relying(program: Program) -> Program:
     """The program with its invariants as assumptions of the tables that read what they speak of."""
     if not program.invariants:
         return program
-    made = [
+    assumptions = [
         Assumption(
             AssumptionName(invariant.name),
             Standing.PROVED,
@@ -55,16 +55,18 @@ def relying(program: Program) -> Program:
         )
         for invariant in program.invariants
     ]
-    reads = {assumption.name: set(read_by(assumption.condition)) for assumption in made}
+    reads = {assumption.name: set(read_by(assumption.condition)) for assumption in assumptions}
 
     def of(table: Table) -> Table:
         names = tuple(
-            assumption.name for assumption in made if not reads[assumption.name].isdisjoint(table.variables)
+            assumption.name
+            for assumption in assumptions
+            if not reads[assumption.name].isdisjoint(table.variables)
         )
         return replace(table, assumptions=(*table.assumptions, *names)) if names else table
 
     tables = tuple(of(table) for table in program.tables)
-    return replace(program, assumptions=(*program.assumptions, *made), tables=tables)
+    return replace(program, assumptions=(*program.assumptions, *assumptions), tables=tables)
 
 
 def with_stops(program: Program, stops: Mapping[str, tuple[AssumptionName, ...]]) -> Program:
@@ -103,11 +105,11 @@ class _Digest:
         ] = {}  # the object is kept, so that its identity is not used again
 
     def of(self, value: object) -> str:
-        found = self._known.get(id(value))
-        if found is None:
+        entry = self._known.get(id(value))
+        if entry is None:
             text = self._text(value)
-            found = self._known[id(value)] = value, hashlib.sha256(text.encode()).hexdigest()
-        return found[1]
+            entry = self._known[id(value)] = value, hashlib.sha256(text.encode()).hexdigest()
+        return entry[1]
 
     def _text(self, value: object) -> str:
         kind = type(value).__name__
@@ -117,7 +119,9 @@ class _Digest:
             return f"{kind} {' '.join(map(self.of, value))}"
         if is_dataclass(value):
             parts = (
-                f"{one.name} {self.of(getattr(value, one.name))}" for one in fields(value) if one.compare
+                f"{attribute.name} {self.of(getattr(value, attribute.name))}"
+                for attribute in fields(value)
+                if attribute.compare
             )
             return f"{kind} {' '.join(parts)}"
         raise TypeError(f"{kind} is no value of the model")

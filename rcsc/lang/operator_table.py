@@ -43,9 +43,9 @@ class Op(StrEnum):
 
     def __new__(cls, word: str, strength: int = POSTFIX, meaning: Callable[..., Any] = abs) -> Self:
         """Makes a member of its row."""
-        one = str.__new__(cls, word)
-        one._value_, one.strength, one.meaning = word, strength, meaning
-        return one
+        member = str.__new__(cls, word)
+        member._value_, member.strength, member.meaning = word, strength, meaning
+        return member
 
     IMPLIES = "implies", IMPLICATION, lambda a, b: not a or b
     OR = "or", DISJUNCTION, lambda a, b: a or b

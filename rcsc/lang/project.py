@@ -51,10 +51,10 @@ def load(paths: Sequence[str], stdin: str | bytes | None = None, stdin_name: str
     roots = tuple(dict.fromkeys(file for path in paths for file in loader.roots(path)))
     for file in roots:
         loader.reach(file)
-    found = tuple(sorted(set(loader.found), key=sort_key))
+    diagnostics = tuple(sorted(set(loader.found), key=sort_key))
     uses = {file: tuple(used) for file, used in loader.uses.items()}
     heads = _heads(roots, {path for path in paths if not os.path.isdir(path)}, uses)
-    return Loaded(roots, heads, loader.files, uses, loader.sources, found)
+    return Loaded(roots, heads, loader.files, uses, loader.sources, diagnostics)
 
 
 def _heads(roots: tuple[str, ...], named: set[str], uses: Mapping[str, tuple[str, ...]]) -> tuple[str, ...]:

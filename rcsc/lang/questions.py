@@ -103,10 +103,10 @@ def _within(terms: list[tuple[Expr, int]], low: int, high: int) -> list[Expr]:
         return []
     second = terms[1][0]
     if isinstance(first.type, Real):
-        said = {Op.LT: high == -1, Op.LE: high == 0, Op.GE: low == 0, Op.GT: low == 1}
+        comparisons = {Op.LT: high == -1, Op.LE: high == 0, Op.GE: low == 0, Op.GT: low == 1}
     else:
-        said = {Op.EQ: low == high == 0, Op.NE: high < 0 or low > 0}
-    return [_compare(op, first, second) for op, whether in said.items() if whether]
+        comparisons = {Op.EQ: low == high == 0, Op.NE: high < 0 or low > 0}
+    return [_compare(op, first, second) for op, whether in comparisons.items() if whether]
 
 
 def _one(term: Expr, low: int, high: int) -> list[Expr]:

@@ -95,18 +95,18 @@ class Tests:
         subject = self.subjects[column]
         if subject is None:
             return None
-        found: Typed | None
+        condition: Typed | None
         match written:
             case tree.Comparison(written_op, value, span):
                 op: Operator = Op(written_op)
                 assert is_comparison(op)
                 other = typed(scope, body, value, subject.expr.type)
-                found = None if other is None else compared(scope, op, (subject, other), span)
+                condition = None if other is None else compared(scope, op, (subject, other), span)
             case tree.OneOf(members, span):
-                found = among(scope, body, subject, members, span)
+                condition = among(scope, body, subject, members, span)
             case tree.Between(low, high, span):
-                found = between(scope, body, subject, low, high, span)
-        return None if found is None else found.expr
+                condition = between(scope, body, subject, low, high, span)
+        return None if condition is None else condition.expr
 
 
 # --- boxes ---------------------------------------------------------------------------
@@ -147,20 +147,20 @@ def _box(condition: Expr, kind: Scalar, low: int, high: int) -> Box | None:
             box = _box(inner, kind, low, high)
             return None if box is None else complement(box, low, high)
         case Apply(op=op, args=(left, right)) if is_logic(op):
-            one, two = _box(left, kind, low, high), _box(right, kind, low, high)
-            return None if one is None or two is None else _logic(op, one, two, low, high)
+            first, second = _box(left, kind, low, high), _box(right, kind, low, high)
+            return None if first is None or second is None else _logic(op, first, second, low, high)
         case Apply(op=op, args=(left, right)) if is_comparison(op):
             return _compared(op, left, right, kind, low, high)
         case _:
             return None
 
 
-def _logic(op: Logic, one: Box, two: Box, low: int, high: int) -> Box:
+def _logic(op: Logic, left: Box, right: Box, low: int, high: int) -> Box:
     def signed(box: Box) -> Signed[Box]:
         return lambda wanted: box if wanted else complement(box, low, high)
 
     whole = truth_function(
-        op, signed(one), signed(two), lambda boxes: meet(*boxes), lambda boxes: joined(boxes[0] + boxes[1])
+        op, signed(left), signed(right), lambda boxes: meet(*boxes), lambda boxes: joined(boxes[0] + boxes[1])
     )
     return whole(True)
 
@@ -189,14 +189,14 @@ def _affine(expr: Expr) -> tuple[int, int] | None:
             line = _affine(inner)
             return None if line is None else (-line[0], -line[1])
         case Apply(op=Op.ADD | Op.SUB | Op.MUL as op, args=(left, right)):
-            one, two = _affine(left), _affine(right)
-            return None if one is None or two is None else _combined(op, one, two)
+            first, second = _affine(left), _affine(right)
+            return None if first is None or second is None else _combined(op, first, second)
         case _:
             return None
 
 
-def _combined(op: Op, one: tuple[int, int], two: tuple[int, int]) -> tuple[int, int] | None:
-    (a, b), (c, d) = one, two
+def _combined(op: Op, left: tuple[int, int], right: tuple[int, int]) -> tuple[int, int] | None:
+    (a, b), (c, d) = left, right
     if op is Op.MUL:
         return None if a and c else (a * d + c * b, b * d)
     sign = 1 if op is Op.ADD else -1

@@ -51,7 +51,7 @@ def _one_spelling(scope: Scope, value: float, text: str, span: Span) -> None:
     """Reports two different numbers of the text that are the same double."""
     first = scope.doubles.setdefault(value, (text, scope.at(span)))
     if first[0] != text and Fraction(first[0]) != Fraction(text):
-        shown = [one if len(one) <= 40 else one[:37] + "..." for one in (text, first[0])]
+        shown = [spelling if len(spelling) <= 40 else spelling[:37] + "..." for spelling in (text, first[0])]
         message = f"`{shown[0]}` and `{shown[1]}` are different numbers but the same double, {value!r}"
         label = Label(first[1], "the other")
         scope.report(Code.SAME_DOUBLE, message, span, f"write {value!r} for both", related=(label,))

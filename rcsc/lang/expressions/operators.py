@@ -56,11 +56,11 @@ def kind_word(kind: Scalar) -> str:
             return "real"
 
 
-def same_kind(one: Scalar, two: Scalar) -> bool:
+def same_kind(left: Scalar, right: Scalar) -> bool:
     """Whether values of the two can be compared or assigned, units aside."""
-    if isinstance(one, Enum) or isinstance(two, Enum):
-        return one == two
-    return type(one) is type(two)
+    if isinstance(left, Enum) or isinstance(right, Enum):
+        return left == right
+    return type(left) is type(right)
 
 
 def applied(
@@ -70,19 +70,19 @@ def applied(
     kinds = tuple(o.expr.type for o in operands if isinstance(o.expr.type, Int | Real))
     args = tuple(o.expr for o in operands)
     bare = all(o.bare for o in operands)
-    made = Apply(op, args, intervals.apply(op, kinds, unit), span)
-    value = fold(made) if all(isinstance(arg, Literal) for arg in args) else None
+    operation = Apply(op, args, intervals.apply(op, kinds, unit), span)
+    value = fold(operation) if all(isinstance(arg, Literal) for arg in args) else None
     if value is None:
-        return Typed(made, bare)
-    if isinstance(made.type, Real) and not math.isfinite(value):
+        return Typed(operation, bare)
+    if isinstance(operation.type, Real) and not math.isfinite(value):
         scope.report(Code.NOT_FINITE, "this constant is larger than every double", span)
         return None
-    if isinstance(made.type, Int) and not I64_MIN <= value <= U64_MAX:
+    if isinstance(operation.type, Int) and not I64_MIN <= value <= U64_MAX:
         scope.report(Code.TOO_WIDE, "no 64-bit integer holds this constant", span)
         return None
     point = (
         Int(int(value), int(value), unit)
-        if isinstance(made.type, Int)
+        if isinstance(operation.type, Int)
         else Real(value + 0.0, value + 0.0, unit)
     )
     return Typed(Literal(value + 0.0 if isinstance(value, float) else value, point, span), bare)
@@ -109,9 +109,9 @@ def alike(scope: Scope, op: Arithmetic, operands: tuple[Typed, ...], span: Span)
 def one_kind(scope: Scope, left: Typed, right: Typed, span: Span) -> bool:
     """Whether both sides are of one kind, and one 64-bit integer type holds both."""
     if not same_kind(left.expr.type, right.expr.type):
-        one, two = kind_word(left.expr.type), kind_word(right.expr.type)
-        helps = ("convert with `real(n)` or `int(x)`",) if {one, two} == {"int", "real"} else ()
-        scope.report(Code.KIND, f"the two sides are {one} and {two}", span, *helps)
+        left_word, right_word = kind_word(left.expr.type), kind_word(right.expr.type)
+        helps = ("convert with `real(n)` or `int(x)`",) if {left_word, right_word} == {"int", "real"} else ()
+        scope.report(Code.KIND, f"the two sides are {left_word} and {right_word}", span, *helps)
         return False
     kinds = [k for k in (left.expr.type, right.expr.type) if isinstance(k, Int)]
     unsigned = any(k.low >= 0 and k.high > I64_MAX for k in kinds)
@@ -168,9 +168,9 @@ def converted(scope: Scope, op: Conversion, operand: Typed, span: Span) -> Typed
             return None
         wide = not (math.isfinite(kind.low) and math.isfinite(kind.high))
         converted = Int(*((-(2**1024), 2**1024) if wide else (int(kind.low), int(kind.high))), kind.unit)
-    made = Apply(op, (operand.expr,), converted, span)
-    value = fold(made) if isinstance(operand.expr, Literal) else None
+    conversion = Apply(op, (operand.expr,), converted, span)
+    value = fold(conversion) if isinstance(operand.expr, Literal) else None
     if value is not None and op is Op.TO_INT and not I64_MIN <= value <= U64_MAX:
         scope.report(Code.TOO_WIDE, "no 64-bit integer holds this constant", span)
         return None
-    return Typed(made if value is None else Literal(value, converted, span), operand.bare)
+    return Typed(conversion if value is None else Literal(value, converted, span), operand.bare)

@@ -92,11 +92,11 @@ class Scope:
 
     def names(self, base: str, length: int) -> tuple[str, ...]:
         """The names of the elements of an array; made once, as every use by index has them all."""
-        made = self.elements.get((base, length))
-        if made is None:
-            made = tuple(f"{base}[{at}]" for at in range(length))
-            self.elements[base, length] = made
-        return made
+        names = self.elements.get((base, length))
+        if names is None:
+            names = tuple(f"{base}[{at}]" for at in range(length))
+            self.elements[base, length] = names
+        return names
 
     def claim(self, name: tree.Name, space: str) -> bool:
         """Takes `name` in a name space; reports and refuses one that is taken."""

@@ -86,13 +86,15 @@ def _typed(scope: Scope, body: Body, written: tree.Expr, want: Scalar | None) ->
 
 def boolean(scope: Scope, body: Body, written: tree.Expr) -> Expr | None:
     """A condition."""
-    found = typed(scope, body, written, Bool())
-    if found is None:
+    condition = typed(scope, body, written, Bool())
+    if condition is None:
         return None
-    if not isinstance(found.expr.type, Bool):
-        scope.report(Code.KIND, f"a condition is a bool, this is {kind_word(found.expr.type)}", written.span)
+    if not isinstance(condition.expr.type, Bool):
+        scope.report(
+            Code.KIND, f"a condition is a bool, this is {kind_word(condition.expr.type)}", written.span
+        )
         return None
-    return found.expr
+    return condition.expr
 
 
 def _reference(scope: Scope, body: Body, name: tree.Name, span: Span, want: Scalar | None) -> Typed | None:
@@ -183,7 +185,7 @@ def _field(scope: Scope, base: Path | None, name: tree.Name) -> Path | None:
         return None
     for part in base.type.fields:
         if part.name == name.text:
-            return Path(tuple(f"{one}.{name.text}" for one in base.names), part.type, base.index)
+            return Path(tuple(f"{prefix}.{name.text}" for prefix in base.names), part.type, base.index)
     scope.unknown("field", name, [part.name for part in base.type.fields])
     return None
 
@@ -254,8 +256,8 @@ def _was(scope: Scope, body: Body, written: tree.Expr, span: Span, want: Scalar 
         scope.report(Code.NO_CYCLE_BEFORE, scope.no_before, span)
         return None
     with without_before(scope, "`was` goes back one cycle, not two"):
-        found = typed(scope, body, written, want)
-    return None if found is None else Typed(one_earlier(found.expr), found.bare)
+        operand = typed(scope, body, written, want)
+    return None if operand is None else Typed(one_earlier(operand.expr), operand.bare)
 
 
 @contextmanager
@@ -276,12 +278,12 @@ def _number(scope: Scope, operand: Typed, written: tree.Expr) -> bool:
 def _pair(scope: Scope, body: Body, left: tree.Expr, right: tree.Expr) -> tuple[Typed, Typed] | None:
     """Both sides; a bare enum member takes the enumeration of the other side."""
     if _may_be_member(scope, body, left):
-        two = typed(scope, body, right)
-        one = typed(scope, body, left, two.expr.type if two else None)
+        second = typed(scope, body, right)
+        first = typed(scope, body, left, second.expr.type if second else None)
     else:
-        one = typed(scope, body, left)
-        two = typed(scope, body, right, one.expr.type if one else None)
-    return None if one is None or two is None else (one, two)
+        first = typed(scope, body, left)
+        second = typed(scope, body, right, first.expr.type if first else None)
+    return None if first is None or second is None else (first, second)
 
 
 def _may_be_member(scope: Scope, body: Body, written: tree.Expr) -> bool:
@@ -294,8 +296,12 @@ def _may_be_member(scope: Scope, body: Body, written: tree.Expr) -> bool:
 def _binary(scope: Scope, body: Body, written: tree.Binary) -> Typed | None:
     op: Operator = Op(written.op)
     if is_logic(op):
-        one, two = boolean(scope, body, written.left), boolean(scope, body, written.right)
-        return None if one is None or two is None else Typed(Apply(op, (one, two), Bool(), written.span))
+        first, second = boolean(scope, body, written.left), boolean(scope, body, written.right)
+        return (
+            None
+            if first is None or second is None
+            else Typed(Apply(op, (first, second), Bool(), written.span))
+        )
     pair = _pair(scope, body, written.left, written.right)
     if pair is None:
         return None
@@ -327,16 +333,16 @@ def among(
     """`subject in {members}`; members are constants."""
     values: list[Value] = []
     for member in members:
-        one = typed(scope, body, member, subject.expr.type)
-        if one is None:
+        element = typed(scope, body, member, subject.expr.type)
+        if element is None:
             return None
-        value = fold(one.expr)
+        value = fold(element.expr)
         if value is None:
             scope.report(Code.NOT_CONSTANT, "the members of a set are constants", member.span)
             return None
         if (
-            not one_kind(scope, subject, one, member.span)
-            or common_unit(scope, (subject, one), member.span) is None
+            not one_kind(scope, subject, element, member.span)
+            or common_unit(scope, (subject, element), member.span) is None
         ):
             return None
         values.append(value)

@@ -70,9 +70,9 @@ def _small(scope: Scope, kind: Array, span: Span) -> Type:
 
 def scalar_of(scope: Scope, written: tree.TypeExpr) -> Scalar:
     """The type of a local or parameter, which is a scalar."""
-    found = type_of(scope, written)
-    if isinstance(found, Bool | Enum | Int | Real):
-        return found
+    kind = type_of(scope, written)
+    if isinstance(kind, Bool | Enum | Int | Real):
+        return kind
     scope.report(Code.KIND, "a local or parameter is a bool, an enumeration or a number", written.span)
     return Bool()
 

@@ -42,8 +42,8 @@ class Names:
                 case _:
                     pass
         declared = [d for d in self.all if isinstance(d, tree.VariableDecl)]
-        mine = [one for one in declared if scope.claim(one.name, "value")]
-        scope.variables.update(one.name.text for one in mine)
+        mine = [variable for variable in declared if scope.claim(variable.name, "value")]
+        scope.variables.update(variable.name.text for variable in mine)
         scope.demand = self._demand
         for key in list(self.waiting):
             if key in self.waiting:
@@ -58,7 +58,7 @@ class Names:
         """Resolves a name asked for before its turn; False where it asks for itself, which is reported."""
         key = f"{space} {name.text}"
         if key in self.path:
-            names = [one.partition(" ")[2] for one in (*self.path[self.path.index(key) :], key)]
+            names = [link.partition(" ")[2] for link in (*self.path[self.path.index(key) :], key)]
             message = f"`{name.text}` is declared by means of itself: {' -> '.join(names)}"
             code = Code.KIND if space == "type" else Code.NOT_CONSTANT
             self.scope.report(code, message, name.span)
@@ -72,15 +72,15 @@ class Names:
         return True
 
     def _resolve(self, key: str) -> None:
-        scope, one = self.scope, self.waiting.pop(key)
+        scope, declaration = self.scope, self.waiting.pop(key)
         self.path.append(key)
         depth, scope.depth = scope.depth, 0
-        match one:
+        match declaration:
             case tree.ConstDecl():
-                variables.declare_constant(scope, one)
+                variables.declare_constant(scope, declaration)
             case tree.TypeDecl():
-                variables.declare_type(scope, one)
+                variables.declare_type(scope, declaration)
             case tree.RecordDecl():
-                variables.declare_record(scope, one)
+                variables.declare_record(scope, declaration)
         scope.depth = depth
         self.path.pop()

@@ -92,14 +92,14 @@ def _chosen(
         if value is None or not fits(scope, selector.expr.type, value, dispatch.value.span):
             sound = False
             continue
-        found = value.literal().value
-        if found in pairs:
-            first = Label(places[found], "here")
+        command = value.literal().value
+        if command in pairs:
+            first = Label(places[command], "here")
             scope.report(
                 Code.DUPLICATE_ARM, "this command has a table already", dispatch.value.span, related=(first,)
             )
-        places.setdefault(found, dispatch.value.span)
-        pairs.setdefault(found, TableName(dispatch.table.text))
+        places.setdefault(command, dispatch.value.span)
+        pairs.setdefault(command, TableName(dispatch.table.text))
     if not sound or not _complete(scope, selector.expr.type, pairs, written.selector.span):
         return None
     return TableByCommand(selector.expr, tuple(sorted(pairs.items())))
@@ -125,16 +125,16 @@ def _written(
     tables: Iterable[Table], after: Iterable[str], procedures: Mapping[str, Procedure]
 ) -> dict[str, str]:
     """What lines of the tables and the postprocess may write, each with one that does."""
-    found: dict[str, str] = {}
+    writers: dict[str, str] = {}
     for table in tables:
         lines: list[Line | Default] = [*table.lines, *([] if table.default is None else [table.default])]
         for line in lines:
             _, writes = touched([action.statement for action in line.actions], procedures)
-            found |= dict.fromkeys(map(str, writes), f"line `{line.name}` of table `{table.name}`")
-    for one in after:
-        if one in procedures:
-            found |= dict.fromkeys(map(str, procedures[one].writes), f"`{one}` in the postprocess")
-    return found
+            writers |= dict.fromkeys(map(str, writes), f"line `{line.name}` of table `{table.name}`")
+    for name in after:
+        if name in procedures:
+            writers |= dict.fromkeys(map(str, procedures[name].writes), f"`{name}` in the postprocess")
+    return writers
 
 
 def _table(scope: Scope, name: tree.Name, tables: set[TableName]) -> bool:

@@ -33,7 +33,7 @@ class Owners:
 
     def laid_out(self, names: tuple[tree.Name, ...]) -> tuple[str, ...]:
         """The procedures that the named owners and procedures come to, in order."""
-        return tuple(one for name in names for one in self._runs_of(name))
+        return tuple(procedure for name in names for procedure in self._runs_of(name))
 
     def _runs_of(self, member: tree.Name) -> tuple[str, ...]:
         """What a member runs; one that is no owner and no procedure without parameters is reported."""

@@ -58,11 +58,11 @@ def _body(scope: Scope, written: tree.ProcedureDecl) -> _Body:
     body = Body()
     params = []
     for param, kind in zip(written.params, scope.signatures[written.name.text], strict=True):
-        made = Parameter(body.fresh(param.name.text), kind, param.span)
+        parameter = Parameter(body.fresh(param.name.text), kind, param.span)
         if param.name.text in body.visible:
             scope.report(Code.DUPLICATE_NAME, f"`{param.name.text}` is a parameter twice", param.name.span)
-        body.visible[param.name.text] = made
-        params.append(made)
+        body.visible[param.name.text] = parameter
+        params.append(parameter)
     return tuple(params), Statements(scope, body).block(written.body)
 
 
@@ -84,7 +84,7 @@ def _visit(scope: Scope, start: str, calls: dict[str, list[Call]], deep: dict[st
         call = next(path[name], None)
         if call is None:
             del path[name]
-            deep[name] = 1 + max((deep.get(one.procedure, 0) for one in calls[name]), default=0)
+            deep[name] = 1 + max((deep.get(nested.procedure, 0) for nested in calls[name]), default=0)
             continue
         callee = call.procedure
         if callee in path:
@@ -145,15 +145,15 @@ def touched(
 def _places(scope: Scope, written: tuple[tree.Expr, ...], writing: bool) -> set[VariableName]:
     """Leaves under the declared paths."""
     leaves: set[VariableName] = set()
-    for one in written:
-        path = path_of(scope, Body(), one)
+    for place in written:
+        path = path_of(scope, Body(), place)
         if path is None:
             continue
         root = root_of(path.names[0])
         if writing and scope.declared[root].kind is Kind.INPUT:
-            scope.report(Code.NOT_WRITABLE, f"`{root}` is an input; only the world writes it", one.span)
+            scope.report(Code.NOT_WRITABLE, f"`{root}` is an input; only the world writes it", place.span)
         if path.index is not None:
-            scope.report(Code.NOT_CONSTANT, "the index of a declared path is a constant", one.span)
+            scope.report(Code.NOT_CONSTANT, "the index of a declared path is a constant", place.span)
         own = scope.declared[root].leaves
         every = (*own, *(pending(name) for name in own if name in scope.deferred))
         leaves.update(name for name in every if below(name, path.names[0]))

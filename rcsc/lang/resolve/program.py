@@ -122,18 +122,20 @@ class _Resolver:
         )
 
     def _assumptions(self, all_: list[tree.Declaration]) -> tuple[Assumption, ...]:
-        made = []
+        assumptions = []
         for assume in all_:
             if isinstance(assume, tree.AssumeDecl) and self.scope.claim(assume.name, "assumption"):
                 condition = boolean(self.scope, Body(), assume.condition)
                 if condition is not None:
                     standing = Standing(assume.state or "assumed")
                     name = AssumptionName(assume.name.text)
-                    made.append(Assumption(name, standing, condition, " ".join(assume.doc), assume.name.span))
-        return tuple(made)
+                    assumptions.append(
+                        Assumption(name, standing, condition, " ".join(assume.doc), assume.name.span)
+                    )
+        return tuple(assumptions)
 
     def _invariants(self, all_: list[tree.Declaration]) -> tuple[Invariant, ...]:
-        made = []
+        invariants = []
         for invariant in all_:
             if not (
                 isinstance(invariant, tree.InvariantDecl) and self.scope.claim(invariant.name, "assumption")
@@ -150,15 +152,15 @@ class _Resolver:
                     invariant.condition.span,
                     "an assumption can be about inputs",
                 )
-            made.append(
+            invariants.append(
                 Invariant(invariant.name.text, condition, " ".join(invariant.doc), invariant.name.span)
             )
-        return tuple(made)
+        return tuple(invariants)
 
     def _properties(self, all_: list[tree.Declaration]) -> tuple[Property, ...]:
         written = (d for d in all_ if isinstance(d, tree.PropertyDecl))
-        made = (made_property(self.scope, d) for d in written if self.scope.claim(d.name, "assumption"))
-        return tuple(one for one in made if one is not None)
+        properties = (made_property(self.scope, d) for d in written if self.scope.claim(d.name, "assumption"))
+        return tuple(resolved for resolved in properties if resolved is not None)
 
     def _levels(
         self,
@@ -167,18 +169,18 @@ class _Resolver:
         owners: Owners,
         procedures: tuple[Procedure, ...],
     ) -> tuple[Level, ...]:
-        by_name = {one.name: one for one in tables}
+        by_name = {table.name: table for table in tables}
         bodies = {str(procedure.name): procedure for procedure in procedures}
         written = [d for d in all_ if isinstance(d, tree.LevelDecl) and self.scope.claim(d.name, "table")]
-        made = (level(self.scope, one, by_name, owners, bodies) for one in written)
-        return tuple(one for one in made if one is not None)
+        levels = (level(self.scope, declaration, by_name, owners, bodies) for declaration in written)
+        return tuple(resolved for resolved in levels if resolved is not None)
 
     def _tables(self, all_: list[tree.Declaration], assumptions: set[AssumptionName]) -> tuple[Table, ...]:
-        made = []
-        for one in all_:
-            if isinstance(one, tree.TableDecl) and self.scope.claim(one.name, "table"):
-                for name in one.assuming:
+        tables = []
+        for declaration in all_:
+            if isinstance(declaration, tree.TableDecl) and self.scope.claim(declaration.name, "table"):
+                for name in declaration.assuming:
                     if name.text not in assumptions:
                         self.scope.unknown("assumption", name, list(assumptions))
-                made.append(table(self.scope, one, self.sources))
-        return tuple(made)
+                tables.append(table(self.scope, declaration, self.sources))
+        return tuple(tables)

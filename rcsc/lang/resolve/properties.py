@@ -22,20 +22,20 @@ from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.spell import spell_expr
 
 
-def made_property(scope: Scope, one: tree.PropertyDecl) -> Property | None:
+def made_property(scope: Scope, written: tree.PropertyDecl) -> Property | None:
     """Resolve a property; None after an error."""
-    text = spell_expr(one.condition)
-    if one.other is None:
-        condition = _condition(scope, one.condition, "")
+    text = spell_expr(written.condition)
+    if written.other is None:
+        condition = _condition(scope, written.condition, "")
     else:
-        form = _FORMS[one.word]
-        text += f" {one.word} {spell_expr(one.other)}"
-        first = _condition(scope, one.condition, form.first_of_one_cycle)
-        other = _condition(scope, one.other, form.other_of_one_cycle)
+        form = _FORMS[written.word]
+        text += f" {written.word} {spell_expr(written.other)}"
+        first = _condition(scope, written.condition, form.first_of_one_cycle)
+        other = _condition(scope, written.other, form.other_of_one_cycle)
         condition = None if first is None or other is None else form.condition(first, other)
     if condition is None:
         return None
-    return Property(one.name.text, condition, text, " ".join(one.doc), one.name.span)
+    return Property(written.name.text, condition, text, " ".join(written.doc), written.name.span)
 
 
 def _condition(scope: Scope, written: tree.Expr, why_no_before: str) -> Expr | None:
@@ -87,5 +87,5 @@ _FORMS = {
 }
 
 
-def _apply(op: Op, one: Expr, two: Expr) -> Expr:
-    return Apply(op, (one, two), Bool())
+def _apply(op: Op, left: Expr, right: Expr) -> Expr:
+    return Apply(op, (left, right), Bool())

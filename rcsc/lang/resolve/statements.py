@@ -58,7 +58,7 @@ class Statements:
     def block(self, written: tuple[tree.Statement, ...]) -> tuple[Statement, ...]:
         """The statements; locals declared inside are forgotten after it."""
         before = dict(self.body.visible)
-        resolved = tuple(made for one in written for made in self._statement(one))
+        resolved = tuple(statement for part in written for statement in self._statement(part))
         self.body.visible = before
         return resolved
 
@@ -102,13 +102,13 @@ class Statements:
         """One assignment a leaf of the place."""
         if not isinstance(target.type, Bool | Enum | Int | Real):
             return self._copy(target, value, span)
-        found = typed(self.scope, self.body, value, target.type)
-        if found is None or not self._assignable(target.type, found, value.span):
+        assigned = typed(self.scope, self.body, value, target.type)
+        if assigned is None or not self._assignable(target.type, assigned, value.span):
             return ()
         names = tuple(pending(name) if deferred else VariableName(name) for name in target.names)
         if target.index is None:
-            return (Assign(ToLeaf(names[0], target.type), found.expr, span),)
-        return (Assign(ToElement(names, target.index, target.type), found.expr, span),)
+            return (Assign(ToLeaf(names[0], target.type), assigned.expr, span),)
+        return (Assign(ToElement(names, target.index, target.type), assigned.expr, span),)
 
     def _assign_local(
         self, place: tree.Reference, value: tree.Expr, deferred: bool, span: Span
@@ -130,10 +130,10 @@ class Statements:
                 Code.NOT_WRITABLE, f"`{place.name.text}` counts a loop and is not assigned", place.span
             )
             return ()
-        found = typed(self.scope, self.body, value, local.type)
-        if found is None or not self._assignable(local.type, found, value.span):
+        assigned = typed(self.scope, self.body, value, local.type)
+        if assigned is None or not self._assignable(local.type, assigned, value.span):
             return ()
-        return (Assign(ToLocal(local.name, local.type), found.expr, span),)
+        return (Assign(ToLocal(local.name, local.type), assigned.expr, span),)
 
     def _writable(self, target: Path, deferred: bool, span: Span) -> bool:
         root = root_of(target.names[0])
@@ -195,7 +195,7 @@ class Statements:
             self.scope.report(Code.LOOP_TOO_LONG, message, span)
             return True
         used = {name for path in (target, origin) if path.index for name in read_by(path.index)}
-        own = [name for name in used if any(below(name, one) for one in target.names)]
+        own = [name for name in used if any(below(name, written) for written in target.names)]
         if own:
             message = f"the index reads `{min(own)}`, which this assignment changes"
             self.scope.report(Code.KIND, message, span, "keep the index in a local first")
@@ -211,9 +211,9 @@ class Statements:
         kind = scalar_of(self.scope, written.type)
         value = None
         if written.value is not None:
-            found = typed(self.scope, self.body, written.value, kind)
-            if found is not None and self._assignable(kind, found, written.value.span):
-                value = found.expr
+            initial = typed(self.scope, self.body, written.value, kind)
+            if initial is not None and self._assignable(kind, initial, written.value.span):
+                value = initial.expr
         if written.name.text in self.body.visible:
             self.scope.report(
                 Code.DUPLICATE_NAME, f"`{written.name.text}` is declared twice", written.name.span
@@ -231,16 +231,16 @@ class Statements:
 
     def _arm(self, written: tree.Arm, subject: Typed | None, seen: dict[Value, Span]) -> Arm:
         values = []
-        for one in written.values if subject is not None else ():
+        for label in written.values if subject is not None else ():
             assert subject is not None
-            value = constant(self.scope, one, subject.expr.type)
-            if value is None or not self._arm_fits(subject, value, one.span):
+            value = constant(self.scope, label, subject.expr.type)
+            if value is None or not self._arm_fits(subject, value, label.span):
                 continue
-            found = value.literal().value
-            if found in seen:
-                self.scope.report(Code.DUPLICATE_ARM, "an arm above already takes this value", one.span)
-            seen.setdefault(found, one.span)
-            values.append(found)
+            literal = value.literal().value
+            if literal in seen:
+                self.scope.report(Code.DUPLICATE_ARM, "an arm above already takes this value", label.span)
+            seen.setdefault(literal, label.span)
+            values.append(literal)
         return Arm(tuple(values), self.block(written.body), written.span)
 
     def _arm_fits(self, subject: Typed, value: Typed, span: Span) -> bool:
@@ -248,10 +248,10 @@ class Statements:
             words = kind_word(subject.expr.type), kind_word(value.expr.type)
             self.scope.report(Code.KIND, f"expected {words[0]}, this is {words[1]}", span)
             return False
-        kind, found = subject.expr.type, value.literal().value
-        if isinstance(kind, Int | Real) and not kind.low <= found <= kind.high:
+        kind, literal = subject.expr.type, value.literal().value
+        if isinstance(kind, Int | Real) and not kind.low <= literal <= kind.high:
             low, high = spell_number(kind.low), spell_number(kind.high)
-            message = f"{spell_number(found)} is never taken: the subject lies in {low} .. {high}"
+            message = f"{spell_number(literal)} is never taken: the subject lies in {low} .. {high}"
             self.scope.report(Code.OUT_OF_RANGE_CONSTANT, message, span)
             return False
         return common_unit(self.scope, (subject, value), span) is not None
@@ -295,10 +295,10 @@ class Statements:
             return ()
         args = []
         for kind, arg in zip(self.scope.signatures[written.name.text], written.args, strict=True):
-            found = typed(self.scope, self.body, arg, kind)
-            if found is None or not self._assignable(kind, found, arg.span):
+            argument = typed(self.scope, self.body, arg, kind)
+            if argument is None or not self._assignable(kind, argument, arg.span):
                 return ()
-            args.append(found.expr)
+            args.append(argument.expr)
         return (Call(ProcedureName(written.name.text), tuple(args), written.span),)
 
 
@@ -320,9 +320,9 @@ def below(leaf: str, path: str) -> bool:
 def cost(body: tuple[Statement, ...], known: dict[str, int]) -> int:
     """Statements that one run executes at most, calls included."""
     total = 0
-    for one in body:
+    for statement in body:
         total += 1
-        match one:
+        match statement:
             case If(then=then, orelse=orelse):
                 total += max(cost(then, known), cost(orelse, known))
             case Case(arms=arms, orelse=orelse):
@@ -334,5 +334,5 @@ def cost(body: tuple[Statement, ...], known: dict[str, int]) -> int:
             case Assign() | Local():
                 pass
             case _:
-                assert_never(one)
+                assert_never(statement)
     return total

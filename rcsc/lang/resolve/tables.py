@@ -150,13 +150,13 @@ class _Cells:
             if target is None:
                 return []
             path = replaced(target[0], target[1])
-            return [(text, one) for one in statements.store(path, written.value, False, written.span)]
+            return [(text, action) for action in statements.store(path, written.value, False, written.span)]
         pieces = [piece.strip() for piece in text.split(";")]
-        made: list[tuple[str, Statement]] = []
-        for at, one in enumerate(written):
+        actions: list[tuple[str, Statement]] = []
+        for at, action in enumerate(written):
             piece = pieces[at] if len(pieces) == len(written) else text
-            made.extend((piece, statement) for statement in statements.block((one,)))
-        return made
+            actions.extend((piece, statement) for statement in statements.block((action,)))
+        return actions
 
 
 def replaced(path: Path, heading: Span) -> Path:

@@ -153,8 +153,8 @@ def _constant(scope: Scope, written: tree.Expr | None, kind: Type, what: str) ->
     value = constant(scope, written, kind)
     if value is None or not fits(scope, kind, value, written.span):
         return None
-    found = value.literal().value
-    return float(found) + 0.0 if isinstance(kind, Real) else found
+    literal = value.literal().value
+    return float(literal) + 0.0 if isinstance(kind, Real) else literal
 
 
 def _safe(scope: Scope, written: tree.VariableDecl, kind: Type) -> Value | None:
@@ -174,9 +174,9 @@ def fits(scope: Scope, kind: Scalar, value: Typed, span: Span) -> bool:
         target = Typed(Literal(kind.low, kind), False)
         if common_unit(scope, (target, value), span) is None:
             return False
-        found = value.literal().value
-        if not kind.low <= found <= kind.high:
-            scope.report(Code.OUT_OF_RANGE_CONSTANT, f"{found} is not in {kind.low} .. {kind.high}", span)
+        literal = value.literal().value
+        if not kind.low <= literal <= kind.high:
+            scope.report(Code.OUT_OF_RANGE_CONSTANT, f"{literal} is not in {kind.low} .. {kind.high}", span)
             return False
     return True
 

@@ -175,17 +175,17 @@ class Build:
         head = self._head(node)
         parts = node.children[1:]
         period, before = self._find(parts, "period"), self._find(parts, "preprocess")
-        one, many = self._find(parts, "one_table"), self._find(parts, "by_command")
+        table, by_command = self._find(parts, "one_table"), self._find(parts, "by_command")
         after = self._find(parts, "postprocess")
         return tree.LevelDecl(
             self._name(node.children[0]),
             self.expr(period.children[0]) if period else None,
             self._names(before.children[0]) if before else (),
-            self._name(one.children[0]) if one else None,
-            self.expr(many.children[0]) if many else None,
+            self._name(table.children[0]) if table else None,
+            self.expr(by_command.children[0]) if by_command else None,
             tuple(
                 tree.Dispatch(self.expr(d.children[0]), self._name(d.children[1]), self._span(d))
-                for d in (many.children[1:] if many else ())
+                for d in (by_command.children[1:] if by_command else ())
             ),
             self._names(after.children[0]) if after else (),
             **head,

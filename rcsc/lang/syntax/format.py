@@ -29,14 +29,14 @@ def format_file(file: tree.File) -> str:
     return "\n".join(lines) + "\n" if lines else ""
 
 
-def _together(one: tree.Declaration, two: tree.Declaration) -> bool:
+def _together(first: tree.Declaration, second: tree.Declaration) -> bool:
     """Whether two declarations stand without a line between them."""
-    if not isinstance(one, _LONE) or type(one) is not type(two) or two.comments:
+    if not isinstance(first, _LONE) or type(first) is not type(second) or second.comments:
         return False
     return (
-        not isinstance(one, tree.VariableDecl)
-        or not isinstance(two, tree.VariableDecl)
-        or one.kind == two.kind
+        not isinstance(first, tree.VariableDecl)
+        or not isinstance(second, tree.VariableDecl)
+        or first.kind == second.kind
     )
 
 
@@ -45,9 +45,9 @@ def _above(comments: tuple[str, ...], doc: tuple[str, ...], pad: str = "") -> It
     yield from ((f"{pad}## {text}").rstrip() for text in doc)
 
 
-def _declaration(one: tree.Declaration) -> Iterator[str]:
-    yield from _above(one.comments, () if isinstance(one, tree.Use) else one.doc)
-    match one:
+def _declaration(declaration: tree.Declaration) -> Iterator[str]:
+    yield from _above(declaration.comments, () if isinstance(declaration, tree.Use) else declaration.doc)
+    match declaration:
         case tree.Use(path):
             yield f"use {path}"
         case tree.UnitDecl(name):
@@ -59,65 +59,67 @@ def _declaration(one: tree.Declaration) -> Iterator[str]:
         case tree.TypeDecl(name, kind):
             yield f"type {name.text} = {spell_type(kind)}"
         case tree.RecordDecl():
-            yield from _record(one)
+            yield from _record(declaration)
         case tree.VariableDecl():
-            yield _variable(one)
+            yield _variable(declaration)
         case tree.AssumeDecl() | tree.InvariantDecl() | tree.PropertyDecl():
-            yield _claim(one)
+            yield _claim(declaration)
         case tree.ProcedureDecl():
-            yield from _procedure(one)
+            yield from _procedure(declaration)
         case tree.OwnerDecl(name, members):
             inside = f" {', '.join(m.text for m in members)} " if members else " "
             yield f"owner {name.text} {{{inside}}}"
         case tree.TableDecl():
-            yield from _table(one)
+            yield from _table(declaration)
         case tree.LevelDecl():
-            yield from _level(one)
+            yield from _level(declaration)
 
 
-def _claim(one: tree.AssumeDecl | tree.InvariantDecl | tree.PropertyDecl) -> str:
-    said = spell_expr(one.condition)
-    match one:
+def _claim(claim: tree.AssumeDecl | tree.InvariantDecl | tree.PropertyDecl) -> str:
+    condition = spell_expr(claim.condition)
+    match claim:
         case tree.AssumeDecl(name, _, state):
-            return f"assume {name.text}{f' {state}' if state else ''} : {said}"
+            return f"assume {name.text}{f' {state}' if state else ''} : {condition}"
         case tree.InvariantDecl(name):
-            return f"invariant {name.text} : {said}"
+            return f"invariant {name.text} : {condition}"
         case tree.PropertyDecl(name, _, word, other):
-            return f"property {name.text} : {said}" + (
+            return f"property {name.text} : {condition}" + (
                 f" {word} {spell_expr(other)}" if other is not None else ""
             )
 
 
-def _record(one: tree.RecordDecl) -> Iterator[str]:
-    yield f"record {one.name.text} {{"
-    for part in one.fields:
+def _record(record: tree.RecordDecl) -> Iterator[str]:
+    yield f"record {record.name.text} {{"
+    for part in record.fields:
         yield from _above(part.comments, part.doc, "  ")
         yield f"  {part.name.text} : {spell_type(part.type)}"
     yield "}"
 
 
-def _variable(one: tree.VariableDecl) -> str:
-    text = f"{one.kind} {one.name.text} : {spell_type(one.type)}"
-    text += f" = {spell_expr(one.initial)}" if one.initial is not None else ""
-    text += f" safe {spell_expr(one.safe)}" if one.safe is not None else ""
-    text += f" {one.admit}" if one.admit else ""
+def _variable(variable: tree.VariableDecl) -> str:
+    text = f"{variable.kind} {variable.name.text} : {spell_type(variable.type)}"
+    text += f" = {spell_expr(variable.initial)}" if variable.initial is not None else ""
+    text += f" safe {spell_expr(variable.safe)}" if variable.safe is not None else ""
+    text += f" {variable.admit}" if variable.admit else ""
     return text + (
-        f" deferred until {spell_expr(one.deferred_until)}" if one.deferred_until is not None else ""
+        f" deferred until {spell_expr(variable.deferred_until)}"
+        if variable.deferred_until is not None
+        else ""
     )
 
 
-def _procedure(one: tree.ProcedureDecl) -> Iterator[str]:
-    word = {"procedure": "procedure", "module": "module", "extern": "extern procedure"}[one.kind]
-    params = ", ".join(f"{p.name.text} : {spell_type(p.type)}" for p in one.params)
-    head = f"{word} {one.name.text}" + (f"({params})" if params else "")
-    head += f" reads {', '.join(spell_expr(r) for r in one.reads)}" if one.reads else ""
-    head += f" writes {', '.join(spell_expr(w) for w in one.writes)}" if one.writes else ""
-    if one.kind == "extern":
-        head += f' python "{one.python}"' if one.python else ""
-        yield head + (f' c "{one.c}"' if one.c else "")
+def _procedure(procedure: tree.ProcedureDecl) -> Iterator[str]:
+    word = {"procedure": "procedure", "module": "module", "extern": "extern procedure"}[procedure.kind]
+    params = ", ".join(f"{p.name.text} : {spell_type(p.type)}" for p in procedure.params)
+    head = f"{word} {procedure.name.text}" + (f"({params})" if params else "")
+    head += f" reads {', '.join(spell_expr(r) for r in procedure.reads)}" if procedure.reads else ""
+    head += f" writes {', '.join(spell_expr(w) for w in procedure.writes)}" if procedure.writes else ""
+    if procedure.kind == "extern":
+        head += f' python "{procedure.python}"' if procedure.python else ""
+        yield head + (f' c "{procedure.c}"' if procedure.c else "")
         return
     yield f"{head} {{"
-    yield from _block(one.body, 1)
+    yield from _block(procedure.body, 1)
     yield "}"
 
 
@@ -127,17 +129,17 @@ def _block(body: tuple[tree.Statement, ...], depth: int) -> Iterator[str]:
         yield from _statement(statement, depth)
 
 
-def _statement(one: tree.Statement, depth: int) -> Iterator[str]:
+def _statement(statement: tree.Statement, depth: int) -> Iterator[str]:
     pad = "  " * depth
-    match one:
+    match statement:
         case tree.Assign() | tree.Call():
-            yield pad + _simple(one)
+            yield pad + _simple(statement)
         case tree.Local(name, kind, value):
             yield f"{pad}local {name.text} : {spell_type(kind)}" + (
                 f" := {spell_expr(value)}" if value else ""
             )
         case tree.If():
-            yield from _if(one, depth, pad)
+            yield from _if(statement, depth, pad)
         case tree.Case(subject, arms, orelse):
             yield f"{pad}case {spell_expr(subject)} {{"
             for arm in arms:
@@ -156,42 +158,44 @@ def _statement(one: tree.Statement, depth: int) -> Iterator[str]:
             yield f"{pad}}}"
 
 
-def _if(one: tree.If, depth: int, lead: str) -> Iterator[str]:
+def _if(branch: tree.If, depth: int, lead: str) -> Iterator[str]:
     """An `if`; one alone in an `else`, without comments, goes on as `else if`."""
     pad = "  " * depth
-    yield f"{lead}if {spell_expr(one.condition)} {{"
-    yield from _block(one.then, depth + 1)
-    if not one.orelse:
+    yield f"{lead}if {spell_expr(branch.condition)} {{"
+    yield from _block(branch.then, depth + 1)
+    if not branch.orelse:
         yield f"{pad}}}"
-    elif len(one.orelse) == 1 and isinstance(one.orelse[0], tree.If) and not one.orelse[0].comments:
-        yield from _if(one.orelse[0], depth, f"{pad}}} else ")
+    elif len(branch.orelse) == 1 and isinstance(branch.orelse[0], tree.If) and not branch.orelse[0].comments:
+        yield from _if(branch.orelse[0], depth, f"{pad}}} else ")
     else:
         yield f"{pad}}} else {{"
-        yield from _block(one.orelse, depth + 1)
+        yield from _block(branch.orelse, depth + 1)
         yield f"{pad}}}"
 
 
-def _simple(one: tree.Assign | tree.Call) -> str:
-    if isinstance(one, tree.Assign):
-        return f"{'next ' if one.deferred else ''}{spell_expr(one.place)} := {spell_expr(one.value)}"
-    return one.name.text + (f"({', '.join(spell_expr(arg) for arg in one.args)})" if one.args else "")
+def _simple(statement: tree.Assign | tree.Call) -> str:
+    if isinstance(statement, tree.Assign):
+        return f"{'next ' if statement.deferred else ''}{spell_expr(statement.place)} := {spell_expr(statement.value)}"
+    return statement.name.text + (
+        f"({', '.join(spell_expr(arg) for arg in statement.args)})" if statement.args else ""
+    )
 
 
 # --- tables and levels ---------------------------------------------------------------
 
 
-def _table(one: tree.TableDecl) -> Iterator[str]:
-    assuming = f" assuming {', '.join(name.text for name in one.assuming)}" if one.assuming else ""
-    yield f"table {one.name.text}{assuming} {{"
-    left = [["line", *(_heading(h, {"when"}) for h in one.conditions)]]
-    right = [[_heading(h, ACTION_WORDS) for h in one.actions]]
-    for row in one.rows:
-        left.append([row.name, *_conditions(row, one)])
+def _table(table: tree.TableDecl) -> Iterator[str]:
+    assuming = f" assuming {', '.join(name.text for name in table.assuming)}" if table.assuming else ""
+    yield f"table {table.name.text}{assuming} {{"
+    left = [["line", *(_heading(h, {"when"}) for h in table.conditions)]]
+    right = [[_heading(h, ACTION_WORDS) for h in table.actions]]
+    for row in table.rows:
+        left.append([row.name, *_conditions(row, table)])
         right.append([_action(cell) for cell in row.actions])
     widths = _widths(left), _widths(right)
     for number, (conditions, actions) in enumerate(zip(left, right, strict=True)):
         if number:
-            yield from _above(one.rows[number - 1].comments, (), "  ")
+            yield from _above(table.rows[number - 1].comments, (), "  ")
         yield "  " + _row(conditions, actions, widths)
         if not number:
             dashes = [["-" * width for width in side] for side in widths]
@@ -222,7 +226,9 @@ def _conditions(row: tree.Row, table: tree.TableDecl) -> list[str]:
 def _action(cell: tuple[tree.Statement, ...] | tree.Comparison) -> str:
     if isinstance(cell, tree.Comparison):
         return spell_expr(cell.value)
-    return "; ".join(_simple(one) for one in cell if isinstance(one, tree.Assign | tree.Call))
+    return "; ".join(
+        _simple(statement) for statement in cell if isinstance(statement, tree.Assign | tree.Call)
+    )
 
 
 def _widths(rows: list[list[str]]) -> list[int]:
@@ -235,19 +241,19 @@ def _row(conditions: list[str], actions: list[str], widths: tuple[list[int], lis
     return f"| {left} ||" + (f" {right} |" if actions else "")
 
 
-def _level(one: tree.LevelDecl) -> Iterator[str]:
-    yield f"level {one.name.text} {{"
-    if one.period is not None:
-        yield f"  period {spell_expr(one.period)}"
-    if one.preprocess:
-        yield f"  preprocess {', '.join(name.text for name in one.preprocess)}"
-    if one.table is not None:
-        yield f"  table {one.table.text}"
-    elif one.selector is not None:
-        yield f"  table by {spell_expr(one.selector)} {{"
-        for dispatch in one.dispatch:
+def _level(level: tree.LevelDecl) -> Iterator[str]:
+    yield f"level {level.name.text} {{"
+    if level.period is not None:
+        yield f"  period {spell_expr(level.period)}"
+    if level.preprocess:
+        yield f"  preprocess {', '.join(name.text for name in level.preprocess)}"
+    if level.table is not None:
+        yield f"  table {level.table.text}"
+    elif level.selector is not None:
+        yield f"  table by {spell_expr(level.selector)} {{"
+        for dispatch in level.dispatch:
             yield f"    {spell_expr(dispatch.value)} : {dispatch.table.text}"
         yield "  }"
-    if one.postprocess:
-        yield f"  postprocess {', '.join(name.text for name in one.postprocess)}"
+    if level.postprocess:
+        yield f"  postprocess {', '.join(name.text for name in level.postprocess)}"
     yield "}"

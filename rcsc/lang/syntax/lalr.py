@@ -97,10 +97,10 @@ class Tables:
         stack, values, begins, ends = [self._starts[start]], list[Any](), list[int](), list[int]()
         while True:
             words = self._words_of.get(stack[-1]) or self._words_at(stack[-1])
-            found = words.match(text, position)
-            if found is not None:
-                kind = found.lastgroup or ""
-                begin, position = found.span(kind)
+            match = words.match(text, position)
+            if match is not None:
+                kind = match.lastgroup or ""
+                begin, position = match.span(kind)
                 leaf = ParseLeaf(text[begin:position])
                 if kind in words.special:
                     kind = words.special[kind].get(leaf, kind)
@@ -152,10 +152,10 @@ def _words(skipped: str, terminals: Sequence[Any]) -> _Words:
             for terminal in terminals
             if terminal.pattern.type == "str" and terminal.priority == wide.priority
         )
-        found = {word.pattern.value: word.name for word in words if whole(word.pattern.value)}
-        if found:
-            special[wide.name] = found
-    inside = {name for found in special.values() for name in found.values()}
+        names = {word.pattern.value: word.name for word in words if whole(word.pattern.value)}
+        if names:
+            special[wide.name] = names
+    inside = {name for names in special.values() for name in names.values()}
     parts = (
         f"(?P<{terminal.name}>{terminal.pattern.to_regexp()})"
         for terminal in terminals
@@ -194,8 +194,8 @@ def _reduce(
         return
     size = rule.size
     parts = values[-size:]
-    begin = begins[-size] if begins[-size] >= 0 else next((one for one in begins[-size:] if one >= 0), -1)
-    end = ends[-1] if ends[-1] >= 0 else next((one for one in ends[: -size - 1 : -1] if one >= 0), -1)
+    begin = begins[-size] if begins[-size] >= 0 else next((at for at in begins[-size:] if at >= 0), -1)
+    end = ends[-1] if ends[-1] >= 0 else next((at for at in ends[: -size - 1 : -1] if at >= 0), -1)
     del stack[-size:], values[-size:], begins[-size:], ends[-size:]
     if rule.picked is not None:
         parts = _picked(rule.picked, parts)

@@ -45,11 +45,11 @@ def _parsed(text: str, start: str) -> ParseNode:
     Raises:
         lark.UnexpectedInput: It has none.
     """
-    found = _tables().parse(text, start)
-    if found is None:
+    root = _tables().parse(text, start)
+    if root is None:
         _parser().parse(text, start=start)  # says what is wrong
         raise AssertionError("Lark takes a text that its tables refuse")
-    return found
+    return root
 
 
 @lru_cache(maxsize=128)  # one run reads a file for each root that uses it, and a shell at each reload
@@ -62,15 +62,15 @@ def parse(source: Source) -> tree.File | tuple[Diagnostic, ...]:
     if refused:
         return refused
     pieces = _Pieces(source)
-    found = pieces.parse()
-    found += [screen.too_deep(source, *place) for node in pieces.nodes if (place := _deep_in(node))]
-    if found:
-        return tuple(found[:MOST_ERRORS])
+    diagnostics = pieces.parse()
+    diagnostics += [screen.too_deep(source, *place) for node in pieces.nodes if (place := _deep_in(node))]
+    if diagnostics:
+        return tuple(diagnostics[:MOST_ERRORS])
     comments = Comments(source)
-    build = Build(source.name, comments, _Rows(source, comments, found))
+    build = Build(source.name, comments, _Rows(source, comments, diagnostics))
     declarations = tuple(build.declaration(node) for node in pieces.nodes)
-    if found:
-        return tuple(found[:MOST_ERRORS])
+    if diagnostics:
+        return tuple(diagnostics[:MOST_ERRORS])
     return tree.File(declarations, tuple(words(text) for text in comments.rest()), source.name)
 
 
@@ -96,18 +96,18 @@ class _Pieces:
     def parse(self) -> list[Diagnostic]:
         """Fills `nodes`; what was wrong."""
         text, offset = self.source.text, 0
-        found: list[Diagnostic] = []
-        while len(found) < MOST_ERRORS:
+        diagnostics: list[Diagnostic] = []
+        while len(diagnostics) < MOST_ERRORS:
             blank = screen.blank_before(text, offset)
             try:
                 self.nodes.extend(_parsed(blank, "file").children)
-                return found
+                return diagnostics
             except lark.UnexpectedInput as error:
-                found.append(_syntax_error(error, self.source.name, 0, len(text), text))
-                offset = screen.next_declaration(text, found[-1].primary.span.start, offset)
+                diagnostics.append(_syntax_error(error, self.source.name, 0, len(text), text))
+                offset = screen.next_declaration(text, diagnostics[-1].primary.span.start, offset)
             if offset >= len(text):
                 break
-        return found
+        return diagnostics
 
 
 def _syntax_error(error: lark.UnexpectedInput, file: str, start: int, end: int, text: str) -> Diagnostic:

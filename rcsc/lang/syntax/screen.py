@@ -36,8 +36,8 @@ def refuse(source: Source) -> tuple[Diagnostic, ...]:
     unprinted = UNPRINTED.search(text)
     if unprinted is not None:
         named = f"U+{ord(unprinted[0]):04X}"
-        said = f"the text contains {unicodedata.name(unprinted[0], 'the control character')} ({named}), which a reader does not see"
-        return (_error(Code.UNPRINTED, said, source, *unprinted.span()),)
+        message = f"the text contains {unicodedata.name(unprinted[0], 'the control character')} ({named}), which a reader does not see"
+        return (_error(Code.UNPRINTED, message, source, *unprinted.span()),)
     for word in _LONG.finditer(text):
         if word.lastgroup:
             message = f"a name has {len(word[0])} characters, more than {MOST_NAME}"
