@@ -52,8 +52,8 @@ class Bits:
 
     def word(self, node: Node) -> Word:
         """The bits of a node: one for a truth value."""
-        for one in parts_first(node, known=self._words):
-            self._words[one] = self._made(one)
+        for part in parts_first(node, known=self._words):
+            self._words[part] = self._made(part)
         return self._words[node]
 
     def literal(self, node: Node) -> Literal:
@@ -82,10 +82,10 @@ class Bits:
 
     def all_of(self, literals: Iterable[Literal]) -> Literal:
         """The literal of all of them together."""
-        found = TRUE
+        conjunction = TRUE
         for literal in literals:
-            found = self.both(found, literal)
-        return found
+            conjunction = self.both(conjunction, literal)
+        return conjunction
 
     def _either(self, a: Literal, b: Literal) -> Literal:
         return -self.both(-a, -b)
@@ -105,20 +105,25 @@ class Bits:
             self.clauses += [[-gate, -a, b], [-gate, a, -b], [gate, a, b], [gate, -a, -b]]
         return -self._gates[key] if sign else self._gates[key]
 
-    def _mux(self, when: Literal, one: Literal, two: Literal) -> Literal:
-        if when == TRUE or one == two:
-            return one
+    def _mux(self, when: Literal, then: Literal, orelse: Literal) -> Literal:
+        if when == TRUE or then == orelse:
+            return then
         if when == FALSE:
-            return two
-        if one in (TRUE, FALSE) or two in (TRUE, FALSE) or one == -two:
-            return self._either(self.both(when, one), self.both(-when, two))
+            return orelse
+        if then in (TRUE, FALSE) or orelse in (TRUE, FALSE) or then == -orelse:
+            return self._either(self.both(when, then), self.both(-when, orelse))
         if when < 0:
-            when, one, two = -when, two, one
-        key = (f"mux {when}", one, two)
+            when, then, orelse = -when, orelse, then
+        key = (f"mux {when}", then, orelse)
         if key not in self._gates:
             gate = self._gates[key] = self.fresh()
-            self.clauses += [[-when, -one, gate], [-when, one, -gate], [when, -two, gate], [when, two, -gate]]
-            self.clauses += [[-one, -two, gate], [one, two, -gate]]
+            self.clauses += [
+                [-when, -then, gate],
+                [-when, then, -gate],
+                [when, -orelse, gate],
+                [when, orelse, -gate],
+            ]
+            self.clauses += [[-then, -orelse, gate], [then, orelse, -gate]]
         return self._gates[key]
 
     # --- words ---
@@ -129,22 +134,22 @@ class Bits:
     def _below(self, a: Word, b: Word) -> Literal:
         """That the first is less."""
         pairs = list(_aligned(a, b))
-        found = FALSE
+        less = FALSE
         for x, y in pairs[:-1]:
-            found = self._mux(self._same(x, y), found, y)
+            less = self._mux(self._same(x, y), less, y)
         x, y = pairs[-1]  # of the sign, the greater is the less
-        return self._mux(self._same(x, y), found, x)
+        return self._mux(self._same(x, y), less, x)
 
     def _sum(self, a: Word, b: Word, carry: Literal) -> Word:
-        found = []
+        bits = []
         for x, y in _aligned((*a, a[-1]), (*b, b[-1])):
             half = -self._same(x, y)
-            found.append(-self._same(half, carry))
+            bits.append(-self._same(half, carry))
             carry = self._mux(half, carry, x)
-        return tuple(found)
+        return tuple(bits)
 
-    def _choice(self, when: Literal, one: Word, two: Word) -> Word:
-        return tuple(self._mux(when, x, y) for x, y in _aligned(one, two))
+    def _choice(self, when: Literal, then: Word, orelse: Word) -> Word:
+        return tuple(self._mux(when, x, y) for x, y in _aligned(then, orelse))
 
     def _difference(self, a: Word, b: Word) -> Word:
         return self._sum(a, tuple(-x for x in b), TRUE)
@@ -153,11 +158,11 @@ class Bits:
         return self._difference((FALSE,), a)
 
     def _product(self, a: Word, factor: int) -> Word:
-        found: Word = (FALSE,)
+        product: Word = (FALSE,)
         for at in range(abs(factor).bit_length()):
             if abs(factor) >> at & 1:
-                found = self._sum(found, (*(FALSE,) * at, *a), FALSE)
-        return self._opposite(found) if factor < 0 else found
+                product = self._sum(product, (*(FALSE,) * at, *a), FALSE)
+        return self._opposite(product) if factor < 0 else product
 
     # --- nodes ---
 
@@ -185,13 +190,15 @@ class Bits:
             case op:
                 return self._number(op, node, parts)
 
-    def _one_of_few(self, node: Node, one: "Few") -> Word:
+    def _one_of_few(self, node: Node, shared: "Few") -> Word:
         if node.op is Shape.CONSTANT:
-            return tuple(TRUE if one.constants[node.low] >> at & 1 else FALSE for at in range(one.width))
+            return tuple(
+                TRUE if shared.constants[node.low] >> at & 1 else FALSE for at in range(shared.width)
+            )
         if node.op is not Shape.VARIABLE:
-            return tuple(self.fresh() for _ in range(one.width))
+            return tuple(self.fresh() for _ in range(shared.width))
         if node.name not in self._named:
-            self._named[node.name] = tuple(self.fresh() for _ in range(one.width))
+            self._named[node.name] = tuple(self.fresh() for _ in range(shared.width))
         return self._named[node.name]
 
     def _variable(self, name: str, kind: Scalar) -> Word:
@@ -203,10 +210,10 @@ class Bits:
         """A word of any value from `low` to `high`."""
         signed = low < 0
         width = max(low.bit_length(), (-low - 1).bit_length() if signed else 0, high.bit_length())
-        found = tuple(self.fresh() for _ in range(width)) + ((self.fresh(),) if signed else (FALSE,))
-        self.clauses.append([-self._below(found, constant(low))])
-        self.clauses.append([-self._below(constant(high), found)])
-        return found
+        word = tuple(self.fresh() for _ in range(width)) + ((self.fresh(),) if signed else (FALSE,))
+        self.clauses.append([-self._below(word, constant(low))])
+        self.clauses.append([-self._below(constant(high), word)])
+        return word
 
     def _compared(self, op: Ordering, node: Node, parts: list[Word]) -> Literal:
         if isinstance(node.args[0].kind, Bool):
@@ -220,7 +227,7 @@ class Bits:
                 return -self._below(parts[1], parts[0])
 
     def _number(self, op: Arithmetic | Conversion, node: Node, parts: list[Word]) -> Word:
-        a, b, one, two = parts[0], parts[-1], node.args[0], node.args[-1]
+        a, b, left, right = parts[0], parts[-1], node.args[0], node.args[-1]
         match op:
             case Op.NEG:
                 return self._opposite(a)
@@ -230,14 +237,14 @@ class Bits:
                 return self._choice(-self._below(b, a), a, b)
             case Op.MAX:
                 return self._choice(self._below(b, a), a, b)
-            case _ if isinstance(one.kind, Real) or isinstance(node.kind, Real):
+            case _ if isinstance(left.kind, Real) or isinstance(node.kind, Real):
                 return self._any(node)
             case Op.ADD:
                 return self._sum(a, b, FALSE)
             case Op.SUB:
                 return self._difference(a, b)
-            case Op.MUL if one.known or two.known:
-                return self._product(b, int(one.low)) if one.known else self._product(a, int(two.low))
+            case Op.MUL if left.known or right.known:
+                return self._product(b, int(left.low)) if left.known else self._product(a, int(right.low))
             case Op.MOD if wraps_once(node):
                 return self._choice(self._below(a, b), a, self._difference(a, b))
             case Op.MUL | Op.DIV | Op.MOD | Op.TO_INT | Op.TO_REAL:
@@ -274,7 +281,7 @@ def _aligned(a: Word, b: Word) -> Iterable[tuple[Literal, Literal]]:
 
 def key_of_bits(word: Sequence[bool]) -> int:
     """The number that a word stands for."""
-    size = sum(1 << at for at, one in enumerate(word[:-1]) if one)
+    size = sum(1 << at for at, bit in enumerate(word[:-1]) if bit)
     return size - (1 << (len(word) - 1)) if word[-1] else size
 
 
@@ -299,15 +306,15 @@ def few(nodes: Sequence[Node]) -> dict[Node, Few]:
     for node in every:
         if classes.of(node) not in spoilt:
             members.setdefault(classes.of(node), []).append(node)
-    found: dict[Node, Few] = {}
+    encodings: dict[Node, Few] = {}
     for member in members.values():
         values = dict.fromkeys(node.low for node in member if node.op is Shape.CONSTANT)
         names = {node.name for node in member if node.op is Shape.VARIABLE}
         others = sum(not isinstance(node.op, Shape) for node in member)
         width = max(1, (len(values) + len(names) + others - 1).bit_length())
         shared = Few(width, {value: at for at, value in enumerate(values)})
-        found |= dict.fromkeys(member, shared)
-    return found
+        encodings |= dict.fromkeys(member, shared)
+    return encodings
 
 
 @dataclass(slots=True)
@@ -323,8 +330,8 @@ class _Classes:
             node = up
         return node
 
-    def join(self, one: Node, two: Node) -> None:
-        self._up[self.of(one)] = self.of(two)
+    def join(self, left: Node, right: Node) -> None:
+        self._up[self.of(left)] = self.of(right)
 
 
 def _joined(nodes: Iterable[Node], classes: _Classes) -> set[Node]:

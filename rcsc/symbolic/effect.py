@@ -76,19 +76,19 @@ class Shared:
                 key = (part.op, tuple(map(id, args)), part.kind, part.low, part.high, part.name)
                 known = self._known.get(key)
                 if known is None:
-                    same = all(one is two for one, two in zip(args, part.args, strict=True))
+                    same = all(new is old for new, old in zip(args, part.args, strict=True))
                     known = part if same else Node(part.op, args, part.kind, part.low, part.high, part.name)
                     self._known[key] = known
                     self._of[known] = known
                 self._of[part] = known
         return self._of[node]
 
-    def equal(self, one: Node, two: Node) -> Node:
+    def equal(self, left: Node, right: Node) -> Node:
         """That two values are the same; known where they are built alike, whatever was learnt of their bounds.
 
         A value that is kept is no NaN: that is owed.
         """
-        return TRUE if self._built(one) == self._built(two) else values.equal(one, two)
+        return TRUE if self._built(left) == self._built(right) else values.equal(left, right)
 
     def _built(self, node: Node) -> int:
         """A number for how a value is built."""
@@ -114,8 +114,8 @@ class _Followed(Run):
         """As `Run.call`; the results of the n-th extern call have the same names in every run."""
         if procedure.extern is not None:
             given = (*(self.leaf(name) for name in procedure.reads), *(value for _, value in args))
-            said = f"{procedure.name} {procedure.extern} {procedure.reads} {procedure.writes}"
-            self.calls.append(ExternCall(said, self.path, given, dict(self.state.leaves)))
+            spelled = f"{procedure.name} {procedure.extern} {procedure.reads} {procedure.writes}"
+            self.calls.append(ExternCall(spelled, self.path, given, dict(self.state.leaves)))
         Run.call(self, procedure, args)
 
     def any_value(self, name: str, kind: Scalar) -> Node:
@@ -147,9 +147,9 @@ class Meaning:
     def condition(self, expr: Expr) -> Node:
         """The condition; where it is undefined is added to `bad`."""
         run = self._run()
-        found = run.evaluate(expr)
+        value = run.evaluate(expr)
         self.bad += [self.shared.one(values.negation(_paid(obligation))) for obligation in run.obligations]
-        return self.shared.one(found)
+        return self.shared.one(value)
 
     def lines(self, table: Table) -> list[Node]:
         """Return where each line matches, looking at no other; each test is asked once."""
@@ -183,20 +183,20 @@ class Meaning:
         return self._made(run)
 
     def _made(self, run: _Followed) -> Effect:
-        one = self.shared.one
+        canonical = self.shared.one
         calls = tuple(
             ExternCall(
                 call.spelled,
-                one(call.path),
-                tuple(map(one, call.given)),
-                {name: one(node) for name, node in call.before.items()},
+                canonical(call.path),
+                tuple(map(canonical, call.given)),
+                {name: canonical(node) for name, node in call.before.items()},
             )
             for call in run.calls
         )
         return Effect(
-            {name: one(node) for name, node in run.state.leaves.items()},
-            {name: one(node) for name, node in run.state.wrote.items()},
-            tuple(dict.fromkeys(one(_paid(owed)) for owed in run.obligations)),
+            {name: canonical(node) for name, node in run.state.leaves.items()},
+            {name: canonical(node) for name, node in run.state.wrote.items()},
+            tuple(dict.fromkeys(canonical(_paid(owed)) for owed in run.obligations)),
             calls,
         )
 
@@ -210,25 +210,25 @@ def value_after(effect: Effect, leaf: str, shared: Shared) -> Node:
     return effect.leaves.get(leaf, shared.start[leaf])
 
 
-def goes_wrong_otherwise(one: Effect, two: Effect, shared: Shared) -> Node:
+def goes_wrong_otherwise(left: Effect, right: Effect, shared: Shared) -> Node:
     """That one of the runs comes to its end and the other does not; what both owe plays no part."""
-    first = values.all_of(node for node in one.owed if node not in two.owed)
-    second = values.all_of(node for node in two.owed if node not in one.owed)
+    first = values.all_of(node for node in left.owed if node not in right.owed)
+    second = values.all_of(node for node in right.owed if node not in left.owed)
     if first is second:
         return FALSE
-    both = values.all_of(node for node in one.owed if node in two.owed)
+    both = values.all_of(node for node in left.owed if node in right.owed)
     return shared.one(values.both(both, values.negation(values.equal(first, second))))
 
 
-def same_calls(one: Effect, two: Effect, leaves: Collection[str], shared: Shared) -> Node:
+def same_calls(left: Effect, right: Effect, leaves: Collection[str], shared: Shared) -> Node:
     """The same extern procedures, at the same points, in the same states, with the same values.
 
     A result that is refused ends the cycle, so that what was written before the call is seen.
     """
-    if [call.spelled for call in one.calls] != [call.spelled for call in two.calls]:
-        return values.all_of(values.negation(call.path) for call in (*one.calls, *two.calls))
-    found = []
-    for first, second in zip(one.calls, two.calls, strict=True):
+    if [call.spelled for call in left.calls] != [call.spelled for call in right.calls]:
+        return values.all_of(values.negation(call.path) for call in (*left.calls, *right.calls))
+    conditions = []
+    for first, second in zip(left.calls, right.calls, strict=True):
         seen = [leaf for leaf in leaves if leaf in first.before or leaf in second.before]
         pairs = [
             *zip(first.given, second.given, strict=True),
@@ -239,16 +239,16 @@ def same_calls(one: Effect, two: Effect, leaves: Collection[str], shared: Shared
         ]
         both = values.both(first.path, second.path)
         neither = values.negation(values.either(first.path, second.path))
-        found.append(
+        conditions.append(
             values.either(values.both(both, values.all_of(shared.equal(a, b) for a, b in pairs)), neither)
         )
-    return values.all_of(found)
+    return values.all_of(conditions)
 
 
 def several(nodes: Iterable[Node]) -> Node:
     """That at least two of them hold."""
-    before, found = FALSE, FALSE
+    before, twice = FALSE, FALSE
     for node in nodes:
-        found = values.either(found, values.both(before, node))
+        twice = values.either(twice, values.both(before, node))
         before = values.either(before, node)
-    return found
+    return twice

@@ -51,11 +51,11 @@ def encode(expr: Expr, frame: Frame) -> Term:
             return frame.local[name]
         case Select(leaves=leaves, index=index):
             at = encode(index, frame)
-            found = frame.leaves[leaves[-1]]
+            selected = frame.leaves[leaves[-1]]
             for number in range(len(leaves) - 2, -1, -1):
                 here = smt.equal(at, smt.literal(index.type, number), index.type)
-                found = smt.choice(here, frame.leaves[leaves[number]], found)
-            return found
+                selected = smt.choice(here, frame.leaves[leaves[number]], selected)
+            return selected
         case Among(subject=subject, values=values):
             term = encode(subject, frame)
             kind = subject.type
@@ -95,20 +95,20 @@ def _signed(term: Term) -> Signed[Term]:
     return lambda wanted: term if wanted else smt.negation(term)
 
 
-def _comparison(op: Comparison, one: Term, two: Term, kind: Scalar) -> Term:
+def _comparison(op: Comparison, left: Term, right: Term, kind: Scalar) -> Term:
     match op:
         case Op.EQ:
-            return smt.equal(one, two, kind)
+            return smt.equal(left, right, kind)
         case Op.NE:
-            return smt.negation(smt.equal(one, two, kind))
+            return smt.negation(smt.equal(left, right, kind))
         case Op.LT:
-            return smt.below(one, two, kind)
+            return smt.below(left, right, kind)
         case Op.LE:
-            return smt.at_most(one, two, kind)
+            return smt.at_most(left, right, kind)
         case Op.GT:
-            return smt.below(two, one, kind)
+            return smt.below(right, left, kind)
         case Op.GE:
-            return smt.at_most(two, one, kind)
+            return smt.at_most(right, left, kind)
 
 
 def within(term: Term, kind: Scalar) -> Term:

@@ -248,11 +248,11 @@ class Evaluation:
         low, high = max(int(index.low), 0), min(int(index.high), len(leaves) - 1)
         low = min(low, high)
         self.step(high - low)
-        found = self.leaf(leaves[high])
+        selected = self.leaf(leaves[high])
         for at in range(high - 1, low - 1, -1):
             here = values.equal(index, values.constant(index.kind, at))
-            found = values.choice(here, self.leaf(leaves[at]), found)
-        return found
+            selected = values.choice(here, self.leaf(leaves[at]), selected)
+        return selected
 
     def _logic(self, op: Logic, first: Expr, second: Expr) -> Node:
         """The right operand is looked at only where the left one does not decide."""
@@ -299,8 +299,8 @@ class Evaluation:
         if op is Op.MOD:  # the machine divides first
             quotient = values.arithmetic(Op.DIV, args, expr.type)
             self.owe_inside(Code.OVERFLOW, quotient, ends, f"the {_RESULTS[Op.DIV]} {_LEAVES}", expr.span)
-        found = values.arithmetic(op, args, expr.type)
-        return self.owe_inside(Code.OVERFLOW, found, ends, f"the {_RESULTS[op]} {_LEAVES}", expr.span)
+        result = values.arithmetic(op, args, expr.type)
+        return self.owe_inside(Code.OVERFLOW, result, ends, f"the {_RESULTS[op]} {_LEAVES}", expr.span)
 
     def _in_words(self, expr: Apply, args: tuple[Node, ...]) -> tuple[Node, ...]:
         """Operands that are integers within the 64 bits that they share with each other and the result."""

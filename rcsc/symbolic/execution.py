@@ -84,11 +84,11 @@ class Run(Evaluation):
         if isinstance(level.tables, OneTable):
             return {str(level.tables.table): TRUE}
         selector = self.evaluate(level.tables.selector)
-        found: dict[str, Node] = {}
+        conditions: dict[str, Node] = {}
         for value, name in level.tables.tables:
             here = values.equal(selector, values.constant(selector.kind, value))
-            found[str(name)] = values.either(found.get(str(name), FALSE), here)
-        return found
+            conditions[str(name)] = values.either(conditions.get(str(name), FALSE), here)
+        return conditions
 
     def _stored(self, kind: Scalar, value: Node, what: str, span: Span) -> Node:
         """The value as kept in a place of this type."""
@@ -99,15 +99,15 @@ class Run(Evaluation):
         return self.owe_inside(Code.ASSIGNED_RANGE, value, (kind.low, kind.high), message, span)
 
     def _assign(self, place: Place, value: Expr) -> None:
-        found = self.evaluate(value)
+        result = self.evaluate(value)
         match place:
             case ToElement(leaves=leaves, type=kind):
                 what = leaves[0].rpartition("[")[0] or leaves[0]
-                self._set_element(place, self._stored(kind, found, what, value.span))
+                self._set_element(place, self._stored(kind, result, what, value.span))
             case ToLeaf(name=name, type=kind):
-                self.write(name, self._stored(kind, found, name, value.span), TRUE)
+                self.write(name, self._stored(kind, result, name, value.span), TRUE)
             case ToLocal(name=name, type=kind):
-                self.state.local[name] = self._stored(kind, found, name, value.span)
+                self.state.local[name] = self._stored(kind, result, name, value.span)
                 self.state.assigned.pop(name, None)
             case _:
                 assert_never(place)
@@ -143,10 +143,10 @@ class Run(Evaluation):
         self.state = before.copy()
         with self.where(condition):
             self.execute(then)
-        one, self.state = self.state, before.copy()
+        taken, self.state = self.state, before.copy()
         with self.where(condition, holds=False):
             self.execute(orelse)
-        self.state = self._merged(condition, one, self.state)
+        self.state = self._merged(condition, taken, self.state)
 
     def _case(self, statement: Case) -> None:
         """The arms are disjoint, so that their order does not matter."""
@@ -169,23 +169,23 @@ class Run(Evaluation):
         for chosen, state in reversed(arms):
             self.state = self._merged(chosen, state, self.state)
 
-    def _merged(self, condition: Node, one: State, two: State) -> State:
+    def _merged(self, condition: Node, then: State, orelse: State) -> State:
         """One state where the condition holds, the other elsewhere."""
-        self.step(len(one.leaves) + len(two.leaves))
+        self.step(len(then.leaves) + len(orelse.leaves))
         self.state = State()
 
         def leaf(state: State, name: str) -> Node:
             return state.leaves[name] if name in state.leaves else self.leaf(name)
 
         leaves = {
-            name: values.choice(condition, leaf(one, name), leaf(two, name))
-            for name in {**one.leaves, **two.leaves}
+            name: values.choice(condition, leaf(then, name), leaf(orelse, name))
+            for name in {**then.leaves, **orelse.leaves}
         }
-        local = {**two.local, **one.local}  # a local that only one of the two has is that one's
-        for name in one.local.keys() & two.local.keys():
-            local[name] = values.choice(condition, one.local[name], two.local[name])
-        assigned = _joined(condition, one.assigned, two.assigned, TRUE)
-        wrote = _joined(condition, one.wrote, two.wrote, FALSE)
+        local = {**orelse.local, **then.local}  # a local that only one of the two has is that one's
+        for name in then.local.keys() & orelse.local.keys():
+            local[name] = values.choice(condition, then.local[name], orelse.local[name])
+        assigned = _joined(condition, then.assigned, orelse.assigned, TRUE)
+        wrote = _joined(condition, then.wrote, orelse.wrote, FALSE)
         return State(leaves, local, assigned, wrote)
 
     # --- calls ---
@@ -226,8 +226,10 @@ class Run(Evaluation):
         return refused
 
 
-def _joined(condition: Node, one: dict[str, Node], two: dict[str, Node], otherwise: Node) -> dict[str, Node]:
+def _joined(
+    condition: Node, then: dict[str, Node], orelse: dict[str, Node], otherwise: Node
+) -> dict[str, Node]:
     return {
-        name: values.choice(condition, one.get(name, otherwise), two.get(name, otherwise))
-        for name in {**one, **two}
+        name: values.choice(condition, then.get(name, otherwise), orelse.get(name, otherwise))
+        for name in {**then, **orelse}
     }

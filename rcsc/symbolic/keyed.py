@@ -49,17 +49,17 @@ class Keyed:
 
     def term(self, node: Node) -> Term:
         """The term of a node; parts first, without recursion."""
-        for one in parts_first(node, known=self._terms):
-            self._terms[one] = self._made(one)
+        for part in parts_first(node, known=self._terms):
+            self._terms[part] = self._made(part)
         return self._terms[node]
 
     def variable(self, name: str, kind: Scalar) -> Term:
         """The term of a variable, in its declared range."""
         if name not in self._variables:
-            found = self.fresh(name, kind)
+            term = self.fresh(name, kind)
             if not isinstance(kind, Bool):
-                self.within(found, *values.bounds(kind), kind)
-            self._variables[name] = found
+                self.within(term, *values.bounds(kind), kind)
+            self._variables[name] = term
         return self._variables[name]
 
     def fresh(self, name: str, kind: Scalar) -> Term:
@@ -115,7 +115,7 @@ class Keyed:
 
     def _number(self, op: Arithmetic | Conversion, node: Node, parts: list[Term]) -> Term:
         """Arithmetic: exact where it is linear, or only orders."""
-        one, two = node.args[0], node.args[-1]
+        left, right = node.args[0], node.args[-1]
         match op:
             case Op.NEG:
                 return smt.minus(parts[0], KEY)
@@ -127,11 +127,11 @@ class Keyed:
                 return smt.choice(smt.at_most(parts[0], parts[1], KEY), parts[0], parts[1])
             case Op.MAX:
                 return smt.choice(smt.at_most(parts[0], parts[1], KEY), parts[1], parts[0])
-            case _ if isinstance(one.kind, Real) or isinstance(node.kind, Real):
+            case _ if isinstance(left.kind, Real) or isinstance(node.kind, Real):
                 return self.of_reals(op, node, parts)
             case Op.ADD | Op.SUB:
                 return smt.integer_operation(op.value, parts[0], parts[1])
-            case Op.MUL if one.known or two.known:
+            case Op.MUL if left.known or right.known:
                 return smt.integer_operation(op.value, parts[0], parts[1])
             case Op.MOD if wraps_once(node):
                 wrapped = smt.integer_operation("-", parts[0], parts[1])
@@ -146,23 +146,23 @@ class Keyed:
     def any(self, node: Node) -> Term:
         """Any value within the bounds of the node."""
         key = node.op, node.kind, tuple(self._written(arg) for arg in node.args)
-        found = self._open.get(key)
-        if found is None:
+        term = self._open.get(key)
+        if term is None:
             self.guessed += 1
-            found = self._open[key] = self.fresh(f"any!{self.guessed}", node.kind)
+            term = self._open[key] = self.fresh(f"any!{self.guessed}", node.kind)
         if not isinstance(node.kind, Bool) and math.isfinite(node.low) and math.isfinite(node.high):
-            self.within(found, node.low, node.high, node.kind)
-        return found
+            self.within(term, node.low, node.high, node.kind)
+        return term
 
     def _written(self, node: Node) -> int:
         """A number for the node that every node has which is written the same, and of which the same is known.
 
         What is known holds only where the node is reached: one value for both that and another place would carry it there.
         """
-        for one in parts_first(node, known=self._number_of):
-            parts = tuple(self._number_of[arg] for arg in one.args)
-            key = one.op, one.kind, one.name, one.low, one.high, parts
-            self._number_of[one] = self._numbers.setdefault(key, len(self._numbers))
+        for part in parts_first(node, known=self._number_of):
+            parts = tuple(self._number_of[arg] for arg in part.args)
+            key = part.op, part.kind, part.name, part.low, part.high, parts
+            self._number_of[part] = self._numbers.setdefault(key, len(self._numbers))
         return self._number_of[node]
 
 

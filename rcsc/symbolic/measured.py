@@ -46,20 +46,20 @@ class Measured(Keyed):
 
     def _rounded(self, node: Node, exact: Term) -> Term:
         """A value near the exact one, wherever the operands are what is known of them where the node is reached."""
-        found = self.any(node)
+        rounded = self.any(node)
         most = max(abs(node.low), abs(node.high), 1.0)
         if math.isfinite(most):
             slack, zero = smt.fraction(most * ULP), smt.fraction(0.0)
             least = smt.integer_operation("-", exact, slack)
             greatest = smt.integer_operation("+", exact, slack)
             near = [
-                smt.at_most(least, found, KEY),
-                smt.at_most(found, greatest, KEY),
-                smt.implication(smt.at_most(zero, exact, KEY), smt.at_most(zero, found, KEY)),
-                smt.implication(smt.at_most(exact, zero, KEY), smt.at_most(found, zero, KEY)),
+                smt.at_most(least, rounded, KEY),
+                smt.at_most(rounded, greatest, KEY),
+                smt.implication(smt.at_most(zero, exact, KEY), smt.at_most(zero, rounded, KEY)),
+                smt.implication(smt.at_most(exact, zero, KEY), smt.at_most(rounded, zero, KEY)),
             ]
             self.ranges.append(smt.implication(self._reached(node), smt.all_of(near)))
-        return found
+        return rounded
 
     def _reached(self, node: Node) -> Term:
         """That each operand has a value which it may have there; elsewhere the node is not read."""

@@ -72,9 +72,9 @@ def _pick(variable: Node, number: int, random: Random) -> Value:
     return value_of_key(variable.kind, random.randint(low, high))
 
 
-def _less(one: Point, two: Point, variables: Sequence[Node]) -> bool:
+def _less(left: Point, right: Point, variables: Sequence[Node]) -> bool:
     names = [variable.name for variable in variables]
-    return [one[name] for name in names] < [two[name] for name in names]
+    return [left[name] for name in names] < [right[name] for name in names]
 
 
 def _lowered(

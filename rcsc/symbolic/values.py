@@ -120,38 +120,38 @@ def narrowed(node: Node, low: int | float, high: int | float) -> Node:
 # --- truth -----------------------------------------------------------------------------
 
 
-def negation(one: Node) -> Node:
+def negation(node: Node) -> Node:
     """Its opposite."""
-    if one.known:
-        return truth(not one.low)
-    return one.args[0] if one.op == Op.NOT else Node(Op.NOT, (one,), Bool(), 0, 1)
+    if node.known:
+        return truth(not node.low)
+    return node.args[0] if node.op == Op.NOT else Node(Op.NOT, (node,), Bool(), 0, 1)
 
 
-def both(one: Node, two: Node) -> Node:
+def both(left: Node, right: Node) -> Node:
     """One and the other."""
-    if one.known:
-        return two if one.low else FALSE
-    if two.known:
-        return one if two.low else FALSE
-    return one if one is two else Node(Op.AND, (one, two), Bool(), 0, 1)
+    if left.known:
+        return right if left.low else FALSE
+    if right.known:
+        return left if right.low else FALSE
+    return left if left is right else Node(Op.AND, (left, right), Bool(), 0, 1)
 
 
-def either(one: Node, two: Node) -> Node:
+def either(left: Node, right: Node) -> Node:
     """One or the other."""
-    return negation(both(negation(one), negation(two)))
+    return negation(both(negation(left), negation(right)))
 
 
-def follows(one: Node, two: Node) -> Node:
+def follows(premise: Node, conclusion: Node) -> Node:
     """The second wherever the first."""
-    return either(negation(one), two)
+    return either(negation(premise), conclusion)
 
 
 def all_of(nodes: Iterable[Node]) -> Node:
     """Every one."""
-    found = TRUE
+    conjunction = TRUE
     for node in nodes:
-        found = both(found, node)
-    return found
+        conjunction = both(conjunction, node)
+    return conjunction
 
 
 def any_of(nodes: Iterable[Node]) -> Node:
@@ -162,14 +162,14 @@ def any_of(nodes: Iterable[Node]) -> Node:
 # --- values ----------------------------------------------------------------------------
 
 
-def choice(condition: Node, one: Node, two: Node) -> Node:
+def choice(condition: Node, then: Node, orelse: Node) -> Node:
     """The first where the condition holds, else the second."""
     if condition.known:
-        return one if condition.low else two
-    if one is two or (one.known and two.known and one.low == two.low):
-        return one
-    low, high = min(one.low, two.low), max(one.high, two.high)
-    return Node(CHOICE, (condition, one, two), one.kind, low, high)
+        return then if condition.low else orelse
+    if then is orelse or (then.known and orelse.known and then.low == orelse.low):
+        return then
+    low, high = min(then.low, orelse.low), max(then.high, orelse.high)
+    return Node(CHOICE, (condition, then, orelse), then.kind, low, high)
 
 
 def among(subject: Node, values: Sequence[Value]) -> Node:
@@ -177,75 +177,75 @@ def among(subject: Node, values: Sequence[Value]) -> Node:
     return any_of(compare(Op.EQ, subject, constant(subject.kind, value)) for value in values)
 
 
-def logic(op: Logic, one: Node, two: Node) -> Node:
+def logic(op: Logic, left: Node, right: Node) -> Node:
     """A truth function of two conditions."""
 
     def signed(node: Node) -> Signed[Node]:
         return lambda wanted: node if wanted else negation(node)
 
     return truth_function(
-        op, signed(one), signed(two), lambda parts: both(*parts), lambda parts: either(*parts)
+        op, signed(left), signed(right), lambda parts: both(*parts), lambda parts: either(*parts)
     )(True)
 
 
-def compare(op: Comparison, one: Node, two: Node) -> Node:
+def compare(op: Comparison, left: Node, right: Node) -> Node:
     """A comparison, decided where the bounds do."""
     match op:
         case Op.NE:
-            return negation(_ordering(Op.EQ, one, two))
+            return negation(_ordering(Op.EQ, left, right))
         case Op.GT:
-            return _ordering(Op.LT, two, one)
+            return _ordering(Op.LT, right, left)
         case Op.GE:
-            return _ordering(Op.LE, two, one)
+            return _ordering(Op.LE, right, left)
         case Op.EQ | Op.LT | Op.LE:
-            return _ordering(op, one, two)
+            return _ordering(op, left, right)
 
 
-def _ordering(op: Ordering, one: Node, two: Node) -> Node:
-    if one.ordered and two.ordered:
-        decided = _decided(op, one, two)
+def _ordering(op: Ordering, left: Node, right: Node) -> Node:
+    if left.ordered and right.ordered:
+        decided = _decided(op, left, right)
         if decided is not None:
             return truth(decided)
-    return Node(op, (one, two), Bool(), 0, 1)
+    return Node(op, (left, right), Bool(), 0, 1)
 
 
-def _decided(op: Ordering, one: Node, two: Node) -> bool | None:
+def _decided(op: Ordering, left: Node, right: Node) -> bool | None:
     if op is Op.EQ:
-        if one.high < two.low or two.high < one.low:
+        if left.high < right.low or right.high < left.low:
             return False
-        return True if root(one) is root(two) or (one.known and two.known) else None
-    if root(one) is root(two):
+        return True if root(left) is root(right) or (left.known and right.known) else None
+    if root(left) is root(right):
         return op is Op.LE
-    always = one.high < two.low if op is Op.LT else one.high <= two.low
-    never = one.low >= two.high if op is Op.LT else one.low > two.high
+    always = left.high < right.low if op is Op.LT else left.high <= right.low
+    never = left.low >= right.high if op is Op.LT else left.low > right.high
     return True if always else False if never else None
 
 
 def arithmetic(op: Arithmetic | Conversion, args: tuple[Node, ...], kind: Scalar) -> Node:
     """Any operator on numbers but comparisons; `kind` is that of the result."""
     low, high = _bounds(op, args)
-    found = Node(op, args, kind, low, high)
-    if low != high or not found.ordered or (isinstance(kind, Real) and not all(arg.known for arg in args)):
-        return found
+    node = Node(op, args, kind, low, high)
+    if low != high or not node.ordered or (isinstance(kind, Real) and not all(arg.known for arg in args)):
+        return node
     return constant(kind, low)
 
 
 def _bounds(op: Arithmetic | Conversion, args: tuple[Node, ...]) -> tuple[int | float, int | float]:
-    one = args[0]
+    first = args[0]
     if op is Op.TO_REAL:
-        return float(one.low), float(one.high)
+        return float(first.low), float(first.high)
     if op is Op.TO_INT:
-        return (int(one.low), int(one.high)) if one.ordered else (-_GREATEST, _GREATEST)
-    if isinstance(one.kind, Real):
+        return (int(first.low), int(first.high)) if first.ordered else (-_GREATEST, _GREATEST)
+    if isinstance(first.kind, Real):
         kinds: tuple[Int | Real, ...] = tuple(Real(float(arg.low), float(arg.high)) for arg in args)
     else:
         kinds = tuple(Int(int(arg.low), int(arg.high)) for arg in args)
     if op is Op.MOD and all(arg.known for arg in args) and args[1].low:
-        rest = op.meaning(int(one.low), int(args[1].low))
+        rest = op.meaning(int(first.low), int(args[1].low))
         return rest, rest
-    found = intervals.apply(op, kinds, ())
-    assert isinstance(found, Int | Real)
-    return found.low, found.high
+    bounds = intervals.apply(op, kinds, ())
+    assert isinstance(bounds, Int | Real)
+    return bounds.low, bounds.high
 
 
 def wraps_once(remainder: Node) -> bool:
@@ -254,9 +254,9 @@ def wraps_once(remainder: Node) -> bool:
     return divisor.known and value.low >= 0 and value.high < 2 * divisor.low
 
 
-def equal(one: Node, two: Node) -> Node:
+def equal(left: Node, right: Node) -> Node:
     """That two values of one type are the same."""
-    return compare(Op.EQ, one, two)
+    return compare(Op.EQ, left, right)
 
 
 def inside(node: Node, low: int | float, high: int | float) -> Node:
@@ -270,9 +270,9 @@ def inside(node: Node, low: int | float, high: int | float) -> Node:
 
 def term_of(node: Node) -> Term:
     """The solver's term of the node; parts first, without recursion."""
-    for one in parts_first(node):
-        if one.term is None:
-            one.term = _term(one, [part.term for part in one.args if part.term is not None])
+    for part in parts_first(node):
+        if part.term is None:
+            part.term = _term(part, [arg.term for arg in part.args if arg.term is not None])
     assert node.term is not None
     return node.term
 
@@ -296,9 +296,9 @@ def variables(nodes: Iterable[Node]) -> dict[str, Node]:
     return {node.name: node for node in parts_first(*nodes) if node.op == VARIABLE}
 
 
-def domain(found: Iterable[Node]) -> list[Term]:
+def domain(nodes: Iterable[Node]) -> list[Term]:
     """That each variable is a value of its type."""
-    return [within(term_of(node), node.kind) for node in found if not isinstance(node.kind, Bool)]
+    return [within(term_of(node), node.kind) for node in nodes if not isinstance(node.kind, Bool)]
 
 
 def parts_first(*nodes: Node, known: Container[Node] = ()) -> Iterator[Node]:
@@ -346,39 +346,39 @@ def _learn_either(node: Node, facts: dict[Node, Fact]) -> None:
     """Of `not (a and b)`: a root that both negations bound lies within the hull of the two."""
     sides: list[dict[Node, Fact]] = []
     for part in node.args:
-        one: dict[Node, Fact] = {}
+        side: dict[Node, Fact] = {}
         if part.op == Op.AND:
-            _learn_either(part, one)
+            _learn_either(part, side)
         else:
-            learn(part, one, holds=False)
-        sides.append(one)
+            learn(part, side, holds=False)
+        sides.append(side)
     for key in sides[0].keys() & sides[1].keys():
         (a, b), (c, d) = sides[0][key], sides[1][key]
         _meet(facts, key, min(a, c), max(b, d))
 
 
 def _learn_compared(op: Ordering, sides: tuple[Node, Node], facts: dict[Node, Fact], yes: bool) -> None:
-    one, two = sides
-    if not yes and not (one.ordered and two.ordered):
+    left, right = sides
+    if not yes and not (left.ordered and right.ordered):
         return
     if op is Op.EQ:
-        (_learn_equal if yes else _learn_unequal)(one, two, facts)
+        (_learn_equal if yes else _learn_unequal)(left, right, facts)
         return
     if not yes:
-        op, one, two = (Op.LE if op is Op.LT else Op.LT), two, one
+        op, left, right = (Op.LE if op is Op.LT else Op.LT), right, left
     strict = op is Op.LT
-    _meet(facts, one, one.low, _step(two.high, -1, one.kind) if strict else two.high)
-    _meet(facts, two, _step(one.low, 1, two.kind) if strict else one.low, two.high)
+    _meet(facts, left, left.low, _step(right.high, -1, left.kind) if strict else right.high)
+    _meet(facts, right, _step(left.low, 1, right.kind) if strict else left.low, right.high)
 
 
-def _learn_equal(one: Node, two: Node, facts: dict[Node, Fact]) -> None:
-    low, high = max(one.low, two.low), min(one.high, two.high)
-    _meet(facts, one, low, high)
-    _meet(facts, two, low, high)
+def _learn_equal(left: Node, right: Node, facts: dict[Node, Fact]) -> None:
+    low, high = max(left.low, right.low), min(left.high, right.high)
+    _meet(facts, left, low, high)
+    _meet(facts, right, low, high)
 
 
-def _learn_unequal(one: Node, two: Node, facts: dict[Node, Fact]) -> None:
-    for node, other in ((one, two), (two, one)):
+def _learn_unequal(left: Node, right: Node, facts: dict[Node, Fact]) -> None:
+    for node, other in ((left, right), (right, left)):
         if other.known and node.low == other.low:
             _meet(facts, node, _step(node.low, 1, node.kind), node.high)
         elif other.known and node.high == other.low:

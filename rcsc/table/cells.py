@@ -41,15 +41,15 @@ def cell(kind: Scalar, box: Box) -> str | None:
 
 def condition(name: str, kind: Scalar, box: Box) -> str:
     """`name` and its keys as a condition, for people."""
-    said = cell(kind, box)
-    if said is None:
+    text = cell(kind, box)
+    if text is None:
         parts = [cell(kind, (part,)) or "" for part in box[:_MOST]]
         return f"{name} " + " or ".join(parts) + (" or more" if len(box) > _MOST else "")
-    if said.startswith(("/=", "<=", ">=", "in ")):
-        return f"{name} {said}"
-    return f"{name} in {said}" if " .. " in said else f"{name} = {said}"
+    if text.startswith(("/=", "<=", ">=", "in ")):
+        return f"{name} {text}"
+    return f"{name} in {text}" if " .. " in text else f"{name} = {text}"
 
 
-def region(kinds: dict[str, Scalar], found: Region | None) -> tuple[str, ...]:
+def region(kinds: dict[str, Scalar], boxes: Region | None) -> tuple[str, ...]:
     """The region as conditions, one a variable that is not free."""
-    return tuple(condition(name, kinds[name], box) for name, box in found.items()) if found else ()
+    return tuple(condition(name, kinds[name], box) for name, box in boxes.items()) if boxes else ()

@@ -49,10 +49,12 @@ def tree_certificate(
     return _certificate(table, names, forms, [_shown(node) for node in nodes], assumptions)
 
 
-def with_witness(made: Certificate, program: Program, table: Table, witness: Snapshot) -> Certificate:
+def with_witness(certificate: Certificate, program: Program, table: Table, witness: Snapshot) -> Certificate:
     """The certificate of a table with values at which all of the table's assumptions and all invariants hold."""
-    read = sorted({name for one in assumed_of(program, table) for name in read_by(one.condition)})
-    return {**made, "witness": {name: witness[name] for name in read}}
+    read = sorted(
+        {name for assumption in assumed_of(program, table) for name in read_by(assumption.condition)}
+    )
+    return {**certificate, "witness": {name: witness[name] for name in read}}
 
 
 def program_certificate(program: Program, tables: Iterable[Certificate]) -> Certificate:
@@ -68,7 +70,9 @@ def program_certificate(program: Program, tables: Iterable[Certificate]) -> Cert
         "version": VERSION,
         "program": program.name,
         "meaning": digest(program),
-        "tables": [{**made, "stops": stops[TableName(str(made["table"]))]} for made in tables],
+        "tables": [
+            {**certificate, "stops": stops[TableName(str(certificate["table"]))]} for certificate in tables
+        ],
     }
 
 
@@ -104,7 +108,7 @@ def _box_lines(
 ) -> list[dict[int, Box]]:
     """The lines that can match, as boxes by column."""
     telling = {id(test) for test in _tests(table, extents)}
-    found = []
+    lines = []
     for line in table.lines:
         boxes: dict[int, Box] = {}
         for test in line.tests:
@@ -112,8 +116,8 @@ def _box_lines(
                 column = names.index(test.variables[0])
                 boxes[column] = meet(boxes[column], test.box) if column in boxes else test.box
         if all(boxes.values()):
-            found.append(boxes)
-    return found
+            lines.append(boxes)
+    return lines
 
 
 def _shown(node: Node) -> list[object]:

@@ -58,9 +58,9 @@ class TableSolver:
         """The least input for which the terms hold; None where the solver gives up."""
         self.solver.push()
         self.solver.add(*terms)
-        found = least_witness(self.solver, shown(self.program, self.table), self.frame)
+        witness = least_witness(self.solver, shown(self.program, self.table), self.frame)
         self.solver.pop()
-        return found
+        return witness
 
     def holds(self, *terms: Term) -> Answer:
         """Whether the terms can hold together."""
@@ -90,23 +90,23 @@ def worth_asking(table: Table, options: Options) -> bool:
     return options.solver == "auto" and cells * len(table.lines) <= _COSTLY
 
 
-def confirm(program: Program, table: Table, found: tuple[Found, ...], options: Options) -> Agreement:
+def confirm(program: Program, table: Table, findings: tuple[Found, ...], options: Options) -> Agreement:
     """Z3's own answer to whether two lines meet and whether there is a gap, against what was found."""
-    if not worth_asking(table, options) or any(isinstance(one, Undecided) for one in found):
+    if not worth_asking(table, options) or any(isinstance(finding, Undecided) for finding in findings):
         return Agreement.NOT_ASKED
     if options.solver == "auto":
         options = replace(options, steps=min(options.steps, _STEPS))
     asked = TableSolver(program, table, options)
     overlap = _some_overlap(asked)
-    gaps = [one for one in found if isinstance(one, Gap)]
+    gaps = [finding for finding in findings if isinstance(finding, Gap)]
     gap = _some_gap(asked, gaps) if must_cover(table) or gaps else None
-    said = (
-        (overlap, any(isinstance(one, Overlap) for one in found)),
+    answers = (
+        (overlap, any(isinstance(finding, Overlap) for finding in findings)),
         (gap, bool(gaps)),
     )
-    if any(answer is Answer.UNKNOWN for answer, _ in said):
+    if any(answer is Answer.UNKNOWN for answer, _ in answers):
         return Agreement.UNKNOWN
-    agrees = all(answer is None or (answer is Answer.SATISFIABLE) == wrong for answer, wrong in said)
+    agrees = all(answer is None or (answer is Answer.SATISFIABLE) == wrong for answer, wrong in answers)
     return Agreement.AGREES if agrees else Agreement.DISAGREES
 
 

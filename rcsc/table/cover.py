@@ -3,7 +3,8 @@
 In: conditions as values over leaves. Out: boxes of keys, disjoint, each as wide as it goes, and whether they are all. Each
 box is shown by Z3 to lie inside, and that nothing is left outside them; *unknown* raises, so that nobody takes it for an answer.
 
-Source: house style, example 6, for the least witness; `partition.Gaps.grown` for growing in declared order.
+The least input pins each variable, in declared order, to the least value that fits; boxes grow in that order, too
+(`partition.Gaps.grown`).
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -83,9 +84,9 @@ class Space:
 
     def solver(self, *nodes: Node) -> Solver:
         """A solver that knows the domain, what is given, and these."""
-        made = Solver(self.options.limits)
-        made.add(*values.domain(self.nodes.values()), *map(values.term_of, (*self.given, *nodes)))
-        return made
+        solver = Solver(self.options.limits)
+        solver.add(*values.domain(self.nodes.values()), *map(values.term_of, (*self.given, *nodes)))
+        return solver
 
     def possible(self, *nodes: Node) -> bool:
         """Whether all of them can hold together.
@@ -121,11 +122,11 @@ class Space:
 
     def _least(self, solver: Solver) -> dict[str, Value]:
         before = solver.queries
-        found = least_witness(solver, self.variables, self.frame)
+        least = least_witness(solver, self.variables, self.frame)
         self.queries += solver.queries - before
-        if found is None:
+        if least is None:
             raise UndecidedError
-        return found
+        return least
 
     def volume(self, names: Iterable[str]) -> int | None:
         """How many values the variables can have together; None where one is real."""
@@ -148,16 +149,16 @@ class Space:
         if all(hull.values()) and not self.answered(bad, *self._inside(hull)):
             return self._made([hull], exact=True)
         seeds = self.solver(wanted)
-        found: list[dict[str, Box]] = []
+        boxes: list[dict[str, Box]] = []
         while self.answered(seeds):
-            if len(found) == most:
-                return self._made(found, exact=False)
+            if len(boxes) == most:
+                return self._made(boxes, exact=False)
             seeds.push()
             seed = self._least(seeds)
             seeds.pop()
-            found.append(self._grown(seed, bad, (cuts, hull), found))
-            seeds.add(smt.negation(smt.all_of(self._inside(found[-1]))))
-        return self._made(found, exact=True)
+            boxes.append(self._grown(seed, bad, (cuts, hull), boxes))
+            seeds.add(smt.negation(smt.all_of(self._inside(boxes[-1]))))
+        return self._made(boxes, exact=True)
 
     def around(self, condition: Node) -> tuple[Region, tuple[Node, ...]]:
         """A box around all of the condition, and what it asks besides: together they are the condition."""
@@ -169,22 +170,26 @@ class Space:
         rest: list[Node] = []
         hull: dict[str, Box] = {name: (key_bounds(node.kind),) for name, node in self.nodes.items()}
         for part in _conjuncts(allowed):
-            found = values.variables([part])
-            if len(found) != 1 or any(node.op not in _PLAIN for node in values.parts_first(part)):
+            variables = values.variables([part])
+            if len(variables) != 1 or any(node.op not in _PLAIN for node in values.parts_first(part)):
                 rest.append(part)
                 continue
-            [(name, node)] = found.items()
+            [(name, node)] = variables.items()
             kind = node.kind
             classes = _classes(cuts[name], key_bounds(kind)[1])
-            inside = [one for one in classes if trial.holds_at(part, {name: value_of_key(kind, one[0])})]
+            inside = [
+                interval
+                for interval in classes
+                if trial.holds_at(part, {name: value_of_key(kind, interval[0])})
+            ]
             hull[name] = meet(hull[name], joined(inside))
         return hull, rest
 
-    def _made(self, found: list[dict[str, Box]], *, exact: bool) -> Cover:
+    def _made(self, boxes: list[dict[str, Box]], *, exact: bool) -> Cover:
         whole = {name: (key_bounds(node.kind),) for name, node in self.nodes.items()}
         real = any(isinstance(node.kind, Real) for node in self.nodes.values())
-        inputs = None if real else sum(prod(map(size, box.values())) for box in found)
-        narrowed = tuple({name: part for name, part in box.items() if part != whole[name]} for box in found)
+        inputs = None if real else sum(prod(map(size, box.values())) for box in boxes)
+        narrowed = tuple({name: part for name, part in box.items() if part != whole[name]} for box in boxes)
         return Cover(narrowed, exact, inputs)
 
     def _grown(
@@ -240,9 +245,9 @@ class Space:
         return known
 
 
-def _meet(one: Mapping[str, Box], two: Mapping[str, Box]) -> bool:
+def _meet(left: Mapping[str, Box], right: Mapping[str, Box]) -> bool:
     """Whether two boxes over the same variables have an input in common."""
-    return all(meet(part, two[name]) for name, part in one.items())
+    return all(meet(part, right[name]) for name, part in left.items())
 
 
 def _classes(starts: list[int], last: int) -> list[tuple[int, int]]:
@@ -259,11 +264,11 @@ def _within(starts: list[int], part: Box) -> list[tuple[int, int]]:
 
 def _widest(at: int, classes: list[tuple[int, int]], fits: Callable[[Box], bool]) -> Box:
     """The classes that fit beside the one of `at`, or as far as it goes within that."""
-    home = next(one for one in classes if one[0] <= at <= one[1])
+    home = next(interval for interval in classes if interval[0] <= at <= interval[1])
     if not fits((home,)):
         return (_stretched(at, home, fits),)
-    near = sorted(classes, key=lambda one: abs(one[0] - home[0]))[:_MOST_CLASSES]
-    return joined(one for one in sorted(near) if one == home or fits((one,)))
+    near = sorted(classes, key=lambda interval: abs(interval[0] - home[0]))[:_MOST_CLASSES]
+    return joined(interval for interval in sorted(near) if interval == home or fits((interval,)))
 
 
 def _stretched(at: int, ends: tuple[int, int], fits: Callable[[Box], bool]) -> tuple[int, int]:
@@ -298,25 +303,25 @@ def _cuts(condition: Node, nodes: Mapping[str, Node]) -> dict[str, list[int]]:
                 if left.op == VARIABLE and left.name in starts and right.op == CONSTANT:
                     key = key_of(left.kind, right.low)
                     starts[left.name].update((key, key + 1))
-    found = {}
+    cuts = {}
     for name, node in nodes.items():
         low, high = key_bounds(node.kind)
         if isinstance(node.kind, Bool | Enum):
             starts[name].update(range(low, high + 1))
-        found[name] = sorted(start for start in starts[name] if low <= start <= high)
-    return found
+        cuts[name] = sorted(start for start in starts[name] if low <= start <= high)
+    return cuts
 
 
 def _ends(node: Node) -> Iterator[Node]:
     """What a value is chosen from."""
     waiting, seen = [node], set[Node]()
     while waiting and len(seen) < _MOST_CLASSES:
-        one = values.root(waiting.pop())
-        if one not in seen:
-            seen.add(one)
-            if one.op == CHOICE:
-                waiting.extend(one.args[1:])
-            elif one.op in (Op.MIN, Op.MAX):
-                waiting.extend(one.args)
+        root = values.root(waiting.pop())
+        if root not in seen:
+            seen.add(root)
+            if root.op == CHOICE:
+                waiting.extend(root.args[1:])
+            elif root.op in (Op.MIN, Op.MAX):
+                waiting.extend(root.args)
             else:
-                yield one
+                yield root

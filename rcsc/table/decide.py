@@ -23,38 +23,38 @@ def prove_table(program: Program, table: Table, options: Options) -> TableVerdic
     certificate: Mapping[str, object] | None = None
     settled = _by_boxes(program, table) if boxes.applies(table) else None
     if settled is not None and (not table.assumptions or not _wrong(table, settled)):
-        method, found = "boxes", settled
-        if not _wrong(table, found):
+        method, findings = "boxes", settled
+        if not _wrong(table, findings):
             certificate = box_certificate(program, table)
             if _narrows(program, table):
                 from rcsc.table.relational import under_assumptions
 
-                found = under_assumptions(program, table, options, settled)
+                findings = under_assumptions(program, table, options, settled)
     else:
         from rcsc.table.relational import decide
 
         decided = decide(program, table, options)
-        method, found, certificate, used = "tree", decided.found, decided.certificate, decided.used
+        method, findings, certificate, used = "tree", decided.found, decided.certificate, decided.used
     confirmed = False
     if options.solver != "boxes":
-        confirmed, found = _confirmed(program, table, found, options)
+        confirmed, findings = _confirmed(program, table, findings, options)
     standing = {a.name: a.standing for a in program.assumptions}
     backing = Backing(method, confirmed, tuple((name, standing[name]) for name in used))
-    return TableVerdict(table, found, backing, certificate, time.perf_counter() - begun)
+    return TableVerdict(table, findings, backing, certificate, time.perf_counter() - begun)
 
 
 def _by_boxes(program: Program, table: Table) -> tuple[Found, ...]:
     decided = boxes.TableBoxes.of(program, table)
     pairs = list(islice(decided.overlaps(), partition.MOST_PAIRS))
-    found: list[Found] = [DeadLine(at) for at in decided.dead()]
-    found.extend(decided.both(first, second) for first, second in pairs)
+    findings: list[Found] = [DeadLine(at) for at in decided.dead()]
+    findings.extend(decided.both(first, second) for first, second in pairs)
     try:
         gap = decided.gap(disjoint=not pairs)
     except partition.BudgetError:
-        return (*found, Undecided("whether every input is matched by some line; first mend the overlaps"))
+        return (*findings, Undecided("whether every input is matched by some line; first mend the overlaps"))
     if gap is not None:
-        found.append(gap)
-    return tuple(found)
+        findings.append(gap)
+    return tuple(findings)
 
 
 def _narrows(program: Program, table: Table) -> bool:
@@ -63,27 +63,27 @@ def _narrows(program: Program, table: Table) -> bool:
     return any(not set(read_by(assumption.condition)).isdisjoint(table.variables) for assumption in assumed)
 
 
-def _wrong(table: Table, found: tuple[Found, ...]) -> bool:
+def _wrong(table: Table, findings: tuple[Found, ...]) -> bool:
     """Whether there is more than inputs that fall to a DEFAULT line."""
-    return any(not isinstance(one, Gap) or must_cover(table) for one in found)
+    return any(not isinstance(finding, Gap) or must_cover(table) for finding in findings)
 
 
 def _confirmed(
-    program: Program, table: Table, found: tuple[Found, ...], options: Options
+    program: Program, table: Table, findings: tuple[Found, ...], options: Options
 ) -> tuple[bool, tuple[Found, ...]]:
     """Whether Z3 agrees; what it finds wrong with the verdict is added."""
     from rcsc.table.confirm import Agreement, confirm, worth_asking
 
     if not worth_asking(table, options):
-        return False, found
-    match confirm(program, table, found, options):
+        return False, findings
+    match confirm(program, table, findings, options):
         case Agreement.AGREES:
-            return True, found
+            return True, findings
         case Agreement.DISAGREES:
-            pairs = sum(isinstance(one, Overlap) for one in found)
-            return False, (*found, SolversDisagree(f"{pairs} overlapping pairs were found"))
+            pairs = sum(isinstance(finding, Overlap) for finding in findings)
+            return False, (*findings, SolversDisagree(f"{pairs} overlapping pairs were found"))
         case Agreement.UNKNOWN:
             left = Undecided("Z3 gave no answer within its limits")
-            return False, (*found, left) if options.solver == "both" else found
+            return False, (*findings, left) if options.solver == "both" else findings
         case Agreement.NOT_ASKED:
-            return False, found
+            return False, findings

@@ -43,10 +43,10 @@ def diagnostics(program: Program, verdict: TableVerdict, unproved: Collection[st
 
 def _others(program: Program, verdict: TableVerdict, unproved: Collection[str]) -> Iterator[Diagnostic]:
     table = verdict.table
-    for gap in verdict.found:
-        match gap:
+    for finding in verdict.found:
+        match finding:
             case Gap():
-                yield _gap(program, table, gap)
+                yield _gap(program, table, finding)
             case DeadLine(line, assuming):
                 yield _dead(table, line, assuming, _under(table, unproved))
             case ContradictoryAssumptions():
@@ -63,7 +63,7 @@ def _others(program: Program, verdict: TableVerdict, unproved: Collection[str]) 
                 pass
     if table.default is None or table.default.unreachable or verdict.undecided:
         return
-    if not any(isinstance(one, Gap | ContradictoryAssumptions) for one in verdict.found):
+    if not any(isinstance(finding, Gap | ContradictoryAssumptions) for finding in verdict.found):
         message = f"the DEFAULT line of table `{table.name}` is never reached"
         helps = ("declare it: `DEFAULT unreachable`; that is then proved",)
         label = Label(table.default.span)
@@ -96,15 +96,15 @@ def _under(table: Table, unproved: Collection[str]) -> tuple[str, ...]:
 # --- overlaps ------------------------------------------------------------------------
 
 
-def _overlap(program: Program, table: Table, found: Overlap) -> Diagnostic:
-    one, two = table.lines[found.first], table.lines[found.second]
-    column = _column(program, table, found.witness, (found.first, found.second), found.region)
-    repair = parting_cell(program, table, found)
+def _overlap(program: Program, table: Table, overlap: Overlap) -> Diagnostic:
+    first, second = table.lines[overlap.first], table.lines[overlap.second]
+    column = _column(program, table, overlap.witness, (overlap.first, overlap.second), overlap.region)
+    repair = parting_cell(program, table, overlap)
     return Diagnostic(
         Code.OVERLAP,
-        f"lines `{one.name}` and `{two.name}` of table `{table.name}` both match some input",
-        Label(two.cell_span(-1), "this line"),
-        related=(Label(one.cell_span(-1), "and this one"),),
+        f"lines `{first.name}` and `{second.name}` of table `{table.name}` both match some input",
+        Label(second.cell_span(-1), "this line"),
+        related=(Label(first.cell_span(-1), "and this one"),),
         help=(repair,) if repair else (),
         witnesses=(column,),
     )
@@ -113,14 +113,14 @@ def _overlap(program: Program, table: Table, found: Overlap) -> Diagnostic:
 # --- gaps ----------------------------------------------------------------------------
 
 
-def _gap(program: Program, table: Table, found: Gap) -> Diagnostic:
+def _gap(program: Program, table: Table, gap: Gap) -> Diagnostic:
     columns = tuple(
         _column(program, table, witness, (), region)
-        for witness, region in zip(found.witnesses, found.regions, strict=True)
+        for witness, region in zip(gap.witnesses, gap.regions, strict=True)
     )
-    share = f"{_share(*found.count)} of the inputs" if found.count else "some inputs"
+    share = f"{_share(*gap.count)} of the inputs" if gap.count else "some inputs"
     if must_cover(table) and table.default is None:
-        repair = closing_line(program, table, found)
+        repair = closing_line(program, table, gap)
         message = f"no line of table `{table.name}` matches {share}"
         return Diagnostic(
             Code.GAP,
@@ -128,34 +128,34 @@ def _gap(program: Program, table: Table, found: Gap) -> Diagnostic:
             Label(table.span),
             help=(repair,) if repair else (),
             witnesses=columns,
-            more=_more(program, found),
+            more=_more(program, gap),
         )
     assert table.default is not None
     label = Label(table.default.span)
     if table.default.unreachable:
         message = f"the DEFAULT line of table `{table.name}` is declared unreachable, but {share} fall to it"
-        return Diagnostic(Code.DEFAULT_REACHED, message, label, witnesses=columns, more=_more(program, found))
+        return Diagnostic(Code.DEFAULT_REACHED, message, label, witnesses=columns, more=_more(program, gap))
     message = f"{share} fall to the DEFAULT line of table `{table.name}`"
     return Diagnostic(
         Code.DEFAULT_COVERS,
         message,
         label,
         witnesses=columns,
-        more=_more(program, found),
+        more=_more(program, gap),
         severity=Severity.NOTE,
     )
 
 
-def _more(program: Program, found: Gap) -> int:
+def _more(program: Program, gap: Gap) -> int:
     """Inputs outside the regions shown, where they were counted; the regions do not meet."""
-    if found.count is None:
+    if gap.count is None:
         return 0
     bounds = {str(v.name): key_bounds(v.type) for v in program.variables}
     shown = 0
-    for witness, region in zip(found.witnesses, found.regions, strict=True):
+    for witness, region in zip(gap.witnesses, gap.regions, strict=True):
         sizes = (size((region or {}).get(name, (bounds[name],))) for name in witness)
         shown += prod(sizes) if region is not None else 1
-    return max(0, found.count[0] - shown)
+    return max(0, gap.count[0] - shown)
 
 
 def _share(count: int, total: int) -> str:
@@ -184,12 +184,12 @@ def _column(
 
 def _cells(table: Table, line: int, name: str) -> str:
     """What a line says of a variable; conditions over several stand with the first of them."""
-    said = []
+    texts = []
     for test, column in zip(table.lines[line].tests, table.columns, strict=True):
         if test is not None and test.variables and test.variables[0] == name:
-            said.append(
+            texts.append(
                 test.text
                 if column.variable == name or column.subject is None
                 else f"{column.heading} {test.text}"
             )
-    return "; ".join(said)
+    return "; ".join(texts)

@@ -65,37 +65,37 @@ def prove_program(
 
     Tables may rely on the invariants: they are shown in the same step, by induction over cycles.
     """
-    found = [*at_first(program), *properties_elsewhere(program)]
+    findings = [*at_first(program), *properties_elsewhere(program)]
     owed = Obligations(program, options)
     wanted = [table for table in program.tables if only is None or table.name in only]
-    found += owed.prove(wanted)
-    unproved = _unproved(program, found)
+    findings += owed.prove(wanted)
+    unproved = _unproved(program, findings)
     program = with_stops(program, owed.stops)
     assuming = relying(program)
     known = {table.name for table in wanted}
     tables = [table for table in assuming.tables if table.name in known]
-    made = _verdicts(assuming, tables, options, owed.undefined)
-    verdicts = tuple(_with_invariants(program, verdict) for verdict in made)
+    decided = _verdicts(assuming, tables, options, owed.undefined)
+    verdicts = tuple(_with_invariants(program, verdict) for verdict in decided)
     for verdict in verdicts:
         if verdict.table.name not in owed.undefined:
-            found += diagnostics(assuming, verdict, unproved)
-    findings = tuple(sorted(dict.fromkeys(found), key=sort_key))
-    wrong = any(finding.severity is Severity.ERROR for finding in findings)
+            findings += diagnostics(assuming, verdict, unproved)
+    reported = tuple(sorted(dict.fromkeys(findings), key=sort_key))
+    wrong = any(finding.severity is Severity.ERROR for finding in reported)
     if wrong or only is not None:
         unsafe = frozenset(owed.unsafe)
-        return ProgramVerdict(findings, None, verdicts, None, owed.tally, program, unproved, unsafe)
+        return ProgramVerdict(reported, None, verdicts, None, owed.tally, program, unproved, unsafe)
     proved = ProvedProgram(program, seal_of_proof())
     certificate = _certificate(program, verdicts)
-    return ProgramVerdict(findings, proved, verdicts, certificate, owed.tally, program)
+    return ProgramVerdict(reported, proved, verdicts, certificate, owed.tally, program)
 
 
-def _unproved(program: Program, found: Iterable[Diagnostic]) -> frozenset[str]:
+def _unproved(program: Program, findings: Iterable[Diagnostic]) -> frozenset[str]:
     """Invariants and assumptions declared `proved` of which these findings leave the proof incomplete.
 
     Invariants are shown by one induction in which every run rests on all of them, and on what it owes itself: any
     error breaks it. An assumption that is proved rests on the invariants.
     """
-    errors = [diagnostic for diagnostic in found if diagnostic.severity is Severity.ERROR]
+    errors = [diagnostic for diagnostic in findings if diagnostic.severity is Severity.ERROR]
     spans = {error.primary.span for error in errors}
     broken = bool(errors and program.invariants)
     claimed = (assumption for assumption in program.assumptions if assumption.standing is Standing.PROVED)
@@ -123,10 +123,10 @@ def _verdicts(
     """Each table's verdict, in order; in processes where there are several tables and jobs."""
     defined = [table for table in tables if table.name not in undefined]
     if options.jobs > 1 and len(defined) > 1:
-        made = _in_processes(program, defined, options)
+        verdicts = _in_processes(program, defined, options)
     else:
-        made = [_verdict(program, table, options) for table in defined]
-    by_name = {table_verdict.table.name: table_verdict for table_verdict in made}
+        verdicts = [_verdict(program, table, options) for table in defined]
+    by_name = {table_verdict.table.name: table_verdict for table_verdict in verdicts}
     why = Undecided("a condition is not defined for every input")
     return tuple(by_name.get(table.name) or _left_open(table, why) for table in tables)
 
@@ -145,21 +145,25 @@ def _verdict(program: Program, table: Table, options: Options) -> TableVerdict:
 
 
 def _decided(verdict: TableVerdict) -> tuple[Found, ...]:
-    return tuple(one for one in verdict.found if not isinstance(one, Undecided))
+    return tuple(finding for finding in verdict.found if not isinstance(finding, Undecided))
 
 
 def _uncut_verdict(program: Program, table: Table, options: Options) -> TableVerdict:
     """One table, its assumptions not contradictory; exhausted memory leaves it open."""
     try:
         verdict = prove_table(program, table, options)
-        if not table.assumptions or any(isinstance(one, ContradictoryAssumptions) for one in verdict.found):
+        if not table.assumptions or any(
+            isinstance(finding, ContradictoryAssumptions) for finding in verdict.found
+        ):
             return verdict
         possible = assumptions_satisfiable(program, table, options)
     except smt.troubles() as trouble:
         return _left_open(table, Undecided(f"{type(trouble).__name__}: {trouble}"))
     if not isinstance(possible, Answer):
-        made = verdict.certificate
-        return replace(verdict, certificate=made and with_witness(made, program, table, possible))
+        certificate = verdict.certificate
+        return replace(
+            verdict, certificate=certificate and with_witness(certificate, program, table, possible)
+        )
     wrong = ContradictoryAssumptions() if possible is Answer.UNSATISFIABLE else Undecided("its assumptions")
     return replace(verdict, found=(wrong,), certificate=None)
 

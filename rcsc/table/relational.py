@@ -108,7 +108,7 @@ class _Decision:
             few = len(self.table.lines) <= _MOST_LINES_TRIED
             reals = few and any(isinstance(v.type, Real) for v in self.variables)
             every = trial.points(self.program.variables) if reals else ()
-            self._tried = tuple(one for one in every if self.allowed(one))
+            self._tried = tuple(snapshot for snapshot in every if self.allowed(snapshot))
         return self._tried
 
     def allowed(self, snapshot: Snapshot) -> bool:
@@ -142,21 +142,21 @@ class _Decision:
         search = self.search(kept)
         if search.proved:
             kept, search = self.spared(search)
-        found = (*self.overlaps(search), *self.gap(search), *self.dead())
+        findings = (*self.overlaps(search), *self.gap(search), *self.dead())
         if search.undecided:
-            found = (*found, Undecided(f"{search.undecided} regions of the input space"))
+            findings = (*findings, Undecided(f"{search.undecided} regions of the input space"))
         names = tuple(self.table.assumptions[at] for at in kept)
         certificate = (
             tree_certificate(self.table, self.universe, search.nodes, names) if search.proved else None
         )
-        return Decided(found, certificate, names if search.proved else self.table.assumptions)
+        return Decided(findings, certificate, names if search.proved else self.table.assumptions)
 
     def under_assumptions(self, settled: tuple[Found, ...]) -> tuple[Found, ...]:
         """Dead lines, and a gap that DEFAULT takes, under the assumptions."""
         wrong = self.contradiction()
         if wrong:
             return wrong
-        gaps = [found for gap in settled if isinstance(gap, Gap) for found in self.narrowed_gap(gap)]
+        gaps = [finding for gap in settled if isinstance(gap, Gap) for finding in self.narrowed_gap(gap)]
         return (*self.dead(), *gaps)
 
     def contradiction(self) -> tuple[Found, ...]:
@@ -205,7 +205,7 @@ class _Decision:
             return everything, search
         kept = everything
         for at in everything:
-            fewer = tuple(one for one in kept if one != at)
+            fewer = tuple(other for other in kept if other != at)
             again = self.search(fewer, 2 * _MOST_REPROVED, alone=True)
             if again.proved:
                 kept, search = fewer, again
@@ -222,7 +222,7 @@ class _Decision:
         }
         conditions = question(self.program, self.table, self.table.assumptions, bounds, asked.candidates)
         for snapshot in self.tried:
-            if all(fold(one, snapshot) for one in conditions):
+            if all(fold(condition, snapshot) for condition in conditions):
                 return snapshot
         z3 = self.asked
         answer = z3.holds(*(encode(condition, z3.frame) for condition in conditions))
@@ -245,11 +245,11 @@ class _Decision:
         pairs = set(search.overlaps)
         for seen in search.witnesses:
             pairs.update(combinations(self.matching(seen), 2))
-        found: list[Found] = []
+        findings: list[Found] = []
         for first, second in sorted(pairs):
-            grown = len(found) < _MOST_GROWN
-            found.append(self.overlap(first, second, grown=grown))
-        return found
+            grown = len(findings) < _MOST_GROWN
+            findings.append(self.overlap(first, second, grown=grown))
+        return findings
 
     def matching(self, snapshot: Snapshot) -> list[int]:
         """Positions of the lines that match."""
@@ -261,7 +261,7 @@ class _Decision:
         both = [self.lines[first], self.lines[second]]
         point = least(self.universe, [*both, *self.assumed], self.columns)
         if isinstance(point, NoWitness):
-            seen = [one for one in self.tried if {first, second} <= set(self.matching(one))]
+            seen = [snapshot for snapshot in self.tried if {first, second} <= set(self.matching(snapshot))]
             witness = self.witness(seen, lambda z3: (z3.line(first), z3.line(second)))
             pair = f"lines `{self.table.lines[first].name}` and `{self.table.lines[second].name}`"
             return Undecided(pair) if witness is None else Overlap(first, second, witness)
@@ -280,7 +280,7 @@ class _Decision:
             ]
             settled = [point for point in points if not isinstance(point, NoWitness)]
             if len(settled) == len(points):
-                point = min(settled, key=lambda one: [one[column] for column in self.columns])
+                point = min(settled, key=lambda candidate: [candidate[column] for column in self.columns])
                 few = len(self.lines) <= _MOST_LINES_GROWN
                 region = self.around(point, [[line] for line in self.lines]) if few else None
                 return [Gap((self.snapshot(point),), (region,))]
@@ -297,22 +297,24 @@ class _Decision:
         standing = {assumption.name: assumption.standing for assumption in self.program.assumptions}
         names = zip(self.table.assumptions, self.assumed, strict=True)
         sure = [formula for name, formula in names if standing[name] is Standing.PROVED]
-        found: list[Found] = []
+        findings: list[Found] = []
         for at, line in enumerate(self.lines):
             point = find(self.universe, [line, *self.assumed])
             if isinstance(point, NoWitness):
                 answer = Answer.UNSATISFIABLE
-                if point is NoWitness.UNKNOWN and any(at in self.matching(one) for one in self.tried):
+                if point is NoWitness.UNKNOWN and any(
+                    at in self.matching(snapshot) for snapshot in self.tried
+                ):
                     answer = Answer.SATISFIABLE
                 elif point is NoWitness.UNKNOWN:
                     answer = self.asked.holds(self.asked.line(at))
                 if answer is Answer.UNSATISFIABLE:
                     assuming = len(sure) < len(self.assumed)
                     assuming = assuming and find(self.universe, [line, *sure]) is not NoWitness.NONE
-                    found.append(DeadLine(at, assuming))
+                    findings.append(DeadLine(at, assuming))
                 elif answer is Answer.UNKNOWN:
-                    found.append(Undecided(f"whether line `{self.table.lines[at].name}` can match"))
-        return found
+                    findings.append(Undecided(f"whether line `{self.table.lines[at].name}` can match"))
+        return findings
 
     def witness(
         self, seen: Sequence[Snapshot], terms: Callable[[TableSolver], tuple[Term, ...]]
@@ -322,11 +324,11 @@ class _Decision:
         if seen:
             few = replace(self.options, steps=min(self.options.steps, _STEPS_OF_LEAST))
             z3 = TableSolver(self.program, self.table, few)
-        found = z3.witness(*terms(z3))
-        if found is None and seen:
-            best = min(seen, key=lambda one: [key_of(v.type, one[v.name]) for v in self.variables])
-            found = {v.name: best[v.name] for v in self.variables}
-        return found
+        witness = z3.witness(*terms(z3))
+        if witness is None and seen:
+            best = min(seen, key=lambda snapshot: [key_of(v.type, snapshot[v.name]) for v in self.variables])
+            witness = {v.name: best[v.name] for v in self.variables}
+        return witness
 
     # --- witnesses ---------------------------------------------------------------------
 
@@ -352,5 +354,5 @@ class _Decision:
         }
 
     def _extent(self, column: int) -> Bounds:
-        found = self.universe.columns[column]
-        return found.low, found.high
+        bounds = self.universe.columns[column]
+        return bounds.low, bounds.high

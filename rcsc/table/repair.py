@@ -12,7 +12,7 @@ from rcsc.table.regions.partition import BudgetError, Gaps
 from rcsc.table.verdict import Gap, Overlap
 
 
-def parting_cell(program: Program, table: Table, found: Overlap) -> str | None:
+def parting_cell(program: Program, table: Table, overlap: Overlap) -> str | None:
     """The smallest change of one cell that parts the two lines and leaves every input matched.
 
     Narrowing line A on variable v by what line B has there parts the two. What A loses is then matched by B, if on
@@ -23,9 +23,9 @@ def parting_cell(program: Program, table: Table, found: Overlap) -> str | None:
     best: _Change | None = None
     lines = boxes.lines_of(table)
     kinds: dict[str, Scalar] = {v.name: v.type for v in program.variables}
-    for one, other in ((found.second, found.first), (found.first, found.second)):
+    for line, other in ((overlap.second, overlap.first), (overlap.first, overlap.second)):
         for name in table.variables:
-            change = _narrowed(lines, kinds, table, one, other, name)
+            change = _narrowed(lines, kinds, table, line, other, name)
             if change is not None and (best is None or change.lost < best.lost):
                 best = change
     if best is None:
@@ -42,12 +42,12 @@ class _Change:
 
 
 def _narrowed(
-    lines: list[dict[str, Box]], kinds: dict[str, Scalar], table: Table, one: int, other: int, name: str
+    lines: list[dict[str, Box]], kinds: dict[str, Scalar], table: Table, line: int, other: int, name: str
 ) -> _Change | None:
     column = [c for c in table.columns if c.variable == name]
     if len(column) != 1:
         return None
-    mine, theirs = lines[one], lines[other]
+    mine, theirs = lines[line], lines[other]
     whole = (key_bounds(kinds[name]),)
     for another in table.variables:
         everything = (key_bounds(kinds[another]),)
@@ -58,16 +58,16 @@ def _narrowed(
     cell = cells.cell(kinds[name], left) if left else None
     if not cell or meet(left, theirs.get(name, whole)):
         return None
-    return _Change(one, name, cell, size(before) - size(left))
+    return _Change(line, name, cell, size(before) - size(left))
 
 
 def _within(inner: Box, outer: Box) -> bool:
     return meet(inner, outer) == inner
 
 
-def closing_line(program: Program, table: Table, found: Gap) -> str | None:
+def closing_line(program: Program, table: Table, gap: Gap) -> str | None:
     """A line for the first region of the gap: it meets no line, and whether it closes the gap is counted."""
-    region = found.regions[0]
+    region = gap.regions[0]
     if region is None or not boxes.applies(table):
         return None
     kinds: dict[str, Scalar] = {v.name: v.type for v in program.variables}

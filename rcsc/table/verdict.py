@@ -95,4 +95,4 @@ class TableVerdict:
     @property
     def undecided(self) -> bool:
         """Whether something was left open."""
-        return any(isinstance(one, Undecided) for one in self.found)
+        return any(isinstance(finding, Undecided) for finding in self.found)

@@ -217,8 +217,8 @@ class Universe:
                 sign = 1 if op is Op.ADD else -1
                 return _sum(self.linear(left), _scaled(self.linear(right), sign))
             case Apply(op=Op.MUL, args=(left, right), type=Int()):
-                for one, other in ((left, right), (right, left)):
-                    coefficients, constant = self.linear(one)
+                for factor, other in ((left, right), (right, left)):
+                    coefficients, constant = self.linear(factor)
                     if not any(coefficients.values()):
                         return _scaled(self.linear(other), constant)
         return {self.column(expr): 1}, 0
@@ -241,11 +241,13 @@ def some(parts: Iterable[Formula]) -> Formula:
         if part == TRUE:
             return TRUE
         kept.update(dict.fromkeys(part.parts if isinstance(part, Some) else (part,)))
-    forms = {part.form for part in kept if isinstance(part, Atom)}
-    found: list[Formula] = [Atom(form, joined(one for part in kept if isinstance(part, Atom) and part.form == form for one in part.box))
-                             for form in sorted(forms)]  # fmt: skip
-    found += [part for part in kept if not isinstance(part, Atom)]
-    return found[0] if len(found) == 1 else Some(tuple(found))
+    atoms = [part for part in kept if isinstance(part, Atom)]
+    formulas: list[Formula] = [
+        Atom(form, joined(interval for atom in atoms if atom.form == form for interval in atom.box))
+        for form in sorted({atom.form for atom in atoms})
+    ]
+    formulas += [part for part in kept if not isinstance(part, Atom)]
+    return formulas[0] if len(formulas) == 1 else Some(tuple(formulas))
 
 
 def clauses(formulas: Iterable[Formula]) -> Clauses:
@@ -265,7 +267,7 @@ def clauses(formulas: Iterable[Formula]) -> Clauses:
 def lines_of(universe: Universe, table: Table) -> list[Clauses]:
     """Every line of the table as clauses."""
     known: dict[int, Formula] = {}
-    found = []
+    lines = []
     for line in table.lines:
         parts = []
         for test in line.tests:
@@ -273,8 +275,8 @@ def lines_of(universe: Universe, table: Table) -> list[Clauses]:
                 if id(test) not in known:
                     known[id(test)] = universe.of_test(test)
                 parts.append(known[id(test)])
-        found.append(clauses(parts))
-    return found
+        lines.append(clauses(parts))
+    return lines
 
 
 def assumptions_of(universe: Universe, program: Program, table: Table) -> list[Clauses]:

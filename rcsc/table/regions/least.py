@@ -4,7 +4,7 @@ In: clauses over a `Universe` whose columns are leaves. Out: the least point in 
 columns given, and the widest box around it on which a condition holds. Clauses that speak of terms
 that are not linear are for a solver (`smt`).
 
-Source: house style, example 6 (pin each variable, in declared order, to the least value that fits).
+The least point pins each column, in the order given, to the least value that fits.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -38,10 +38,10 @@ def find(universe: Universe, parts: Sequence[Formula], budget: int = 2_000) -> P
         budget=budget,
         first_only=True,
     )
-    found = tree.run()
-    if found.gaps:
-        return found.gaps[0][1]
-    return NoWitness.UNKNOWN if found.undecided else NoWitness.NONE
+    search = tree.run()
+    if search.gaps:
+        return search.gaps[0][1]
+    return NoWitness.UNKNOWN if search.undecided else NoWitness.NONE
 
 
 def _corner(universe: Universe, bounds: Mapping[int, Bounds]) -> Point | NoWitness:
@@ -65,10 +65,10 @@ def _corner(universe: Universe, bounds: Mapping[int, Bounds]) -> Point | NoWitne
         ):
             return _completed(universe, bounds, at)
     system = _system(universe, bounds, used, draw_in=False)
-    found = integer_point(system, [singles[column] for column in used], _ROUNDS)
-    if found is None:
+    solved = integer_point(system, [singles[column] for column in used], _ROUNDS)
+    if solved is None:
         return NoWitness.NONE
-    return _completed(universe, bounds, {column: int(found.value(singles[column])) for column in used})
+    return _completed(universe, bounds, {column: int(solved.value(singles[column])) for column in used})
 
 
 def _system(

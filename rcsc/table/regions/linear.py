@@ -98,28 +98,28 @@ class Simplex:
     def _violated(self) -> tuple[int, bool] | None:
         """The first form out of its bounds, and whether it must grow."""
         values = self._values
-        found: tuple[int, bool] | None = None
+        violated: tuple[int, bool] | None = None
         for basic, (d, row) in self._rows.items():
-            if found is None or basic < found[0]:
+            if violated is None or basic < violated[0]:
                 at = sum(map(operator.mul, row, values))
                 if at < d * self.low[basic]:
-                    found = (basic, True)
+                    violated = (basic, True)
                 elif at > d * self.high[basic]:
-                    found = (basic, False)
-        return found
+                    violated = (basic, False)
+        return violated
 
     def _entering(self, row: list[int], up: bool) -> int | None:
         """Position of the first nonbasic form that can move the row's form the right way."""
-        found: int | None = None
+        entering: int | None = None
         for j, a in enumerate(row):
             if a:
                 form = self._columns[j]
                 free = (
                     self._values[j] < self.high[form] if (a > 0) == up else self._values[j] > self.low[form]
                 )
-                if free and (found is None or form < self._columns[found]):
-                    found = j
-        return found
+                if free and (entering is None or form < self._columns[entering]):
+                    entering = j
+        return entering
 
     def _farkas(self, basic: int, d: int, row: list[int], up: bool) -> Multipliers:
         sign = 1 if up else -1

@@ -204,9 +204,9 @@ class Gaps(Generic[Axis]):
                 raise BudgetError
             inside = [at for at in alive if name not in lines[at] or holds(lines[at][name], low)]
             counted = [piece for piece in pieces if name not in piece.box or holds(piece.box[name], low)]
-            found = self._search(depth + 1, inside, lines, counted)
-            if found is not None:
-                return {name: (low, high), **found}
+            rest = self._search(depth + 1, inside, lines, counted)
+            if rest is not None:
+                return {name: (low, high), **rest}
         self._without.add(memory)
         return None
 
@@ -241,15 +241,17 @@ class Gaps(Generic[Axis]):
         }
         region: dict[Axis, Box] = {}
         for name, every in cuts.items():
-            region[name] = tuple(one for one in every if one[0] <= cell[name][0] <= one[1])
+            region[name] = tuple(
+                interval for interval in every if interval[0] <= cell[name][0] <= interval[1]
+            )
         for name, every in cuts.items():
             close = [
                 boxes for boxes in lines if all(meet(box, region[n]) for n, box in boxes.items() if n != name)
             ]
             region[name] = joined(
-                one
-                for one in every
-                if not any(name not in boxes or holds(boxes[name], one[0]) for boxes in close)
+                interval
+                for interval in every
+                if not any(name not in boxes or holds(boxes[name], interval[0]) for boxes in close)
             )
         return region
 
@@ -314,14 +316,14 @@ def parting(lines: Sequence[BoxLine[Axis]]) -> tuple[Axis, ...] | None:
     )
 
 
-def common(one: BoxLine[Axis], two: BoxLine[Axis]) -> dict[Axis, Box] | None:
+def common(first: BoxLine[Axis], second: BoxLine[Axis]) -> dict[Axis, Box] | None:
     """The inputs of both; None where there are none."""
-    found = dict(one)
-    for name, box in two.items():
-        found[name] = meet(found[name], box) if name in found else box
-        if not found[name]:
+    shared = dict(first)
+    for name, box in second.items():
+        shared[name] = meet(shared[name], box) if name in shared else box
+        if not shared[name]:
             return None
-    return found
+    return shared
 
 
 def _crossing(met: Mapping[int, int]) -> tuple[dict[int, int], list[int]]:
@@ -339,15 +341,15 @@ def _crossing(met: Mapping[int, int]) -> tuple[dict[int, int], list[int]]:
         near[at] = near.get(at, 0) | others
         for other in bits_of(others):
             near[other] = near.get(other, 0) | 1 << at
-    left, found = dict(near), list[int]()
+    left, removed = dict(near), list[int]()
     while left:
         most = max(left, key=lambda at: (left[at].bit_count(), at))
         for other in bits_of(left.pop(most)):
             left[other] &= ~(1 << most)
             if not left[other]:
                 del left[other]
-        found.append(most)
-    return near, found
+        removed.append(most)
+    return near, removed
 
 
 def slices(extent: Bounds, boxes: Iterable[Box]) -> list[Bounds]:
@@ -370,10 +372,10 @@ def bits_of(mask: int) -> Iterator[int]:
 
 def _any(masks: Iterable[int]) -> int:
     """The union."""
-    found = 0
+    union = 0
     for mask in masks:
-        found |= mask
-    return found
+        union |= mask
+    return union
 
 
 def _intervals_meeting(stated: Mapping[Box, int], idle: int) -> Iterator[tuple[Box, int]]:

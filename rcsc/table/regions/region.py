@@ -172,8 +172,8 @@ def _merged(index: int, boxes: Mapping[int, Box], rest: Formula) -> Candidate | 
 def simplified(formula: Formula, form: int, low: int, high: int) -> Formula:
     """The formula where `form` is in `low .. high`."""
     match formula:
-        case Atom(form=found, box=box):
-            if found != form:
+        case Atom(form=bounded, box=box):
+            if bounded != form:
                 return formula
             clipped = meet(box, ((low, high),))
             if not clipped:

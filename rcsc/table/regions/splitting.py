@@ -177,11 +177,11 @@ class Tree:
 
     def _point(self, region: Region) -> Point:
         """The vertex, with the least value of every column that it leaves open."""
-        found = {}
+        point = {}
         for column, form in enumerate(self.universe.single):
             known = region.simplex.knows(form)
-            found[column] = int(region.simplex.value(form)) if known else self._range(region, form)[0]
-        return found
+            point[column] = int(region.simplex.value(form)) if known else self._range(region, form)[0]
+        return point
 
     # --- splits ------------------------------------------------------------------------
 
