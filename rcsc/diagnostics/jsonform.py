@@ -54,7 +54,7 @@ def table_to_json(table: TableReport) -> Json:
 
 
 def _listed(known: InSystem | SystemReport) -> Json:
-    return {name: list(one) if isinstance(one, tuple) else one for name, one in asdict(known).items()}
+    return {name: list(value) if isinstance(value, tuple) else value for name, value in asdict(known).items()}
 
 
 def diagnostic_to_json(diagnostic: Diagnostic, sources: Sources) -> Json:

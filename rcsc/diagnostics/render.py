@@ -120,7 +120,7 @@ def _snippets(
     here = [label for label in diagnostic.related if label.span.file == primary.span.file]
     others = [label for label in diagnostic.related if label.span.file != primary.span.file]
     groups: list[tuple[Label, tuple[Label, ...]]] = [(primary, (primary, *here))]
-    for _, same in groupby(sorted(others, key=lambda label: label.span), key=lambda one: one.span.file):
+    for _, same in groupby(sorted(others, key=lambda label: label.span), key=lambda label: label.span.file):
         group = tuple(same)
         groups.append((group[0], group))
     for index, (first, labels) in enumerate(groups):

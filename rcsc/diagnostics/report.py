@@ -132,10 +132,10 @@ def merged(tables: Iterable[TableReport]) -> tuple[TableReport, ...]:
     return tuple(worst.values())
 
 
-def _worse(one: TableReport, two: TableReport) -> TableReport:
+def _worse(first: TableReport, second: TableReport) -> TableReport:
     order = list(Verdict)
-    kept = two if order.index(two.verdict) > order.index(one.verdict) else one
-    other = one if kept is two else two
+    kept = second if order.index(second.verdict) > order.index(first.verdict) else first
+    other = first if kept is second else second
     if other.verdict is not kept.verdict:
         return kept
     known = dict(kept.assumptions)

@@ -39,11 +39,13 @@ class Cause:
 def diagnostic(code: Code, span: Span, message: str, cause: Cause) -> Diagnostic:
     """One cause as it is reported."""
     failing = [
-        one for one in zip(cause.failures, cause.where, strict=True) if one[0].outcome is Discharge.FAILS
+        (failure, place)
+        for failure, place in zip(cause.failures, cause.where, strict=True)
+        if failure.outcome is Discharge.FAILS
     ]
     if not failing:
-        said = f"could not be decided whether this holds: {message}"
-        return Diagnostic(Code.UNDECIDED, said, Label(span), help=_PATIENCE)
+        undecided = f"could not be decided whether this holds: {message}"
+        return Diagnostic(Code.UNDECIDED, undecided, Label(span), help=_PATIENCE)
     columns = tuple(
         WitnessColumn(
             table,

@@ -135,8 +135,8 @@ class _Question:
     ) -> None:
         self.asker, self.owed, self.wanted = asker, owed, wanted
         self.bad = [values.both(obligation.path, values.negation(obligation.good)) for obligation in owed]
-        found = values.variables([*base, *self.bad])
-        self.variables = sorted(found.values(), key=lambda node: self._place(node.name))
+        variables = values.variables([*base, *self.bad])
+        self.variables = sorted(variables.values(), key=lambda node: self._place(node.name))
         self.reals = any(isinstance(node.kind, Real) for node in self.variables)
         self.known = list(base)
         self.base = [*values.domain(self.variables), *map(values.term_of, base)]
@@ -212,13 +212,13 @@ class _Question:
             Variable(VariableName(node.name), Kind.STATE, node.kind, value_of_key(node.kind, 0))
             for node in self.variables
         ]
-        found = self._least(bad, shown) if tried is None else tried
-        return () if found is None else tuple((variable, found[variable.name]) for variable in shown)
+        point = self._least(bad, shown) if tried is None else tried
+        return () if point is None else tuple((variable, point[variable.name]) for variable in shown)
 
     def _least(self, bad: Node, shown: list[Variable]) -> dict[str, Value] | None:
         solver = self._fresh()
         solver.add(values.term_of(bad))
         frame = Frame({node.name: values.term_of(node) for node in self.variables})
-        found = least_witness(solver, shown, frame)
+        least = least_witness(solver, shown, frame)
         self.asker.tally.queries += solver.queries
-        return found
+        return least

@@ -45,10 +45,10 @@ def at_first(program: Program) -> Iterator[Diagnostic]:
 def properties_elsewhere(program: Program) -> Iterator[Diagnostic]:
     """That properties are not proved of a program alone; one note for each file that declares some."""
     files: dict[str, list[Property]] = {}
-    for one in program.properties:
-        files.setdefault(one.span.file, []).append(one)
+    for claim in program.properties:
+        files.setdefault(claim.span.file, []).append(claim)
     for declared in files.values():
-        names = ", ".join(f"`{one.name}`" for one in declared)
+        names = ", ".join(f"`{claim.name}`" for claim in declared)
         what, is_ = ("property", "is") if len(declared) == 1 else ("properties", "are")
         message = f"{what} {names} {is_} not proved here"
         helps = ("`rcsc prove` proves what a level does in its environment, cycle after cycle",)
@@ -61,9 +61,9 @@ def assumptions_satisfiable(program: Program, table: Table, options: Options) ->
 
     A few are tried by hand before Z3 is asked.
     """
-    conditions = [one.condition for one in assumed_of(program, table)]
+    conditions = [assumption.condition for assumption in assumed_of(program, table)]
     for trial in _trials(program):
-        if all(fold(one, trial) for one in conditions):
+        if all(fold(condition, trial) for condition in conditions):
             return trial
     from rcsc.solvers.smt import Solver
     from rcsc.symbolic.encode import declared, encode

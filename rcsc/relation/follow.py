@@ -64,7 +64,7 @@ def following(program: Program, table: Table, options: Options) -> list[Follow]:
         UnansweredError: Z3 gave no answer, or a cycle is too long to follow.
     """
     whole = relying(program)
-    own = next(one for one in whole.tables if one.name == table.name)
+    own = next(candidate for candidate in whole.tables if candidate.name == table.name)
     try:
         return list(_Cycles(whole, own, _level_of(whole, own), options).pairs())
     except (TooLongError, RecursionError) as error:
@@ -185,7 +185,7 @@ class _Cycles:
 
     def _facts(self, run: Run) -> list[Node]:
         """What is known when the table looks."""
-        facts = [run.evaluate(one) for one in assumed(self.program, self.table)]
+        facts = [run.evaluate(assumption) for assumption in assumed(self.program, self.table)]
         if (
             self.level is not None
             and isinstance(self.level[0].tables, TableByCommand)

@@ -103,21 +103,21 @@ class _Question:
         self.kinds = {str(v.name): v.type for v in program.variables}
         for name, kind in self.kinds.items():
             self.start[name] = self.shared.one(values.variable(name, kind))
-        self.one, self.two = list(self._outcomes(*first)), list(self._outcomes(*second))
-        table = next(one for one in program.tables if one.name == first[1].name)
+        self.outcomes, self.others = list(self._outcomes(*first)), list(self._outcomes(*second))
+        table = next(candidate for candidate in program.tables if candidate.name == first[1].name)
         run = Run({}, self.kinds, self.start)
         self.known = [run.evaluate(condition) for condition in assumed(program, table)]
         self.questions = 0
 
     def answer(self) -> Comparison:
         """Each outcome of the first table against those of the second that it can meet, its namesake first."""
-        for outcome in self.one:
+        for outcome in self.outcomes:
             left = outcome.when  # what of it no outcome of the second table has met yet
-            for two in sorted(self.two, key=lambda two: two.name != outcome.name):
-                found = self._asked(outcome, two)
-                if found is not None:
-                    return found
-                left = values.both(left, values.negation(two.when))
+            for other in sorted(self.others, key=lambda other: other.name != outcome.name):
+                comparison = self._asked(outcome, other)
+                if comparison is not None:
+                    return comparison
+                left = values.both(left, values.negation(other.when))
                 if self._check(left)[0] is Answer.UNSATISFIABLE:
                     break
         return Same(self.questions)
@@ -139,19 +139,19 @@ class _Question:
         yield _Outcome(SEVERAL_LINES, values.both(twice, defined), None)
         yield _Outcome(UNDEFINED, undefined, None)
 
-    def _unlike(self, one: _Outcome, two: _Outcome) -> Node:
-        if one.effect is None or two.effect is None:
-            return values.truth(one.name != two.name)
-        return values.any_of(node for _, node in self._changes(one.effect, two.effect))
+    def _unlike(self, first: _Outcome, second: _Outcome) -> Node:
+        if first.effect is None or second.effect is None:
+            return values.truth(first.name != second.name)
+        return values.any_of(node for _, node in self._changes(first.effect, second.effect))
 
-    def _changes(self, one: Effect, two: Effect) -> Iterator[tuple[str, Node]]:
+    def _changes(self, first: Effect, second: Effect) -> Iterator[tuple[str, Node]]:
         """What can differ afterwards, and where it does."""
-        leaves = [name for name in self.kinds if name in one.leaves or name in two.leaves]
-        good = values.both(one.good, two.good)
-        yield RUN, goes_wrong_otherwise(one, two, self.shared)
-        yield CALLS, values.both(good, values.negation(same_calls(one, two, leaves, self.shared)))
+        leaves = [name for name in self.kinds if name in first.leaves or name in second.leaves]
+        good = values.both(first.good, second.good)
+        yield RUN, goes_wrong_otherwise(first, second, self.shared)
+        yield CALLS, values.both(good, values.negation(same_calls(first, second, leaves, self.shared)))
         for name in leaves:
-            pair = [value_after(effect, name, self.shared) for effect in (one, two)]
+            pair = [value_after(effect, name, self.shared) for effect in (first, second)]
             same = self.shared.equal(*pair)
             if same is not values.TRUE:
                 yield name, values.both(good, values.negation(same))
@@ -161,36 +161,40 @@ class _Question:
         if wrong is values.FALSE:
             return Answer.UNSATISFIABLE, None, {}
         self.questions += 1
-        found = values.variables([*self.known, wrong])
+        variables = values.variables([*self.known, wrong])
         solver = Solver(self.options.limits)
-        solver.add(*values.domain(found.values()), *map(values.term_of, [*self.known, wrong]))
-        return solver.check(), solver, found
+        solver.add(*values.domain(variables.values()), *map(values.term_of, [*self.known, wrong]))
+        return solver.check(), solver, variables
 
-    def _asked(self, one: _Outcome, two: _Outcome) -> Comparison | None:
+    def _asked(self, first: _Outcome, second: _Outcome) -> Comparison | None:
         """None where the two outcomes cannot meet, or are the same where they do."""
-        answer, solver, found = self._check(values.all_of((one.when, two.when, self._unlike(one, two))))
+        answer, solver, variables = self._check(
+            values.all_of((first.when, second.when, self._unlike(first, second)))
+        )
         if solver is None or answer is Answer.UNSATISFIABLE:
             return None
         if answer is Answer.UNKNOWN:
-            return NotDecided(one.name, two.name)
-        return self._witness(solver, found, one, two)
+            return NotDecided(first.name, second.name)
+        return self._witness(solver, variables, first, second)
 
-    def _witness(self, solver: Solver, found: dict[str, Node], one: _Outcome, two: _Outcome) -> Comparison:
+    def _witness(
+        self, solver: Solver, variables: dict[str, Node], first: _Outcome, second: _Outcome
+    ) -> Comparison:
         order = {v.name: at for at, v in enumerate(self.variables)}
-        names = sorted(found, key=lambda name: (order.get(VariableName(name), len(order)), name))
-        shown = [_shown(name, found[name].kind) for name in names]
-        frame = Frame({name: values.term_of(node) for name, node in found.items()})
+        names = sorted(variables, key=lambda name: (order.get(VariableName(name), len(order)), name))
+        shown = [_shown(name, variables[name].kind) for name in names]
+        frame = Frame({name: values.term_of(node) for name, node in variables.items()})
         least = least_witness(solver, shown, frame)
         if least is None:
-            return NotDecided(one.name, two.name)
+            return NotDecided(first.name, second.name)
         changed: tuple[str, ...] = ()
-        if one.effect is not None and two.effect is not None:
+        if first.effect is not None and second.effect is not None:
             changed = tuple(
                 name
-                for name, node in self._changes(one.effect, two.effect)
+                for name, node in self._changes(first.effect, second.effect)
                 if solver.check(values.term_of(node)) is Answer.SATISFIABLE
             )
-        return Differs(tuple((v, least[v.name]) for v in shown), one.name, two.name, changed)
+        return Differs(tuple((v, least[v.name]) for v in shown), first.name, second.name, changed)
 
 
 def _done(meaning: Meaning, actions: tuple[Action, ...]) -> Effect:

@@ -71,7 +71,7 @@ class Steps:
         if self.state.deferred_until is not None:
             self._start[pending(self.state.name)] = before
         run = self._run()
-        self._know([run.evaluate(one) for one in assumed(self.program, self.table)])
+        self._know([run.evaluate(assumption) for assumption in assumed(self.program, self.table)])
         lines = [
             values.all_of(run.evaluate(t.condition) for t in line.tests if t) for line in self.table.lines
         ]
@@ -84,7 +84,7 @@ class Steps:
 
     def steps(self, states: Sequence[Value]) -> list[Step]:
         """Every step from these states; by line, then in the states' order."""
-        found = []
+        steps = []
         for at, actions in enumerate(self._actions()):
             after = self._after(actions)
             for source in states:
@@ -96,8 +96,8 @@ class Steps:
                     for value in self._values()
                     if any(self._possible(*here, when, self._is(node, value)) for when, node in after)
                 ]
-                found += [Step(at, source, target, len(targets) > 1) for target in targets]
-        return found
+                steps += [Step(at, source, target, len(targets) > 1) for target in targets]
+        return steps
 
     def sets(self, action: Action) -> Value | None:
         """The state that the action alone, whatever the input, leads to; None where it does anything else too."""
@@ -158,10 +158,10 @@ class Steps:
     def _after(self, actions: Sequence[Action]) -> list[tuple[Node, Node]]:
         """The state that the actions lead to, and when; one that is written past its deferral comes beside the pending one."""
         run = self._followed(actions)
-        found = [(values.TRUE, run.leaf(self._next()))]
+        successors = [(values.TRUE, run.leaf(self._next()))]
         if self.state.name != self._next() and self.state.name in run.state.wrote:
-            found.append((run.state.wrote[self.state.name], run.leaf(self.state.name)))
-        return found
+            successors.append((run.state.wrote[self.state.name], run.leaf(self.state.name)))
+        return successors
 
     def _know(self, nodes: Sequence[Node]) -> None:
         self._declare(nodes)

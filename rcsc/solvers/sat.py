@@ -30,8 +30,8 @@ def _interrupted() -> type[Exception]:
     """What the solver raises when Ctrl-C stops it; nothing else raises it in a search."""
     import pysolvers
 
-    found: type[Exception] = pysolvers.error
-    return found
+    error: type[Exception] = pysolvers.error
+    return error
 
 
 class Sat:

@@ -36,11 +36,11 @@ def lowest(low: int, known: int, up_to: Callable[[int, int], int | None]) -> int
     """
     limit = low  # where most are
     while low < known:
-        found = up_to(low, limit)
-        if found is None:
+        value = up_to(low, limit)
+        if value is None:
             low = limit + 1
-        elif found < known:
-            known = found
+        elif value < known:
+            known = value
         else:
             break
         limit = (low + known) // 2

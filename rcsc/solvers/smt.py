@@ -377,11 +377,11 @@ class Solver:
     def value(self, term: Term, kind: Scalar) -> Value:
         """The value of a constant in the model of the last satisfiable answer."""
         z3 = _z3()
-        found = self._solver.model().eval(term, model_completion=True)
+        evaluated = self._solver.model().eval(term, model_completion=True)
         if isinstance(kind, Bool):
-            return bool(z3.is_true(found))
+            return bool(z3.is_true(evaluated))
         if isinstance(kind, Real):
-            bits = z3.simplify(z3.fpToIEEEBV(found)).as_long()
+            bits = z3.simplify(z3.fpToIEEEBV(evaluated)).as_long()
             double: float = struct.unpack("<d", struct.pack("<Q", bits))[0]
             return double + 0.0
-        return int(found.as_long())
+        return int(evaluated.as_long())
