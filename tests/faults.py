@@ -110,7 +110,7 @@ def program_with(fault: Fault, folder: Path) -> Program | None:
     """The program of the level with the fault; None where it does not resolve."""
     loaded = load([str(folder / fault.level / f"{fault.level}.rcs")])
     program = resolve(loaded.roots[0], loaded)
-    return program if isinstance(program, Program) and not loaded.found else None
+    return program if isinstance(program, Program) and not loaded.diagnostics else None
 
 
 def resolves(fault: Fault) -> bool:
@@ -126,7 +126,9 @@ def by_check(fault: Fault) -> Answer:
         tables_with(fault, Path(name))
         root = str(Path(name) / fault.level / f"{fault.level}.rcs")
         report = check(Settings((root,), Options(solver="boxes"), use_cache=False))
-        codes = Counter(finding.code.value for finding in report.found if finding.severity is Severity.ERROR)
+        codes = Counter(
+            finding.code.value for finding in report.diagnostics if finding.severity is Severity.ERROR
+        )
         return Answer(report.failed, ", ".join(codes) if report.failed else "")
 
 

@@ -15,7 +15,7 @@ _WORD = {Severity.ERROR: "error", Severity.WARNING: "warning", Severity.NOTE: "n
 
 def annotations(report: Report) -> str:
     """One workflow command a diagnostic, each on its own line."""
-    return "".join(f"{annotation(diagnostic, report.sources)}\n" for diagnostic in report.found)
+    return "".join(f"{annotation(diagnostic, report.sources)}\n" for diagnostic in report.diagnostics)
 
 
 def annotation(diagnostic: Diagnostic, sources: Sources) -> str:

@@ -29,7 +29,7 @@ def report_to_json(report: Report, command: str) -> Json:
         "command": command,
         "ok": not report.failed,
         "counts": {f"{severity.value}s": report.count(severity) for severity in Severity},
-        "diagnostics": [diagnostic_to_json(diagnostic, report.sources) for diagnostic in report.found],
+        "diagnostics": [diagnostic_to_json(diagnostic, report.sources) for diagnostic in report.diagnostics],
         "tables": [table_to_json(table) for table in report.tables],
         "systems": [_listed(system) for system in report.systems],
     }

@@ -150,20 +150,20 @@ class Report:
     """The outcome of a command.
 
     Attributes:
-        found: Sorted, each once.
+        diagnostics: Sorted, each once.
         tables: In order of file and place.
         sources: Every text that a diagnostic points into.
         systems: Those that the tables belong to, as far as they were looked at.
     """
 
-    found: tuple[Diagnostic, ...]
+    diagnostics: tuple[Diagnostic, ...]
     tables: tuple[TableReport, ...] = ()
     sources: Mapping[str, Source] = field(default_factory=dict)
     systems: tuple[SystemReport, ...] = ()
 
     def count(self, severity: Severity) -> int:
         """How many diagnostics are of this severity."""
-        return sum(diagnostic.severity is severity for diagnostic in self.found)
+        return sum(diagnostic.severity is severity for diagnostic in self.diagnostics)
 
     @property
     def failed(self) -> bool:

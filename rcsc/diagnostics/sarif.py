@@ -23,7 +23,7 @@ Json = dict[str, Any]
 
 def sarif(report: Report) -> Json:
     """One run with a result for each diagnostic; table verdicts are properties of the run."""
-    codes = sorted({diagnostic.code for diagnostic in report.found})
+    codes = sorted({diagnostic.code for diagnostic in report.diagnostics})
     index = {code: number for number, code in enumerate(codes)}
     return {
         "$schema": SCHEMA,
@@ -40,7 +40,8 @@ def sarif(report: Report) -> Json:
                 },
                 "columnKind": "unicodeCodePoints",
                 "results": [
-                    _result(diagnostic, index[diagnostic.code], report.sources) for diagnostic in report.found
+                    _result(diagnostic, index[diagnostic.code], report.sources)
+                    for diagnostic in report.diagnostics
                 ],
                 "properties": {"tables": [table_to_json(table) for table in report.tables]},
             }

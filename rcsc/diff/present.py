@@ -180,11 +180,11 @@ def knows(program: Program, table: Table, leaf: str, value: Value, options: Opti
     kinds = {str(v.name): v.type for v in program.variables}
     shared = Shared()
     for name, kind in kinds.items():
-        shared.start[name] = shared.one(values.variable(name, kind))
+        shared.start[name] = shared.canonical(values.variable(name, kind))
     meaning = Meaning(program, kinds, shared)
     known = assumed(program, table, meaning)
     here = values.equal(shared.start[leaf], values.constant(kinds[leaf], value))
-    whole = shared.one(values.all_of([known, here, values.any_of(meaning.lines(table))]))
+    whole = shared.canonical(values.all_of([known, here, values.any_of(meaning.lines(table))]))
     if whole.known:
         return bool(whole.low)
     return Space(values.variables([whole]).values(), (), options).possible(whole)

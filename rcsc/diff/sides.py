@@ -97,7 +97,7 @@ def _read(asked: Given, paths: tuple[str, ...], hidden: str, shown: str) -> Side
     if loaded is None or (asked.may_lack and not loaded.given):
         return Side(asked.name, {}, (), {})
     programs: dict[str, Program] = {}
-    found = [diagnostic for diagnostic in loaded.found if diagnostic.severity is Severity.ERROR]
+    found = [diagnostic for diagnostic in loaded.diagnostics if diagnostic.severity is Severity.ERROR]
     for root in loaded.roots:
         made = resolve(root, loaded)
         if isinstance(made, Program):

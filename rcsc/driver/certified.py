@@ -52,7 +52,7 @@ def certify(settings: Settings, how: Checking, write: Path | None, against: Path
         return Conclusion(report, "nothing is certified: not everything is proved")
     found = _keep(proof.certificate, write) if write is not None else ()
     reviewed = _reviewed(made.loaded, proof.certificate, how, proof.proved)
-    report = made.report((*found, *reviewed.report.found))
+    report = made.report((*found, *reviewed.report.diagnostics))
     return Conclusion(
         replace(report, tables=()), reviewed.closing
     )  # the verdicts are the prover's, not the checker's
@@ -93,7 +93,7 @@ def _reviewed(
     """
     if isinstance(certificate, Diagnostic):
         return Conclusion(Report((certificate,)), "not certified")
-    program = resolve(loaded.roots[0], loaded) if loaded.roots else loaded.found
+    program = resolve(loaded.roots[0], loaded) if loaded.roots else loaded.diagnostics
     if not isinstance(program, Program):
         return Conclusion(Report(program, (), loaded.sources), "not certified")
     stops = None if proved is None else {str(table.name): table.stops for table in proved.program.tables}

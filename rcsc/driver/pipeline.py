@@ -23,7 +23,7 @@ class Proved:
     def report(self, found: tuple[Diagnostic, ...] = ()) -> Report:
         """Everything found, each once, and each table once, with the worst verdict of all programs that it is in."""
         every = {
-            *self.loaded.found,
+            *self.loaded.diagnostics,
             *found,
             *(diagnostic for proof in self.proofs for diagnostic in proof.found),
         }

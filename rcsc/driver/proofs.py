@@ -189,12 +189,12 @@ def table_report(verdict: TableVerdict, program: Program) -> TableReport:
 
 
 def _said(verdict: TableVerdict) -> Verdict:
-    if any(isinstance(one, Undecided | SolversDisagree) for one in verdict.found):
+    if any(isinstance(one, Undecided | SolversDisagree) for one in verdict.findings):
         return Verdict.UNDECIDED
     falls = not must_cover(verdict.table)
     wrong = any(
         not (isinstance(dead_line, Gap) and falls)
         and not (isinstance(dead_line, DeadLine) and dead_line.assuming)
-        for dead_line in verdict.found
+        for dead_line in verdict.findings
     )
     return Verdict.REFUTED if wrong else Verdict.PROVED

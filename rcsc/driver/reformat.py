@@ -41,7 +41,7 @@ def reformat(paths: tuple[str, ...], stdin: bytes | None, *, write: bool) -> For
     roots = [name for name in loaded.given if name in loaded.files]
     mine = tuple(
         diagnostic
-        for diagnostic in loaded.found
+        for diagnostic in loaded.diagnostics
         if diagnostic.code.value < "RCS2" and _of(diagnostic, loaded.given, paths)
     )
     texts = {name: _text(name, loaded.files[name]) for name in roots}

@@ -32,7 +32,7 @@ def with_levels(report: Report, cache: Cache) -> Report:
     """The report, with what is known of the systems that its tables belong to."""
     seen = _Seen(cache)
     tables = tuple(seen.table(table) for table in report.tables)
-    found = {*map(seen.noted, report.found), *seen.warnings()}
+    found = {*map(seen.noted, report.diagnostics), *seen.warnings()}
     sources = {**seen.sources, **report.sources}
     systems = tuple(seen.systems.values())
     return Report(tuple(sorted(found, key=sort_key)), tables, sources, systems)

@@ -97,8 +97,8 @@ def proofs(options: Options) -> Proofs:
 
     def prover(program: Program, table: Table) -> Opinion:
         verdict = prove_table(program, table, options)
-        falls = [one for one in verdict.found if isinstance(one, Gap)]
-        accepted = len(falls) == len(verdict.found) and (not falls or not must_cover(table))
+        falls = [one for one in verdict.findings if isinstance(one, Gap)]
+        accepted = len(falls) == len(verdict.findings) and (not falls or not must_cover(table))
         return Opinion(accepted, repr([(gap.count, gap.witnesses) for gap in falls]))
 
     def solver(program: Program, condition: Expr) -> Snapshot | Missing:

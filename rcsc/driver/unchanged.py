@@ -54,12 +54,14 @@ def recall(cache: Cache, paths: tuple[str, ...], options: Options) -> Report | N
 
 def remember(cache: Cache, paths: tuple[str, ...], options: Options, loaded: Loaded, report: Report) -> None:
     """Keep the report, unless it may change though no file does."""
-    if any(diagnostic.code in _PASSING or diagnostic.code.value[3] in "19" for diagnostic in report.found):
+    if any(
+        diagnostic.code in _PASSING or diagnostic.code.value[3] in "19" for diagnostic in report.diagnostics
+    ):
         return
     looked_at = digests(loaded)
     if looked_at is None:
         return
-    checked = _Checked(tuple(loaded.given), looked_at, report.found, report.tables)
+    checked = _Checked(tuple(loaded.given), looked_at, report.diagnostics, report.tables)
     cache.store(checked, *_key(paths, options))
 
 

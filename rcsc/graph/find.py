@@ -56,8 +56,8 @@ def tables(named: str, *, running: bool = False) -> list[FoundTable] | NotFound:
     if os.path.isdir(file):
         return _every(load([file]))
     loaded = load([file])
-    if loaded.found:
-        return NotFound(loaded.found, dict(loaded.sources))
+    if loaded.diagnostics:
+        return NotFound(loaded.diagnostics, dict(loaded.sources))
     program = resolve(loaded.roots[0], loaded)
     if not isinstance(program, Program):
         return NotFound(program, dict(loaded.sources))
@@ -98,8 +98,8 @@ def _every(loaded: Loaded) -> list[FoundTable] | NotFound:
             made.setdefault((table.file, table.name), FoundTable(loaded, root, program, table))
     if not made:
         return (
-            NotFound(loaded.found, dict(loaded.sources))
-            if loaded.found
+            NotFound(loaded.diagnostics, dict(loaded.sources))
+            if loaded.diagnostics
             else _nothing("there is no table", "")
         )
     return [made[key] for key in sorted(made)]

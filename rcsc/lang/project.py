@@ -34,7 +34,7 @@ class Loaded:
         files: Every file, used ones too, by name as reached from the paths given.
         uses: For each file the files that it uses.
         sources: Every text.
-        found: What could not be read, found or parsed.
+        diagnostics: What could not be read, found or parsed.
     """
 
     given: tuple[str, ...]
@@ -42,7 +42,7 @@ class Loaded:
     files: "Mapping[str, tree.File]"
     uses: Mapping[str, tuple[str, ...]]
     sources: Mapping[str, Source]
-    found: tuple[Diagnostic, ...]
+    diagnostics: tuple[Diagnostic, ...]
 
 
 def load(paths: Sequence[str], stdin: str | bytes | None = None, stdin_name: str = "-") -> Loaded:
@@ -51,7 +51,7 @@ def load(paths: Sequence[str], stdin: str | bytes | None = None, stdin_name: str
     roots = tuple(dict.fromkeys(file for path in paths for file in loader.roots(path)))
     for file in roots:
         loader.reach(file)
-    diagnostics = tuple(sorted(set(loader.found), key=sort_key))
+    diagnostics = tuple(sorted(set(loader.diagnostics), key=sort_key))
     uses = {file: tuple(used) for file, used in loader.uses.items()}
     heads = _heads(roots, {path for path in paths if not os.path.isdir(path)}, uses)
     return Loaded(roots, heads, loader.files, uses, loader.sources, diagnostics)
@@ -114,7 +114,7 @@ class _Loader:
     files: "dict[str, tree.File]" = field(default_factory=dict)
     uses: dict[str, list[str]] = field(default_factory=dict)
     sources: dict[str, Source] = field(default_factory=dict)
-    found: list[Diagnostic] = field(default_factory=list)
+    diagnostics: list[Diagnostic] = field(default_factory=list)
     named: dict[str, str] = field(default_factory=dict)
     unread: dict[str, _Unread] = field(default_factory=dict)
     excluded: dict[str, tuple[str, ...]] = field(default_factory=dict)
@@ -122,7 +122,7 @@ class _Loader:
 
     def report(self, code: Code, message: str, span: Span, *helps: str) -> None:
         """Adds an error."""
-        self.found.append(Diagnostic(code, message, Label(span), help=helps))
+        self.diagnostics.append(Diagnostic(code, message, Label(span), help=helps))
 
     # --- which files ---
 
@@ -245,7 +245,7 @@ class _Loader:
         self.sources[file] = Source(file, text)
         parsed = parse(self.sources[file])
         if not isinstance(parsed, File):
-            self.found.extend(parsed)
+            self.diagnostics.extend(parsed)
             return False
         self.files[file] = parsed
         self.uses[file] = []

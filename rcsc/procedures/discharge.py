@@ -161,7 +161,7 @@ class _Question:
     def all_hold(self) -> bool:
         """Whether none of the obligations can fail."""
         bad = values.any_of(self.bad)
-        if self.reals and trial.found([*self.known, bad], self.variables) is not None:
+        if self.reals and trial.witness([*self.known, bad], self.variables) is not None:
             return False
         return self._ask(values.term_of(bad)) is Answer.UNSATISFIABLE
 
@@ -171,7 +171,7 @@ class _Question:
             self.failures += [Failure(self.owed[at], Discharge.OPEN) for at in places]
             return True
         bad = values.any_of([self.bad[at] for at in places])
-        tried = trial.found([*self.known, bad], self.variables) if self.reals else None
+        tried = trial.witness([*self.known, bad], self.variables) if self.reals else None
         answer = self._ask(values.term_of(bad)) if tried is None else Answer.SATISFIABLE
         self._last = answer, tried
         return answer is Answer.UNSATISFIABLE

@@ -102,7 +102,7 @@ class _Question:
         self.variables = program.variables
         self.kinds = {str(v.name): v.type for v in program.variables}
         for name, kind in self.kinds.items():
-            self.start[name] = self.shared.one(values.variable(name, kind))
+            self.start[name] = self.shared.canonical(values.variable(name, kind))
         self.outcomes, self.others = list(self._outcomes(*first)), list(self._outcomes(*second))
         table = next(candidate for candidate in program.tables if candidate.name == first[1].name)
         run = Run({}, self.kinds, self.start)

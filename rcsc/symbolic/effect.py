@@ -68,7 +68,7 @@ class Shared:
         self._bare: dict[tuple[object, ...], int] = {}
         self._number: dict[Node, int] = {}
 
-    def one(self, node: Node) -> Node:
+    def canonical(self, node: Node) -> Node:
         """The node that stands for all that are built like this one."""
         for part in values.parts_first(node):
             if part not in self._of:
@@ -148,8 +148,10 @@ class Meaning:
         """The condition; where it is undefined is added to `bad`."""
         run = self._run()
         value = run.evaluate(expr)
-        self.bad += [self.shared.one(values.negation(_paid(obligation))) for obligation in run.obligations]
-        return self.shared.one(value)
+        self.bad += [
+            self.shared.canonical(values.negation(_paid(obligation))) for obligation in run.obligations
+        ]
+        return self.shared.canonical(value)
 
     def lines(self, table: Table) -> list[Node]:
         """Return where each line matches, looking at no other; each test is asked once."""
@@ -183,7 +185,7 @@ class Meaning:
         return self._made(run)
 
     def _made(self, run: _Followed) -> Effect:
-        canonical = self.shared.one
+        canonical = self.shared.canonical
         calls = tuple(
             ExternCall(
                 call.spelled,
@@ -217,7 +219,7 @@ def goes_wrong_otherwise(left: Effect, right: Effect, shared: Shared) -> Node:
     if first is second:
         return FALSE
     both = values.all_of(node for node in left.owed if node in right.owed)
-    return shared.one(values.both(both, values.negation(values.equal(first, second))))
+    return shared.canonical(values.both(both, values.negation(values.equal(first, second))))
 
 
 def same_calls(left: Effect, right: Effect, leaves: Collection[str], shared: Shared) -> Node:

@@ -31,7 +31,7 @@ MOST_NODES = 1_500
 Point = dict[str, Value]
 
 
-def found(conditions: Sequence[Node], variables: Sequence[Node]) -> Point | None:
+def witness(conditions: Sequence[Node], variables: Sequence[Node]) -> Point | None:
     """A point at which all conditions hold, made small variable by variable; None where no trial succeeds."""
     order = list(parts_first(*conditions))
     if len(order) > MOST_NODES:

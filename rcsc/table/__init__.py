@@ -18,7 +18,7 @@ disjoint in pairs, and their sizes add up to the size of the input space. Here 4
 ...   | wide | > 40     || false |
 ... }''')
 >>> verdict = prove_table(program, program.tables[0], Options())
->>> (verdict.found, verdict.backing.method, verdict.backing.confirmed_by_z3)
+>>> (verdict.findings, verdict.backing.method, verdict.backing.confirmed_by_z3)
 ((), 'boxes', True)
 
 Tests across variables, and assumptions, take a tree of regions (`regions`), and Z3 for what is not linear. Trusted,

@@ -14,7 +14,7 @@ from rcsc.solvers.options import Options
 from rcsc.solvers.smt import Answer, Solver, Term
 from rcsc.symbolic.encode import declared, encode, least_witness
 from rcsc.table.certificate import must_cover
-from rcsc.table.verdict import Found, Gap, Overlap, Undecided
+from rcsc.table.verdict import Gap, Overlap, TableFinding, Undecided
 
 
 def shown(program: Program, table: Table) -> list[Variable]:
@@ -90,7 +90,9 @@ def worth_asking(table: Table, options: Options) -> bool:
     return options.solver == "auto" and cells * len(table.lines) <= _COSTLY
 
 
-def confirm(program: Program, table: Table, findings: tuple[Found, ...], options: Options) -> Agreement:
+def confirm(
+    program: Program, table: Table, findings: tuple[TableFinding, ...], options: Options
+) -> Agreement:
     """Z3's own answer to whether two lines meet and whether there is a gap, against what was found."""
     if not worth_asking(table, options) or any(isinstance(finding, Undecided) for finding in findings):
         return Agreement.NOT_ASKED

@@ -10,7 +10,7 @@ from rcsc.solvers.options import Options
 from rcsc.table import boxes
 from rcsc.table.certificate import box_certificate, must_cover
 from rcsc.table.regions import partition
-from rcsc.table.verdict import DeadLine, Found, Gap, Overlap, SolversDisagree, TableVerdict, Undecided
+from rcsc.table.verdict import DeadLine, Gap, Overlap, SolversDisagree, TableFinding, TableVerdict, Undecided
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -34,7 +34,7 @@ def prove_table(program: Program, table: Table, options: Options) -> TableVerdic
         from rcsc.table.relational import decide
 
         decided = decide(program, table, options)
-        method, findings, certificate, used = "tree", decided.found, decided.certificate, decided.used
+        method, findings, certificate, used = "tree", decided.findings, decided.certificate, decided.used
     confirmed = False
     if options.solver != "boxes":
         confirmed, findings = _confirmed(program, table, findings, options)
@@ -43,10 +43,10 @@ def prove_table(program: Program, table: Table, options: Options) -> TableVerdic
     return TableVerdict(table, findings, backing, certificate, time.perf_counter() - begun)
 
 
-def _by_boxes(program: Program, table: Table) -> tuple[Found, ...]:
+def _by_boxes(program: Program, table: Table) -> tuple[TableFinding, ...]:
     decided = boxes.TableBoxes.of(program, table)
     pairs = list(islice(decided.overlaps(), partition.MOST_PAIRS))
-    findings: list[Found] = [DeadLine(at) for at in decided.dead()]
+    findings: list[TableFinding] = [DeadLine(at) for at in decided.dead()]
     findings.extend(decided.both(first, second) for first, second in pairs)
     try:
         gap = decided.gap(disjoint=not pairs)
@@ -63,14 +63,14 @@ def _narrows(program: Program, table: Table) -> bool:
     return any(not set(read_by(assumption.condition)).isdisjoint(table.variables) for assumption in assumed)
 
 
-def _wrong(table: Table, findings: tuple[Found, ...]) -> bool:
+def _wrong(table: Table, findings: tuple[TableFinding, ...]) -> bool:
     """Whether there is more than inputs that fall to a DEFAULT line."""
     return any(not isinstance(finding, Gap) or must_cover(table) for finding in findings)
 
 
 def _confirmed(
-    program: Program, table: Table, findings: tuple[Found, ...], options: Options
-) -> tuple[bool, tuple[Found, ...]]:
+    program: Program, table: Table, findings: tuple[TableFinding, ...], options: Options
+) -> tuple[bool, tuple[TableFinding, ...]]:
     """Whether Z3 agrees; what it finds wrong with the verdict is added."""
     from rcsc.table.confirm import Agreement, confirm, worth_asking
 

@@ -30,7 +30,7 @@ MOST_PAIRS = 20
 def diagnostics(program: Program, verdict: TableVerdict, unproved: Collection[str] = ()) -> list[Diagnostic]:
     """The verdict's findings, ready to show; `unproved` are invariants and assumptions that should be proved and are not."""
     table = verdict.table
-    overlaps = [overlap for overlap in verdict.found if isinstance(overlap, Overlap)]
+    overlaps = [overlap for overlap in verdict.findings if isinstance(overlap, Overlap)]
     shown = [_overlap(program, table, overlap) for overlap in overlaps[:MOST_PAIRS]]
     if len(overlaps) > MOST_PAIRS:
         least = "at least " if len(overlaps) == partition.MOST_PAIRS else ""
@@ -43,7 +43,7 @@ def diagnostics(program: Program, verdict: TableVerdict, unproved: Collection[st
 
 def _others(program: Program, verdict: TableVerdict, unproved: Collection[str]) -> Iterator[Diagnostic]:
     table = verdict.table
-    for finding in verdict.found:
+    for finding in verdict.findings:
         match finding:
             case Gap():
                 yield _gap(program, table, finding)
@@ -63,7 +63,7 @@ def _others(program: Program, verdict: TableVerdict, unproved: Collection[str]) 
                 pass
     if table.default is None or table.default.unreachable or verdict.undecided:
         return
-    if not any(isinstance(finding, Gap | ContradictoryAssumptions) for finding in verdict.found):
+    if not any(isinstance(finding, Gap | ContradictoryAssumptions) for finding in verdict.findings):
         message = f"the DEFAULT line of table `{table.name}` is never reached"
         helps = ("declare it: `DEFAULT unreachable`; that is then proved",)
         label = Label(table.default.span)

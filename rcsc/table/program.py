@@ -28,7 +28,7 @@ from rcsc.solvers.smt import Answer
 from rcsc.table.certificate import program_certificate, with_witness
 from rcsc.table.decide import prove_table
 from rcsc.table.diagnose import diagnostics
-from rcsc.table.verdict import ContradictoryAssumptions, Found, TableVerdict, Undecided
+from rcsc.table.verdict import ContradictoryAssumptions, TableFinding, TableVerdict, Undecided
 
 TOO_MANY_STEPS = f"the questions about it take, together, more than {smt.TOGETHER} times the steps of one"
 
@@ -137,15 +137,15 @@ def _verdict(program: Program, table: Table, options: Options) -> TableVerdict:
     with smt.together(options.together) as budget:
         verdict = _uncut_verdict(program, table, options)
     if budget.spent and verdict.undecided:
-        verdict = replace(verdict, found=(*_decided(verdict), Undecided(TOO_MANY_STEPS)), certificate=None)
+        verdict = replace(verdict, findings=(*_decided(verdict), Undecided(TOO_MANY_STEPS)), certificate=None)
     if smt.cut_short() > before:
         left = Undecided("a question to the solver took more processor time than it may")
-        verdict = replace(verdict, found=(*verdict.found, left), certificate=None)
+        verdict = replace(verdict, findings=(*verdict.findings, left), certificate=None)
     return verdict
 
 
-def _decided(verdict: TableVerdict) -> tuple[Found, ...]:
-    return tuple(finding for finding in verdict.found if not isinstance(finding, Undecided))
+def _decided(verdict: TableVerdict) -> tuple[TableFinding, ...]:
+    return tuple(finding for finding in verdict.findings if not isinstance(finding, Undecided))
 
 
 def _uncut_verdict(program: Program, table: Table, options: Options) -> TableVerdict:
@@ -153,7 +153,7 @@ def _uncut_verdict(program: Program, table: Table, options: Options) -> TableVer
     try:
         verdict = prove_table(program, table, options)
         if not table.assumptions or any(
-            isinstance(finding, ContradictoryAssumptions) for finding in verdict.found
+            isinstance(finding, ContradictoryAssumptions) for finding in verdict.findings
         ):
             return verdict
         possible = assumptions_satisfiable(program, table, options)
@@ -165,7 +165,7 @@ def _uncut_verdict(program: Program, table: Table, options: Options) -> TableVer
             verdict, certificate=certificate and with_witness(certificate, program, table, possible)
         )
     wrong = ContradictoryAssumptions() if possible is Answer.UNSATISFIABLE else Undecided("its assumptions")
-    return replace(verdict, found=(wrong,), certificate=None)
+    return replace(verdict, findings=(wrong,), certificate=None)
 
 
 def _left_open(table: Table, why: Undecided) -> TableVerdict:

@@ -35,7 +35,15 @@ from rcsc.table.regions.atoms import Formula, Universe, assumptions_of, lines_of
 from rcsc.table.regions.least import find, inside, least, negated, whole, widest
 from rcsc.table.regions.region import Bounds, NoWitness, Point, Question, Rests, Search
 from rcsc.table.regions.splitting import Tree
-from rcsc.table.verdict import ContradictoryAssumptions, DeadLine, Found, Gap, Overlap, Region, Undecided
+from rcsc.table.verdict import (
+    ContradictoryAssumptions,
+    DeadLine,
+    Gap,
+    Overlap,
+    Region,
+    TableFinding,
+    Undecided,
+)
 
 _MOST_CANDIDATES = 64
 """Lines in one question to the solver: it states every pair of them."""
@@ -57,7 +65,7 @@ _MOST_REPROVED = 2_000
 class Decided:
     """What was found, the certificate of a table in order, and the assumptions that were needed."""
 
-    found: tuple[Found, ...]
+    findings: tuple[TableFinding, ...]
     certificate: Mapping[str, object] | None
     used: tuple[AssumptionName, ...]
 
@@ -68,8 +76,8 @@ def decide(program: Program, table: Table, options: Options) -> Decided:
 
 
 def under_assumptions(
-    program: Program, table: Table, options: Options, settled: tuple[Found, ...]
-) -> tuple[Found, ...]:
+    program: Program, table: Table, options: Options, settled: tuple[TableFinding, ...]
+) -> tuple[TableFinding, ...]:
     """What is found under the assumptions of a table that is right without them: dead lines, and what falls to DEFAULT.
 
     Args:
@@ -151,7 +159,7 @@ class _Decision:
         )
         return Decided(findings, certificate, names if search.proved else self.table.assumptions)
 
-    def under_assumptions(self, settled: tuple[Found, ...]) -> tuple[Found, ...]:
+    def under_assumptions(self, settled: tuple[TableFinding, ...]) -> tuple[TableFinding, ...]:
         """Dead lines, and a gap that DEFAULT takes, under the assumptions."""
         wrong = self.contradiction()
         if wrong:
@@ -159,7 +167,7 @@ class _Decision:
         gaps = [finding for gap in settled if isinstance(gap, Gap) for finding in self.narrowed_gap(gap)]
         return (*self.dead(), *gaps)
 
-    def contradiction(self) -> tuple[Found, ...]:
+    def contradiction(self) -> tuple[TableFinding, ...]:
         """That the assumptions cannot hold together, or that nobody could tell."""
         if not self.table.assumptions:
             return ()
@@ -170,7 +178,7 @@ class _Decision:
             ContradictoryAssumptions() if possible is Answer.UNSATISFIABLE else Undecided("the assumptions"),
         )
 
-    def narrowed_gap(self, gap: Gap) -> list[Found]:
+    def narrowed_gap(self, gap: Gap) -> list[TableFinding]:
         """The gap under the assumptions: one of its witnesses that they allow, else whatever the solver finds."""
         singles = self.universe.single
         columns = {str(v.name): (v, column) for v, column in zip(self.variables, self.columns, strict=True)}
@@ -240,12 +248,12 @@ class _Decision:
             return self.asked.holds(*terms)
         return Answer.UNSATISFIABLE if isinstance(point, NoWitness) else Answer.SATISFIABLE
 
-    def overlaps(self, search: Search) -> list[Found]:
+    def overlaps(self, search: Search) -> list[TableFinding]:
         """Every overlapping pair with its least witness."""
         pairs = set(search.overlaps)
         for seen in search.witnesses:
             pairs.update(combinations(self.matching(seen), 2))
-        findings: list[Found] = []
+        findings: list[TableFinding] = []
         for first, second in sorted(pairs):
             grown = len(findings) < _MOST_GROWN
             findings.append(self.overlap(first, second, grown=grown))
@@ -256,7 +264,7 @@ class _Decision:
         names = set(matching_lines(self.table, snapshot))
         return [at for at, line in enumerate(self.table.lines) if line.name in names]
 
-    def overlap(self, first: int, second: int, *, grown: bool) -> Found:
+    def overlap(self, first: int, second: int, *, grown: bool) -> TableFinding:
         """A pair of lines that overlaps, at its least input."""
         both = [self.lines[first], self.lines[second]]
         point = least(self.universe, [*both, *self.assumed], self.columns)
@@ -269,7 +277,7 @@ class _Decision:
         region = self.around(point, [[outside]]) if grown else None
         return Overlap(first, second, self.snapshot(point), region)
 
-    def gap(self, search: Search) -> list[Found]:
+    def gap(self, search: Search) -> list[TableFinding]:
         """The least input that no line matches, if there is one; also where DEFAULT takes it."""
         seen = [snapshot for snapshot in search.witnesses if not self.matching(snapshot)]
         if must_cover(self.table) and not search.gaps and not seen:
@@ -292,12 +300,12 @@ class _Decision:
         witness = self.witness(seen, lambda z3: (z3.none(),))
         return [Undecided("what no line matches")] if witness is None else [Gap((witness,), (None,))]
 
-    def dead(self) -> list[Found]:
+    def dead(self) -> list[TableFinding]:
         """Lines that no input matches, those that only an assumption excludes told apart from those that ranges and invariants do."""
         standing = {assumption.name: assumption.standing for assumption in self.program.assumptions}
         names = zip(self.table.assumptions, self.assumed, strict=True)
         sure = [formula for name, formula in names if standing[name] is Standing.PROVED]
-        findings: list[Found] = []
+        findings: list[TableFinding] = []
         for at, line in enumerate(self.lines):
             point = find(self.universe, [line, *self.assumed])
             if isinstance(point, NoWitness):

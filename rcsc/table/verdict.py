@@ -72,7 +72,7 @@ class SolversDisagree:
     what: str
 
 
-Found: TypeAlias = Overlap | Gap | DeadLine | ContradictoryAssumptions | Undecided | SolversDisagree
+TableFinding: TypeAlias = Overlap | Gap | DeadLine | ContradictoryAssumptions | Undecided | SolversDisagree
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,14 +80,14 @@ class TableVerdict:
     """The verdict on one table.
 
     Attributes:
-        found: What is wrong; a gap too where a DEFAULT line takes it (the report tells them apart).
+        findings: What is wrong; a gap too where a DEFAULT line takes it (the report tells them apart).
         backing: What it rests on.
         certificate: For `rcsc certify`; None where there is nothing to certify.
         seconds: How long it took.
     """
 
     table: Table
-    found: tuple[Found, ...]
+    findings: tuple[TableFinding, ...]
     backing: Backing
     certificate: Mapping[str, object] | None
     seconds: float
@@ -95,4 +95,4 @@ class TableVerdict:
     @property
     def undecided(self) -> bool:
         """Whether something was left open."""
-        return any(isinstance(finding, Undecided) for finding in self.found)
+        return any(isinstance(finding, Undecided) for finding in self.findings)

@@ -46,8 +46,8 @@ def ours(family: str, lines: int, variables: int, fault: Fault, solver: str) -> 
     begun = time.perf_counter()
     verdict = prove_table(program, table, options)
     proved = time.perf_counter() - begun
-    wrong = bool(verdict.found)
-    assert wrong == (fault != "ok"), (family, lines, variables, fault, verdict.found[:2])
+    wrong = bool(verdict.findings)
+    assert wrong == (fault != "ok"), (family, lines, variables, fault, verdict.findings[:2])
     checked = "-"
     if verdict.certificate is not None:
         certificate = program_certificate(program, [verdict.certificate])

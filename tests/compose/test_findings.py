@@ -667,7 +667,7 @@ def test_the_weakest_condition_holds_of_just_the_inputs_that_one_line_matches(tm
     ]
     assert all(held)
     assert len(held) == 2 * 2 * 2 * 3 * 3
-    assert not prove_table(changed, table, Options()).found
+    assert not prove_table(changed, table, Options()).findings
 
 
 def test_a_condition_that_would_be_long_is_not_shown() -> None:

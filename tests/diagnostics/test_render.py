@@ -225,7 +225,7 @@ def test_a_diagnostic_comes_back_as_it_was_kept() -> None:
 def test_sarif_is_valid_against_the_standards_schema() -> None:
     official = schema("data/sarif-schema-2.1.0.json")
     nowhere = Diagnostic(Code.NO_TABLES, "nothing here", Label(Span("", 0, 0)))
-    form = json.loads(json.dumps(sarif(replace(REPORT, found=(*REPORT.found, nowhere)))))
+    form = json.loads(json.dumps(sarif(replace(REPORT, diagnostics=(*REPORT.diagnostics, nowhere)))))
     validator = jsonschema.validators.validator_for(official)(official)
     assert [error.message for error in validator.iter_errors(form)] == []
     [run] = form["runs"]

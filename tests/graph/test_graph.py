@@ -778,7 +778,9 @@ def test_graph_and_table_are_each_other_s_way_back(form: str, tmp_path: Path) ->
     assert (status, "assume acquire_states monitored" in whole) == (0, True)
     place = tmp_path / "new.rcs"
     place.write_text(whole, encoding="utf-8")
-    assert load([str(place)]).found[0].code is Code.FILE_NOT_FOUND  # only `task/common` is not beside it
+    assert (
+        load([str(place)]).diagnostics[0].code is Code.FILE_NOT_FOUND
+    )  # only `task/common` is not beside it
 
 
 def test_a_folder_of_tables_is_drawn_into_a_folder(tmp_path: Path) -> None:

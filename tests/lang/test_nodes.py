@@ -202,14 +202,14 @@ def test_a_comparison_with_what_may_be_no_number_tells_nothing_where_it_fails() 
 
 def test_a_point_that_is_found_is_as_low_as_each_variable_goes() -> None:
     high = values.compare(Op.GE, values.arithmetic(Op.ADD, (N, M), Int(-9, 20)), whole(11))
-    found = trial.found([high, values.compare(Op.GT, X, double(0.0))], [N, M, X])
+    found = trial.witness([high, values.compare(Op.GT, X, double(0.0))], [N, M, X])
     assert found == {"n": 6, "m": 5, "x": 5e-324}
-    assert trial.found([values.compare(Op.LT, N, whole(-2)), values.both(B, C)], [N, B, C]) == {
+    assert trial.witness([values.compare(Op.LT, N, whole(-2)), values.both(B, C)], [N, B, C]) == {
         "n": -3,
         "b": True,
         "c": True,
     }
-    assert trial.found([values.both(LOW, HIGH)], [N]) is None
+    assert trial.witness([values.both(LOW, HIGH)], [N]) is None
 
 
 def test_the_points_that_are_tried_are_always_the_same() -> None:
@@ -225,7 +225,7 @@ def test_the_points_that_are_tried_are_always_the_same() -> None:
 def test_a_point_is_found_where_a_choice_hangs_on_it() -> None:
     chosen = values.choice(values.compare(Op.GE, M, whole(3)), N, whole(20))
     conditions = [values.compare(Op.LE, chosen, whole(4)), values.compare(Op.GT, N, whole(-2))]
-    assert trial.found(conditions, [N, M]) == {"n": -1, "m": 3}
+    assert trial.witness(conditions, [N, M]) == {"n": -1, "m": 3}
 
 
 def test_a_question_as_large_as_may_be_is_tried_and_a_larger_one_is_not(
@@ -234,9 +234,9 @@ def test_a_question_as_large_as_may_be_is_tried_and_a_larger_one_is_not(
     conditions = [values.compare(Op.GE, N, whole(2))]
     size = len(list(values.parts_first(*conditions)))
     monkeypatch.setattr(trial, "MOST_NODES", size)
-    assert trial.found(conditions, [N]) == {"n": 2}
+    assert trial.witness(conditions, [N]) == {"n": 2}
     monkeypatch.setattr(trial, "MOST_NODES", size - 1)
-    assert trial.found(conditions, [N]) is None
+    assert trial.witness(conditions, [N]) is None
 
 
 @pytest.mark.parametrize(("many", "asked"), [(3, 7), (6, 63), (7, MOST_CHOICES + 7), (9, MOST_CHOICES + 9)])

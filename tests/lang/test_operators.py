@@ -609,7 +609,7 @@ def test_where_no_line_matches_what_is_no_number_an_input_is_tried(kind: str) ->
         "input n : int 0 .. 3\ninput x : real -10.0 .. 10.0\ninput y : real -10.0 .. 10.0\nassume low monitored : x <= y + 20.0\n"
         f"table t assuming low {{\n| line | when ||\n| a | {first} ||\n| b | {second} ||\n}}\n"
     )
-    found = prove_table(program, program.tables[0], Options(steps=20_000)).found
+    found = prove_table(program, program.tables[0], Options(steps=20_000)).findings
     [witness] = [
         wrong.witnesses[0] if isinstance(wrong, Gap) else wrong.witness
         for wrong in found

@@ -24,7 +24,9 @@ def _here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def codes(*paths: str, stdin: str | bytes | None = None) -> list[tuple[str, str]]:
-    return [(finding.primary.span.file, finding.code.value) for finding in load(paths, stdin=stdin).found]
+    return [
+        (finding.primary.span.file, finding.code.value) for finding in load(paths, stdin=stdin).diagnostics
+    ]
 
 
 # --- uses ---
@@ -34,28 +36,28 @@ def test_a_used_file_is_looked_for_beside_the_file_then_at_the_root(tmp_path: Pa
     write(tmp_path, types="type n = bool", sub__a="use types\nuse near", sub__near="")
     (tmp_path / "rcsc.toml").write_text("")
     loaded = load(["sub/a.rcs"])
-    assert loaded.found == ()
+    assert loaded.diagnostics == ()
     assert loaded.uses["sub/a.rcs"] == ("types.rcs", "sub/near.rcs")
 
 
 def test_a_lone_file_has_its_own_folder_for_root(tmp_path: Path) -> None:
     write(tmp_path, types="", sub__a="use types")
     assert codes("sub/a.rcs") == [("sub/a.rcs", "RCS205")]
-    (finding,) = load(["sub/a.rcs"]).found
+    (finding,) = load(["sub/a.rcs"]).diagnostics
     assert finding.help == ("looked for `sub/types.rcs`",)
 
 
 def test_both_places_that_were_tried_are_named(tmp_path: Path) -> None:
     write(tmp_path, sub__a="use types")
     (tmp_path / "rcsc.toml").write_text("")
-    (finding,) = load(["sub/a.rcs"]).found
+    (finding,) = load(["sub/a.rcs"]).diagnostics
     assert finding.help == ("looked for `sub/types.rcs` and `types.rcs`",)
     assert (finding.primary.span.start, finding.primary.span.end) == (0, 9)
 
 
 def test_a_circle_of_files_is_told_with_its_path_where_it_closes(tmp_path: Path) -> None:
     write(tmp_path, a="use b", b="use c", c="use b")
-    (finding,) = load(["a.rcs"]).found
+    (finding,) = load(["a.rcs"]).diagnostics
     assert (finding.code.value, finding.primary.span.file) == ("RCS204", "c.rcs")
     assert "b.rcs -> c.rcs -> b.rcs" in finding.message
 
@@ -68,14 +70,14 @@ def test_a_file_that_uses_itself(tmp_path: Path) -> None:
 def test_a_file_reached_twice_is_read_once_and_is_no_circle(tmp_path: Path) -> None:
     write(tmp_path, a="use b\nuse c", b="use d", c="use d", d="type n = bool")
     loaded = load(["a.rcs"])
-    assert loaded.found == ()
+    assert loaded.diagnostics == ()
     assert isinstance(resolve("a.rcs", loaded), Program)
 
 
 def test_a_long_chain_of_files(tmp_path: Path) -> None:
     write(tmp_path, **{f"f{n}": f"use f{n + 1}" for n in range(1500)}, f1500="type n = bool")
     loaded = load(["f0.rcs"])
-    assert loaded.found == ()
+    assert loaded.diagnostics == ()
     assert len(loaded.files) == 1501
     assert isinstance(resolve("f0.rcs", loaded), Program)
 
@@ -91,7 +93,7 @@ def test_a_link_to_a_file_is_that_file(tmp_path: Path) -> None:
 def test_an_error_in_a_used_file_is_an_error_of_every_user(tmp_path: Path) -> None:
     write(tmp_path, a="use bad", b="use bad", bad="type =", good="type n = bool")
     loaded = load(["."])
-    assert [finding.primary.span.file for finding in loaded.found] == ["bad.rcs"]
+    assert [finding.primary.span.file for finding in loaded.diagnostics] == ["bad.rcs"]
     assert not isinstance(resolve("a.rcs", loaded), Program)
     assert not isinstance(resolve("b.rcs", loaded), Program)
     assert isinstance(resolve("good.rcs", loaded), Program)
@@ -143,7 +145,7 @@ def test_every_user_of_an_unreadable_file_is_told(tmp_path: Path) -> None:
     write(tmp_path, a="use dir", b="use dir")
     (tmp_path / "dir.rcs").mkdir()
     loaded = load(["a.rcs", "b.rcs"])
-    assert [(d.primary.span.file, d.code.value) for d in loaded.found] == [
+    assert [(d.primary.span.file, d.code.value) for d in loaded.diagnostics] == [
         ("a.rcs", "RCS107"),
         ("b.rcs", "RCS107"),
     ]
@@ -172,7 +174,7 @@ def test_links_between_folders_are_followed_once(tmp_path: Path) -> None:
 
 def test_bytes_that_are_not_utf8(tmp_path: Path) -> None:
     (tmp_path / "a.rcs").write_bytes(b"type n\xff = bool")
-    (finding,) = load(["a.rcs"]).found
+    (finding,) = load(["a.rcs"]).diagnostics
     assert (finding.code.value, finding.message) == ("RCS105", "`a.rcs` is not UTF-8 at byte 6")
     assert codes("-", stdin=b"\xfe") == [("-", "RCS105")]
 
@@ -182,7 +184,7 @@ def test_a_byte_order_mark_and_crlf_are_tolerated(tmp_path: Path) -> None:
         b"\xef\xbb\xbfinput a : bool\r\ntable t {\r\n| line | a ||\r\n| x | true ||\r\n}\r\n"
     )
     loaded = load(["a.rcs"])
-    assert loaded.found == ()
+    assert loaded.diagnostics == ()
     assert isinstance(resolve("a.rcs", loaded), Program)
 
 
@@ -233,7 +235,7 @@ def test_a_project_file_that_is_not_right(tmp_path: Path, text: str, start: int)
     write(tmp_path, sub__a="use b", sub__b="")
     (tmp_path / "rcsc.toml").write_text(text)
     for path in ("sub/a.rcs", "sub", "."):
-        (finding,) = load([path]).found
+        (finding,) = load([path]).diagnostics
         assert finding.code.value == "RCS110"
         assert finding.primary.span.file.endswith("rcsc.toml")
         assert text.startswith("a") or finding.primary.span.start == start
@@ -254,7 +256,7 @@ def test_the_root_of_a_linked_folder_is_where_the_folder_is(tmp_path: Path) -> N
     (tmp_path / "one" / "rcsc.toml").write_text("")
     (tmp_path / "two").mkdir()
     (tmp_path / "two" / "link").symlink_to("../one/sub")
-    assert load(["two/link/a.rcs"]).found == ()
+    assert load(["two/link/a.rcs"]).diagnostics == ()
 
 
 def test_stdin_is_a_file_of_the_working_folder(tmp_path: Path) -> None:

@@ -120,7 +120,7 @@ def test_findings_are_those_of_brute_force(text: str) -> None:
     program = program_of(text)
     table, right = program.tables[0], matched(program)
     assert boxes.applies(table)
-    found = prove_table(program, table, Options()).found
+    found = prove_table(program, table, Options()).findings
     overlaps_are_right(program, right, {(f.first, f.second): f for f in found if isinstance(f, Overlap)})
     gaps_are_right(program, right, [f for f in found if isinstance(f, Gap)])
     dead = {f.line for f in found if isinstance(f, DeadLine)}
@@ -155,7 +155,7 @@ def test_a_search_for_gaps_is_undecided_past_its_budget_where_it_may_look_in_vai
 ) -> None:
     program = program_of(families.box(40, 9, 1, "gap", widened))
     monkeypatch.setattr(partition, "BUDGET", 30)
-    found = prove_table(program, program.tables[0], BOXES).found
+    found = prove_table(program, program.tables[0], BOXES).findings
     assert any(isinstance(wrong, Gap) for wrong in found) is exact
     assert any(isinstance(wrong, Undecided) for wrong in found) is not exact
 
@@ -164,7 +164,7 @@ def test_a_report_of_very_many_overlaps_ends() -> None:
     rows = [[f"l{at}", "", "", ""] for at in range(300)]
     program = program_of(written(rows))
     found = prove_table(program, program.tables[0], BOXES)
-    assert len(found.found) == partition.MOST_PAIRS
+    assert len(found.findings) == partition.MOST_PAIRS
     assert "at least" in diagnostics(program, found)[-1].message
 
 
@@ -183,7 +183,7 @@ def maximal(program: Program, region: Region, bare: set[Point]) -> None:
 def test_a_repair_that_is_shown_repairs(text: str) -> None:
     program = program_of(text)
     table, right = program.tables[0], matched(program)
-    for found in prove_table(program, table, Options()).found:
+    for found in prove_table(program, table, Options()).findings:
         if isinstance(found, Overlap) and (help_ := parting_cell(program, table, found)):
             said = re.fullmatch(r"in line `(l\d)` write `(.*)` under `(.)`: proved .*", help_)
             assert said is not None, help_
@@ -274,7 +274,7 @@ def test_z3_disagrees_with_every_verdict_that_is_of_another_kind(
     asked: str, claimed: str, solver: Literal["auto", "both"]
 ) -> None:
     other, program = ANSWERED[claimed], ANSWERED[asked]
-    found = prove_table(other, other.tables[0], BOXES).found
+    found = prove_table(other, other.tables[0], BOXES).findings
     agreed = confirm(program, program.tables[0], found, Options(solver=solver))
     assert agreed is (Agreement.AGREES if asked == claimed else Agreement.DISAGREES)
 
@@ -284,7 +284,7 @@ def test_a_verdict_that_z3_disagrees_with_is_told_as_a_fault_of_rcsc(
     monkeypatch: pytest.MonkeyPatch, asked: str, claimed: str
 ) -> None:
     other, program = ANSWERED[claimed], ANSWERED[asked]
-    claim = prove_table(other, other.tables[0], BOXES).found
+    claim = prove_table(other, other.tables[0], BOXES).findings
     monkeypatch.setattr("rcsc.table.decide._by_boxes", lambda *_: claim)
     monkeypatch.setattr("rcsc.table.decide.box_certificate", lambda *_: {})
     verdict = prove_program(program, Options())
@@ -329,10 +329,10 @@ def test_a_table_is_not_decided_under_what_cannot_hold(column: str, claim: str, 
     program = program_of(HEAD + text)
     options = BOXES
     [whole] = prove_program(program, options).tables
-    assert any(isinstance(wrong, ContradictoryAssumptions) for wrong in whole.found) is not possible
-    assert not any(isinstance(wrong, Gap | Overlap | Undecided) for wrong in whole.found)
+    assert any(isinstance(wrong, ContradictoryAssumptions) for wrong in whole.findings) is not possible
+    assert not any(isinstance(wrong, Gap | Overlap | Undecided) for wrong in whole.findings)
     if "n" in re.findall(r"\w+", claim):  # what the table reads: found where it is decided
-        alone = prove_table(program, program.tables[0], options).found
+        alone = prove_table(program, program.tables[0], options).findings
         assert any(isinstance(wrong, ContradictoryAssumptions) for wrong in alone) is not possible
 
 
@@ -361,5 +361,5 @@ def test_a_gap_is_found_where_overlaps_are_not_counted(monkeypatch: pytest.Monke
     lines = "".join(f"| l{at} | {row} ||\n" for at, row in enumerate(rows))
     program = program_of(f"input a : bool\ninput b : int 0 .. 3\ntable t {{\n| line | a | b ||\n{lines}}}\n")
     [found] = prove_program(program, Options(solver="boxes")).tables
-    [gap] = [one for one in found.found if isinstance(one, Gap)]
+    [gap] = [one for one in found.findings if isinstance(one, Gap)]
     assert gap.witnesses == ({"a": True, "b": 3},)

@@ -445,7 +445,7 @@ def test_processes_give_the_same_verdicts() -> None:
     one = verdict_of(text)
     two = verdict_of(text, replace(BOXES, jobs=2))
     assert one.findings == two.findings
-    assert [v.found for v in one.tables] == [v.found for v in two.tables]
+    assert [v.findings for v in one.tables] == [v.findings for v in two.tables]
     assert codes(one.findings) == ["RCS401", "RCS402"]
 
 

@@ -215,7 +215,7 @@ def verdict(more: str, assume: str) -> TableVerdict:
 )
 def test_what_is_undecided_is_told_word_for_word(more: str, assume: str, words: list[str]) -> None:
     found = verdict(more, assume)
-    assert [undecided.what for undecided in found.found if isinstance(undecided, Undecided)] == words
+    assert [undecided.what for undecided in found.findings if isinstance(undecided, Undecided)] == words
 
 
 def test_assumptions_that_nobody_could_tell_of_are_told_word_for_word() -> None:
@@ -223,13 +223,15 @@ def test_assumptions_that_nobody_could_tell_of_are_told_word_for_word() -> None:
         more="", assume="assume it assumed : a * b > 7 and a * b < 11\n", assuming="assuming it"
     )
     program = program_of(text)
-    assert prove_table(program, program.tables[0], Options(steps=1)).found == (Undecided("the assumptions"),)
+    assert prove_table(program, program.tables[0], Options(steps=1)).findings == (
+        Undecided("the assumptions"),
+    )
 
 
 def test_what_z3_does_not_confirm_is_told_word_for_word() -> None:
     text = "input a : bool\ntable t {\n| line | a ||\n| x | true ||\n| y | false ||\n}\n"
     [found] = prove_program(program_of(text), Options(solver="both", steps=1)).tables
-    assert found.found == (Undecided("Z3 gave no answer within its limits"),)
+    assert found.findings == (Undecided("Z3 gave no answer within its limits"),)
     assert not found.backing.confirmed_by_z3
 
 
@@ -237,7 +239,7 @@ def test_boxes_alone_are_asked_where_it_is_wanted() -> None:
     text = "input a : bool\ntable t {\n| line | a ||\n| x | true ||\n| y | false ||\n}\n"
     program = program_of(text)
     found = prove_table(program, program.tables[0], Options(solver="boxes"))
-    assert (found.found, found.backing) == ((), Backing("boxes", confirmed_by_z3=False))
+    assert (found.findings, found.backing) == ((), Backing("boxes", confirmed_by_z3=False))
 
 
 def test_z3_sees_two_lines_meet_wherever_they_stand() -> None:
@@ -247,14 +249,14 @@ def test_z3_sees_two_lines_meet_wherever_they_stand() -> None:
     table, options = program.tables[0], Options(solver="both")
     assert confirm(program, table, (), options) is Agreement.DISAGREES
     found = prove_table(program, table, options)
-    assert [type(one) for one in found.found] == [Overlap]
+    assert [type(one) for one in found.findings] == [Overlap]
     assert found.backing.confirmed_by_z3
 
 
 def test_a_table_with_a_condition_that_is_not_defined_is_left_open_at_no_cost() -> None:
     text = "input a : int 0 .. 9\ntable t {\n| line | 9 / a ||\n| x | > 2 ||\n| y | <= 2 ||\n}\n"
     [found] = prove_program(program_of(text), Options()).tables
-    assert found.found == (Undecided("a condition is not defined for every input"),)
+    assert found.findings == (Undecided("a condition is not defined for every input"),)
     assert (found.backing.method, found.backing.confirmed_by_z3, found.seconds) == ("none", False, 0.0)
 
 
@@ -263,7 +265,7 @@ def test_what_the_clock_cut_short_is_told_word_for_word(monkeypatch: pytest.Monk
     monkeypatch.setattr(smt, "cut_short", lambda: next(ended))
     text = "input a : bool\ntable t {\n| line | a ||\n| x | true ||\n| y | false ||\n}\n"
     [found] = prove_program(program_of(text), Options()).tables
-    assert found.found == (Undecided("a question to the solver took more processor time than it may"),)
+    assert found.findings == (Undecided("a question to the solver took more processor time than it may"),)
     assert found.certificate is None
 
 
@@ -273,7 +275,7 @@ def test_the_first_twenty_overlaps_are_told_with_their_regions(many: int) -> Non
     lines = "".join(f"| l{at} | x + y = {at} ||\n| m{at} | x + y = {at} ||\n" for at in range(many))
     text = f"input x : int 0 .. 50\ninput y : int 0 .. 50\ntable t {{\n| line | when ||\n{lines}| d | DEFAULT ||\n}}\n"
     [found] = prove_program(program_of(text), Options(solver="boxes")).tables
-    regions = [overlap.region is not None for overlap in found.found if isinstance(overlap, Overlap)]
+    regions = [overlap.region is not None for overlap in found.findings if isinstance(overlap, Overlap)]
     assert regions == [True] * min(many, 20) + [False] * max(0, many - 20)
 
 
@@ -319,5 +321,5 @@ def test_a_line_that_breaks_an_invariant_where_its_extern_fails_is_told_so() -> 
 def test_z3_finds_the_overlap_of_two_lines_of_which_a_third_is_apart() -> None:
     text = "input a : int 0 .. 9\ntable t {\n| line | a ||\n| x | < 5 ||\n| y | 4 .. 7 ||\n| z | > 7 ||\n}\n"
     [found] = prove_program(program_of(text), Options(solver="both")).tables
-    assert [type(one) for one in found.found] == [Overlap]
+    assert [type(one) for one in found.findings] == [Overlap]
     assert found.backing.confirmed_by_z3

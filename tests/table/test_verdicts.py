@@ -191,7 +191,7 @@ def told(program: Program, options: Options) -> tuple[set[object], list[object],
     [table] = verdict.tables
     names = [line.name for line in table.table.lines]
     found: set[object] = set()
-    for wrong in table.found:
+    for wrong in table.findings:
         match wrong:
             case Overlap(first, second):
                 found.add((names[first], names[second]))
@@ -203,7 +203,7 @@ def told(program: Program, options: Options) -> tuple[set[object], list[object],
                 found.add("contradiction")
             case _:
                 found.add(wrong)
-    gaps: list[object] = [gap.witnesses[0] for gap in table.found if isinstance(gap, Gap)]
+    gaps: list[object] = [gap.witnesses[0] for gap in table.findings if isinstance(gap, Gap)]
     for witness in gaps:
         assert isinstance(witness, dict)
         snapshot = {name: values[0] for name, values in RANGES.items()} | witness
@@ -246,14 +246,14 @@ def test_a_line_that_an_invariant_kills_is_a_mistake(solver: Literal["boxes", "a
 def test_a_gap_between_related_lines_is_told_with_the_region_around_its_least_point() -> None:
     head = "input x : int 0 .. 9\ninput y : int 0 .. 9\n"
     text = head + table("t", "line | when ||", "l | x < y ||", "m | x > y + 1 ||")
-    [gap] = [one for one in verdict_of(text, Options()).tables[0].found if isinstance(one, Gap)]
+    [gap] = [one for one in verdict_of(text, Options()).tables[0].findings if isinstance(one, Gap)]
     assert gap.witnesses == ({"x": 0, "y": 0},)
     assert gap.regions[0] is not None
 
 
 def test_the_zeros_of_both_signs_are_one_value_to_the_solver() -> None:
     text = "input r : real -1.0 .. 1.0\n" + table("t", "line | r * 0.0 ||", "l | = 0.0 ||")
-    assert verdict_of(text, Options()).tables[0].found == ()
+    assert verdict_of(text, Options()).tables[0].findings == ()
 
 
 def test_what_an_unproved_invariant_kills_says_so() -> None:
@@ -283,11 +283,11 @@ def test_what_inputs_show_of_products_of_doubles_is_told_though_z3_gives_up(
         f"table t {assumed}{{\n| line | when ||\n| a | {one} ||\n| b | {two} ||\n}}\n"
     )
     [table] = prove_program(program, Options(solver="boxes", steps=steps)).tables
-    kinds = {type(found) for found in table.found}
+    kinds = {type(found) for found in table.findings}
     assert kinds - {Undecided} <= wrong
     assert wrong & {Overlap, Gap} <= kinds
     assert wrong <= kinds or Undecided in kinds
-    for found in table.found:
+    for found in table.findings:
         if isinstance(found, Overlap | Gap):
             witness = found.witness if isinstance(found, Overlap) else found.witnesses[0]
             assert not assumed or holds(program.assumptions[0].condition, witness)

@@ -145,14 +145,14 @@ def _github(report: Report, _command: str, _output: Output, _closing: str) -> st
 
 
 def _lines(report: Report, _command: str, _output: Output, _closing: str) -> str:
-    return "".join(f"{one_line(diagnostic, report.sources)}\n" for diagnostic in report.found)
+    return "".join(f"{one_line(diagnostic, report.sources)}\n" for diagnostic in report.diagnostics)
 
 
 def _text(report: Report, _command: str, output: Output, closing: str) -> str:
     coloured = wants_color(output.color, output.file)
     columns = os.get_terminal_size(1).columns if output.file is None and _is_terminal(1) else 200
     rows: list[Row] = []
-    for diagnostic in report.found:
+    for diagnostic in report.diagnostics:
         rows += (*full(diagnostic, report.sources, columns), ())
     if not output.quiet:
         rows += summary(report)
@@ -205,7 +205,7 @@ def summary(report: Report) -> Iterator[Row]:
             yield (TextPiece(_of_system(system), Style.NOTE),)
         elif system.missing:
             yield (TextPiece(_missing(system), Style.NOTE),)
-    if report.tables or report.found:
+    if report.tables or report.diagnostics:
         yield tuple(_counts(report))
 
 

@@ -87,6 +87,6 @@ def _prove(made: Tabled, named: str, options: Options) -> None:
 def _placed(made: Tabled, file: str) -> str:
 
     loaded = load([file])
-    if loaded.found:
-        raise WrongError(loaded.found, loaded.sources)
+    if loaded.diagnostics:
+        raise WrongError(loaded.diagnostics, loaded.sources)
     return in_place(loaded.files[loaded.roots[0]], made.table)

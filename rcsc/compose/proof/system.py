@@ -197,7 +197,7 @@ def loaded_program(path: Path, name: str) -> tuple[Program, Loaded]:
         if file.is_file():
             loaded = load([str(file)])
             program = resolve(loaded.roots[0], loaded)
-            if isinstance(program, Program) and not loaded.found:
+            if isinstance(program, Program) and not loaded.diagnostics:
                 return program, loaded
             raise NoProgramError(f"`{file}` is not in order: see `rcsc check {file}`")
     raise NoProgramError(f"there is no program `{name}` beside {path}")

@@ -38,7 +38,7 @@ class Contrast:
     @property
     def node(self) -> Node:
         """Where the effects differ, within the region."""
-        return self.versions.shared.one(values.any_of(self.differ.values()))
+        return self.versions.shared.canonical(values.any_of(self.differ.values()))
 
     def everywhere(self) -> bool:
         """Whether some leaf differs all over the region.
@@ -63,7 +63,7 @@ class Contrast:
         versions, whole = self.versions, self.node
         if self.everywhere():
             return versions.where(wanted, self.region)
-        one = versions.shared.one
+        one = versions.shared.canonical
         inner = one(values.both(self.region, whole))
         if not is_hard(whole):
             most = MOST_BOXES_ACROSS if is_across(whole) else MOST_BOXES
@@ -86,7 +86,7 @@ class Contrast:
 
     def _unequal(self, leaf: str) -> Node:
         pair = [value_after(doing.effect, leaf, self.versions.shared) for doing in self.pair]
-        return self.versions.shared.one(values.negation(self.versions.shared.equal(*pair)))
+        return self.versions.shared.canonical(values.negation(self.versions.shared.equal(*pair)))
 
     # --- what is left otherwise ---
 
@@ -149,7 +149,7 @@ def contrast(versions: Versions, region: Node, pair: tuple[Doing, Doing]) -> Con
     """
     one, two = (doing.effect for doing in pair)
     shared = versions.shared
-    good = shared.one(values.both(one.good, two.good))
+    good = shared.canonical(values.both(one.good, two.good))
     asked = {RUN: goes_wrong_otherwise(one, two, shared)}
     asked[CALLS] = values.both(good, values.negation(same_calls(one, two, versions.leaves, shared)))
     for leaf in versions.leaves:
@@ -158,7 +158,7 @@ def contrast(versions: Versions, region: Node, pair: tuple[Doing, Doing]) -> Con
             asked[leaf] = values.both(good, values.negation(shared.equal(*pair_)))
     found = {}
     for leaf, node in asked.items():
-        differ = shared.one(node)
+        differ = shared.canonical(node)
         if versions.meet(region, differ):
             found[leaf] = differ
     return Contrast(versions, region, pair, found)
@@ -181,7 +181,7 @@ def changes(
     Raises:
         UndecidedError: The solver gave up.
     """
-    one, found = versions.shared.one, []
+    one, found = versions.shared.canonical, []
     rest = region
     for relied_on, standing in ((True, relied), (False, values.negation(relied))):
         part = one(values.both(rest, standing))

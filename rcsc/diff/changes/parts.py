@@ -310,7 +310,7 @@ def _condition(versions: Versions, what: str, name: str, pair: tuple[Expr, Expr]
     found: list[Change] = []
     for first, second in product(one, two):
         if first != second:
-            region = versions.shared.one(values.both(one[first], two[second]))
+            region = versions.shared.canonical(values.both(one[first], two[second]))
             found += changes(versions, PartSort.CONDITION, (first, second), region)
     return ComparedPart(what, name, (), tuple(found), (), Basis.SOLVER, versions.queries - before)
 

@@ -111,7 +111,7 @@ class _Comparison:
             {out.key: out for out in _outcomes(table, meaning)}
             for table, meaning in zip(self.tables, self.meanings, strict=True)
         )
-        self.relied = versions.shared.one(
+        self.relied = versions.shared.canonical(
             values.any_of(
                 assumed(program, table, meaning)
                 for program, table, meaning in zip(
@@ -175,9 +175,9 @@ class _Comparison:
     def _compared(self, one: InputOutcome, two: InputOutcome) -> list[Change]:
         """What changed where one version has the first outcome and the other the second."""
         versions = self.versions
-        both = versions.shared.one(values.both(one.when, two.when))
+        both = versions.shared.canonical(values.both(one.when, two.when))
         if both not in versions.stated:
-            versions.stated[both] = versions.shared.one(values.both(one.holds, two.holds))
+            versions.stated[both] = versions.shared.canonical(values.both(one.holds, two.holds))
         labels = one.label, two.label
         if one.actions is None or two.actions is None:
             return self._confirmed(changes(versions, PartSort.FAULT, labels, both, self.relied), one, two)
@@ -199,7 +199,7 @@ class _Comparison:
         versions = self.versions
         if not made.differ:
             return changes(versions, PartSort.LINE, labels, both)
-        alike = versions.shared.one(values.both(both, values.negation(made.node)))
+        alike = versions.shared.canonical(values.both(both, values.negation(made.node)))
         if is_hard(alike) or not versions.possible(alike):
             return []
         return changes(versions, PartSort.LINE, labels, alike)
@@ -243,7 +243,7 @@ def _outcomes(table: Table, meaning: Meaning) -> Iterable[InputOutcome]:
     """Everything that can become of an input: exactly one of them does."""
     lines = meaning.lines(table)
     fine = values.all_of(values.negation(bad) for bad in meaning.bad)
-    many, one = several(lines), meaning.shared.one
+    many, one = several(lines), meaning.shared.canonical
     alone = values.both(fine, values.negation(many))
     for line, holds in zip(table.lines, lines, strict=True):
         yield InputOutcome(

@@ -107,7 +107,7 @@ def _steps(versions: Versions, side: int, table: Table, state: str) -> Iterator[
         effect = meaning.effect([action.statement for action in line.actions], [known, when])
         for leaf in (str(pending(state)), state):
             wrote = values.all_of([known, when, effect.good, effect.wrote.get(leaf, FALSE)])
-            wrote = versions.shared.one(wrote)
+            wrote = versions.shared.canonical(wrote)
             if leaf in effect.leaves and not (wrote.known and not wrote.low):
                 for before, after, taken in _reached(
                     versions, wrote, versions.shared.start[state], effect.leaves[leaf]
@@ -128,7 +128,7 @@ def _reached(versions: Versions, wrote: Node, state: Node, now: Node) -> Iterato
         solver.add(values.term_of(values.negation(here)))
     versions.queries += space.queries
     for before, after, here in sorted(found, key=lambda one: one[:2]):
-        yield before, after, versions.shared.one(values.both(wrote, here))
+        yield before, after, versions.shared.canonical(values.both(wrote, here))
 
 
 def _is(node: Node, value: int) -> Node:

@@ -87,9 +87,9 @@ class Versions:
         self.kinds = {**self.types, **made.leaves}
         self.shared = Shared()
         for name, kind in self.kinds.items():
-            self.shared.start[name] = self.shared.one(values.variable(name, kind))
+            self.shared.start[name] = self.shared.canonical(values.variable(name, kind))
             before = earlier(name)  # what a property calls it; no run begins with it
-            self.shared.start[before] = self.shared.one(values.variable(before, kind))
+            self.shared.start[before] = self.shared.canonical(values.variable(before, kind))
         self.order = {name: at for at, name in enumerate(self.kinds)}
         self.queries = 0
         self.stated: dict[Node, Node] = {}
@@ -117,7 +117,7 @@ class Versions:
         Raises:
             UndecidedError: The solver gave up.
         """
-        whole = self.shared.one(values.all_of(nodes))
+        whole = self.shared.canonical(values.all_of(nodes))
         if whole.known:
             return bool(whole.low)
         space = self.space(whole)
@@ -137,7 +137,7 @@ class Versions:
         Raises:
             UndecidedError: The solver gave up.
         """
-        whole = self.shared.one(values.both(easy, hard))
+        whole = self.shared.canonical(values.both(easy, hard))
         return self._hit(easy, whole) is not None if is_hard(whole) else self.possible(whole)
 
     def found(self, easy: Node, hard: Node) -> Hit | None:
@@ -146,7 +146,7 @@ class Versions:
         Raises:
             UndecidedError: The solver gave up.
         """
-        whole = self.shared.one(values.both(easy, hard))
+        whole = self.shared.canonical(values.both(easy, hard))
         if is_hard(whole):
             return self._hit(easy, whole)
         return Hit(self.witness(whole), least=True) if self.possible(whole) else None
@@ -188,7 +188,7 @@ class Versions:
             else node
             for name, node in sorted(named.items(), key=lambda one: self.order.get(one[0], len(self.order)))
         ]
-        point = trial.found([whole], variables)
+        point = trial.witness([whole], variables)
         if point is None:
             return None
         return {name: bool(at) if isinstance(named[name].kind, Bool) else at for name, at in point.items()}

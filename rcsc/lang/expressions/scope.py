@@ -46,11 +46,11 @@ class Scope:
         variables: Names of variables, declared or not yet.
         cell: The table cell that is being resolved.
         depth: How deep the expression that is being resolved nests.
-        made: Statements made so far; a copy of a record or an array is one a scalar.
+        copied: Statements that copies of records and arrays came to so far.
         no_before: Why `was` cannot stand in the expression that is being resolved; empty where it can.
     """
 
-    found: list[Diagnostic] = field(default_factory=list)
+    diagnostics: list[Diagnostic] = field(default_factory=list)
     places: dict[str, Span] = field(default_factory=dict)
     units: set[str] = field(default_factory=lambda: set(BASE_UNITS))
     constants: dict[str, Constant] = field(default_factory=dict)
@@ -69,14 +69,14 @@ class Scope:
     variables: set[str] = field(default_factory=set)
     cell: Span | None = None
     depth: int = 0
-    made: int = 0
+    copied: int = 0
     no_before: str = "`was` stands in a property only"
 
     def report(
         self, code: Code, message: str, span: Span, *helps: str, related: tuple[Label, ...] = ()
     ) -> None:
         """Adds an error; one found in a cell is told where it stands in the file."""
-        self.found.append(Diagnostic(code, message, Label(self.at(span)), related=related, help=helps))
+        self.diagnostics.append(Diagnostic(code, message, Label(self.at(span)), related=related, help=helps))
 
     def at(self, span: Span) -> Span:
         """The span in the file: nodes inside a table cell count from the start of the cell."""

@@ -36,7 +36,7 @@ from rcsc.lang.syntax import tree
 def resolve(root: str, loaded: Loaded) -> Program | tuple[Diagnostic, ...]:
     """The program of the file `root`, or every diagnostic of it and of the files it uses, by position."""
     files = closure(root, loaded)
-    wrong = tuple(d for d in loaded.found if d.primary.span.file in files)
+    wrong = tuple(d for d in loaded.diagnostics if d.primary.span.file in files)
     if wrong:
         return wrong
     declarations = [d for file in files for d in loaded.files[file].declarations]
@@ -59,7 +59,7 @@ def _uncollected() -> Iterator[None]:
 def compile_text(text: str, file: str = "case.rcs") -> Program | tuple[Diagnostic, ...]:
     """The program of a text that uses no other file."""
     loaded = load(["-"], stdin=text, stdin_name=file)
-    return loaded.found or resolve(loaded.roots[0], loaded)
+    return loaded.diagnostics or resolve(loaded.roots[0], loaded)
 
 
 def closure(root: str, loaded: Loaded) -> list[str]:
@@ -100,8 +100,8 @@ class _Resolver:
         properties = self._properties(all_)
         tables = self._tables(all_, {a.name for a in assumptions})
         levels = self._levels(all_, tables, owners, procedures)
-        if scope.found:
-            return tuple(sorted(set(scope.found), key=sort_key))
+        if scope.diagnostics:
+            return tuple(sorted(set(scope.diagnostics), key=sort_key))
         own = tuple(TableName(d.name.text) for d in root.declarations if isinstance(d, tree.TableDecl))
         stem = self.root.rpartition("/")[2].removesuffix(".rcs")
         return Program(

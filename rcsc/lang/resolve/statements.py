@@ -189,8 +189,8 @@ class Statements:
 
     def _refused(self, target: Path, origin: Path, count: int, span: Span) -> bool:
         """Whether a copy is too much, or would change an index that its later parts use."""
-        self.scope.made += count * len(target.names) * len(origin.names)
-        if self.scope.made > MOST_STATEMENTS:
+        self.scope.copied += count * len(target.names) * len(origin.names)
+        if self.scope.copied > MOST_STATEMENTS:
             message = f"copies of records and arrays come to more than {MOST_STATEMENTS} statements"
             self.scope.report(Code.LOOP_TOO_LONG, message, span)
             return True

@@ -93,7 +93,7 @@ class _Cells:
         self.known = tests
         self.headings = [text[h.span.start : h.span.end] for h in written.actions]
         self.places = [self._place(heading) for heading in written.actions]
-        self.made: dict[tuple[int, int], list[tuple[str, Statement]]] = {}
+        self.resolved: dict[tuple[int, int], list[tuple[str, Statement]]] = {}
 
     def _place(self, heading: tree.Heading) -> tuple[Path, Span] | None:
         """Where a column of values assigns; None for a column of actions, and after an error."""
@@ -132,12 +132,12 @@ class _Cells:
                 continue
             span = self.span(row, 1 + len(row.conditions) + column)
             key = (column, id(written))
-            if key not in self.made:
+            if key not in self.resolved:
                 self.scope.cell = span
-                self.made[key] = self._actions(column, written, self.text[span.start : span.end])
+                self.resolved[key] = self._actions(column, written, self.text[span.start : span.end])
                 self.scope.cell = None
             heading = self.headings[column]
-            for text, statement in self.made[key]:
+            for text, statement in self.resolved[key]:
                 result.append(Action(heading, text, placed_statement(statement, span)))
         return tuple(result)
 

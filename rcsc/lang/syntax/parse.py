@@ -147,7 +147,7 @@ class _Rows:
 
     source: Source
     comments: Comments
-    found: list[Diagnostic]
+    diagnostics: list[Diagnostic]
     memory: dict[tuple[str, str], Any] = field(default_factory=dict)
 
     def table(
@@ -168,7 +168,7 @@ class _Rows:
         start = row.start_pos
         cells = cut(str(row), start)
         if isinstance(cells, str):
-            self.found.append(
+            self.diagnostics.append(
                 _error(Code.RAGGED_ROW, cells, Span(self.source.name, start, start + len(row.rstrip())))
             )
             return None
@@ -228,7 +228,7 @@ class _Rows:
         ):
             if len(got) != len(want):
                 start = row.start_pos
-                self.found.append(
+                self.diagnostics.append(
                     _error(
                         Code.RAGGED_ROW,
                         f"this row has {len(got)} cells of {side}, the heading {len(want)}",
@@ -262,14 +262,14 @@ class _Rows:
         try:
             node = _parsed(cell.text, start)
             if _deep_in(node):
-                self.found.append(screen.too_deep(self.source, cell.start, cell.end))
+                self.diagnostics.append(screen.too_deep(self.source, cell.start, cell.end))
                 return None
             parsed = Build("", Comments(Source("", "")), None).cell(node)
         except lark.UnexpectedInput as error:
-            self.found.append(_syntax_error(error, self.source.name, cell.start, cell.end, cell.text))
+            self.diagnostics.append(_syntax_error(error, self.source.name, cell.start, cell.end, cell.text))
             return None
         self.memory[start, cell.text] = parsed
         return parsed
 
     def _report(self, code: Code, message: str, cell: Cell, *helps: str) -> None:
-        self.found.append(_error(code, message, Span(self.source.name, cell.start, cell.end), *helps))
+        self.diagnostics.append(_error(code, message, Span(self.source.name, cell.start, cell.end), *helps))

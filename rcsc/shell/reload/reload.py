@@ -147,7 +147,7 @@ def _refused(level: str, why: str, *helps: str) -> Refused:
 
 
 def _why(report: Report) -> str:
-    errors = [diagnostic for diagnostic in report.found if diagnostic.severity is Severity.ERROR]
+    errors = [diagnostic for diagnostic in report.diagnostics if diagnostic.severity is Severity.ERROR]
     shown = [one_line(error, report.sources) for error in errors[:MOST_SHOWN]]
     more = [f"and {len(errors) - MOST_SHOWN} more"] if len(errors) > MOST_SHOWN else []
     return "\n".join(["", *shown, *more])

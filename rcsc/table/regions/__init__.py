@@ -22,7 +22,7 @@ regions with one line each:
 ...   | out  | > 0                        ||
 ... }''')
 >>> verdict = prove_table(program, program.tables[0], Options())
->>> (verdict.found, verdict.backing.method)
+>>> (verdict.findings, verdict.backing.method)
 ((), 'tree')
 
 The tree is the certificate: `rcsc.certify` walks it again with arithmetic of its own. Trusted without that: all of

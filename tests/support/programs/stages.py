@@ -94,4 +94,4 @@ def compile_beside(*sources: Path) -> None:
     """Compile sources of one folder, which must be proved, into the folder `generated` beside them."""
     settings = Settings(tuple(map(str, sources)), Options())
     made = compile_(settings, sources[0].parent / "generated", TARGETS, only_check=False)
-    assert not made.report.failed, made.report.found
+    assert not made.report.failed, made.report.diagnostics
