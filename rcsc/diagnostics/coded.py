@@ -1,4 +1,4 @@
-"""Errors that end what was asked for and are nobody's bug: each knows its code, so that one place shows them all."""
+"""Errors of users, files and machines, not of rcsc: each knows its code, so that one place shows them."""
 
 from rcsc.diagnostics.codes import Code
 

@@ -30,7 +30,7 @@ class InSystem:
         proved: Assumptions that the levels keep, all of this content; `trusts`, what that and `unreached` take for granted,
             as tables declare it.
         conditional: Assumptions that they keep if what that rests on is so; `rests`, what of it is not proved, in words.
-        not_proved: Assumptions of which an earlier run could not show that.
+        not_proved: Assumptions that an earlier run could not show to be kept.
         unreached: Lines that no reachable cycle of this system runs, DEFAULT too.
     """
 
@@ -93,7 +93,7 @@ class TableReport:
 
 
 MOST_NAMED = 3
-"""Claims that are named of those that a verdict rests on; then how many more."""
+"""Claims named of those that a verdict rests on; the others are counted."""
 
 
 def named(words: Collection[str]) -> str:
@@ -103,7 +103,7 @@ def named(words: Collection[str]) -> str:
 
 
 def trusting(words: Collection[str]) -> str:
-    """What a verdict takes for granted, to be put after it; empty for nothing."""
+    """Text, put after a verdict, of what it takes for granted; may be empty."""
     return f", trusting {', '.join(words)}" if words else ""
 
 

@@ -38,7 +38,7 @@ class Digests:
         self.assumptions = {str(assumption.name): assumption for assumption in self.program.assumptions}
 
     def table(self, table: Table) -> str:
-        """Of a table: its lines, what they run, its assumptions and invariants, and the types of what it touches."""
+        """Digest a table: its lines, what they run, its assumptions and invariants, and the types of what it touches."""
         hashed = hashlib.sha256(b"table\n")
         known: dict[int, str] = {}
         lines: list[tuple[object, ...]] = [
@@ -72,12 +72,12 @@ class Digests:
         return hashed.hexdigest()
 
     def body(self, body: Iterable[Statement]) -> str:
-        """Of statements and all that they call."""
+        """Digest statements and all they call."""
         statements = list(body)
         return repr([repr(statement) for statement in statements]) + self._rest(statements, ())
 
     def procedure(self, name: str) -> str:
-        """Of a procedure and all that it calls."""
+        """Digest a procedure and all it calls."""
         procedure = self.procedures[name]
         return repr(procedure.params) + self.body([Call(procedure.name)])
 

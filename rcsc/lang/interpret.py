@@ -219,9 +219,9 @@ def call(program: Program, name: str, args: list[Value], snapshot: dict[str, Val
 def _call_extern(
     program: Program, procedure: Procedure, args: list[Value], snapshot: dict[str, Value]
 ) -> None:
-    """The user's function takes the reads and the arguments, and gives the writes in order: one as it is or in a tuple.
+    """Call the user's function with reads and arguments; it returns the writes in order, one bare or in a tuple.
 
-    What it gives where nothing is written does not matter; another number of values than are written is refused.
+    Where nothing is written its result is ignored; else a wrong number of values is refused.
     """
     given = (_ANSWERS.get() or _of_user)(procedure, [*(snapshot[name] for name in procedure.reads), *args])
     if procedure.writes and len(given) != len(procedure.writes):
@@ -279,7 +279,7 @@ def _admitted(variable: Variable, value: Value) -> Value | None:
 
 
 def _exactly(kind: type[int | float], value: Any) -> Value | None:
-    """What came from outside as a value of its kind: None for a NaN, a fraction among integers, and what is no number."""
+    """Convert an outside value exactly; None for a NaN, a fraction among integers, and what is no number."""
     if kind is int and isinstance(value, int):
         return value
     try:

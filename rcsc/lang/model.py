@@ -210,7 +210,7 @@ class Variable:
         initial: Its value before the first cycle (inputs too).
         deferred_until: For a deferred variable: at the start of a cycle, when this holds of
             the snapshot, `x` takes the value of `x.next`. `next x := e` writes `x.next`.
-        safe: Of an output, what it shows after a cycle that ended in a fault; None where it then stays as it is.
+        safe: What an output shows after a cycle that ended in a fault; None where it stays as it is.
     """
 
     name: VariableName

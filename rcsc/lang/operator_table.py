@@ -26,7 +26,7 @@ def divide(a: int, b: int) -> int:
 
 
 class Op(StrEnum):
-    """Operators; the value is the spelling in the source, but of the negative.
+    """Operators; the value is the spelling in the source, except of the negative.
 
     The meanings are those of every stage: folding, bounds and interpreter compute with them, and executors, solvers and reference are
     held against them. Reals are IEEE 754 binary64, rounded to nearest even. Comparisons with a NaN are false, but `/=`, which is
@@ -75,7 +75,7 @@ Logic: TypeAlias = Literal[Op.AND, Op.OR, Op.XOR, Op.IMPLIES]
 """Truth functions of two operands. The right one is looked at only where the left one does not decide."""
 Comparison: TypeAlias = Literal[Op.EQ, Op.NE, Op.LT, Op.LE, Op.GT, Op.GE]
 Ordering: TypeAlias = Literal[Op.EQ, Op.LT, Op.LE]
-"""Comparisons by which the others can be said, of a NaN too."""
+"""Comparisons that express the others, for a NaN too."""
 Arithmetic: TypeAlias = Literal[Op.NEG, Op.ABS, Op.ADD, Op.SUB, Op.MUL, Op.DIV, Op.MOD, Op.MIN, Op.MAX]
 """From numbers of one kind to a number of it."""
 Conversion: TypeAlias = Literal[Op.TO_INT, Op.TO_REAL]
@@ -85,7 +85,7 @@ Operator: TypeAlias = Logic | Strict
 """Every operator: `Op` member by member, so that mypy knows what is left where a group has been dealt with."""
 
 Core: TypeAlias = Literal[Op.NOT, Op.AND] | Ordering | Arithmetic | Conversion
-"""What is left where the other truth functions and comparisons are said by these."""
+"""Operators left once the others are expressed by these."""
 
 LOGIC: frozenset[Logic] = frozenset(get_args(Logic))
 COMPARISONS: frozenset[Comparison] = frozenset(get_args(Comparison))
@@ -112,7 +112,7 @@ def is_comparison(op: Operator) -> "TypeIs[Comparison]":
 PAIRS = ((True, True), (True, False), (False, True), (False, False))
 T = TypeVar("T")
 Signed: TypeAlias = Callable[[bool], T]
-"""A condition where it is to hold, or (of false) where it is not."""
+"""A condition, or (given false) its negation."""
 
 
 def truth_function(

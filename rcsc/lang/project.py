@@ -58,7 +58,7 @@ def load(paths: Sequence[str], stdin: str | bytes | None = None, stdin_name: str
 
 
 def _heads(roots: tuple[str, ...], named: set[str], uses: Mapping[str, tuple[str, ...]]) -> tuple[str, ...]:
-    """Without the files of a folder that another of its files uses: they are checked as parts of that one."""
+    """Leave out a folder's files that another of its files uses: they are checked as parts of that one."""
     explicit = {os.path.realpath(path) for path in named}
     used = {part for file in roots for part in uses.get(file, ()) if part != file}
     waiting = list(used)

@@ -69,19 +69,19 @@ def fault(table: Table, candidates: Sequence[int]) -> Expr:
 
 
 def conjunction(conditions: Iterable[Expr]) -> Expr:
-    """All of them; true when there are none."""
+    """Conjoin; true for none."""
     kept = [condition for condition in conditions if condition != _TRUE]
     return reduce(lambda a, b: Apply(Op.AND, (a, b), Bool()), kept) if kept else _TRUE
 
 
 def disjunction(conditions: Iterable[Expr]) -> Expr:
-    """One of them; false when there are none."""
+    """Disjoin; false for none."""
     kept = list(conditions)
     return reduce(lambda a, b: Apply(Op.OR, (a, b), Bool()), kept) if kept else Literal(False, Bool())
 
 
 def negation(condition: Expr) -> Expr:
-    """Its opposite."""
+    """Negate it."""
     return Apply(Op.NOT, (condition,), Bool())
 
 
@@ -92,7 +92,7 @@ def _conditions(program: Program, table: Table) -> Iterator[Expr]:
 
 
 def _within(terms: list[tuple[Expr, int]], low: int, high: int) -> list[Expr]:
-    """`low <= sum <= high` in keys, as far as it can be said."""
+    """`low <= sum <= high` in keys, as far as conditions express it."""
     first = terms[0][0]
     if len(terms) == 1:
         return _one(first, low, high)

@@ -97,9 +97,9 @@ class Asker:
 def fewest(
     candidates: Sequence[Candidate], suffice: Callable[[Sequence[Candidate]], bool]
 ) -> tuple[Candidate, ...]:
-    """The fewest candidates that suffice, the first such choice in their order; more never suffice less.
+    """Return the fewest candidates that suffice, first in their order; adding one never hurts.
 
-    Where there are many candidates: a choice of which none can be spared, later ones spared first.
+    With many candidates: a choice of which none can be dropped; later ones are dropped first.
     """
     tried = 0
     for count in range(len(candidates)):
@@ -166,7 +166,7 @@ class _Question:
         return self._ask(values.term_of(bad)) is Answer.UNSATISFIABLE
 
     def _hold(self, places: Sequence[int]) -> bool:
-        """Whether these obligations hold, given that those before do or were found; open ones are done with, too."""
+        """Whether these obligations need no further search: they hold, or are given up as open."""
         if self.unknown > MOST_UNKNOWN:
             self.failures += [Failure(self.owed[at], Discharge.OPEN) for at in places]
             return True
@@ -177,7 +177,7 @@ class _Question:
         return answer is Answer.UNSATISFIABLE
 
     def _ask(self, bad: Term) -> Answer:
-        """Whether it can be; doubles are quicker in a solver of their own."""
+        """Ask whether `bad` is possible; doubles are quicker in a new solver."""
         if self.reals or self.solver is None:
             solver = self._fresh()
             self.solver = None if self.reals else solver

@@ -43,7 +43,7 @@ def at_first(program: Program) -> Iterator[Diagnostic]:
 
 
 def properties_elsewhere(program: Program) -> Iterator[Diagnostic]:
-    """That properties are not proved of a program alone; one note for each file that declares some."""
+    """Note, for each file that declares some, that a program alone proves no properties."""
     files: dict[str, list[Property]] = {}
     for claim in program.properties:
         files.setdefault(claim.span.file, []).append(claim)
@@ -57,7 +57,7 @@ def properties_elsewhere(program: Program) -> Iterator[Diagnostic]:
 
 
 def assumptions_satisfiable(program: Program, table: Table, options: Options) -> Snapshot | Answer:
-    """Values that satisfy all assumptions of the table and all invariants, or that there are none, or that Z3 does not know.
+    """Return values that satisfy all assumptions of the table and all invariants, or Z3's answer where it has none.
 
     A few are tried by hand before Z3 is asked.
     """

@@ -152,7 +152,7 @@ class Obligations:
         return [*self._too_long, *(diagnostic(*key, cause) for key, cause in self._causes.items())]
 
     def stopping(self, tables: Iterable[Table]) -> dict[str, tuple[AssumptionName, ...]]:
-        """The stopping assumptions of the tables alone; what they owe besides is not told."""
+        """Return the stopping assumptions of the tables, and report nothing."""
         for table in tables:
             with self._budget():
                 self._table(table)
@@ -233,7 +233,7 @@ class Obligations:
     # --- tables ---
 
     def _table(self, table: Table) -> None:
-        """Its conditions and lines, and on which assumptions they rest."""
+        """Discharge a table's conditions and lines; find the stopping assumptions."""
         assumptions = [
             assumption for assumption in self.program.assumptions if assumption.name in table.assumptions
         ]
@@ -255,7 +255,7 @@ class Obligations:
             self.stops[table.name] = tuple(assumption.name for assumption in chosen)
 
     def _suffice(self, needing: Iterable[_Owing], chosen: Sequence[Assumption]) -> bool:
-        """Whether all is shown under these assumptions that is not reported under all of them."""
+        """Whether these assumptions show all that is not reported under all of them."""
         for owing in needing:
             run, known = owing.run(self._known(assumption.condition for assumption in chosen))
             left = [
@@ -362,7 +362,7 @@ class Obligations:
     # --- lines ---
 
     def _plain(self, actions: tuple[Action, ...]) -> bool:
-        """Whether it is plain, without a run, that the line's actions owe nothing."""
+        """Whether the line's actions owe nothing, as far as is seen without a run."""
         written: set[str] = set()
         for action in actions:
             names = self._plainly_written(action.statement)
@@ -449,7 +449,7 @@ class Obligations:
                 run.owe(Code.INVARIANT_BROKEN, f"{who} can break invariant `{invariant.name}`", span, good)
 
     def _settle(self, run: Run, base: Callable[[], list[Node]], where: str, table: str) -> bool:
-        """Asks what bounds did not settle; whether all is shown."""
+        """Ask what bounds did not settle; return whether all is shown."""
         self.tally.by_intervals += run.settled
         failures = self._asker.unshown(run.obligations, base, self._shown)
         for failure in failures:
@@ -460,7 +460,7 @@ class Obligations:
         return not failures
 
     def _shown(self, owed: Obligation) -> bool:
-        """Whether a witness is wanted, too."""
+        """Whether to look for a witness: its cause has too few."""
         cause = self._causes.get((owed.code, owed.span, owed.message))
         return cause is None or len(cause.failures) < MOST_WITNESSES
 
@@ -472,7 +472,7 @@ class Obligations:
 
 
 def _name_of(line: Line | Default) -> Span:
-    """Where the line's name stands."""
+    """The span of the line's name."""
     return line.cell_span(-1) if isinstance(line, Line) else line.span
 
 

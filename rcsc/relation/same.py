@@ -110,7 +110,7 @@ class _Question:
         self.questions = 0
 
     def answer(self) -> Comparison:
-        """Each outcome of the first table against those of the second that it can meet, its namesake first."""
+        """Compare each outcome of the first table with those of the second that it can meet, namesake first."""
         for outcome in self.outcomes:
             left = outcome.when  # what of it no outcome of the second table has met yet
             for other in sorted(self.others, key=lambda other: other.name != outcome.name):
@@ -157,7 +157,7 @@ class _Question:
                 yield name, values.both(good, values.negation(same))
 
     def _check(self, wrong: Node) -> tuple[Answer, Solver | None, dict[str, Node]]:
-        """Whether it can be, the solver that says so, and the variables that it is about."""
+        """Ask whether `wrong` is possible; return the answer, its solver and variables."""
         if wrong is values.FALSE:
             return Answer.UNSATISFIABLE, None, {}
         self.questions += 1
@@ -167,7 +167,7 @@ class _Question:
         return solver.check(), solver, variables
 
     def _asked(self, first: _Outcome, second: _Outcome) -> Comparison | None:
-        """None where the two outcomes cannot meet, or are the same where they do."""
+        """Compare two outcomes; None where they never meet, or agree where they do."""
         answer, solver, variables = self._check(
             values.all_of((first.when, second.when, self._unlike(first, second)))
         )

@@ -156,7 +156,7 @@ class Steps:
         return run
 
     def _after(self, actions: Sequence[Action]) -> list[tuple[Node, Node]]:
-        """The state that the actions lead to, and when; one that is written past its deferral comes beside the pending one."""
+        """Return the states that the actions lead to, each with its condition: the pending one, and one written directly."""
         run = self._followed(actions)
         successors = [(values.TRUE, run.leaf(self._next()))]
         if self.state.name != self._next() and self.state.name in run.state.wrote:

@@ -11,7 +11,7 @@ from typing import Any
 BUDGET = 400_000
 """Conflicts after which a question is given up: an effort that is the same on every machine."""
 QUESTIONS, CONFLICTS = 200_000, 4_000_000
-"""Of one solver in all, after which a search is given up, likewise; TASK's asks some 4,000 and meets 30,000 conflicts."""
+"""Limits of one solver in all, after which a search is given up; TASK's has some 4,000 questions and 30,000 conflicts."""
 
 
 class GaveUpError(Exception):
@@ -77,7 +77,7 @@ class Sat:
         return (at < len(self._model) and self._model[at] > 0) == (literal > 0)
 
     def core(self) -> frozenset[int]:
-        """Assumptions of the last question, answered no, that cannot hold together."""
+        """Unsatisfiable core of the assumptions of the last question."""
         return frozenset(self._solver.get_core() or ())
 
     def close(self) -> None:

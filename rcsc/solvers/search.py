@@ -10,7 +10,7 @@ Item = TypeVar("Item")
 
 
 def furthest(start: int, end: int, fits: Callable[[int], bool]) -> int:
-    """The greatest value up to `end` to which it fits; at `start` it does, and up to somewhere.
+    """Return the greatest value up to `end` that fits, as `start` and all between do.
 
     The end is tried first: what is grown often goes as far as its variable does, and that takes one question.
     """
@@ -27,12 +27,12 @@ def furthest(start: int, end: int, fits: Callable[[int], bool]) -> int:
 
 
 def lowest(low: int, known: int, up_to: Callable[[int, int], int | None]) -> int:
-    """The least value, of which one is known.
+    """Find the least value by bisection.
 
     Args:
-        low: It is no less.
-        known: A value that there is.
-        up_to: Finds a value from a least one up to a limit, or None where there is none; the one known where nobody can tell.
+        low: A lower bound.
+        known: A value that exists.
+        up_to: Finds a value from a least one up to a limit, or None where there is none; `known` where nobody can tell.
     """
     limit = low  # where most are
     while low < known:

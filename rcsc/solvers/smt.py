@@ -164,7 +164,7 @@ def truth(value: bool) -> Term:
 
 
 def negation(term: Term) -> Term:
-    """Its opposite."""
+    """Negate it."""
     return Term(_z3().Not(term))
 
 
@@ -268,7 +268,7 @@ class Solver:
 
     Attributes:
         queries: How often it was asked.
-        refuted: Where it remembers: of each answer that there is none, what was asserted besides what stands for good.
+        refuted: If it remembers: for each unsatisfiable answer, the assertions that are not permanent.
     """
 
     def __init__(self, limits: Limits = Limits(), *, remembers: bool = False) -> None:
@@ -367,7 +367,7 @@ class Solver:
         return f"(set-logic ALL)\n{self._solver.to_smt2()}"
 
     def refutations(self) -> str:
-        """A script that has no model exactly if each answer that there is none was right; where there was one, and outside `push`."""
+        """Return a script that is unsatisfiable just if all such answers, one at least, were right; call outside `push`."""
         self.push()
         self.add(any_of(self.refuted))
         script = self.script()

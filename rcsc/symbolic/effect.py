@@ -42,7 +42,7 @@ class Effect:
     Attributes:
         leaves: The value after the run of every leaf that it may write.
         wrote: For each of them, when it is written.
-        owed: What must hold that nothing goes wrong on the way: no overflow, no index outside its array, no value out of
+        owed: What must hold so that nothing goes wrong: no overflow, no index outside its array, no value out of
             its range. What is owed twice is there once.
         calls: Calls of extern procedures, in order.
     """
@@ -59,7 +59,7 @@ class Effect:
 
 
 class Shared:
-    """Nodes made one where they are built alike, and the leaves that all runs begin with."""
+    """Hash-consed nodes, and the leaves that all runs begin with."""
 
     def __init__(self) -> None:
         self.start: dict[str, Node] = {}
@@ -69,7 +69,7 @@ class Shared:
         self._number: dict[Node, int] = {}
 
     def canonical(self, node: Node) -> Node:
-        """The node that stands for all that are built like this one."""
+        """Return the node that stands for all built alike."""
         for part in values.parts_first(node):
             if part not in self._of:
                 args = tuple(self._of[arg] for arg in part.args)
@@ -145,7 +145,7 @@ class Meaning:
         return _Followed(self._procedures, self.kinds, self.shared.start)
 
     def condition(self, expr: Expr) -> Node:
-        """The condition; where it is undefined is added to `bad`."""
+        """Evaluate a condition; add to `bad` where it is undefined."""
         run = self._run()
         value = run.evaluate(expr)
         self.bad += [
@@ -213,7 +213,7 @@ def value_after(effect: Effect, leaf: str, shared: Shared) -> Node:
 
 
 def goes_wrong_otherwise(left: Effect, right: Effect, shared: Shared) -> Node:
-    """That one of the runs comes to its end and the other does not; what both owe plays no part."""
+    """Return where just one run comes to its end; what both owe plays no part."""
     first = values.all_of(node for node in left.owed if node not in right.owed)
     second = values.all_of(node for node in right.owed if node not in left.owed)
     if first is second:
@@ -223,7 +223,7 @@ def goes_wrong_otherwise(left: Effect, right: Effect, shared: Shared) -> Node:
 
 
 def same_calls(left: Effect, right: Effect, leaves: Collection[str], shared: Shared) -> Node:
-    """The same extern procedures, at the same points, in the same states, with the same values.
+    """Return where both call the same extern procedures, at the same points, in the same states, with the same values.
 
     A result that is refused ends the cycle, so that what was written before the call is seen.
     """
@@ -248,7 +248,7 @@ def same_calls(left: Effect, right: Effect, leaves: Collection[str], shared: Sha
 
 
 def several(nodes: Iterable[Node]) -> Node:
-    """That at least two of them hold."""
+    """Return where at least two hold."""
     before, twice = FALSE, FALSE
     for node in nodes:
         twice = values.either(twice, values.both(before, node))

@@ -128,9 +128,9 @@ class Evaluation:
         stops: Called where a cycle may end early (an extern procedure's result is refused).
         cell: Where the present action or condition is written.
         fresh: Values that the run has made up: results of extern procedures, locals without a value.
-        suffix: Behind their names, where several runs are followed by one question: each run has its own.
+        suffix: After their names, where one question follows several runs; each run has its own.
         refusals: Whether results of extern procedures may be refused; else a run goes on as if none were.
-        ended: That one was refused: what would be written later stays as it is.
+        ended: Where one was refused: later writes have no effect.
         answered: What extern procedures give, in the order in which they can be called.
     """
 
@@ -176,7 +176,7 @@ class Evaluation:
         return span if span.file else self.cell
 
     def assume(self, condition: Node) -> None:
-        """What is known from the start: its bounds are used; asserting it is the asker's business."""
+        """Use the bounds of what is known from the start; the asker asserts it."""
         values.learn(condition, self.facts)
 
     @contextmanager

@@ -170,7 +170,7 @@ class Run(Evaluation):
             self.state = self._merged(chosen, state, self.state)
 
     def _merged(self, condition: Node, then: State, orelse: State) -> State:
-        """One state where the condition holds, the other elsewhere."""
+        """Merge states: `then` where the condition holds, else `orelse`."""
         self.step(len(then.leaves) + len(orelse.leaves))
         self.state = State()
 
@@ -218,7 +218,7 @@ class Run(Evaluation):
         self.answered.append(ExternResults(str(procedure.name), path, tuple(given), tuple(refused)))
 
     def _refusal(self, name: str) -> Node:
-        """That the result is refused, where a run follows that: from here on the cycle has ended then."""
+        """Return where the result is refused, if the run follows that; there the cycle ends."""
         if not self.refusals:
             return FALSE
         refused = self.any_value(name, Bool())

@@ -155,9 +155,9 @@ class Keyed:
         return term
 
     def _written(self, node: Node) -> int:
-        """A number for the node that every node has which is written the same, and of which the same is known.
+        """Number the node; nodes built alike and with the same bounds get the same number.
 
-        What is known holds only where the node is reached: one value for both that and another place would carry it there.
+        Bounds hold only where the node is reached: one value for two places would carry them over.
         """
         for part in parts_first(node, known=self._number_of):
             parts = tuple(self._number_of[arg] for arg in part.args)

@@ -45,7 +45,7 @@ class Measured(Keyed):
         return self.any(node)
 
     def _rounded(self, node: Node, exact: Term) -> Term:
-        """A value near the exact one, wherever the operands are what is known of them where the node is reached."""
+        """Return a value near the exact one, wherever the operands lie within their bounds."""
         rounded = self.any(node)
         most = max(abs(node.low), abs(node.high), 1.0)
         if math.isfinite(most):
@@ -62,7 +62,7 @@ class Measured(Keyed):
         return rounded
 
     def _reached(self, node: Node) -> Term:
-        """That each operand has a value which it may have there; elsewhere the node is not read."""
+        """Return where each operand lies within its bounds; elsewhere the node is not read."""
         parts = [arg for arg in node.args if arg.op not in (CONSTANT, VARIABLE)]
         return smt.all_of([term for arg in parts for term in self._inside(arg)])
 

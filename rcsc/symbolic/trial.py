@@ -32,7 +32,7 @@ Point = dict[str, Value]
 
 
 def witness(conditions: Sequence[Node], variables: Sequence[Node]) -> Point | None:
-    """A point at which all conditions hold, made small variable by variable; None where no trial succeeds."""
+    """Find a point at which all conditions hold, and lower each variable; None where no trial succeeds."""
     order = list(parts_first(*conditions))
     if len(order) > MOST_NODES:
         return None
@@ -80,7 +80,7 @@ def _less(left: Point, right: Point, variables: Sequence[Node]) -> bool:
 def _lowered(
     order: Sequence[Node], conditions: Sequence[Node], variables: Sequence[Node], point: Point
 ) -> Point:
-    """Each variable in turn as low as bisection finds, the others as they are."""
+    """Lower each variable in turn by bisection; the others stay."""
 
     def up_to(variable: Node, _low: int, limit: int) -> int | None:
         nonlocal point

@@ -121,14 +121,14 @@ def narrowed(node: Node, low: int | float, high: int | float) -> Node:
 
 
 def negation(node: Node) -> Node:
-    """Its opposite."""
+    """Negate it."""
     if node.known:
         return truth(not node.low)
     return node.args[0] if node.op == Op.NOT else Node(Op.NOT, (node,), Bool(), 0, 1)
 
 
 def both(left: Node, right: Node) -> Node:
-    """One and the other."""
+    """Conjunction."""
     if left.known:
         return right if left.low else FALSE
     if right.known:
@@ -137,17 +137,17 @@ def both(left: Node, right: Node) -> Node:
 
 
 def either(left: Node, right: Node) -> Node:
-    """One or the other."""
+    """Disjunction."""
     return negation(both(negation(left), negation(right)))
 
 
 def follows(premise: Node, conclusion: Node) -> Node:
-    """The second wherever the first."""
+    """Implication."""
     return either(negation(premise), conclusion)
 
 
 def all_of(nodes: Iterable[Node]) -> Node:
-    """Every one."""
+    """Conjoin."""
     conjunction = TRUE
     for node in nodes:
         conjunction = both(conjunction, node)
@@ -163,7 +163,7 @@ def any_of(nodes: Iterable[Node]) -> Node:
 
 
 def choice(condition: Node, then: Node, orelse: Node) -> Node:
-    """The first where the condition holds, else the second."""
+    """Choose `then` where the condition holds, else `orelse`."""
     if condition.known:
         return then if condition.low else orelse
     if then is orelse or (then.known and orelse.known and then.low == orelse.low):
@@ -249,18 +249,18 @@ def _bounds(op: Arithmetic | Conversion, args: tuple[Node, ...]) -> tuple[int | 
 
 
 def wraps_once(remainder: Node) -> bool:
-    """Whether a `mod` is of a value that is not negative and below twice its divisor: the value, or less the divisor."""
+    """Whether a `mod` subtracts its divisor at most once: the value is from 0 to below twice the divisor."""
     value, divisor = remainder.args
     return divisor.known and value.low >= 0 and value.high < 2 * divisor.low
 
 
 def equal(left: Node, right: Node) -> Node:
-    """That two values of one type are the same."""
+    """Equality of two values of one type."""
     return compare(Op.EQ, left, right)
 
 
 def inside(node: Node, low: int | float, high: int | float) -> Node:
-    """That it lies within the bounds; false of a NaN."""
+    """Whether it is in bounds; false for a NaN."""
     least, greatest = constant(node.kind, low), constant(node.kind, high)
     return both(compare(Op.LE, least, node), compare(Op.LE, node, greatest))
 
@@ -297,12 +297,12 @@ def variables(nodes: Iterable[Node]) -> dict[str, Node]:
 
 
 def domain(nodes: Iterable[Node]) -> list[Term]:
-    """That each variable is a value of its type."""
+    """State that each variable is in range."""
     return [within(term_of(node), node.kind) for node in nodes if not isinstance(node.kind, Bool)]
 
 
 def parts_first(*nodes: Node, known: Container[Node] = ()) -> Iterator[Node]:
-    """Every node once, parts before wholes; but those that are known, and what only they are made of."""
+    """Yield each node once, parts first; leave out known ones and what only they are made of."""
     seen: set[Node] = set()
     stack = [(node, False) for node in reversed(nodes)]
     while stack:
@@ -343,7 +343,7 @@ def learn(condition: Node, facts: dict[Node, Fact], *, holds: bool = True) -> No
 
 
 def _learn_either(node: Node, facts: dict[Node, Fact]) -> None:
-    """Of `not (a and b)`: a root that both negations bound lies within the hull of the two."""
+    """Learn from `not (a and b)`: a root that both negations bound is in the hull of the two."""
     sides: list[dict[Node, Fact]] = []
     for part in node.args:
         side: dict[Node, Fact] = {}

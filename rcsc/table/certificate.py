@@ -50,7 +50,7 @@ def tree_certificate(
 
 
 def with_witness(certificate: Certificate, program: Program, table: Table, witness: Snapshot) -> Certificate:
-    """The certificate of a table with values at which all of the table's assumptions and all invariants hold."""
+    """Add values to a certificate at which all of the table's assumptions and all invariants hold."""
     read = sorted(
         {name for assumption in assumed_of(program, table) for name in read_by(assumption.condition)}
     )

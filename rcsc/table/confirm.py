@@ -93,7 +93,7 @@ def worth_asking(table: Table, options: Options) -> bool:
 def confirm(
     program: Program, table: Table, findings: tuple[TableFinding, ...], options: Options
 ) -> Agreement:
-    """Z3's own answer to whether two lines meet and whether there is a gap, against what was found."""
+    """Compare the findings with Z3's answers: do two lines overlap, and is there a gap?"""
     if not worth_asking(table, options) or any(isinstance(finding, Undecided) for finding in findings):
         return Agreement.NOT_ASKED
     if options.solver == "auto":

@@ -1,7 +1,7 @@
 """Where a condition holds: the least input, and boxes that make up the region exactly.
 
-In: conditions as values over leaves. Out: boxes of keys, disjoint, each as wide as it goes, and whether they are all. Each
-box is shown by Z3 to lie inside, and that nothing is left outside them; *unknown* raises, so that nobody takes it for an answer.
+In: conditions as values over leaves. Out: disjoint boxes of keys, each as wide as possible, and whether they fill the
+region. Z3 proves that each box lies inside and that nothing is left outside; *unknown* raises.
 
 The least input pins each variable, in declared order, to the least value that fits; boxes grow in that order, too
 (`partition.Gaps.grown`).
@@ -113,7 +113,7 @@ class Space:
         return answer is Answer.SATISFIABLE
 
     def witness(self, *nodes: Node) -> dict[str, Value]:
-        """The least input for which they hold together, which they can.
+        """Return the least input at which the nodes hold; there is one.
 
         Raises:
             UndecidedError: The solver gave up.
@@ -138,7 +138,7 @@ class Space:
     # --- boxes ---
 
     def cover(self, wanted: Node, allowed: Node, most: int) -> Cover:
-        """Boxes within `allowed` that hold all of `wanted`, as far as `most` of them do.
+        """Cover `wanted` with at most `most` boxes within `allowed`.
 
         Raises:
             UndecidedError: The solver gave up.
@@ -161,12 +161,12 @@ class Space:
         return self._made(boxes, exact=True)
 
     def around(self, condition: Node) -> tuple[Region, tuple[Node, ...]]:
-        """A box around all of the condition, and what it asks besides: together they are the condition."""
+        """Split a condition into a box around it and further conditions: together they are equivalent."""
         hull, rest = self._hull(condition, _cuts(condition, self.nodes))
         return self._made([hull], exact=True).boxes[0], tuple(rest)
 
     def _hull(self, allowed: Node, cuts: Mapping[str, list[int]]) -> tuple[dict[str, Box], list[Node]]:
-        """What conditions on one variable each leave of that variable, and the other conditions."""
+        """Return the box that conditions on single variables allow, and the other conditions."""
         rest: list[Node] = []
         hull: dict[str, Box] = {name: (key_bounds(node.kind),) for name, node in self.nodes.items()}
         for part in _conjuncts(allowed):
@@ -199,7 +199,7 @@ class Space:
         limits: tuple[Mapping[str, list[int]], Mapping[str, Box]],
         others: list[dict[str, Box]],
     ) -> dict[str, Box]:
-        """The box around the seed that is grown within the hull: several variables at once where that fits."""
+        """Grow a box around the seed within the hull, several variables at once where that fits."""
         cuts, hull = limits
         point = {name: key_of(node.kind, seed[name]) for name, node in self.nodes.items()}
         box: dict[str, Box] = {name: ((at, at),) for name, at in point.items()}
@@ -263,7 +263,7 @@ def _within(starts: list[int], part: Box) -> list[tuple[int, int]]:
 
 
 def _widest(at: int, classes: list[tuple[int, int]], fits: Callable[[Box], bool]) -> Box:
-    """The classes that fit beside the one of `at`, or as far as it goes within that."""
+    """Join the class of `at` with others that fit; where it does not fit, stretch `at`."""
     home = next(interval for interval in classes if interval[0] <= at <= interval[1])
     if not fits((home,)):
         return (_stretched(at, home, fits),)
@@ -272,14 +272,14 @@ def _widest(at: int, classes: list[tuple[int, int]], fits: Callable[[Box], bool]
 
 
 def _stretched(at: int, ends: tuple[int, int], fits: Callable[[Box], bool]) -> tuple[int, int]:
-    """As far up, then down, from `at` as fits."""
+    """Stretch `at` up, then down, while it fits."""
     top = furthest(at, ends[1], lambda end: fits(((at, end),)))
     bottom = -furthest(-at, -ends[0], lambda end: fits(((-end, top),)))
     return bottom, top
 
 
 _PLAIN = {*COMPARISONS, Op.NOT, Op.AND, CONSTANT, VARIABLE, NARROWED}
-"""What a condition is made of whose value is the same all over a class."""
+"""Operators of conditions that have one value all over a class."""
 
 
 def _conjuncts(condition: Node) -> Iterator[Node]:
@@ -294,7 +294,7 @@ def _conjuncts(condition: Node) -> Iterator[Node]:
 
 
 def _cuts(condition: Node, nodes: Mapping[str, Node]) -> dict[str, list[int]]:
-    """For each variable the keys at which a class of alike values begins, as far as constants say."""
+    """Return the keys at which a class of equivalent values begins, by variable, from constants."""
     starts = {name: {key_bounds(node.kind)[0]} for name, node in nodes.items()}
     for node in values.parts_first(condition):
         if node.op in COMPARISONS:
@@ -313,7 +313,7 @@ def _cuts(condition: Node, nodes: Mapping[str, Node]) -> dict[str, list[int]]:
 
 
 def _ends(node: Node) -> Iterator[Node]:
-    """What a value is chosen from."""
+    """Yield the values that choices select from."""
     waiting, seen = [node], set[Node]()
     while waiting and len(seen) < _MOST_CLASSES:
         root = values.root(waiting.pop())

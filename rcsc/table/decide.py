@@ -1,4 +1,4 @@
-"""One table, decided by whatever suits it, confirmed by Z3, certified."""
+"""Decide one table by the method that suits it, confirm and certify it."""
 
 import time
 from itertools import islice
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def prove_table(program: Program, table: Table, options: Options) -> TableVerdict:
-    """Whether exactly one line of the table matches every input, over the declared ranges under its assumptions."""
+    """Decide whether exactly one line matches every input in the declared ranges, under the assumptions."""
     begun = time.perf_counter()
     used: tuple[AssumptionName, ...] = ()
     certificate: Mapping[str, object] | None = None
@@ -64,14 +64,14 @@ def _narrows(program: Program, table: Table) -> bool:
 
 
 def _wrong(table: Table, findings: tuple[TableFinding, ...]) -> bool:
-    """Whether there is more than inputs that fall to a DEFAULT line."""
+    """Whether anything is found but inputs that a DEFAULT line takes."""
     return any(not isinstance(finding, Gap) or must_cover(table) for finding in findings)
 
 
 def _confirmed(
     program: Program, table: Table, findings: tuple[TableFinding, ...], options: Options
 ) -> tuple[bool, tuple[TableFinding, ...]]:
-    """Whether Z3 agrees; what it finds wrong with the verdict is added."""
+    """Ask Z3 whether it agrees, and add a finding where it does not."""
     from rcsc.table.confirm import Agreement, confirm, worth_asking
 
     if not worth_asking(table, options):

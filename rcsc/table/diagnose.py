@@ -147,7 +147,7 @@ def _gap(program: Program, table: Table, gap: Gap) -> Diagnostic:
 
 
 def _more(program: Program, gap: Gap) -> int:
-    """Inputs outside the regions shown, where they were counted; the regions do not meet."""
+    """Count the gap's inputs outside the regions shown; 0 where nobody counted."""
     if gap.count is None:
         return 0
     bounds = {str(v.name): key_bounds(v.type) for v in program.variables}
@@ -183,7 +183,7 @@ def _column(
 
 
 def _cells(table: Table, line: int, name: str) -> str:
-    """What a line says of a variable; conditions over several stand with the first of them."""
+    """Return a line's tests of a variable; one of several variables stands with the first."""
     texts = []
     for test, column in zip(table.lines[line].tests, table.columns, strict=True):
         if test is not None and test.variables and test.variables[0] == name:

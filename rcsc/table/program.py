@@ -1,4 +1,4 @@
-"""A whole program: its invariants, its tables, and all that its procedures owe.
+"""Prove a whole program: its invariants, its tables, and all that its procedures owe.
 
 The only place where a `ProvedProgram` is made, and only when nothing is wrong and nothing undecided.
 """
@@ -35,17 +35,17 @@ TOO_MANY_STEPS = f"the questions about it take, together, more than {smt.TOGETHE
 
 @dataclass(frozen=True, slots=True)
 class ProgramVerdict:
-    """What was found of a program.
+    """The verdict on a program.
 
     Attributes:
         findings: Errors, warnings and notes, by position.
         proved: Set only when there is no error.
         tables: One verdict a table.
-        certificate: Of all tables; None where something is not proved.
+        certificate: For all tables; None where something is not proved.
         tally: How the obligations of procedures and conditions were settled.
         program: What was proved, with the stopping assumptions of the tables that were looked at.
         unproved: Invariants, and assumptions declared `proved`, that are not proved: what rests on one is not, either.
-        unsafe: Tables of which a line owes what is not shown.
+        unsafe: Tables with a line that owes what is not shown.
     """
 
     findings: tuple[Diagnostic, ...]
@@ -90,7 +90,7 @@ def prove_program(
 
 
 def _unproved(program: Program, findings: Iterable[Diagnostic]) -> frozenset[str]:
-    """Invariants and assumptions declared `proved` of which these findings leave the proof incomplete.
+    """Return invariants, and assumptions declared `proved`, whose proof these findings break.
 
     Invariants are shown by one induction in which every run rests on all of them, and on what it owes itself: any
     error breaks it. An assumption that is proved rests on the invariants.
@@ -108,7 +108,7 @@ def _unproved(program: Program, findings: Iterable[Diagnostic]) -> frozenset[str
 
 
 def _with_invariants(program: Program, verdict: TableVerdict) -> TableVerdict:
-    """The verdict, resting on every invariant where the ranges alone do not show its conditions to be defined."""
+    """Rest the verdict on every invariant, unless ranges alone show its conditions to be defined."""
     if not program.invariants or defined_alone(program, verdict.table):
         return verdict
     named = dict(verdict.backing.assumptions)
@@ -132,7 +132,7 @@ def _verdicts(
 
 
 def _verdict(program: Program, table: Table, options: Options) -> TableVerdict:
-    """One table; where the solver was cut short, which another machine might not have done, it is left open."""
+    """Decide one table; leave it open where the clock, which differs by machine, ended a question."""
     before = smt.cut_short()
     with smt.together(options.together) as budget:
         verdict = _uncut_verdict(program, table, options)
@@ -149,7 +149,7 @@ def _decided(verdict: TableVerdict) -> tuple[TableFinding, ...]:
 
 
 def _uncut_verdict(program: Program, table: Table, options: Options) -> TableVerdict:
-    """One table, its assumptions not contradictory; exhausted memory leaves it open."""
+    """Decide one table and whether its assumptions are consistent; open where memory ends."""
     try:
         verdict = prove_table(program, table, options)
         if not table.assumptions or any(
@@ -173,7 +173,7 @@ def _left_open(table: Table, why: Undecided) -> TableVerdict:
 
 
 def _in_processes(program: Program, tables: list[Table], options: Options) -> list[TableVerdict]:
-    """Each table in a process of a pool; none outlives this call, also when it is interrupted."""
+    """Decide the tables in a pool of processes; none outlives this call, even interrupted."""
     one_each = replace(options, jobs=1)
     with children.pool(min(options.jobs, len(tables))) as pool:
         waiting = [pool.submit(_verdict, program, table, one_each) for table in tables]

@@ -63,7 +63,7 @@ _MOST_REPROVED = 2_000
 
 @dataclass(frozen=True, slots=True)
 class Decided:
-    """What was found, the certificate of a table in order, and the assumptions that were needed."""
+    """Findings, the certificate of a table without any, and the assumptions needed."""
 
     findings: tuple[TableFinding, ...]
     certificate: Mapping[str, object] | None
@@ -78,7 +78,7 @@ def decide(program: Program, table: Table, options: Options) -> Decided:
 def under_assumptions(
     program: Program, table: Table, options: Options, settled: tuple[TableFinding, ...]
 ) -> tuple[TableFinding, ...]:
-    """What is found under the assumptions of a table that is right without them: dead lines, and what falls to DEFAULT.
+    """Find, under the assumptions of a table that is right without them, dead lines and what DEFAULT takes.
 
     Args:
         program: Where the assumptions are declared.
@@ -111,7 +111,7 @@ class _Decision:
 
     @property
     def tried(self) -> tuple[Snapshot, ...]:
-        """Inputs that the assumptions allow, tried before Z3 is asked: for it doubles are slow; none in a table without them."""
+        """Sample inputs that the assumptions allow, tried before Z3, which is slow on doubles; none without doubles."""
         if self._tried is None:
             few = len(self.table.lines) <= _MOST_LINES_TRIED
             reals = few and any(isinstance(v.type, Real) for v in self.variables)
@@ -142,7 +142,7 @@ class _Decision:
         return self._asked
 
     def decided(self) -> Decided:
-        """Everything about the table."""
+        """Decide and certify the table."""
         wrong = self.contradiction()
         if wrong:
             return Decided(wrong, None, ())
@@ -168,7 +168,7 @@ class _Decision:
         return (*self.dead(), *gaps)
 
     def contradiction(self) -> tuple[TableFinding, ...]:
-        """That the assumptions cannot hold together, or that nobody could tell."""
+        """Find that the assumptions contradict each other, or are undecided."""
         if not self.table.assumptions:
             return ()
         possible = self.satisfiable(self.assumed)
@@ -192,7 +192,7 @@ class _Decision:
         return self.gap(Search())
 
     def search(self, kept: Sequence[int], budget: int = 60_000, *, alone: bool = False) -> Search:
-        """The tree under some of the assumptions; `alone` without the solver, to the first finding."""
+        """Search under some of the assumptions; `alone`: without the solver, to the first finding."""
         return Tree(
             self.universe,
             self.clauses,
@@ -204,7 +204,7 @@ class _Decision:
         ).run()
 
     def spared(self, search: Search) -> tuple[tuple[int, ...], Search]:
-        """The assumptions that the proof cannot do without, one after the other left out, and its tree.
+        """Drop assumptions one by one; return those that the proof needs, and its tree.
 
         Where a solver or a large tree was needed, every assumption that some leaf rests on is kept.
         """
@@ -242,7 +242,7 @@ class _Decision:
     # --- findings ----------------------------------------------------------------------
 
     def satisfiable(self, formulas: Sequence[Formula], *terms: Term) -> Answer:
-        """Whether the formulas can hold together under no assumption but what they say."""
+        """Whether the formulas can hold together, without any assumption."""
         point = find(self.universe, formulas)
         if point is NoWitness.UNKNOWN:
             return self.asked.holds(*terms)
@@ -301,7 +301,7 @@ class _Decision:
         return [Undecided("what no line matches")] if witness is None else [Gap((witness,), (None,))]
 
     def dead(self) -> list[TableFinding]:
-        """Lines that no input matches, those that only an assumption excludes told apart from those that ranges and invariants do."""
+        """Find the lines that no input matches, and whether only an assumption excludes them."""
         standing = {assumption.name: assumption.standing for assumption in self.program.assumptions}
         names = zip(self.table.assumptions, self.assumed, strict=True)
         sure = [formula for name, formula in names if standing[name] is Standing.PROVED]
@@ -327,7 +327,7 @@ class _Decision:
     def witness(
         self, seen: Sequence[Snapshot], terms: Callable[[TableSolver], tuple[Term, ...]]
     ) -> Snapshot | None:
-        """The least input for which the terms hold; where Z3 gives up, the least of those that are known."""
+        """Return the least input for which the terms hold; where Z3 gives up, the least one known."""
         z3 = self.asked
         if seen:
             few = replace(self.options, steps=min(self.options.steps, _STEPS_OF_LEAST))

@@ -66,7 +66,7 @@ def _within(inner: Box, outer: Box) -> bool:
 
 
 def closing_line(program: Program, table: Table, gap: Gap) -> str | None:
-    """A line for the first region of the gap: it meets no line, and whether it closes the gap is counted."""
+    """Propose a line for the gap's first region; it overlaps none, and counting tells if it closes the gap."""
     region = gap.regions[0]
     if region is None or not boxes.applies(table):
         return None

@@ -1,4 +1,4 @@
-"""What was found of one table: findings as data, and what the verdict rests on.
+"""The verdict on one table: findings as data, and what they rest on.
 
 Keys are those of `rcsc.lang.model`: order-preserving integers for every kind of value.
 """

@@ -122,7 +122,7 @@ def box_of(condition: Expr, leaf: Variable) -> Box | None:
 
 
 def _tried(condition: Expr, name: VariableName, kind: Scalar, keys: range) -> Box | None:
-    """By trying every key; None where the condition is undefined for some."""
+    """Try every key; None where the condition is undefined for some."""
     holding = []
     for key in keys:
         value = fold(condition, {name: value_of_key(kind, key)})

@@ -85,7 +85,7 @@ def _typed(scope: Scope, body: Body, written: tree.Expr, want: Scalar | None) ->
 
 
 def boolean(scope: Scope, body: Body, written: tree.Expr) -> Expr | None:
-    """A condition."""
+    """Resolve a condition."""
     condition = typed(scope, body, written, Bool())
     if condition is None:
         return None
@@ -251,7 +251,7 @@ def _unary(scope: Scope, body: Body, written: tree.Unary) -> Typed | None:
 
 
 def _was(scope: Scope, body: Body, written: tree.Expr, span: Span, want: Scalar | None) -> Typed | None:
-    """The same expression of the values after the cycle before."""
+    """Resolve `was e`: `e` of the values after the cycle before."""
     if scope.no_before:
         scope.report(Code.NO_CYCLE_BEFORE, scope.no_before, span)
         return None

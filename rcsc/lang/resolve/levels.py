@@ -54,7 +54,7 @@ def level(
 
 
 def _period(scope: Scope, written: tree.LevelDecl) -> int:
-    """In ms.
+    """Return the period in ms.
 
     Source: Haynes et al. 1984, section 2: the sample period was 40 ms; taken where none is written.
     """
@@ -106,7 +106,7 @@ def _chosen(
 
 
 def _stays(scope: Scope, chosen: TableByCommand, span: Span, written: Mapping[str, str]) -> None:
-    """Reports a selector that a cycle may leave other than it chose by: which table ran would show nowhere."""
+    """Report a selector that a cycle may change after choosing by it: nothing would show which table ran."""
     if not isinstance(chosen.selector, Read):
         scope.report(Code.UNSTEADY_SELECTOR, "an element that is chosen by its index chooses the table", span)
         return
@@ -124,7 +124,7 @@ def _stays(scope: Scope, chosen: TableByCommand, span: Span, written: Mapping[st
 def _written(
     tables: Iterable[Table], after: Iterable[str], procedures: Mapping[str, Procedure]
 ) -> dict[str, str]:
-    """What lines of the tables and the postprocess may write, each with one that does."""
+    """Map each leaf that tables or the postprocess may write to one writer."""
     writers: dict[str, str] = {}
     for table in tables:
         lines: list[Line | Default] = [*table.lines, *([] if table.default is None else [table.default])]

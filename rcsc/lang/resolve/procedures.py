@@ -77,7 +77,7 @@ def _call_order(scope: Scope, bodies: dict[str, _Body]) -> list[str]:
 
 
 def _visit(scope: Scope, start: str, calls: dict[str, list[Call]], deep: dict[str, int]) -> None:
-    """Goes through all that `start` calls; in `deep`, callees first, how deep the calls of each nest."""
+    """Visit all that `start` calls; enter in `deep`, callees first, how deep the calls of each nest."""
     path: dict[str, Iterator[Call]] = {start: iter(calls[start])}
     while path:
         name = next(reversed(path))

@@ -46,7 +46,7 @@ def resolve(root: str, loaded: Loaded) -> Program | tuple[Diagnostic, ...]:
 
 @contextmanager
 def _uncollected() -> Iterator[None]:
-    """Without garbage collection: the model has no cycles, and to look for them doubles the time."""
+    """Suspend garbage collection: the model has no cycles, and the search doubles the time."""
     was_on = gc.isenabled()
     gc.disable()
     try:

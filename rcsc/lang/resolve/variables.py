@@ -144,7 +144,7 @@ def _leaves(name: str, kind: Type) -> Iterator[tuple[str, Scalar]]:
 
 
 def _constant(scope: Scope, written: tree.Expr | None, kind: Type, what: str) -> Value | None:
-    """The initial or the safe value; None where none is written, or what is written is none."""
+    """Return the initial or safe value; None where none is written, or no valid one."""
     if written is None:
         return None
     if not isinstance(kind, Bool | Enum | Int | Real):

@@ -39,7 +39,7 @@ class _Reduction:
     Attributes:
         size: How many symbols it takes from the stack.
         origin: The symbol that it makes.
-        name: Of its nodes; empty where the children go to the parent.
+        name: The name of its nodes; empty where the children go to the parent.
         picked: Which of the symbols become children, and whether their own children do; None for all as they are.
         alone: Whether a single child stands for the node.
         handed: Whether it always hands on what it takes.
@@ -143,7 +143,7 @@ def _rank(terminal: Any) -> tuple[int, int, int, str]:
 
 
 def _words(skipped: str, terminals: Sequence[Any]) -> _Words:
-    """One expression for what is skipped and one of these terminals; a word that another of its priority matches is told by its text."""
+    """Build one pattern of what is skipped and these terminals; words that a pattern of their priority matches are told by text."""
     special: dict[str, dict[str, str]] = {}
     for wide in (terminal for terminal in terminals if terminal.pattern.type == "re"):
         whole = re.compile(wide.pattern.to_regexp()).fullmatch
@@ -186,7 +186,7 @@ def _reduction(rule: Any) -> _Reduction:
 def _reduce(
     rule: _Reduction, stack: list[int], values: list[Any], begins: list[int], ends: list[int]
 ) -> None:
-    """Takes the symbols of a rule from the stacks and puts there what it makes of them; the state after it is left to do."""
+    """Pop a rule's symbols from the stacks and push what it makes of them; the caller pushes the state."""
     if not rule.size:
         values.append([] if not rule.name else ParseNode(rule.name, [], -1, -1))
         begins.append(-1)

@@ -94,7 +94,7 @@ class _Pieces:
     nodes: list[ParseNode] = field(default_factory=list)
 
     def parse(self) -> list[Diagnostic]:
-        """Fills `nodes`; what was wrong."""
+        """Fill `nodes`; return what was wrong."""
         text, offset = self.source.text, 0
         diagnostics: list[Diagnostic] = []
         while len(diagnostics) < MOST_ERRORS:

@@ -63,7 +63,7 @@ def _too_deep(text: str) -> int | None:
 
 
 def too_deep(source: Source, start: int, end: int) -> Diagnostic:
-    """That what stands from `start` to `end` has expressions, types or blocks within each other too deep."""
+    """Report that from `start` to `end` expressions, types or blocks nest too deep."""
     return _error(Code.TOO_DEEP, f"expressions and blocks nest more than {DEEPEST} deep", source, start, end)
 
 

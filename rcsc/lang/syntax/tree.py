@@ -21,7 +21,7 @@ def at() -> Span:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Commented:
-    """What has comments above it, or behind it in its line."""
+    """A node with comments above it, or after it on its line."""
 
     span: Span = at()
     comments: tuple[str, ...] = ()

@@ -56,7 +56,7 @@ class Boxes(Generic[Axis]):
         return [at for at, boxes in enumerate(self.lines) if any(not box for box in boxes.values())]
 
     def overlaps(self) -> Iterator[tuple[int, int]]:
-        """Every pair of lines that some input matches both of, first line first."""
+        """Yield every pair of lines that both match some input, first line first."""
         for at, others in self.meeting():
             for other in bits_of(others):
                 yield at, other
@@ -276,7 +276,7 @@ class Counting(Generic[Axis]):
         self.exact = all(counted)
 
     def _count(self, at: int) -> bool:
-        """Counts a line more, unless that takes too many terms; says whether it did."""
+        """Count one more line unless that takes too many terms; return whether it did."""
         if at not in self._near:
             return False
         room = self._most - len(self.pieces)
@@ -327,9 +327,9 @@ def common(first: BoxLine[Axis], second: BoxLine[Axis]) -> dict[Axis, Box] | Non
 
 
 def _crossing(met: Mapping[int, int]) -> tuple[dict[int, int], list[int]]:
-    """Which lines each line overlaps, and lines without which no two do: always the one that overlaps most others.
+    """Return which lines each line overlaps, and a greedy choice of lines without which no two overlap.
 
-    Where very many pairs overlap these are the later line of each, and the first answer is left empty.
+    Where very many pairs overlap, the choice is the later line of each, and the first answer is empty.
     """
     if sum(others.bit_count() for others in met.values()) > 50 * MOST_PAIRS:
         later = 0
@@ -371,7 +371,7 @@ def bits_of(mask: int) -> Iterator[int]:
 
 
 def _any(masks: Iterable[int]) -> int:
-    """The union."""
+    """Unite the masks."""
     union = 0
     for mask in masks:
         union |= mask

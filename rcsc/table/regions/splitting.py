@@ -122,12 +122,12 @@ class Tree:
     # --- findings ----------------------------------------------------------------------
 
     def _all_known(self, region: Region) -> bool:
-        """Whether splitting further could tell of no other pair (two lines hold, so no gap)."""
+        """Whether no further split could find another pair (two lines hold, so no gap)."""
         others = [line.index for line in region.lines]
         return all(pair in self.search.overlaps for pair in combinations(others, 2))
 
     def _probe(self, region: Region, pairs: list[tuple[int, int]]) -> tuple[Node, list[Region]]:
-        """Look for a point of a region that is wrong all over, if it has any."""
+        """Look for a point of a region that is wrong at every point."""
         multipliers = self._refute(region)
         if multipliers is not None:
             return Empty(multipliers), []
