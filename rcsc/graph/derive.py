@@ -38,7 +38,7 @@ class Derived:
     """A table's graph.
 
     Attributes:
-        everywhere: Terms that every edge which leaves a state by itself states, and that are left out of `shown`.
+        everywhere: Terms of every edge that leaves a single state; they are left out of `shown`.
         lost: What the graph does not hold, in sentences; no proof rests on them.
     """
 
@@ -84,15 +84,15 @@ def _state(program: Program, table: Table, wanted: str) -> Variable | Diagnostic
     """The variable whose values are the states."""
     fit = [v for v in program.variables if v.kind is Kind.STATE and not v.name.endswith(".next") and _few(v)]
     if wanted:
-        found = [v for v in fit if v.name == wanted]
+        candidates = [v for v in fit if v.name == wanted]
     else:
-        found = [v for v in fit if v.name == "cur_state"] or [
+        candidates = [v for v in fit if v.name == "cur_state"] or [
             v for v in fit if isinstance(v.type, Enum) and v.name in table.variables
         ]
-    if len(found) == 1:
-        return found[0]
+    if len(candidates) == 1:
+        return candidates[0]
     several = f"several variables could be the state of table `{table.name}`: " + ", ".join(
-        f"`{v.name}`" for v in found
+        f"`{v.name}`" for v in candidates
     )
     none = (
         f"`{wanted}` is no state variable of few values"
@@ -100,7 +100,7 @@ def _state(program: Program, table: Table, wanted: str) -> Variable | Diagnostic
         else f"table `{table.name}` has no variable that could be its state"
     )
     helps = ("name one with `--state`: an enumeration, a boolean or a few integers",)
-    return Diagnostic(Code.GRAPH_NO_STATE, several if found else none, Label(table.span), help=helps)
+    return Diagnostic(Code.GRAPH_NO_STATE, several if candidates else none, Label(table.span), help=helps)
 
 
 def _few(variable: Variable) -> bool:
@@ -181,7 +181,7 @@ class _Derivation:
     # --- edges ---
 
     def _edges(self, at: int, line: Line | Default, steps: list[Step], states: list[Value]) -> list[Edge]:
-        """The edges of one line, drawn from every state at once where it is so."""
+        """The edges of one line; a single edge from ANY where it leads alike from every state."""
         default = "" if isinstance(line, Line) else f"DEFAULT{' unreachable' if line.unreachable else ''}"
         sources = list(dict.fromkeys(step.source for step in steps))
         goal = self._goal(line.actions)
@@ -214,7 +214,7 @@ class _Derivation:
         return goals[0] if goals and all(goal is None for goal in goals[1:]) else None
 
     def _deciders(self, actions: tuple[Action, ...], goal: Value | None) -> str:
-        """The actions that can write the state, but the one that the edge says."""
+        """The actions that can write the state, without the one that the edge itself says."""
         writers = [action for action in actions if self.steps.writes(action)]
         return ", ".join(action.text for action in (writers if goal is None else writers[1:]))
 
@@ -228,7 +228,7 @@ class _Derivation:
         return []
 
     def _narrowed(self, at: int, sources: list[Value]) -> None:
-        """Says so where the states written are not those from which the edges come."""
+        """Notes as lost that the states written are not those from which the edges come."""
         stated = [
             spell_condition(cell, whole=False)
             for heading, cell in zip(self.written.conditions, self._row(at).conditions, strict=True)
@@ -238,9 +238,9 @@ class _Derivation:
         again = names[0] if len(names) == 1 else "in {" + ", ".join(names) + "}" if names else ""
         before = " and ".join(stated)
         if before != again and not self._row(at).default:
-            said, then = (f"`{text}`" if text else "a blank" for text in (before, again))
+            written, then = (f"`{text}`" if text else "a blank" for text in (before, again))
             name = self._lines()[at].name
-            self.lost.append(f"line `{name}`: {said} under `{self.steps.state.name}` comes back as {then}")
+            self.lost.append(f"line `{name}`: {written} under `{self.steps.state.name}` comes back as {then}")
 
     def _effect(self, row: tree.Row, actions: tuple[Action, ...], goal: Value | None) -> str:
         """The action cells, without the one action that the edge itself says."""
@@ -256,9 +256,9 @@ class _Derivation:
     # --- what is shown ---
 
     def _common(self, edges: list[Edge]) -> list[tree.Expr]:
-        """Terms of every edge that leaves a state by itself."""
+        """The terms shared by every edge that leaves a single state."""
         own = [labels.terms_of(edge.guard) for edge in edges if edge.source != ANY]
-        return [one for one in own[0] if all(one in terms for terms in own)] if len(own) > 1 else []
+        return [term for term in own[0] if all(term in terms for terms in own)] if len(own) > 1 else []
 
     def _eased(self, edge: Edge, common: list[tree.Expr]) -> Edge:
         if edge.default:
@@ -296,6 +296,6 @@ def _taken(left: list[Action]) -> Action:
 
 
 def _of_one(first: Action, other: Action) -> bool:
-    one, two = first.statement, other.statement
+    a, b = first.statement, other.statement
     alike = other.heading == first.heading and other.text == first.text
-    return alike and isinstance(one, Assign) and isinstance(two, Assign) and one.place != two.place
+    return alike and isinstance(a, Assign) and isinstance(b, Assign) and a.place != b.place

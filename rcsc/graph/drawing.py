@@ -48,13 +48,13 @@ class ArrowLine:
 
     @property
     def width_px(self) -> float:
-        """Of the badge and the text."""
-        letters = max((len(one) for one in self.text), default=0)
+        """Width of the badge and the text."""
+        letters = max((len(piece) for piece in self.text), default=0)
         return self.before_px + letters * _LETTER_PX
 
     @property
     def before_px(self) -> float:
-        """From the left end to the text."""
+        """Distance from the left end to the text."""
         return 2 * self.badge_px + (_GAP_PX if self.text else 0.0) if self.line else 0.0
 
     @property
@@ -64,7 +64,7 @@ class ArrowLine:
 
     @property
     def height_px(self) -> float:
-        """Of the row."""
+        """Height of the row."""
         return max(2 * _BADGE_PX, len(self.text) * _ROW_PX) + 3
 
 
@@ -94,7 +94,7 @@ class Picture:
 
 
 def svg(graph: StateGraph, everywhere: str = "") -> str:
-    """The drawing of a state graph; `everywhere` is said once for every arrow from a state.
+    """The drawing of a state graph; `everywhere` is noted once for every arrow from a state.
 
     Raises:
         NoLayoutError: There is no layout program.
@@ -111,10 +111,10 @@ def svg(graph: StateGraph, everywhere: str = "") -> str:
 
 
 def _settled(graph: StateGraph, edge: Edge) -> Edge:
-    """The edge, as one that says its target where its line can lead nowhere else from there."""
+    """The edge, without deciding procedures where its line can lead nowhere else from there."""
     elsewhere = any(
-        (one.line, one.source) == (edge.line, edge.source) and one.target != edge.target
-        for one in graph.edges
+        (other.line, other.source) == (edge.line, edge.source) and other.target != edge.target
+        for other in graph.edges
     )
     return edge if elsewhere or not edge.line else replace(edge, decided="")
 
@@ -137,7 +137,7 @@ def _sheaves(edges: Iterable[Edge]) -> list[Sheaf]:
 
 
 def _never(edge: Edge) -> bool:
-    """Whether the edge is a DEFAULT line's that is never taken: told beside the drawing."""
+    """Whether the edge belongs to a DEFAULT line that is never taken: noted beside the drawing."""
     return edge.default.endswith("unreachable")
 
 

@@ -22,7 +22,7 @@ class FoundTable:
     """A table and where it stands.
 
     Attributes:
-        root: Root file of the program; of several, one that has the level that runs the table.
+        root: Root file of the program; where there are several, one with the level that runs the table.
     """
 
     loaded: Loaded
@@ -36,18 +36,18 @@ class NotFound:
     """Why there is no table.
 
     Attributes:
-        sources: Texts that `found` points into.
+        sources: Texts that `diagnostics` point into.
     """
 
-    found: tuple[Diagnostic, ...]
+    diagnostics: tuple[Diagnostic, ...]
     sources: dict[str, Source]
 
 
 def tables(named: str, *, running: bool = False) -> list[FoundTable] | NotFound:
-    """The tables that are meant, in order of file and place; each once.
+    """The tables that a name means, each once, in order of file and place.
 
     Args:
-        named: As above.
+        named: A table, a file, a file and its table, or a folder.
         running: Whether to look through a file's project for the program that has the level which runs the table.
     """
     file, name = _parted(named)
@@ -66,15 +66,12 @@ def tables(named: str, *, running: bool = False) -> list[FoundTable] | NotFound:
         own = [table for table in program.tables if not name or table.name == name]
     if not own:
         return _nothing(f"`{file}` has no table{f' `{name}`' if name else ''}", file)
-    found = [FoundTable(loaded, loaded.roots[0], program, table) for table in own]
-    return [
-        _in_level(found_table) if running and not _run_here(found_table) else found_table
-        for found_table in found
-    ]
+    entries = [FoundTable(loaded, loaded.roots[0], program, table) for table in own]
+    return [_in_level(entry) if running and not _run_here(entry) else entry for entry in entries]
 
 
 def _parted(named: str) -> tuple[str | None, str]:
-    """File or folder, and table."""
+    """The file or folder named, and the table."""
     if os.path.exists(named) or named.endswith(".rcs"):
         return named, ""
     file, colon, name = named.rpartition(":")
@@ -87,39 +84,39 @@ def _here() -> str:
 
 def _programs(loaded: Loaded) -> Iterator[tuple[str, Program]]:
     """Every root that resolves; those with a level first."""
-    made = [(root, program) for root in loaded.roots if isinstance(program := resolve(root, loaded), Program)]
-    yield from sorted(made, key=lambda one: not one[1].levels)
+    programs = [
+        (root, program) for root in loaded.roots if isinstance(program := resolve(root, loaded), Program)
+    ]
+    yield from sorted(programs, key=lambda pair: not pair[1].levels)
 
 
 def _every(loaded: Loaded) -> list[FoundTable] | NotFound:
-    made: dict[tuple[str, str], FoundTable] = {}
+    by_name: dict[tuple[str, str], FoundTable] = {}
     for root, program in _programs(loaded):
         for table in program.tables:
-            made.setdefault((table.file, table.name), FoundTable(loaded, root, program, table))
-    if not made:
+            by_name.setdefault((table.file, table.name), FoundTable(loaded, root, program, table))
+    if not by_name:
         return (
             NotFound(loaded.diagnostics, dict(loaded.sources))
             if loaded.diagnostics
             else _nothing("there is no table", "")
         )
-    return [made[key] for key in sorted(made)]
+    return [by_name[key] for key in sorted(by_name)]
 
 
 def _by_name(name: str, loaded: Loaded) -> list[FoundTable] | NotFound:
     every = _every(loaded)
     if isinstance(every, NotFound):
         return every
-    found = [found_table for found_table in every if found_table.table.name == name]
-    found = [
-        found_table for found_table in found if _run_here(found_table)
-    ] or found  # an example is meant only by its file
-    if len(found) == 1:
-        return found
-    if found:
-        names = tuple(f"`{found_table.table.file}:{name}`" for found_table in found)
-        return _nothing(f"{len(found)} tables are called `{name}`", "", f"say which: {', '.join(names)}")
-    near = get_close_matches(name, sorted({found_table.table.name for found_table in every}), 3, 0.5)
-    helps = (f"near it: {', '.join(f'`{one}`' for one in near)}",) if near else ()
+    named = [entry for entry in every if entry.table.name == name]
+    named = [entry for entry in named if _run_here(entry)] or named  # an example is meant only by its file
+    if len(named) == 1:
+        return named
+    if named:
+        names = tuple(f"`{entry.table.file}:{name}`" for entry in named)
+        return _nothing(f"{len(named)} tables are called `{name}`", "", f"say which: {', '.join(names)}")
+    near = get_close_matches(name, sorted({entry.table.name for entry in every}), 3, 0.5)
+    helps = (f"near it: {', '.join(f'`{candidate}`' for candidate in near)}",) if near else ()
     return _nothing(f"there is no table `{name}`", "", *helps)
 
 
@@ -127,16 +124,18 @@ def _nothing(message: str, file: str, *helps: str) -> NotFound:
     return NotFound((Diagnostic(Code.UNKNOWN_NAME, message, Label(Span(file, 0, 0)), help=helps),), {})
 
 
-def _run_here(one: FoundTable) -> bool:
-    return any(one.table.name in level.tables.names for level in one.program.levels)
+def _run_here(entry: FoundTable) -> bool:
+    return any(entry.table.name in level.tables.names for level in entry.program.levels)
 
 
-def _in_level(one: FoundTable) -> FoundTable:
-    """The same table in a program of its project that has the level which runs it; as it was where there is none."""
-    root = project_root(one.table.file)
+def _in_level(entry: FoundTable) -> FoundTable:
+    """The table in a program of its project whose level runs it; unchanged where there is none."""
+    root = project_root(entry.table.file)
     every = _every(load([root])) if os.path.isfile(os.path.join(root, "rcsc.toml")) else []
     if isinstance(every, NotFound):
-        return one
-    real = os.path.realpath(one.table.file)
-    same = [it for it in every if it.table.name == one.table.name and os.path.realpath(it.table.file) == real]
-    return next((it for it in same if _run_here(it)), one)
+        return entry
+    real = os.path.realpath(entry.table.file)
+    same = [
+        it for it in every if it.table.name == entry.table.name and os.path.realpath(it.table.file) == real
+    ]
+    return next((it for it in same if _run_here(it)), entry)

@@ -51,7 +51,7 @@ def term(heading: tree.Heading, cell: tree.Condition) -> tree.Expr:
 
 def guard(terms: list[tree.Expr]) -> str:
     """The terms joined by `and`; "" without any."""
-    return " and ".join(spell_expr(one, NEGATION) for one in terms)
+    return " and ".join(spell_expr(term, NEGATION) for term in terms)
 
 
 def terms_of(text: str) -> list[tree.Expr]:
@@ -110,7 +110,7 @@ def effect(headings: tuple[str, ...], cells: tuple[str, ...]) -> str:
 
 def effect_cells(text: str) -> list[tuple[str, str]]:
     """Heading and cell of each part of an effect; WordsError where it is not made so."""
-    found = []
+    cells = []
     at = 0
     while text[at:].strip():
         match = _HEADING.match(text, at)
@@ -119,9 +119,9 @@ def effect_cells(text: str) -> list[tuple[str, str]]:
         end = _closing(text, match.end() - 1)
         inside = text[match.end() : end].strip()
         heading = match.group(1)
-        found.append((heading, "; ".join(split(inside)) if heading in ACTION_WORDS else inside))
+        cells.append((heading, "; ".join(split(inside)) if heading in ACTION_WORDS else inside))
         at = end + 1
-    return found
+    return cells
 
 
 def _closing(text: str, opening: int) -> int:
@@ -134,7 +134,7 @@ def _closing(text: str, opening: int) -> int:
 
 
 def split(text: str, mark: str = ",") -> list[str]:
-    """The pieces between marks that stand in no bracket."""
+    """The pieces between marks outside brackets."""
     pieces, depth, begun = [], 0, 0
     for at, letter in enumerate(text):
         depth += (letter in _OPEN) - (letter in _CLOSE)

@@ -68,21 +68,21 @@ def place(boxes: Sequence[LayoutBox], arrows: Sequence[Arrow]) -> Arrangement:
     Raises:
         NoLayoutError: No layout program is there, or it failed.
     """
-    said = json_of(_run(_text(boxes, arrows)))
-    left, bottom, right, top = (float(one) for one in said["bb"].split(","))
+    layout = json_of(_run(_text(boxes, arrows)))
+    left, bottom, right, top = (float(side) for side in layout["bb"].split(","))
 
     def point(text: str) -> Point:
-        x, y = (float(one) for one in text.split(","))
+        x, y = (float(number) for number in text.split(","))
         return round(x - left, 2), round(top - y, 2)
 
-    by_name = {one["name"]: one for one in said["objects"]}
-    found = sorted(said.get("edges", []), key=lambda one: int(one["id"][1:]))
+    by_name = {node["name"]: node for node in layout["objects"]}
+    edges = sorted(layout.get("edges", []), key=lambda edge: int(edge["id"][1:]))
     return Arrangement(
         right - left,
         top - bottom,
         tuple(point(by_name[f"n{at}"]["pos"]) for at in range(len(boxes))),
-        tuple(_curve(one["pos"], point) for one in found),
-        tuple(point(one["lp"]) if "lp" in one else None for one in found),
+        tuple(_curve(edge["pos"], point) for edge in edges),
+        tuple(point(edge["lp"]) if "lp" in edge else None for edge in edges),
     )
 
 
@@ -129,7 +129,7 @@ def _run(text: str) -> str:
 
 def _program() -> str:
     beside = shutil.which(PACKAGE, path=sysconfig.get_path("scripts")) or shutil.which(PACKAGE)
-    found = beside or shutil.which("dot")
-    if found is None:
+    program = beside or shutil.which("dot")
+    if program is None:
         raise NoLayoutError(f"`{PACKAGE}` is not installed")
-    return str(Path(found))
+    return str(Path(program))

@@ -60,7 +60,7 @@ def _terms(written: tree.TableDecl, row: tree.Row) -> dict[int, tree.Expr]:
 
 
 def _common(every: list[list[tree.Expr]]) -> list[tree.Expr]:
-    return [one for one in every[0] if all(one in terms for terms in every)] if len(every) > 1 else []
+    return [term for term in every[0] if all(term in terms for terms in every)] if len(every) > 1 else []
 
 
 def _edge(names: list[str], follow: Follow, terms: dict[int, tree.Expr], common: list[tree.Expr]) -> Edge:
@@ -72,7 +72,7 @@ def _edge(names: list[str], follow: Follow, terms: dict[int, tree.Expr], common:
 def _from_any(
     names: list[str], at: int, before: list[Follow], terms: dict[int, tree.Expr], live: list[int]
 ) -> Edge:
-    never = [names[one] for one in live if one not in {follow.line for follow in before}]
+    never = [names[line] for line in live if line not in {follow.line for follow in before}]
     whole = labels.guard(list(terms.values()))
     needed = {column for follow in before for column in follow.needed}
     shown = labels.guard([terms[column] for column in sorted(needed)])

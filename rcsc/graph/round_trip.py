@@ -1,4 +1,4 @@
-"""Whether the table that a graph says does what another table does: proved, or refuted by an input.
+"""Whether a graph's table does what another table does: proved, or refuted by an input.
 
 In: a file that declares a table, and the table to stand in its place. Out: the program with it, and the verdict.
 """
@@ -28,18 +28,18 @@ class Against:
     """The verdict on a table in place of another.
 
     Attributes:
-        found: Why it is not the same; empty where it is proved.
+        diagnostics: Why it is not the same; empty where it is proved.
         questions: How many the proof put to Z3.
-        sources: Texts that `found` points into.
+        sources: Texts that `diagnostics` point into.
     """
 
-    found: tuple[Diagnostic, ...]
+    diagnostics: tuple[Diagnostic, ...]
     questions: int = 0
     sources: Mapping[str, Source] | None = None
 
 
 def in_place(file: tree.File, table: tree.TableDecl) -> str:
-    """The file's text with the table in the place of the one of its name, or at its end; comments above a table stay."""
+    """The file's text with the table replacing the one of its name, or at its end; comments above a table stay."""
     kept: list[tree.Declaration] = []
     there = False
     for declaration in file.declarations:
@@ -76,7 +76,7 @@ def against(
     if not isinstance(resolved, Program):
         shown = tuple(_renamed(diagnostic, table.file, name) for diagnostic in resolved)
         return Against(shown, sources={**loaded.sources, name: Source(name, text)})
-    other = next(one for one in resolved.tables if one.name == table.name)
+    other = next(candidate for candidate in resolved.tables if candidate.name == table.name)
     verdict = compare((program, table), (resolved, other), options)
     if isinstance(verdict, Same) and set(other.assumptions) != set(table.assumptions):
         return Against((_assuming(table, other),))
@@ -87,17 +87,19 @@ def against(
     return Against(_findings(verdict, program, table), questions, loaded.sources)
 
 
-def _renamed(found: Diagnostic, file: str, name: str) -> Diagnostic:
+def _renamed(diagnostic: Diagnostic, file: str, name: str) -> Diagnostic:
     def moved(label: Label) -> Label:
         span = label.span
         return Label(Span(name, span.start, span.end), label.message) if span.file == file else label
 
-    return replace(found, primary=moved(found.primary), related=tuple(map(moved, found.related)))
+    return replace(
+        diagnostic, primary=moved(diagnostic.primary), related=tuple(map(moved, diagnostic.related))
+    )
 
 
 def _assuming(table: Table, other: Table) -> Diagnostic:
     message = f"the graph's table `{table.name}` does not rest on the same assumptions"
-    names = [", ".join(f"`{name}`" for name in one.assumptions) or "none" for one in (table, other)]
+    names = [", ".join(f"`{name}`" for name in side.assumptions) or "none" for side in (table, other)]
     return Diagnostic(
         Code.GRAPH_DIFFERS,
         message,
@@ -107,7 +109,7 @@ def _assuming(table: Table, other: Table) -> Diagnostic:
 
 
 def _begins(program: Program, table: Table, new: Tabled) -> Diagnostic | None:
-    """That the graph begins in another state."""
+    """A diagnostic where the graph begins in another state."""
     name, initial = new.begins
     state = next((variable for variable in program.variables if variable.name == name), None)
     if not initial or state is None or spell(state.type, state.initial) == initial:

@@ -70,7 +70,7 @@ def tabled(graph: StateGraph) -> Tabled:
 
 @dataclass(frozen=True, slots=True)
 class _Line:
-    """What a row says.
+    """A row of the table.
 
     Attributes:
         sources: The states in which it matches; empty for all.
@@ -108,11 +108,11 @@ def _lines(graph: StateGraph) -> Iterator[_Line]:
 
 
 def _named(lines: list[_Line], graph: StateGraph, notes: list[str]) -> list[_Line]:
-    """The lines with a name of their own each, in the order that the graph gives."""
+    """The lines, each with a name of its own, in the order that the graph gives."""
     taken = {line.name for line in lines if line.name}
-    made = []
+    named = []
     for number, line in enumerate(lines):
-        twins = [at for at, one in enumerate(lines) if one.name == line.name]
+        twins = [at for at, other in enumerate(lines) if other.name == line.name]
         name = line.name
         if not name:
             name = _free(str(number + 1), taken)
@@ -121,14 +121,14 @@ def _named(lines: list[_Line], graph: StateGraph, notes: list[str]) -> list[_Lin
             name = _free(f"{name}{_letter(twins.index(number))}", taken)
             notes.append(f"the edges of line `{line.name}` do not say one thing: there is a line `{name}`")
         taken.add(name)
-        made.append(_Line(name, line.edge, line.sources, line.target))
+        named.append(_Line(name, line.edge, line.sources, line.target))
     order = {name: at for at, name in enumerate(graph.lines)}
     originals = [line.name for line in lines]
     ranked = sorted(
-        range(len(made)),
-        key=lambda at: (bool(made[at].edge.default), order.get(originals[at], len(order)), at),
+        range(len(named)),
+        key=lambda at: (bool(named[at].edge.default), order.get(originals[at], len(order)), at),
     )
-    return [made[at] for at in ranked]
+    return [named[at] for at in ranked]
 
 
 def _letter(number: int) -> str:
@@ -161,7 +161,7 @@ class _Columns:
     def of(cls, graph: StateGraph) -> "_Columns":
         left, _, right = graph.columns.partition("||")
         conditions, actions = (
-            [one.strip() for one in side.split("|") if one.strip()] for side in (left, right)
+            [heading.strip() for heading in side.split("|") if heading.strip()] for side in (left, right)
         )
         return cls(graph, bool(graph.columns), conditions, actions)
 
@@ -199,7 +199,7 @@ class _Columns:
         ]
 
     def _condition(self, expr: tree.Expr, cells: dict[str, str]) -> None:
-        """Puts a term under its heading, or under `when` where another stands there already."""
+        """Puts a term under its heading, or under `when` where that is taken."""
         parted = labels.cell(expr)
         if parted is not None:
             heading = spell_expr(parted[0])
@@ -222,11 +222,11 @@ class _Columns:
         actions += [word for word in self.actions if word not in actions]
         assuming = f" assuming {', '.join(graph.assuming)}" if graph.assuming else ""
         lines = [f"table {graph.table}{assuming} {{", _row(["line", *conditions], actions)]
-        for line, said, done in rows:
-            cells = [said.get(condition, "") for condition in conditions]
+        for line, tested, done in rows:
+            cells = [tested.get(condition, "") for condition in conditions]
             if line.edge.default:
                 cells[0] = line.edge.default
-            elif not said and conditions == [_WHEN]:
+            elif not tested and conditions == [_WHEN]:
                 cells[0] = "true"
             lines.append(_row([line.name, *cells], [done.get(action, "") for action in actions]))
         return "\n".join([*lines, "}", ""])

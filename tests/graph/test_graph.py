@@ -89,7 +89,7 @@ def test_every_table_of_the_system_comes_back_from_every_form_and_is_proved_the_
         texts = {tabled(FORMS[form].read(FORMS[form].write(made.graph))).text() for form in EVERY_FORM}
         assert len(texts) == 1, name  # the forms hold the same, so that one proof is enough
         verdict = said(entry, FORMS["dot"].write(made.graph), "dot")
-        assert verdict.found == (), name
+        assert verdict.diagnostics == (), name
 
 
 def test_the_graph_of_acquire_is_fig_10(shipped: dict[str, FoundTable]) -> None:
@@ -159,7 +159,7 @@ def test_a_broken_graph_is_refuted_by_an_input(
     entry = shipped["task.acquire"]
     text = FORMS[form].write(graph_of(entry).graph)
     assert old in text
-    [found] = said(entry, text.replace(old, new), form).found
+    [found] = said(entry, text.replace(old, new), form).diagnostics
     assert found.code is Code.GRAPH_DIFFERS
     assert found.witnesses[0].variables
 
@@ -169,7 +169,7 @@ def test_a_dropped_edge_is_refuted(shipped: dict[str, FoundTable], form: str) ->
     entry = shipped["primitive.goto"]
     lines = FORMS[form].write(graph_of(entry).graph).splitlines(keepends=True)
     at = next(at for at, line in enumerate(lines) if "robot_status_in = done and there = true" in line)
-    [found] = said(entry, "".join(lines[:at] + lines[at + 1 :]), form).found
+    [found] = said(entry, "".join(lines[:at] + lines[at + 1 :]), form).diagnostics
     assert found.code is Code.GRAPH_DIFFERS
     assert "line `6`, the graph to line `10`" in found.message  # DEFAULT takes it
 
@@ -181,7 +181,7 @@ def test_a_table_that_rests_on_other_assumptions_is_not_the_same(shipped: dict[s
         .write(graph_of(entry).graph)
         .replace("in_step, resting, acquire_states", "in_step, resting")
     )
-    [found] = said(entry, text, "mermaid").found
+    [found] = said(entry, text, "mermaid").diagnostics
     assert (found.code, "acquire_states" in found.notes[0]) == (Code.GRAPH_DIFFERS, True)
 
 
@@ -222,8 +222,8 @@ def test_what_is_not_seen_in_the_variables_afterwards_is_a_difference_too(
     entry = found_in(WRITES, tmp_path)
     text = FORMS["mermaid"].write(graph_of(entry).graph)
     assert old in text
-    assert said(entry, text, "mermaid").found == ()
-    [found] = said(entry, edited(text, (old, new)), "mermaid").found
+    assert said(entry, text, "mermaid").diagnostics == ()
+    [found] = said(entry, edited(text, (old, new)), "mermaid").diagnostics
     assert found.code is Code.GRAPH_DIFFERS
 
 
@@ -424,7 +424,7 @@ def test_units_arrays_values_and_whole_conditions_come_back(tmp_path: Path, form
     )  # it cancels what is pending: a loop alone would not say so
     assert edges["thin"].decided == "next at := low"
     verdict = said(entry, FORMS[form].write(made.graph), form)
-    assert verdict.found == ()
+    assert verdict.diagnostics == ()
     assert FORMS[form].read(FORMS[form].write(made.graph)).columns == made.graph.columns
 
 
@@ -432,7 +432,7 @@ def test_units_arrays_values_and_whole_conditions_come_back(tmp_path: Path, form
 def test_what_writes_the_state_last_decides(tmp_path: Path, actions: str) -> None:
     entry = found_in(edited(DOOR, ("rest; go(open)  ", actions)), tmp_path)
     verdict = said(entry, FORMS["dot"].write(graph_of(entry).graph), "dot")
-    assert verdict.found == ()
+    assert verdict.diagnostics == ()
     goals = {(edge.target, edge.decided) for edge in graph_of(entry).graph.edges if edge.line == "3"}
     assert (
         goals
@@ -482,7 +482,7 @@ def test_a_solver_without_time_draws_nothing(tmp_path: Path, monkeypatch: pytest
     ):
         assert isinstance(made, Diagnostic)
         assert made.code is Code.UNDECIDED
-    [found] = against(entry.loaded, entry.root, entry.program, entry.table, table, OPTIONS).found
+    [found] = against(entry.loaded, entry.root, entry.program, entry.table, table, OPTIONS).diagnostics
     assert found.code is Code.UNDECIDED
 
 

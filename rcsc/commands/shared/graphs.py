@@ -44,7 +44,7 @@ def found_tables(named: str, *, running: bool = False) -> list[FoundTable]:
     """
     found = tables(named, running=running)
     if isinstance(found, NotFound):
-        raise WrongError(found.found, found.sources)
+        raise WrongError(found.diagnostics, found.sources)
     return found
 
 

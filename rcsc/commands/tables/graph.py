@@ -138,6 +138,6 @@ def _read_back(one: FoundTable, form: str, text: str, options: Options) -> int:
     """How many questions prove that the written graph says the table."""
     made = tabled(FORMS[form].read(text))
     verdict = against(one.loaded, one.root, one.program, one.table, made, options)
-    if verdict.found:
-        raise WrongError(verdict.found, {**one.loaded.sources, **(verdict.sources or {})})
+    if verdict.diagnostics:
+        raise WrongError(verdict.diagnostics, {**one.loaded.sources, **(verdict.sources or {})})
     return verdict.questions

@@ -78,8 +78,8 @@ def _prove(made: Tabled, named: str, options: Options) -> None:
     found = found_tables(f"{named}:{name}" if named.endswith(".rcs") else named)
     one = next((found_table for found_table in found if found_table.table.name == name), found[0])
     verdict = against(one.loaded, one.root, one.program, one.table, made, options)
-    if verdict.found:
-        raise WrongError(verdict.found, {**one.loaded.sources, **(verdict.sources or {})})
+    if verdict.diagnostics:
+        raise WrongError(verdict.diagnostics, {**one.loaded.sources, **(verdict.sources or {})})
     where = f"{one.table.file}:{one.table.name}"
     click.echo(f"{name}: does the same as {where}: proved, {verdict.questions} questions", err=True)
 

@@ -12,7 +12,7 @@ class GraphForm:
     """One form.
 
     Attributes:
-        endings: Of files in it.
+        endings: Endings of its files.
         read: Raises UnreadableError.
     """
 

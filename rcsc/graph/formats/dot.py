@@ -42,7 +42,7 @@ def write(graph: StateGraph) -> str:
 
 
 def _attributes(edge: Edge) -> str:
-    said = {
+    attributes = {
         "label": wrapped(
             " ".join(part for part in (edge.line and f"({edge.line})", edge.shown or edge.default) if part)
         ),
@@ -53,7 +53,7 @@ def _attributes(edge: Edge) -> str:
         "default": edge.default,
     }
     style = ", style=dashed" if edge.decided or edge.default else ""
-    return ", ".join(f"{word}={_quoted(text)}" for word, text in said.items() if text) + style
+    return ", ".join(f"{word}={_quoted(text)}" for word, text in attributes.items() if text) + style
 
 
 def wrapped(text: str) -> str:
@@ -79,7 +79,7 @@ def read(text: str) -> StateGraph:
     """The graph that the text draws; UnreadableError where it is none."""
     reader = _Reader(list(_tokens(text)))
     reader.graph()
-    return finished(reader.said, reader.drawn)
+    return finished(reader.attributes, reader.drawn)
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,24 +114,24 @@ class _Reader:
     tokens: list[_Token]
     at: int = 0
     depth: int = 0
-    said: dict[str, str] = field(default_factory=dict)
+    attributes: dict[str, str] = field(default_factory=dict)
     drawn: list[ReadArrow] = field(default_factory=list)
 
     def graph(self) -> None:
-        """The whole text."""
+        """Reads the whole text."""
         self._skip_word("strict")
         begun = self._take("name")
         if begun.text.lower() != "digraph":
             raise UnreadableError("a state graph is a `digraph`", begun.offset)
         if self._now().kind == "name":
-            self.said["table"] = self._take("name").text
+            self.attributes["table"] = self._take("name").text
         self._take("mark", "{")
         self._statements()
         if self._now().kind != "end":
             raise UnreadableError(f"`{self._now().text}` after the graph", self._now().offset)
 
     def _statements(self) -> None:
-        """Those up to the closing brace."""
+        """Reads the statements up to the closing brace."""
         self.depth += 1
         if self.depth > DEEPEST:
             raise UnreadableError(f"subgraphs are nested more than {DEEPEST} deep", self._now().offset)
@@ -153,11 +153,11 @@ class _Reader:
             self._statements()
             return
         if first.text.lower() in ("node", "edge", "graph") and self._is("["):
-            said = self._attributes()
-            self.said |= said if first.text.lower() == "graph" else {}
+            attributes = self._attributes()
+            self.attributes |= attributes if first.text.lower() == "graph" else {}
             return
         if self._skip("="):
-            self.said[first.text] = self._take("name").text
+            self.attributes[first.text] = self._take("name").text
             return
         self._port()
         ends = [first]
@@ -165,28 +165,28 @@ class _Reader:
             self.at += 1
             ends.append(self._take("name"))
             self._port()
-        said = self._attributes()
+        attributes = self._attributes()
         self.drawn += [
-            ReadArrow(one.text, two.text, said, one.offset)
-            for one, two in pairwise(ends)
-            if one.text  # the nameless point before the initial state
+            ReadArrow(source.text, target.text, attributes, source.offset)
+            for source, target in pairwise(ends)
+            if source.text  # the nameless point before the initial state
         ]
         if not first.text and len(ends) == 2:
-            self.said.setdefault("initial", ends[1].text)
+            self.attributes.setdefault("initial", ends[1].text)
 
     def _port(self) -> None:
         while self._skip(":"):
             self._take("name")
 
     def _attributes(self) -> dict[str, str]:
-        said: dict[str, str] = {}
+        attributes: dict[str, str] = {}
         while self._skip("["):
             while not self._skip("]"):
                 name = self._take("name").text
-                said[name] = self._value() if self._skip("=") else "true"
+                attributes[name] = self._value() if self._skip("=") else "true"
                 if not self._skip(","):
                     self._skip(";")
-        return said
+        return attributes
 
     def _value(self) -> str:
         text = self._take("name").text
@@ -205,9 +205,9 @@ class _Reader:
         return self._now() == _Token("mark", mark, self._now().offset)
 
     def _skip(self, mark: str) -> bool:
-        found = self._now() == _Token("mark", mark, self._now().offset)
-        self.at += found
-        return found
+        present = self._now() == _Token("mark", mark, self._now().offset)
+        self.at += present
+        return present
 
     def _skip_word(self, word: str) -> None:
         self.at += self._now().kind == "name" and self._now().text.lower() == word

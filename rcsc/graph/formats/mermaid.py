@@ -60,9 +60,9 @@ def read(text: str) -> StateGraph:
         raise UnreadableError("the text has no `stateDiagram-v2`")
     ends = {name: ANY for name, shown in read_.names.items() if shown == _ANY_NAME}
     return finished(
-        read_.said,
+        read_.attributes,
         [
-            ReadArrow(ends.get(d.source, d.source), ends.get(d.target, d.target), d.said, d.offset)
+            ReadArrow(ends.get(d.source, d.source), ends.get(d.target, d.target), d.attributes, d.offset)
             for d in read_.drawn
         ],
     )
@@ -72,7 +72,7 @@ def read(text: str) -> StateGraph:
 class _Read:
     """What the lines so far say: of the graph, of its arrows, and what states are shown as, by their names."""
 
-    said: dict[str, str] = field(default_factory=dict)
+    attributes: dict[str, str] = field(default_factory=dict)
     drawn: list[ReadArrow] = field(default_factory=list)
     names: dict[str, str] = field(default_factory=dict)
     begun: bool = False
@@ -81,7 +81,7 @@ class _Read:
         """Takes the next line, without the space around it; `offset` is where in the text it begins."""
         if match := _HEADER.match(line):
             if match[1] in HEADER:
-                self.said[match[1]] = match[2].strip()
+                self.attributes[match[1]] = match[2].strip()
         elif line in ("stateDiagram-v2", "stateDiagram"):
             self.begun = True
         elif not line or line.startswith("%%"):
@@ -103,7 +103,7 @@ class _Read:
 
     def _arrow(self, source: str, target: str, text: str, offset: int) -> None:
         if source == "[*]":
-            self.said["initial"] = target
+            self.attributes["initial"] = target
         elif target == "[*]":
             raise UnreadableError("a table has no end: a level runs its table in every cycle", offset)
         else:
@@ -111,21 +111,21 @@ class _Read:
 
 
 def _transition(text: str, offset: int) -> dict[str, str]:
-    """What a transition's text says."""
+    """The attributes that a transition's text states."""
     match = _LINE.match(text)
     assert match is not None  # everything in it may be left out
-    said = {"line": match[1] or "", "default": match[2] or ""}
+    attributes = {"line": match[1] or "", "default": match[2] or ""}
     rest = text[match.end() :]
     if rest.startswith("["):
         end = _closing(rest)
         if end < 0:
             raise UnreadableError("the guard's bracket is not closed", offset)
-        said["when"] = rest[1:end]
+        attributes["when"] = rest[1:end]
         rest = rest[end + 1 :]
-    said["does"], _, said["decided"] = (
+    attributes["does"], _, attributes["decided"] = (
         rest.partition("by ") if rest.strip().startswith("by ") else rest.partition(" by ")
     )
-    return said
+    return attributes
 
 
 def _closing(text: str) -> int:

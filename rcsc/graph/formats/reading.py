@@ -23,36 +23,36 @@ class UnreadableError(Exception):
 
 
 MOST_BYTES = 16 * 1024 * 1024
-"""Of a graph."""
+"""Largest text of a graph."""
 MOST_ARROWS = 4096
 """More make no table that anyone reads."""
 
 
 @dataclass(frozen=True, slots=True)
 class ReadArrow:
-    """An arrow as a form has it: its ends, and words about it (`line`, `when`, `does`, `decided`, `default`)."""
+    """An arrow as a form has it: its ends, and attributes (`line`, `when`, `does`, `decided`, `default`)."""
 
     source: str
     target: str
-    said: Mapping[str, str]
+    attributes: Mapping[str, str]
     offset: int = 0
 
     def edge(self) -> Edge:
-        """The edge."""
-        said = self.said
+        """The arrow as an edge of a state graph."""
+        attributes = self.attributes
         return Edge(
-            said.get("line", "").strip(),
+            attributes.get("line", "").strip(),
             self.source,
             self.target,
-            said.get("when", "").strip(),
-            said.get("does", "").strip(),
-            said.get("decided", "").strip(),
-            said.get("default", "").strip(),
+            attributes.get("when", "").strip(),
+            attributes.get("does", "").strip(),
+            attributes.get("decided", "").strip(),
+            attributes.get("default", "").strip(),
             offset=self.offset,
         )
 
 
-def finished(said: Mapping[str, str], drawn: list[ReadArrow]) -> StateGraph:
+def finished(attributes: Mapping[str, str], drawn: list[ReadArrow]) -> StateGraph:
     """The graph of what was read; UnreadableError where it is no graph of a table."""
     if not drawn:
         raise UnreadableError("the graph has no edge")
@@ -60,16 +60,16 @@ def finished(said: Mapping[str, str], drawn: list[ReadArrow]) -> StateGraph:
         raise UnreadableError(
             f"the graph has {len(drawn)} arrows, more than {MOST_ARROWS}", drawn[MOST_ARROWS].offset
         )
-    said = {word: text for word, text in said.items() if word in HEADER}
-    if not said.get("table"):
+    attributes = {word: text for word, text in attributes.items() if word in HEADER}
+    if not attributes.get("table"):
         raise UnreadableError("the graph does not say which `table` it is")
-    states = dict.fromkeys(name for one in drawn for name in (one.source, one.target) if name != ANY)
-    for one in drawn:
-        if one.target == ANY and one.source != ANY:
+    states = dict.fromkeys(name for arrow in drawn for name in (arrow.source, arrow.target) if name != ANY)
+    for arrow in drawn:
+        if arrow.target == ANY and arrow.source != ANY:
             raise UnreadableError(
-                "an edge can lead to every state only from every state: draw a loop", one.offset
+                "an edge can lead to every state only from every state: draw a loop", arrow.offset
             )
-    return with_header(dict(said), tuple(one.edge() for one in drawn), tuple(states))
+    return with_header(dict(attributes), tuple(arrow.edge() for arrow in drawn), tuple(states))
 
 
 def diagnosed(error: UnreadableError, source: Source) -> Diagnostic:

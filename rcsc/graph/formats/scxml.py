@@ -49,10 +49,12 @@ def _free(name: str, taken: tuple[str, ...]) -> str:
 def _transition(edge: Edge) -> str:
     target = "" if edge.target == ANY else edge.target
     own = zip(_WORDS, (edge.line, edge.effect, edge.decided, edge.default), strict=True)
-    said = {"event": "cycle", "cond": edge.guard, "target": target} | {
+    attributes = {"event": "cycle", "cond": edge.guard, "target": target} | {
         f"rcsc:{word}": text for word, text in own
     }
-    return f"<transition {' '.join(f'{word}={quoteattr(text)}' for word, text in said.items() if text)}/>"
+    return (
+        f"<transition {' '.join(f'{word}={quoteattr(text)}' for word, text in attributes.items() if text)}/>"
+    )
 
 
 # --- reading -----------------------------------------------------------------------------
@@ -67,19 +69,19 @@ def read(text: str) -> StateGraph:
         raise UnreadableError(what, _offset(text, row) + column) from error
     if root.tag != f"{{{SCXML}}}scxml":
         raise UnreadableError("the outermost element is not `scxml`")
-    said = {
+    attributes = {
         name.removeprefix(f"{{{OWN}}}"): value
         for name, value in root.attrib.items()
         if name.startswith(f"{{{OWN}}}")
     }
-    said.setdefault("table", root.get("name", ""))
+    attributes.setdefault("table", root.get("name", ""))
     states = [element for element in root if element.tag == _STATE]
     whole = len(states) == 1 and any(element.tag == _STATE for element in states[0])
-    said.setdefault("initial", (states[0] if whole else root).get("initial", ""))
+    attributes.setdefault("initial", (states[0] if whole else root).get("initial", ""))
     reader = _Reader(text)
     for state in states:
         reader.state(state, ANY if whole else state.get("id", ""))
-    return finished({word: one for word, one in said.items() if one}, reader.drawn)
+    return finished({word: value for word, value in attributes.items() if value}, reader.drawn)
 
 
 def _offset(text: str, row: int) -> int:
@@ -106,11 +108,11 @@ class _Reader:
             if element.tag != f"{{{SCXML}}}transition":
                 continue
             at = len(self.drawn)
-            said = {word: element.get(f"{{{OWN}}}{word}", "") for word in _WORDS} | {
+            attributes = {word: element.get(f"{{{OWN}}}{word}", "") for word in _WORDS} | {
                 "when": element.get("cond", "")
             }
             offset = self.places[at] if at < len(self.places) else 0
-            self.drawn.append(ReadArrow(name, element.get("target") or name, said, offset))
+            self.drawn.append(ReadArrow(name, element.get("target") or name, attributes, offset))
 
 
 def _blank(match: re.Match[str]) -> str:

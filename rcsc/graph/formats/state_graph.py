@@ -69,12 +69,12 @@ class StateGraph:
 
 
 HEADER = ("table", "state", "next", "initial", "assuming", "uses", "columns", "lines")
-"""What every form says of the graph as a whole, by these words."""
+"""Attributes of the graph as a whole, in every form."""
 
 
 def header(graph: StateGraph) -> dict[str, str]:
-    """What is said of the graph as a whole; empty texts left out."""
-    said = {
+    """The attributes of the graph as a whole; empty texts left out."""
+    attributes = {
         "table": graph.table,
         "state": graph.state,
         "next": "deferred" if graph.deferred else "at once",
@@ -84,20 +84,20 @@ def header(graph: StateGraph) -> dict[str, str]:
         "columns": graph.columns,
         "lines": " ".join(graph.lines),
     }
-    return {word: text for word, text in said.items() if text}
+    return {word: text for word, text in attributes.items() if text}
 
 
-def with_header(said: dict[str, str], edges: tuple[Edge, ...], states: tuple[str, ...]) -> StateGraph:
-    """The graph of which a form says this; the words not said are as in `StateGraph`."""
+def with_header(attributes: dict[str, str], edges: tuple[Edge, ...], states: tuple[str, ...]) -> StateGraph:
+    """The graph with these attributes; one that is missing is as in `StateGraph`."""
     return StateGraph(
-        said.get("table", ""),
-        said.get("state", "cur_state"),
+        attributes.get("table", ""),
+        attributes.get("state", "cur_state"),
         edges,
-        said.get("next", "deferred") == "deferred",
-        said.get("initial", ""),
-        tuple(one.strip() for one in said.get("assuming", "").split(",") if one.strip()),
-        tuple(one.strip() for one in said.get("uses", "").split(",") if one.strip()),
-        said.get("columns", ""),
-        tuple(said.get("lines", "").split()),
+        attributes.get("next", "deferred") == "deferred",
+        attributes.get("initial", ""),
+        tuple(name.strip() for name in attributes.get("assuming", "").split(",") if name.strip()),
+        tuple(name.strip() for name in attributes.get("uses", "").split(",") if name.strip()),
+        attributes.get("columns", ""),
+        tuple(attributes.get("lines", "").split()),
         states,
     )
