@@ -55,21 +55,21 @@ Fields: TypeAlias = tuple[tuple[str, str], ...]
 def emit_c(plan: Plan) -> dict[str, str]:
     """The C files of the plan, by path below the generated folder."""
     maker = _Maker(plan)
-    made, name = maker.view(), maker.p
+    view, name = maker.view(), maker.p
     return {
-        f"c/{name}.h": render("header.h.jinja", made),
-        f"c/{name}.c": render("source.c.jinja", made),
+        f"c/{name}.h": render("header.h.jinja", view),
+        f"c/{name}.c": render("source.c.jinja", view),
         f"c/{maker.names.file}.json": symbols(plan, maker.names),
-        f"c/{name}.cmake": render("target.cmake.jinja", made),
-        f"c/{name}.pc": render("package.pc.jinja", made),
+        f"c/{name}.cmake": render("target.cmake.jinja", view),
+        f"c/{name}.pc": render("package.pc.jinja", view),
     }
 
 
 def outward(plan: Plan) -> Iterator[tuple[str, str]]:
     """Give each name in C that others than the program's own file see, and what it is.
 
-    Two programs that are linked, or whose headers are included together, may share a name only where both declare it, and alike: an extern
-    procedure.
+    Two programs that are linked, or whose headers are included together, may share only the name of an extern procedure that both
+    declare alike.
     """
     maker = _Maker(plan)
     names, p = maker.names, maker.names.program
@@ -79,8 +79,8 @@ def outward(plan: Plan) -> Iterator[tuple[str, str]]:
     own += [f"{p}_{stem}_t" for stem in (*names.records.values(), *names.enums.values())]
     own += [member for members in names.constants.values() for member in members]
     yield from ((name, f"a name of program `{plan.program.name}`") for name in own)
-    for one, types in maker.declared():
-        yield one, f"a function of yours of {', '.join(types) or 'nothing'}"
+    for extern, types in maker.declared():
+        yield extern, f"a function of yours of {', '.join(types) or 'nothing'}"
 
 
 def helper(program: str, name: str) -> Function:
@@ -93,12 +93,12 @@ def helper(program: str, name: str) -> Function:
     op, short = name.split("_")
     kind = SHORT[short]
     if op == "abs":
-        zero, found = Constant(0, kind), None
+        zero, absolute = Constant(0, kind), None
         if kind == "double":
-            found = Choice(infix("<=", a, zero), infix("-", zero, a), a)  # of -0.0 too
+            absolute = Choice(infix("<=", a, zero), infix("-", zero, a), a)  # of -0.0 too
         elif kind == "int64_t":
-            found = Choice(infix("<", a, zero), Prefix("-", a), a)
-        return Function("The absolute value.", f"{kind} {program}_{name}({kind} a)", (Leave(found or a),))
+            absolute = Choice(infix("<", a, zero), Prefix("-", a), a)
+        return Function("The absolute value.", f"{kind} {program}_{name}({kind} a)", (Leave(absolute or a),))
     sign, word = ("<", "lesser") if op == "min" else (">", "greater")
     return Function(
         f"The {word} of two; the first where it is no number.",
@@ -131,9 +131,9 @@ class _Maker:
         publics = (self._init(), self._check(), *tables, *self._steps(), *levels)
         code = tuple(read((*procedures, *shared, *publics, *self.cuts)))
         used = {invoke.helper for invoke in code if isinstance(invoke, Invoke) and invoke.helper}
-        bits = {one for one in used if one.startswith("bit")}
+        bits = {name for name in used if name.startswith("bit")}
         kinds = {c_type(variable.type) for variable in self.program.variables}
-        reals = "double" in kinds.union(getattr(one, "type", "") for one in code)
+        reals = "double" in kinds.union(getattr(node, "type", "") for node in code)
         return {
             "plan": self.plan,
             "program": self.p,
@@ -176,17 +176,22 @@ class _Maker:
 
     def _fields(self) -> Iterator[tuple[str, str]]:
         variables = {v.name: v for v in self.program.variables}
-        for one in self.program.declared:
-            root = self.names.roots[one.name]
-            words = [one.kind.value, _range(one.type), _safe_said(variables[one.leaves[0]]), comment(one.doc)]
-            yield self._declare(root, one.type), "; ".join(word for word in words if word)
-            later = pending(one.name)
+        for declared in self.program.declared:
+            root = self.names.roots[declared.name]
+            words = [
+                declared.kind.value,
+                _range(declared.type),
+                _safe_text(variables[declared.leaves[0]]),
+                comment(declared.doc),
+            ]
+            yield self._declare(root, declared.type), "; ".join(word for word in words if word)
+            later = pending(declared.name)
             if later in variables:
                 doc = f"state; the deferred next value of {root}"
                 yield self._declare("".join(self.names.paths[later]), variables[later].type), doc
 
     def declared(self) -> Iterator[tuple[str, tuple[str, ...]]]:
-        """Each function of the user's, and the types of its parameters; a pointer's ends in a star."""
+        """Each user function, and the types of its parameters; a pointer's ends in a star."""
         for procedure in self.program.procedures:
             if procedure.extern is not None:
                 yield (
@@ -230,9 +235,11 @@ class _Maker:
         kinds = dict(locals_of(procedure))
         yield from (Let(wide_type(kind), f"v_{name}", constant(kind, 0)) for name, kind in kinds.items())
         body = self.text.block(procedure.body)
-        used = {one.text for one in read(body) if isinstance(one, Name)}
+        used = {code.text for code in read(body) if isinstance(code, Name)}
         named = (local(name) for name in (*kinds, *(param.name for param in procedure.params)))
-        yield from (_unused(one) for one in named if one.text not in used)  # set, perhaps, and never read
+        yield from (
+            _unused(variable) for variable in named if variable.text not in used
+        )  # set, perhaps, and never read
         yield from body
         if not _of_state(body):
             yield _unused(STATE)
@@ -288,7 +295,7 @@ class _Maker:
         )
 
     def _check(self) -> Function:
-        """All states and outputs, and the representation of every bool; then the invariants, which are about these."""
+        """Checks all states and outputs, and the representation of every bool; then the invariants over them."""
         tests = [self._unfit(variable) for variable in self.program.variables]
         tests += [
             Prefix("!", Round(self.text.expr(invariant.condition))) for invariant in self.program.invariants
@@ -310,7 +317,7 @@ class _Maker:
         return Function(doc, f"int32_t {self.p}_check(const {self.p}_t *s)", body)
 
     def _unfit(self, variable: Variable) -> Code | None:
-        """That the place holds no value of the type; inputs are admitted by every cycle."""
+        """A condition that the place holds no value of its type; None where its C type or admission rules that out."""
         kind, place = variable.type, self.text.place(variable.name)
         if isinstance(kind, Bool):  # read as a byte: as a bool, another than 0 and 1 means nothing
             byte = Prefix("*", Cast("const uint8_t *", Prefix("&", place)))
@@ -389,13 +396,13 @@ class _Maker:
         yield from (self._one_word if matcher.words <= 1 else self._many_words)(matcher, masks)
 
     def _index(self, group: Group, name: str) -> Code:
-        found: Code | None = None
+        index: Code | None = None
         for number, probe in enumerate(group):
-            one = self._class(probe.index, f"{name}_{number}")
-            moved = found and Round(infix("*", Round(found), Constant(probe.index.count, "uint32_t")))
-            found = Round(infix("+", moved, one)) if moved else one
-        assert found is not None
-        return found
+            leaf_class = self._class(probe.index, f"{name}_{number}")
+            moved = index and Round(infix("*", Round(index), Constant(probe.index.count, "uint32_t")))
+            index = Round(infix("+", moved, leaf_class)) if moved else leaf_class
+        assert index is not None
+        return index
 
     def _class(self, index: Index, name: str) -> Code:
         match index:
@@ -467,14 +474,14 @@ class _Maker:
         zero, several, seen, some, w = Constant(0, "uint32_t"), *map(Name, ("several", "seen", "some", "w"))
         yield from (Let("uint64_t", "several", zero), Let("uint64_t", "seen", zero))
         yield from (Let("int32_t", "line", Constant(0)), Let("int32_t", "none"), Let("uint32_t", "w"))
-        found = infix("!=", M, zero)
+        nonzero = infix("!=", M, zero)
         at = infix("+", infix("*", Cast("int32_t", w), Constant(WORD)), self._lowest(WORD, M))
         body = (
             Let("const uint64_t", "m", Infix("&", tuple(Element(row, w) for row in rows))),
-            Let("const uint64_t", "some", Choice(found, ONE, NOTHING)),
+            Let("const uint64_t", "some", Choice(nonzero, ONE, NOTHING)),
             Set(several, infix("|", several, infix("&", M, infix("-", M, ONE)), infix("&", some, seen))),
             Set(seen, infix("|", seen, some)),
-            Set(FOUND, Choice(found, at, FOUND)),
+            Set(FOUND, Choice(nonzero, at, FOUND)),
         )
         yield _counted(w, Constant(matcher.words, "uint32_t"), *body)
         yield Set(Name("none"), Constant(matcher.lines) if matcher.default else Round(NONE))
@@ -486,7 +493,9 @@ class _Maker:
         """One function a table: a match that runs the line's actions."""
         for table in self.plan.tables:
             name = self.names.tables[table.table.name]
-            told = [one for place in table.monitored for one in self._told(place, stops=place in table.stops)]
+            told = [
+                stmt for place in table.monitored for stmt in self._told(place, stops=place in table.stops)
+            ]
             matched = self._matched(table, name)
             run = (when(FAULTLESS, *matched),) if table.stops else matched
             doc = f"Matches table {table.table.name} and runs the line."
@@ -522,7 +531,7 @@ class _Maker:
     # --- steps and cycles ---
 
     def _cycle(self, doc: str, name: str, *body: Stmt) -> Function:
-        """What every step and cycle begins and ends with."""
+        """The frame of every step and cycle."""
         begin = self._run_on_state("begin" if self.plan.defensive else "admit")
         shown = any(variable.safe is not None for variable in self.program.variables)
         safe = (when(FAULTED, self._run_on_state("safe")),) if shown else ()
@@ -570,7 +579,7 @@ class _Maker:
 
 
 def _counted(count: Name, end: Code, *body: Stmt) -> Frame:
-    """A loop from 0 up to the end, which is left out."""
+    """A loop from 0 up to the end, exclusive."""
     zero, one = Constant(0, "uint32_t"), Constant(1, "uint32_t")
     return repeated(Set(count, zero), infix("<", count, end), Set(count, infix("+", count, one)), *body)
 
@@ -581,7 +590,7 @@ def _unused(name: Name) -> Do:
 
 def _of_state(body: Body) -> bool:
     """Whether it reads or writes the state."""
-    return any(isinstance(one, Place) or one == STATE for one in read(body))
+    return any(isinstance(code, Place) or code == STATE for code in read(body))
 
 
 def _faulted(fault: Fault, at: int) -> Body:
@@ -611,7 +620,7 @@ def _admitted(variable: Variable, place: Code, position: int, fault: Fault) -> I
 
 
 def _beyond(kind: Real, place: Code) -> Code:
-    """That a real is outside its range, or no number."""
+    """A condition that a real is outside its range, or no number."""
     low, high = constant(kind, kind.low), constant(kind, kind.high)
     return Prefix("!", infix("&&", infix(">=", place, low), infix("<=", place, high)))
 
@@ -687,7 +696,7 @@ def _wrapped(values: Iterable[Code], width: int = 88) -> Iterator[Line]:
 def _codes(index: Coded) -> Body:
     """The class of `value`, looked up."""
     head = f"static const uint{8 if index.count <= 256 else 16}_t classes[{len(index.classes)}] = {{"
-    rows = tuple(_wrapped(Constant(one, "uint32_t") for one in index.classes))
+    rows = tuple(_wrapped(Constant(number, "uint32_t") for number in index.classes))
     return Frame((head,), rows, "};"), Leave(Element(Name("classes"), Name("value")))
 
 
@@ -701,8 +710,8 @@ def _search(index: Cuts, wide: str) -> Iterator[Stmt]:
     while step:
         ahead, last = (infix("+", AT, Constant(by, "uint32_t")) for by in (step, step - 1))
         reached = infix(">=", Name("value"), Element(cuts, infix("%", last, count)))
-        found = infix("&&", infix("<=", ahead, count), reached)
-        yield Set(AT, infix("+", AT, Choice(found, Constant(step, "uint32_t"), Constant(0, "uint32_t"))))
+        taken = infix("&&", infix("<=", ahead, count), reached)
+        yield Set(AT, infix("+", AT, Choice(taken, Constant(step, "uint32_t"), Constant(0, "uint32_t"))))
         step >>= 1
     yield Leave(AT)
 
@@ -718,12 +727,12 @@ def _range(kind: model.Type) -> str:
             return ""
 
 
-def _safe_said(variable: Variable) -> str:
+def _safe_text(variable: Variable) -> str:
     return "" if variable.safe is None else f"safe {spell(variable.type, variable.safe)}"
 
 
 def _failing(program: Program) -> frozenset[str]:
-    """Procedures that call an extern one, directly or not."""
+    """Procedures that call an extern procedure, directly or not."""
     failing = {str(p.name) for p in program.procedures if p.extern is not None}
     while True:
         more = {str(p.name) for p in program.procedures if failing.intersection(_called(p.body))} - failing
@@ -751,7 +760,7 @@ def _callees_first(program: Program) -> list[Procedure]:
     reached = set[str]()
     while run - reached:
         reached |= run
-        run = {name for one in reached for name in _called(by_name[model.ProcedureName(one)].body)}
+        run = {name for caller in reached for name in _called(by_name[model.ProcedureName(caller)].body)}
     for procedure in program.procedures:
         if procedure.name in reached:
             visit(procedure)

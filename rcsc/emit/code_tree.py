@@ -203,7 +203,7 @@ def infix(op: str, *operands: Code) -> Infix:
 
 def repeated(begin: Set, goes: Code, step: Set, *body: Stmt) -> Frame:
     """C's `for`."""
-    first, then = (infix("=", one.place, one.value) for one in (begin, step))
+    first, then = (infix("=", assignment.place, assignment.value) for assignment in (begin, step))
     return Frame(("for (", first, "; ", goes, "; ", then, ") {"), body, "}")
 
 
@@ -215,8 +215,8 @@ def when(condition: Code, *body: Stmt) -> Branch:
 def read(node: object) -> Iterator[Code]:
     """Every expression in a tree, but for variables that are only set."""
     if isinstance(node, tuple):
-        for one in node:
-            yield from read(one)
+        for child in node:
+            yield from read(child)
     elif isinstance(node, Set) and isinstance(node.place, Name):
         yield from read(node.value)
     elif isinstance(node, Code | Stmt | Function):
@@ -251,13 +251,13 @@ class Language(ABC):
     end = ""
     heads: tuple[str, str, str, str]
 
-    def code(self, one: Code) -> str:
+    def code(self, code: Code) -> str:
         """An expression."""
-        match one:
+        match code:
             case Name(text=text):
                 return text
             case Constant():
-                return self.constant(one)
+                return self.constant(code)
             case Place(steps=steps):
                 return self.state + "".join(s if isinstance(s, str) else f"[{self.code(s)}]" for s in steps)
             case Prefix(op=op, operand=operand):
@@ -269,30 +269,30 @@ class Language(ABC):
             case Invoke(function=function, args=args):
                 return f"{function}({', '.join(map(self.code, args))})"
             case Cast() | Choice() | Items():
-                return self.own(one)
+                return self.own(code)
             case Element(of=of, at=at):
                 return f"{self.operand(of, TIGHTEST)}[{self.code(at)}]"
             case Round(inner=inner):
                 return f"({self.code(inner)})"
             case _:
-                assert_never(one)
+                assert_never(code)
 
-    def operand(self, one: Code, level: int) -> str:
+    def operand(self, code: Code, level: int) -> str:
         """An operand of an operator of this level, in parentheses where it binds no closer."""
-        match one:
+        match code:
             case Infix(op=op):
                 loose = self.levels.get(op, 0) <= level
             case Prefix(op=op):
                 loose = self.levels.get(f"{op}x", 0) <= level
             case _:
-                loose = isinstance(one, Choice)
-        return f"({self.code(one)})" if loose else self.code(one)
+                loose = isinstance(code, Choice)
+        return f"({self.code(code)})" if loose else self.code(code)
 
     def lines(self, body: Body, indent: int = 1) -> Iterator[str]:
         """Statements, a line each."""
         pad = "    " * indent
-        for one in body:
-            match one:
+        for stmt in body:
+            match stmt:
                 case Set(place=place, value=value):
                     yield f"{pad}{self.code(place)} = {self.code(value)}{self.end}"
                 case Do(call=call):
@@ -314,20 +314,20 @@ class Language(ABC):
                 case Line(text=text):
                     yield pad + text
                 case Let() | Loop():
-                    yield from self.lines(self.framed(one), indent)
+                    yield from self.lines(self.framed(stmt), indent)
                 case _:
-                    assert_never(one)
+                    assert_never(stmt)
 
     @abstractmethod
-    def constant(self, one: Constant) -> str:
+    def constant(self, constant: Constant) -> str:
         """A number or a truth."""
 
     @abstractmethod
-    def own(self, one: Cast | Choice | Items) -> str:
+    def own(self, code: Cast | Choice | Items) -> str:
         """An expression that each language spells in its own way."""
 
     @abstractmethod
-    def framed(self, one: Let | Loop) -> Body:
+    def framed(self, stmt: Let | Loop) -> Body:
         """A statement that each language spells in its own way, by simpler ones."""
 
 
@@ -338,10 +338,10 @@ class C(Language):
     levels = MappingProxyType({"=": -1, "*": 1})
     heads = ("if ({}) {{", "}} else if ({}) {{", "} else {", "}")
 
-    def constant(self, one: Constant) -> str:
+    def constant(self, constant: Constant) -> str:
         """By its type; the least of `int64_t` has no spelling of its own."""
-        value = one.value
-        match one.type:
+        value = constant.value
+        match constant.type:
             case "bool":
                 return "true" if value else "false"
             case "double":
@@ -351,14 +351,14 @@ class C(Language):
             case "int64_t" | "uint64_t":
                 if value == I64_MIN:
                     return f"(-INT64_C({I64_MAX}) - INT64_C(1))"
-                word = "UINT64_C" if value > I64_MAX or one.type == "uint64_t" else "INT64_C"
+                word = "UINT64_C" if value > I64_MAX or constant.type == "uint64_t" else "INT64_C"
                 return f"{word}({value:d})" if value >= 0 else f"(-{word}({-value:d}))"
             case _:
-                return f"{value:d}{'u' if one.type == 'uint32_t' else ''}"
+                return f"{value:d}{'u' if constant.type == 'uint32_t' else ''}"
 
-    def own(self, one: Cast | Choice | Items) -> str:
+    def own(self, code: Cast | Choice | Items) -> str:
         """As ISO C99, 6.5.4, 6.5.15 and 6.7.8."""
-        match one:
+        match code:
             case Cast(type=name, operand=operand):
                 return f"({name}){self.operand(operand, -1 if isinstance(operand, Prefix) else 1)}"
             case Choice(condition=condition, yes=yes, no=no):
@@ -366,20 +366,20 @@ class C(Language):
             case Items(items=items):
                 return f"{{ {', '.join(map(self.code, items))} }}"
 
-    def framed(self, one: Let | Loop) -> Body:
+    def framed(self, stmt: Let | Loop) -> Body:
         """Declarations; a loop to the last value of its type ends without counting past it."""
-        match one:
+        match stmt:
             case Let(type=kind, name=name, value=value):
                 return (Line(f"{kind} {name}{'' if value is None else f' = {self.code(value)}'};"),)
             case Loop(name=name, guard=guard):
-                count, high = Name(name), Constant(one.high, "int64_t")
-                begin = Set(count, Constant(one.low, "int64_t"))
-                wide = one.low >= 0 and one.high > I64_MAX
+                count, high = Name(name), Constant(stmt.high, "int64_t")
+                begin = Set(count, Constant(stmt.low, "int64_t"))
+                wide = stmt.low >= 0 and stmt.high > I64_MAX
                 step = Set(count, infix("+", count, Constant(1, "uint64_t" if wide else "int64_t")))
-        if one.high < (U64_MAX if wide else I64_MAX):
-            return (repeated(begin, infix("&&", infix("<=", count, high), *guard), step, *one.body),)
+        if stmt.high < (U64_MAX if wide else I64_MAX):
+            return (repeated(begin, infix("&&", infix("<=", count, high), *guard), step, *stmt.body),)
         more = Name(f"more_{name.removeprefix('v_')}")
-        inner = (*one.body, Set(more, infix("<", count, high)), when(more, step))
+        inner = (*stmt.body, Set(more, infix("<", count, high)), when(more, step))
         again = Frame(("while (", infix("&&", more, *guard), ") {"), inner, "}")
         return (Frame(("{",), (Let("bool", more.text, Constant(1, "bool")), begin, again), "}"),)
 
@@ -395,14 +395,14 @@ class Python(Language):
     chained = "+-"
     heads = ("if {}:", "elif {}:", "else:", "")
 
-    def constant(self, one: Constant) -> str:
+    def constant(self, constant: Constant) -> str:
         """A number has no type of C."""
-        kind = {"bool": bool, "double": float}.get(one.type, int)
-        return repr(kind(one.value))
+        kind = {"bool": bool, "double": float}.get(constant.type, int)
+        return repr(kind(constant.value))
 
-    def own(self, one: Cast | Choice | Items) -> str:
+    def own(self, code: Cast | Choice | Items) -> str:
         """A conversion, a conditional expression, a tuple."""
-        match one:
+        match code:
             case Cast(type=name, operand=operand):
                 return f"{name}({self.code(operand)})"
             case Choice(condition=condition, yes=yes, no=no):
@@ -414,9 +414,9 @@ class Python(Language):
         """Statements, a line each; `pass` for nothing."""
         yield from list(super().lines(body, indent)) or ["    " * indent + "pass"]
 
-    def framed(self, one: Let | Loop) -> Body:
+    def framed(self, stmt: Let | Loop) -> Body:
         """Nothing is declared."""
-        match one:
+        match stmt:
             case Let(name=name, value=value):
                 return (Set(Name(name), value),) if value is not None else ()
             case Loop(name=name, low=low, high=high, body=body):

@@ -177,7 +177,7 @@ class CText(Text):
         steps: tuple[str | Code, ...] = self.names.paths[leaves[0]]
         if index is not None and len(leaves) > 1:
             pairs = zip(steps, self.names.paths[leaves[1]], strict=True)
-            at = next(at for at, (one, other) in enumerate(pairs) if one != other)
+            at = next(at for at, (step, other) in enumerate(pairs) if step != other)
             steps = (*steps[:at], self.expr(index), *steps[at + 1 :])
         return Place(steps, c_type(kind))
 
@@ -187,8 +187,8 @@ class CText(Text):
         return Infix("||", equal) if equal else constant(Bool(), value=False)
 
     def _applied(self, op: Operator, args: tuple[Expr, ...], kind: Scalar) -> Code:
-        """In the one type that the prover shows operands and result to fit in."""
-        if op is Op.XOR:  # of truth values; one that is known to equal the other is no comparison, either
+        """An operation, in the type that the prover shows operands and result to fit in."""
+        if op is Op.XOR:  # of truth values; it is no comparison where the operands are known to be equal
             op = Op.NE
         if is_comparison(op) and (known := _decided(op, args)) is not None:
             return constant(Bool(), known)
@@ -196,8 +196,8 @@ class CText(Text):
         if op is Op.TO_INT or op is Op.TO_REAL:
             return self.converted(*given[0], wide_type(kind))
         shared = _shared((*(arg.type for arg in args), kind))
-        found = self._operation(op, tuple(self.converted(*one, shared) for one in given), shared)
-        return found if is_comparison(op) else self.converted(found, shared, wide_type(kind))
+        result = self._operation(op, tuple(self.converted(*operand, shared) for operand in given), shared)
+        return result if is_comparison(op) else self.converted(result, shared, wide_type(kind))
 
     def _operation(
         self,
@@ -228,7 +228,7 @@ class CText(Text):
     def converted(self, code: Code, source: str, target: str) -> Code:
         """A value of C type `source` as one of `target`; it was proved to fit.
 
-        What an operation made is converted by a function of its own: MISRA C 10.8 forbids a cast there.
+        The result of an operation is converted by a function of its own: MISRA C 10.8 forbids a cast there.
         """
         if source == target:
             return code
@@ -275,10 +275,10 @@ class CText(Text):
     def asked(self, condition: Expr) -> Code:
         """A condition as it stands in the parentheses of an `if`: `(a == b)` in them looks like a mistyped assignment."""
         match self.expr(condition):
-            case Round(Infix(op="==", operands=(Name() | Place() | Invoke() as one, other))):
-                return infix("==", one, other)
-            case Round(Infix(op="==", operands=(Constant(value=value) as one, other))) if value >= 0:
-                return infix("==", one, other)
+            case Round(Infix(op="==", operands=(Name() | Place() | Invoke() as left, right))):
+                return infix("==", left, right)
+            case Round(Infix(op="==", operands=(Constant(value=value) as left, right))) if value >= 0:
+                return infix("==", left, right)
             case code:
                 return code
 

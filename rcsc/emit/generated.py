@@ -19,7 +19,7 @@ _SYMBOLS = re.compile(r'\{\s*"program": "([^"]*)"')
 
 
 def write(files: Mapping[str, str], folder: str) -> tuple[Diagnostic, ...]:
-    """Write the files under `folder`; what could not be written, or would overwrite something else: then none is written.
+    """Write the files under `folder`; return what cannot be written or would overwrite something else: then none is.
 
     Unchanged files are left alone.
     """
@@ -39,8 +39,8 @@ def write(files: Mapping[str, str], folder: str) -> tuple[Diagnostic, ...]:
 
 
 def stale(files: Mapping[str, str], folder: str) -> tuple[Diagnostic, ...]:
-    """Files under `folder` that are missing or differ."""
-    found = []
+    """A diagnostic for each file under `folder` that is missing or differs."""
+    diagnostics = []
     for name, text in sorted(files.items()):
         path = Path(folder) / name
         try:
@@ -50,8 +50,8 @@ def stale(files: Mapping[str, str], folder: str) -> tuple[Diagnostic, ...]:
             fresh, message = False, f"`{path}` is missing"
         if not fresh:
             helps = ("run `rcsc compile`",)
-            found.append(Diagnostic(Code.STALE, message, Label(Span(str(path), 0, 0)), help=helps))
-    return tuple(found)
+            diagnostics.append(Diagnostic(Code.STALE, message, Label(Span(str(path), 0, 0)), help=helps))
+    return tuple(diagnostics)
 
 
 def _others(files: Mapping[str, str], folder: Path) -> Iterator[Diagnostic]:
@@ -71,8 +71,8 @@ def _others(files: Mapping[str, str], folder: Path) -> Iterator[Diagnostic]:
 
 def _program(text: str) -> str:
     """The name of the program that a generated file says it is of; empty where it says none."""
-    if found := _MARK.match(text):
-        return PurePath(found[1].removesuffix(" */")).stem
+    if match := _MARK.match(text):
+        return PurePath(match[1].removesuffix(" */")).stem
     symbols = _SYMBOLS.match(text)
     return symbols[1] if symbols else ""
 

@@ -89,9 +89,9 @@ class NameScope:
 
     def fresh(self, name: str) -> str:
         """`name`, or the first of `name_2`, `name_3` that is free; it is then taken."""
-        found = next(variant for variant in _variants(name) if variant not in self.names)
-        self.names.add(found)
-        return found
+        free = next(variant for variant in _variants(name) if variant not in self.names)
+        self.names.add(free)
+        return free
 
     def all(self, wanted: Iterable[tuple[str, str]], claims: "Claims | None" = None) -> dict[str, str]:
         """A spelling for each name, in order.
@@ -108,9 +108,9 @@ class NameScope:
 
     def _claimed(self, word: str, claims: "Claims | None") -> str:
         for variant in _variants(word):
-            made = [(self, variant), *(claims(variant) if claims else ())]
-            if all(name not in scope.names for scope, name in made):
-                for scope, name in made:
+            claimed = [(self, variant), *(claims(variant) if claims else ())]
+            if all(name not in scope.names for scope, name in claimed):
+                for scope, name in claimed:
                     scope.names.add(name)
                 return variant
         raise AssertionError(word)
@@ -132,16 +132,16 @@ class Names:
     """The names of one program's executors.
 
     Attributes:
-        file: What the symbol file is called: the program's name as it is.
-        program: In front of all C names, and the other files' name.
-        attributes: Of each leaf, in Python.
-        paths: Of each leaf, in the C struct, member by member and index by index.
-        roots: Of each declared variable, in the C struct.
-        members: Of each record, what its struct calls each field.
+        file: Stem of the symbol file: the program's name as it is.
+        program: Prefix of all C names, and stem of the other files.
+        attributes: Python attribute of each leaf.
+        paths: Path of each leaf in the C struct, member by member and index by index.
+        roots: Member of the C struct for each declared variable.
+        members: For each record, what its struct calls each field.
         tables, levels, procedures, records, enums: The stem of each.
-        constants: Of each enumeration, the C constant of each member.
-        classes: Of each enumeration, its Python class.
-        class_members: Of each enumeration, what its Python class calls each member.
+        constants: For each enumeration, the C constant of each member.
+        classes: Python class of each enumeration.
+        class_members: For each enumeration, what its Python class calls each member.
         failed: Words of the trace for the monitored assumptions that failed.
         c: What stands at file scope in C; `module` in the Python module.
     """
@@ -195,7 +195,7 @@ def names_of(program: Program) -> Names:
 
 
 def _program_words(program: Program) -> tuple[str, str]:
-    """The program's own word, and the one that its C names and files bear: one that no library or tool keeps."""
+    """The program's own word, and its word in C names and files, which no library or tool reserves."""
     own = re.sub(r"\W", "_", program.name, flags=re.ASCII) or "program"
     own = short(own if own[0].isalpha() else f"p{own}")
     kept = own.lower() in _FILES | C_WORDS
@@ -277,11 +277,11 @@ def _constants(program: Program, p: str, scope: NameScope) -> dict[str, tuple[st
 
 
 def _class_members(program: Program) -> dict[str, tuple[str, ...]]:
-    made = {}
+    members = {}
     for enum in program.enums:
         words = ((m, _unlike(python_word(m), NameScope(set(reserved.PYTHON_MEMBERS)))) for m in enum.members)
-        made[enum.name] = tuple(NameScope(set(reserved.PYTHON_MEMBERS)).all(words).values())
-    return made
+        members[enum.name] = tuple(NameScope(set(reserved.PYTHON_MEMBERS)).all(words).values())
+    return members
 
 
 def _paths(
@@ -292,9 +292,15 @@ def _paths(
     roots = taken.all((d.name, _unlike(c_word(d.name), taken)) for d in program.declared)
     variables = {str(v.name) for v in program.variables}
     paths: dict[str, tuple[str, ...]] = {}
-    for one in program.declared:
-        paths.update(zip(map(str, one.leaves), _places((roots[one.name],), one.type, members), strict=True))
-        for leaf in one.leaves:
+    for declared in program.declared:
+        paths.update(
+            zip(
+                map(str, declared.leaves),
+                _places((roots[declared.name],), declared.type, members),
+                strict=True,
+            )
+        )
+        for leaf in declared.leaves:
             if pending(leaf) in variables:
                 paths[pending(leaf)] = (taken.fresh(f"{''.join(paths[leaf])}_next"),)
     return roots, {str(v.name): paths[v.name] for v in program.variables}
@@ -308,7 +314,7 @@ def _places(
             for at in range(length):
                 yield from _places((*path, f"[{at}]"), element, members)
         case Record(name=record, fields=fields):
-            for one in fields:
-                yield from _places((*path, f".{members[record][one.name]}"), one.type, members)
+            for part in fields:
+                yield from _places((*path, f".{members[record][part.name]}"), part.type, members)
         case _:
             yield path

@@ -48,7 +48,7 @@ def lower(proved: ProvedProgram, root: str = "", *, defensive: bool = False) -> 
     """The plan of a proved program; there is no other way to one that is not marked.
 
     Args:
-        proved: What `prove` made.
+        proved: The program that was proved.
         root: The project's folder: files are named as seen from there, so that the same project gives the
             same bytes wherever it stands and from wherever it is compiled; "" leaves their names alone.
         defensive: Whether the executors check their state at the beginning of every cycle.

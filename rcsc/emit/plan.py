@@ -112,9 +112,9 @@ def joined(group: Group) -> tuple[int, ...]:
 def grouped(probes: Iterable[Probe], most: int) -> tuple[Group, ...]:
     """Probes joined while their classes together are at most `most`: fewer masks to load, larger tables."""
     bins: list[list[Probe]] = []
-    for probe in sorted(probes, key=lambda one: -len(one.masks)):
+    for probe in sorted(probes, key=lambda probe: -len(probe.masks)):
         for group in bins:
-            if prod(len(one.masks) for one in group) * len(probe.masks) <= most:
+            if prod(len(other.masks) for other in group) * len(probe.masks) <= most:
                 group.append(probe)
                 break
         else:
@@ -160,7 +160,7 @@ class Plan:
     Attributes:
         source: The root file, relative, with `/`.
         monitored: Positions in `program.assumptions` of those that the executors check: monitored ones, and those that stop some table.
-        proved: Whether it is proved; of one that is not, every file is marked (`UNPROVED`).
+        proved: Whether it is proved; otherwise every file is marked (`UNPROVED`).
         defensive: Whether every cycle begins with a check of the state.
     """
 

@@ -198,7 +198,7 @@ class _Maker:
             yield _on_state("After a fault: outputs that have a safe value show it.", "_safe", *shown)
 
     def _cycle(self, doc: str, name: str, *body: Stmt) -> Function:
-        """What every step and cycle begins and ends with."""
+        """The frame of every step and cycle."""
         begin = Invoke("_begin" if self.plan.defensive else "_admit", (STATE,))
         shown = any(variable.safe is not None for variable in self.program.variables)
         safe = (when(FAULTED, _run("_safe")),) if shown else ()
@@ -240,8 +240,8 @@ class _Maker:
         }
         groups = grouped(probes, MOST_KEYS)
         if len(groups) == 1:
-            found = self._constant(f"{upper}_LINE", (f"*_lines_of({_joined(groups[0], names)}, {tail}),",))
-            yield Leave(Element(found, self._index(groups[0], f"{upper}_K0")))
+            lookup = self._constant(f"{upper}_LINE", (f"*_lines_of({_joined(groups[0], names)}, {tail}),",))
+            yield Leave(Element(lookup, self._index(groups[0], f"{upper}_K0")))
             return
         ands: list[Code] = []
         for at, group in enumerate(grouped(probes, MOST_GROUPED)):
@@ -251,8 +251,8 @@ class _Maker:
             ands.append(Element(where, self._index(group, f"{upper}_K{at}")))
         masks = Infix("&", tuple(ands)) if ands else Constant((1 << matcher.lines) - 1)
         if matcher.lines <= WORD:  # small masks are found fastest in a dictionary, large ones by their length
-            found = self._constant(f"{upper}_ONE", (f"_one_of({tail}),",))
-            yield Frame(("try:",), (Leave(Element(Element(found, Constant(0)), masks)),))
+            lookup = self._constant(f"{upper}_ONE", (f"_one_of({tail}),",))
+            yield Frame(("try:",), (Leave(Element(Element(lookup, Constant(0)), masks)),))
             yield Frame(("except KeyError:",), (Leave(Constant(-2)),))
             return
         yield Set(Name("m"), masks)
@@ -261,12 +261,12 @@ class _Maker:
     def _index(self, group: Group, name: str) -> Code:
         """The place of the classes together: a sum, each class times how many places it moves."""
         stride = prod(len(probe.masks) for probe in group)
-        found: Code | None = None
+        index: Code | None = None
         for number, probe in enumerate(group):
             stride //= len(probe.masks)
-            found = self._class(probe.index, f"{name}_{number}", stride, found)
-        assert found is not None
-        return found
+            index = self._class(probe.index, f"{name}_{number}", stride, index)
+        assert index is not None
+        return index
 
     def _class(self, index: Index, name: str, stride: int, before: Code | None) -> Code:
         """The class of one leaf times the stride, added to what is before it."""
@@ -274,18 +274,18 @@ class _Maker:
             case Direct(leaf=leaf, low=low) if stride == 1:
                 return _less(_plus(before, self.text.place(leaf)), low)
             case Direct(leaf=leaf, low=low):
-                found = _less(self.text.place(leaf), low)
+                leaf_class = _less(self.text.place(leaf), low)
             case Truth(condition=condition):
-                found = Round(self.text.expr(condition))
+                leaf_class = Round(self.text.expr(condition))
             case Coded(leaf=leaf, low=low):
                 runs = [(at * stride, len(list(same))) for at, same in groupby(index.classes)]
                 rows = tuple(f"*({at},) * {length}," for at, length in runs)
                 return _plus(before, Element(self._constant(name, rows), _less(self.text.place(leaf), low)))
             case Cuts(leaf=leaf, cuts=cuts):
-                found = Invoke("_bisect", (Name(repr(cuts)), self.text.place(leaf)))
+                leaf_class = Invoke("_bisect", (Name(repr(cuts)), self.text.place(leaf)))
             case _:
                 assert_never(index)
-        return _plus(before, infix("*", found, Constant(stride)) if stride > 1 else found)
+        return _plus(before, infix("*", leaf_class, Constant(stride)) if stride > 1 else leaf_class)
 
     def _run(self, table: PlanTable, name: str, actions: str) -> Iterator[Stmt]:
         for place in table.monitored:
@@ -380,5 +380,5 @@ def _joined(group: Group, names: dict[int, Name]) -> str:
 
 
 def _typed(kind: model.Scalar, value: Code) -> Code:
-    """What gives the value as one of its kind, and a NaN, which no range holds, where it is none."""
+    """Code that gives the value as one of its kind, else a NaN, which no range holds."""
     return Invoke("_real" if isinstance(kind, Real) else "_whole", (value,))

@@ -10,8 +10,8 @@ from rcsc.emit.code_tree import IN_C, IN_PYTHON
 
 @cache
 def environment() -> jinja2.Environment:
-    """Strict: a template that misspells an attribute fails."""
-    found = jinja2.Environment(
+    """A strict environment: a template that misspells an attribute fails."""
+    templates = jinja2.Environment(
         loader=jinja2.PackageLoader("rcsc.emit"),
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
@@ -19,8 +19,8 @@ def environment() -> jinja2.Environment:
         keep_trailing_newline=True,
         autoescape=False,  # noqa: S701 - the output is C and Python, not HTML
     )
-    found.filters |= {"c": IN_C.lines, "python": IN_PYTHON.lines}
-    return found
+    templates.filters |= {"c": IN_C.lines, "python": IN_PYTHON.lines}
+    return templates
 
 
 def render(template: str, view: Mapping[str, object]) -> str:

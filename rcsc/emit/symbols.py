@@ -9,7 +9,7 @@ from rcsc.lang.model import Bool, Enum, Int, Level, OneTable, Read, Real, Unit, 
 
 
 def symbols(plan: Plan, names: Names) -> str:
-    """What everything is called, for tools."""
+    """The symbol file: every name, for tools."""
     p = names.program
     document = {
         **({"unproved": plan.mark} if plan.mark else {}),
@@ -76,17 +76,17 @@ def shortened(text: str) -> str:
 def _described(variable: Variable) -> dict[str, object]:
     """What a log or a shell shows of a leaf: its range, unit or members, initial value and doc."""
     kind = variable.type
-    said: dict[str, object] = {"initial": variable.initial, "doc": shortened(variable.doc)}
+    entry: dict[str, object] = {"initial": variable.initial, "doc": shortened(variable.doc)}
     if variable.safe is not None:
-        said["safe"] = variable.safe
+        entry["safe"] = variable.safe
     match kind:
         case Enum(members=members):
-            said["members"] = list(members)
+            entry["members"] = list(members)
         case Int(low, high, unit) | Real(low, high, unit):
-            said |= {"low": low, "high": high, "unit": unit_text(unit)}
+            entry |= {"low": low, "high": high, "unit": unit_text(unit)}
         case Bool():
             pass
-    return said
+    return entry
 
 
 def _dispatched(level: Level) -> dict[str, object]:

@@ -86,7 +86,7 @@ class Text(ABC):
 
     def block(self, body: Sequence[Statement]) -> Body:
         """Statements."""
-        return tuple(one for statement in body for one in self.statement(statement))
+        return tuple(stmt for statement in body for stmt in self.statement(statement))
 
     def statement(self, statement: Statement) -> Iterator[Stmt]:
         """A statement."""
