@@ -49,7 +49,7 @@ class Cache:
     tool: str
 
     def memo(self, kind: type[T], parts: Sequence[str], make: Callable[[], T | None]) -> T | None:
-        """What was stored under the same parts; else what is made now, and kept unless it is None."""
+        """Return the entry of the same parts, else a new result, which is stored unless it is None."""
         result = self.load(kind, *parts)
         if result is None and (result := make()) is not None:
             self.store(result, *parts)
@@ -70,18 +70,18 @@ class Cache:
     def store(self, result: object, *parts: str) -> None:
         """Keep a result, a dataclass, under its kind and `parts`: the whole entry or nothing."""
         key = self._key(type(result), parts)
-        said = json.dumps(plain(result), separators=(",", ":"), sort_keys=True).encode()
+        encoded = json.dumps(plain(result), separators=(",", ":"), sort_keys=True).encode()
         path = self._path(key)
         try:
             self._prepare(path.parent)
-            write_atomically(path, self._seal(key, said) + b"\n" + said, durable=False)
+            write_atomically(path, self._seal(key, encoded) + b"\n" + encoded, durable=False)
             self._prune()
         except OSError:
             return
 
     def _key(self, kind: type, parts: tuple[str, ...]) -> str:
-        said = [self.tool, kind.__module__, kind.__qualname__, *parts]
-        return hashlib.sha256(json.dumps(said).encode()).hexdigest()
+        identity = [self.tool, kind.__module__, kind.__qualname__, *parts]
+        return hashlib.sha256(json.dumps(identity).encode()).hexdigest()
 
     def _seal(self, key: str, kept: bytes) -> bytes:
         return hmac.new(self.secret, key.encode() + b"\n" + kept, "sha256").hexdigest().encode()
@@ -143,14 +143,14 @@ def _secret_at(path: Path) -> bytes | None:
 
 
 def digest_of_tool() -> str:
-    """Changes with what rcsc is made of, with Python and with each prover that is installed; by content, whatever the times of files."""
+    """Digest of rcsc's files, of Python and of each prover that is installed; by content, whatever the times of files."""
     hashed = hashlib.sha256(f"{__version__} {sys.version}".encode())
     package = Path(__file__).parents[1]
     for path in sorted(_parts(package)):
-        found = content(Path(path))
-        hashed.update(f"{os.path.relpath(path, package)} {len(found)}\n".encode() + found)
-    for name, found in _provers():
-        hashed.update(f"{name} {len(found)}\n".encode() + found)
+        body = content(Path(path))
+        hashed.update(f"{os.path.relpath(path, package)} {len(body)}\n".encode() + body)
+    for name, body in _provers():
+        hashed.update(f"{name} {len(body)}\n".encode() + body)
     return hashed.hexdigest()
 
 
@@ -163,7 +163,7 @@ def _parts(package: Path) -> Iterator[str]:
 
 
 def _files_below(folder: str) -> Iterator[str]:
-    """These of one folder and those in it; `os.scandir` asks once for a folder where `Path.rglob` asks for each file."""
+    """The files in a folder and in those below it; `os.scandir` asks once for a folder where `Path.rglob` asks for each file."""
     with os.scandir(folder) as entries:
         for entry in entries:
             if entry.name.endswith((".py", ".lark", ".jinja", ".md")):

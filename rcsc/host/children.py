@@ -94,7 +94,7 @@ class _Keeper:
             return self._process.stdin.fileno()
 
     def let_go(self, what: str) -> None:
-        """It has been cleared away."""
+        """Forget `what`: it has been cleared away."""
         with self._lock:
             if self._held.pop(what, self) is None:
                 self._tell(f"-{what}")
@@ -118,8 +118,8 @@ class _Keeper:
             [sys.executable, "-I", "-S", str(_KEEPER)], stdin=subprocess.PIPE, bufsize=0, cwd="/",
             stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
         )  # fmt: skip
-        self._held = {one: None for one in self._held if _still(one)}
-        self._write([f"+{one}" for one in self._held])
+        self._held = {what: None for what in self._held if _still(what)}
+        self._write([f"+{what}" for what in self._held])
 
     def _write(self, lines: Sequence[str]) -> None:
         assert self._process is not None
@@ -380,24 +380,24 @@ def executor(workers: int, then: Callable[[], None] | None = None) -> "ProcessPo
 @contextlib.contextmanager
 def pool(workers: int) -> "Iterator[ProcessPoolExecutor]":
     """An `executor` whose workers are killed when the block is left by an exception or an interrupt."""
-    made = executor(workers)
+    processes = executor(workers)
     try:
-        yield made
+        yield processes
     except BaseException:
-        kill(made)
+        kill(processes)
         raise
     finally:
-        made.shutdown(wait=True, cancel_futures=True)
+        processes.shutdown(wait=True, cancel_futures=True)
 
 
-def kill(made: Executor) -> None:
+def kill(executor: Executor) -> None:
     """Kill every worker, whatever it is doing."""
-    for worker in list((getattr(made, "_processes", None) or {}).values()):
+    for worker in list((getattr(executor, "_processes", None) or {}).values()):
         worker.kill()
 
 
 def answer(future: Future[T]) -> T:
-    """What a worker returned.
+    """Return what a worker returned.
 
     Raises:
         WorkerEndedError: It ended without an answer. Whatever it raised is raised here.
@@ -424,11 +424,11 @@ def pipe() -> "tuple[Connection, Connection]":
     return Pipe(duplex=False)
 
 
-def start(made: "SpawnProcess") -> None:
+def start(child: "SpawnProcess") -> None:
     """Begin a process that `process` made."""
     with interrupts_held():
-        made.start()
-        _keeper.hold(f"process {made.pid}")
+        child.start()
+        _keeper.hold(f"process {child.pid}")
 
 
 def _as_child(parent: int, target: Callable[..., None], args: tuple[Any, ...]) -> None:

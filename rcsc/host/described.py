@@ -26,30 +26,33 @@ MOST_FAULTS = 100
 
 
 class BadFile(CodedError):  # noqa: N818  # what happened, not an error of ours
-    """A description says something that cannot be.
+    """A description with faults.
 
     Attributes:
-        found: Everything that is wrong, in order of place; may be empty, and then the text says what is.
+        diagnostics: Everything that is wrong, in order of place; where it is empty, the text says what is.
         sources: The texts that these point into.
     """
 
     def __init__(
-        self, text: str = "", found: Sequence[Diagnostic] = (), sources: Mapping[str, Source] | None = None
+        self,
+        text: str = "",
+        diagnostics: Sequence[Diagnostic] = (),
+        sources: Mapping[str, Source] | None = None,
     ) -> None:
-        self.found, self.sources = tuple(found), dict(sources or {})
-        if self.found:
-            self.code = self.found[0].code
-        super().__init__(text or "; ".join(self._line(diagnostic) for diagnostic in found))
+        self.diagnostics, self.sources = tuple(diagnostics), dict(sources or {})
+        if self.diagnostics:
+            self.code = self.diagnostics[0].code
+        super().__init__(text or "; ".join(self._line(diagnostic) for diagnostic in diagnostics))
 
     def __reduce__(self) -> tuple[Any, ...]:
         """As it is, from one process to another: classes below take other arguments."""
         return type(self).__new__, (type(self), *self.args), self.__dict__
 
-    def _line(self, one: Diagnostic) -> str:
-        span = one.primary.span
+    def _line(self, diagnostic: Diagnostic) -> str:
+        span = diagnostic.primary.span
         source = self.sources.get(span.file)
         where = f"{span.file}:{source.position(span.start).line}" if source else span.file
-        return f"{where}: {one.message}"
+        return f"{where}: {diagnostic.message}"
 
 
 # --- what may stand where ---
@@ -168,7 +171,7 @@ def shown_path(path: KeyPath) -> str:
 def nearest(name: str, names: Sequence[str]) -> tuple[str, ...]:
     """A help that names the nearest of `names`; none where nothing is near."""
     near = get_close_matches(name, names, n=1, cutoff=0.6)
-    return tuple(f"did you mean `{one}`?" for one in near)
+    return tuple(f"did you mean `{word}`?" for word in near)
 
 
 # --- the document ---
@@ -181,8 +184,8 @@ class Document:
     Attributes:
         name: As the user gave it.
         value: What it says.
-        code: Of its faults.
-        faults: What is wrong with it, as found so far.
+        code: The code of its faults.
+        faults: What is wrong with it, so far.
     """
 
     name: str
@@ -211,36 +214,38 @@ class Document:
         self._check(kind, self.value, ())
 
     def holds(self, kind: Record) -> bool:
-        """Whether the keys of a record stand there as it says, whatever else does."""
+        """Whether the keys of a record are there as it says, whatever else is."""
         keys = {**kind.needed, **kind.others}
-        page = replace(self, faults=[], value={key: one for key, one in self.value.items() if key in keys})
+        page = replace(
+            self, faults=[], value={key: value for key, value in self.value.items() if key in keys}
+        )
         page.check(kind)
         return not page.faults
 
     def bad(self, error: type[BadFile]) -> BadFile:
         """The faults as an exception."""
-        found = sorted(dict.fromkeys(self.faults), key=lambda one: one.primary.span.start)
-        more = len(found) - MOST_FAULTS
+        faults = sorted(dict.fromkeys(self.faults), key=lambda fault: fault.primary.span.start)
+        more = len(faults) - MOST_FAULTS
         if more > 0:
-            last = Diagnostic(self.code, f"and {more} faults more", Label(found[MOST_FAULTS].primary.span))
-            found = [*found[:MOST_FAULTS], last]
-        return error(found=found, sources={self.name: self.source})
+            last = Diagnostic(self.code, f"and {more} faults more", Label(faults[MOST_FAULTS].primary.span))
+            faults = [*faults[:MOST_FAULTS], last]
+        return error(diagnostics=faults, sources={self.name: self.source})
 
     def _check(self, kind: Kind, value: object, path: KeyPath) -> None:
         if not fits(kind, value):
             what = f"`{shown_path(path)}` must be {kind.shown}" if path else f"the file must be {kind.shown}"
-            self.wrong(path, f"{what}, not {_said(value)}")
+            self.wrong(path, f"{what}, not {_short(value)}")
             return
         for key, inner, of in self._parts(kind, value, path):
             self._check(of, inner, (*path, key))
 
     def _parts(self, kind: Kind, value: Any, path: KeyPath) -> Iterator[tuple[str | int, object, Kind]]:
-        """What stands in a value that fits, and what each must be."""
+        """Each part of a value that fits, by key or position, and the kind it must be."""
         match kind:
             case Listing(of):
-                yield from ((at, one, of) for at, one in enumerate(value))
+                yield from ((at, item, of) for at, item in enumerate(value))
             case Entries(of):
-                yield from ((name, one, of) for name, one in value.items())
+                yield from ((name, item, of) for name, item in value.items())
             case Record(needed, others):
                 every = {**needed, **others}
                 for key in value.keys() - every.keys():
@@ -250,7 +255,7 @@ class Document:
                     self.wrong(path, f"{where} lacks `{key}`: {needed[key].shown}")
                 yield from ((key, value[key], every[key]) for key in value.keys() & every.keys())
             case Either(kinds):
-                yield from self._parts(next(one for one in kinds if fits(one, value)), value, path)
+                yield from self._parts(next(option for option in kinds if fits(option, value)), value, path)
             case Number() | Text() | FileName() | Word() | Member() | Flag():
                 return
             case _:
@@ -280,13 +285,13 @@ def fits(kind: Kind, value: Any) -> bool:
         case Record():
             return isinstance(value, dict)
         case Either(kinds):
-            return any(fits(one, value) for one in kinds)
+            return any(fits(option, value) for option in kinds)
         case _:
             assert_never(kind)
 
 
-def _said(value: object) -> str:
-    """What stands there instead, short."""
+def _short(value: object) -> str:
+    """The value as a message shows it."""
     match value:
         case bool():
             return f"`{str(value).lower()}`"
@@ -307,11 +312,11 @@ def read_document(path: Path, code: Code, error: type[BadFile]) -> Document:
 
     Args:
         path: Where it is.
-        code: Of every fault of it.
-        error: What is raised of it.
+        code: The code of its faults.
+        error: The exception that it raises.
 
     Raises:
-        BadFile: It cannot be read, is too large or is not TOML; of the class `error`.
+        BadFile: It cannot be read, is too large or is not TOML; its class is `error`.
     """
     name = str(path)
     try:
@@ -325,12 +330,12 @@ def read_document(path: Path, code: Code, error: type[BadFile]) -> Document:
         return Document(name, source, read.toml_of(text), code)
     except read.Malformed as problem:
         at = _decode_place(str(problem), text)
-        found = Diagnostic(code, f"the file {problem}", Label(Span(name, at, at)))
-        raise error(found=(found,), sources={name: source}) from problem
+        fault = Diagnostic(code, f"the file {problem}", Label(Span(name, at, at)))
+        raise error(diagnostics=(fault,), sources={name: source}) from problem
 
 
 def _unread(name: str, message: str, code: Code, error: type[BadFile]) -> BadFile:
-    return error(found=(Diagnostic(code, message, Label(Span(name, 0, 0))),))
+    return error(diagnostics=(Diagnostic(code, message, Label(Span(name, 0, 0))),))
 
 
 def _decode_place(message: str, text: str) -> int:
@@ -339,7 +344,7 @@ def _decode_place(message: str, text: str) -> int:
     if "line" not in words or "column" not in words:
         return len(text) if "end of document" in message else 0
     line, column = int(words[words.index("line") + 1]), int(words[words.index("column") + 1])
-    return min(len(text), sum(len(one) + 1 for one in text.split("\n")[: line - 1]) + column - 1)
+    return min(len(text), sum(len(row) + 1 for row in text.split("\n")[: line - 1]) + column - 1)
 
 
 class _Scan:

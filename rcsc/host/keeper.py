@@ -48,10 +48,10 @@ def _opened(process: int) -> list[int]:
 
 
 def _running(processes: list[int]) -> list[int]:
-    """Those that have not ended; the others are closed. A descriptor can be read when its process has ended."""
+    """The processes that have not ended; the others are closed. A descriptor can be read when its process has ended."""
     ended = set(select.select(processes, [], [], 0)[0])
-    for one in ended:
-        os.close(one)
+    for descriptor in ended:
+        os.close(descriptor)
     return [process for process in processes if process not in ended]
 
 

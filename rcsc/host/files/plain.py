@@ -34,16 +34,16 @@ class Kept:
         """Its state in plain values."""
         return {name: plain(getattr(self, name)) for name in _names(self)}
 
-    def restore(self, said: Mapping[str, Any]) -> None:
-        """Takes a state.
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Puts back a state.
 
         Raises:
             ValueError: It is none of this class.
         """
         hints = get_type_hints(type(self))
-        if set(said) != set(_names(self)):
+        if set(state) != set(_names(self)):
             raise ValueError(f"not the state of a {type(self).__name__}")
-        for name, value in said.items():
+        for name, value in state.items():
             now = getattr(self, name)
             if isinstance(now, Kept):  # in place: what is transient stays
                 now.restore(value)
@@ -54,14 +54,14 @@ class Kept:
 def _names(kept: Any) -> list[str]:
     """The fields of a dataclass, or of one of its objects, that are state."""
     left: frozenset[str] = getattr(kept, "transient", frozenset())
-    return [one.name for one in fields(kept) if one.name not in left]
+    return [field.name for field in fields(kept) if field.name not in left]
 
 
 def plain(value: Any) -> Any:
-    """The value as JSON has it.
+    """The value in plain form, as JSON has it.
 
     Raises:
-        TypeError: It is none that could be read again.
+        TypeError: It could not be read back.
     """
     if isinstance(value, PLAIN):
         return value
@@ -70,66 +70,66 @@ def plain(value: Any) -> Any:
     if isinstance(value, Mapping):
         if not all(isinstance(key, str) for key in value):
             raise TypeError("a dictionary is kept by text")
-        return {key: plain(one) for key, one in value.items()}
+        return {key: plain(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
-        return [plain(one) for one in value]
+        return [plain(item) for item in value]
     raise TypeError(f"a {type(value).__name__} cannot be kept")
 
 
-def read(kind: Any, said: Any) -> Any:
-    """The value of a declared type that `plain` made this of.
+def read(kind: Any, value: Any) -> Any:
+    """The value of a declared type that `plain` turned into this.
 
     Raises:
-        ValueError: It made it of no such value.
+        ValueError: It is the plain form of no such value.
     """
     origin, args = get_origin(kind), get_args(kind)
     if origin in (types.UnionType, Union):
-        return _any(args, said)
+        return _any(args, value)
     if kind is Any:
-        return said
+        return value
     if origin is Literal:
-        return _one_of(args, said)
+        return _one_of(args, value)
     if is_dataclass(kind):
-        return _made(cast(type, kind), said)
+        return _object(cast(type, kind), value)
     if origin is list:
-        return [read(args[0], one) for one in _items(said)]
+        return [read(args[0], item) for item in _items(value)]
     if origin is tuple:
-        items = _items(said)
+        items = _items(value)
         each = [args[0]] * len(items) if args[1:] == (...,) else list(args)
         if len(each) != len(items):
             raise ValueError(f"{len(items)} values for {len(each)}")
-        return tuple(read(one, item) for one, item in zip(each, items, strict=True))
-    if origin is not None and isinstance(said, dict) and issubclass(origin, Mapping):
-        return {key: read(args[1], one) for key, one in said.items()}
+        return tuple(read(of, item) for of, item in zip(each, items, strict=True))
+    if origin is not None and isinstance(value, dict) and issubclass(origin, Mapping):
+        return {key: read(args[1], item) for key, item in value.items()}
     if isinstance(kind, type) and issubclass(kind, StrEnum):
-        return kind(_text(said))
-    if type(said) is kind or (kind is float and type(said) is int):
-        return _bounded(said)
-    raise ValueError(f"{_shown(said)} is no {getattr(kind, '__name__', kind)}")
+        return kind(_text(value))
+    if type(value) is kind or (kind is float and type(value) is int):
+        return _bounded(value)
+    raise ValueError(f"{_shown(value)} is no {getattr(kind, '__name__', kind)}")
 
 
-def _bounded(said: Any) -> Any:
-    """The value, unless it is a number that nothing is as large as; NaN is a reading that could not be taken."""
-    large = (isinstance(said, int) and abs(said) > MOST_WHOLE) or (
-        isinstance(said, float) and abs(said) > MOST_REAL
+def _bounded(value: Any) -> Any:
+    """The value, unless it is a number out of bounds; NaN is a reading that could not be taken."""
+    large = (isinstance(value, int) and abs(value) > MOST_WHOLE) or (
+        isinstance(value, float) and abs(value) > MOST_REAL
     )
     if large:
-        raise ValueError(f"{_shown(said)} is too large")
-    return said
+        raise ValueError(f"{_shown(value)} is too large")
+    return value
 
 
-def _one_of(allowed: Sequence[Any], said: Any) -> Any:
-    if not any(type(said) is type(one) and said == one for one in allowed):
-        raise ValueError(f"{_shown(said)} is none of {', '.join(map(str, allowed))}")
-    return said
+def _one_of(allowed: Sequence[Any], value: Any) -> Any:
+    if not any(type(value) is type(option) and value == option for option in allowed):
+        raise ValueError(f"{_shown(value)} is none of {', '.join(map(str, allowed))}")
+    return value
 
 
-def _shown(said: Any) -> str:
-    return shown(said if isinstance(said, str) else repr(said)[:80])
+def _shown(value: Any) -> str:
+    return shown(value if isinstance(value, str) else repr(value)[:80])
 
 
 def alike(now: Any, then: Any) -> bool:
-    """Whether two values have the same shape: tuples as long, and their values of one type; what is declared need not say it."""
+    """Whether two values have the same shape: tuples of one length, values of one type, declared or not."""
     if isinstance(now, tuple):
         return isinstance(then, tuple) and len(now) == len(then) and all(map(alike, now, then))
     if is_dataclass(now):
@@ -140,7 +140,7 @@ def alike(now: Any, then: Any) -> bool:
 
 
 def finite(value: Any) -> bool:
-    """Whether every number in a plain value is one."""
+    """Whether every number in a plain value is finite."""
     if isinstance(value, Mapping):
         return all(map(finite, value.values()))
     if isinstance(value, (list, tuple)):
@@ -148,38 +148,38 @@ def finite(value: Any) -> bool:
     return not isinstance(value, float) or isfinite(value)
 
 
-def _items(said: Any) -> Sequence[Any]:
-    if not isinstance(said, list):
-        raise ValueError(f"{_shown(said)} is no list")  # noqa: TRY004  # what was read, not what was called
-    return said
+def _items(value: Any) -> Sequence[Any]:
+    if not isinstance(value, list):
+        raise ValueError(f"{_shown(value)} is no list")  # noqa: TRY004  # what was read, not what was called
+    return value
 
 
-def _any(kinds: Sequence[Any], said: Any) -> Any:
-    """The first of several types that reads it."""
+def _any(kinds: Sequence[Any], value: Any) -> Any:
+    """The value as the first of several types that reads it."""
     for kind in kinds:
         try:
-            return None if kind is type(None) and said is None else read(kind, said)
+            return None if kind is type(None) and value is None else read(kind, value)
         except ValueError:
             continue
-    raise ValueError(f"{_shown(said)} is none of its types")
+    raise ValueError(f"{_shown(value)} is none of its types")
 
 
-def _text(said: Any) -> str:
-    if not isinstance(said, str):
-        raise ValueError(f"{_shown(said)} is no text")  # noqa: TRY004  # what was read, not what was called
-    return said
+def _text(value: Any) -> str:
+    if not isinstance(value, str):
+        raise ValueError(f"{_shown(value)} is no text")  # noqa: TRY004  # what was read, not what was called
+    return value
 
 
 _hints = cache(get_type_hints)
 
 
-def _made(kind: type, said: Any) -> Any:
+def _object(kind: type, value: Any) -> Any:
     hints = _hints(kind)
-    if not isinstance(said, dict) or set(said) != set(_names(kind)):
+    if not isinstance(value, dict) or set(value) != set(_names(kind)):
         raise ValueError(f"not the values of a {kind.__name__}")
-    given = {name: read(hints[name], one) for name, one in said.items()}
-    asked = {one.name for one in fields(kind) if one.init}
-    made = kind(**{name: value for name, value in given.items() if name in asked})
+    given = {name: read(hints[name], item) for name, item in value.items()}
+    asked = {field.name for field in fields(kind) if field.init}
+    result = kind(**{name: item for name, item in given.items() if name in asked})
     for name in given.keys() - asked:
-        object.__setattr__(made, name, given[name])
-    return made
+        object.__setattr__(result, name, given[name])
+    return result

@@ -96,30 +96,30 @@ def piped(file: IO[bytes], most: int = MOST_BYTES) -> bytes:
     Raises:
         Malformed: There is more.
     """
-    found = file.read(most + 1)
-    if len(found) > most:
+    received = file.read(most + 1)
+    if len(received) > most:
         raise Malformed(f"has more than {_size(most)}")
-    return found
+    return received
 
 
-def plain(found: str) -> str:
+def plain(text: str) -> str:
     """Return a text without characters that a terminal would obey.
 
     Raises:
         Malformed: It has one.
     """
-    _check_texts(found)
-    return found
+    _check_texts(text)
+    return text
 
 
-def decoded(found: bytes) -> str:
+def decoded(encoded: bytes) -> str:
     """Return bytes as text.
 
     Raises:
         Malformed: They are not UTF-8.
     """
     try:
-        return found.decode("utf-8-sig")
+        return encoded.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise Malformed(f"is not UTF-8 at byte {error.start}") from error
 
@@ -127,21 +127,21 @@ def decoded(found: bytes) -> str:
 # --- forms ---------------------------------------------------------------------------------
 
 
-def json_of(found: str | bytes, deepest: int = DEEPEST, *, plain: bool = True) -> Any:
+def json_of(document: str | bytes, deepest: int = DEEPEST, *, plain: bool = True) -> Any:
     """Return the value of a JSON text.
 
     Args:
-        found: The text.
+        document: The text.
         deepest: Levels of nesting that it may have.
         plain: Whether its texts may hold no control characters: what is shown on a terminal later.
 
     Raises:
         Malformed: It is no JSON, or nested too deep.
     """
-    said = found if isinstance(found, str) else decoded(found)
-    _check_depth(_JSON.finditer(said), deepest)
+    text = document if isinstance(document, str) else decoded(document)
+    _check_depth(_JSON.finditer(text), deepest)
     try:
-        value = json.loads(said)
+        value = json.loads(text)
     except ValueError as error:
         raise Malformed(f"is not JSON: {error}") from error
     if plain:
@@ -149,7 +149,7 @@ def json_of(found: str | bytes, deepest: int = DEEPEST, *, plain: bool = True) -
     return value
 
 
-def toml_of(found: str | bytes) -> dict[str, Any]:
+def toml_of(document: str | bytes) -> dict[str, Any]:
     """Return the table of a TOML text.
 
     Raises:
@@ -157,29 +157,29 @@ def toml_of(found: str | bytes) -> dict[str, Any]:
     """
     import tomllib
 
-    said = found if isinstance(found, str) else decoded(found)
-    if len(said) > MOST_TOML_BYTES:
+    text = document if isinstance(document, str) else decoded(document)
+    if len(text) > MOST_TOML_BYTES:
         raise Malformed(f"has more than {_size(MOST_TOML_BYTES)}")
-    bare = _TOML.sub(_bare, said)
+    bare = _TOML.sub(_bare, text)
     _check_depth(re.finditer(r"[\[{\]}]", bare), DEEPEST_TOML)
     if _DOTTED.search(bare):
         raise Malformed(f"is nested more than {DEEPEST_TOML} deep")
     try:
-        value = tomllib.loads(said)
+        value = tomllib.loads(text)
     except (tomllib.TOMLDecodeError, ValueError, RecursionError) as error:
         raise Malformed(f"is not TOML: {error}") from error
     _check_texts(value)
     return value
 
 
-def _bare(found: re.Match[str]) -> str:
+def _bare(match: re.Match[str]) -> str:
     """Brackets as they are, a text or a comment as a letter."""
-    if found[0] in {'"', "'"}:
+    if match[0] in {'"', "'"}:
         raise Malformed("has a text without an end")
-    return found["mark"] or "q"
+    return match["mark"] or "q"
 
 
-def xml_of(found: str) -> "Element":
+def xml_of(text: str) -> "Element":
     """Return the outermost element of an XML text without a document type, so that there is no entity to expand.
 
     Raises:
@@ -187,11 +187,11 @@ def xml_of(found: str) -> "Element":
     """
     from xml.etree import ElementTree as ET
 
-    if "<!DOCTYPE" in found or "<!ENTITY" in found:
-        raise Malformed("a document type is not read", found[: found.find("<!")].count("\n") + 1, 0)
+    if "<!DOCTYPE" in text or "<!ENTITY" in text:
+        raise Malformed("a document type is not read", text[: text.find("<!")].count("\n") + 1, 0)
     parser = ET.XMLParser(target=_shallow())  # noqa: S314  # without a document type there is no entity to expand
     try:
-        parser.feed(found)
+        parser.feed(text)
         root: Element = parser.close()
     except ET.ParseError as error:
         raise Malformed(f"not XML: {error.msg.split(':')[0]}", *error.position) from error
@@ -199,7 +199,7 @@ def xml_of(found: str) -> "Element":
 
 
 def _shallow() -> Any:
-    """What builds the elements of an XML text, up to a depth."""
+    """A builder of the elements of an XML text, up to a depth."""
     from xml.etree import ElementTree as ET
 
     class Shallow(ET.TreeBuilder):
@@ -218,13 +218,13 @@ def _shallow() -> Any:
     return Shallow()
 
 
-def rows_of(found: str, columns: Sequence[str]) -> list[dict[str, str]]:
+def rows_of(text: str, columns: Sequence[str]) -> list[dict[str, str]]:
     """Return the rows of a CSV text with a heading.
 
     Raises:
         Malformed: It is no CSV, or has other columns.
     """
-    table = csv.DictReader(io.StringIO(found, newline=""))
+    table = csv.DictReader(io.StringIO(text, newline=""))
     try:
         if tuple(table.fieldnames or ()) != tuple(columns):
             raise Malformed(f"the columns are {', '.join(columns)}")
@@ -235,8 +235,8 @@ def rows_of(found: str, columns: Sequence[str]) -> list[dict[str, str]]:
 
 def _check_depth(marks: Iterator[re.Match[str]], deepest: int) -> None:
     depth = 0
-    for found in marks:
-        mark = found[0]
+    for match in marks:
+        mark = match[0]
         if mark == '"':
             raise Malformed("has a text without an end")
         if mark in "[{":
@@ -251,18 +251,18 @@ def _check_texts(value: object) -> None:
     """Refuse what a terminal would obey."""
     waiting = [value]
     while waiting:
-        one = waiting.pop()
-        if isinstance(one, str):
-            bad = UNPRINTED.search(one)
+        item = waiting.pop()
+        if isinstance(item, str):
+            bad = UNPRINTED.search(item)
             if bad is not None:
                 raise Malformed(
-                    f"has a character that does not print, in {shown(one[max(0, bad.start() - 20) :])}"
+                    f"has a character that does not print, in {shown(item[max(0, bad.start() - 20) :])}"
                 )
-        elif isinstance(one, dict):
-            waiting += one.keys()
-            waiting += one.values()
-        elif isinstance(one, list):
-            waiting += one
+        elif isinstance(item, dict):
+            waiting += item.keys()
+            waiting += item.values()
+        elif isinstance(item, list):
+            waiting += item
 
 
 # --- values --------------------------------------------------------------------------------
@@ -272,7 +272,7 @@ _REQUIRED: Any = object()
 
 @dataclass(frozen=True, slots=True)
 class Said:
-    """A table of outside data, of which each field is taken as what it must be.
+    """A table of outside data; each method returns a field, checked to be what its name says.
 
     Attributes:
         value: The table.
@@ -292,10 +292,10 @@ class Said:
         Raises:
             Malformed: It is none, or missing.
         """
-        found = self._get(key, default)
-        if not isinstance(found, str):
+        value = self._get(key, default)
+        if not isinstance(value, str):
             raise Malformed(f"{self._at(key)} is no text")
-        return found
+        return value
 
     def name(self, key: str, default: str = _REQUIRED) -> str:
         """Return an identifier; the default may be another text.
@@ -319,10 +319,10 @@ class Said:
         Raises:
             Malformed: It is another, or missing.
         """
-        found = self.text(key)
-        if found not in allowed:
-            raise Malformed(f"{self._at(key)}: {shown(found)} is none of {', '.join(allowed)}")
-        return found
+        text = self.text(key)
+        if text not in allowed:
+            raise Malformed(f"{self._at(key)}: {shown(text)} is none of {', '.join(allowed)}")
+        return text
 
     def whole(self, key: str, low: int, high: int) -> int:
         """Return a whole number in a range.
@@ -330,10 +330,10 @@ class Said:
         Raises:
             Malformed: It is none, or missing.
         """
-        found = self._get(key, _REQUIRED)
-        if not isinstance(found, int) or isinstance(found, bool) or not low <= found <= high:
+        value = self._get(key, _REQUIRED)
+        if not isinstance(value, int) or isinstance(value, bool) or not low <= value <= high:
             raise Malformed(f"{self._at(key)} is no whole number from {low} to {high}")
-        return found
+        return value
 
     def number(self, key: str, default: float | None = _REQUIRED) -> float | None:
         """Return a number or a bool.
@@ -341,9 +341,9 @@ class Said:
         Raises:
             Malformed: It is none, or missing.
         """
-        found = self._get(key, default)
-        if found is None or isinstance(found, int | float):
-            return found
+        value = self._get(key, default)
+        if value is None or isinstance(value, int | float):
+            return value
         raise Malformed(f"{self._at(key)} is no number")
 
     def names(self, key: str, default: Sequence[str] = _REQUIRED) -> tuple[str, ...]:
@@ -376,8 +376,8 @@ class Said:
         Raises:
             Malformed: It is no list of tables, has more than `most`, or is missing.
         """
-        for at, one in enumerate(self._list(key, most, default)):
-            yield Said(one, f"{self._at(key)}[{at}]")
+        for at, item in enumerate(self._list(key, most, default)):
+            yield Said(item, f"{self._at(key)}[{at}]")
 
     def table(self, key: str) -> "Said":
         """Return a table in it.
@@ -388,33 +388,33 @@ class Said:
         return Said(self._get(key, _REQUIRED), self._at(key))
 
     def _each(self, key: str, check: Any, default: Sequence[str]) -> tuple[str, ...]:
-        found = self._list(key, 1_000_000, default)
-        return tuple(self._named(key, check, one) for one in found)
+        items = self._list(key, 1_000_000, default)
+        return tuple(self._named(key, check, item) for item in items)
 
     def _list(self, key: str, most: int, default: Sequence[object]) -> Sequence[Any]:
-        found = self._get(key, default)
-        if not isinstance(found, list | tuple):
+        items = self._get(key, default)
+        if not isinstance(items, list | tuple):
             raise Malformed(f"{self._at(key)} is no list")
-        if len(found) > most:
-            raise Malformed(f"{self._at(key)} has {len(found)} entries, more than {most}")
-        return found
+        if len(items) > most:
+            raise Malformed(f"{self._at(key)} has {len(items)} entries, more than {most}")
+        return items
 
     def _checked(self, key: str, check: Any, default: str) -> str:
-        found = self._get(key, default)
-        return self._named(key, check, found) if key in self.value else default
+        value = self._get(key, default)
+        return self._named(key, check, value) if key in self.value else default
 
-    def _named(self, key: str, check: Any, found: object) -> str:
+    def _named(self, key: str, check: Any, value: object) -> str:
         try:
-            named: str = check(found)
+            named: str = check(value)
         except BadName as error:
             raise Malformed(f"{self._at(key)}: {error}") from error
         return named
 
     def _get(self, key: str, default: Any) -> Any:
-        found = self.value.get(key, default)
-        if found is _REQUIRED:
+        value = self.value.get(key, default)
+        if value is _REQUIRED:
             raise Malformed(f"{self.where or 'it'} lacks `{key}`")
-        return found
+        return value
 
     def _at(self, key: str) -> str:
         return f"{self.where}.{key}" if self.where else f"`{key}`"

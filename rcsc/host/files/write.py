@@ -17,7 +17,7 @@ def write_atomically(path: Path, content: bytes, mode: int = 0o666, *, durable: 
     """Write a file so that a reader, or a kill at any time, sees all of it or the one before.
 
     Args:
-        path: Where; a symbolic link is followed.
+        path: The place; a symbolic link is followed.
         content: All of it.
         mode: Permissions of a new file, before the user's mask; a file that is there keeps its own.
         durable: Whether it reaches the disk before it replaces what was there.
@@ -36,7 +36,7 @@ def write_atomically(path: Path, content: bytes, mode: int = 0o666, *, durable: 
 def csv_text(rows: Iterable[Sequence[object]]) -> str:
     """Return rows as CSV in which no text is a formula: what begins as one has an apostrophe before it, as spreadsheets show it."""
     out = io.StringIO()
-    csv.writer(out, lineterminator="\n").writerows([_cell(one) for one in row] for row in rows)
+    csv.writer(out, lineterminator="\n").writerows([_cell(value) for value in row] for row in rows)
     return out.getvalue()
 
 
@@ -56,7 +56,7 @@ def written_whole(path: Path, mode: int = 0o666, *, durable: bool = True) -> Ite
     """Give the place of an empty file beside `path`; it takes the name of `path` when the block ends well.
 
     Args:
-        path: Where; a symbolic link is followed.
+        path: The place; a symbolic link is followed.
         mode: Permissions of a new file, before the user's mask; a file that is there keeps its own.
         durable: Whether it reaches the disk before it replaces what was there.
 

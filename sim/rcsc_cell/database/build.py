@@ -82,11 +82,11 @@ class BadData(BadFile):
     def __init__(
         self,
         problems: Sequence[str] = (),
-        found: Sequence[Diagnostic] = (),
+        diagnostics: Sequence[Diagnostic] = (),
         sources: Mapping[str, Source] | None = None,
     ) -> None:
-        self.problems = tuple(problems) or tuple(diagnostic.message for diagnostic in found)
-        super().__init__("; ".join(problems), found, sources)
+        self.problems = tuple(problems) or tuple(diagnostic.message for diagnostic in diagnostics)
+        super().__init__("; ".join(problems), diagnostics, sources)
 
     @property
     def shown(self) -> str:
