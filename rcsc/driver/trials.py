@@ -69,7 +69,7 @@ def _try_out(
         progress=progress,
     )
     result = run_suite(program, files, asked, proofs(options))
-    return result.found, result.text()
+    return result.diagnostics, result.text()
 
 
 def _write_vectors(programs: Sequence[Program], options: Options, file: Path) -> tuple[Diagnostic, ...]:

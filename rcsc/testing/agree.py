@@ -143,7 +143,7 @@ def run_session(
     """Runs one session in all executors.
 
     Args:
-        executors: Of the program.
+        executors: The program's executors.
         target: A step or a cycle.
         session: Start and readings; see `keeps_invariants`.
         compared: Counts what was compared.
@@ -205,7 +205,7 @@ def run_lines(
 ) -> Disagreement | None:
     """Compares the matchers on snapshots in which the table may be matched; assumptions that only tell may fail."""
     table = executors.program.tables[target.number]
-    snapshots = [one for one in snapshots if may_be_matched(executors.program, table, one)]
+    snapshots = [snapshot for snapshot in snapshots if may_be_matched(executors.program, table, snapshot)]
     number = executors.number(target)
     in_c = executors.native.run(number, WHOLE, snapshots)
     reference = executors.native.run(number + 1, WHOLE, snapshots)
@@ -229,10 +229,10 @@ def run_sanitized(
     executors: Executors, compared: AgreementCount
 ) -> Disagreement | BuildFailed | Absent | None:
     """All sessions again in the program with sanitizers, which stop it at the first finding."""
-    made = executors.native.run_checked(compared.sessions_again())
-    if not isinstance(made, list):
-        return made
-    for (which, _, session, expected), rows in zip(compared.kept, made, strict=True):
+    results = executors.native.run_checked(compared.sessions_again())
+    if not isinstance(results, list):
+        return results
+    for (which, _, session, expected), rows in zip(compared.kept, results, strict=True):
         for at, (right, row) in enumerate(zip(expected, rows, strict=True)):
             seen = seen_in_c(executors.program, executors.native, row)
             words = differences(executors.program, right, seen)

@@ -68,7 +68,7 @@ WORD = re.compile(r"[A-Za-z_]\w*")
 ELEMENT = re.compile(r"uint(\d+)_t")
 FUNCTION = re.compile(r"^(?:static inline |static )?(?:\w+ )+\**(\w+)\([^;{}]*\)\n\{", re.MULTILINE)
 BRANCHES = re.compile(
-    r"^#if defined\(__GNUC__\)\n(?P<one>.*?)^#else\n(?P<other>.*?)^#endif\n", re.DOTALL | re.MULTILINE
+    r"^#if defined\(__GNUC__\)\n(?P<built_in>.*?)^#else\n(?P<portable>.*?)^#endif\n", re.DOTALL | re.MULTILINE
 )
 INTEGER = re.compile(r"(0[xX][0-9a-fA-F]+|\d+)([uUlL]*)$")
 
@@ -125,7 +125,7 @@ class _Token:
 
 def _tokens(text: str) -> list[_Token]:
     """The tokens of a C file, with their depth in braces; in initializer lists, the bits of an element."""
-    found: list[_Token] = []
+    tokens: list[_Token] = []
     depth, table_depth, before, bits = 0, 0, "", 0
     for match in TOKEN.finditer(text):
         kind, text_here = str(match.lastgroup), match.group()
@@ -136,23 +136,23 @@ def _tokens(text: str) -> list[_Token]:
         if text_here == "{":
             depth += 1
             table_depth += 1 if before == "=" or table_depth else 0
-        found.append(_Token(kind, text_here, match.start(), depth, bits if table_depth else 0))
+        tokens.append(_Token(kind, text_here, match.start(), depth, bits if table_depth else 0))
         if text_here == "}":
             depth -= 1
             table_depth -= 1 if table_depth else 0
         before = text_here
-    return found
+    return tokens
 
 
 def variants(text: str) -> tuple[str, str]:
     """The C as a compiler with bit-scan built-ins sees it, and as any other does; lines keep their numbers."""
-    found = BRANCHES.search(text)
-    if found is None:
+    match = BRANCHES.search(text)
+    if match is None:
         return text, text
-    blank = {part: "\n" * found[part].count("\n") for part in ("one", "other")}
-    built_in = f"\n{found['one']}\n{blank['other']}\n"
-    portable = f"\n{blank['one']}\n{found['other']}\n"
-    begin, end = text[: found.start()], text[found.end() :]
+    blank = {part: "\n" * match[part].count("\n") for part in ("built_in", "portable")}
+    built_in = f"\n{match['built_in']}\n{blank['portable']}\n"
+    portable = f"\n{blank['built_in']}\n{match['portable']}\n"
+    begin, end = text[: match.start()], text[match.end() :]
     return f"{begin}{built_in}{end}", f"{begin}{portable}{end}"
 
 
@@ -209,10 +209,10 @@ def code_mutants(text: str, lines: int) -> Iterator[CodeMutant]:
     """
     built_in, portable = variants(text)
     yield from _mutants(built_in, lines, 0, len(built_in))
-    found = BRANCHES.search(text)
-    if found is not None:
-        shift = found.start() + 1 + found["one"].count("\n") + 1
-        yield from _mutants(portable, 1, shift, shift + len(found["other"]))
+    match = BRANCHES.search(text)
+    if match is not None:
+        shift = match.start() + 1 + match["built_in"].count("\n") + 1
+        yield from _mutants(portable, 1, shift, shift + len(match["portable"]))
 
 
 def _mutants(text: str, lines: int, first: int, last: int) -> Iterator[CodeMutant]:
@@ -266,12 +266,12 @@ def decider(
         if table.name not in checked:
             continue
         tables, function = checked[table.name].tables, symbols.lines[table.name]
-        for one in numbers(source, function, matcher_text(source, function, symbols.struct)):
-            compared, component = tables[one.lookup], one.component
+        for initializer in numbers(source, function, matcher_text(source, function, symbols.struct)):
+            compared, component = tables[initializer.lookup], initializer.component
             read = compared.words if component < 0 else [at for at, _ in compared.classes[component]]
-            if list(one.values) == read:
-                found = ((compared, component, at) for at, _ in enumerate(read))
-                places.update(zip(one.offsets, found, strict=True))
+            if list(initializer.values) == read:
+                entries = ((compared, component, at) for at, _ in enumerate(read))
+                places.update(zip(initializer.offsets, entries, strict=True))
     return Decider(source, places)
 
 
@@ -327,7 +327,7 @@ class Judge:
         return Noticed.UNDECIDED if same else Noticed.TESTS
 
     def by_proof(self, mutant: CodeMutant) -> Noticed:
-        """What is shown of a mutant that left the same behind.
+        """Return what is proved of a mutant that the tests cannot tell from the original.
 
         The functions asked about are the first on every way up from the changed one that have a reference: where
         those are proved equal to it, their callers cannot tell.
@@ -335,16 +335,16 @@ class Judge:
         files = {**self.files, self.source(): mutant.text}
         with_reference = {target.function: target for target in targets(self.program, self.symbols)}
         asked = first_callers(mutant.text, mutant.function, with_reference)
-        found = Noticed.EQUIVALENT
+        noticed = Noticed.EQUIVALENT
         for target in (with_reference[name] for name in asked):
-            said = self.shown(files, target)
-            if said in (Noticed.MATCHER, Noticed.ESBMC):
-                return said
-            found = Noticed.UNDECIDED if said is Noticed.UNDECIDED else found
-        return found
+            answer = self.shown(files, target)
+            if answer in (Noticed.MATCHER, Noticed.ESBMC):
+                return answer
+            noticed = Noticed.UNDECIDED if answer is Noticed.UNDECIDED else noticed
+        return noticed
 
     def shown(self, files: Mapping[str, str], target: ComparedFunction) -> Noticed:
-        """What the check of the matcher says of a changed function, else ESBMC."""
+        """Return the verdict of the matcher's check on a changed function, else ESBMC's."""
         if target.kind == "line":
             table = self.program.tables[target.number]
             checked = check_matcher(self.program, self.symbols, files, table)
@@ -354,9 +354,9 @@ class Judge:
                 return Noticed.EQUIVALENT  # complete without the truths of conditions
         if not self.esbmc_s or too_large(self.program, target):
             return Noticed.UNDECIDED
-        said = prove_function(self.program, self.symbols, files, target, self.esbmc_s).said
+        answer = prove_function(self.program, self.symbols, files, target, self.esbmc_s).answer
         return {EsbmcAnswer.PROVED: Noticed.EQUIVALENT, EsbmcAnswer.REFUTED: Noticed.ESBMC}.get(
-            said, Noticed.UNDECIDED
+            answer, Noticed.UNDECIDED
         )
 
 

@@ -34,7 +34,7 @@ MACHINE = (
 )
 FLAGS = ("-std=gnu11", "-O2", "-w", "-mcpu=cortex-m3", "-mthumb", "-ffp-contract=off", "--specs=rdimon.specs")
 LINK = ("-nostartfiles", "-Wl,-T,rcsc.ld", "-Wl,--no-warn-rwx-segments")
-SAID = re.compile(r"rcsc (\d+) inputs, (\d+) lines differ, (\d+) steps, (\d+) steps differ")
+RESULT = re.compile(r"rcsc (\d+) inputs, (\d+) lines differ, (\d+) steps, (\d+) steps differ")
 
 LINKER = """
 MEMORY { FLASH (rx) : ORIGIN = 0x00000000, LENGTH = 4M
@@ -69,7 +69,7 @@ __attribute__((section(".vectors"), used)) static const void *const vectors[8] =
 
 @dataclass(frozen=True, slots=True)
 class CortexRun:
-    """What the emulated target said of one table.
+    """The emulated target's answer about a table.
 
     Attributes:
         inputs: Combinations of the test variables that were matched.
@@ -201,10 +201,10 @@ def run_cortex(
         if built.status != 0:
             return BuildFailed(f"the image for the target was not built: {built.err.strip()[:400]}")
         ran = run_command([tools[1], *MACHINE, "-kernel", "image.elf"], place, TIMEOUT_S)
-    said = SAID.search(ran.out)
-    if said is None:
+    match = RESULT.search(ran.out)
+    if match is None:
         return BuildFailed(
             f"the target gave no result (status {ran.status}): {(ran.out + ran.err).strip()[:400]}"
         )
-    inputs, lines, steps, differ = (int(number) for number in said.groups())
+    inputs, lines, steps, differ = (int(number) for number in match.groups())
     return CortexRun(table.name, inputs, choices(program, table, most)[1], steps, lines + differ)

@@ -43,7 +43,7 @@ def search_sessions(
     """Runs drawn sessions of a step or a cycle.
 
     Args:
-        executors: Of the program.
+        executors: The program's executors.
         target: The step or cycle.
         compared: Counts what was compared.
         examples: How many sessions.
@@ -57,8 +57,10 @@ def search_sessions(
         drawn = session(known, table, most_cycles, random)
         if not keeps_invariants(program, drawn):
             continue
-        if found := run_session(executors, target, drawn, compared):
-            return simplest(program, found, lambda one: _differs(executors, target, one, compared))
+        if disagreement := run_session(executors, target, drawn, compared):
+            return simplest(
+                program, disagreement, lambda stimuli: _differs(executors, target, stimuli, compared)
+            )
         left -= 1
         if not left:
             break
@@ -66,11 +68,11 @@ def search_sessions(
 
 
 def _differs(
-    executors: Executors, target: ComparedFunction, one: Stimuli, compared: AgreementCount
+    executors: Executors, target: ComparedFunction, stimuli: Stimuli, compared: AgreementCount
 ) -> Disagreement | None:
-    if not keeps_invariants(executors.program, one):
+    if not keeps_invariants(executors.program, stimuli):
         return None
-    return run_session(executors, target, one, compared)
+    return run_session(executors, target, stimuli, compared)
 
 
 def search_lines(
@@ -82,28 +84,32 @@ def search_lines(
     random = Random(target.function)  # noqa: S311  # repeatable on purpose
     for _ in range(max(1, examples // TOGETHER)):
         drawn = [snapshot(known, table, random) for _ in range(TOGETHER)]
-        if found := run_lines(executors, target, drawn, compared):
-            return simplest(program, found, lambda one: run_lines(executors, target, [one.start], compared))
+        if disagreement := run_lines(executors, target, drawn, compared):
+            return simplest(
+                program, disagreement, lambda stimuli: run_lines(executors, target, [stimuli.start], compared)
+            )
     return None
 
 
 def simplest(
-    program: Program, found: Disagreement, differs: Callable[[Stimuli], Disagreement | None]
+    program: Program, disagreement: Disagreement, differs: Callable[[Stimuli], Disagreement | None]
 ) -> Disagreement:
-    """A disagreement with as few cycles, and as few values that are not initial, as can be had one by one."""
-    for one in _shorter(found):
-        found = differs(one) or found
+    """The disagreement, shrunk step by step to few cycles and few values that are not initial."""
+    for stimuli in _shorter(disagreement):
+        disagreement = differs(stimuli) or disagreement
     for variable in program.variables:
         name = str(variable.name)
-        start = {**found.session.start, name: variable.initial}
-        changed = tuple({**r, name: variable.initial} if name in r else r for r in found.session.readings)
-        found = differs(Stimuli(start, changed)) or found
-    return found
+        start = {**disagreement.session.start, name: variable.initial}
+        changed = tuple(
+            {**r, name: variable.initial} if name in r else r for r in disagreement.session.readings
+        )
+        disagreement = differs(Stimuli(start, changed)) or disagreement
+    return disagreement
 
 
-def _shorter(found: Disagreement) -> Iterator[Stimuli]:
+def _shorter(disagreement: Disagreement) -> Iterator[Stimuli]:
     """The session cut after the cycle that differs, then its last cycles alone."""
-    start, kept = found.session.start, found.session.readings[: found.cycle]
+    start, kept = disagreement.session.start, disagreement.session.readings[: disagreement.cycle]
     yield Stimuli(start, kept)
     for count in (4, 2, 1):
         if count < len(kept):

@@ -48,7 +48,7 @@ SAME = """static int ref_same(double a, double b) {
 
 
 class EsbmcAnswer(StrEnum):
-    """What ESBMC said."""
+    """ESBMC's answer."""
 
     PROVED = "proved"
     REFUTED = "refuted"
@@ -59,7 +59,7 @@ class EsbmcAnswer(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class EsbmcVerdict:
-    """One function and what was shown of it.
+    """A function and the verdict on it.
 
     Attributes:
         function: Name of the emitted function.
@@ -68,7 +68,7 @@ class EsbmcVerdict:
     """
 
     function: str
-    said: EsbmcAnswer
+    answer: EsbmcAnswer
     properties: int
     seconds: float
     detail: str = ""
@@ -98,21 +98,21 @@ def _externs(program: Program, symbols: Symbols) -> Iterator[str]:
         read = [symbols.c_type(name) for name in procedure.reads]
         read += [symbols.value_type(p.type) for p in procedure.params]
         written = [symbols.c_type(name) for name in procedure.writes]
-        given = [f"{one} a{i}" for i, one in enumerate(read)] + [
-            f"{one} *w{i}" for i, one in enumerate(written)
+        given = [f"{c_type} a{i}" for i, c_type in enumerate(read)] + [
+            f"{c_type} *w{i}" for i, c_type in enumerate(written)
         ]
-        yield from (f"static {one} e{at}_a{i}[{MOST_CALLS}];" for i, one in enumerate(read))
-        yield from (f"static {one} e{at}_w{i}[{MOST_CALLS}];" for i, one in enumerate(written))
+        yield from (f"static {c_type} e{at}_a{i}[{MOST_CALLS}];" for i, c_type in enumerate(read))
+        yield from (f"static {c_type} e{at}_w{i}[{MOST_CALLS}];" for i, c_type in enumerate(written))
         yield f"static uint32_t e{at}_n[2];"
         yield f"void {procedure.extern.c if procedure.extern else ''}({', '.join(given) or 'void'}) {{"
         yield f"const uint32_t n = e{at}_n[rcsc_again]; e{at}_n[rcsc_again] = n + 1u;"
         yield f'__ESBMC_assert(n < {MOST_CALLS}u, "{RECORD}"); __ESBMC_assume(n < {MOST_CALLS}u);'
         yield "if (rcsc_again == 0) {"
         yield from (f"e{at}_a{i}[n] = a{i};" for i, _ in enumerate(read))
-        yield from (f"e{at}_w{i}[n] = {_any(one)}();" for i, one in enumerate(written))
+        yield from (f"e{at}_w{i}[n] = {_any(c_type)}();" for i, c_type in enumerate(written))
         yield "} else {"
-        for i, one in enumerate(read):
-            same = f"ref_same(e{at}_a{i}[n], a{i})" if one == "double" else f"e{at}_a{i}[n] == a{i}"
+        for i, c_type in enumerate(read):
+            same = f"ref_same(e{at}_a{i}[n], a{i})" if c_type == "double" else f"e{at}_a{i}[n] == a{i}"
             yield f'__ESBMC_assert({same}, "an extern is given what the reference gives it");'
         yield "}"
         yield from (f"*w{i} = e{at}_w{i}[n];" for i, _ in enumerate(written))
@@ -170,7 +170,7 @@ KNOWN = "__ESBMC_assume(ref_ranges(&a, 0)); __ESBMC_assume(ref_invariants(&a));"
 def part_harness(
     program: Program, symbols: Symbols, target: ComparedFunction, part: str, function: str
 ) -> str:
-    """What is to be proved of one part of a step: `admit`, `settle` or `run`.
+    """The C text that states what is to be proved of a part of a step: `admit`, `settle` or `run`.
 
     `run` begins from what the reference's own admission and deferral leave, so that both sides compute on the
     same terms; with the other two proved equal to the reference's, the whole step is.
@@ -199,7 +199,7 @@ def part_harness(
 def too_large(program: Program, target: ComparedFunction) -> bool:
     """Whether ESBMC is not asked about a function, for the size of its tables."""
     table = program.tables[target.number] if target.kind in ("line", "batch", "step") else None
-    lines = max((len(one.lines) for one in ((table,) if table else program.tables)), default=0)
+    lines = max((len(candidate.lines) for candidate in ((table,) if table else program.tables)), default=0)
     return lines > MOST_LINES and target.kind != "init"
 
 
@@ -234,8 +234,8 @@ def step_parts(symbols: Symbols, files: Mapping[str, str], target: ComparedFunct
         body = function_body(source, f"int32_t {target.function}({symbols.struct} *s)")
     except ShapeError:
         return None
-    found = STEP.fullmatch(body)
-    return None if found is None else found.groupdict()
+    match = STEP.fullmatch(body)
+    return None if match is None else match.groupdict()
 
 
 def _prove_parts(
@@ -251,9 +251,9 @@ def _prove_parts(
         text = part_harness(program, symbols, target, part, function)
         verdict = ask(files, target.function, text, timeout_s, with_sources=False)
         properties, seconds = properties + verdict.properties, seconds + verdict.seconds
-        if verdict.said is not EsbmcAnswer.PROVED:
+        if verdict.answer is not EsbmcAnswer.PROVED:
             detail = f"{function}: {verdict.detail}"
-            return EsbmcVerdict(target.function, verdict.said, properties, seconds, detail)
+            return EsbmcVerdict(target.function, verdict.answer, properties, seconds, detail)
     return EsbmcVerdict(target.function, EsbmcAnswer.PROVED, properties, seconds)
 
 
@@ -275,11 +275,11 @@ def ask(
     began = perf_counter()
     verdict = EsbmcVerdict(function, EsbmcAnswer.TOO_LARGE, 0, 0.0)
     with scratch("esbmc") as place:
-        sources = [one for one in write_c(files, place) if with_sources and one != STAND_INS]
+        sources = [source for source in write_c(files, place) if with_sources and source != STAND_INS]
         (place / "harness.c").write_text(text, "utf-8")
         for solver in SOLVERS:
             left = timeout_s - (perf_counter() - began)
-            if verdict.said is EsbmcAnswer.TOO_LARGE and left > 1.0:
+            if verdict.answer is EsbmcAnswer.TOO_LARGE and left > 1.0:
                 command = [binary, "harness.c", *sources, *CHECKS, solver]
                 ran = run_command(command, place, left, MEMORY_MB)
                 verdict = _verdict(function, ran, perf_counter() - began)

@@ -1,6 +1,6 @@
-"""What a run of the suite counted, and how it is said.
+"""What a run of the suite counted, and its text.
 
-In: counts. Out: frozen figures, and their text; what was not tested is always said.
+In: counts. Out: frozen figures, and their text; what was not tested is always noted.
 """
 
 from collections import Counter
@@ -24,7 +24,7 @@ class TableFigures:
         impossible: Conditions for which that is shown impossible within ranges and assumptions.
         cells: Cells of the matcher compared with the table, complete; 0 where it was not done.
         mutants: Mutants of the table by who caught them.
-        cortex: What the emulated target said, or why it was not asked.
+        cortex: The emulated target's answer, or why it was not asked.
     """
 
     table: str
@@ -65,15 +65,15 @@ class ProgramFigures:
 
 @dataclass(frozen=True, slots=True)
 class SuiteResult:
-    """Everything that `rcsc test` has to say."""
+    """The result of `rcsc test`."""
 
     programs: tuple[ProgramFigures, ...]
-    found: tuple[Diagnostic, ...]
+    diagnostics: tuple[Diagnostic, ...]
 
     @property
     def failed(self) -> bool:
         """Whether there is an error."""
-        return any(diagnostic.severity is Severity.ERROR for diagnostic in self.found)
+        return any(diagnostic.severity is Severity.ERROR for diagnostic in self.diagnostics)
 
     def text(self) -> str:
         """The figures for people, program by program."""
@@ -95,9 +95,9 @@ def _program_text(program: ProgramFigures) -> Iterator[str]:
     )
     yield f"  sanitizers: {program.sanitized}"
     for verdict in program.esbmc:
-        shown = f", {verdict.properties} properties" if verdict.said is EsbmcAnswer.PROVED else ""
+        shown = f", {verdict.properties} properties" if verdict.answer is EsbmcAnswer.PROVED else ""
         detail = f": {verdict.detail}" if verdict.detail else ""
-        yield f"  ESBMC {verdict.function}: {verdict.said}{shown} ({verdict.seconds:.1f} s){detail}"
+        yield f"  ESBMC {verdict.function}: {verdict.answer}{shown} ({verdict.seconds:.1f} s){detail}"
     for table in program.tables:
         yield from _table_text(table)
     for name, mutants in program.code_mutants.items():

@@ -108,13 +108,13 @@ def test_of_box(like: Test, kind: Scalar, box: Box) -> Test:
 
 def merged(box: Sequence[tuple[int, int]]) -> Box:
     """Intervals sorted and joined where they touch."""
-    found: list[tuple[int, int]] = []
+    intervals: list[tuple[int, int]] = []
     for low, high in sorted(box):
-        if found and low <= found[-1][1] + 1:
-            found[-1] = (found[-1][0], max(high, found[-1][1]))
+        if intervals and low <= intervals[-1][1] + 1:
+            intervals[-1] = (intervals[-1][0], max(high, intervals[-1][1]))
         else:
-            found.append((low, high))
-    return tuple(found)
+            intervals.append((low, high))
+    return tuple(intervals)
 
 
 def wider(box: Box, kind: Scalar) -> Iterator[Box]:
@@ -197,12 +197,12 @@ def table_mutants(program: Program, table: Table) -> Iterator[TableMutant]:
 
 
 def _swaps(table: Table, first: int, second: int) -> Iterator[TableMutant]:
-    one, two = table.lines[first], table.lines[second]
-    for column, (a, b) in enumerate(zip(one.tests, two.tests, strict=True)):
+    upper, lower = table.lines[first], table.lines[second]
+    for column, (a, b) in enumerate(zip(upper.tests, lower.tests, strict=True)):
         if a != b:
             swapped = with_cell(with_cell(table, first, column, b), second, column, a)
-            where = f"lines {one.name} and {two.name}, column {table.columns[column].heading}"
-            yield TableMutant("swap", where, swapped, (str(one.name), str(two.name)))
+            where = f"lines {upper.name} and {lower.name}, column {table.columns[column].heading}"
+            yield TableMutant("swap", where, swapped, (str(upper.name), str(lower.name)))
 
 
 def _line(table: Table, name: str) -> Line | None:
@@ -219,10 +219,10 @@ def difference(search: InputSearch, table: Table, mutant: TableMutant) -> Snapsh
     answer = Missing.NONE
     for name in mutant.lines:
         for here, there in ((table, mutant.table), (mutant.table, table)):
-            found = _only(search, given, _line(here, name), _line(there, name))
-            if not isinstance(found, Missing):
-                return found
-            answer = Missing.UNKNOWN if found is Missing.UNKNOWN else answer
+            snapshot = _only(search, given, _line(here, name), _line(there, name))
+            if not isinstance(snapshot, Missing):
+                return snapshot
+            answer = Missing.UNKNOWN if snapshot is Missing.UNKNOWN else answer
     return answer
 
 
@@ -237,10 +237,10 @@ def _only(
         return search.find(wanted)
     answer = Missing.NONE
     for test, _ in _holds(there):
-        found = search.find([*wanted, (test, False)])
-        if not isinstance(found, Missing):
-            return found
-        answer = Missing.UNKNOWN if found is Missing.UNKNOWN else answer
+        snapshot = search.find([*wanted, (test, False)])
+        if not isinstance(snapshot, Missing):
+            return snapshot
+        answer = Missing.UNKNOWN if snapshot is Missing.UNKNOWN else answer
     return answer
 
 
@@ -250,7 +250,7 @@ def judge(
     """What becomes of one mutant.
 
     Args:
-        search: Over the program.
+        search: A search over the program.
         table: The table as it is.
         mutant: The changed table.
         before: What the prover says of the table as it is.
@@ -263,12 +263,12 @@ def judge(
         return JudgedMutant(mutant.change, mutant.where, Caught.PROVER)
     if after.default != before.default:
         return JudgedMutant(mutant.change, mutant.where, Caught.DEFAULT)
-    found = difference(search, table, mutant)
-    if found is Missing.NONE:
+    snapshot = difference(search, table, mutant)
+    if snapshot is Missing.NONE:
         return JudgedMutant(mutant.change, mutant.where, Caught.EQUIVALENT)
-    if isinstance(found, Missing):
+    if isinstance(snapshot, Missing):
         return JudgedMutant(mutant.change, mutant.where, Caught.UNDECIDED)
-    parted = matching_lines(table, found) != matching_lines(mutant.table, found)
+    parted = matching_lines(table, snapshot) != matching_lines(mutant.table, snapshot)
     return JudgedMutant(mutant.change, mutant.where, Caught.EXECUTORS if parted else Caught.SURVIVED)
 
 
@@ -278,11 +278,11 @@ def judge_table(
     """Judges the table's mutants: all of them, or a sample by seed.
 
     Args:
-        search: Over the program.
+        search: A search over the program.
         table: A table that the prover accepts.
         prover: The prover.
         sample: How many mutants at most; None for all.
-        seed: Of the sample.
+        seed: Seed of the sample.
     """
     mutants = list(table_mutants(search.program, table))
     if sample is not None and len(mutants) > sample:

@@ -1,7 +1,7 @@
 """The whole suite on one screen: what `rcsc test` runs on a program and what was generated from it.
 
 In: a program, its generated files, the prover and its solver as functions. Out: figures and diagnostics. What
-could not be checked is said in the figures; a missing tool is never a pass.
+could not be checked is noted in the figures; a missing tool is never a pass.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -55,7 +55,7 @@ class SuiteOptions:
         esbmc_s: Time limit of ESBMC for one function, in seconds; 0 leaves it out.
         cortex: Whether the emulated target is asked.
         mutants: How many mutants of each table (and of the C, where `deep`) are tried; None for all, 0 for none.
-        seed: Of every sample.
+        seed: Seed of every sample.
         progress: Told what is being done.
     """
 
@@ -81,11 +81,9 @@ def _place(program: Program, table: Table | None = None) -> Label:
     return Label(Span(program.file, 0, 0) if table is None else table.span)
 
 
-def _disagreement(program: Program, found: Disagreement, table: Table | None) -> Diagnostic:
-    message = (
-        f"the {found.executor} executor's `{found.function}` differs from the tables in cycle {found.cycle}"
-    )
-    notes = (*found.words, *described(program, found.session))
+def _disagreement(program: Program, disagreement: Disagreement, table: Table | None) -> Diagnostic:
+    message = f"the {disagreement.executor} executor's `{disagreement.function}` differs from the tables in cycle {disagreement.cycle}"
+    notes = (*disagreement.words, *described(program, disagreement.session))
     return Diagnostic(Code.EXECUTORS_DISAGREE, message, _place(program, table), notes=notes)
 
 
@@ -107,7 +105,7 @@ class Suite:
     proofs: Proofs
     executors: Executors
     compared: AgreementCount = field(default_factory=AgreementCount)
-    found: list[Diagnostic] = field(default_factory=list)
+    diagnostics: list[Diagnostic] = field(default_factory=list)
     checked: dict[str, Checked] = field(default_factory=dict)
 
     def table(self, target: ComparedFunction) -> Table | None:
@@ -121,28 +119,28 @@ class Suite:
             table = self.table(target)
             snapshots = [] if table is None else [v.snapshot for v in vectors[table.name].vectors]
             if target.kind == "init":
-                found = run_init(self.executors, target)
+                disagreement = run_init(self.executors, target)
             elif is_matcher(target):
-                found = self.lines(target, snapshots)
+                disagreement = self.lines(target, snapshots)
             else:
-                found = self.steps(target, snapshots)
-            if found is not None:
-                self.found.append(_disagreement(self.program, found, table))
+                disagreement = self.steps(target, snapshots)
+            if disagreement is not None:
+                self.diagnostics.append(_disagreement(self.program, disagreement, table))
 
     def lines(self, target: ComparedFunction, snapshots: Sequence[Snapshot]) -> Disagreement | None:
         """A matcher on the vectors and on drawn snapshots."""
         from rcsc.testing.differential_search import search_lines
 
-        found = run_lines(self.executors, target, snapshots, self.compared)
-        return found or search_lines(self.executors, target, self.compared, self.options.examples)
+        disagreement = run_lines(self.executors, target, snapshots, self.compared)
+        return disagreement or search_lines(self.executors, target, self.compared, self.options.examples)
 
     def steps(self, target: ComparedFunction, snapshots: Sequence[Snapshot]) -> Disagreement | None:
         """A step from the vectors, a step or cycle in drawn sessions."""
         from rcsc.testing.differential_search import search_sessions
 
-        found = next(filter(None, (self.one_step(target, snapshot) for snapshot in snapshots)), None)
+        disagreement = next(filter(None, (self.one_step(target, snapshot) for snapshot in snapshots)), None)
         options = self.options
-        return found or search_sessions(
+        return disagreement or search_sessions(
             self.executors, target, self.compared, options.examples, options.cycles
         )
 
@@ -156,21 +154,23 @@ class Suite:
 
     def sanitized(self) -> str:
         """The sessions under the sanitizers."""
-        made = run_sanitized(self.executors, self.compared)
-        if isinstance(made, Absent):
-            return f"not run: {made.reason}"
-        if isinstance(made, BuildFailed):
+        result = run_sanitized(self.executors, self.compared)
+        if isinstance(result, Absent):
+            return f"not run: {result.reason}"
+        if isinstance(result, BuildFailed):
             message = f"the C executor of `{self.program.name}` stopped under the sanitizers"
-            notes = tuple(made.text.splitlines())
-            self.found.append(Diagnostic(Code.EXECUTORS_DISAGREE, message, _place(self.program), notes=notes))
+            notes = tuple(result.text.splitlines())
+            self.diagnostics.append(
+                Diagnostic(Code.EXECUTORS_DISAGREE, message, _place(self.program), notes=notes)
+            )
             return "stopped"
-        if made is not None:
-            self.found.append(_disagreement(self.program, made, None))
+        if result is not None:
+            self.diagnostics.append(_disagreement(self.program, result, None))
             return "differs"
         return f"the same {len(self.compared.kept)} sequences, no finding of AddressSanitizer or UBSan"
 
     def reached(self, table: Table, vectors: Vectors) -> int:
-        """Reports lines that no step took though an input takes them; how many were taken."""
+        """Report lines that no step took though an input takes them; return how many were taken."""
         taken: Mapping[str, int] = self.compared.lines.get(table.name, {})
         spans = {str(line.name): line.span for line in table.lines}
         looked_at = {v.line for v in vectors.vectors if v.purpose == "reach" and v.expected == v.line}
@@ -179,13 +179,13 @@ class Suite:
             if name in looked_at and not taken.get(name, 0):
                 label = Label(spans.get(name, table.default.span if table.default else table.span))
                 message = f"no step of the tests took line `{name}` of table `{table.name}`"
-                self.found.append(Diagnostic(Code.LINE_NOT_REACHED, message, label))
+                self.diagnostics.append(Diagnostic(Code.LINE_NOT_REACHED, message, label))
         return sum(1 for name in named if taken.get(name, 0))
 
     def differs(self, message: str, table: Table | None, notes: Sequence[str]) -> None:
-        """The C is not the table."""
+        """Report that the C differs from the table."""
         place = _place(self.program, table)
-        self.found.append(Diagnostic(Code.MATCHER_DIFFERS, message, place, notes=tuple(notes)))
+        self.diagnostics.append(Diagnostic(Code.MATCHER_DIFFERS, message, place, notes=tuple(notes)))
 
     def matcher(self, table: Table) -> Checked | None:
         """The complete per-variable check of the emitted masks."""
@@ -208,7 +208,7 @@ class Suite:
                 yield EsbmcVerdict(target.function, EsbmcAnswer.TOO_LARGE, 0, 0.0, reason)
                 continue
             verdict = prove_function(self.program, self.symbols, self.files, target, self.options.esbmc_s)
-            if verdict.said is EsbmcAnswer.REFUTED:
+            if verdict.answer is EsbmcAnswer.REFUTED:
                 message = f"ESBMC refutes that the C function `{target.function}` equals the tables"
                 self.differs(message, self.table(target), (verdict.detail,))
             yield verdict
@@ -235,13 +235,15 @@ class Suite:
         self.options.progress(f"mutating table {table.name}")
         search = search_in(self.program, self.proofs.solver)
         judged = judge_table(search, table, self.proofs.prover, self.options.mutants, self.options.seed)
-        alive = [one for one in judged if one.caught is Caught.SURVIVED]
+        alive = [mutant for mutant in judged if mutant.caught is Caught.SURVIVED]
         if alive:
             message = (
                 f"{counted(len(alive), 'mutant')} of table `{table.name}` told apart by the search alone"
             )
-            self.differs(message, table, [f"{one.change}: {one.where}" for one in alive[:MOST_SHOWN]])
-        return tally([one.caught.value for one in judged])
+            self.differs(
+                message, table, [f"{mutant.change}: {mutant.where}" for mutant in alive[:MOST_SHOWN]]
+            )
+        return tally([mutant.caught.value for mutant in judged])
 
     def code_mutants(self) -> Iterator[tuple[str, dict[str, int]]]:
         """Mutants of the emitted C, by who noticed them: of the masks, and of the rest."""
@@ -349,4 +351,4 @@ def _run(
     executors = Executors(program, native, python, tuple(targets(program, native.symbols)))
     suite = Suite(program, native.symbols, files, options, proofs, executors)
     figures = suite.run()
-    return SuiteResult((figures,), tuple(sorted(suite.found, key=sort_key)))
+    return SuiteResult((figures,), tuple(sorted(suite.diagnostics, key=sort_key)))

@@ -458,7 +458,7 @@ def test_nothing_of_the_users_is_called(python: str, c: str) -> None:
 
     kept = os._exit
     result = run_suite(program := program_of(SINGLE.format(python=python, c=c)), emitted(program), QUICK)
-    assert result.found == ()
+    assert result.diagnostics == ()
     assert result.programs[0].faults[4] > 0
     assert result.programs[0].tables[0].cells > 0
     assert os._exit is kept
@@ -495,7 +495,7 @@ def test_esbmc_knows_nothing_of_what_an_extern_gives(
     symbols = symbols_of(program, files)
     files = {path: swap(old, new)(text) if path.endswith(".c") else text for path, text in files.items()}
     step = next(target for target in targets(program, symbols) if target.kind == "step")
-    assert prove_function(program, symbols, files, step, 30.0).said is said
+    assert prove_function(program, symbols, files, step, 30.0).answer is said
 
 
 QUOTIENT = """
@@ -521,4 +521,4 @@ table u {
 def test_conditions_are_tested_only_where_they_are_defined() -> None:
     program = proved_of(QUOTIENT)
     made = run_suite(program, emitted(program), QUICK)
-    assert made.found == ()
+    assert made.diagnostics == ()

@@ -228,7 +228,7 @@ def test_what_nobody_can_decide_is_a_figure_and_no_failure(
 ) -> None:
     program, files, _, _ = classed
     result = deep(program, files)
-    assert result.found == ()
+    assert result.diagnostics == ()
     assert "mutants of the masks: " in result.text()
     assert set(result.programs[0].code_mutants["mutants of the masks"]) <= {"the matcher check", "equivalent"}
     for said, failed in ((EsbmcAnswer.FAILED, False), (EsbmcAnswer.REFUTED, True)):
@@ -241,7 +241,7 @@ def test_a_check_of_the_masks_that_calls_all_equal_is_found_out(monkeypatch: pyt
     lines = "| line | part || on |\n| a | < 2 || true |\n| b | >= 2 || false |"
     program = program_of(f"input part : int 0 .. 3\noutput on : bool\ntable t {{\n{lines}\n}}\n")
     monkeypatch.setattr(Compared, "with_word", lambda *_: True)
-    found = deep(program, emitted(program)).found
+    found = deep(program, emitted(program)).diagnostics
     assert ["calls equal what the tests tell apart" in finding.message for finding in found] == [True]
 
 

@@ -71,12 +71,12 @@ def expressions(body: Iterable[Statement]) -> Iterator[Expr]:
 
 def tests_of(table: Table) -> tuple[Test, ...]:
     """Every distinct test of the table, in order of its first line."""
-    found: dict[tuple[str, Expr], Test] = {}
+    tests: dict[tuple[str, Expr], Test] = {}
     for line in table.lines:
         for test in line.tests:
             if test is not None:
-                found.setdefault((test.text, test.condition), test)
-    return tuple(found.values())
+                tests.setdefault((test.text, test.condition), test)
+    return tuple(tests.values())
 
 
 def relational_tests(table: Table) -> tuple[Test, ...]:
@@ -142,17 +142,17 @@ def _inside(variable: Variable, near: set[int]) -> tuple[int, ...]:
 
 
 def companions(program: Program) -> dict[str, tuple[str, ...]]:
-    """For every leaf those it is compared with in one expression, of the same kind."""
+    """For every leaf, the leaves of its kind that it is compared with in an expression."""
     kinds: Mapping[str, Scalar] = {variable.name: variable.type for variable in program.variables}
-    found: dict[str, set[str]] = {}
+    compared: dict[str, set[str]] = {}
     for expr in all_expressions(program):
         names = reads(expr)
         if 1 < len(names) <= MOST_COMPANIONS:
             for name in names:
-                found.setdefault(name, set()).update(
+                compared.setdefault(name, set()).update(
                     other for other in names if other != name and _same_kind(kinds[name], kinds[other])
                 )
-    return {name: tuple(sorted(others)) for name, others in found.items() if others}
+    return {name: tuple(sorted(others)) for name, others in compared.items() if others}
 
 
 def representable(kind: Scalar) -> tuple[int, int]:

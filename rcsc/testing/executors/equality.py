@@ -5,9 +5,9 @@ from math import copysign, isnan
 from rcsc.lang.model import Value
 
 
-def same_value(one: Value, other: Value) -> bool:
+def same_value(value: Value, other: Value) -> bool:
     """Whether two values of one leaf are the same."""
-    if isinstance(one, float) or isinstance(other, float):
-        a, b = float(one), float(other)
+    if isinstance(value, float) or isinstance(other, float):
+        a, b = float(value), float(other)
         return (isnan(a) and isnan(b)) or (a == b and copysign(1.0, a) == copysign(1.0, b))
-    return int(one) == int(other)
+    return int(value) == int(other)

@@ -69,8 +69,8 @@ def word(kind: Scalar, value: Value) -> int:
 def chosen(words: list[int], salt: int, count: int) -> int:
     """Which result is given."""
     state = SEED ^ salt
-    for one in (SCRIPT.number, *words):
-        state = ((state ^ one) * FACTOR) & MASK
+    for word in (SCRIPT.number, *words):
+        state = ((state ^ word) * FACTOR) & MASK
     return (state >> 8) % count
 
 

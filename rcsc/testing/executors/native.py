@@ -80,27 +80,27 @@ class Native:
 
     def rows(self, snapshots: Sequence[Snapshot]) -> "array[int]":
         """The snapshots as words, row after row."""
-        found = array("q")
+        packed = array("q")
         for snapshot in snapshots:
-            found.extend(to_word(v.type, snapshot[v.name]) for v in self.program.variables)
-        return found
+            packed.extend(to_word(v.type, snapshot[v.name]) for v in self.program.variables)
+        return packed
 
     def run(self, which: int, mode: int, snapshots: Sequence[Snapshot]) -> list[NativeRun]:
         """Runs a session of function `which` in the shared object; see `shim`."""
         given, width = self.rows(snapshots), words(self.program)
-        made = array("q", bytes(8 * width * len(snapshots)))
+        output = array("q", bytes(8 * width * len(snapshots)))
         pointer = ctypes.POINTER(ctypes.c_int64)
-        address = [ctypes.cast(a.buffer_info()[0], pointer) for a in (given, made)]
+        address = [ctypes.cast(a.buffer_info()[0], pointer) for a in (given, output)]
         self.library.rcsc_session(which, mode, ctypes.c_int64(len(snapshots)), *address)
-        return self.results(made)
+        return self.results(output)
 
-    def results(self, made: "array[int]") -> list[NativeRun]:
+    def results(self, output: "array[int]") -> list[NativeRun]:
         """Rows of words as results."""
         width, count = words(self.program), len(monitored(self.program))
         leaves = [
             (str(v.name), v.type, self.symbols.c_type(v.name) == "uint64_t") for v in self.program.variables
         ]
-        return [_result(leaves, count, made[at : at + width]) for at in range(0, len(made), width)]
+        return [_result(leaves, count, output[at : at + width]) for at in range(0, len(output), width)]
 
     def run_checked(
         self, sessions: Sequence[tuple[int, int, Sequence[Snapshot]]]
@@ -116,21 +116,21 @@ class Native:
         ran = run_command([str(self.checked), "in.bin", "out.bin"], place, COMPILE_S)
         if ran.status != 0:
             return BuildFailed("\n".join(ran.err.strip().splitlines()[:6]) or f"exit status {ran.status}")
-        made = array("q")
-        made.frombytes((place / "out.bin").read_bytes())
-        return self._parted(made, [len(snapshots) for _, _, snapshots in sessions])
+        output = array("q")
+        output.frombytes((place / "out.bin").read_bytes())
+        return self._parted(output, [len(snapshots) for _, _, snapshots in sessions])
 
-    def _parted(self, made: "array[int]", lengths: Sequence[int]) -> list[list[NativeRun]]:
-        found, results = [], self.results(made)
+    def _parted(self, output: "array[int]", lengths: Sequence[int]) -> list[list[NativeRun]]:
+        parts, results = [], self.results(output)
         at = 0
         for length in lengths:
-            found.append(results[at : at + length])
+            parts.append(results[at : at + length])
             at += length
-        return found
+        return parts
 
 
 def _result(leaves: Sequence[tuple[str, Scalar, bool]], count: int, row: Sequence[int]) -> NativeRun:
-    """A row as a result; of a leaf its name, its type, and whether C holds it in 64 bits without a sign."""
+    """A row as a result; `leaves` has the name and type of each leaf, and whether C holds it in 64 bits without a sign."""
     failed = tuple(at for at in range(count) if row[TRACE_WORDS + at])
     given = zip(leaves, row[TRACE_WORDS + count :], strict=True)
     snapshot = {name: of_word(kind, word, unsigned) for (name, kind, unsigned), word in given}

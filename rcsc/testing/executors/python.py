@@ -36,9 +36,9 @@ class PythonUnderTest:
 
     def state(self, snapshot: Snapshot) -> Any:
         """A state with these values."""
-        made = getattr(self.module, self.symbols.state_class)()
-        self.put(made, snapshot)
-        return made
+        state = getattr(self.module, self.symbols.state_class)()
+        self.put(state, snapshot)
+        return state
 
     def put(self, state: Any, values: Snapshot) -> None:
         """Sets leaves of a state."""
@@ -56,14 +56,14 @@ class PythonUnderTest:
     def run(self, target: ComparedFunction, session: Stimuli) -> list[Seen]:
         """Runs a session; the state is carried from cycle to cycle."""
         function, state = self.function(target), self.state(session.start)
-        found = []
+        seen = []
         for readings in session.readings:
             self.put(state, readings)
             try:
-                found.append(self.seen(function(state), state))
+                seen.append(self.seen(function(state), state))
             except Exception as error:  # noqa: BLE001  # whatever it raises is a finding
-                found.append(Seen(RAISED, f"raised {error!r}", -1, (), self.leaves(state)))
-        return found
+                seen.append(Seen(RAISED, f"raised {error!r}", -1, (), self.leaves(state)))
+        return seen
 
     def seen(self, fault: int, state: Any) -> Seen:
         """The state after a cycle in the common words."""
@@ -79,8 +79,8 @@ class PythonUnderTest:
     def line(self, target: ComparedFunction, snapshot: Snapshot) -> int:
         """What the emitted `line` or `lines` function gives."""
         if target.kind == "batch":
-            one, other = self.function(target)([self.state(snapshot), self.state(snapshot)])
-            return int(one) if one == other else -7
+            line, other = self.function(target)([self.state(snapshot), self.state(snapshot)])
+            return int(line) if line == other else -7
         return int(self.function(target)(self.state(snapshot)))
 
 
@@ -93,7 +93,7 @@ def python_executor(
         program: The program.
         symbols: Names in its emitted files.
         files: The emitted files, text by path.
-        stand_ins: Of the program's externs, where it has any.
+        stand_ins: Stand-ins for the program's externs, where it has any.
     """
     text = next(text for path, text in files.items() if Path(path).name == symbols.module)
     module = (stand_ins or PythonStandIns(program, {})).load(text, f"rcsc_tested_{symbols.program}")

@@ -126,10 +126,10 @@ def _actions(writer: Writer, number: int, table: Table) -> Iterator[str]:
 
 def all_lines(table: Table) -> list[tuple[str, tuple[Statement, ...]]]:
     """Name and statements of every line, DEFAULT last."""
-    found = [(str(line.name), tuple(a.statement for a in line.actions)) for line in table.lines]
+    lines = [(str(line.name), tuple(a.statement for a in line.actions)) for line in table.lines]
     if table.default is not None:
-        found.append((str(table.default.name), tuple(a.statement for a in table.default.actions)))
-    return found
+        lines.append((str(table.default.name), tuple(a.statement for a in table.default.actions)))
+    return lines
 
 
 def monitored(program: Program) -> tuple[str, ...]:

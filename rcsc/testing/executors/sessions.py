@@ -45,20 +45,20 @@ class Seen:
 
 def differences(program: Program, expected: Seen, seen: Seen) -> tuple[str, ...]:
     """What differs, in words; empty where nothing does."""
-    found: list[str] = []
+    notes: list[str] = []
     for what in ("fault", "fault_at", "line", "failed"):
-        one, other = getattr(expected, what), getattr(seen, what)
-        if one != other:
-            found.append(f"{what.replace('_', ' ')} {other!r} where {one!r} is right")
+        right, other = getattr(expected, what), getattr(seen, what)
+        if right != other:
+            notes.append(f"{what.replace('_', ' ')} {other!r} where {right!r} is right")
     for variable in program.variables:
-        one_value, other_value = expected.snapshot[variable.name], seen.snapshot[variable.name]
-        if not same_value(one_value, other_value):
-            words = (said(program, variable.name, value) for value in (other_value, one_value))
-            found.append("`{}` = {} where {} is right".format(variable.name, *words))
-    return tuple(found[:MOST_DIFFERENCES])
+        right_value, other_value = expected.snapshot[variable.name], seen.snapshot[variable.name]
+        if not same_value(right_value, other_value):
+            words = (spelled(program, variable.name, value) for value in (other_value, right_value))
+            notes.append("`{}` = {} where {} is right".format(variable.name, *words))
+    return tuple(notes[:MOST_DIFFERENCES])
 
 
-def said(program: Program, name: str, value: Value) -> str:
+def spelled(program: Program, name: str, value: Value) -> str:
     """A value in the table's words, also where it lies outside its type."""
     kind = program.variable(name).type
     try:
@@ -81,4 +81,4 @@ def described(program: Program, session: Stimuli) -> tuple[str, ...]:
 def _changes(program: Program, before: Snapshot, after: Snapshot) -> str:
     names = [str(v.name) for v in program.variables if v.name in after]
     changed = [name for name in names if not same_value(before[name], after[name])]
-    return ", ".join(f"{name} = {said(program, name, after[name])}" for name in changed) or "no change"
+    return ", ".join(f"{name} = {spelled(program, name, after[name])}" for name in changed) or "no change"

@@ -116,9 +116,9 @@ def symbols_of(program: Program, files: Mapping[str, str]) -> Symbols:
     Raises:
         KeyError: The symbol file is missing, or is another program's.
     """
-    found = [json_of(text) for path, text in files.items() if path.endswith(".json")]
+    documents = [json_of(text) for path, text in files.items() if path.endswith(".json")]
     names = [str(v.name) for v in program.variables]
-    for document in found:
+    for document in documents:
         if [leaf["name"] for leaf in document["leaves"]] == names:
             return _symbols(document)
     raise KeyError(program.name)

@@ -23,8 +23,8 @@ def words(expr: Expr) -> str:
             return f"{_inner(subject)} in {{{', '.join(spell(subject.type, value) for value in values)}}}"
         case Apply(op=op, args=args) if op in CALLED:
             return f"{op.value}({', '.join(words(arg) for arg in args)})"
-        case Apply(op=op, args=(one,)):
-            return f"{'-' if op is Op.NEG else 'not '}{_inner(one)}"
+        case Apply(op=op, args=(operand,)):
+            return f"{'-' if op is Op.NEG else 'not '}{_inner(operand)}"
         case Apply(op=op, args=args):
             return f" {op.value} ".join(_inner(arg) for arg in args)
 

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 from rcsc.host.files import csv_text
 from rcsc.lang.model import Program, Real, Snapshot, Value
-from rcsc.testing.executors.sessions import said
+from rcsc.testing.executors.sessions import spelled
 from rcsc.testing.inputs.vectors import Vectors
 
 COLUMNS = ("table", "line", "condition", "purpose", "expected")
@@ -22,7 +22,7 @@ def _plain(program: Program, name: str, value: Value) -> object:
     return (
         float(value)
         if isinstance(kind, Real)
-        else said(program, name, value)
+        else spelled(program, name, value)
         if _named(program, name)
         else value
     )
@@ -36,7 +36,7 @@ def _values(program: Program, snapshot: Snapshot) -> dict[str, object]:
     return {str(v.name): _plain(program, v.name, snapshot[v.name]) for v in program.variables}
 
 
-def vectors_json(program: Program, found: Sequence[Vectors]) -> str:
+def vectors_json(program: Program, parts: Sequence[Vectors]) -> str:
     """The vectors and what has none, as JSON."""
     document = {
         "program": program.name,
@@ -55,16 +55,16 @@ def vectors_json(program: Program, found: Sequence[Vectors]) -> str:
                     for unshown in part.unshown
                 ],
             }
-            for part in found
+            for part in parts
         ],
     }
     return json.dumps(document, indent=1) + "\n"
 
 
-def vectors_csv(program: Program, found: Sequence[Vectors]) -> str:
+def vectors_csv(program: Program, parts: Sequence[Vectors]) -> str:
     """The vectors as CSV: one row a vector, one column a leaf."""
     rows: list[list[object]] = [[*COLUMNS, *(v.name for v in program.variables)]]
-    for part in found:
+    for part in parts:
         for vector in part.vectors:
             values = _values(program, vector.snapshot).values()
             words = [str(value).lower() if isinstance(value, bool) else value for value in values]

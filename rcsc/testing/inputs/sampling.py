@@ -42,7 +42,7 @@ class Declarations:
     Attributes:
         program: The program.
         edges: For every leaf the keys at which something may turn.
-        near: For every leaf those it is compared with.
+        near: For every leaf, the leaves that it is compared with.
         inputs: The names of its inputs.
         strange: For every input that can hold them, readings outside its range.
         checked: The conditions that the executors check, and the leaves that each reads.
@@ -103,17 +103,17 @@ def _break(known: Declarations, drawn: dict[str, int], random: Random) -> None:
 
 def _scattered(known: Declarations, random: Random) -> dict[str, int]:
     """A key for every leaf: mostly edges, some values between them, some beside a leaf it is compared with."""
-    found: dict[str, int] = {}
+    keys: dict[str, int] = {}
     for variable in known.program.variables:
         name, edges = str(variable.name), known.edges[variable.name]
         low, high = key_bounds(variable.type)
-        found[name] = random.randint(low, high) if random.random() < BETWEEN else random.choice(edges)
-        beside = [found[other] for other in known.near.get(name, ()) if other in found]
+        keys[name] = random.randint(low, high) if random.random() < BETWEEN else random.choice(edges)
+        beside = [keys[other] for other in known.near.get(name, ()) if other in keys]
         if beside and random.random() < BESIDE:
-            found[name] = min(high, max(low, random.choice(beside) + random.choice((-1, 0, 1))))
+            keys[name] = min(high, max(low, random.choice(beside) + random.choice((-1, 0, 1))))
     if random.random() < BROKEN:
-        _break(known, found, random)
-    return found
+        _break(known, keys, random)
+    return keys
 
 
 def snapshot(known: Declarations, table: Table | None, random: Random) -> Snapshot:
@@ -133,11 +133,11 @@ def _readings(
     drawn = snapshot(known, table, random)
     steady = bool(before) and random.random() < STEADY
     changed = random.choices(known.inputs, k=random.randint(0, MOST_CHANGED)) if steady else known.inputs
-    found: dict[str, Value] = {**before, **{name: drawn[name] for name in changed}}
+    readings: dict[str, Value] = {**before, **{name: drawn[name] for name in changed}}
     if wild and known.strange:
         for name in random.choices(list(known.strange), k=random.choice(STRANGE)):
-            found[name] = random.choice(known.strange[name])
-    return found
+            readings[name] = random.choice(known.strange[name])
+    return readings
 
 
 def session(known: Declarations, table: Table | None, most: int, random: Random) -> Stimuli:

@@ -111,11 +111,11 @@ class InputSearch:
         boxes: dict[str, Box] = {}
         rest: list[Wanted] = []
         for condition, truth in wanted:
-            one = box_of(condition)
-            if one is None:
+            boxed = box_of(condition)
+            if boxed is None:
                 rest.append((condition, truth))
                 continue
-            name, box = one
+            name, box = boxed
             kind = self.variables[name].type
             allowed = box if truth else complement(box, *key_bounds(kind))
             boxes[name] = meet(boxes.get(name, (key_bounds(kind),)), allowed)
@@ -127,15 +127,15 @@ class InputSearch:
         return self._relational(boxes, rest, base, wanted)
 
     def _settle(self, boxes: Mapping[str, Box], prefer: Snapshot | None) -> dict[str, Value]:
-        found = {name: v.initial for name, v in self.variables.items()} if prefer is None else dict(prefer)
+        snapshot = {name: v.initial for name, v in self.variables.items()} if prefer is None else dict(prefer)
         for name, box in boxes.items():
             kind = self.variables[name].type
-            key = key_of(kind, found[name])
+            key = key_of(kind, snapshot[name])
             if not any(low <= key <= high for low, high in box):
-                found[name] = value_of_key(
+                snapshot[name] = value_of_key(
                     kind, min((e for ends in box for e in ends), key=lambda e: abs(e - key))
                 )
-        return found
+        return snapshot
 
     def _agrees(self, rest: Sequence[Wanted], snapshot: Snapshot) -> bool:
         return all(holds(expr_of(condition), snapshot) is truth for condition, truth in rest)

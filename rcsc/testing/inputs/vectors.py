@@ -70,17 +70,17 @@ def atoms(test: Test) -> tuple[Test | Expr, ...]:
     """The conditions of one cell: a cell on one leaf is one; others are parted at and, or, not, implies."""
     if test.box is not None:
         return (test,)
-    found: dict[Expr, None] = {}
+    conditions: dict[Expr, None] = {}
 
     def part(expr: Expr) -> None:
         if isinstance(expr, Apply) and (is_logic(expr.op) or expr.op is Op.NOT):
             for arg in expr.args:
                 part(arg)
         else:
-            found.setdefault(expr)
+            conditions.setdefault(expr)
 
     part(test.condition)
-    return tuple(found) if len(found) <= MOST_ATOMS else (test,)
+    return tuple(conditions) if len(conditions) <= MOST_ATOMS else (test,)
 
 
 def _truth(expr: Expr, known: Mapping[Expr, bool]) -> bool:
@@ -104,8 +104,8 @@ class _Pair:
 def _assignments(test: Test, parts: Sequence[Test | Expr]) -> list[tuple[bool, ...]]:
     """The truths of the atoms under which the cell holds."""
     exprs = [expr_of(part) for part in parts]
-    found = product((True, False), repeat=len(parts))
-    return [t for t in found if _truth(test.condition, dict(zip(exprs, t, strict=True)))]
+    truths = product((True, False), repeat=len(parts))
+    return [t for t in truths if _truth(test.condition, dict(zip(exprs, t, strict=True)))]
 
 
 def _pairs(test: Test, atom: int, parts: Sequence[Test | Expr]) -> Iterator[_Pair]:
@@ -143,12 +143,12 @@ class Finder:
 
     def find(self, wanted: Sequence[Wanted], prefer: Snapshot | None = None) -> Snapshot | Missing:
         """As `Search.find`; deferred values are settled where possible, so that a step takes the line."""
-        found = self.search.find(wanted, prefer)
-        if isinstance(found, Missing):
-            return found
+        snapshot = self.search.find(wanted, prefer)
+        if isinstance(snapshot, Missing):
+            return snapshot
         deferred = [v.name for v in self.search.program.variables if v.deferred_until is not None]
-        steady = {**found, **{str(pending(name)): found[name] for name in deferred}}
-        return steady if all(holds(expr_of(c), steady) is truth for c, truth in wanted) else found
+        steady = {**snapshot, **{str(pending(name)): snapshot[name] for name in deferred}}
+        return steady if all(holds(expr_of(c), steady) is truth for c, truth in wanted) else snapshot
 
     def name_at(self, snapshot: Snapshot) -> str:
         """The line that the reference takes; empty where none or several match."""
@@ -201,7 +201,7 @@ def vectors_of(search: InputSearch, table: Table, lines: Sequence[Line] | None =
     """Vectors for the table's lines (or for those given).
 
     Args:
-        search: Over the table's program.
+        search: A search over the table's program.
         table: A table of that program.
         lines: Lines to make vectors for; all of them if None.
     """
@@ -220,12 +220,12 @@ def vectors_of(search: InputSearch, table: Table, lines: Sequence[Line] | None =
             for number, atom in enumerate(atoms(test)):
                 conditions += 1
                 text = _spelled(atom)
-                found = finder.pair(line, test, number)
-                if isinstance(found, str):
-                    unshown.append(Unshown(table.name, line.name, text, found))
+                answer = finder.pair(line, test, number)
+                if isinstance(answer, str):
+                    unshown.append(Unshown(table.name, line.name, text, answer))
                     continue
                 shown += 1
-                on, off, pair = found
+                on, off, pair = answer
                 for snapshot, truth in ((on, pair.truth_on), (off, not pair.truth_on)):
                     named = finder.name_at(snapshot)
                     vectors.append(Vector(table.name, line.name, text, str(truth).lower(), named, snapshot))
@@ -235,9 +235,9 @@ def vectors_of(search: InputSearch, table: Table, lines: Sequence[Line] | None =
 
 
 def _default_vector(finder: Finder, name: str, vectors: list[Vector], unshown: list[Unshown]) -> None:
-    table, found = finder.table, finder.default()
-    if not isinstance(found, Missing):
-        vectors.append(Vector(table.name, name, "", "reach", finder.name_at(found), found))
+    table, snapshot = finder.table, finder.default()
+    if not isinstance(snapshot, Missing):
+        vectors.append(Vector(table.name, name, "", "reach", finder.name_at(snapshot), snapshot))
     else:
-        reason = "not found" if found is Missing.UNKNOWN else "ranges"
+        reason = "not found" if snapshot is Missing.UNKNOWN else "ranges"
         unshown.append(Unshown(table.name, name, "", reason))

@@ -124,15 +124,15 @@ def agrees(
     """Compares every entry that some input finds with the AND of its classes' cells.
 
     Returns:
-        How many entries were compared; None if one differs, or is none of the table's.
+        How many entries were compared; None if an entry differs, or lies outside the table.
     """
     compared = 0
     for classes in product(*(expected.items() for expected in ways)):
         at, cells = 0, everyone
-        for (one, lines), count in zip(classes, counts, strict=True):
-            if one >= count:
+        for (number, lines), count in zip(classes, counts, strict=True):
+            if number >= count:
                 return None
-            at, cells = at * count + one, cells & lines
+            at, cells = at * count + number, cells & lines
         if entries[at] != cells:
             return None
         compared += 1
@@ -172,10 +172,10 @@ class _Checker:
 
     def run(self, function: str, count: int, given: "array[int]") -> "array[int]":
         """Calls a function of the self-test that maps rows of words to classes."""
-        made = array("I", bytes(4 * count))
-        pointers = [ctypes.c_void_p(words.buffer_info()[0]) for words in (given, made)]
+        classes = array("I", bytes(4 * count))
+        pointers = [ctypes.c_void_p(words.buffer_info()[0]) for words in (given, classes)]
         getattr(self.library, function)(ctypes.c_int64(count), *pointers)
-        return made
+        return classes
 
     def boxes(self, leaf: Variable) -> Iterator[tuple[int, Box]]:
         """For each line that states the leaf, its bit and the keys it admits."""
@@ -198,13 +198,13 @@ class _Checker:
                 on[low] = on.get(low, 0) | bit
                 off[high + 1] = off.get(high + 1, 0) | bit
         turns = sorted(on.keys() | off.keys())
-        found, place = [], 0
+        cells, place = [], 0
         for key in keys:
             while place < len(turns) and turns[place] <= key:
                 now = now & ~off.get(turns[place], 0) | on.get(turns[place], 0)
                 place += 1
-            found.append(now)
-        return found
+            cells.append(now)
+        return cells
 
     def keys(self, leaf: Variable, part: Component) -> list[int]:
         """The keys at which the class is found; see the module."""
@@ -225,23 +225,23 @@ class _Checker:
         words = array("q", [to_word(leaf.type, value_of_key(leaf.type, key)) for key in keys])
         classes = self.run(name, len(keys), words)
         self.classes += len(keys)
-        found = list(zip(classes, self.cells_at(leaf, keys), strict=True))
+        pairs = list(zip(classes, self.cells_at(leaf, keys), strict=True))
         expected: dict[int, int] = {}
-        for key, (at, cells) in zip(keys, found, strict=True):
+        for key, (at, cells) in zip(keys, pairs, strict=True):
             if expected.setdefault(at, cells) != cells:
                 value = value_of_key(leaf.type, key)
                 self.wrong.append(f"`{leaf.name}` = {value} shares its class with a value of other lines")
-        return found
+        return pairs
 
     def truth(self, name: str, rows: "array[int]", count: int) -> "list[_Way]":
         """For each truth of a condition the lines that admit it; once for each test that agrees."""
         seen = list(self.run(name, count, rows))
-        found = [at for at, truths in self.truths.items() if truths == seen]
-        if not found:
+        agreeing = [at for at, truths in self.truths.items() if truths == seen]
+        if not agreeing:
             self.wrong.append(f"the condition of `{name}` is none of the table's tests")
         tests = relational_tests(self.table)
-        found.sort(key=lambda at: at in self.stated)
-        return [_Way(at, {1: self.everyone, 0: self.everyone & ~self.stating(tests[at])}) for at in found]
+        agreeing.sort(key=lambda at: at in self.stated)
+        return [_Way(at, {1: self.everyone, 0: self.everyone & ~self.stating(tests[at])}) for at in agreeing]
 
     def stating(self, test: object) -> int:
         """The lines that state a test."""
@@ -292,11 +292,11 @@ class _Checker:
             else self.run(f"rcsc_class_{number}_{at}", count, self.column(part, rows))
             for at, part in enumerate(lookup.components)
         ]
-        for at, found in enumerate(whole):
+        for at, index in enumerate(whole):
             right = 0
             for classes, radix in zip(parts, counts, strict=True):
                 right = right * radix + classes[at]
-            if found != right:
+            if index != right:
                 self.wrong.append(f"the index of table t{number} is not its classes in mixed radix")
                 return
 
@@ -306,7 +306,7 @@ class _Checker:
         return rows[names.index(part.path) :: len(names)]
 
     def tail(self) -> int:
-        """Runs the tail; how many masks it was given."""
+        """Runs the tail; returns how many masks it was given."""
         wrong = ctypes.c_uint64()
         self.library.rcsc_tail_test.restype = ctypes.c_uint64
         tried: int = self.library.rcsc_tail_test(ctypes.byref(wrong))

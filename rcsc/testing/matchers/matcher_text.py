@@ -143,13 +143,13 @@ def parted(index: str) -> list[tuple[str, int]]:
 def component(source: str, text: str, count: int) -> Component:
     """A component with what it reads; a search function's constants are taken from its own text."""
     for shape in UNARY:
-        found = shape.match(text)
-        if found is None:
+        match = shape.match(text)
+        if match is None:
             continue
-        path = found["path"]
+        path = match["path"]
         if any(place != path for place in re.findall(r"s->([\w.\[\]]+)", text)):
             break
-        name = found.groupdict().get("search")
+        name = match.groupdict().get("search")
         constants = NUMBER.findall(_search_text(source, name) if name else text.replace(f"s->{path}", ""))
         return Component(text, path, tuple(dict.fromkeys(constants)), count)
     if text == "0u":
@@ -217,12 +217,12 @@ def matcher_text(source: str, function: str, struct: str) -> MatcherText:
 
 def _loads(text: str) -> list[tuple[int, str]]:
     """Each look-up's table number and index, in order."""
-    found, at = [], 0
+    loads, at = [], 0
     while (match := LOAD.search(text, at)) is not None:
         end = closing(text, match.end() - 1, "[]")
-        found.append((int(match[1]), text[match.end() : end]))
+        loads.append((int(match[1]), text[match.end() : end]))
         at = end
-    return found
+    return loads
 
 
 def _without_indices(text: str) -> str:
@@ -264,6 +264,6 @@ def numbers(source: str, function: str, parts: MatcherText) -> Iterator[Numbers]
 
 
 def _numbers(source: str, start: int, end: int, lookup: int, component: int) -> Numbers:
-    found = list(WHOLE.finditer(source, start, end))
-    values = tuple(int(number[1], 0) for number in found)
-    return Numbers(lookup, component, tuple(number.start() for number in found), values)
+    matches = list(WHOLE.finditer(source, start, end))
+    values = tuple(int(number[1], 0) for number in matches)
+    return Numbers(lookup, component, tuple(number.start() for number in matches), values)
