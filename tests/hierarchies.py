@@ -25,7 +25,7 @@ from multiprocessing import get_context
 from pathlib import Path
 from random import Random
 
-from rcsc.compose.contract.claims import FOUND, SAFE, Closed, Need, closed
+from rcsc.compose.contract.claims import ACCEPTED, SAFE, Closed, Need, closed
 from rcsc.compose.contract.obligations import Obligation, Sort
 from rcsc.compose.contract.transition import TransitionSystem
 from rcsc.compose.counterexample.trace import NotReproducedError, Trace
@@ -203,20 +203,20 @@ def _verdicts(
             continue
         proved = follows[name, obligation.key].proved
         breaks = truth.breaks(key_of(obligation))
-        said = "rests on what is not proved" if verdict in FOUND and not proved else verdict.value
+        said = "rests on what is not proved" if verdict in ACCEPTED and not proved else verdict.value
         truly = "not defined" if truth.undefined else "breaks" if breaks else "holds"
         counts[f"{said}, {truly}"] += 1
         if truth.undefined:
             if proved:
                 yield Disagreement("proved, but not defined", name, _shown(obligation))
-        elif breaks and verdict in FOUND:
+        elif breaks and verdict in ACCEPTED:
             yield Disagreement(
                 "proved, but breaks",
                 name,
                 _shown(obligation),
                 f"in {truth.least.get(key_of(obligation))} cycles",
             )
-        elif not breaks and verdict not in FOUND:
+        elif not breaks and verdict not in ACCEPTED:
             incomplete.append(
                 Disagreement(f"{verdict.value}, but holds", name, _shown(obligation), obligation.sort.value)
             )
@@ -266,7 +266,7 @@ def _traces(
     sound = [
         obligation
         for obligation, verdict in one.proof.found
-        if verdict not in FOUND and obligation.key != SAFE and key_of(obligation) not in truth.least
+        if verdict not in ACCEPTED and obligation.key != SAFE and key_of(obligation) not in truth.least
         # a fact that is declared is not proved where no first cycle can keep to it; no run of the contract breaks it
         if not (obligation.sort is Sort.ASSUMPTION and obligation.name in one.ts.trusted)
     ]

@@ -9,7 +9,7 @@ from random import Random
 import pytest
 
 from rcsc.commands import run
-from rcsc.compose.contract.claims import CONTRACT, ENDING, FOUND, RUNS, SAFE, Claim, Key, Need, closed
+from rcsc.compose.contract.claims import ACCEPTED, CONTRACT, ENDING, RUNS, SAFE, Claim, Key, Need, closed
 from rcsc.compose.contract.environment import links
 from rcsc.compose.contract.obligations import Sort, unstated
 from rcsc.compose.contract.properties import invariant_kept, property_kept
@@ -284,7 +284,7 @@ def test_what_a_level_assumes_of_a_report_rests_on_how_it_numbers_its_orders(
         edit_file(path, ('[[level]]\nname = "lower"\n', ""))
     proof = prove_system(path, LITTLE)
     wrong = ("upper", (sort, "", name))
-    assert wrong not in {need for need, one in proof.closed.items() if one.found}
+    assert wrong not in {need for need, one in proof.closed.items() if one.accepted}
     for key in ((CONTRACT, "", "lower"), RUNS, *(obligation.key for obligation, _ in proof.levels[0].found)):
         assert (sort, "", name) == key or wrong in proof.of("upper", key).lacks, key
 
@@ -694,7 +694,7 @@ def test_what_is_trusted_of_a_restart_is_named_of_both_levels(tmp_path: Path) ->
     claimed = of_level(transition_systems(path)["lower"], proof)
     assert [key for key, claim in claimed if words in claim.trusts] == [(Sort.ECHOES, "", "report")]
     echoes = whole.of("lower", (Sort.ECHOES, "", "report"))
-    assert echoes.found
+    assert echoes.accepted
     assert words in echoes.trusts
     assert words in whole.of("upper", (Sort.ONE_LINE, "work", "")).trusts
 
@@ -729,7 +729,7 @@ def test_what_is_safe_only_under_an_invariant_falls_with_it(step: str, rests: bo
     assert whole.of("solo", broken).verdict is Verdict.NOT_PROVED
     for key in [(Sort.ASSUMPTION, "t", "small"), (Sort.PROPERTY, "", "never_ten"), (Sort.ONE_LINE, "t", "")]:
         found = whole.of("solo", key)
-        assert found.found
+        assert found.accepted
         assert found.proved is not rests
         assert found.lacks == ((("solo", broken),) if rests else ())
 
@@ -771,8 +771,8 @@ def test_an_invariant_that_is_broken_within_a_cycle_keeps_nothing_safe(
     text: str, safe: bool, tmp_path: Path
 ) -> None:
     whole = prove_system(solo_system(tmp_path, within(text)), LITTLE)
-    assert whole.of("solo", (Sort.INVARIANT, "", "inside")).found
-    assert whole.of("solo", SAFE).found is safe
+    assert whole.of("solo", (Sort.INVARIANT, "", "inside")).accepted
+    assert whole.of("solo", SAFE).accepted is safe
     assert whole.of("solo", (Sort.ONE_LINE, "t", "")).proved is safe
 
 
@@ -871,7 +871,7 @@ def test_claims_close_over_what_they_rest_on() -> None:
         made = drawn_claims(random)
         for need, found in closed(made).items():
             reached = reached_from(need, made)
-            bad = {other for other in reached if other not in made or made[other].verdict not in FOUND}
+            bad = {other for other in reached if other not in made or made[other].verdict not in ACCEPTED}
             assert found.proved == (not bad)
             assert set(found.lacks) == bad - {need}
             assert set(found.trusts) == {

@@ -23,7 +23,7 @@ def standing(whole: SystemProof, level: str, key: Key) -> str:
         if found.verdict.value != "proved":
             return f"{found.verdict.value}, as the tables declare it"
         return f"proved{trusting(whole, level, [key])}"
-    return found.verdict.value if not found.found else f"rests on {named(whole, level, found.lacks)}"
+    return found.verdict.value if not found.accepted else f"rests on {named(whole, level, found.lacks)}"
 
 
 def trusting(whole: SystemProof, level: str, keys: Sequence[Key]) -> str:
@@ -94,7 +94,7 @@ def left_out(whole: SystemProof) -> Iterator[str]:
     if whole.whole or not whole.proved:
         return
     unstated = sum(len(one.unstated) for one in whole.levels)
-    rests = sum(found.found and not found.proved for found in whole.closed.values())
+    rests = sum(found.accepted and not found.proved for found in whole.closed.values())
     ends = sum(not ending.proved for level in whole.levels for ending in level.endings)
     said = [
         f"{unstated} not looked at" if unstated else "",
@@ -177,7 +177,9 @@ def claim(whole: SystemProof, level: str, key: Key) -> dict[str, Any]:
     """A verdict, what it rests on that is not found, and what it trusts."""
     found = whole.of(level, key)
     return {
-        "verdict": found.verdict.value if found.proved or not found.found else "rests on what is not proved",
+        "verdict": found.verdict.value
+        if found.proved or not found.accepted
+        else "rests on what is not proved",
         "rests_on": [
             {"level": owner, "what": sort, "table": table, "name": name}
             for owner, (sort, table, name) in found.lacks

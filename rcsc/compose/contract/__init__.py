@@ -3,12 +3,12 @@
 Definitions. A *leaf* is a scalar part of a variable, such as `command.inc_command`. A *neighbour* is a level, or something outside the
 system, that gives this level orders or takes orders from it. A *transition system* turns one *cycle* of a level into nodes over the leaves
 before and after it, from one state or from any (*havoc*). The *contract* is the condition on what the environment gives in a cycle. An
-*obligation* is a condition that every reachable cycle has to fulfil; its *sort* says what it is about. A *claim* is what was found of an
-obligation, or of the contract, together with the claims that it rests on. A *predicate* is a truth value or a member of a state: what an
-invariant may speak of.
+*obligation* is a condition that every reachable cycle has to fulfil; its *sort* says what it is about. A *claim* is an obligation, or the
+contract, with its verdict and the claims that it rests on. A *predicate* is a truth value or a member of a state: an invariant is made of
+predicates.
 
-Example. A level takes orders in `command` and has the state `new_command`. Of a cycle that takes the same number as the cycle before, the
-contract says that the numbered fields of the order are the same, too; obligation `ONCE` is that `new_command` does not rise in it. If the
+Example. A level takes orders in `command` and has the state `new_command`. In a cycle that takes the same number as the cycle before, the
+numbered fields of the order are the same, too, by the contract; obligation `ONCE` is that `new_command` does not rise in it. If the
 level raises the flag only where the command differs from the last one, the obligation follows from the contract. If it raises the flag
 whenever the command is `go`, a state with `go` and without the flag breaks it, unless an invariant excludes that state.
 

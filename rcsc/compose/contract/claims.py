@@ -1,14 +1,14 @@
-"""What is claimed of levels, what each claim rests on, and what is proved of them over the whole chain.
+"""Claims about levels, what each rests on, and which of them are proved with all that they rest on.
 
-In: `Claim`s, each with what was found of it *given* what it rests on. Out: `Closed`, one for each: a claim is proved only where it, and
-all that it rests on, directly or not, is found so or stated as assumed. What is missing is *not looked at*, and never proved.
+In: `Claim`s, each with its verdict *given* what it rests on. Out: a `Closed` for each. A claim is *accepted* if its verdict is proved or
+assumed; it is proved only if it and all that it rests on, directly or not, are accepted. A missing claim is *not looked at*, never proved.
 
-Claims may rest on each other in a circle: an invariant on the safety of the procedures that keep it, which is shown under the invariant;
+Claims may rest on each other in a circle: an invariant on the safety of the procedures that keep it, and their safety on the invariant;
 a guarantee of a level on one of its neighbour, and back. Each such step goes back by a cycle (`compose.__doc__`): what holds in a cycle is
-shown from what held in the cycles before. So a circle of claims, each found so, stands; as soon as one of them is not, none does.
+shown from what held in the cycles before. So a circle of accepted claims stands; once one of them is not accepted, none does.
 
-Example: `p` rests on `safe`, `safe` on invariant `i`, and `i` on `safe`. If `i` is found, all three are proved. If a restart breaks `i`,
-none is, and `p` lacks `i`.
+Example: `p` rests on `safe`, `safe` on invariant `i`, and `i` on `safe`. If all three are accepted, all are proved. If a restart breaks
+`i`, none is, and `p` lacks `i`.
 """
 
 from collections.abc import Collection, Iterable, Mapping
@@ -17,42 +17,40 @@ from enum import StrEnum
 from typing import TypeAlias
 
 Key: TypeAlias = tuple[str, str, str]
-"""What tells the claims about a level apart: sort, table and name."""
+"""Identifies a claim about a level: sort, table and name."""
 Need: TypeAlias = tuple[str, Key]
-"""A level, and which claim."""
+"""A level, and the key of a claim about it."""
 
 RUNS: Key = ("the level runs as its tables say", "", "")
 """What every other claim of a level rests on."""
 SAFE: Key = ("every operation is defined and in range", "", "")
 ENDING: Key = ("every command ends", "", "")
-"""What the endings of the level above rest on."""
+"""What termination of the level above rests on."""
 CONTRACT, UNREACHED, AGAIN = "the contract", "never reached", "does nothing when it matches again"
 """Sorts of claims that are no obligations of one cycle."""
 
 
 class Verdict(StrEnum):
-    """What was found of a claim, given what it rests on."""
+    """Whether a claim holds, given what it rests on."""
 
     PROVED = "proved"
-    NOT_PROVED = (
-        "not proved"  # some state that the invariant allows breaks it: perhaps one that is never reached
-    )
+    NOT_PROVED = "not proved"  # a state within the invariant breaks it, perhaps one that is never reached
     UNDECIDED = "undecided"  # the solver gave up
-    TRUSTED = "assumed"  # the tables say so, of what comes from outside
+    TRUSTED = "assumed"  # the tables declare it, of what comes from outside
     UNLOOKED = "not looked at"
 
 
-FOUND = frozenset({Verdict.PROVED, Verdict.TRUSTED})
+ACCEPTED = frozenset({Verdict.PROVED, Verdict.TRUSTED})
 
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """A statement about a level, with what was found of it.
+    """A statement about a level, with its verdict.
 
     Attributes:
-        verdict: What was found of it, given what it rests on.
+        verdict: Whether it holds, given what it rests on.
         rests_on: Other claims.
-        trusts: What it takes for granted that no level is responsible for, in words.
+        trusts: Assumptions for which no level is responsible, in words.
     """
 
     verdict: Verdict
@@ -62,17 +60,17 @@ class Claim:
 
 @dataclass(frozen=True, slots=True)
 class Promise:
-    """One thing that a level assumes of a neighbour.
+    """An assumption of a level about a neighbour.
 
     Attributes:
-        level: Who assumes it.
-        record: In which the level takes what it is about.
+        level: The level that assumes it.
+        record: The input that it is about.
         assumed: In words; `reason`, whose guarantee it is.
         needs: What must be proved of the neighbour.
-        own: What the level has to keep itself: reports are about its orders only as far as it numbers them.
-        begins: Whether both begin in agreement.
-        outside: Whether the neighbour stands outside the levels: then it is its own to keep.
-        holds: Whether it is found so of the neighbour, given what that rests on; known where proofs are.
+        own: What the level itself must keep: reports are about its orders only if it numbers them.
+        begins: Whether both sides agree initially.
+        outside: Whether the neighbour stands outside the levels, and must keep it by its own means.
+        holds: Whether the neighbour's claims are accepted, given what they rest on; set once there are proofs.
     """
 
     level: str
@@ -87,7 +85,7 @@ class Promise:
 
     @property
     def claim(self) -> tuple[Need, Claim]:
-        """The claim that what the level takes in the record is as it assumes."""
+        """The claim that the record's values are as the level assumes."""
         trusts = self.reason.replace("stands outside the levels", "keeps to the protocol")
         verdict = Verdict.PROVED if self.begins else Verdict.NOT_PROVED
         claim = Claim(verdict, (*self.needs, *self.own), (trusts,) if self.outside else ())
@@ -99,9 +97,9 @@ class Closed:
     """A claim together with everything that it rests on, directly or not.
 
     Attributes:
-        verdict: What was found of it, given that.
-        lacks: Claims in what it rests on that are not found so: itself apart.
-        trusts: All that is taken for granted.
+        verdict: Whether it holds, given that.
+        lacks: The claims that it rests on, itself apart, that are not accepted.
+        trusts: All assumptions for which no level is responsible.
     """
 
     verdict: Verdict
@@ -109,21 +107,21 @@ class Closed:
     trusts: tuple[str, ...] = ()
 
     @property
-    def found(self) -> bool:
-        """Whether it is found so, given what it rests on."""
-        return self.verdict in FOUND
+    def accepted(self) -> bool:
+        """Whether it is proved or assumed, given what it rests on."""
+        return self.verdict in ACCEPTED
 
     @property
     def proved(self) -> bool:
-        """Whether it holds, given only what is taken for granted."""
-        return self.found and not self.lacks
+        """Whether it holds under `trusts` alone."""
+        return self.accepted and not self.lacks
 
 
 UNKNOWN = Closed(Verdict.UNLOOKED)
 
 
 def closed(claims: Mapping[Need, Claim]) -> dict[Need, Closed]:
-    """Close claims under what they rest on: the least sets of what each lacks and trusts."""
+    """Close claims under what they rest on: compute the least sets that each lacks and trusts."""
     lacks: dict[Need, frozenset[Need]] = dict.fromkeys(claims, frozenset())
     trusts = {need: frozenset(claim.trusts) for need, claim in claims.items()}
     grows = True
@@ -131,9 +129,9 @@ def closed(claims: Mapping[Need, Claim]) -> dict[Need, Closed]:
         grows = False
         for need, claim in claims.items():
             more = frozenset().union(
-                *(_missing(one, claims) | lacks.get(one, frozenset()) for one in claim.rests_on)
+                *(_missing(other, claims) | lacks.get(other, frozenset()) for other in claim.rests_on)
             )
-            trusted = trusts[need].union(*(trusts.get(one, frozenset()) for one in claim.rests_on))
+            trusted = trusts[need].union(*(trusts.get(other, frozenset()) for other in claim.rests_on))
             if not more <= lacks[need] or trusted != trusts[need]:
                 lacks[need], trusts[need], grows = lacks[need] | more, trusted, True
     return {
@@ -143,8 +141,8 @@ def closed(claims: Mapping[Need, Claim]) -> dict[Need, Closed]:
 
 
 def _missing(need: Need, claims: Mapping[Need, Claim]) -> frozenset[Need]:
-    found = claims.get(need)
-    return frozenset() if found is not None and found.verdict in FOUND else frozenset({need})
+    claim = claims.get(need)
+    return frozenset() if claim is not None and claim.verdict in ACCEPTED else frozenset({need})
 
 
 def worst(verdicts: Iterable[Verdict]) -> Verdict:
@@ -155,7 +153,7 @@ def worst(verdicts: Iterable[Verdict]) -> Verdict:
 
 
 DECLARED = ", as it is declared"
-"""How what is trusted ends of which a table says that it is assumed."""
+"""The suffix of a trusted assumption that a table declares."""
 
 
 def declared(trusts: Iterable[str]) -> tuple[str, ...]:
@@ -164,16 +162,16 @@ def declared(trusts: Iterable[str]) -> tuple[str, ...]:
 
 
 def spelled(need: Need, level: str, claims: Collection[Need] | None = None) -> str:
-    """Spell a claim in words, with the level's name where it is another than `level`."""
+    """Spell a claim in words, with its level's name unless that is `level`."""
     owner, (sort, table, name) = need
-    said = {
+    phrases = {
         RUNS: "the level was not looked at",
         SAFE: f"{sort} within a cycle",
         ENDING: "that its commands end was not looked at",
     }
-    words = said.get(need[1], " ".join(part for part in (sort, f"`{name}`" if name else "") if part))
+    words = phrases.get(need[1], " ".join(part for part in (sort, f"`{name}`" if name else "") if part))
     if sort == CONTRACT:
         words = f"what it takes in `{name}` is as it assumes"
     where = [f"level `{owner}`" if owner != level else "", f"table `{table}`" if table else ""]
-    gone = ", not looked at" if claims is not None and need not in claims and need[1] not in said else ""
+    gone = ", not looked at" if claims is not None and need not in claims and need[1] not in phrases else ""
     return ": ".join([part for part in where if part] + [words]) + gone

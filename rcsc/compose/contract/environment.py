@@ -1,4 +1,4 @@
-"""What a level may take its environment to do: the contract of its buffers.
+"""Who gives a level orders, who takes its orders, and through which buffers.
 
 In: a system's description and its programs. Out: for each level its `Links`: who gives it orders, to whom it gives
 orders, and which inputs the database fills. The names of the fields are those of section 9 of Haynes et al. (1984): an
@@ -20,9 +20,9 @@ class Neighbour:
     """A level, or something outside the system, with which orders and reports are exchanged.
 
     Attributes:
-        name: Of the level, or of what stands outside.
+        name: Its name.
         order: The record of this level that carries orders; `report`, the one that carries reports on them.
-        outside: Whether it is no level of the system.
+        outside: Whether it stands outside the levels.
     """
 
     name: str
@@ -52,7 +52,7 @@ class Neighbour:
 
     @property
     def status(self) -> str:
-        """The leaf with what is reported of it."""
+        """The leaf with the reported status."""
         return f"{self.report}.{STATUS}"
 
 
@@ -86,8 +86,8 @@ class Links:
     """The environment of one level.
 
     Attributes:
-        free: Inputs that nothing is known of but their ranges.
-        unread: Buffers that may be meant as orders and reports, and are not taken for such: which, and what is missing.
+        free: Inputs of which only the range is known.
+        unread: Buffers that resemble orders and reports and are not recognised, each with what is missing.
     """
 
     level: str
@@ -105,11 +105,11 @@ def leaves_under(program: Program, record: str) -> tuple[str, ...]:
 
 
 def links(system: Description, level: str, program: Program) -> Links:
-    """Find the environment of a level; every leaf of its order is taken to be numbered.
+    """Find the environment of a level; every leaf of its order counts as numbered.
 
     Raises:
-        BadDescription: An order has no report to answer it, a report no order, or one lacks a field; there are two superiors;
-            or a question to the database has an answer of it as a key.
+        BadDescription: An order has no report, a report no order, or one lacks a field; there are two superiors; or a
+            database answer is itself a key.
     """
     inputs = {_variable(w.target): _owner(w.source) for w in system.wires if _owner(w.target) == level}
     outputs = {_variable(w.source): _owner(w.target) for w in system.wires if _owner(w.source) == level}
@@ -119,7 +119,7 @@ def links(system: Description, level: str, program: Program) -> Links:
     below: list[Below] = []
     used: set[str] = set()
     for record, owner in inputs.items():
-        back = [made for made, to in outputs.items() if to == owner]
+        back = [output for output, to in outputs.items() if to == owner]
         if not _pairs(record, back, names):
             continue
         if f"{record}.{NUMBER}" in names:
@@ -138,35 +138,37 @@ def links(system: Description, level: str, program: Program) -> Links:
             used |= {*leaves_under(program, record)}
     feeds = next((spec.feeds for spec in system.levels if spec.name == level), ())
     asked = tuple(Asked(feed.into, leaves_under(program, feed.into), feed.keys) for feed in feeds)
-    answers = {leaf for one in asked for leaf in one.leaves}
-    for one in asked:
-        if late := sorted(answers & set(one.keys)):
+    answers = {leaf for question in asked for leaf in question.leaves}
+    for question in asked:
+        if late := sorted(answers & set(question.keys)):
             raise BadDescription(
-                f"`{level}.{one.into}` is asked of the database by `{late[0]}`, which is an answer of the database itself: "
+                f"`{level}.{question.into}` is asked of the database by `{late[0]}`, which is an answer of the database itself: "
                 "of the cycle before, so that the same question need not have the same answer"
             )
     used |= answers
     free = tuple(str(v.name) for v in program.variables if v.kind is Kind.INPUT and v.name not in used)
     seen = [above.name] if above is not None else []
-    unread = _unread(program, level, inputs, outputs, levels, {*seen, *(one.name for one in below)})
+    unread = _unread(
+        program, level, inputs, outputs, levels, {*seen, *(subordinate.name for subordinate in below)}
+    )
     if above is None and not isinstance(_level(program, level).tables, OneTable):
         unread = (*unread, f"no input has `{NUMBER}` and `{COMMAND}`, so that no order selects the table")
     return Links(level, above, tuple(below), asked, free, unread)
 
 
 def _level(program: Program, name: str) -> Level:
-    found = next((level for level in program.levels if level.name == name), None)
-    if found is None:
+    level = next((level for level in program.levels if level.name == name), None)
+    if level is None:
         raise BadDescription(f"program `{program.name}` has no level `{name}`")
-    return found
+    return level
 
 
 def _pairs(record: str, back: list[str], names: set[str]) -> bool:
-    """Return whether the record and what goes back are an order and its report, with all their fields."""
+    """Return whether the record and those that go back are a complete order and report."""
     order, report = (NUMBER, COMMAND), (ECHO, ECHOED)
     for mine, other in ((order, report), (report, order)):
         if f"{record}.{mine[0]}" in names:
-            ends = [record, *(one for one in back if f"{one}.{other[0]}" in names)]
+            ends = [record, *(returned for returned in back if f"{returned}.{other[0]}" in names)]
             fields = [mine, *(other for _ in ends[1:])]
             return all(
                 f"{end}.{part}" in names for end, parts in zip(ends, fields, strict=True) for part in parts
@@ -182,12 +184,12 @@ def _unread(
     levels: set[str],
     seen: set[str],
 ) -> tuple[str, ...]:
-    """Describe what goes both ways between the level and a neighbour without being an order and its report.
+    """Describe each two-way exchange with a neighbour that is not an order and its report.
 
-    Looked at are neighbours that are levels, records of which some field is one of the protocol's, and, where the level has no
-    superior, every neighbour that gives a record and takes one.
+    Covers neighbours that are levels, records with some field of the protocol, and, if no neighbour was recognised, each
+    neighbour that gives a record and takes one.
     """
-    found = []
+    descriptions = []
     for owner in dict.fromkeys((*inputs.values(), *outputs.values())):
         if owner in seen:
             continue
@@ -209,16 +211,16 @@ def _unread(
                 if missing
                 else "is not one order and one report"
             )
-            said = ", ".join(f"`{record}`" for record in ends)
-            found.append(f"what `{level}` and `{owner}` say to each other ({said}) {lacks}")
-    return tuple(found)
+            records = ", ".join(f"`{record}`" for record in ends)
+            descriptions.append(f"what `{level}` and `{owner}` say to each other ({records}) {lacks}")
+    return tuple(descriptions)
 
 
 def _whole(level: str, program: Program, order: str, report: str) -> None:
-    """Check that a numbered order and the report on it have the other fields of the contract, and that these can be compared.
+    """Check that a numbered order and its report have the other fields of the contract, with comparable types.
 
     Raises:
-        BadDescription: One is missing, a number is none, or the report cannot repeat every command.
+        BadDescription: A field is missing, a number is not whole, or the two commands differ in type.
     """
     kinds = {str(variable.name): variable.type for variable in program.variables}
     needed = f"{order}.{COMMAND}", f"{report}.{ECHOED}", f"{report}.{STATUS}"
@@ -243,10 +245,10 @@ def _whole(level: str, program: Program, order: str, report: str) -> None:
 
 
 def check_ends(system: Description, programs: Mapping[str, Program]) -> None:
-    """Check that both ends of each buffer have the same leaves, and that the taker admits every value that is given.
+    """Check that both ends of each buffer have the same leaves, and that the reader admits every value written.
 
     Raises:
-        BadDescription: They have not, or an input is filled twice, or something else than an input.
+        BadDescription: They do not, an input is filled twice, or something other than an input is filled.
     """
     filled = [wire.target for wire in system.wires]
     filled += [f"{spec.name}.{feed.into}" for spec in system.levels for feed in spec.feeds]
@@ -275,7 +277,7 @@ def check_ends(system: Description, programs: Mapping[str, Program]) -> None:
 
 
 def _at_end(programs: Mapping[str, Program], end: str) -> tuple[Variable, ...]:
-    """List the leaves of a buffer at one end; none where that end stands outside the levels."""
+    """List the leaves of a buffer at one end; none if that end is outside the levels."""
     if _owner(end) not in programs:
         return ()
     program = programs[_owner(end)]
@@ -286,7 +288,7 @@ def _at_end(programs: Mapping[str, Program], end: str) -> tuple[Variable, ...]:
 
 
 def _admits(taken: Scalar, given: Scalar) -> bool:
-    """Return whether every value of the given type means the same in the type that takes it."""
+    """Return whether each value of the given type has the same meaning in the taking type."""
     if isinstance(taken, Enum) and isinstance(given, Enum):
         return taken.members == given.members
     if (isinstance(taken, Int) and isinstance(given, Int)) or (

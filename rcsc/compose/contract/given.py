@@ -1,7 +1,7 @@
-"""What extern procedures give while a level is proved: never the user's code, which is neither imported nor called.
+"""Results of extern procedures while a level is proved; the user's code is neither imported nor called.
 
-In: a program, and a script or a source of chance. Out: contexts in which the interpreter takes the results from there. A result is any
-value of its type; where it is refused, any value that is none. A cycle in which a result is refused ends at that call.
+In: a program, and a script or a random source. Out: contexts in which the interpreter takes results from it. A result is any value
+of its type or, if it is refused, a value outside the type. A refused result ends the cycle at that call.
 """
 
 import math
@@ -65,7 +65,7 @@ def scripted(program: Program, answers: Sequence[ExternAnswer]) -> Iterator[None
 def at_random(program: Program, random: Random) -> Iterator[None]:
     """Answer each call of an extern procedure with random values of its types, and now and then a refused one."""
 
-    def one(variable: Variable) -> Value:
+    def result(variable: Variable) -> Value:
         if may_be_refused(variable) and random.random() < REFUSED_NOW_AND_THEN:
             return refused(variable)
         low, high = key_bounds(variable.type)
@@ -74,7 +74,7 @@ def at_random(program: Program, random: Random) -> Iterator[None]:
         return value_of_key(variable.type, random.choice((low, random.randint(low, high), high)))
 
     def answer(procedure: Procedure, _args: list[Value]) -> tuple[Value, ...]:
-        return tuple(one(program.variable(name)) for name in procedure.writes)
+        return tuple(result(program.variable(name)) for name in procedure.writes)
 
     with answering(answer):
         yield

@@ -1,8 +1,7 @@
 """What is proved of every level, as conditions on one cycle from any reachable state.
 
-In: a transition system and a cycle from any state. Out: `Obligation`s, each of which is to hold in every cycle. They are of two kinds:
-what is claimed of the level itself, and what it guarantees its neighbours, which is what they assume of it
-(`compose.__doc__`).
+In: a transition system and a cycle from any state. Out: `Obligation`s, each of which must hold in every cycle. Some concern the level
+alone; the others are its guarantees, which its neighbours assume (`compose.__doc__`).
 """
 
 from collections.abc import Iterator
@@ -45,7 +44,7 @@ class Sort(StrEnum):
     DEFERRED = "no state is written directly while another is pending"
     INVARIANT = "invariant"
     PROPERTY = "property"
-    ENDS = "the command ends"  # none of one cycle: `termination`, `lasso`
+    ENDS = "the command ends"  # not a condition on one cycle: `termination`, `lasso`
     PROTOCOL = "orders and reports"  # all of its sorts at once
     SAFE = SAFE[0]
 
@@ -66,10 +65,10 @@ BROKEN = {
     Sort.SAME_ORDER: "another order under the number that was taken last: it is not seen as new",
     Sort.OF_ITS_ORDER: "what is reported under the number of the last order is not about it",
 }
-"""How it is said, of the name of an obligation, that a cycle breaks it; where nothing stands, lines and assumptions say it themselves."""
+"""What is printed when a cycle breaks an obligation, `{}` being its name; other sorts print their lines or assumption."""
 
 ObligationKey: TypeAlias = tuple[Sort, str, str]
-"""What tells the obligations of a level apart: a key of a claim (`claims`)."""
+"""Identifies an obligation of a level: the key of a claim (`claims`)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +81,7 @@ class Unstated:
 
     @property
     def shown(self) -> str:
-        """In one line."""
+        """Its text in one line."""
         table = f"table `{self.table}`: " if self.table else ""
         return f"{table}{self.sort.value}: {self.missing}"
 
@@ -92,8 +91,8 @@ class Obligation:
     """A condition that every cycle has to fulfil.
 
     Attributes:
-        table: Whose it is; empty where it is the level's.
-        name: Of the assumption, the buffer, or the leaf; of a pair of lines, both.
+        table: Its table; empty if it is the level's.
+        name: The assumption, buffer or leaf; or both lines of a pair.
         holds: The condition.
         lines: The two lines that it is about (`pairs`).
     """
@@ -111,7 +110,7 @@ class Obligation:
 
     @property
     def shown(self) -> str:
-        """In one line, without the table."""
+        """Its text in one line, without the table."""
         if self.sort in {Sort.ASSUMPTION, Sort.INVARIANT, Sort.PROPERTY}:
             return f"{self.sort.value} `{self.name}`"
         if self.lines:
@@ -144,31 +143,34 @@ def _tables(cycle: Cycle) -> Iterator[Obligation]:
 
 
 def pairs(cycle: Cycle) -> tuple[Obligation, ...]:
-    """State pair by pair that no two lines match: what to look for where `ONE_LINE` is not proved."""
-    found = []
+    """State for each pair of lines that they never both match, to refute one where `ONE_LINE` is not proved."""
+    exclusions = []
     for at in cycle.tables:
-        for one, two in may_meet(at.table):
-            first, second = (str(at.table.lines[place].name) for place in (one, two))
-            never = values.negation(values.both(at.matches[one], at.matches[two]))
+        for earlier, later in may_meet(at.table):
+            first, second = (str(at.table.lines[place].name) for place in (earlier, later))
+            never = values.negation(values.both(at.matches[earlier], at.matches[later]))
             obligation = values.follows(at.runs, never)
-            found.append(
+            exclusions.append(
                 Obligation(
                     Sort.ONE_LINE, str(at.table.name), f"{first} and {second}", obligation, (first, second)
                 )
             )
-    return tuple(found)
+    return tuple(exclusions)
 
 
 def may_meet(table: Table) -> list[tuple[int, int]]:
-    """List the pairs of lines whose cells do not exclude each other; all pairs where a cell is about several leaves."""
+    """List the pairs of lines whose cells do not exclude each other; all pairs if some cell reads several leaves."""
     every = combinations(range(len(table.lines)), 2)
     if not boxes.applies(table):
         return list(every)
     lines = boxes.lines_of(table)
     return [
-        (one, two)
-        for one, two in every
-        if all(meet(lines[one][name], lines[two][name]) for name in lines[one].keys() & lines[two].keys())
+        (earlier, later)
+        for earlier, later in every
+        if all(
+            meet(lines[earlier][name], lines[later][name])
+            for name in lines[earlier].keys() & lines[later].keys()
+        )
     ]
 
 
@@ -178,11 +180,8 @@ def _upward(ts: TransitionSystem, cycle: Cycle) -> Iterator[Obligation]:
         return
     number = values.equal(cycle.after[above.echo], cycle.taken[above.number])
     command = values.equal(cycle.after[above.echoed], cycle.taken[above.command])
-    as_before = (
-        values.all_of(  # where an extern procedure is refused it may be as late as if the level had not run
-            values.equal(cycle.before[leaf], cycle.after[leaf])
-            for leaf in leaves_under(ts.program, above.report)
-        )
+    as_before = values.all_of(  # after a refused result the report may be as late as if the level had not run
+        values.equal(cycle.before[leaf], cycle.after[leaf]) for leaf in leaves_under(ts.program, above.report)
     )
     late = values.both(cycle.refused, as_before)
     yield Obligation(Sort.ECHOES, "", above.report, values.either(values.both(number, command), late))
@@ -208,7 +207,7 @@ def _downward(ts: TransitionSystem, cycle: Cycle) -> Iterator[Obligation]:
 
 
 def command_stays(ts: TransitionSystem, cycle: Cycle) -> Node:
-    """Return the condition that the level takes the same order as in the cycle before; it has a superior."""
+    """Return the condition that a level with a superior takes the same order as in the cycle before."""
     above = ts.links.above
     assert above is not None
     return values.equal(cycle.before[above.number], cycle.taken[above.number])
@@ -255,7 +254,7 @@ def has_flag(ts: TransitionSystem) -> bool:
 
 
 def unstated(ts: TransitionSystem) -> tuple[Unstated, ...]:
-    """List the obligations that are not looked at, and what is missing for them."""
+    """List the obligations that cannot be stated, each with what is missing."""
     return tuple(_unstated(ts))
 
 
@@ -281,7 +280,7 @@ def _unstated(ts: TransitionSystem) -> Iterator[Unstated]:
 
 
 def _no_pause(ts: TransitionSystem, below: Below) -> Iterator[str]:
-    """Say why it is not known what a PAUSE is: the first command, which has a table of its own."""
+    """Yield why PAUSE is not recognised: it is the first command, with a table of its own."""
     assert ts.links.above is not None
     if isinstance(ts.level.tables, OneTable):
         yield "the level has one table for all commands"
@@ -296,7 +295,7 @@ def run_by(ts: TransitionSystem) -> list[Table]:
 
 
 def _rests(ts: TransitionSystem, table: Table) -> bool:
-    """Return whether the table serves the first command (PAUSE or its like) alone: new or not, it does the same."""
+    """Return whether the table serves only the first command (such as PAUSE), which is the same whether new or not."""
     chosen = ts.level.tables
     return not isinstance(chosen, OneTable) and [
         value for value, name in chosen.tables if name == table.name
@@ -319,9 +318,9 @@ def asks(program: Program) -> bool:
 
 
 def _overlooking(ts: TransitionSystem, cycle: Cycle, at: TableAt) -> tuple[Node, ...] | None:
-    """List when lines match without looking for a new command: with the flag up and with the flag down, all else alike.
+    """List conditions under which a line ignores the flag: it matches with the flag up and down, all else equal.
 
-    None where no line reads the flag. DEFAULT never looks.
+    None if no line reads the flag. DEFAULT never reads it.
     """
     if not any(looks_for(FLAG, line) for line in at.table.lines):
         return None
@@ -336,7 +335,7 @@ def _overlooking(ts: TransitionSystem, cycle: Cycle, at: TableAt) -> tuple[Node,
 
 
 def _asks_for(flag: str, line: Line) -> bool:
-    """Return whether a cell of the line has one value of the flag, and nothing else."""
+    """Return whether a cell of the line tests only the flag, for one value."""
     whole = ((0, 1),)
     return any(
         test is not None and test.box not in (None, whole) and [*map(str, test.variables)] == [flag]
@@ -350,10 +349,10 @@ def looks_for(leaf: str, line: Line) -> bool:
 
 
 def _answered(ts: TransitionSystem, cycle: Cycle, at: TableAt, overlooking: tuple[Node, ...]) -> Obligation:
-    """State that the flag of a new command outlasts each line that does not look for it, and each cycle that ends early.
+    """State that a new command's flag stays up over each line that ignores it, and over each cycle that ends early.
 
-    If it is down as soon as the level sees the same once more, no line will answer the command, and what this line
-    reports is taken for the answer.
+    If it is down when the level sees the same inputs again, no line will answer the command, and the report of this
+    line is taken for the answer.
     """
     again = ts.cycle(cycle.after, " again", taken=cycle.taken).middle[FLAG]
     missed = values.any_of(overlooking)

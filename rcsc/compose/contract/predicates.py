@@ -5,9 +5,9 @@ a state; all of it is read from the model:
 
 - truth values and enumerations that conditions of tables, assumptions or the contract read, and flags;
 - whether two leaves are equal that the level itself compares: an order and the last one, a number and the one seen;
-- which class of a number's values a cell of a table tells apart;
-- whether a test variable still is what its module would compute now: a module that reads inputs only says the same again
-  as long as its inputs stay, which is what makes a line that matches again do the same again.
+- whether a number is in a class of values that a cell of a table distinguishes;
+- whether a test variable still is what its module would compute now: a module that reads only inputs gives the same result
+  while they stay, so that a line that matches again does the same again.
 """
 
 from collections.abc import Container, Iterable, Iterator, Mapping
@@ -43,15 +43,15 @@ from rcsc.symbolic.execution import Run
 from rcsc.symbolic.values import Node
 
 CLOSELY = 1
-"""Up to here, what is not proved is looked at with more predicates."""
+"""The highest `closely`: each step retries what is not proved with more predicates."""
 
 
 @dataclass(frozen=True, slots=True)
 class Predicate:
-    """A truth value or a member; or, as a truth value, whether it equals another leaf, or what a module computes of it.
+    """A leaf's truth value or member; or whether the leaf equals another one, or what a module computes for it.
 
     Attributes:
-        parts: Whether it is one of those that part the states.
+        parts: Whether it partitions the states.
         procedures: Those that the module may call.
     """
 
@@ -65,7 +65,7 @@ class Predicate:
 
     @property
     def name(self) -> str:
-        """In the tables' words."""
+        """Its name in the tables' words."""
         if self.condition is not None:
             return f"({self.leaf})"
         if self.module is not None:
@@ -78,7 +78,7 @@ class Predicate:
         return len(self.kind.members) if isinstance(self.kind, Enum) else 2
 
     def node(self, leaves: Leaves) -> Node:
-        """Its value in a state."""
+        """Return its value in a state."""
         if self.condition is not None:
             return Run({}, {}, dict(leaves)).evaluate(self.condition)
         if self.module is not None:
@@ -89,22 +89,22 @@ class Predicate:
         return values.equal(leaves[self.leaf], leaves[self.other]) if self.other else leaves[self.leaf]
 
     def shown(self, value: int) -> str:
-        """A value in the tables' words."""
+        """Return a value in the tables' words."""
         return spell(self.kind, value)
 
 
 def cone(cycle: Cycle, obligations: Iterable[Node]) -> frozenset[str]:
     """Find the leaves whose values before a cycle can influence the nodes, in this cycle or a later one."""
-    found: set[str] = set()
+    leaves: set[str] = set()
     waiting = [name for name in values.variables(obligations) if name in cycle.before]
     while waiting:
         name = waiting.pop()
-        if name not in found:
-            found.add(name)
+        if name not in leaves:
+            leaves.add(name)
             waiting += [
                 variable for variable in values.variables([cycle.after[name]]) if variable in cycle.before
             ]
-    return frozenset(found)
+    return frozenset(leaves)
 
 
 def predicates(
@@ -115,8 +115,8 @@ def predicates(
     Args:
         ts: The level.
         cycle: From any state.
-        obligations: What is to be proved.
-        closely: At 1 (`CLOSELY`) there are also those by which procedures decide, after the others.
+        obligations: The conditions to be proved.
+        closely: At 1 (`CLOSELY`), those on which procedures branch come after the others.
     """
     inside = cone(cycle, obligations)
     program, kinds = ts.program, ts.kinds
@@ -131,37 +131,37 @@ def predicates(
         *_selector(ts),
         *(name for name in chosen if _flag(program, name) and name not in computed),
     }
-    found = [Predicate(name, kinds[name], parts=name in parting) for name in chosen]
+    selected = [Predicate(name, kinds[name], parts=name in parting) for name in chosen]
     pairs = sorted({*compared(program), *_questions(ts)})
-    found += [
-        Predicate(one, Bool(), other) for one, other in pairs if {one, other} <= inside and one in kinds
+    selected += [
+        Predicate(leaf, Bool(), other) for leaf, other in pairs if {leaf, other} <= inside and leaf in kinds
     ]
-    found += [
+    selected += [
         Predicate(leaf, Bool(), module=module, procedures=ts.procedures) for leaf, module in computed.items()
     ]
-    found += _cells(ts, {*inside, *computed})
+    selected += _cells(ts, {*inside, *computed})
     if closely:
-        found += _branches(ts, inside, {predicate.leaf for predicate in found})
-    return tuple(found)
+        selected += _branches(ts, inside, {predicate.leaf for predicate in selected})
+    return tuple(selected)
 
 
 def point(ts: TransitionSystem, chosen: tuple[Predicate, ...], state: Mapping[str, Value]) -> tuple[int, ...]:
     """Evaluate the predicates in a state that was reached; modules are run by the interpreter."""
     again: dict[str, dict[str, Value]] = {}
-    found = []
+    coordinates = []
     for predicate in chosen:
         if predicate.condition is not None:
-            found.append(int(holds(predicate.condition, state)))
+            coordinates.append(int(holds(predicate.condition, state)))
         elif predicate.module is not None:
             if predicate.module.name not in again:
                 again[predicate.module.name] = dict(state)
                 call(ts.program, predicate.module.name, [], again[predicate.module.name])
-            found.append(int(state[predicate.leaf] == again[predicate.module.name][predicate.leaf]))
+            coordinates.append(int(state[predicate.leaf] == again[predicate.module.name][predicate.leaf]))
         elif predicate.other:
-            found.append(int(state[predicate.leaf] == state[predicate.other]))
+            coordinates.append(int(state[predicate.leaf] == state[predicate.other]))
         else:
-            found.append(key_of(predicate.kind, state[predicate.leaf]))
-    return tuple(found)
+            coordinates.append(key_of(predicate.kind, state[predicate.leaf]))
+    return tuple(coordinates)
 
 
 def listed(kind: Scalar) -> bool:
@@ -189,11 +189,11 @@ def _read(ts: TransitionSystem) -> set[str]:
     ]
     if not isinstance(level.tables, OneTable):
         conditions.append(level.tables.selector)
-    found = {str(name) for condition in conditions for name in read_by(condition)}
-    found |= {below.command for below in ts.links.below}
-    found |= {f"{GHOST}{asked.into}" for asked in ts.links.asked}
-    return found | {
-        str(pending(v.name)) for v in program.variables if v.deferred_until is not None and v.name in found
+    leaves = {str(name) for condition in conditions for name in read_by(condition)}
+    leaves |= {below.command for below in ts.links.below}
+    leaves |= {f"{GHOST}{asked.into}" for asked in ts.links.asked}
+    return leaves | {
+        str(pending(v.name)) for v in program.variables if v.deferred_until is not None and v.name in leaves
     }
 
 
@@ -206,10 +206,13 @@ def _computed(ts: TransitionSystem) -> Iterator[tuple[str, Procedure]]:
         run = Run(ts.procedures, ts.kinds, ts.havoc())
         run.execute((Call(module.name),))
         if run.fresh:
-            continue  # it asks what nobody can say again
+            continue  # its result is not a function of the state
         for leaf in map(str, module.writes):
             used = values.variables([run.leaf(leaf)])
-            if all(one in own or variables[one].kind is Kind.INPUT or _flag(ts.program, one) for one in used):
+            if all(
+                source in own or variables[source].kind is Kind.INPUT or _flag(ts.program, source)
+                for source in used
+            ):
                 yield leaf, module
 
 
@@ -249,9 +252,9 @@ def _branches(ts: TransitionSystem, inside: Container[str], there: Container[str
 def _decisions(program: Program) -> Iterator[Expr]:
     """List the conditions of two-way choices."""
     for procedure in program.procedures:
-        for one in everything(procedure.body):
-            if isinstance(one, If):
-                yield one.condition
+        for statement in everything(procedure.body):
+            if isinstance(statement, If):
+                yield statement.condition
 
 
 def compared(program: Program) -> Iterator[tuple[str, str]]:
@@ -260,14 +263,14 @@ def compared(program: Program) -> Iterator[tuple[str, str]]:
     conditions += [
         expr
         for procedure in program.procedures
-        for one in everything(procedure.body)
-        for expr in expressions(one)
+        for statement in everything(procedure.body)
+        for expr in expressions(statement)
     ]
     for condition in conditions:
         for part in parts(condition):
             match part:
-                case Apply(op=Op.EQ | Op.NE, args=(Read(name=one), Read(name=two))) if one != two:
-                    yield min(str(one), str(two)), max(str(one), str(two))
+                case Apply(op=Op.EQ | Op.NE, args=(Read(name=left), Read(name=right))) if left != right:
+                    yield min(str(left), str(right)), max(str(left), str(right))
                 case _:
                     pass
 

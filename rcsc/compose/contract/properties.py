@@ -1,12 +1,12 @@
-"""The program's own invariants and properties: as conditions on one cycle, as predicates, and of a run.
+"""The program's own invariants and properties: as conditions on one cycle, as predicates, and evaluated on a run.
 
-In: a program and a cycle. Out: nodes that are to hold in every cycle; what the search has to look at for them; and whether a cycle that
-was run keeps them, as the interpreter says.
+In: a program and a cycle. Out: nodes that must hold in every cycle; predicates for the search; and whether the interpreter finds them
+true of a cycle that was run.
 
-An *invariant* is about state and outputs: it holds of the values with which the level begins, at first and after a restart, and
-after every cycle. A *property* is about a cycle and the one before (`model.Property`): it holds after every cycle, the first and the
-first after a restart included, of inputs as the cycle took them; before those stands what the level begins with. It says nothing of a
-cycle before a restart and one after it. What is not defined (a division by zero, an index outside) does not hold.
+An *invariant* is a condition on state and outputs. It holds initially, after a restart, and after every cycle. A *property* is a
+condition on a cycle and the one before (`model.Property`), with inputs as the cycle took them. It holds after every cycle; before the
+first cycle, and the first after a restart, stand the values with which the level begins. It never spans a restart. An undefined
+condition (a division by zero, an index out of range) does not hold.
 """
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
@@ -37,14 +37,14 @@ from rcsc.symbolic.execution import Run
 from rcsc.symbolic.values import Node
 
 _PARTIAL = frozenset({Op.DIV, Op.MOD, Op.TO_INT})
-"""Operations that are not defined of every value; no predicate evaluates them."""
+"""Operations that are not defined for every value; no predicate evaluates them."""
 
 
 # --- as conditions on a cycle ----------------------------------------------------------------
 
 
 def invariants(program: Program, cycle: Cycle) -> Iterator[tuple[str, Node]]:
-    """State each invariant by name: it holds before the cycle and after it."""
+    """Yield each invariant's name, and the condition that it holds before and after the cycle."""
     for invariant in program.invariants:
         yield (
             invariant.name,
@@ -53,7 +53,7 @@ def invariants(program: Program, cycle: Cycle) -> Iterator[tuple[str, Node]]:
 
 
 def kept_within(program: Program, cycle: Cycle, names: Collection[str]) -> Node:
-    """State that the invariants hold within the cycle, too, wherever operations are shown to be safe under them."""
+    """Return the condition that the invariants hold within the cycle, too, where operations are safe only under them."""
     return values.all_of(
         _true(invariant.condition, leaves)
         for invariant in program.invariants
@@ -63,18 +63,18 @@ def kept_within(program: Program, cycle: Cycle, names: Collection[str]) -> Node:
 
 
 def properties(program: Program, cycle: Cycle) -> Iterator[tuple[str, Node]]:
-    """State each property by name, over the cycle and the one before."""
+    """Yield each property's name and its condition on the cycle and the one before."""
     leaves = {**cycle.after, **{str(earlier(name)): node for name, node in cycle.before.items()}}
-    for one in program.properties:
-        yield one.name, _true(one.condition, leaves)
+    for stated in program.properties:
+        yield stated.name, _true(stated.condition, leaves)
 
 
 def _true(condition: Expr, leaves: Leaves) -> Node:
     """Return the condition that an expression is defined and true."""
     run = Run({}, {}, dict(leaves))
-    found = run.evaluate(condition)
+    truth = run.evaluate(condition)
     return values.all_of(
-        (*(values.follows(obligation.path, obligation.good) for obligation in run.obligations), found)
+        (*(values.follows(obligation.path, obligation.good) for obligation in run.obligations), truth)
     )
 
 
@@ -101,13 +101,13 @@ def property_kept(
     Raises:
         StopIteration: There is no such property.
     """
-    condition = next(one.condition for one in ts.program.properties if one.name == name)
+    condition = next(stated.condition for stated in ts.program.properties if stated.name == name)
     kinds = {**ts.kinds, **{str(earlier(leaf)): kind for leaf, kind in ts.kinds.items()}}
     return _held(condition, {**after, **{str(earlier(leaf)): value for leaf, value in before.items()}}, kinds)
 
 
 def _held(condition: Expr, state: Mapping[str, Value], kinds: Mapping[str, Scalar]) -> bool:
-    """Return whether the interpreter finds the condition true; what leaves 64 bits counts as undefined."""
+    """Return whether the interpreter finds the condition true; beyond 64 bits it is undefined."""
     try:
         if not holds(condition, state):
             return False
@@ -125,41 +125,47 @@ def every_predicate(
 ) -> tuple[Predicate, ...]:
     """Choose the predicates of tables and procedures, and those of invariants and properties.
 
-    Those that there are at less closeness come first, in the same order, as clauses name predicates by their position.
+    Those of a lower `closely` come first, in the same order, because clauses name predicates by position.
     """
     wanted = list(obligations)
     first = predicates(ts, cycle, wanted)
-    said = _said(ts, cone(cycle, wanted), {predicate.name for predicate in first}) if _states(ts) else ()
-    found = (*first, *said)
+    stated = (
+        _stated_predicates(ts, cone(cycle, wanted), {predicate.name for predicate in first})
+        if _stated_conditions(ts)
+        else ()
+    )
+    chosen = (*first, *stated)
     if closely:
-        there = {predicate.name for predicate in found}
+        there = {predicate.name for predicate in chosen}
         closer = predicates(ts, cycle, wanted, closely)
-        found = (*found, *(predicate for predicate in closer if predicate.name not in there))
-    return found
+        chosen = (*chosen, *(predicate for predicate in closer if predicate.name not in there))
+    return chosen
 
 
-def _states(ts: TransitionSystem) -> list[Expr]:
+def _stated_conditions(ts: TransitionSystem) -> list[Expr]:
     program = ts.program
     return [
         *(invariant.condition for invariant in program.invariants),
-        *(one.condition for one in program.properties),
+        *(stated.condition for stated in program.properties),
     ]
 
 
-def _said(ts: TransitionSystem, inside: frozenset[str], there: set[str]) -> tuple[Predicate, ...]:
-    """Make predicates of the parts of invariants and properties that matter for a later cycle."""
-    found: dict[str, Predicate] = {}
-    for condition in _states(ts):
+def _stated_predicates(
+    ts: TransitionSystem, inside: frozenset[str], there: set[str]
+) -> tuple[Predicate, ...]:
+    """Make predicates of those parts of invariants and properties that can influence a later cycle."""
+    by_name: dict[str, Predicate] = {}
+    for condition in _stated_conditions(ts):
         for part in parts(condition):
             if len({name.startswith(BEFORE) for name in read_by(part)}) > 1:
-                continue  # it says of two cycles what no state shows
+                continue  # it compares two cycles, which no single state shows
             for predicate in _predicates_of(_of_one_cycle(part), ts.kinds):
                 read = {predicate.leaf, *([predicate.other] if predicate.other else [])}
                 if predicate.condition is not None:
                     read = set(map(str, read_by(predicate.condition)))
                 if predicate.name not in there and read and read <= inside:
-                    found.setdefault(predicate.name, predicate)
-    return tuple(found.values())
+                    by_name.setdefault(predicate.name, predicate)
+    return tuple(by_name.values())
 
 
 def _of_one_cycle(part: Expr) -> Expr:
@@ -176,12 +182,12 @@ def _of_one_cycle(part: Expr) -> Expr:
 
 
 def _predicates_of(part: Expr, kinds: Mapping[str, Scalar]) -> Iterator[Predicate]:
-    """Make the predicates of one part of an expression; none of a part that is made of others."""
+    """Make the predicates of an atomic part of an expression; none of a compound one."""
     match part:
         case Read(name=name) if listed(kinds[name]):
             yield Predicate(str(name), kinds[name])
-        case Apply(op=Op.EQ | Op.NE, args=(Read(name=one), Read(name=two))) if one != two:
-            yield Predicate(min(str(one), str(two)), Bool(), max(str(one), str(two)))
+        case Apply(op=Op.EQ | Op.NE, args=(Read(name=left), Read(name=right))) if left != right:
+            yield Predicate(min(str(left), str(right)), Bool(), max(str(left), str(right)))
         case Apply(op=op) if op in COMPARISONS:
             yield from _condition(part, kinds)
         case Among():
@@ -191,7 +197,7 @@ def _predicates_of(part: Expr, kinds: Mapping[str, Scalar]) -> Iterator[Predicat
 
 
 def _condition(part: Expr, kinds: Mapping[str, Scalar]) -> Iterator[Predicate]:
-    """Make a predicate of a comparison of numbers, where it is defined of every value."""
+    """Make a predicate of a comparison of numbers that is defined for every value."""
     whole = all(
         not isinstance(apply, Select) and not (isinstance(apply, Apply) and apply.op in _PARTIAL)
         for apply in parts(part)

@@ -36,17 +36,17 @@ from rcsc.symbolic.execution import Run
 from rcsc.symbolic.values import FALSE, TRUE, Node
 
 GHOST = "asked "
-"""Names of what the proof remembers and the level does not: that the database was asked, and for which keys."""
+"""Prefix of ghosts, which the proof remembers and the level does not: that the database was asked, and for which keys."""
 
 SEEN = "inc_command_seen"
 """The number of the command being worked on; a level that restarts counts the one in its buffer as seen."""
 TAKEN = f"command.{NUMBER}"
-"""Where that one stands, by the convention of the tables: of an order under another name nothing is adopted."""
+"""The input with that number, by the tables' convention; nothing is adopted from an order under another name."""
 EARLY = frozenset({Fault.EXTERN, Fault.ASSUMPTION})
 """Faults that no proof excludes: the cycle ends there, and the next one runs."""
 Leaves = dict[str, Node]
 NUMBERS = 65536
-"""Command numbers that there are (16 bits)."""
+"""How many command numbers there are (16 bits)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,9 +54,9 @@ class TableAt:
     """A table in one cycle.
 
     Attributes:
-        chosen: When it is the one that runs; `selected`, that would, if the cycle did not end before.
-        matches: When each of its lines matches, in order.
-        assumptions: When each of its assumptions holds, by name.
+        chosen: The condition that it runs; `selected`, that it would run if the cycle did not end before.
+        matches: The condition of each line, in order.
+        assumptions: The condition of each assumption, by name.
     """
 
     table: Table
@@ -68,37 +68,37 @@ class TableAt:
     @property
     def lines(self) -> list[tuple[Line | Default, Node]]:
         """Each line with its condition, DEFAULT last."""
-        found: list[tuple[Line | Default, Node]] = list(zip(self.table.lines, self.matches, strict=True))
-        return found if self.table.default is None else [*found, (self.table.default, self.none)]
+        lines: list[tuple[Line | Default, Node]] = list(zip(self.table.lines, self.matches, strict=True))
+        return lines if self.table.default is None else [*lines, (self.table.default, self.none)]
 
     @property
     def none(self) -> Node:
-        """No line matches."""
+        """The condition that no line matches."""
         return values.all_of(map(values.negation, self.matches))
 
     @property
     def one_line(self) -> Node:
-        """A line runs."""
+        """The condition that one line, or DEFAULT, runs."""
         some = values.TRUE if self.table.default is not None else values.negation(self.none)
         return values.both(some, values.negation(self.several()))
 
     @property
     def runs(self) -> Node:
-        """It is the one that runs, and none of its stopping assumptions fails: else the cycle ends before it is matched."""
+        """The condition that it is matched: it is chosen, and none of its stopping assumptions fails."""
         return values.all_of((self.chosen, *(self.assumptions[name] for name in self.table.stops)))
 
     @property
     def stopped(self) -> Node:
-        """It is the one that would run, and a stopping assumption fails."""
+        """The condition that it is chosen, and a stopping assumption fails."""
         return values.both(self.chosen, values.negation(self.runs)) if self.table.stops else FALSE
 
     def several(self) -> Node:
-        """At least two lines match."""
-        found, before = FALSE, FALSE
+        """Return the condition that at least two lines match."""
+        twice, before = FALSE, FALSE
         for match in self.matches:
-            found = values.either(found, values.both(before, match))
+            twice = values.either(twice, values.both(before, match))
             before = values.either(before, match)
-        return found
+        return twice
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,15 +106,15 @@ class Cycle:
     """One cycle as nodes.
 
     Attributes:
-        before: Every leaf as the last cycle left it, and the ghosts; inputs as last taken.
+        before: Every leaf and ghost as the last cycle left it; inputs as last taken.
         taken: The inputs of this cycle.
-        contract: What the environment keeps to; `undeclared`, the same without what tables are declared to rely on.
-        middle: Every leaf that the table sees.
+        contract: The condition on the environment; `undeclared`, without assumptions that tables declare.
+        middle: Every leaf as the table sees it.
         tables: Each table that may run.
         after: Every leaf and ghost after the cycle.
-        refused: An extern procedure's result is refused, or a stopping assumption fails, so that the cycle ends there;
-            `unmatched`, before the table is looked at; `interrupted`, before its line is done.
-        calls: Of extern procedures, in the order in which they can be made.
+        refused: The condition that the cycle ends early, by a refused result or a failed stopping assumption;
+            `unmatched`, before the table is matched; `interrupted`, before its line is done.
+        calls: Calls of extern procedures, in the order in which they can be made.
         settled: Every leaf before the preprocess, and `acted`, before the postprocess.
     """
 
@@ -134,13 +134,13 @@ class Cycle:
 
     @property
     def cases(self) -> tuple[Node, ...]:
-        """Conditions on the cycle, of which one holds: which table runs, or that none does."""
+        """Conditions of which exactly one holds: for each table that it runs, and that none does."""
         none = (self.unmatched,) if self.unmatched is not FALSE else ()
         return (*(at.chosen for at in self.tables), *none)
 
     @property
     def goes_on(self) -> Node:
-        """One line matches, or DEFAULT runs, where a table is matched: the cycle does not end in a fault that the proofs exclude."""
+        """The condition that a matched table runs one line or DEFAULT: the cycle ends in no fault that the proofs exclude."""
         return values.all_of(values.follows(at.runs, at.one_line) for at in self.tables)
 
 
@@ -153,8 +153,8 @@ class Safety:
     """Why a cycle as nodes is what the executors do: every operation is defined, and every value in range.
 
     Attributes:
-        invariants: Under which of the program's that was shown; empty where it is so whatever the state.
-        within: Whether they have to be shown to hold within a cycle, too, as some procedure of the program alone can break one.
+        invariants: The program's invariants under which that was shown; empty if it is so in any state.
+        within: Whether they must be shown within a cycle, too, because some procedure alone can break one.
     """
 
     invariants: tuple[str, ...] = ()
@@ -168,7 +168,7 @@ class TransitionSystem:
     Attributes:
         kinds: The type of each leaf and ghost, by name.
         inputs: The leaves that each cycle takes, in declared order.
-        trusted: Assumptions that the tables are declared to rely on, of what the environment gives: part of the contract.
+        trusted: Assumptions about inputs that the tables declare: part of the contract.
     """
 
     program: Program
@@ -181,7 +181,7 @@ class TransitionSystem:
     trusted: frozenset[str] = field(init=False, default=frozenset())
 
     def __post_init__(self) -> None:
-        """Reads what cycles are made of."""
+        """Derives types, inputs and trusted assumptions from the program."""
         self.procedures = {procedure.name: procedure for procedure in self.program.procedures}
         self.kinds = {str(v.name): v.type for v in self.program.variables}
         self.inputs = tuple(str(v.name) for v in self.program.variables if v.kind is Kind.INPUT)
@@ -223,9 +223,8 @@ class TransitionSystem:
     def restarted(self) -> Leaves:
         """Return the states before the first cycle after a restart, as `run.adopt` makes them, whatever stood in the buffers.
 
-        A member that a state has no name for leaves it as it is initially, as there, and so does a number of another type. An order
-        has a number that no report can echo yet: the one after the order that stands in the buffer, which may be late; after the echo
-        where none stands.
+        A state that lacks the member, or has a number of another type, keeps its initial value, as there. An order has a number that
+        no report can echo yet: the one after the order in the buffer, which may be late, or after the echo if there is none.
         """
         start = self.initial()
         start |= {
@@ -252,9 +251,9 @@ class TransitionSystem:
         return start
 
     def _numbers(self, *leaves: str) -> tuple[Int, ...]:
-        """Return the types of the leaves, where there are all and all are whole numbers; else none."""
-        found = tuple(kind for kind in map(self.kinds.get, leaves) if isinstance(kind, Int))
-        return found if len(found) == len(leaves) else ()
+        """Return the types of the leaves if all exist and are whole numbers; else none."""
+        types = tuple(kind for kind in map(self.kinds.get, leaves) if isinstance(kind, Int))
+        return types if len(types) == len(leaves) else ()
 
     def of(self, program: Program) -> "TransitionSystem":
         """Return the same level with another program of the same leaves."""
@@ -271,18 +270,18 @@ class TransitionSystem:
         Raises:
             StopIteration: It has none of this name.
         """
-        return next(one for one in self.program.tables if one.name == name)
+        return next(table for table in self.program.tables if table.name == name)
 
     def table_of(self, snapshot: Snapshot) -> str:
-        """Return the table that ran, from the leaves that its cycle left: what selects it is steady (`UNSTEADY_SELECTOR`)."""
+        """Return the table that ran, from the leaves after its cycle; its selector is steady (`UNSTEADY_SELECTOR`)."""
         if isinstance(self.level.tables, OneTable):
             return str(self.level.tables.table)
         return str(dict(self.level.tables.tables)[evaluate(self.level.tables.selector, snapshot)])
 
     def cycle(self, before: Leaves, suffix: str = " taken", taken: Leaves | None = None) -> Cycle:
-        """Run one cycle symbolically from `before`; inputs that are not given are fresh variables, named with the suffix.
+        """Run one cycle symbolically from `before`; inputs default to fresh variables, named with the suffix.
 
-        What extern procedures give is named with it, too: cycles that one question is about need different suffixes.
+        Results of extern procedures are named with it, too, so that cycles in one query need different suffixes.
         """
         if taken is None:
             taken = {name: values.variable(f"{name}{suffix}", self.kinds[name]) for name in self.inputs}
@@ -313,7 +312,7 @@ class TransitionSystem:
         )  # fmt: skip
 
     def tables(self, middle: Leaves, *, matched: bool) -> tuple[TableAt, ...]:
-        """Match each table that may run on these leaves; none runs where the cycle ends before matching."""
+        """Match each table that may run on these leaves; none runs if the cycle is not `matched`."""
         run = Run(self.procedures, self.kinds, dict(middle), ended=values.truth(not matched))
         return tuple(self._tables(run))
 
@@ -329,7 +328,7 @@ class TransitionSystem:
         )
 
     def _protocol(self, before: Leaves, taken: Leaves) -> Node:
-        """Return what holds of orders and reports, whatever the delay (`compose.__doc__`)."""
+        """Return the contract of orders and reports, whatever the delay (`compose.__doc__`)."""
         kept = TRUE
         if (above := self.links.above) is not None:
             same = values.all_of(values.equal(before[leaf], taken[leaf]) for leaf in above.numbered)
@@ -341,7 +340,7 @@ class TransitionSystem:
 
     @staticmethod
     def echo(below: Below, before: Leaves, taken: Leaves) -> Node:
-        """Return the contract of a report: what echoes the last number is about the last command, and stays; the next is not echoed."""
+        """Return the contract of a report: an echo of the last number repeats its command, and stays; the next is not echoed."""
         sent, last, echo = before[below.number], before[below.echo], taken[below.echo]
         it = values.equal(taken[below.echoed], before[below.command])
         now = values.equal(echo, sent)
@@ -351,7 +350,7 @@ class TransitionSystem:
         )
 
     def _database(self, before: Leaves, taken: Leaves) -> tuple[Leaves, Node]:
-        """Return what was asked of the database, and the condition that the same question has the same answer."""
+        """Return the ghosts after the cycle, and the condition that the same question has the same answer."""
         ghosts: Leaves = {}
         kept = TRUE
         for asked in self.links.asked:
@@ -380,7 +379,7 @@ class TransitionSystem:
             yield TableAt(table, values.both(selected, goes_on), matches, assumptions, selected)
 
     def matches(self, cycle: Cycle, table: Table, instead: Leaves) -> tuple[Node, ...]:
-        """Return when each line of a table would match in a cycle that came to it with these leaves instead of its own."""
+        """Return the condition of each line of a table, with these leaves in place of the cycle's own."""
         run = Run(self.procedures, self.kinds, {**cycle.middle, **instead})
         return tuple(map(partial(_matches, run), table.lines))
 
@@ -398,16 +397,16 @@ class TransitionSystem:
         names = {name for _, state in ways for name in state.leaves}
         leaves = {}
         for name in sorted(names):
-            found = run.start[name] if name not in middle.leaves else middle.leaves[name]
-            base = found
+            node = run.start[name] if name not in middle.leaves else middle.leaves[name]
+            base = node
             for when, state in reversed(ways):
-                found = values.choice(when, state.leaves.get(name, base), found)
-            leaves[name] = found
+                node = values.choice(when, state.leaves.get(name, base), node)
+            leaves[name] = node
         run.state = State({**middle.leaves, **leaves})
 
 
 def _way(run: Run, middle: State, when: Node, actions: tuple[Action, ...]) -> tuple[Node, State]:
-    """Run the actions of one line symbolically; return when, and the leaves they leave."""
+    """Run the actions of one line symbolically; return its condition and the state after them."""
     run.state = State(dict(middle.leaves))
     with run.where(when):
         for action in actions:
@@ -418,7 +417,7 @@ def _way(run: Run, middle: State, when: Node, actions: tuple[Action, ...]) -> tu
 
 def successor(number: Node) -> Node:
     """Return the next number of 16 bits."""
-    one, many = values.constant(number.kind, 1), values.constant(Int(0, NUMBERS), NUMBERS)
+    step, modulus = values.constant(number.kind, 1), values.constant(Int(0, NUMBERS), NUMBERS)
     return values.arithmetic(
-        Op.MOD, (values.arithmetic(Op.ADD, (number, one), Int(0, NUMBERS)), many), number.kind
+        Op.MOD, (values.arithmetic(Op.ADD, (number, step), Int(0, NUMBERS)), modulus), number.kind
     )

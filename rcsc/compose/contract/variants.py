@@ -1,7 +1,7 @@
-"""Programs as if the language had other rules: what a rule is good for is seen where it is off.
+"""Variants of a program under other language rules, to show what each rule prevents.
 
-In: a program. Out: one of the same leaves, whose meaning is the language's own again. Executors of a variant are not what the
-tables say, so that they are marked like those of tables that do not prove (`findings`).
+In: a program. Out: a program with the same leaves, in the language as it is. Executors of a variant do not follow the tables as
+written, and are marked like those of unproved tables (`findings`).
 """
 
 from collections.abc import Callable, Mapping
@@ -14,7 +14,7 @@ TRUE = Literal(value=True, type=Bool())
 
 
 def undeferred(program: Program) -> Program:
-    """Take every deferred state at once, not when its command is echoed: what section 9 of Haynes et al. warns of."""
+    """Write every deferred state at once instead of when its command is echoed; section 9 of Haynes et al. warns of it."""
     at_once = tuple(
         replace(v, deferred_until=TRUE) if v.deferred_until is not None else v for v in program.variables
     )
@@ -22,12 +22,12 @@ def undeferred(program: Program) -> Program:
 
 
 def first_match(program: Program) -> Program:
-    """Run the first of several matching lines: each line also asks that none before it matches."""
+    """Run the first of several matching lines: each line also requires that no earlier one matches."""
     return replace(program, tables=tuple(map(_first_match, program.tables)))
 
 
 def defaults_reported(program: Program) -> Program:
-    """Declare every DEFAULT line unreachable, to find what falls to it."""
+    """Declare every DEFAULT line unreachable, to find the inputs that reach it."""
     return replace(
         program,
         tables=tuple(
@@ -40,11 +40,11 @@ def defaults_reported(program: Program) -> Program:
 
 
 def _first_match(table: Table) -> Table:
-    """Add a column in which a line that can meet an earlier one asks that it does not match."""
+    """Add a column in which a line that overlaps earlier ones requires that none of them matches."""
     meeting = may_meet(table)
     if not meeting:
         return table
-    earlier = {at: [one for one, two in meeting if two == at] for at in range(len(table.lines))}
+    earlier = {at: [before for before, after in meeting if after == at] for at in range(len(table.lines))}
     conditions = [
         _all_of([test.condition for test in line.tests if test is not None]) for line in table.lines
     ]
@@ -56,17 +56,17 @@ def _first_match(table: Table) -> Table:
 
 
 def _none_of(table: Table, conditions: list[Expr]) -> Test:
-    found = conditions[0]
+    disjunction = conditions[0]
     for condition in conditions[1:]:
-        found = Apply(Op.OR, (found, condition), Bool())
-    return Test("no line before", Apply(Op.NOT, (found,), Bool()), table.variables, None)
+        disjunction = Apply(Op.OR, (disjunction, condition), Bool())
+    return Test("no line before", Apply(Op.NOT, (disjunction,), Bool()), table.variables, None)
 
 
 def _all_of(conditions: list[Expr]) -> Expr:
-    found: Expr = TRUE
+    conjunction: Expr = TRUE
     for condition in conditions:
-        found = condition if found is TRUE else Apply(Op.AND, (found, condition), Bool())
-    return found
+        conjunction = condition if conjunction is TRUE else Apply(Op.AND, (conjunction, condition), Bool())
+    return conjunction
 
 
 VARIANTS: Mapping[str, Callable[[Program], Program]] = {
@@ -74,4 +74,4 @@ VARIANTS: Mapping[str, Callable[[Program], Program]] = {
     "first-match": first_match,
     "without-default": defaults_reported,
 }
-"""Each by the name of its option."""
+"""The variants by the names of their options."""

@@ -1,7 +1,7 @@
-"""Random walks of a level on the reference interpreter, its environment keeping to the contract.
+"""Random walks of a level on the reference interpreter, in an environment that keeps to the contract.
 
-In: a transition system, a seed. Out: states that can be reached, so that the search for invariants begins near its end; each
-state comes from the meaning of the language itself, not from its translation. A walk proves nothing, and no proof rests on one.
+In: a transition system, a seed. Out: reachable states, which give the search for invariants a head start. Each state comes from the
+reference meaning of the language, not from its translation. A walk proves nothing, and no proof rests on one.
 """
 
 from collections.abc import Iterator, Mapping
@@ -20,8 +20,8 @@ class Walk:
     """One random walk on the interpreter.
 
     Attributes:
-        now: Every leaf.
-        ghosts: What was asked of the database, as `transition` keeps it.
+        now: The value of every leaf.
+        ghosts: What was asked of the database, as in `transition`.
         ran: The tables and lines that ran.
     """
 
@@ -37,12 +37,12 @@ class Walk:
         self.ghosts = {name: value_of_key(kinds[name], 0) for name in kinds if name.startswith(GHOST)}
 
     def begin_at(self, state: Mapping[str, Value]) -> None:
-        """Go on from a state that a walk has reached."""
+        """Continue from a state that a walk has reached."""
         self.now = {leaf: state[leaf] for leaf in self.now}
         self.ghosts = {leaf: state[leaf] for leaf in self.ghosts}
 
     def states(self, cycles: int) -> Iterator[dict[str, Value]]:
-        """Yield the state after each cycle; stop at a fault, which is for the proof to find."""
+        """Yield the state after each cycle; stop at a fault, which the proof has to find."""
         for _ in range(cycles):
             self._take()
             try:
@@ -58,7 +58,7 @@ class Walk:
             yield {**self.now, **self.ghosts}
 
     def _any(self, leaf: str) -> Value:
-        """Draw a value; of wide ranges only a few different ones, to make some equal."""
+        """Draw a value; from a wide range one of a few, so that equal values are common."""
         kind = self.ts.kinds[leaf]
         low, high = key_bounds(kind)
         if isinstance(kind, Enum) or high - low < 64:
@@ -78,8 +78,8 @@ class Walk:
             self._report(below)
         for asked in links.asked:
             keys = {f"{GHOST}{asked.into} {key}": self.now[key] for key in asked.keys}
-            said = self.ghosts[f"{GHOST}{asked.into}"]
-            if not said or any(self.ghosts[name] != value for name, value in keys.items()):
+            was_asked = self.ghosts[f"{GHOST}{asked.into}"]
+            if not was_asked or any(self.ghosts[name] != value for name, value in keys.items()):
                 for leaf in asked.leaves:
                     self.now[leaf] = self._any(leaf)
             self.ghosts |= keys

@@ -8,11 +8,11 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 
 from rcsc.compose.contract.claims import (
+    ACCEPTED,
     AGAIN,
     CONTRACT,
     DECLARED,
     ENDING,
-    FOUND,
     RUNS,
     SAFE,
     UNREACHED,
@@ -35,7 +35,7 @@ def agreements(made: Mapping[str, TransitionSystem], proofs: Mapping[str, LevelP
         (name, obligation.key)
         for name, proof in proofs.items()
         for obligation, verdict in proof.found
-        if verdict in FOUND
+        if verdict in ACCEPTED
     }
     return [
         replace(promise, holds=promise.begins and proved.issuperset(promise.needs))

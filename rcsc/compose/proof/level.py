@@ -9,7 +9,7 @@ import time
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
-from rcsc.compose.contract.claims import FOUND
+from rcsc.compose.contract.claims import ACCEPTED
 from rcsc.compose.contract.claims import Verdict as Verdict  # noqa: PLC0414  # it is the verdict of an obligation, too
 from rcsc.compose.contract.environment import COMMAND
 from rcsc.compose.contract.obligations import Obligation, Sort, Unstated, obligations, unstated
@@ -76,7 +76,7 @@ class LevelProof:
     @property
     def open(self) -> tuple[Obligation, ...]:
         """The obligations that are not proved."""
-        return tuple(obligation for obligation, verdict in self.found if verdict not in FOUND)
+        return tuple(obligation for obligation, verdict in self.found if verdict not in ACCEPTED)
 
 
 def essential(proof: LevelProof) -> tuple[Obligation, ...]:
@@ -254,7 +254,7 @@ def certificate(ts: TransitionSystem, proof: LevelProof, limits: Limits = LIMITS
     names = [*(f"step {at.table.name}" for at in cycle.tables), "step of no table"]
     for name, case in zip(names, cycle.cases, strict=False):
         found[name] = asked.step_question(clauses, case).script()
-    proved = {obligation.key for obligation, verdict in proof.found if verdict in FOUND}
+    proved = {obligation.key for obligation, verdict in proof.found if verdict in ACCEPTED}
     for name, first in firsts.items():
         wanted = [obligation for obligation in obligations(ts, first) if obligation.key in proved]
         found[f"goals {name}"] = _none_broken(asked, asked.beginning(first), wanted)

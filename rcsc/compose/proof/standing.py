@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 
 from rcsc.compose.contract.claims import (
-    FOUND,
+    ACCEPTED,
     RUNS,
     UNREACHED,
     Claim,
@@ -58,7 +58,7 @@ class Verdicts:
     @property
     def many(self) -> int:
         """How many claims are found so."""
-        return sum(claim.verdict in FOUND for claim in self.claims.values())
+        return sum(claim.verdict in ACCEPTED for claim in self.claims.values())
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,7 +180,7 @@ class KnownSystem:
         if verdicts is None:
             return Known.UNKNOWN
         claim = verdicts.claims.get(key)
-        return Known.PROVED if claim is not None and claim.verdict in FOUND else Known.NOT_PROVED
+        return Known.PROVED if claim is not None and claim.verdict in ACCEPTED else Known.NOT_PROVED
 
     def of_obligation(self, level: str, key: Key) -> Known:
         """Return what is known of an obligation over the whole chain of levels."""
