@@ -1,4 +1,4 @@
-"""What people type, as what a session does.
+"""Turn what people type into calls on a session.
 
 In: a line. Out: what to show; a refusal where it is not done.
 """
@@ -16,7 +16,7 @@ from rcsc.shell.reload.refusal import Refused
 from rcsc.shell.session import MOST_CYCLES, Session
 from rcsc.shell.typed_names import NamedLine
 
-Said = list[str]
+Output = list[str]
 _SHOW = re.compile(rf"(?P<name>{typed_names.NAME})\s*\?$")
 _SET = re.compile(rf"(?P<name>{typed_names.NAME})\s*=(?!=)\s*(?P<value>.*)$")
 _SUFFIX = "_level"
@@ -58,14 +58,14 @@ class Commands:
     """The commands of a session.
 
     Attributes:
-        over: Whether `quit` was said.
+        over: Whether `quit` was typed.
     """
 
     session: Session
     over: bool = False
 
-    def do(self, line: str) -> Said:
-        """Does what a line says; what to show.
+    def do(self, line: str) -> Output:
+        """Run a line and return what to show.
 
         Raises:
             Refused: It was not done.
@@ -83,7 +83,7 @@ class Commands:
         return self._by_name(text) if command is None else command(rest.strip())
 
     @property
-    def _words(self) -> dict[str, Callable[[str], Said]]:
+    def _words(self) -> dict[str, Callable[[str], Output]]:
         return {
             "break": self._break, "breaks": self._breaks, "buffers": self._buffers, "delete": self._delete,
             "diff": self._diff,
@@ -105,16 +105,16 @@ class Commands:
 
     # --- by name ---
 
-    def _by_name(self, text: str) -> Said:
-        said = call_of(text)
-        if said is None:
+    def _by_name(self, text: str) -> Output:
+        call = call_of(text)
+        if call is None:
             raise Refused(Code.SHELL_COMMAND, f"`{text}` is no command", "`help` lists the commands")
-        name, args = said
+        name, args = call
         cycled = self._cycled(name)
         if cycled is not None:
             return self._alone(cycled, _number(args[0]) if args else 1)
         level, rest = typed_names.split(name, self.session.levels, self.session.level)
-        if typed_names.found(rest, part_names(self.session.program(level))) is None:
+        if typed_names.known_name(rest, part_names(self.session.program(level))) is None:
             raise self._unknown(name)
         return self.session.part(level, rest, args)
 
@@ -142,17 +142,17 @@ class Commands:
 
     # --- variables ---
 
-    def _show_variable(self, name: str) -> Said:
+    def _show_variable(self, name: str) -> Output:
         level, places = typed_names.variable(name, self.session.levels, self.session.level)
         return [typed_names.shown(level, at) for at in places]
 
-    def _show(self, rest: str) -> Said:
+    def _show(self, rest: str) -> Output:
         if not rest:
             return self.session.changed() or ["the last cycle changed nothing"]
         level = typed_names.level_of(rest, self.session.levels)
         return [typed_names.shown(level, at) for at in range(len(level.sign.leaves))]
 
-    def _buffers(self, rest: str) -> Said:
+    def _buffers(self, rest: str) -> Output:
         every = [
             wire for wire in self.session.system.description.wires if rest in wire.source + " " + wire.target
         ]
@@ -180,12 +180,12 @@ class Commands:
 
     # --- levels ---
 
-    def _level(self, rest: str) -> Said:
+    def _level(self, rest: str) -> Output:
         if rest:
             self.session.chosen = typed_names.level_of(rest, self.session.levels).name
         return [f"level `{self.session.chosen}`"]
 
-    def _levels(self, rest: str) -> Said:
+    def _levels(self, rest: str) -> Output:
         _nothing("levels", rest)
         return [
             f"{'*' if level.name == self.session.chosen else ' '} {level.name:14} every {level.level.period_ms} ms: "
@@ -193,13 +193,13 @@ class Commands:
             for level in self.session.levels
         ]
 
-    def _lines(self, rest: str) -> Said:
+    def _lines(self, rest: str) -> Output:
         _nothing("lines", rest)
         return [f"{level.name:14} {_at(level)}" for level in self.session.levels]
 
     # --- cycles ---
 
-    def _step(self, rest: str) -> Said:
+    def _step(self, rest: str) -> Output:
         words = rest.split()
         if words and not _is_number(words[0]):
             level = typed_names.level_of(words[0], self.session.levels)
@@ -208,14 +208,14 @@ class Commands:
             self.session.cycle()
             if self.session.interrupted:
                 break
-        return [f"cycle {self.session.system.tick}: {', '.join(_at(one) for one in self.session.levels)}"]
+        return [f"cycle {self.session.system.tick}: {', '.join(_at(level) for level in self.session.levels)}"]
 
-    def _alone(self, level: RunningLevel, count: int) -> Said:
+    def _alone(self, level: RunningLevel, count: int) -> Output:
         for _ in range(count):
             self.session.cycle_alone(level)
         return [f"{level.name} alone: {_at(level)}"]
 
-    def _run(self, rest: str) -> Said:
+    def _run(self, rest: str) -> Output:
         word, _, more = rest.partition(" ")
         if word == "until":
             return [self.session.run(MOST_CYCLES, self.session.question(more))]
@@ -246,18 +246,18 @@ class Commands:
             raise typed_names.unknown(place, "line", self.completions())
         return line
 
-    def _undo(self, rest: str) -> Said:
+    def _undo(self, rest: str) -> Output:
         self.session.undo(_number(rest or "1"))
         return [f"cycle {self.session.system.tick}: {', '.join(_at(level) for level in self.session.levels)}"]
 
-    def _reload(self, rest: str) -> Said:
-        words, said = rest.split(), set[str]()
+    def _reload(self, rest: str) -> Output:
+        words, flags = rest.split(), set[str]()
         while words and words[-1].casefold() in {"anyway", "proved"}:
-            said.add(words.pop().casefold())
+            flags.add(words.pop().casefold())
         name = self._named(" ".join(words))
-        return self.session.reload(name, anyway="anyway" in said, prove="proved" in said)
+        return self.session.reload(name, anyway="anyway" in flags, prove="proved" in flags)
 
-    def _diff(self, rest: str) -> Said:
+    def _diff(self, rest: str) -> Output:
         return self.session.difference(self._named(rest))
 
     def _named(self, rest: str) -> str:
@@ -265,37 +265,37 @@ class Commands:
 
     # --- conditions ---
 
-    def _break(self, rest: str) -> Said:
+    def _break(self, rest: str) -> Output:
         what: StateQuery | NamedLine | None = typed_names.line_of(
             rest, self.session.levels, self.session.level
         )
         stop = self.session.stops.add(what or self.session.question(rest))
         return [f"breakpoint {stop.number}: {stop.text}"]
 
-    def _breaks(self, rest: str) -> Said:
+    def _breaks(self, rest: str) -> Output:
         _nothing("breaks", rest)
         return [f"{stop.number}: {stop.text}" for stop in self.session.stops.every] or ["no breakpoints"]
 
-    def _delete(self, rest: str) -> Said:
+    def _delete(self, rest: str) -> Output:
         number = _number(rest)
-        stop = next((one for one in self.session.stops.every if one.number == number), None)
+        stop = next((stop for stop in self.session.stops.every if stop.number == number), None)
         if stop is None:
             raise Refused(Code.SHELL_NAME, f"there is no breakpoint {number}", "`breaks` lists them")
         self.session.stops.every.remove(stop)
         return []
 
-    def _expect(self, rest: str) -> Said:
+    def _expect(self, rest: str) -> Output:
         condition = self.session.question(rest)
         if not asked(condition, self.session.levels):
             now = condition.now(typed_names.by_name(self.session.levels))
             raise Refused(Code.SHELL_EXPECTED, f"`{condition.text}` does not hold{f': {now}' if now else ''}")
         return []
 
-    def _help(self, rest: str) -> Said:
+    def _help(self, rest: str) -> Output:
         _nothing("help", rest)
         return HELP.splitlines()
 
-    def _quit(self, rest: str) -> Said:
+    def _quit(self, rest: str) -> Output:
         _nothing("quit", rest)
         self.over = True
         return []

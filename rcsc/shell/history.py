@@ -62,7 +62,7 @@ def kept(system: System, memory: Memory, answers: Mapping[tuple[object, ...], Va
         system.levels,
         tuple(level.values for level in system.levels),
         dict(memory.held),
-        tuple(_copied(one) for one in system.outside),
+        tuple(_copied(outside) for outside in system.outside),
         dict(answers),
     )
 
@@ -82,7 +82,7 @@ def _copied(outside: Outside) -> Outside:
 
 
 def _parts(whole: object) -> list[object]:
-    return [getattr(whole, one.name, None) for one in fields(whole)] if is_dataclass(whole) else []
+    return [getattr(whole, field.name, None) for field in fields(whole)] if is_dataclass(whole) else []
 
 
 def _is_frozen(value: object) -> bool:

@@ -40,10 +40,10 @@ from rcsc.lang.model import (
 from rcsc.run.levels import RunningLevel
 from rcsc.run.signature import Values
 from rcsc.shell.reload.refusal import Refused
-from rcsc.shell.typed_names import found, near
+from rcsc.shell.typed_names import known_name, near
 
 STEPS = ("preprocess", "state_table", "postprocess")
-"""Of a cycle; run one after the other they are one."""
+"""The parts of a cycle, in order."""
 _CALL = re.compile(r"(?P<name>[\w.\-]+)\s*(?:\((?P<inside>.*)\)|(?P<after>[^()]*))$")
 
 
@@ -53,11 +53,11 @@ class PartRun:
 
     Attributes:
         values: All leaves and the trace.
-        said: In words.
+        text: In words.
     """
 
     values: Values
-    said: str
+    text: str
 
 
 @dataclass(slots=True)
@@ -93,7 +93,7 @@ def run_part(running: RunningLevel, program: Program, name: str, args: Sequence[
     Raises:
         Refused: There is no such part, or it met what cannot be.
     """
-    meant = found(name, part_names(program))
+    meant = known_name(name, part_names(program))
     if meant is None:
         raise Refused(
             Code.SHELL_NAME,
@@ -101,12 +101,14 @@ def run_part(running: RunningLevel, program: Program, name: str, args: Sequence[
             *near(name, part_names(program)),
         )
     names = [leaf.name for leaf in running.sign.leaves]
-    stops = {table: tuple(map(AssumptionName, one)) for table, one in running.sign.stops.items()}
+    stops = {
+        table: tuple(map(AssumptionName, assumptions)) for table, assumptions in running.sign.stops.items()
+    }
     program = with_stops(program, stops)
-    level = next(one for one in program.levels if one.name == running.name)
+    level = next(level for level in program.levels if level.name == running.name)
     part = _Part(program, level, dict(zip(names, running.values, strict=False)), running.values[len(names) :])
     try:
-        said = _run(part, meant, args)
+        text = _run(part, meant, args)
     except ExternError as error:
         raise Refused(
             Code.SHELL_PART, f"an extern procedure in `{meant}` gave no value for `{error}`"
@@ -117,21 +119,21 @@ def run_part(running: RunningLevel, program: Program, name: str, args: Sequence[
             f"`{meant}` divides by zero, leaves an array or takes the whole number of a NaN: nothing was changed",
         ) from error
     _within(part, running, meant)
-    return PartRun((*(part.now[one] for one in names), *part.trace), said)
+    return PartRun((*(part.now[leaf] for leaf in names), *part.trace), text)
 
 
 def _run(part: _Part, name: str, args: Sequence[str]) -> str:
     program = part.program
-    procedure = next((one for one in program.procedures if one.name == name), None)
+    procedure = next((procedure for procedure in program.procedures if procedure.name == name), None)
     if procedure is not None:
         call(program, name, _arguments(procedure, args), part.now)
         return f"procedure `{name}`"
     if args:
         raise Refused(Code.SHELL_COMMAND, f"`{name}` takes no arguments")
-    owner = next((one for one in program.owners if one.name == name), None)
+    owner = next((owner for owner in program.owners if owner.name == name), None)
     if owner is not None:
         return f"owner `{name}`: {', '.join(_in_order(part, _flat(program, owner.members)))}"
-    table = next((one for one in program.tables if one.name == name), None)
+    table = next((table for table in program.tables if table.name == name), None)
     return _match(part, table) if table is not None else _step(part, name)
 
 
@@ -155,7 +157,7 @@ def _in_order(part: _Part, procedures: Sequence[str]) -> Sequence[str]:
 
 
 def _flat(program: Program, members: Sequence[str]) -> list[str]:
-    """The procedures of an owner, those of owners in it too."""
+    """Return the procedures of an owner, and of the owners in it."""
     owners: Mapping[str, Sequence[str]] = {owner.name: owner.members for owner in program.owners}
     return [
         name
@@ -175,14 +177,14 @@ def _chosen(part: _Part) -> Table:
 
 
 def _match(part: _Part, table: Table) -> str:
-    """Runs the line that matches; assumptions that fail are told, and kept in the trace."""
+    """Run the matching line; report assumptions that fail, and keep them in the trace."""
     failed = failed_assumptions(part.program, table, part.now)
     stopped = [name for name in failed if name in table.stops]
     if stopped:
-        said = (
+        message = (
             f"table `{table.name}`: assumption `{stopped[0]}` fails, on which the safety of its lines rests"
         )
-        raise Refused(Code.STATE_TABLE_ERROR, said)
+        raise Refused(Code.STATE_TABLE_ERROR, message)
     matching = matching_lines(table, part.now)
     warned = f"; assumptions that do not hold: {', '.join(failed)}" if failed else ""
     if len(matching) > 1:
@@ -203,7 +205,7 @@ def _match(part: _Part, table: Table) -> str:
 
 def _arguments(procedure: Procedure, given: Sequence[str]) -> list[Value]:
     if len(given) != len(procedure.params):
-        wanted = ", ".join(one.name for one in procedure.params) or "none"
+        wanted = ", ".join(param.name for param in procedure.params) or "none"
         raise Refused(
             Code.SHELL_COMMAND, f"`{procedure.name}` takes {len(procedure.params)} arguments: {wanted}"
         )
@@ -215,14 +217,14 @@ def _arguments(procedure: Procedure, given: Sequence[str]) -> list[Value]:
 def _argument(name: str, kind: Scalar, text: str) -> Value:
     """The value that a text means for a parameter."""
     members = kind.members if isinstance(kind, Enum) else ()
-    value = value_of_text(kind, found(text, members) or text)
+    value = value_of_text(kind, known_name(text, members) or text)
     if value is None:
         raise Refused(Code.SHELL_VALUE, f"`{text}` is no value of parameter `{name}`", *near(text, members))
     return value
 
 
 def _within(part: _Part, running: RunningLevel, name: str) -> None:
-    """Nothing leaves its declared range: within a cycle that is proved, by itself a part may be asked for more."""
+    """Refuse a value out of its declared range: only whole cycles are proved to stay within it."""
     for leaf in part.program.variables:
         value = part.now[leaf.name]
         if value == running.value(leaf.name):

@@ -14,7 +14,7 @@ from rcsc.diagnostics.codes import Code
 from rcsc.run.levels import RunningLevel
 from rcsc.run.signature import Value
 from rcsc.shell.reload.refusal import Refused
-from rcsc.shell.typed_names import NAME, by_name, found, one_leaf, shown, split
+from rcsc.shell.typed_names import NAME, by_name, known_name, one_leaf, shown, split
 
 Running = Mapping[str, RunningLevel]
 Holds = Callable[[Running], bool]
@@ -37,8 +37,8 @@ class StateQuery:
     """A condition on the levels.
 
     Attributes:
-        leaves: Which it is about: a level's name and a position.
-        chosen: The level that names without a level speak of.
+        leaves: What it reads: a level's name and a position each.
+        chosen: The level of names that are written without one.
     """
 
     text: str
@@ -47,7 +47,7 @@ class StateQuery:
     leaves: tuple[tuple[str, int], ...]
 
     def now(self, running: Running) -> str:
-        """What it is about, as it is now."""
+        """Return what it reads, as it is now."""
         return ", ".join(shown(running[level], at) for level, at in dict.fromkeys(self.leaves))
 
 
@@ -59,7 +59,7 @@ class _Operand:
         kind: `number`, `bool`, `member` (of an enumeration), or `word`, which the other side must know.
     """
 
-    said: str
+    text: str
     kind: str
     term: Term
     members: tuple[str, ...] = ()
@@ -153,7 +153,7 @@ class _Reading:
             raise (
                 self._lost(left)
                 if left.kind == "word"
-                else self.bad(f"`{left.said}` is neither true nor false")
+                else self.bad(f"`{left.text}` is neither true nor false")
             )
         return lambda now: bool(left.term(now))
 
@@ -161,72 +161,72 @@ class _Reading:
         """A leaf, a number, a bool or a member."""
         if not self.tokens or self.tokens[0] in {*_COMPARE, "(", ")"}:
             raise self.bad("a value is missing")
-        said = self.tokens.pop(0)
-        if said[0].isdigit() or said[0] in "-.":
-            number = float(said) if re.search(r"[.eE]", said) else int(said)
-            return _Operand(said, "number", lambda _: number)
-        if said in _BOOLS:
-            truth = _BOOLS[said]
-            return _Operand(said, "bool", lambda _: truth)
+        token = self.tokens.pop(0)
+        if token[0].isdigit() or token[0] in "-.":
+            number = float(token) if re.search(r"[.eE]", token) else int(token)
+            return _Operand(token, "number", lambda _: number)
+        if token in _BOOLS:
+            truth = _BOOLS[token]
+            return _Operand(token, "bool", lambda _: truth)
         try:
-            level, at = one_leaf(said, self.levels, self.chosen)
+            level, at = one_leaf(token, self.levels, self.chosen)
         except Refused:
-            return self._word(said)
-        return self._leaf(said, level, at)
+            return self._word(token)
+        return self._leaf(token, level, at)
 
-    def _leaf(self, said: str, level: RunningLevel, at: int) -> _Operand:
+    def _leaf(self, token: str, level: RunningLevel, at: int) -> _Operand:
         name, leaf = level.name, level.sign.leaves[at]
         self.leaves.append((name, at))
         if leaf.members:
-            return _Operand(said, "member", lambda now: leaf.shown(now[name].values[at]), leaf.members)
+            return _Operand(token, "member", lambda now: leaf.shown(now[name].values[at]), leaf.members)
         kind = "bool" if leaf.c_type == "bool" else "number"
-        return _Operand(said, kind, lambda now: now[name].values[at])
+        return _Operand(token, kind, lambda now: now[name].values[at])
 
-    def _word(self, said: str) -> _Operand:
-        """What is no leaf: the table or line that a level runs, or a member that the other side knows."""
-        level, rest = split(said, self.levels, self.chosen)
+    def _word(self, token: str) -> _Operand:
+        """Read what is no leaf: the table or line that a level runs, or a member that the other side knows."""
+        level, rest = split(token, self.levels, self.chosen)
         name = level.name
         if rest == "table":
-            return _Operand(said, "member", lambda now: now[name].table, tuple(level.sign.tables))
+            return _Operand(token, "member", lambda now: now[name].table, tuple(level.sign.tables))
         if rest == "line":
             lines = dict.fromkeys(line for table in level.sign.tables.values() for line in table)
-            return _Operand(said, "member", lambda now: now[name].line, tuple(lines))
-        return _Operand(said, "word", lambda _: said)
+            return _Operand(token, "member", lambda now: now[name].line, tuple(lines))
+        return _Operand(token, "word", lambda _: token)
 
-    def _lost(self, one: _Operand) -> Refused:
-        """The refusal of a word that nobody knows, as of a variable."""
+    def _lost(self, operand: _Operand) -> Refused:
+        """Refuse an unknown word, as an unknown variable is refused."""
         try:
-            one_leaf(one.said, self.levels, self.chosen)
+            one_leaf(operand.text, self.levels, self.chosen)
         except Refused as error:
             return error
-        return self.bad(f"`{one.said}` is no variable")
+        return self.bad(f"`{operand.text}` is no variable")
 
     def compared(self, left: _Operand, mark: str, right: _Operand) -> Holds:
         """The comparison of two operands that can be compared."""
         left, right = self._meant(left, right), self._meant(right, left)
         if left.kind != right.kind or left.members != right.members:
-            raise self.bad(f"`{left.said}` and `{right.said}` cannot be compared")
+            raise self.bad(f"`{left.text}` and `{right.text}` cannot be compared")
         if left.kind != "number" and mark not in _EQUALITY:
-            raise self.bad(f"`{left.said}` and `{right.said}` have no order")
+            raise self.bad(f"`{left.text}` and `{right.text}` have no order")
         compare = _COMPARE[mark]
         return lambda now: compare(left.term(now), right.term(now))
 
-    def _meant(self, one: _Operand, other: _Operand) -> _Operand:
-        """A bare word, or a line's number, as the member of the other side's that it names."""
-        if other.kind == "member" and one.kind in {"word", "number"}:
-            member = found(one.said, other.members)
+    def _meant(self, operand: _Operand, other: _Operand) -> _Operand:
+        """Read a bare word, or a line's number, as the member of the other side that it names."""
+        if other.kind == "member" and operand.kind in {"word", "number"}:
+            member = known_name(operand.text, other.members)
             if member is None:
                 raise Refused(
                     Code.SHELL_VALUE,
-                    f"`{other.said}` is never `{one.said}`",
+                    f"`{other.text}` is never `{operand.text}`",
                     f"it is one of {', '.join(other.members)}",
                 )
-            return _Operand(one.said, "member", lambda _: member, other.members)
-        if one.kind == "word":
-            raise self._lost(one)
-        return one
+            return _Operand(operand.text, "member", lambda _: member, other.members)
+        if operand.kind == "word":
+            raise self._lost(operand)
+        return operand
 
 
-def asked(one: StateQuery, levels: Sequence[RunningLevel]) -> bool:
+def asked(query: StateQuery, levels: Sequence[RunningLevel]) -> bool:
     """Whether it holds now."""
-    return one.holds(by_name(levels))
+    return query.holds(by_name(levels))

@@ -1,6 +1,6 @@
-"""A system under somebody's hands: cycles, single levels, parts of levels, variables, what to stop at, and the way back.
+"""Control a system by hand: cycles, single levels, parts of levels, variables, breakpoints and undo.
 
-In: a system ready for its first tick. Out: a `Session`; each of its methods does one thing and says what it did. Nothing is read or
+In: a system ready for its first tick. Out: a `Session`; each of its methods does one thing and returns what it did. Nothing is read or
 printed here.
 """
 
@@ -130,7 +130,7 @@ class Session:
             raise Refused(Code.STATE_TABLE_ERROR, _fault(level), "`undo` takes the cycle back")
 
     def part(self, level: RunningLevel, name: str, args: Sequence[str]) -> list[str]:
-        """Runs a part of a level on its present values; what it did.
+        """Run a part of a level on its present values; return what it did.
 
         Raises:
             Refused: There is none of that name, or it met what cannot be.
@@ -139,10 +139,10 @@ class Session:
         self._keep()
         level.executor.put(0, ran.values[: len(level.sign.leaves)])
         level.values = _spoken(level, ran.values)
-        return [f"{level.name}: {ran.said}", *self.changed()]
+        return [f"{level.name}: {ran.text}", *self.changed()]
 
     def run(self, most: int, until: StateQuery | NamedLine | None = None) -> str:
-        """Cycles until the condition holds, a breakpoint is met, or there were enough; why it ended.
+        """Run cycles until the condition holds, a breakpoint is met, or `most` are done; return why it ended.
 
         Raises:
             Refused: As `cycle`.
@@ -184,7 +184,7 @@ class Session:
         """Variables that the last cycle left with another value: `task.cur_state: d_state -> state_2`."""
         if not self._past:
             return []
-        said = []
+        changes = []
         for level in self.levels:
             old, values = self._past[-1].of(level.name)
             alike = old.sign is level.sign
@@ -194,10 +194,10 @@ class Session:
                 before = old.sign.index.get(leaf.name)
                 shown = "" if before is None else old.sign.leaves[before].shown(values[before])
                 if shown != leaf.shown(level.values[at]):
-                    said.append(
+                    changes.append(
                         f"{level.name}.{leaf.name}: {shown or 'nothing'} -> {leaf.shown(level.values[at])}"
                     )
-        return said
+        return changes
 
     # --- variables ---
 
@@ -220,7 +220,7 @@ class Session:
         return typed_names.shown(level, at)
 
     def _answer(self, level: RunningLevel, at: int) -> None:
-        """What is set in a record that the database fills is from now on its answer to the same question."""
+        """Keep a value set by hand as the database's answer to the same question from now on."""
         for feed, fill in zip(self.spec(level.name).feeds, level.fills, strict=True):
             run = level.sign.record(feed.into)
             if at in run:
@@ -242,7 +242,7 @@ class Session:
     # --- other tables ---
 
     def reload(self, name: str, *, anyway: bool = False, prove: bool = False) -> list[str]:
-        """Takes a level's tables as they are now, between two cycles; what they do otherwise.
+        """Take a level's tables as they are now, between two cycles; return what they do otherwise.
 
         Args:
             name: The level's.
@@ -252,54 +252,59 @@ class Session:
         Raises:
             Refused: They are not taken; the old ones run on.
         """
-        old, made, judged = self._made_anew(name, prove=prove)
+        old, reloaded, judged = self._try_reload(name, prove=prove)
         if judged is None:
             return [f"level `{name}` runs these very tables: nothing changed"]
         if judged.doubts and not anyway:
             raise Refused(
                 Code.SHELL_OTHERWISE,
                 "\n".join(
-                    (f"level `{name}` keeps its tables: {judged.doubts[0]}", *judged.doubts[1:], *judged.said)
+                    (
+                        f"level `{name}` keeps its tables: {judged.doubts[0]}",
+                        *judged.doubts[1:],
+                        *judged.notes,
+                    )
                 ),
                 f"`reload {name} anyway` takes them",
             )
         self._keep()
-        self._programs[id(made.level)] = made.level, made.program
-        self._made[id(made.level)] = made.level, made.digest, made.sources
-        self.system.levels = tuple(made.level if level is old else level for level in self.levels)
+        self._programs[id(reloaded.level)] = reloaded.level, reloaded.program
+        self._made[id(reloaded.level)] = reloaded.level, reloaded.digest, reloaded.sources
+        self.system.levels = tuple(reloaded.level if level is old else level for level in self.levels)
         gone = self.stops.ask_again(self.levels)
-        taken = f"level `{name}` runs its new tables from cycle {self.system.tick + 1} on: {made.said}"
-        return [*judged.said, *judged.doubts, taken, *gone]
+        taken = f"level `{name}` runs its new tables from cycle {self.system.tick + 1} on: {reloaded.carried}"
+        return [*judged.notes, *judged.doubts, taken, *gone]
 
     def difference(self, name: str) -> list[str]:
-        """What `reload` would take, and whether it would; nothing is taken.
+        """Return what `reload` would take, and whether it would.
 
         Raises:
-            Refused: It would not take it, whatever is said.
+            Refused: It would not take it, not even with `anyway`.
         """
-        _, made, judged = self._made_anew(name)
+        _, reloaded, judged = self._try_reload(name)
         if judged is None:
             return [f"level `{name}` runs these very tables: nothing changed"]
-        would = f"`reload {name}{' anyway' if judged.doubts else ''}` takes it: {made.said}"
-        return [*judged.said, *judged.doubts, would]
+        would = f"`reload {name}{' anyway' if judged.doubts else ''}` takes it: {reloaded.carried}"
+        return [*judged.notes, *judged.doubts, would]
 
-    def _made_anew(self, name: str, *, prove: bool = False) -> tuple[RunningLevel, Reloaded, Judged | None]:
-        """The level that runs, that which would, and what is to be said of it; None where they are the same."""
+    def _try_reload(self, name: str, *, prove: bool = False) -> tuple[RunningLevel, Reloaded, Judged | None]:
+        """Return the running level, its reload, and the verdict on that; None where they are the same."""
         old = self.system.level(name)
-        made = reload(self.plant, self.spec(name), old)
-        if self._made[id(old)][1:] == (made.digest, made.sources):
-            return old, made, None
-        self._answer_by_hand(made.level)
+        reloaded = reload(self.plant, self.spec(name), old)
+        if self._made[id(old)][1:] == (reloaded.digest, reloaded.sources):
+            return old, reloaded, None
+        self._answer_by_hand(reloaded.level)
         try:
             program = self.program(old)
         except Refused:
             program = None
-        judged = judge(Running(old, program), made.level, made.program, self.memory)
+        judged = judge(Running(old, program), reloaded.level, reloaded.program, self.memory)
         runs = {
-            level.name: made.sources if level is old else self._made[id(level)][2] for level in self.levels
+            level.name: reloaded.sources if level is old else self._made[id(level)][2]
+            for level in self.levels
         }
         known = together(self.plant, name, runs, self._compiled, prove=prove)
-        return old, made, replace(judged, said=(*judged.said, known))
+        return old, reloaded, replace(judged, notes=(*judged.notes, known))
 
     def _compiled(self, name: str) -> bool:
         """Whether a level's executors were made of the sources that were there when it began to run."""
@@ -318,7 +323,7 @@ def _with(values: Values, at: int, value: Value) -> Values:
 
 
 def _spoken(level: RunningLevel, values: Values) -> Values:
-    """The values, without a line where they ask for another table than the one that it is of."""
+    """Return the values, without the line where they now select another table."""
     line = len(level.sign.leaves)
     same = level.sign.table_of(level.level, values) == level.table or values[line] != level.values[line]
     return values if same else _with(values, line, -1)
@@ -331,7 +336,7 @@ def _carriers(level: RunningLevel) -> list[tuple[str, int, int]]:
 
 
 def _fit(level: RunningLevel) -> None:
-    """Refuses a cycle from a state that was set by hand and is none that the tables are proved for.
+    """Refuse a cycle from a state that was set by hand and that the proof does not cover.
 
     Raises:
         Refused: It is.
@@ -339,8 +344,8 @@ def _fit(level: RunningLevel) -> None:
     at = level.executor.check()
     if at >= 0:
         wrong = level.sign.unfit(at, level.values)
-        said = f"level `{level.name}` cannot go on from this state: {wrong}"
-        raise Refused(Code.STATE_TABLE_ERROR, said, "`set` what it is about, or `undo`")
+        message = f"level `{level.name}` cannot go on from this state: {wrong}"
+        raise Refused(Code.STATE_TABLE_ERROR, message, "`set` what it is about, or `undo`")
 
 
 def _fault(level: RunningLevel) -> str:
@@ -348,20 +353,20 @@ def _fault(level: RunningLevel) -> str:
 
 
 def silent_queries(system: Description, signs: Mapping[str, Signature]) -> dict[str, Query]:
-    """A database that knows nothing: every answer is what stands in the record before the first cycle.
+    """Return the queries of an empty database: every answer is the record's initial value.
 
     Raises:
         BadDescription: A feed fills what its program does not have.
     """
-    found = {}
+    queries = {}
     for spec in system.levels:
         for feed in spec.feeds:
             try:
                 run = signs[spec.name].record(feed.into)
             except KeyError as error:
                 raise BadDescription(f"level `{spec.name}` has no variable `{feed.into}` to fill") from error
-            found[feed.query] = _silent(tuple(signs[spec.name].leaves[at].initial for at in run))
-    return found
+            queries[feed.query] = _silent(tuple(signs[spec.name].leaves[at].initial for at in run))
+    return queries
 
 
 def _silent(answer: Values) -> Query:

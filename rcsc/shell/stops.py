@@ -47,7 +47,7 @@ class Stops:
     _numbered: int = 0
 
     def add(self, what: StateQuery | NamedLine) -> Stop:
-        """A new one."""
+        """Add a breakpoint."""
         self._numbered += 1
         self.every.append(Stop(self._numbered, what))
         return self.every[-1]
@@ -58,7 +58,7 @@ class Stops:
             stop.stood = stands(stop.what, levels)
 
     def met(self, levels: Levels) -> Stop | None:
-        """The first that has come to hold since they were looked at."""
+        """Return the first that has come to hold since `look`."""
         before = [stop.stood for stop in self.every]
         self.look(levels)
         return next(
@@ -66,16 +66,16 @@ class Stops:
         )
 
     def ask_again(self, levels: Levels) -> list[str]:
-        """Has them speak of other levels; those that cannot are gone, and are named."""
-        kept, said = [], []
+        """Read every breakpoint against other levels; drop those that do not fit, and name them."""
+        kept, dropped = [], []
         for stop in self.every:
             try:
                 _again(stop, levels)
                 kept.append(stop)
             except Refused as refused:
-                said.append(f"breakpoint {stop.number}, `{stop.text}`, is gone: {refused}")
+                dropped.append(f"breakpoint {stop.number}, `{stop.text}`, is gone: {refused}")
         self.every = kept
-        return said
+        return dropped
 
 
 def _again(stop: Stop, levels: Levels) -> None:

@@ -25,25 +25,25 @@ Complain = Callable[[str, Refused], None]
 
 
 def follow(commands: Commands, lines: Iterable[str], name: str, show: Show, complain: Complain) -> int:
-    """Does the lines in order, and stops at the first that fails: what follows would be of another state."""
+    """Run the lines in order, up to the first that fails: later ones would meet another state."""
     for number, line in enumerate(lines, 1):
         try:
             with _interruptible(commands):
-                said = commands.do(line)
+                output = commands.do(line)
                 if commands.session.interrupted:
                     raise KeyboardInterrupt
         except Refused as refused:
             complain(f"{name}:{number}: ", refused)
             return 1
-        for one in said:
-            show(one)
+        for text in output:
+            show(text)
         if commands.over:
             break
     return 0
 
 
 def converse(commands: Commands, show: Show, complain: Complain) -> int:
-    """Asks for lines until `quit` or the end of the input; a refusal is shown, and the next is asked for."""
+    """Run lines as they are typed until `quit` or the end of the input; show a refusal and go on."""
     prompt = _prompt(commands)
     while not commands.over:
         try:
@@ -54,12 +54,12 @@ def converse(commands: Commands, show: Show, complain: Complain) -> int:
             break
         try:
             with _interruptible(commands):
-                said = commands.do(line)
+                output = commands.do(line)
         except Refused as refused:
             complain("", refused)
             continue
-        for one in said:
-            show(one)
+        for text in output:
+            show(text)
     return 0
 
 

@@ -37,16 +37,16 @@ def normal(name: str) -> str:
     return name.casefold().replace("-", "_")
 
 
-def found(name: str, known: Iterable[str]) -> str | None:
-    """The known name that is meant: as written, else whatever its case and hyphens."""
+def known_name(name: str, known: Iterable[str]) -> str | None:
+    """Return the known name that is meant: the exact one, or else the first equal but for case and hyphens."""
     every = list(known)
-    return name if name in every else next((one for one in every if normal(one) == normal(name)), None)
+    return name if name in every else next((word for word in every if normal(word) == normal(name)), None)
 
 
 def near(name: str, known: Iterable[str]) -> tuple[str, ...]:
     """`near it: ...`; nothing where nothing is near."""
-    every = {normal(one): one for one in known}
-    like = [every[get_close_match] for get_close_match in difflib.get_close_matches(normal(name), every, 3)]
+    every = {normal(word): word for word in known}
+    like = [every[match] for match in difflib.get_close_matches(normal(name), every, 3)]
     return (f"near it: {', '.join(like)}",) if like else ()
 
 
@@ -61,7 +61,7 @@ def level_of(name: str, levels: Sequence[RunningLevel]) -> RunningLevel:
     Raises:
         Refused: There is none.
     """
-    meant = found(name, [level.name for level in levels])
+    meant = known_name(name, [level.name for level in levels])
     if meant is None:
         raise unknown(name, "level", [level.name for level in levels])
     return next(level for level in levels if level.name == meant)
@@ -70,7 +70,7 @@ def level_of(name: str, levels: Sequence[RunningLevel]) -> RunningLevel:
 def split(name: str, levels: Sequence[RunningLevel], chosen: RunningLevel) -> tuple[RunningLevel, str]:
     """The level that a name speaks of, and the rest of it: `task.cur_state`, or `cur_state` of the level chosen."""
     head, point, rest = name.partition(".")
-    meant = found(head, [level.name for level in levels]) if point else None
+    meant = known_name(head, [level.name for level in levels]) if point else None
     if meant is None:
         return chosen, name
     level = next(level for level in levels if level.name == meant)
@@ -103,7 +103,7 @@ def variable(
     places = positions(level.sign, rest)
     if not places:
         own = [leaf.name for leaf in level.sign.leaves]
-        every = [f"{one.name}.{leaf.name}" for one in levels for leaf in one.sign.leaves]
+        every = [f"{level.name}.{leaf.name}" for level in levels for leaf in level.sign.leaves]
         raise unknown(name, "variable", own if level is chosen and rest == name else every)
     return level, places
 
@@ -127,10 +127,10 @@ def line_of(text: str, levels: Sequence[RunningLevel], chosen: RunningLevel) -> 
     """The line that `level.table.line`, or `table.line` of the level chosen, names; None where it names none."""
     level, rest = split(text, levels, chosen)
     table, _, line = rest.partition(".")
-    known = found(table, tables_of(level))
+    known = known_name(table, tables_of(level))
     if known is None:
         return None
-    named = found(line, level.sign.tables[known])
+    named = known_name(line, level.sign.tables[known])
     return None if named is None else NamedLine(level.name, known, named)
 
 
@@ -146,7 +146,7 @@ def value_of(leaf: Leaf, text: str) -> Value:
         Refused: It is none of that leaf's.
     """
     try:
-        return leaf.read((found(text, leaf.members) or text) if leaf.members else text)
+        return leaf.read((known_name(text, leaf.members) or text) if leaf.members else text)
     except (ValueError, OverflowError) as error:
         helps = near(text, leaf.members)
         raise Refused(

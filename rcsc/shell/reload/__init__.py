@@ -3,7 +3,7 @@
 A level may take new tables where it stands only if three things hold, in this order: they prove; the present state
 lies in the ranges and invariants that were proved; and the next cycle, from this state and with what the buffers
 hold, does what it did before. The next cycle is run on both executors and both are put back; what later cycles can
-come to is said by `diff`, in table words. `anyway` takes tables that do otherwise; nothing takes tables that do not
+come to is shown by `diff`, in table words. `anyway` takes tables that do otherwise; nothing takes tables that do not
 prove.
 
     > diff task               what the edited tables do otherwise; nothing is taken

@@ -1,7 +1,7 @@
 """What is known of a level's new tables together with its neighbours, before they are taken.
 
-In: where the system comes from, and a level. Out: a line to show, or a refusal where they were found not to be proved. It is the files
-that were proved, so that nothing is claimed while a level runs other tables than its file holds. No search is begun unless it is asked for.
+In: where the system comes from, and a level. Out: a line to show, or a refusal where they were found not to be proved. Files
+are what is proved: nothing is claimed while a level runs other tables than its file holds. No search begins unasked.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -39,7 +39,7 @@ def together(
         plant: Where the system comes from.
         level: Its name.
         runs: What each level runs, this one if it takes the new tables.
-        compiled: Whether a level's executors were made of that; asked of its neighbours before anything is called proved.
+        compiled: Whether a level's executors were compiled from what it runs; its neighbours' must be, too.
         prove: Whether the levels are proved first where nothing is kept, and refused unless that succeeds.
 
     Raises:
@@ -49,40 +49,44 @@ def together(
     cache = open_cache(plant.path.parent)
     if prove and not edited and cache is not None:
         _prove(plant, cache)
-    made = None if cache is None or edited else known(plant.path, cache)
-    found = Known.UNKNOWN if made is None else made.of_level(level)
-    if made is not None and found is Known.NOT_PROVED:
-        raise _refused(plant, level, "".join(f"\nnot proved: {one}" for one in made.known[level].open))
-    if found is Known.PROVED:
+    known_system = None if cache is None or edited else known(plant.path, cache)
+    verdict = Known.UNKNOWN if known_system is None else known_system.of_level(level)
+    if known_system is not None and verdict is Known.NOT_PROVED:
+        raise _refused(
+            plant,
+            level,
+            "".join(f"\nnot proved: {obligation}" for obligation in known_system.known[level].open),
+        )
+    if verdict is Known.PROVED:
         others = (spec.name for spec in plant.system.levels if spec.name != level)
         edited = [name for name in others if not compiled(name)]
-    if found is Known.PROVED and not edited:
+    if verdict is Known.PROVED and not edited:
         return f"level `{level}` is proved together with its neighbours, as the files of {plant.path} stand"
-    why = _unknown(plant, level, made, edited)
+    why = _unknown(plant, level, known_system, edited)
     if prove:
         raise _refused(plant, level, f": {why}")
     return f"level `{level}` is not known to be proved together with its neighbours: {why}"
 
 
 def _prove(plant: Origin, cache: Cache) -> None:
-    """Proves what no earlier run did, and keeps it."""
+    """Prove what no earlier run did, and cache it."""
     from rcsc.compose.proof.system import NoProgramError, prove_transition_systems, transition_systems
 
     try:
-        made = transition_systems(plant.path)
+        systems = transition_systems(plant.path)
     except (BadDescription, NoProgramError) as error:
         raise Refused(Code.BAD_SYSTEM, str(error)) from error
-    prove_transition_systems(made, None, 1, tuple(made), None, cache)
+    prove_transition_systems(systems, None, 1, tuple(systems), None, cache)
 
 
-def _unknown(plant: Origin, level: str, made: KnownSystem | None, edited: Sequence[str]) -> str:
+def _unknown(plant: Origin, level: str, known_system: KnownSystem | None, edited: Sequence[str]) -> str:
     if edited:
         return f"level `{edited[0]}` runs other tables than its file holds"
-    if made is not None and made.broken:
-        one = made.broken[0]
-        return f"level `{one.level}` assumes that {one.assumed}, which its neighbour is not proved to keep"
-    if made is not None and made.of_level(level) is not Known.UNKNOWN:
-        return named(made.missing(level))
+    if known_system is not None and known_system.broken:
+        assumption = known_system.broken[0]
+        return f"level `{assumption.level}` assumes that {assumption.assumed}, which its neighbour is not proved to keep"
+    if known_system is not None and known_system.of_level(level) is not Known.UNKNOWN:
+        return named(known_system.missing(level))
     return f"`rcsc prove {plant.path}` decides it"
 
 

@@ -1,11 +1,11 @@
-"""Whether a level may take new tables where it stands: what they do otherwise, and whether that is met at once.
+"""Judge whether a running level may take new tables: what they change, and whether the next cycle meets it.
 
 In: the level as it runs and as it would be, both with what they mean, and the buffers. Out: `Judged`, or a refusal where the
 proofs of the new tables do not speak of the present state.
 
-The next cycle is run on both executors from the present state, with the inputs that the buffers hold, and both are put back: nothing has
-happened. What the cycles after it can come to is the difference's to say (`rcsc.diff`), which is proved. A level with extern
-procedures is not tried out: they may do something.
+The next cycle is run on both executors from the present state, with the inputs that the buffers hold, and both are put back.
+Later cycles are covered by the difference (`rcsc.diff`), which is proved. A level with extern procedures is not tried out:
+they may have effects.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -28,7 +28,7 @@ from rcsc.solvers.options import Options
 from rcsc.table.cover import UndecidedError
 
 REACH_STEPS = 5_000_000
-"""Budget of a question whether some input leads to a change; in doubt it is said to."""
+"""Budget for deciding whether some input leads to a change; out of budget means yes."""
 MOST_LEAVES = 12
 """Leaves that are shown of a cycle."""
 
@@ -50,11 +50,11 @@ class Judged:
     """What a reload would do.
 
     Attributes:
-        said: The difference, and what of it the present state meets.
-        doubts: Why somebody has to say that it is meant; empty where the next cycle does as before.
+        notes: The difference, and which of it the present state can meet.
+        doubts: Why the user must confirm it; empty where the next cycle does as before.
     """
 
-    said: tuple[str, ...]
+    notes: tuple[str, ...]
     doubts: tuple[str, ...]
 
 
@@ -72,7 +72,7 @@ class _Tried:
 
 
 def judge(old: Running, new: RunningLevel, program: Program, buffers: Buffers) -> Judged:
-    """What the new tables do otherwise, and whether the present state is where they do.
+    """Compare the new tables with the old, in general and in the present state.
 
     Args:
         old: What runs.
@@ -89,20 +89,20 @@ def judge(old: Running, new: RunningLevel, program: Program, buffers: Buffers) -
         _proved(old, new, program, tried.taken)
     if old.program is None:
         return Judged((), ("the sources of what runs are not known, so that the two cannot be compared",))
-    found = compare(new.name, old.program, program, Options(), follow=True)
-    met = _met(found, new, program) if found.changed else ()
-    said = (*_difference(found), *_reach(found, met))
-    if found.undecided:
-        return Judged(said, (f"the solver gave up on {', '.join(found.undecided)}",))
+    difference = compare(new.name, old.program, program, Options(), follow=True)
+    met = _met(difference, new, program) if difference.changed else ()
+    notes = (*_difference(difference), *_reach(difference, met))
+    if difference.undecided:
+        return Judged(notes, (f"the solver gave up on {', '.join(difference.undecided)}",))
     if not quiet or _extern(old.program):
         why = "the next cycle was not tried out, and assumptions not looked at: an extern procedure might do something"
-        return Judged(said, (why,) if met or not quiet else ())
+        return Judged(notes, (why,) if met or not quiet else ())
     at = old.level.executor.check()
     if at >= 0:
         wrong = old.level.sign.unfit(at, old.level.values)
-        return Judged(said, (f"what runs was not tried out, as it cannot go on from this state: {wrong}",))
+        return Judged(notes, (f"what runs was not tried out, as it cannot go on from this state: {wrong}",))
     left = _tried(old.level, buffers, run=True).left
-    return Judged(said, tuple(_otherwise(met, old.level, new, (left, tried.left))))
+    return Judged(notes, tuple(_otherwise(met, old.level, new, (left, tried.left))))
 
 
 # --- the next cycle --------------------------------------------------------------------
@@ -135,31 +135,33 @@ def _look(program: Program, level: RunningLevel, taken: Values) -> tuple[Table, 
         level: The level.
         taken: All leaves, with the inputs.
     """
-    one = model_of(program, level)
+    model = model_of(program, level)
     now = admit(program, {leaf.name: value for leaf, value in zip(level.sign.leaves, taken, strict=False)})
     if isinstance(now, str):
         return None
     settle(program, now)
-    for procedure in one.preprocess:
+    for procedure in model.preprocess:
         call(program, procedure, [], now)
-    tables = one.tables
+    tables = model.tables
     name = (
         tables.table if isinstance(tables, OneTable) else dict(tables.tables)[evaluate(tables.selector, now)]
     )
     return next(table for table in program.tables if table.name == name), now
 
 
-def model_of(program: Program, level: RunningLevel) -> Level:
+def model_of(program: Program, running: RunningLevel) -> Level:
     """The level as its program has it."""
-    return next(one for one in program.levels if one.name == level.name)
+    return next(level for level in program.levels if level.name == running.name)
 
 
 def _otherwise(
     met: Sequence[Met], old: RunningLevel, new: RunningLevel, left: tuple[Values, Values]
 ) -> Iterator[str]:
-    """What the next cycle would leave otherwise; nothing where the two versions leave the same."""
-    one, two = (_words(level.sign, values) for level, values in zip((old, new), left, strict=True))
-    differing = [name for name in one if name in two and one[name] != two[name]]
+    """Yield what the next cycle would leave otherwise; nothing where both leave the same."""
+    old_words, new_words = (
+        _words(level.sign, values) for level, values in zip((old, new), left, strict=True)
+    )
+    differing = [name for name in old_words if name in new_words and old_words[name] != new_words[name]]
     faults = [
         FAULTS[int(values[len(level.sign.leaves) + 1])]
         for level, values in zip((old, new), left, strict=True)
@@ -173,7 +175,7 @@ def _otherwise(
     before, after = (_ran(level, values) for level, values in zip((old, new), left, strict=True))
     yield f"in the present state the next cycle would do otherwise: {before} before, {after} now"
     for name in differing[:MOST_LEAVES]:
-        yield f"  {name}: {one[name]} -> {two[name]}"
+        yield f"  {name}: {old_words[name]} -> {new_words[name]}"
     if len(differing) > MOST_LEAVES:
         yield f"  and {len(differing) - MOST_LEAVES} more"
 
@@ -194,21 +196,21 @@ def _ran(level: RunningLevel, values: Values) -> str:
 # --- the difference --------------------------------------------------------------------
 
 
-def _difference(found: ProgramDifference) -> Iterator[str]:
-    """In table words, as `rcsc diff` shows it."""
-    whole = Difference("what runs", "what is there now", (found,))
+def _difference(difference: ProgramDifference) -> Iterator[str]:
+    """Render the difference as `rcsc diff` does."""
+    whole = Difference("what runs", "what is there now", (difference,))
     yield from plain(rows(whole, quiet=True)).splitlines()
     yield headline(whole)
 
 
-def _met(found: ProgramDifference, new: RunningLevel, program: Program) -> tuple[Met, ...]:
+def _met(difference: ProgramDifference, new: RunningLevel, program: Program) -> tuple[Met, ...]:
     now = {leaf.name: value for leaf, value in zip(new.sign.leaves, new.values, strict=False)}
-    return within_reach(found, program, model_of(program, new), now, Options(steps=REACH_STEPS))
+    return within_reach(difference, program, model_of(program, new), now, Options(steps=REACH_STEPS))
 
 
-def _reach(found: ProgramDifference, met: Sequence[Met]) -> Iterator[str]:
-    """What of the difference the next cycle could come to with any inputs."""
-    if found.undecided or not found.changed:
+def _reach(difference: ProgramDifference, met: Sequence[Met]) -> Iterator[str]:
+    """Say which changes the next cycle can meet with some inputs."""
+    if difference.undecided or not difference.changed:
         return
     if met:
         yield f"within reach of the present state, with some inputs: {'; '.join(_met_said(met))}"
@@ -218,28 +220,28 @@ def _reach(found: ProgramDifference, met: Sequence[Met]) -> Iterator[str]:
 
 def _met_said(met: Sequence[Met]) -> list[str]:
     """Each part once, with what matched before and matches now."""
-    said: dict[str, None] = {}
-    for one in met:
+    parts: dict[str, None] = {}
+    for reachable in met:
         name = (
-            f"{one.part.what} {one.part.name}"
-            if "`" in one.part.name
-            else f"{one.part.what} `{one.part.name}`"
+            f"{reachable.part.what} {reachable.part.name}"
+            if "`" in reachable.part.name
+            else f"{reachable.part.what} `{reachable.part.name}`"
         )
-        if one.change is None:
-            said[f"{name}, {', '.join(one.part.said)}"] = None
-        elif one.part.what == "table":
-            lines = dict.fromkeys((one.change.before, one.change.after))
-            said[f"{name}, {' -> '.join(lines)}"] = None
+        if reachable.change is None:
+            parts[f"{name}, {', '.join(reachable.part.said)}"] = None
+        elif reachable.part.what == "table":
+            lines = dict.fromkeys((reachable.change.before, reachable.change.after))
+            parts[f"{name}, {' -> '.join(lines)}"] = None
         else:
-            said[name] = None
-    return list(said)
+            parts[name] = None
+    return list(parts)
 
 
 # --- what the proofs of the new tables speak of ---------------------------------------
 
 
 def _proved(old: Running, new: RunningLevel, program: Program, taken: Values) -> None:
-    """The table that the next cycle runs was proved for what it will see."""
+    """Refuse a next cycle that the proof of its table does not cover."""
     looked = _look(program, new, taken)
     if looked is not None:
         _in_proof(new, program, *looked)
@@ -247,7 +249,7 @@ def _proved(old: Running, new: RunningLevel, program: Program, taken: Values) ->
 
 
 def _in_proof(level: RunningLevel, program: Program, table: Table, now: Mapping[str, Value]) -> None:
-    """The assumptions of the table that the next cycle runs hold of what it sees."""
+    """Refuse where the next cycle's table assumes what does not hold."""
     for assumption in program.assumptions:
         if assumption.name in table.assumptions and not holds(assumption.condition, now):
             raise Refused(
@@ -265,7 +267,7 @@ def witness(program: Program, condition: Expr, now: Mapping[str, Value]) -> str:
 
 
 def _known(old: Running, new: RunningLevel, program: Program, table: Table, now: Mapping[str, Value]) -> None:
-    """The table has a line for each of the states that it tests, as it is and as it is to be; or never had one."""
+    """Refuse a present or pending state that the old table had a line for and the new one has not."""
     for variable in program.variables:
         if (
             variable.kind is not Kind.STATE
@@ -290,8 +292,8 @@ def _known(old: Running, new: RunningLevel, program: Program, table: Table, now:
 
 
 def _has_line(program: Program, name: str, leaf: str, state: str) -> bool:
-    """Whether the table of that name has a line for a state; in doubt not, and where there is no such table."""
-    table = next((one for one in program.tables if one.name == name), None)
+    """Return whether the table of that name is known to have a line for a state."""
+    table = next((table for table in program.tables if table.name == name), None)
     kinds = {str(variable.name): variable.type for variable in program.variables}
     kind = kinds.get(leaf)
     if table is None or not isinstance(kind, Enum) or state not in kind.members:

@@ -54,35 +54,35 @@ class Reloaded:
 
     Attributes:
         digest: Of its executors, as `rcsc.run.log.schema.fingerprints` has it.
-        sources: What they were made of.
-        said: What became of its variables.
+        sources: What they were compiled from.
+        carried: What became of its variables, in words.
     """
 
     level: RunningLevel
     program: Program
     digest: str
     sources: KeptSources
-    said: str
+    carried: str
 
 
 def source_of(plant: Origin, spec: LevelSpec) -> Path:
-    """The file that a level's program is compiled of.
+    """Return the file that a level's program is compiled from.
 
     Raises:
         Refused: It is not where it is looked for.
     """
     tried = places(plant.path, spec.program)
-    found = next((path for path in tried if path.is_file()), None)
-    if found is None:
+    source = next((path for path in tried if path.is_file()), None)
+    if source is None:
         looked = " and ".join(f"`{path}`" for path in tried)
         raise Refused(
             Code.SHELL_RELOAD, f"the tables of level `{spec.name}` are not there", f"looked for {looked}"
         )
-    return found
+    return source
 
 
 def program_of(plant: Origin, spec: LevelSpec, held: KeptSources | None) -> Program:
-    """What the tables that the executors were compiled of mean.
+    """Return the meaning of the tables of the executors.
 
     Args:
         plant: Where the system comes from.
@@ -94,11 +94,11 @@ def program_of(plant: Origin, spec: LevelSpec, held: KeptSources | None) -> Prog
     """
     source = source_of(plant, spec)
     with laid_out(held or kept(source)) as there:
-        made = compile_(_settings(there), plant.system.generated, TARGETS, only_check=True)
-        if made.report.failed:
+        compiled = compile_(_settings(there), plant.system.generated, TARGETS, only_check=True)
+        if compiled.report.failed:
             raise Refused(
                 Code.SHELL_RELOAD,
-                f"`{source}` is not what level `{spec.name}` runs: {_why(made.report)}",
+                f"`{source}` is not what level `{spec.name}` runs: {_why(compiled.report)}",
                 f"`reload {spec.name}` takes it",
             )
         return _resolved(there)
@@ -113,9 +113,9 @@ def reload(plant: Origin, spec: LevelSpec, old: RunningLevel) -> Reloaded:
     source = source_of(plant, spec)
     sources = kept(source)
     with scratch("reload") as place:
-        made = compile_(_settings(source), place, TARGETS, only_check=False)
-        if made.report.failed:
-            raise _refused(spec.name, f"it is not proved: {_why(made.report)}")
+        compiled = compile_(_settings(source), place, TARGETS, only_check=False)
+        if compiled.report.failed:
+            raise _refused(spec.name, f"it is not proved: {_why(compiled.report)}")
         program = _resolved(source)
         try:
             there = replace(plant.system, generated=place)
@@ -126,9 +126,9 @@ def reload(plant: Origin, spec: LevelSpec, old: RunningLevel) -> Reloaded:
             raise _refused(spec.name, str(error) or "it has no such level") from error
         digest = fingerprints(there)[spec.program]
     _same_buffers(old, level)
-    said = _carried(old, level)
+    carried = _carried(old, level)
     _in_proof(level, program)
-    return Reloaded(level, program, digest, sources, said)
+    return Reloaded(level, program, digest, sources, carried)
 
 
 def _settings(source: Path) -> Settings:
@@ -154,10 +154,10 @@ def _why(report: Report) -> str:
 
 
 def _same_buffers(old: RunningLevel, new: RunningLevel) -> None:
-    """What the level's neighbours see keeps its form: they were compiled for it."""
-    for one, made in ((_buffers(old), _buffers(new)), (_buffers(new), _buffers(old))):
-        for name, form in one.items():
-            if made.get(name) != form:
+    """Refuse a buffer of another form: the neighbours were compiled for the old."""
+    for forms, others in ((_buffers(old), _buffers(new)), (_buffers(new), _buffers(old))):
+        for name, form in forms.items():
+            if others.get(name) != form:
                 raise _refused(
                     old.name,
                     f"buffer `{name}` has another form",
@@ -178,7 +178,7 @@ def _buffers(level: RunningLevel) -> dict[str, list[object]]:
 
 
 def _carried(old: RunningLevel, new: RunningLevel) -> str:
-    """Puts the old values into the new level, by name; what became of them."""
+    """Put the old values into the new level, by name; return what became of them."""
     values: list[Value] = [
         _value(old, leaf) if leaf.name in old.sign.index else leaf.initial for leaf in new.sign.leaves
     ]
@@ -217,7 +217,7 @@ def _form(leaf: Leaf) -> str:
 
 
 def _in_proof(level: RunningLevel, program: Program) -> None:
-    """The invariants, which every cycle keeps, hold of the present values."""
+    """Refuse where an invariant does not hold of the present values."""
     sign: Signature = level.sign
     now = {leaf.name: value for leaf, value in zip(sign.leaves, level.values, strict=False)}
     for invariant in program.invariants:

@@ -1,4 +1,4 @@
-"""The sources of what runs, kept from before anybody edits them: what a running table says, when its file says something else.
+"""Keep the sources of what runs, from before anybody edits them.
 
 In: a root file. Out: `KeptSources`, and the same files laid out elsewhere.
 """
@@ -29,12 +29,12 @@ class KeptSources:
 def kept(source: Path) -> KeptSources:
     """The texts as they are now, of exactly the files that a check reads; what cannot be read is left out."""
     project = os.path.abspath(project_root(str(source)))
-    texts = {_below(name, project): one.text.encode() for name, one in load([str(source)]).sources.items()}
+    texts = {_below(name, project): file.text.encode() for name, file in load([str(source)]).sources.items()}
     return KeptSources(_below(str(source), project), {PROJECT_FILE: b"", **texts})
 
 
 def _below(file: str, project: str) -> str:
-    """The path below the project's folder, by names or else by where links lead; the whole path of what is elsewhere."""
+    """Return the path below the project's folder, by names or else by links; the whole path of a file elsewhere."""
     whole = os.path.abspath(file)
     folder, name = os.path.split(whole)
     for path, above in (
@@ -48,7 +48,7 @@ def _below(file: str, project: str) -> str:
 
 @contextmanager
 def laid_out(held: KeptSources) -> Iterator[Path]:
-    """The root file among the others, in a folder that is gone afterwards; nothing is written anywhere else."""
+    """Write the files to a temporary folder, and give the root file there."""
     with scratch("reload") as place:
         for name, text in held.texts.items():
             if os.path.isabs(name):
