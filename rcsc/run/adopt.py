@@ -1,4 +1,4 @@
-"""How a level starts again: from its checkpoint, or anew: then what stands in its buffers is old, and PAUSE goes down.
+"""Restart a level from its checkpoint, or anew: then its buffers hold old values, and PAUSE goes down.
 
 In: a level, its buffers, its checkpoint; for a start anew a signature and values: an initial state with the inputs as the buffers hold
 them now; its own orders that stand. Out: values to start from.
@@ -28,7 +28,7 @@ FAILED = {
 
 
 class Begun(StrEnum):
-    """From what state a level goes on that was started again."""
+    """The state from which a restarted level goes on."""
 
     CHECKPOINT = "checkpoint"  # that of its last cycle
     ANEW = "anew"  # that is lost, or ended in a fault: the state that `adopt` says
@@ -48,7 +48,7 @@ class Restarted:
 
 
 def restart(level: RunningLevel, buffers: Buffers, checkpoint: Values | None = None) -> Restarted:
-    """Puts a level where its process would begin again.
+    """Put a level where its process would begin again.
 
     Args:
         level: Whatever state it is in.
@@ -69,7 +69,7 @@ def restart(level: RunningLevel, buffers: Buffers, checkpoint: Values | None = N
 
 
 def standing(level: RunningLevel, buffers: Buffers) -> dict[int, Value]:
-    """What a level's own orders and reports say that still stand in the buffers, by the positions of the leaves."""
+    """Return a level's own orders and reports that still stand in the buffers, by position of the leaf."""
     return {
         give.first + at: value
         for give in level.gives
@@ -78,11 +78,11 @@ def standing(level: RunningLevel, buffers: Buffers) -> dict[int, Value]:
 
 
 def adopt(sign: Signature, values: Values, stands: Mapping[int, Value] | None = None) -> Values:
-    """The values with which a level starts safely, whatever is in its buffers.
+    """Return the values with which a level starts safely, whatever its buffers hold.
 
     The order in the command buffer counts as seen, and has failed; each level below gets PAUSE with a number that no order had
-    before: the next after the order that stands, which it may not have echoed yet; after what it echoed where none stands. What a
-    program has no variable for, or one of another type, is left as it is.
+    before: the next after the order that stands, which it may not have echoed yet, or else after what it echoed. Variables
+    that a program lacks, or has with another type, are left alone.
 
     Args:
         sign: The level's program.
@@ -104,7 +104,7 @@ def adopt(sign: Signature, values: Values, stands: Mapping[int, Value] | None = 
 
 
 def _order(sign: Signature, name: str, now: list[Value], at: int, stands: Mapping[int, Value]) -> Value:
-    """What a leaf of an order starts with: a number not yet echoed, the first command, which rests; the others stay."""
+    """Return the start value of an order's leaf: a number not yet echoed, the first command (rest), else as it is."""
     record, _, part = name.partition(".")
     if part == "input_command":
         return 0
@@ -115,13 +115,13 @@ def _order(sign: Signature, name: str, now: list[Value], at: int, stands: Mappin
 
 
 def _admits(sign: Signature, taker: int, giver: int) -> bool:
-    """Whether a number can have every value of another."""
+    """Return whether a number can have every value of another."""
     to, of = sign.leaves[taker], sign.leaves[giver]
     return (to.low or 0) <= (of.low or 0) and (of.high or 0) <= (to.high or 0)
 
 
 def _numbers(sign: Signature, *places: int) -> bool:
-    """Whether all these leaves are whole numbers: what has another type under such a name numbers nothing."""
+    """Return whether all these leaves are whole numbers: a leaf of another type is no number of an order."""
     return all(
         sign.leaves[at].c_type not in {"bool", "double"} and not sign.leaves[at].members for at in places
     )

@@ -1,4 +1,4 @@
-"""What extern procedures give in the run of a finding: told to the executors, so that they do without the user's functions.
+"""Give executors the answers of extern procedures in the run of a finding, instead of the user's functions.
 
 In: the answers of one cycle, as (procedure, results). Executors that were made for a finding call `of_NAME` here in Python, and in C
 functions that read the same results from `rcsc_answers` (`stand_ins`).
@@ -31,7 +31,7 @@ _left: list[tuple[str, tuple[Value, ...]]] = []
 
 
 def __getattr__(name: str) -> Callable[..., Any]:
-    """The function of an extern procedure: gives the next of its answers.
+    """Return the function of an extern procedure, which gives its next answer.
 
     Raises:
         AttributeError: The name is none of an extern procedure.
@@ -40,7 +40,7 @@ def __getattr__(name: str) -> Callable[..., Any]:
         raise AttributeError(name)
 
     def answer(*_args: Value) -> Any:
-        at = next((at for at, (one, _) in enumerate(_left) if one == name.removeprefix(OF)), None)
+        at = next((at for at, (procedure, _) in enumerate(_left) if procedure == name.removeprefix(OF)), None)
         if at is None:
             raise LookupError(f"nothing is said of what `{name.removeprefix(OF)}` gives here")
         results = _left.pop(at)[1]
@@ -50,7 +50,7 @@ def __getattr__(name: str) -> Callable[..., Any]:
 
 
 def told(executor: Executor, answers: Answers) -> None:
-    """Has the executor's next cycle take these answers."""
+    """Give these answers to the executor's next cycle."""
     _left[:] = answers
     if isinstance(executor, CExecutor):
         words = [_word(value) for _, results in answers for value in results][:MOST]

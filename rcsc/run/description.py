@@ -139,32 +139,32 @@ def _place(path: Path, document: Document, key: str) -> Path:
 
 
 def _described(path: Path, document: Document, generated: Path, data: Path) -> Description:
-    said: dict[str, Any] = document.value
+    content: dict[str, Any] = document.value
     return Description(
-        said["name"],
+        content["name"],
         generated,
         data if data != path.resolve() else data.with_name(NO_DATA),  # older descriptions name themselves
-        said["tick_ms"],
-        tuple(level_of(Said(one)) for one in said["level"]),
-        tuple(Wire(a, b) for a, b in said["buffers"].items()),
-        {name: tuple(shown) for name, shown in said.get("displays", {}).items()},
+        content["tick_ms"],
+        tuple(level_of(Said(level)) for level in content["level"]),
+        tuple(Wire(a, b) for a, b in content["buffers"].items()),
+        {name: tuple(shown) for name, shown in content.get("displays", {}).items()},
         document,
     )
 
 
-def level_of(said: Said) -> LevelSpec:
+def level_of(entry: Said) -> LevelSpec:
     """Return a level of a description, or of a log's copy of one.
 
     Raises:
         Malformed: It is none, or a name in it is none.
     """
-    feeds = "feed" if "feed" in said.value else "feeds"
+    feeds = "feed" if "feed" in entry.value else "feeds"
     return LevelSpec(
-        said.name("name"),
-        said.name("program", said.name("name")),
+        entry.name("name"),
+        entry.name("program", entry.name("name")),
         tuple(
-            Feed(one.member("into"), one.name("query"), one.members("keys"))
-            for one in said.each(feeds, MOST_LEVELS, ())
+            Feed(feed.member("into"), feed.name("query"), feed.members("keys"))
+            for feed in entry.each(feeds, MOST_LEVELS, ())
         ),
     )
 
@@ -183,19 +183,19 @@ NO_DATA = ".no-data"
 
 
 def _check_parties(document: Document) -> None:
-    """Every level has a name of its own; each buffer has a level at an end, and parties that are known."""
-    said = document.value
-    levels = [str(one["name"]) for one in said["level"]]
+    """Check that levels have names of their own, and buffers a level at an end and known parties."""
+    content = document.value
+    levels = [str(level["name"]) for level in content["level"]]
     for at, name in enumerate(levels):
         if name in levels[:at]:
             document.wrong(("level", at, "name"), f"there are two levels `{name}`")
-    ends = list(_ends(said["buffers"]))
+    ends = list(_ends(content["buffers"]))
     for path, end, _ in ends:
         party, dot, variable = end.partition(".")
         if not (party and dot and variable) or not is_member(end):
             document.wrong(path, f"`{end}` is no buffer's end", "write `party.variable`")
     parties = [end.partition(".")[0] for _, end, _ in ends]
-    outside = said.get("outside")
+    outside = content.get("outside")
     for path, end, other in ends:
         party, theirs = end.partition(".")[0], other.partition(".")[0]
         if party in levels:
@@ -225,13 +225,13 @@ def _ends(buffers: Mapping[str, str]) -> Iterator[tuple[KeyPath, str, str]]:
 
 
 def _alike(party: str, levels: list[str], parties: list[str]) -> str:
-    """The level, or the party that is named oftener, whose spelling is nearest; empty where none is near."""
-    oftener = [one for one in parties if parties.count(one) > parties.count(party)]
+    """Return the level, or the party named oftener, that is spelled nearest; empty where none is near."""
+    oftener = [other for other in parties if parties.count(other) > parties.count(party)]
     swapped = [level for level in levels if sorted(level) == sorted(party)]
     near = [*swapped, *get_close_matches(party, [*levels, *oftener], n=1, cutoff=0.8)]
     return near[0] if near else ""
 
 
 def places(path: Path, program: str) -> tuple[Path, Path]:
-    """Where the program of a level is looked for, beside the description, in order."""
+    """Return where the program of a level is looked for, in order."""
     return path.parent / program / f"{program}.rcs", path.parent / f"{program}.rcs"

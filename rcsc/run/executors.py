@@ -80,8 +80,8 @@ class PythonExecutor:
 
     def values(self) -> Values:
         """All leaves, then the trace."""
-        found: Values = self._get(self._state)
-        return found
+        values: Values = self._get(self._state)
+        return values
 
     def put(self, first: int, values: Sequence[Value]) -> None:
         """Set the leaves from position `first` on."""
@@ -97,7 +97,7 @@ class Library:
 
 
 _BUILT: dict[bytes, Library] = {}
-"""What this process has built already, by the text that it was built of."""
+"""What this process has built already, by the text it was built from."""
 
 
 def build(generated: Path, signs: Sequence[Signature]) -> Library:
@@ -148,10 +148,11 @@ def _built(compiler: str, generated: Path, signs: Sequence[Signature], layout: s
 
 
 def _layout(sign: Signature) -> str:
-    """Where each leaf lies in the program's struct, said by the compiler itself."""
+    """Return C that has the compiler say where each leaf lies in the program's struct."""
     p, kind = sign.program, sign.struct_name
     places = [
-        f"(unsigned)offsetof({kind}, {one})" for one in (*(leaf.place for leaf in sign.leaves), *sign.trace)
+        f"(unsigned)offsetof({kind}, {place})"
+        for place in (*(leaf.place for leaf in sign.leaves), *sign.trace)
     ]
     return (
         f'#include <stddef.h>\n#include "{p}.h"\n'
@@ -201,8 +202,8 @@ class CExecutor:
 
     def values(self) -> Values:
         """All leaves, then the trace."""
-        found = self._whole.unpack(self._memory)
-        return found if self._order is None else tuple(found[at] for at in self._order)
+        values = self._whole.unpack(self._memory)
+        return values if self._order is None else tuple(values[at] for at in self._order)
 
     def put(self, first: int, values: Sequence[Value]) -> None:
         """Set the leaves from position `first` on."""
@@ -224,9 +225,9 @@ class CExecutor:
 
 
 def _padded(fields: Sequence[tuple[int, str]], size: int) -> struct.Struct:
-    """A format with the padding that the compiler left between ascending places."""
+    """Return a format with the compiler's padding between ascending places."""
     text, at = "<" if sys.byteorder == "little" else ">", 0
-    for place, one in fields:
-        text += "x" * (place - at) + one
-        at = place + struct.calcsize(one)
+    for place, form in fields:
+        text += "x" * (place - at) + form
+        at = place + struct.calcsize(form)
     return struct.Struct(text + "x" * (size - at))

@@ -57,7 +57,7 @@ class BadState(StateTableError):  # noqa: N818  # what was refused, not an error
 
 
 def put_checked(name: str, sign: Signature, executor: Executor, values: Values) -> None:
-    """Gives an executor a state from outside, and checks it before any cycle sees it.
+    """Give an executor a state from outside, checked before any cycle sees it.
 
     Raises:
         BadState: Something lies outside its range, or an invariant does not hold; the executor has the state that it had.
@@ -130,7 +130,7 @@ class RunningLevel:
         self.executor.put(first, values)
 
     def run(self) -> int:
-        """One cycle; the fault, 0 for none."""
+        """Run one cycle; return the fault, 0 for none."""
         fault = self.executor.cycle()
         self.values = self.executor.values()
         return fault
@@ -141,7 +141,7 @@ class RunningLevel:
             buffers.publish(give.buffer, self.values[give.first : give.end])
 
     def restore(self, values: Values) -> None:
-        """Goes on from a state that `values` said, as if nothing had happened in between.
+        """Go on from a state that `values` held, as if nothing had happened since.
 
         Raises:
             BadState: The state is none that a cycle may begin with; the level has kept its own.
@@ -150,7 +150,7 @@ class RunningLevel:
         self._restored()
 
     def put_back(self, values: Values) -> None:
-        """The same with a state that this level had, or that was looked at already: it is not checked."""
+        """Go on from a state that this level had, or that was checked already."""
         self.executor.put(0, values[: len(self.sign.leaves)])
         self._restored()
 
@@ -201,17 +201,17 @@ def running_level(
     Raises:
         BadDescription: A buffer or a feed names what the program does not have, or what does not fit.
     """
-    level = next((one for one in sign.levels if one.name == spec.name), None)
+    level = next((level for level in sign.levels if level.name == spec.name), None)
     if level is None:
         raise BadDescription(f"program `{sign.program}` has no level `{spec.name}`")
     takes: list[tuple[str, int, int]] = []
     gives: list[tuple[str, int, int]] = []
     for wire in system.wires:
-        for end, made in ((wire.target, takes), (wire.source, gives)):
+        for end, records in ((wire.target, takes), (wire.source, gives)):
             owner, _, variable = end.partition(".")
             if owner == spec.name:
                 run = _positions(sign, variable, end)
-                made.append((wire.source, run.start, len(run)))
+                records.append((wire.source, run.start, len(run)))
     return RunningLevel(
         spec.name,
         sign,

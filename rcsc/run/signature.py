@@ -42,7 +42,7 @@ STOPPED = FAULTS.index("assumption failed")
 
 MOST_SYMBOL_BYTES, MOST_LEAVES, MOST_LEVELS, LONGEST_PERIOD_MS = 64 * MIB, 1_000_000, 100_000, 2**31 - 1
 MOST_MEMBERS = {"uint8_t": 2**8, "uint16_t": 2**16}
-"""Of an enumeration, by the type in C that its values have."""
+"""Most members of an enumeration, by the C type of its values."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +51,7 @@ class Leaf:
 
     Attributes:
         kind: `input`, `state` or `output`.
-        place: How the C struct calls it; `attribute` is its name in Python.
+        place: Its name in the C struct; `attribute` is its name in Python.
         members: Of an enumeration; empty for numbers and bools.
     """
 
@@ -148,9 +148,9 @@ class Signature:
         return struct.Struct("<" + "".join(FORMATS[leaf.c_type] for leaf in self.leaves) + self.trace_format)
 
     def form(self, run: range) -> str:
-        """The format of these leaves in which `struct.pack` refuses what is not of their types; a bool is packed as a number."""
+        """Return the format in which `struct.pack` refuses values of other types; a bool is packed as a number."""
         types = (FORMATS[self.leaves[at].c_type] for at in run)
-        return "<" + "".join("B" if one == "?" else one for one in types)
+        return "<" + "".join("B" if code == "?" else code for code in types)
 
     def record(self, name: str) -> range:
         """Positions of the leaves of a variable: a record's or array's are next to each other.
@@ -158,14 +158,14 @@ class Signature:
         Raises:
             KeyError: There is no such variable.
         """
-        found = [
+        places = [
             at
             for at, leaf in enumerate(self.leaves)
             if leaf.name == name or leaf.name.startswith((f"{name}.", f"{name}["))
         ]
-        if not found:
+        if not places:
             raise KeyError(name)
-        return range(found[0], found[-1] + 1)
+        return range(places[0], places[-1] + 1)
 
     def table_of(self, level: LevelSign, values: Values) -> str:
         """The table that the level ran in the cycle that left these values."""
@@ -203,7 +203,7 @@ class Signature:
 
 
 def generated_files(generated: Path, program: str) -> tuple[Path, ...]:
-    """What was generated of a program: symbol file, C, header, Python; all in the generated folder.
+    """Return what was generated of a program: symbol file, C, header, Python; all in the generated folder.
 
     The symbol file bears the program's name; the others one that no library keeps, as the symbol file says.
 
@@ -213,7 +213,7 @@ def generated_files(generated: Path, program: str) -> tuple[Path, ...]:
     try:
         symbols = inside(generated, "c", f"{identifier(program, 'program')}.json")
         try:
-            word = _said(text(symbols, MOST_SYMBOL_BYTES)).name("program")
+            word = _parsed(text(symbols, MOST_SYMBOL_BYTES)).name("program")
         except (OSError, Malformed):
             word = program
         return symbols, *sources_of(generated, word)
@@ -233,7 +233,7 @@ def sources_of(generated: Path, word: str) -> tuple[Path, Path, Path]:
 
 
 def signature(path: Path) -> Signature:
-    """Reads a symbol file.
+    """Read a symbol file.
 
     Raises:
         OSError: It cannot be read.
@@ -246,39 +246,39 @@ def signature(path: Path) -> Signature:
 
 
 @lru_cache(maxsize=16)  # to assemble a system reads each symbol file several times
-def _said(found: str) -> Said:
-    return Said(json_of(found))
+def _parsed(symbols: str) -> Said:
+    return Said(json_of(symbols))
 
 
 @lru_cache(maxsize=16)
-def _signature(found: str) -> Signature:
-    return signature_of(_said(found))
+def _signature(symbols: str) -> Signature:
+    return signature_of(_parsed(symbols))
 
 
-def signature_of(said: Said) -> Signature:
-    """Returns the signature that a symbol file, or a log's copy of one, holds.
+def signature_of(symbols: Said) -> Signature:
+    """Return the signature that a symbol file, or a log's copy of one, holds.
 
-    What is called by name is called so by this program alone: its functions begin with its own name.
+    The functions it names are the program's own: their names begin with its name.
 
     Raises:
         Malformed: A name in it is none, a value does not fit its type, or something is missing.
     """
-    program = said.name("program")
-    leaves = tuple(map(_leaf, said.each("leaves", MOST_LEAVES)))
+    program = symbols.name("program")
+    leaves = tuple(map(_leaf, symbols.each("leaves", MOST_LEAVES)))
     index = {leaf.name: at for at, leaf in enumerate(leaves)}
     if len(index) < len(leaves):
         raise Malformed("two leaves have one name")
-    tables, stops = _tables(said)
-    levels = tuple(_level(one, program, index) for one in said.each("levels", MOST_LEVELS))
+    tables, stops = _tables(symbols)
+    levels = tuple(_level(level, program, index) for level in symbols.each("levels", MOST_LEVELS))
     if len(tables) == 0 and levels:
         raise Malformed("it has levels and no table")
-    monitored, failed = said.names("monitored"), said.names("failed", FAILED)
+    monitored, failed = symbols.names("monitored"), symbols.names("failed", FAILED)
     if len(monitored) > 64 * len(failed):
         raise Malformed(f"{len(failed)} words for {len(monitored)} assumptions")
     return Signature(
         program,
-        _own(said.name("struct" if "struct" in said.value else "struct_name"), f"{program}_t", ""),
-        _own(said.name("init"), f"{program}_init", ""),
+        _own(symbols.name("struct" if "struct" in symbols.value else "struct_name"), f"{program}_t", ""),
+        _own(symbols.name("init"), f"{program}_init", ""),
         leaves,
         tables,
         levels,
@@ -286,7 +286,7 @@ def signature_of(said: Said) -> Signature:
         index,
         failed,
         stops,
-        said.names("invariants", ()),
+        symbols.names("invariants", ()),
     )
 
 
@@ -297,34 +297,34 @@ def _own(name: str, begins: str, rest: str) -> str:
     return name
 
 
-def _leaf(said: Said) -> Leaf:
+def _leaf(entry: Said) -> Leaf:
     members, c_type, initial = (
-        said.names("members", ()),
-        said.one_of("c_type", tuple(FORMATS)),
-        said.number("initial"),
+        entry.names("members", ()),
+        entry.one_of("c_type", tuple(FORMATS)),
+        entry.number("initial"),
     )
     if not _fits(c_type, initial) or (members and not 0 <= (initial or 0) < len(members)):
-        raise Malformed(f"{said.where}.initial is no `{c_type}` of it")
+        raise Malformed(f"{entry.where}.initial is no `{c_type}` of it")
     if len(members) > MOST_MEMBERS.get(c_type, 0):
-        raise Malformed(f"{said.where} has {len(members)} members, more than a `{c_type}` can tell apart")
+        raise Malformed(f"{entry.where} has {len(members)} members, more than a `{c_type}` can tell apart")
     assert initial is not None
     return Leaf(
-        said.member("name"),
-        said.one_of("kind", ("input", "state", "output")),
-        said.member("path" if "path" in said.value else "place"),
-        said.name("attribute"),
+        entry.member("name"),
+        entry.one_of("kind", ("input", "state", "output")),
+        entry.member("path" if "path" in entry.value else "place"),
+        entry.name("attribute"),
         c_type,
         members,
-        said.number("low", None),
-        said.number("high", None),
-        said.text("unit", ""),
+        entry.number("low", None),
+        entry.number("high", None),
+        entry.text("unit", ""),
         initial,
-        said.text("doc"),
+        entry.text("doc"),
     )
 
 
 def _fits(c_type: str, value: object) -> bool:
-    """Whether a value is one of the type, and not of another that happens to be equal."""
+    """Return whether a value is of the type, not an equal one of another type."""
     if type(value) is not {"bool": bool, "double": float}.get(c_type, int):
         return False
     try:
@@ -334,35 +334,38 @@ def _fits(c_type: str, value: object) -> bool:
     return True
 
 
-def _tables(said: Said) -> tuple[dict[str, tuple[str, ...]], dict[str, tuple[str, ...]]]:
-    """The lines of each table, and what stops it: a list of tables in a symbol file, two tables of them in a log."""
-    if isinstance(said.value.get("tables"), dict):
-        lines, stops = said.table("tables"), said.table("stops") if "stops" in said.value else Said({})
+def _tables(symbols: Said) -> tuple[dict[str, tuple[str, ...]], dict[str, tuple[str, ...]]]:
+    """Return the lines of each table, and what stops it; a symbol file lists tables, a log keeps two mappings."""
+    if isinstance(symbols.value.get("tables"), dict):
+        lines, stops = (
+            symbols.table("tables"),
+            symbols.table("stops") if "stops" in symbols.value else Said({}),
+        )
         return (
             {identifier(name, "table"): lines.lines(name) for name in lines.value},
             {identifier(name, "table"): stops.names(name) for name in stops.value},
         )
-    several = tuple(said.each("tables", MOST_LEVELS))
+    several = tuple(symbols.each("tables", MOST_LEVELS))
     return (
-        {one.name("name"): one.lines("lines") for one in several},
-        {one.name("name"): one.names("stops") for one in several if "stops" in one.value},
+        {table.name("name"): table.lines("lines") for table in several},
+        {table.name("name"): table.names("stops") for table in several if "stops" in table.value},
     )
 
 
-def _level(said: Said, program: str, index: Mapping[str, int]) -> LevelSign:
-    by, tables = said.text("by", ""), {}
-    if "tables" in said.value:
-        named = said.table("tables")
+def _level(entry: Said, program: str, index: Mapping[str, int]) -> LevelSign:
+    by, tables = entry.text("by", ""), {}
+    if "tables" in entry.value:
+        named = entry.table("tables")
         tables = {_key(value): named.name(value) for value in named.value}
     if (by or tables) and by not in index:
-        raise Malformed(f"{said.where}.by: {shown(by)} is no leaf")
-    table = said.name("table", "") if said.value.get("table") else ""
+        raise Malformed(f"{entry.where}.by: {shown(by)} is no leaf")
+    table = entry.name("table", "") if entry.value.get("table") else ""
     if not table and not by:
-        raise Malformed(f"{said.where} has no table")
+        raise Malformed(f"{entry.where} has no table")
     return LevelSign(
-        said.name("name"),
-        _own(said.name("cycle"), f"{program}_", "..."),
-        said.whole("period_ms", 1, LONGEST_PERIOD_MS),
+        entry.name("name"),
+        _own(entry.name("cycle"), f"{program}_", "..."),
+        entry.whole("period_ms", 1, LONGEST_PERIOD_MS),
         table,
         by,
         tables,

@@ -66,11 +66,13 @@ class System:
             StateTableError: A level was refused an input, no line or several matched, or what stands outside published no such values.
         """
         due = tuple(
-            one for one in self.levels if self.tick * self.description.tick_ms % one.level.period_ms == 0
+            level
+            for level in self.levels
+            if self.tick * self.description.tick_ms % level.level.period_ms == 0
         )
         for level in due:
             level.take(self.buffers)
-        given = [one.step(self.tick, self.buffers.latest) for one in self.outside]
+        given = [part.step(self.tick, self.buffers.latest) for part in self.outside]
         faulty = [level for level in due if level.run()]
         for level in due:
             level.give(self.buffers)
@@ -82,7 +84,7 @@ class System:
             watch(self, due)
         self.restarts.clear()
         for level in faulty:
-            raise StateTableError(_said(level, self.tick))
+            raise StateTableError(_message(level, self.tick))
 
     def _publish(self, name: str, values: Values) -> None:
         """Raises: StateTableError: What stands outside published what the buffer cannot hold."""
@@ -94,7 +96,7 @@ class System:
         self.buffers.publish(name, values)
 
     def restart(self, name: str, checkpoint: Values | None = None) -> None:
-        """Has a level lose what it was doing, as one whose process is killed and started again, before the next tick.
+        """Restart a level before the next tick, as if its process had been killed and started again.
 
         Args:
             name: The level's.
@@ -111,14 +113,14 @@ class System:
         Raises:
             KeyError: There is none.
         """
-        return next((one for one in self.levels if one.name == name), None) or _missing(name)
+        return next((level for level in self.levels if level.name == name), None) or _missing(name)
 
 
 def _missing(name: str) -> RunningLevel:
     raise KeyError(name)
 
 
-def _said(level: RunningLevel, tick: int) -> str:
+def _message(level: RunningLevel, tick: int) -> str:
     return f"level `{level.name}`, table `{level.table}`, cycle {tick}: {level.sign.fault_said(level.values)}"
 
 
@@ -132,27 +134,27 @@ def signatures(system: Description, *, fitting: bool = True) -> dict[str, Signat
     Raises:
         BadDescription: A program is not there, or the description does not fit the programs.
     """
-    found, page = {}, system.review()
+    signs, page = {}, system.review()
     for at, spec in enumerate(system.levels):
         path, *_ = generated_files(system.generated, spec.program)
         place: KeyPath = ("level", at, "name" if spec.program == spec.name else "program")
         try:
-            found[spec.name] = signature(path)
+            signs[spec.name] = signature(path)
         except OSError:
-            made = sorted(one.stem for one in path.parent.glob("*.json"))
-            helps = nearest(spec.program, made) or ("run `rcsc compile`",)
+            compiled = sorted(file.stem for file in path.parent.glob("*.json"))
+            helps = nearest(spec.program, compiled) or ("run `rcsc compile`",)
             page.wrong(place, f"program `{spec.program}` is not compiled: `{path}` cannot be read", *helps)
         except ValueError as error:
             page.wrong(place, str(error))
     if page.faults:
         raise page.bad(BadDescription)
     if fitting:
-        _check_fit(system, found)
-    return found
+        _check_fit(system, signs)
+    return signs
 
 
 def _check_fit(system: Description, signs: Mapping[str, Signature]) -> None:
-    """What the description says of levels and variables is so in their programs.
+    """Check what the description says of levels and variables against their programs.
 
     Raises:
         BadDescription: Something is not; all that is not is told at once.
@@ -160,9 +162,9 @@ def _check_fit(system: Description, signs: Mapping[str, Signature]) -> None:
     page = system.review()
     for at, spec in enumerate(system.levels):
         sign = signs[spec.name]
-        level = next((one for one in sign.levels if one.name == spec.name), None)
+        level = next((level for level in sign.levels if level.name == spec.name), None)
         if level is None:
-            names = [one.name for one in sign.levels]
+            names = [level.name for level in sign.levels]
             page.wrong(
                 ("level", at, "name"),
                 f"program `{sign.program}` has no level `{spec.name}`",
@@ -178,7 +180,7 @@ def _check_fit(system: Description, signs: Mapping[str, Signature]) -> None:
             path: KeyPath = ("level", at, "feed", number)
             _check_variable(page, (*path, "into"), sign, feed.into, "input")
             for place, key in enumerate(feed.keys):
-                _check_variable(page, (*path, "keys", place), sign, key, one=True)
+                _check_variable(page, (*path, "keys", place), sign, key, scalar=True)
     for wire in system.wires:
         for end, kind in ((wire.source, ""), (wire.target, "input")):
             owner, _, variable = end.partition(".")
@@ -192,13 +194,13 @@ def _check_fit(system: Description, signs: Mapping[str, Signature]) -> None:
             if owner not in signs:
                 page.wrong(("displays", name, place), f"there is no level `{owner}` to show", *nearest(owner, list(signs)))  # fmt: skip
             else:
-                _check_variable(page, ("displays", name, place), signs[owner], variable, one=True)
+                _check_variable(page, ("displays", name, place), signs[owner], variable, scalar=True)
     if page.faults:
         raise page.bad(BadDescription)
 
 
 def _check_variable(
-    page: Document, path: KeyPath, sign: Signature, variable: str, kind: str = "", *, one: bool = False
+    page: Document, path: KeyPath, sign: Signature, variable: str, kind: str = "", *, scalar: bool = False
 ) -> None:
     """Note where the program has no such variable, or not of that kind, or not one scalar where one is wanted."""
     try:
@@ -209,7 +211,7 @@ def _check_variable(
         return
     if kind and any(leaf.kind != kind for leaf in leaves):
         page.wrong(path, f"`{variable}` of program `{sign.program}` is filled, and is no {kind}")
-    if one and variable not in sign.index:
+    if scalar and variable not in sign.index:
         page.wrong(path, f"`{variable}` of program `{sign.program}` has {len(leaves)} parts; name one")
 
 
@@ -257,8 +259,8 @@ def assemble(
     for name, sign in signs.items():
         if not any(level.name == name for level in sign.levels):
             raise BadDescription(f"program `{sign.program}` has no level `{name}`")
-    made = executors(system, signs, kind)
+    by_level = executors(system, signs, kind)
     levels: Sequence[RunningLevel] = [
-        running_level(spec, system, signs[spec.name], made[spec.name], queries) for spec in system.levels
+        running_level(spec, system, signs[spec.name], by_level[spec.name], queries) for spec in system.levels
     ]
     return System(system, tuple(levels), tuple(outside))

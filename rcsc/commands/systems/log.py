@@ -89,7 +89,7 @@ def _changed(file: Path, found: Log) -> int:
     """What is no longer as it was recorded; a log that a kill has cut is read as far as it goes."""
     if found.checked.seal is not Seal.CHANGED:
         return 0
-    return refuse(file, Code.LOG_NOT_WHOLE, f"the log is {found.checked.said}")
+    return refuse(file, Code.LOG_NOT_WHOLE, f"the log is {found.checked.text}")
 
 
 def _check_plot(plot: str | None, against: str | None, output: Path | None) -> None:
@@ -135,7 +135,7 @@ def _summary(found: Log) -> None:
     count = len(found.ticks)
     seconds = count * found.tick_ms / 1000
     click.echo(f"{found.facts['name']}: {count} ticks of {found.tick_ms} ms, {seconds:g} s")
-    click.echo(found.checked.said)
+    click.echo(found.checked.text)
     if (shown := found.finding) is not None:
         where = f"level `{shown.level}`" + (f", table `{shown.table}`" if shown.table else "")
         click.echo(f"a finding, broken in cycle {shown.broken_at}: {where}: {shown.obligation}")

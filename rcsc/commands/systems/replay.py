@@ -58,12 +58,12 @@ def command(
     if tick is None:
         lacking = again.lacking
         differs = "nothing that these tables have differs" if lacking else "nothing differs"
-        click.echo(f"{len(found.ticks)} ticks replayed: {differs}; {found.checked.said}")
+        click.echo(f"{len(found.ticks)} ticks replayed: {differs}; {found.checked.text}")
         if lacking:
             more = f", and {len(lacking) - SHOWN} more" if len(lacking) > SHOWN else ""
             click.echo(f"not in these tables, and so not compared: {', '.join(lacking[:SHOWN])}{more}")
     if not found.complete:
-        return refuse(file, Code.LOG_NOT_WHOLE, f"the log is {found.checked.said}")
+        return refuse(file, Code.LOG_NOT_WHOLE, f"the log is {found.checked.text}")
     return 0
 
 

@@ -36,7 +36,7 @@ class Coverage:
 
 def coverage(log: Log) -> tuple[Coverage, ...]:
     """Each table of each level, in order."""
-    return tuple(found for level in log.levels for found in _coverage(level))
+    return tuple(table for level in log.levels for table in _coverage(level))
 
 
 def _coverage(level: LoggedLevel) -> Iterator[Coverage]:
@@ -85,7 +85,7 @@ def json_text(log: Log) -> str:
         "system": log.facts["name"],
         "tick_ms": log.tick_ms,
         "complete": log.complete,
-        "checked": log.checked.said,
+        "checked": log.checked.text,
         "programs": dict(log.programs),
         "levels": [level.name for level in log.levels],
         "restarts": [
@@ -141,8 +141,8 @@ def write_parquet(log: Log, path: Path) -> None:
     arrays = {"tick": pa.array(ticks, pa.int64())}
     arrays["time_ms"] = pa.array([tick * log.tick_ms for tick in ticks], pa.int64())
     for name, (_, column) in known.items():
-        made = pa.array(cells[name], getattr(pa, _ARROW.get(column.c_type, "string"))())
-        arrays[name] = made if column.c_type else made.dictionary_encode()
+        array = pa.array(cells[name], getattr(pa, _ARROW.get(column.c_type, "string"))())
+        arrays[name] = array if column.c_type else array.dictionary_encode()
     with written_whole(path) as beside:
         parquet.write_table(pa.table(arrays), beside)
 

@@ -1,4 +1,4 @@
-"""What a log says of the finding that it keeps: what the run breaks, and what no level's state holds of it.
+"""Keep a finding in its log: what the run breaks, and what of it no level's state holds.
 
 In: a `LoggedFinding`. Out: its text, a metadata record of the log; and back. The log of a run in the cell has none.
 """
@@ -37,12 +37,12 @@ class LoggedFinding:
 
     Attributes:
         level: Whose obligation it is.
-        table: That it is about; empty where it is about the whole level.
-        obligation: Which, in words.
+        table: What it is about; empty for the whole level.
+        obligation: In words.
         broken_at: The tick in which it is broken.
         restarted: Whether it begins where a restart does, and not with the initial values.
         legal: Whether the levels around do only what neighbours can that began with it.
-        altered: Whether its tables were looked at under another rule than the language's.
+        altered: Whether its tables were read by another rule than the language's.
         cycles: By tick and level.
     """
 
@@ -81,15 +81,15 @@ def finding_facts(finding: LoggedFinding) -> dict[str, str]:
 
 
 def _numbers(given: Sequence[Value]) -> list[Value | str]:
-    """As JSON has them: what is no number in words."""
-    return [str(one) if isinstance(one, float) and not math.isfinite(one) else one for one in given]
+    """Return them for JSON: infinities and NaN as words."""
+    return [str(value) if isinstance(value, float) and not math.isfinite(value) else value for value in given]
 
 
-def _answer(said: Sequence[Any]) -> tuple[str, tuple[Value, ...]]:
-    name, given = said
-    if not all(isinstance(one, bool | int | float | str) for one in given):
-        raise ValueError(said)
-    return str(name), tuple(float(one) if isinstance(one, str) else one for one in given)
+def _answer(entry: Sequence[Any]) -> tuple[str, tuple[Value, ...]]:
+    name, given = entry
+    if not all(isinstance(value, bool | int | float | str) for value in given):
+        raise ValueError(entry)
+    return str(name), tuple(float(value) if isinstance(value, str) else value for value in given)
 
 
 def _flag(text: str) -> bool:
@@ -98,14 +98,16 @@ def _flag(text: str) -> bool:
 
 
 def finding_of(facts: Mapping[str, str]) -> LoggedFinding:
-    """What `finding_facts` was made of.
+    """Return the finding of `finding_facts`.
 
     Raises:
         KeyError, TypeError, ValueError: The facts are none.
     """
     cycles = {
         (int(tick), str(level)): LoggedCycle(
-            tuple(map(str, matched)), str(wrong), tuple(_answer(one) for each in answers for one in each)
+            tuple(map(str, matched)),
+            str(wrong),
+            tuple(_answer(entry) for entries in answers for entry in entries),
         )
         for tick, level, matched, wrong, *answers in json_of(facts["cycles"])
     }

@@ -83,11 +83,11 @@ def _series(log: Log, names: Sequence[str]) -> list[_Series]:
             raise BadExpression(nearest(name, known))
         if not (known[name][1].members or known[name][1].c_type):
             raise BadExpression(f"`{name}` is text, which has no place on an axis")
-    made = [_Series(name, known[name][1], []) for name in names]
+    curves = [_Series(name, known[name][1], []) for name in names]
     for _, held in rows(log):
-        for series in made:
+        for series in curves:
             series.values.append(_number(series.column, series.column.read(held[known[series.name][0]])))
-    return made
+    return curves
 
 
 def _number(column: LogColumn, value: Value | str) -> float:

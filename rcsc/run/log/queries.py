@@ -45,18 +45,18 @@ class _Operand:
 
     term: Term
     kind: str
-    said: str
+    text: str
     members: tuple[str, ...] = ()
     bare: bool = False
 
 
 def predicate(text: str, log: Log) -> Predicate:
-    """What the text asks.
+    """Return what the text asks.
 
     Raises:
         BadExpression: It is no question, or names what the log does not have.
     """
-    marked = _KEYWORD.sub(lambda found: found[0] + _MARK * keyword.iskeyword(found[0]), text)
+    marked = _KEYWORD.sub(lambda match: match[0] + _MARK * keyword.iskeyword(match[0]), text)
     try:
         parsed = ast.parse(marked.strip(), mode="eval").body
         return _Building(named_columns(log)).predicate(parsed)
@@ -105,10 +105,10 @@ class _Building:
                 return lambda moment: not negated(moment)
             case ast.Compare(left=left, ops=ops, comparators=rest):
                 return self._comparison([left, *rest], ops)
-        one = self._operand(node)
-        if one.kind != "bool":
-            raise BadExpression(f"`{one.said}` is neither true nor false: compare it with something")
-        return lambda moment: bool(one.term(moment))
+        operand = self._operand(node)
+        if operand.kind != "bool":
+            raise BadExpression(f"`{operand.text}` is neither true nor false: compare it with something")
+        return lambda moment: bool(operand.term(moment))
 
     def _comparison(self, nodes: list[ast.expr], ops: list[ast.cmpop]) -> Predicate:
         sides = [self._operand(node) for node in nodes]
@@ -146,17 +146,17 @@ def _compared(left: _Operand, op: ast.cmpop, right: _Operand) -> Predicate:
         raise BadExpression("only ==, !=, <, <=, > and >= compare")
     if left.kind != right.kind:
         raise BadExpression(
-            f"`{left.said}` and `{right.said}` cannot be compared: {left.kind} and {right.kind}"
+            f"`{left.text}` and `{right.text}` cannot be compared: {left.kind} and {right.kind}"
         )
     if left.kind != "number" and not isinstance(op, _EQUALITY):
-        raise BadExpression(f"`{left.said}` and `{right.said}` have no order: use == or !=")
+        raise BadExpression(f"`{left.text}` and `{right.text}` have no order: use == or !=")
     for operand, other in ((left, right), (right, left)):
-        if operand.bare and other.members and operand.said not in other.members:
+        if operand.bare and other.members and operand.text not in other.members:
             raise BadExpression(
-                f"`{other.said}` is never `{operand.said}`: it is one of {', '.join(filter(None, other.members))}"
+                f"`{other.text}` is never `{operand.text}`: it is one of {', '.join(filter(None, other.members))}"
             )
         if operand.bare and other.bare:
-            raise BadExpression(f"`{operand.said}` is no leaf: write `level.leaf`")
+            raise BadExpression(f"`{operand.text}` is no leaf: write `level.leaf`")
     compare = _COMPARE[type(op)]
     return lambda moment: compare(left.term(moment), right.term(moment))
 

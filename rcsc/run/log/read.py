@@ -113,7 +113,7 @@ class LoggedLevel:
     restarts: tuple[LoggedRestart, ...] = ()
 
     def restarted(self, at: int) -> LoggedRestart | None:
-        """The restart that the cycle whose record has this place began from; None where it went on from the record before."""
+        """Return the restart before the cycle at this place; None where it went on from the record before."""
         after, until = self.track.ticks[at - 1], self.track.ticks[at]
         return next((restart for restart in reversed(self.restarts) if after < restart.tick <= until), None)
 
@@ -180,17 +180,17 @@ class Log:
 
 
 def read(path: Path) -> Log:
-    """Reads a log; one that was cut off or changed is read as far as it is what was recorded.
+    """Read a log; one that was cut off or changed is read as far as it is as recorded.
 
     Raises:
         UnreadableLog: It cannot be read, or is none.
     """
     checked = ChainCheck()
-    made = _Reading(checked)
+    reading = _Reading(checked)
     try:
         for record in records(path, checked):
-            made.take(record)
-        return made.log()
+            reading.take(record)
+        return reading.log()
     except OSError as error:
         raise UnreadableLog(f"`{path}` cannot be read: {error.strerror}") from error
     except (KeyError, TypeError, ValueError, AttributeError, StopIteration, struct.error) as error:
@@ -213,8 +213,8 @@ class _Reading:
     def take(self, record: McapRecord) -> None:
         """Notes one record."""
         match record:
-            case Metadata(name=name, metadata=said):
-                self.metadata[name] = said
+            case Metadata(name=name, metadata=facts):
+                self.metadata[name] = facts
             case Channel():
                 self._channel(record)
             case Message(channel_id=channel, sequence=tick, data=content) if channel in self.tracks:
@@ -266,8 +266,8 @@ class _Reading:
             for topic, channel in self.topics.items()
             if topic.startswith(BUFFERS)
         }
-        found = finding_of(self.metadata[FINDING]) if FINDING in self.metadata else None
-        log = Log(facts, self.metadata.get(PROGRAMS, {}), levels, buffers, self.checked, found)
+        finding = finding_of(self.metadata[FINDING]) if FINDING in self.metadata else None
+        log = Log(facts, self.metadata.get(PROGRAMS, {}), levels, buffers, self.checked, finding)
         held = sum(len(track.ticks) for track in self.tracks.values())
         if log.last - log.first > _ALWAYS_TICKS + _TICKS_A_MESSAGE * held:
             raise ValueError(f"{log.last - log.first} ticks and {held} records")
@@ -275,6 +275,6 @@ class _Reading:
 
     def _level(self, name: str) -> LoggedLevel:
         sign = self.signs[name]
-        level = next(one for one in sign.levels if one.name == name)
+        level = next(level for level in sign.levels if level.name == name)
         restarts = tuple(self.restarts.get(name, ()))
         return LoggedLevel(name, sign, level, self.tracks[self.topics[LEVELS + name]], restarts)

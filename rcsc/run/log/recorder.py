@@ -151,8 +151,8 @@ class Recorder:
     def _level_channel(self, level: RunningLevel) -> int:
         definition = message_definition(level.sign.leaves, level.sign.failed)
         schema = self._writer.register_schema(f"rcsc/{level.name}", "ros1msg", definition.encode())
-        said = {SIGNATURE: signature_text(level.sign)}
-        return self._writer.register_channel(LEVELS + level.name, "ros1", schema, said)
+        metadata = {SIGNATURE: signature_text(level.sign)}
+        return self._writer.register_channel(LEVELS + level.name, "ros1", schema, metadata)
 
     def _buffer_channel(
         self, source: str, leaves: tuple[Leaf, ...], target: str
@@ -169,12 +169,12 @@ class Recorder:
         Raises:
             OSError: The disk is full, or cannot be written; says up to which cycle the log is kept.
         """
-        with self._said():
+        with self._reporting():
             self._write_tick(system, ran)
 
     @contextlib.contextmanager
-    def _said(self) -> Iterator[None]:
-        """Say what is kept where no more can be written; nothing more is."""
+    def _reporting(self) -> Iterator[None]:
+        """Report what is kept where no more can be written, and write nothing more."""
         try:
             yield
         except OSError as error:
@@ -194,7 +194,7 @@ class Recorder:
             self._end_chunk()
 
     def _end_chunk(self) -> None:
-        """Writes what there is, and the chain over it."""
+        """Write what there is, and the chain over it."""
         self._writer.flush()  # type: ignore[no-untyped-call]  # mcap leaves it untyped
         self._writer.add_metadata(CHAIN, {DIGEST: self._file.digest()})
         self._file.flush()
@@ -235,7 +235,7 @@ class Recorder:
         """
         if self._file.closed:
             return
-        with self._said():
+        with self._reporting():
             self._end_chunk()
             self._file.seal_comes()
             self._writer.add_metadata(SEAL, {DIGEST: OPEN})

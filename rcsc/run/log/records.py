@@ -35,7 +35,7 @@ OPEN = "0" * 64
 """The digest of a seal that is not closed yet."""
 
 MOST_CHUNK = 64 * 1024 * 1024
-"""Bytes that a chunk unpacks to; those that are written are ended long before."""
+"""Most bytes that a chunk unpacks to; those that are written are far smaller."""
 _MOST_RECORD = 64 * 1024 * 1024
 _INDEXED, _UNPACKED_A_BYTE, _ALWAYS = 16, 1024, 1 << 24
 """Bytes of the file for each message, the most that a byte of it unpacks to, and what any file may unpack to."""
@@ -59,7 +59,7 @@ class Seal(Enum):
 
 @dataclass(slots=True)
 class ChainCheck:
-    """What was read of a file, and what its chain said.
+    """What was read of a file, and what its chain shows.
 
     Attributes:
         good: Bytes, from the first, that the chain covers and that are as they were recorded.
@@ -73,8 +73,8 @@ class ChainCheck:
     why: str = ""
 
     @property
-    def said(self) -> str:
-        """In words."""
+    def text(self) -> str:
+        """Describe it in words."""
         read = f"the first {self.good} of {self.size} bytes are as they were recorded, and were read"
         match self.seal:
             case Seal.WHOLE:
@@ -107,10 +107,10 @@ class _Frames:
         Raises:
             EOFError: There are not as many.
         """
-        found = self.file.read(count)
-        if len(found) < count:
+        taken = self.file.read(count)
+        if len(taken) < count:
             raise EOFError
-        return found
+        return taken
 
     def frame(self) -> tuple[int, bytes]:
         """The next record, its length and kind before it; not in the chain yet.
@@ -147,21 +147,21 @@ def records(path: Path, checked: ChainCheck) -> Iterator[McapRecord]:
         checked.size = os.fstat(file.fileno()).st_size
         unpacking = _Unpacking(checked.size)
         waiting: list[McapRecord] = []
-        for found in _framed(_Frames(file), checked):
-            if found is None:  # the chain holds so far
+        for record in _framed(_Frames(file), checked):
+            if record is None:  # the chain holds so far
                 yield from unpacking.all_of(waiting, checked)
                 waiting.clear()
                 if unpacking.stopped:
                     return
             else:
-                waiting.append(found)
+                waiting.append(record)
         if checked.seal is not Seal.CHANGED and checked.good == 0:
             checked.seal = Seal.NONE
             yield from unpacking.all_of(waiting, checked)
 
 
 def _framed(frames: _Frames, checked: ChainCheck) -> Iterator[McapRecord | None]:
-    """Every record of the file itself; None where the chain was looked at and holds."""
+    """Yield the records of the file itself; None where the chain was checked and holds."""
     checked.seal = Seal.CUT
     try:
         magic = frames.take(len(_MAGIC))
@@ -194,19 +194,19 @@ def _framed(frames: _Frames, checked: ChainCheck) -> Iterator[McapRecord | None]
 def _sealed(
     frames: _Frames, frame: bytes, record: Metadata, checked: ChainCheck
 ) -> Iterator[McapRecord | None]:
-    """Whatever comes after the seal, and whether the seal is that of the whole file."""
-    said = record.metadata.get(DIGEST, "")
-    if record.metadata != {DIGEST: said} or frame.count(said.encode()) != 1 or len(said) != len(OPEN):
+    """Read what comes after the seal; yield None if it seals the whole file."""
+    digest = record.metadata.get(DIGEST, "")
+    if record.metadata != {DIGEST: digest} or frame.count(digest.encode()) != 1 or len(digest) != len(OPEN):
         raise ValueError(f"the seal at byte {frames.at} is none")
     frames.sealed = frames.chain.copy()
-    frames.pass_over(frame.replace(said.encode(), OPEN.encode()))
+    frames.pass_over(frame.replace(digest.encode(), OPEN.encode()))
     last = b""
     while rest := frames.file.read(1 << 20):
         frames.pass_over(rest)
         last = (last + rest)[-len(_MAGIC) :]
-    if said == OPEN or last != _MAGIC:
+    if digest == OPEN or last != _MAGIC:
         raise EOFError
-    if frames.chain.hexdigest() != said:
+    if frames.chain.hexdigest() != digest:
         checked.seal, checked.why = Seal.CHANGED, f"something changed after byte {checked.good}, or the seal"
         return
     checked.seal, checked.good = Seal.WHOLE, checked.size
@@ -243,7 +243,7 @@ class _Unpacking:
     stopped: bool = False
 
     def all_of(self, several: list[McapRecord], checked: ChainCheck) -> Iterator[McapRecord]:
-        """The records, those in chunks for the chunks."""
+        """Yield the records, for each chunk those in it."""
         try:
             for mcap_record in several:
                 inside = (

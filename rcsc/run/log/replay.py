@@ -120,7 +120,7 @@ class _Again:
         )
 
     def _put(self, before: Values, recorded: Values) -> None:
-        """The state before, and the inputs of the cycle; what the log does not know stays as it is.
+        """Put the state before the cycle, and its inputs; keep what the log does not hold.
 
         Raises:
             BadState: The tables are not proved for it.
@@ -142,20 +142,20 @@ class _Again:
     def _differences(self, recorded: Values, now: Values) -> tuple[ReplayDifference, ...]:
         then_words = words(self.logged.sign, self.logged.level, recorded)
         now_words = words(self.sign, self.level, now)
-        found = tuple(
-            ReplayDifference(name, said, now_words[name])
-            for name, said in then_words.items()
-            if name in now_words and now_words[name] != said
+        differences = tuple(
+            ReplayDifference(name, then, now_words[name])
+            for name, then in then_words.items()
+            if name in now_words and now_words[name] != then
         )
-        return found if any(difference.name not in self.aside for difference in found) else ()
+        return differences if any(difference.name not in self.aside for difference in differences) else ()
 
 
 def _translated(then: Leaf, now: Leaf, value: Value) -> Value:
-    """A recorded value in the other program's numbers; a member that it lacks is put as its initial value."""
+    """Return a recorded value in the other program's numbers; the initial value for a member it lacks."""
     if then.members == now.members:
         return value
-    said = then.shown(value)
-    return now.members.index(said) if said in now.members else now.initial
+    member = then.shown(value)
+    return now.members.index(member) if member in now.members else now.initial
 
 
 def _line(sign: Signature, level: LevelSign, values: Values) -> str:
@@ -190,10 +190,11 @@ class Replay:
         for name, sign in signs.items():
             if not any(level.name == name for level in sign.levels):
                 raise BadDescription(f"program `{sign.program}` has no level `{name}`")
-        made = executors(system, signs, self.kind)
+        by_level = executors(system, signs, self.kind)
         self.unchanged = fingerprints(system) == dict(self.log.programs)
         self._levels = tuple(
-            _again(level, signs[level.name], made[level.name], self.unchanged) for level in self.log.levels
+            _again(level, signs[level.name], by_level[level.name], self.unchanged)
+            for level in self.log.levels
         )
         self.tick = self.log.first
 
@@ -206,12 +207,12 @@ class Replay:
         if tick not in self.log.ticks:
             raise IndexError(tick)
         self.tick = tick
-        found = (
+        cycles = (
             level.cycle(at, self._answers(tick, level.logged.name))
             for level in self._levels
             if (at := level.logged.track.place(tick)) >= 0 and level.logged.track.ticks[at] == tick
         )
-        return ReplayMoment(tick, tuple(cycle for cycle in found if cycle is not None))
+        return ReplayMoment(tick, tuple(cycle for cycle in cycles if cycle is not None))
 
     def _answers(self, tick: int, level: str) -> Answers:
         """What extern procedures gave in a cycle of a finding; where the log keeps none, they are called."""
@@ -240,8 +241,8 @@ class Replay:
 
     @property
     def lacking(self) -> tuple[str, ...]:
-        """What the log has and these tables have not, as far as it was run: it was not compared, or stood at its initial value."""
-        return tuple(one for level in self._levels for one in level.lacking)
+        """Return what the log has and these tables lack, as far as it ran: it was not compared, or put as initial."""
+        return tuple(name for level in self._levels for name in level.lacking)
 
     def first_difference(self) -> ReplayMoment | None:
         """The first tick in which a level leaves something else than was recorded; None for none."""
@@ -249,7 +250,7 @@ class Replay:
 
 
 def _again(logged: LoggedLevel, sign: Signature, executor: Executor, unchanged: bool) -> _Again:
-    level = next(one for one in sign.levels if one.name == logged.name)
+    level = next(level for level in sign.levels if level.name == logged.name)
     aside = frozenset() if unchanged else _ASIDE - logged.sign.index.keys()
     return _Again(logged, sign, level, executor, sign == logged.sign, sign.packed, aside)
 

@@ -1,4 +1,4 @@
-"""What a log says of itself: the layout of each message for other tools, and each level's signature for rcsc.
+"""Describe a log in itself: the layout of each message for other tools, and each level's signature for rcsc.
 
 In: signatures and descriptions. Out: their texts, and back. The canonical bytes of a state (little-endian, unpadded, in
 order) are at the same time a ROS 1 message of plain fields, so that any viewer of MCAP files decodes them.
@@ -55,8 +55,8 @@ def _field(leaf: Leaf) -> Iterable[str]:
     kind, name = _ROS[leaf.c_type], leaf.attribute
     for value, member in enumerate(leaf.members):
         yield f"{kind} {name.upper()}_{member.upper()}={value}"
-    said = " ".join(f"{leaf.name} ({leaf.kind}{', ' + leaf.unit if leaf.unit else ''}) {leaf.doc}".split())
-    yield f"{kind} {name} # {said}"
+    comment = " ".join(f"{leaf.name} ({leaf.kind}{', ' + leaf.unit if leaf.unit else ''}) {leaf.doc}".split())
+    yield f"{kind} {name} # {comment}"
 
 
 def restart_topic(begun: Begun, level: str) -> str:
@@ -65,7 +65,7 @@ def restart_topic(begun: Begun, level: str) -> str:
 
 
 def restart_of(topic: str) -> tuple[Begun, str]:
-    """What `restart_topic` was made of.
+    """Return the parts of a `restart_topic`.
 
     Raises:
         ValueError: A kind that this version does not know.
@@ -99,7 +99,7 @@ def signature_from(text: str) -> Signature:
 
 
 def system_facts(system: Description) -> dict[str, str]:
-    """The description without its paths, which are another's on another machine."""
+    """Return the description without its paths, which differ between machines."""
     return {
         "format": FORMAT,
         "name": system.name,
@@ -124,15 +124,15 @@ def system_of(facts: Mapping[str, str], generated: Path, database: Path) -> Desc
 
 
 def fingerprints(system: Description) -> dict[str, str]:
-    """A digest of everything generated for each program: equal digests, equal tables."""
-    found = {}
+    """Return a digest of everything generated for each program: equal digests, equal tables."""
+    digests = {}
     for program in sorted({level.program for level in system.levels}):
         digest = hashlib.sha256()
         for path in generated_files(system.generated, program):
             text = content(path) if path.is_file() else b""
             digest.update(f"{path.parent.name}/{path.name} {len(text)}\n".encode() + text)
-        found[program] = digest.hexdigest()
-    return found
+        digests[program] = digest.hexdigest()
+    return digests
 
 
 def outside_wires(system: Description) -> tuple[Wire, ...]:

@@ -39,18 +39,18 @@ def failed_of(sign: Signature, values: Values) -> str:
 
 
 def traced(sign: Signature, level: LevelSign, values: Values) -> dict[str, str]:
-    """What the cycle left beside the leaves."""
-    said = (
+    """Return the trace in words, by name."""
+    texts = (
         sign.table_of(level, values), line_of(sign, level, values), fault_of(sign, values),
         refused_of(sign, values), failed_of(sign, values),
     )  # fmt: skip
-    return dict(zip(TRACED, said, strict=True))
+    return dict(zip(TRACED, texts, strict=True))
 
 
 def words(sign: Signature, level: LevelSign, values: Values) -> dict[str, str]:
-    """Everything, by name."""
-    said = {leaf.name: leaf.shown(value) for leaf, value in zip(sign.leaves, values, strict=False)}
-    return traced(sign, level, values) | said
+    """Return trace and leaves in words, by name."""
+    shown = {leaf.name: leaf.shown(value) for leaf, value in zip(sign.leaves, values, strict=False)}
+    return traced(sign, level, values) | shown
 
 
 def fault_in_words(sign: Signature, level: LevelSign, values: Values) -> str:
@@ -62,7 +62,7 @@ def fault_in_words(sign: Signature, level: LevelSign, values: Values) -> str:
 
 
 def begun_in_words(begun: Begun) -> str:
-    """From what state a level went on that was started again."""
+    """Name the state from which a restarted level went on."""
     return _BEGUN[begun]
 
 

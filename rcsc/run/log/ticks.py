@@ -1,4 +1,4 @@
-"""A recorded run, tick by tick, as its levels saw it: the order that each took, its report, its orders and the reports that it saw.
+"""Show a recorded run tick by tick, as its levels saw it: the order each took, its report, its orders, the reports it saw.
 
 In: a log. Out: `LoggedTick`s, in the words of the tables. What an order and a report are is told by their fields (Haynes et al.
 1984, section 9): an order has `inc_command` and `input_command`, a report `inc_command_echo`, `ref_command_echo` and
@@ -33,11 +33,11 @@ class Order:
 
     Attributes:
         buffer: The level's own name of it.
-        other: Who is at the other end of the buffer; empty where the log does not say.
+        other: Who is at the buffer's other end; empty where the log does not say.
         number: Its number; None for what is not numbered.
         new: Whether the number is not what it was.
         altered: Whether the command is not what it was, though the number is.
-        fields: What else it says that is not as it was at first, or that changed.
+        fields: Its other fields that changed or are not initial.
     """
 
     buffer: str
@@ -145,12 +145,12 @@ def frames(log: Log) -> Iterator[LoggedTick]:
 
 
 def _wires(log: Log) -> dict[str, str]:
-    """Who is at the other end of each variable, `level.variable`."""
-    found: dict[str, str] = {}
+    """Return who is at the other end of each variable, `level.variable`."""
+    others: dict[str, str] = {}
     for wire in log.system().wires:
-        found[wire.target] = wire.source.partition(".")[0]
-        found[wire.source] = wire.target.partition(".")[0]
-    return found
+        others[wire.target] = wire.source.partition(".")[0]
+        others[wire.source] = wire.target.partition(".")[0]
+    return others
 
 
 def _box(log: Log, level: LoggedLevel, tick: int, wires: Mapping[str, str]) -> LevelTick:
@@ -174,7 +174,7 @@ class _Cycle:
     wires: Mapping[str, str]
 
     def box(self, told: LoggedCycle | None) -> LevelTick:
-        """What there is to be seen."""
+        """Return what it shows."""
         sign, level = self.logged.sign, self.logged.level
         fault, leaf = fault_of(sign, self.after), refused_of(sign, self.after)
         line, failed = line_of(sign, level, self.after), failed_of(sign, self.after)
@@ -190,7 +190,7 @@ class _Cycle:
             above=above,
             below=below,
             inputs=tuple(
-                said for record in self._aside() for said in self._fields(record, only_changed=True)
+                value for record in self._aside() for value in self._fields(record, only_changed=True)
             ),
             states=tuple(self._states()),
         )
@@ -258,17 +258,17 @@ class _Cycle:
                 yield record
 
     def _states(self) -> Iterator[ShownState]:
-        """Deferred ones first, whether or not they changed; then what changed of the others, and of outputs to nobody who answers."""
+        """Yield every deferred state; then other states that changed, and outputs that nobody answers."""
         index, leaves = self.logged.sign.index, self.logged.sign.leaves
         deferred = [leaf.name for leaf in leaves if pending(leaf.name) in index]
         nexts = {str(pending(name)) for name in deferred}
         for name in deferred:
             now, then = self._word(self.after, name), self._word(self.after, pending(name))
             yield ShownState(name, self._word(self.before, name), now, True, then if then != now else "")
-        said = {*deferred, *nexts}
+        shown = {*deferred, *nexts}
         for leaf in leaves:
             aside = leaf.kind == "state" or (leaf.kind == "output" and not self._is_said(leaf.name))
-            if aside and leaf.name not in said and self._changed(leaf):
+            if aside and leaf.name not in shown and self._changed(leaf):
                 yield ShownState(
                     leaf.name, self._word(self.before, leaf.name), self._word(self.after, leaf.name)
                 )
@@ -276,24 +276,24 @@ class _Cycle:
     def _fields(
         self, record: str, but: tuple[str, ...] = (), *, only_changed: bool = False
     ) -> tuple[TickValue, ...]:
-        """The leaves of a record that are not as at first, or that changed; an array in it as one."""
+        """Return the leaves of a record that changed or are not initial; an array in it as one."""
         aside = {f"{record}.{name}" for name in but}
         arrays: dict[str, list[Leaf]] = {}
         for at in self.logged.sign.record(record):
             leaf = self.logged.sign.leaves[at]
             if leaf.name not in aside:
                 arrays.setdefault(leaf.name.partition("[")[0], []).append(leaf)
-        found = []
+        fields = []
         for name, leaves in arrays.items():
             changed = any(map(self._changed, leaves))
             at_first = all(self._value(self.after, leaf.name) == leaf.initial for leaf in leaves)
             if changed or not (only_changed or at_first):
                 words = [self._word(self.after, leaf.name) for leaf in leaves]
                 shown = words[0] if "[" not in leaves[0].name else f"({', '.join(words)})"
-                found.append(
+                fields.append(
                     TickValue(name if only_changed else name.removeprefix(f"{record}."), shown, changed)
                 )
-        return tuple(found)
+        return tuple(fields)
 
     def _records(self) -> dict[str, str]:
         """Variables, records and arrays whole, with their kinds, in declared order."""

@@ -71,12 +71,12 @@ class Block:
             name = f"{PREFIX}{os.getpid()}-{secrets.token_hex(6)}"
             children.hold(FOLDER / name)
             with _untracked():
-                made = cls(name, SharedMemory(name, create=True, size=size))
+                block = cls(name, SharedMemory(name, create=True, size=size))
             lock = children.lock(FOLDER / name)
             if lock is not None:
-                made._lock = lock
-                return made
-            made.close()
+                block._lock = lock
+                return block
+            block.close()
             children.let_go(FOLDER / name)
 
     @classmethod

@@ -112,12 +112,12 @@ class Turn:
 
     def _behind(self) -> dict[str, int]:
         """The clocks of those that have to be waited for."""
-        now_ms, found = self._now_ms, {}
+        now_ms, behind = self._now_ms, {}
         for name, period_ms in self.clocks.periods_ms.items():
             other_ms = self.clocks.now_ms(name)
             if other_ms is not None and other_ms + period_ms < now_ms and self._left.get(name) != other_ms:
-                found[name] = other_ms
-        return found
+                behind[name] = other_ms
+        return behind
 
     def _go_on_without(self, behind: Mapping[str, int]) -> None:
         """Wait no longer for those that do not move; the time that they have lost is not made up for when they do."""

@@ -127,7 +127,7 @@ def layout(system: Description, signs: Mapping[str, Signature]) -> Layout:
         first, text = ends[0]
         packed = struct.Struct(f"<{text}")
         if owner in signs:
-            bit = 1 << sum(one.region == owner for one in places.values())
+            bit = 1 << sum(place.region == owner for place in places.values())
             places[wire.source] = BufferPlace(owner, first, packed, bit)
         else:
             payloads[wire.source] = packed
@@ -153,9 +153,9 @@ def _laid(payloads: Mapping[str, struct.Struct], places: Mapping[str, BufferPlac
         slot = -(-(HEAD.size + packed.size) // LINE) * LINE
         regions[name] = SharedRegion(at, packed, slot)
         at += LINE + 2 * slot
-    said = [(name, region.at, region.packed.format) for name, region in regions.items()]
-    said += [(name, place.first, place.packed.format) for name, place in places.items()]
-    return Layout(regions, places, at, zlib.crc32(repr(said).encode()))
+    entries = [(name, region.at, region.packed.format) for name, region in regions.items()]
+    entries += [(name, place.first, place.packed.format) for name, place in places.items()]
+    return Layout(regions, places, at, zlib.crc32(repr(entries).encode()))
 
 
 @dataclass(slots=True)
@@ -174,10 +174,10 @@ class SharedMemoryBuffers:
     @classmethod
     def create(cls, layout: Layout, more: int = 0) -> Self:
         """A new block in which no buffer holds anything, with so many bytes more after the layout's."""
-        made = cls(Block.create(layout.size + more), layout)
+        buffers = cls(Block.create(layout.size + more), layout)
         for name, region in layout.regions.items():
-            made._commit(name, 0, bytes(region.packed.size))
-        return made
+            buffers._commit(name, 0, bytes(region.packed.size))
+        return buffers
 
     @classmethod
     def attach(cls, name: str, layout: Layout) -> Self:
@@ -256,10 +256,10 @@ class SharedMemoryBuffers:
             stamp = self.block.word(region.at)
             if known is not None and known.stamp == stamp:
                 return known
-            found = self._slot(region, stamp)
-            if found is not None:
-                self._images[name] = found
-                return found
+            image = self._slot(region, stamp)
+            if image is not None:
+                self._images[name] = image
+                return image
             if self.block.word(region.at) == stamp:  # no writer has been here: the slot is bad
                 return None
         return known
@@ -269,9 +269,9 @@ class SharedMemoryBuffers:
         image = self.block.read(at, HEAD.size + region.packed.size)
         # The stamp before and after says that no writer was here; the checksum, that one had been, in whatever order
         # this machine shows one processor's stores to another.
-        said, mask, checksum, _ = HEAD.unpack_from(image)
+        written, mask, checksum, _ = HEAD.unpack_from(image)
         payload = image[HEAD.size :]
-        if not said == stamp == self.block.word(at) or checksum != self._checksum(stamp, mask, payload):
+        if not written == stamp == self.block.word(at) or checksum != self._checksum(stamp, mask, payload):
             return None
         return Image(stamp, mask, payload)
 

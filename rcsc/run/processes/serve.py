@@ -146,12 +146,12 @@ def serve_level(setting: Setting, name: str, told: "Connection") -> None:
 def serve_outside(setting: Setting, name: str, factory: Factory, told: "Connection") -> None:
     """A process for what stands outside the levels, until it is over: until one part of it says `over`."""
     with _telling(told), _attached(setting) as (_, transport):
-        made: tuple[Outside, ...] = tuple(factory.make())
+        parts: tuple[Outside, ...] = tuple(factory.make())
         for tick in _rounds(setting, name, transport):
-            for one in made:
-                for buffer, values in one.step(tick, transport.latest).items():
+            for part in parts:
+                for buffer, values in part.step(tick, transport.latest).items():
                     _publish(transport, buffer, values)
-            if any(getattr(one, "over", False) for one in made):
+            if any(getattr(part, "over", False) for part in parts):
                 return
 
 
@@ -185,7 +185,7 @@ def _attached(setting: Setting) -> Iterator[tuple[dict[str, Signature], SharedMe
 
 
 def _rounds(setting: Setting, name: str, buffers: SharedMemoryBuffers) -> Iterator[int]:
-    """Counts a process's rounds, each when it is due and its turn has come, until SIGTERM or until nobody is there who started it."""
+    """Yield a process's ticks, each when it is due and its turn has come, until SIGTERM or the end of its parent."""
     told: list[int] = []
     signal.signal(signal.SIGTERM, lambda number, _: told.append(number))
     turn = Turn(Clocks(buffers.block, buffers.layout.size, setting.periods_ms), name)
@@ -202,12 +202,12 @@ def _rounds(setting: Setting, name: str, buffers: SharedMemoryBuffers) -> Iterat
 
 def _level(setting: Setting, name: str, sign: Signature) -> RunningLevel:
     system = setting.description
-    spec = next(one for one in system.levels if one.name == name)
-    level = next(one for one in sign.levels if one.name == name)
-    made = (
+    spec = next(spec for spec in system.levels if spec.name == name)
+    level = next(level for level in sign.levels if level.name == name)
+    executor = (
         CExecutor(build(system.generated, [sign]), sign, level)
         if setting.kind == "c"
         else PythonExecutor(system.generated, sign, level)
     )
     queries = setting.queries.make() if setting.queries else {}
-    return running_level(spec, system, sign, made, queries)
+    return running_level(spec, system, sign, executor, queries)

@@ -34,9 +34,9 @@ if TYPE_CHECKING:
 PATIENCE_S, GRACE_S = 5.0, 0.5
 MOST_RESTARTS = 20
 STILL_PERIODS, STILL_S = 25, 0.2
-"""A process that has committed nothing for so many periods, and so many seconds, is looked at."""
+"""Periods, and seconds, without a commit after which a process is looked at."""
 LOOP_CPU_S, WAIT_S = 5.0, 10.0
-"""One that computes for so long without a commit loops; one that waits for so long hangs. One that gets no processor does neither."""
+"""Seconds without a commit: of computing for a process that loops, of waiting for one that hangs."""
 
 
 @dataclass(slots=True)
@@ -126,10 +126,10 @@ class Supervisor:
             else (serve_outside, (self._setting, name, self._outside[name], tells))
         )
         self._clocks.start(name)
-        made = children.process(name, work[0], *work[1])
-        children.start(made)
+        process = children.process(name, work[0], *work[1])
+        children.start(process)
         tells.close()
-        self._running[name] = made
+        self._running[name] = process
         if name in self._told:
             self._told[name].close()
         self._told[name] = told
@@ -167,7 +167,7 @@ class Supervisor:
             if code == REFUSED and self._told[name].poll():
                 raise StateTableError(self._told[name].recv_bytes(MOST_TOLD).decode(errors="replace"))
             if code == FAULTY and name in self._signs:
-                raise StateTableError(self._said(name))
+                raise StateTableError(self._message(name))
             if code is not None and code > 0:
                 raise ChildProcessError(f"process `{name}` ended with code {code}")
 
@@ -176,9 +176,9 @@ class Supervisor:
         return tuple(name for name in self._running if (self.code(name) or 0) < 0)
 
     def still(self) -> dict[str, str]:
-        """Processes that run and stand still, and why: of each, whether it was stopped, loops, or waits for something."""
-        found = {name: self._why_still(name) for name in self._running if self.runs(name)}
-        return {name: why for name, why in found.items() if why}
+        """Return the processes that run and stand still, and why: each was stopped, loops, or waits for something."""
+        reasons = {name: self._why_still(name) for name in self._running if self.runs(name)}
+        return {name: why for name, why in reasons.items() if why}
 
     def _why_still(self, name: str) -> str:
         region = self.buffers.layout.regions.get(name)
@@ -216,7 +216,7 @@ class Supervisor:
             self.buffers.block.unlink()
             self.buffers.close()
 
-    def _said(self, name: str) -> str:
+    def _message(self, name: str) -> str:
         values = self.buffers.checkpoint(name)
         if isinstance(values, NotShared):
             return f"level `{name}`: a fault"
@@ -289,7 +289,7 @@ def _state(pid: int) -> tuple[str, float]:
 
 
 def _ended(process: "SpawnProcess", until_s: float) -> None:
-    """Waits for the end of a process that was told, and kills it then; at once where it stands still and hears nothing."""
+    """Wait for the end of a process that was told to end, then kill it; at once where it stands still."""
     if process.pid is not None and _state(process.pid)[0] in STOPPED:
         process.kill()
     process.join(max(0.0, until_s - time.monotonic()))
