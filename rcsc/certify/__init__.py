@@ -97,8 +97,8 @@ class Certified:
 
 def check_certificate(program: Program, certificate: Mapping[str, object]) -> tuple[str, ...]:
     """Problems of the certificate, and what it leaves unchecked; none when it shows all that `program` owes."""
-    found = certify(program, certificate)
-    return (*found.problems, *(f"not checked: {unchecked.name}" for unchecked in found.unchecked))
+    outcome = certify(program, certificate)
+    return (*outcome.problems, *(f"not checked: {unchecked.name}" for unchecked in outcome.unchecked))
 
 
 def certify(
@@ -166,7 +166,7 @@ class _Check:
         self.rests: dict[str, None] = {}
 
     def outcome(self) -> Certified:
-        """Everything that is owed, checked."""
+        """Check everything that is owed."""
         for debt in Debts(self.program, self.start).all():
             self.settle(debt)
         for table in self.relying.tables:
@@ -219,7 +219,7 @@ class _Check:
         self.checked[name] = None
 
     def settle(self, debt: Debt) -> None:
-        """One run: what it owes, in the order in which it does."""
+        """Settle what one run owes, in the order of the run."""
         if debt.too_long:
             name = f"{debt.too_long}: what it owes has too many steps to be followed"
             self.unchecked[name] = Unchecked(name, debt.written or self.program.tables[0].span, "")
@@ -238,7 +238,7 @@ class _Check:
             self.note(owed, outcome)
 
     def note(self, owed: Owed, outcome: Outcome) -> None:
-        """Enters what became of one obligation."""
+        """Enter the outcome of one obligation."""
         match outcome:
             case Shown():
                 self.checked[owed.name] = None
@@ -254,7 +254,7 @@ class _Check:
                 self.leave(owed.name, owed.written, question)
 
     def leave(self, name: str, written: Span, question: str) -> None:
-        """Enters an obligation that is not settled; those of one name are numbered, so that each question is told."""
+        """Enter an open obligation; those of one name are numbered, so that each question is listed."""
         same = self.left.setdefault(name, set())
         if (question, written) not in same:
             same.add((question, written))

@@ -133,7 +133,7 @@ class Run:
         self._steps = self._fresh = 0
 
     def owe(self, what: str, good: Term, written: Written = NOWHERE) -> int:
-        """Adds an obligation; its number."""
+        """Add an obligation; return its number."""
         number = len(self.owed)
         place = written if written.file else self.cell
         self.owed.append(Owed(f"{self.where}: {what}", place, self.path, good, number))
@@ -184,13 +184,13 @@ class Run:
                 return self._applied(expr, op, [self.evaluate(arg) for arg in args])
 
     def _among(self, subject: Term, values: Iterable[object]) -> Term:
-        found = (
+        constants = (
             self.terms.constant(subject.sort, value) for value in values if isinstance(value, int | float)
         )
-        return self.terms.some(self.terms.make("=", subject, term) for term in found)
+        return self.terms.some(self.terms.make("=", subject, term) for term in constants)
 
     def _truth(self, true: Pairs, first: Expr, second: Expr) -> Term:
-        """The right side is looked at only where the left does not decide."""
+        """The right side is evaluated only where the left does not decide."""
         left, path = self.evaluate(first), self.path
         open_for = [a for a in (True, False) if ((a, True) in true) != ((a, False) in true)]
         if len(open_for) == 1:
@@ -218,11 +218,11 @@ class Run:
         if at.op == "constant":
             return self.leaf(leaves[min(max(int(at.low), 0), len(leaves) - 1)])
         self._step(len(leaves))
-        found = self.leaf(leaves[-1])
+        element = self.leaf(leaves[-1])
         for number, name in reversed(list(enumerate(leaves[:-1]))):
             here = self.terms.make("=", at, self.terms.constant(INT, number))
-            found = self.terms.choice(here, self.leaf(name), found)
-        return found
+            element = self.terms.choice(here, self.leaf(name), element)
+        return element
 
     def _applied(self, expr: Apply, op: Strict, args: list[Term]) -> Term:
         kinds = [kind for kind in (*(arg.type for arg in expr.args), expr.type) if isinstance(kind, Int)]
@@ -242,9 +242,9 @@ class Run:
             return self._operation(op, args)
         if op is Op.MOD:  # the machine divides first
             self._owe_word(self._operation(Op.DIV, args), ends, "the quotient", expr.span)
-        found = self._operation(op, args)
-        self._owe_word(found, ends, f"the result of `{op.value}`", expr.span)
-        return found
+        result = self._operation(op, args)
+        self._owe_word(result, ends, f"the result of `{op.value}`", expr.span)
+        return result
 
     def _owe_word(self, value: Term, ends: tuple[int, int], what: str, written: Written) -> None:
         if value.op == "constant" and ends[0] <= value.low <= ends[1]:
@@ -294,7 +294,7 @@ class Run:
     # --- statements ---
 
     def execute(self, body: Iterable[Statement]) -> None:
-        """Runs statements."""
+        """Run the statements."""
         for statement in body:
             self._step()
             match statement:
@@ -333,14 +333,14 @@ class Run:
         self.state.assigned.pop(name, None)
 
     def _assign(self, place: Place, value: Expr) -> None:
-        found = self.evaluate(value)
+        term = self.evaluate(value)
         match place:
             case ToLeaf(name=name, type=kind):
-                self.write(name, self._stored(kind, found, name, value.span), self.terms.true)
+                self.write(name, self._stored(kind, term, name, value.span), self.terms.true)
             case ToLocal(name=name, type=kind):
-                self._set_local(name, self._stored(kind, found, name, value.span))
+                self._set_local(name, self._stored(kind, term, name, value.span))
             case ToElement(leaves=leaves, index=index, type=kind):
-                stored = self._stored(kind, found, leaves[0], value.span)
+                stored = self._stored(kind, term, leaves[0], value.span)
                 at = self.index(index, len(leaves))
                 self._step(len(leaves))
                 for number, leaf in enumerate(leaves):
@@ -370,14 +370,14 @@ class Run:
         before, path = self.state, self.path
         self.state, self.path = before.copy(), self.terms.every((path, condition))
         self.execute(body)
-        one = self.state
+        after = self.state
         self.state, self.path = before, self.terms.every((path, self.terms.negation(condition)))
         self._arms(others, orelse)
         self.path = path
-        self.state = self._merged(condition, one, self.state)
+        self.state = self._merged(condition, after, self.state)
 
-    def _merged(self, condition: Term, one: State, two: State) -> State:
-        self._step(len(one.leaves) + len(two.leaves))
+    def _merged(self, condition: Term, then: State, orelse: State) -> State:
+        self._step(len(then.leaves) + len(orelse.leaves))
         choice, start = self.terms.choice, self.start.leaves
 
         def joined(a: dict[str, Term], b: dict[str, Term], otherwise: Term) -> dict[str, Term]:
@@ -386,17 +386,21 @@ class Run:
             }
 
         leaves = {
-            name: choice(condition, one.leaves.get(name) or start[name], two.leaves.get(name) or start[name])
-            for name in {**one.leaves, **two.leaves}
+            name: choice(
+                condition, then.leaves.get(name) or start[name], orelse.leaves.get(name) or start[name]
+            )
+            for name in {**then.leaves, **orelse.leaves}
         }
         local = {
             name: choice(
-                condition, one.local.get(name) or two.local[name], two.local.get(name) or one.local[name]
+                condition,
+                then.local.get(name) or orelse.local[name],
+                orelse.local.get(name) or then.local[name],
             )
-            for name in {**one.local, **two.local}
-        }  # one that only one side has was never assigned on the other: reading it there is owed not to happen
-        assigned = joined(one.assigned, two.assigned, self.terms.true)
-        return State(leaves, local, assigned, joined(one.wrote, two.wrote, self.terms.false))
+            for name in {**then.local, **orelse.local}
+        }  # a local of one side only was never assigned on the other: reading it there is owed not to happen
+        assigned = joined(then.assigned, orelse.assigned, self.terms.true)
+        return State(leaves, local, assigned, joined(then.wrote, orelse.wrote, self.terms.false))
 
     # --- calls ---
 

@@ -37,11 +37,11 @@ class Known:
     def span(self, term: Term) -> Span:
         """The span of the term."""
         for part in parts_first(term, but=self._spans):
-            self._spans[part] = self._found(part)
+            self._spans[part] = self._span_of(part)
             self.work += 1
         return self._spans[term]
 
-    def _found(self, term: Term) -> Span:
+    def _span_of(self, term: Term) -> Span:
         if term.op == "kept":
             span = self._spans[term.args[0]]
             if term.debt in self.shown:
@@ -55,9 +55,9 @@ class Known:
         if told is None:
             self.impossible = True
             return
-        for one, span in told.items():
-            met = _meet(self._facts.get(one, FREE), span)
-            self._facts[one] = met
+        for part, span in told.items():
+            met = _meet(self._facts.get(part, FREE), span)
+            self._facts[part] = met
             self.impossible = self.impossible or met[0] > met[1]
 
     def _told(self, term: Term, yes: bool) -> Facts | None:
@@ -71,9 +71,9 @@ class Known:
             return self._all(term.args, yes) if (term.op == "and") == yes else self._any(term.args, yes)
         told: Facts = {term: (int(yes), int(yes))}
         if term.op in ("=", "<", "<="):
-            for one, found in self._compared(term, yes):
-                told[one] = _meet(told.get(one, FREE), found)
-                if told[one][0] > told[one][1]:
+            for part, bounds in self._compared(term, yes):
+                told[part] = _meet(told.get(part, FREE), bounds)
+                if told[part][0] > told[part][1]:
                     return None
         return told
 
@@ -100,20 +100,20 @@ class Known:
         }  # fmt: skip
 
     def _compared(self, term: Term, yes: bool) -> Iterable[tuple[Term, tuple[Number, Number]]]:
-        one, two = term.args
-        a, b = self.span(one), self.span(two)
+        left, right = term.args
+        a, b = self.span(left), self.span(right)
         if not yes and (a is None or b is None):
             return  # a comparison with a NaN is false, and says nothing
         (a, b) = a or FREE, b or FREE
         if term.op == "=":
-            yield from ((one, b), (two, a)) if yes else (*_apart(one, a, b), *_apart(two, b, a))
+            yield from ((left, b), (right, a)) if yes else (*_apart(left, a, b), *_apart(right, b, a))
             return
         op = term.op
         if not yes:
-            op, one, two, a, b = ("<=" if op == "<" else "<"), two, one, b, a
-        by = int(op == "<" and one.sort == INT)
-        yield one, (-math.inf, b[1] - by)
-        yield two, (a[0] + by, math.inf)
+            op, left, right, a, b = ("<=" if op == "<" else "<"), right, left, b, a
+        by = int(op == "<" and left.sort == INT)
+        yield left, (-math.inf, b[1] - by)
+        yield right, (a[0] + by, math.inf)
 
 
 def _apart(

@@ -79,7 +79,7 @@ class Debts:
         self.holding = tuple(start.condition(condition) for _, condition, _ in self.invariants)
 
     def all(self) -> Iterator[Debt]:
-        """Everything."""
+        """Every debt."""
         yield self._first()
         yield from self._conditions()
         yield self._deferred()
@@ -171,12 +171,12 @@ class Debts:
         run.keeps(self.invariants)
         return Debt(self.holding, tuple(run.owed))
 
-    def _set(self, run: Run, one: Variable, declared: Value) -> None:
-        """Gives a leaf a value that its declaration names, which is owed to be one of its type."""
-        value = run.state.leaves[one.name] = self.terms.constant(sort_of(one.type), declared)
-        low, high = ends_of(one.type)
+    def _set(self, run: Run, variable: Variable, declared: Value) -> None:
+        """Give a leaf a value that its declaration names; that its type has it is owed."""
+        value = run.state.leaves[variable.name] = self.terms.constant(sort_of(variable.type), declared)
+        low, high = ends_of(variable.type)
         if not (low <= value.low and value.high <= high):
-            run.owe(f"`{one.name}` lies in its range", self.terms.false, one.span)
+            run.owe(f"`{variable.name}` lies in its range", self.terms.false, variable.span)
 
     def _running(self, where: str, cell: Written) -> _Running:
         run = _Running(self.start, where, cell)
@@ -205,7 +205,7 @@ class Debts:
         waiting = list(reached)
         while waiting:
             inner = everything(self.start.procedures[waiting.pop()].body)
-            new = {str(one.procedure) for one in inner if isinstance(one, Call)} - reached
+            new = {str(statement.procedure) for statement in inner if isinstance(statement, Call)} - reached
             reached |= new
             waiting += new
         for procedure in self.program.procedures:

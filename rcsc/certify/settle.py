@@ -44,19 +44,19 @@ Cases: TypeAlias = Mapping[Term, Any]
 
 @dataclass(frozen=True, slots=True)
 class Shown:
-    """It holds."""
+    """The obligation holds."""
 
 
 @dataclass(frozen=True, slots=True)
 class Fails:
-    """It does not; the values of a case, by variable."""
+    """The obligation fails in a case: values by variable."""
 
     case: tuple[tuple[str, Number], ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Left:
-    """It was not settled; the question that would settle it."""
+    """The obligation is open; this question would settle it."""
 
     question: str
 
@@ -97,7 +97,7 @@ class Settler:
     def _every_case(self, hypotheses: Sequence[Term], bad: Term, known: Known) -> Outcome | None:
         """All values of what the obligation speaks of, and of what hypotheses tie to that while these are few.
 
-        Hypotheses that speak of nothing of it are tried after it, part by part: a case that fails is one only where they can hold.
+        Hypotheses about other variables are tried afterwards, part by part: a failing case counts only where they can hold.
         """
         rest, case = list(hypotheses), dict[str, Number]()
         wanted = bad
@@ -105,14 +105,14 @@ class Settler:
             together = _tied(wanted, rest, known)
             if together is None:
                 return None
-            found = self._where(
+            rows = self._where(
                 self.terms.every((wanted, *together)), cases := _crossed(variables(wanted, *together), known)
             )
-            if found is None:
+            if rows is None:
                 return None
-            if not len(found):
+            if not len(rows):
                 return Shown()  # the obligation cannot fail, or the hypotheses cannot hold
-            case |= dict(_row(cases, int(found[0])))
+            case |= dict(_row(cases, int(rows[0])))
             rest = [term for term in rest if term not in together]
             if not rest:
                 return Fails(tuple(sorted(case.items())))
@@ -182,8 +182,8 @@ def variables(*terms: Term) -> list[Term]:
     return [term for term in parts_first(*terms) if term.op == "variable"]
 
 
-def _extent(one: Term, known: Known) -> tuple[Number, Number]:
-    return known.span(one) or (one.low, one.high)
+def _extent(term: Term, known: Known) -> tuple[Number, Number]:
+    return known.span(term) or (term.low, term.high)
 
 
 def _few(wanted: Iterable[Term], known: Known, size: int) -> bool:
@@ -233,11 +233,11 @@ def _row(cases: Cases, at: int) -> Iterator[tuple[str, Number]]:
 
 def _edges(term: Term) -> Mapping[str, list[Number]]:
     """Constants in the term and their neighbours, by sort."""
-    found: dict[str, list[Number]] = {BOOL: [0, 1], INT: [0, 1, -1], REAL: [0.0, 1.0, -1.0]}
+    edges: dict[str, list[Number]] = {BOOL: [0, 1], INT: [0, 1, -1], REAL: [0.0, 1.0, -1.0]}
     for part in parts_first(term):
         if part.op == "constant" and part.sort != BOOL:
-            found[part.sort] += [part.low, part.low - 1, part.low + 1]
-    return {sort: sorted(set(values)) for sort, values in found.items()}
+            edges[part.sort] += [part.low, part.low - 1, part.low + 1]
+    return {sort: sorted(set(values)) for sort, values in edges.items()}
 
 
 def values_in(wanted: Term, cases: Cases, count: int) -> Any:
@@ -251,7 +251,7 @@ def values_in(wanted: Term, cases: Cases, count: int) -> Any:
     parts = parts_first(wanted)
     spans = [known.span(part) for part in parts if part.sort == INT]
     wide = any(span is None or not all(isfinite(end) and abs(end) < _FIT for end in span) for span in spans)
-    found: dict[Term, Any] = {}
+    columns: dict[Term, Any] = {}
     for part in parts:
         if part.op == "constant":
             column = np.repeat(_array(part.sort, [part.low], wide=wide), count)
@@ -260,34 +260,34 @@ def values_in(wanted: Term, cases: Cases, count: int) -> Any:
             column = column.astype(np.int64) if not wide and part.sort == INT else column
         else:
             with np.errstate(all="ignore"):  # infinities and NaN are values
-                column = _computed(part, [found[arg] for arg in part.args], wide)
-        found[part] = column
-    return found[wanted].astype(bool) if wanted.sort == BOOL else found[wanted]
+                column = _computed(part, [columns[arg] for arg in part.args], wide)
+        columns[part] = column
+    return columns[wanted].astype(bool) if wanted.sort == BOOL else columns[wanted]
 
 
 def _computed(term: Term, args: Sequence[Any], wide: bool) -> Any:
     """One operation in every case."""
-    one, two = args[0], args[-1]
+    first, last = args[0], args[-1]
     match term.op:
         case "kept":
-            return one
+            return first
         case "not":
-            return ~one.astype(bool)
+            return ~first.astype(bool)
         case "and" | "or":
             join = np.logical_and if term.op == "and" else np.logical_or
             return join.reduce([arg.astype(bool) for arg in args])
         case "ite":
-            return np.where(one.astype(bool), args[1], args[2])
+            return np.where(first.astype(bool), args[1], args[2])
         case "=" | "<" | "<=":
             compare = {"=": operator.eq, "<": operator.lt, "<=": operator.le}[term.op]
-            return compare(one, two).astype(bool)
+            return compare(first, last).astype(bool)
         case "real":
-            return np.array([float(value) for value in one.tolist()], dtype=np.float64)
+            return np.array([float(value) for value in first.tolist()], dtype=np.float64)
         case "int":
-            whole = [int(value) if isfinite(value) else 0 for value in one.tolist()]
+            whole = [int(value) if isfinite(value) else 0 for value in first.tolist()]
             return np.array(whole, dtype=object if wide else np.int64)
         case "/" | "mod" if term.sort == INT:
-            return _divided(term.op, one, two)
+            return _divided(term.op, first, last)
         case _:
             return _NUMBERS[term.op](*args)
 
@@ -297,12 +297,12 @@ _NUMBERS: Mapping[str, Callable[..., Any]] = {
 }  # fmt: skip
 
 
-def _divided(op: str, one: Any, two: Any) -> Any:
+def _divided(op: str, dividend: Any, divisor: Any) -> Any:
     """The quotient toward zero, or what it leaves; 0 where the divisor is 0."""
-    divisor = np.where(two == 0, 1, two)
-    quotient = abs(one) // abs(divisor)
-    quotient = np.where((one < 0) == (divisor < 0), quotient, -quotient)
-    return np.where(two == 0, 0, quotient if op == "/" else one - divisor * quotient)
+    nonzero = np.where(divisor == 0, 1, divisor)
+    quotient = abs(dividend) // abs(nonzero)
+    quotient = np.where((dividend < 0) == (nonzero < 0), quotient, -quotient)
+    return np.where(divisor == 0, 0, quotient if op == "/" else dividend - nonzero * quotient)
 
 
 # --- SMT-LIB ---------------------------------------------------------------------------

@@ -154,9 +154,9 @@ class _Terms:
                     total, right, factor if op is Op.ADD else -factor
                 )
             case Apply(op=Op.MUL, args=(left, right), type=Int()):
-                for one, other in ((left, right), (right, left)):
+                for side, other in ((left, right), (right, left)):
                     trial: dict[str, int] = {}
-                    constant = self.add(trial, one, 1)
+                    constant = self.add(trial, side, 1)
                     if not any(trial.values()):
                         return self.add(total, other, factor * constant)
         name = self.name(expr)
@@ -258,13 +258,13 @@ class TableChecker:
         for part in (self.judge(part, bounds) for part in formula.parts):
             if part == other(()):
                 return other(())
-            for one in part.parts if isinstance(part, All | AnyOf) and isinstance(part, kind) else (part,):
-                if not isinstance(one, tuple):
-                    parts.append(one)
-                elif one[0] not in boxes:
-                    boxes[one[0]] = one[1]
+            for child in part.parts if isinstance(part, All | AnyOf) and isinstance(part, kind) else (part,):
+                if not isinstance(child, tuple):
+                    parts.append(child)
+                elif child[0] not in boxes:
+                    boxes[child[0]] = child[1]
                 else:
-                    boxes[one[0]] = (_meet if kind is All else _join)(boxes[one[0]], one[1])
+                    boxes[child[0]] = (_meet if kind is All else _join)(boxes[child[0]], child[1])
         for form, box in boxes.items():  # what speaks of one form is one box of it
             low, high = self.range(form, bounds)
             if box == (((low, high),) if kind is AnyOf else ()):
@@ -381,14 +381,14 @@ class TableChecker:
                 return [make("<=", least, parts[0][0]), make("<=", parts[0][0], greatest)]
             if [k for _, k in parts] != [1, -1]:
                 return []
-            (one, _), (two, _) = parts
-            said = [
-                ("<", one, two, high <= -1),
-                ("<=", one, two, high <= 0),
-                ("<", two, one, low >= 1),
-                ("<=", two, one, low >= 0),
+            (first, _), (second, _) = parts
+            comparisons = [
+                ("<", first, second, high <= -1),
+                ("<=", first, second, high <= 0),
+                ("<", second, first, low >= 1),
+                ("<=", second, first, low >= 0),
             ]
-            return [make(op, left, right) for op, left, right, true in said if true]
+            return [make(op, left, right) for op, left, right, true in comparisons if true]
         total = terms.constant(INT, 0)
         for term, k in parts:
             number = (
@@ -509,10 +509,10 @@ def _complement(box: Box, low: int, high: int) -> Box:
 
 def _union(boxes: Iterator[Box]) -> Box:
     """The intervals of all boxes, sorted, those that overlap or touch joined."""
-    found: list[tuple[int, int]] = []
+    intervals: list[tuple[int, int]] = []
     for low, high in sorted(pair for box in boxes for pair in box):
-        if found and low <= found[-1][1] + 1:
-            found[-1] = (found[-1][0], max(high, found[-1][1]))
+        if intervals and low <= intervals[-1][1] + 1:
+            intervals[-1] = (intervals[-1][0], max(high, intervals[-1][1]))
         else:
-            found.append((low, high))
-    return tuple(found)
+            intervals.append((low, high))
+    return tuple(intervals)

@@ -61,7 +61,7 @@ class Terms:
         self._known: dict[tuple[object, ...], Term] = {}
         self.true, self.false = self.constant(BOOL, 1), self.constant(BOOL, 0)
 
-    def _one(self, term: Term) -> Term:
+    def _interned(self, term: Term) -> Term:
         ends = (repr(term.low), repr(term.high))
         key = (term.op, term.sort, *ends, term.name, term.debt, *map(id, term.args))
         return self._known.setdefault(key, term)
@@ -69,38 +69,38 @@ class Terms:
     def constant(self, sort: str, value: Value) -> Term:
         """A constant."""
         point = float(value) if sort == REAL else int(value)
-        return self._one(Term("constant", (), sort, point, point))
+        return self._interned(Term("constant", (), sort, point, point))
 
     def variable(self, name: str, kind: Scalar) -> Term:
         """Any value of the type."""
-        return self._one(Term("variable", (), sort_of(kind), *ends_of(kind), name))
+        return self._interned(Term("variable", (), sort_of(kind), *ends_of(kind), name))
 
     def kept(self, inner: Term, low: Number, high: Number, debt: int) -> Term:
         """The value, where obligation `debt` holds: then it lies in `low .. high`."""
-        return self._one(Term("kept", (inner,), inner.sort, low, high, debt=debt))
+        return self._interned(Term("kept", (inner,), inner.sort, low, high, debt=debt))
 
     def make(self, op: str, *args: Term) -> Term:
         """An operation on numbers, or a comparison."""
         sort = BOOL if op in ("=", "<", "<=") else {"int": INT, "real": REAL}.get(op, args[0].sort)
-        made = Term(op, args, sort)
+        term = Term(op, args, sort)
         if all(arg.op == "constant" for arg in args):
-            span = spanned(made, [spanned(arg, ()) for arg in args])
+            span = spanned(term, [spanned(arg, ()) for arg in args])
             if span is not None and span[0] == span[1] and math.isfinite(span[0]):
                 return self.constant(sort, span[0])
-        return self._one(made)
+        return self._interned(term)
 
-    def negation(self, one: Term) -> Term:
-        """Its opposite."""
-        if one.op == "constant":
-            return self.false if one.low else self.true
-        return one.args[0] if one.op == "not" else self._one(Term("not", (one,), BOOL))
+    def negation(self, term: Term) -> Term:
+        """The opposite of a term."""
+        if term.op == "constant":
+            return self.false if term.low else self.true
+        return term.args[0] if term.op == "not" else self._interned(Term("not", (term,), BOOL))
 
     def every(self, parts: Iterable[Term]) -> Term:
-        """All of them."""
+        """That all parts hold."""
         return self._joined("and", parts, self.true, self.false)
 
     def some(self, parts: Iterable[Term]) -> Term:
-        """One of them."""
+        """That some part holds."""
         return self._joined("or", parts, self.false, self.true)
 
     def _joined(self, op: str, parts: Iterable[Term], neutral: Term, final: Term) -> Term:
@@ -110,17 +110,17 @@ class Terms:
         if final in flat:
             return final
         kept = tuple(part for part in flat if part is not neutral)
-        return kept[0] if len(kept) == 1 else self._one(Term(op, kept, BOOL)) if kept else neutral
+        return kept[0] if len(kept) == 1 else self._interned(Term(op, kept, BOOL)) if kept else neutral
 
-    def follows(self, one: Term, two: Term) -> Term:
-        """The second wherever the first."""
-        return self.some((self.negation(one), two))
+    def follows(self, premise: Term, conclusion: Term) -> Term:
+        """The conclusion wherever the premise."""
+        return self.some((self.negation(premise), conclusion))
 
-    def choice(self, condition: Term, one: Term, two: Term) -> Term:
-        """The first where the condition holds, else the second."""
+    def choice(self, condition: Term, then: Term, orelse: Term) -> Term:
+        """`then` where the condition holds, else `orelse`."""
         if condition.op == "constant":
-            return one if condition.low else two
-        return one if one is two else self._one(Term("ite", (condition, one, two), one.sort))
+            return then if condition.low else orelse
+        return then if then is orelse else self._interned(Term("ite", (condition, then, orelse), then.sort))
 
 
 # --- spans -----------------------------------------------------------------------------
@@ -152,16 +152,16 @@ def _logic(op: str, spans: Sequence[tuple[Number, Number]]) -> Span:
 
 
 def _chosen(term: Term, spans: Sequence[Span]) -> Span:
-    """Of both sides, each where the condition lets it be; None only where a side may be a NaN."""
+    """The span of both sides, each as the condition narrows it; None only where one may be a NaN."""
     condition = spans[0] or TRUTHS
     if condition[0] == condition[1]:
         return spans[1] if condition[0] else spans[2]
-    one, two = spans[1], spans[2]
-    if one is None or two is None:
+    then, orelse = spans[1], spans[2]
+    if then is None or orelse is None:
         return None
-    one = _beside(term.args[0], term.args[1], one, term.args, spans, True)
-    two = _beside(term.args[0], term.args[2], two, term.args, spans, False)
-    return min(one[0], two[0]), max(one[1], two[1])
+    then = _beside(term.args[0], term.args[1], then, term.args, spans, True)
+    orelse = _beside(term.args[0], term.args[2], orelse, term.args, spans, False)
+    return min(then[0], orelse[0]), max(then[1], orelse[1])
 
 
 def _beside(
@@ -188,14 +188,19 @@ def _beside(
     return met if met[0] <= met[1] else span
 
 
-def _compared(op: str, args: Sequence[Term], one: tuple[Number, Number], two: tuple[Number, Number]) -> Span:
+def _compared(
+    op: str, args: Sequence[Term], left: tuple[Number, Number], right: tuple[Number, Number]
+) -> Span:
     same = args[0] is args[1]
     if op == "=":
-        always, never = same or one[0] == one[1] == two[0] == two[1], one[1] < two[0] or two[1] < one[0]
+        always, never = (
+            same or left[0] == left[1] == right[0] == right[1],
+            left[1] < right[0] or right[1] < left[0],
+        )
     elif op == "<":
-        always, never = one[1] < two[0], same or one[0] >= two[1]
+        always, never = left[1] < right[0], same or left[0] >= right[1]
     else:
-        always, never = same or one[1] <= two[0], one[0] > two[1]
+        always, never = same or left[1] <= right[0], left[0] > right[1]
     return (1, 1) if always else (0, 0) if never else TRUTHS
 
 
@@ -219,15 +224,15 @@ def _of_integers(op: str, spans: Sequence[tuple[Number, Number]]) -> Span:
     if op == "-":
         return a - d, b - c
     if op == "*":
-        found = [a * c, a * d, b * c, b * d]
+        results = [a * c, a * d, b * c, b * d]
     elif op == "/":
-        found = [truncated(x, y) for x in (a, b) for y in (c, d, -1, 1, 0) if c <= y <= d] or [0]
+        results = [truncated(x, y) for x in (a, b) for y in (c, d, -1, 1, 0) if c <= y <= d] or [0]
     elif a == b and c == d:
-        found = [a - c * truncated(a, c) if c else 0]
+        results = [a - c * truncated(a, c) if c else 0]
     else:
         most = max(abs(c), abs(d), 1) - 1
-        found = [max(min(a, 0), -most), min(max(b, 0), most)]
-    return min(found), max(found)
+        results = [max(min(a, 0), -most), min(max(b, 0), most)]
+    return min(results), max(results)
 
 
 def _of_doubles(op: str, spans: Sequence[tuple[Number, Number]]) -> Span:
@@ -243,8 +248,8 @@ def _of_doubles(op: str, spans: Sequence[tuple[Number, Number]]) -> Span:
         return None  # an infinity less itself, or times zero, is a NaN
     if op in ("+", "-"):
         return (a + c, b + d) if op == "+" else (a - d, b - c)
-    found = [x * y if op == "*" else x / y for x in (a, b) for y in (c, d)]
-    return min(found), max(found)
+    results = [x * y if op == "*" else x / y for x in (a, b) for y in (c, d)]
+    return min(results), max(results)
 
 
 # --- walks -----------------------------------------------------------------------------
@@ -252,15 +257,15 @@ def _of_doubles(op: str, spans: Sequence[tuple[Number, Number]]) -> Span:
 
 def parts_first(*terms: Term, but: Container[Term] = ()) -> list[Term]:
     """Every term once, parts before wholes, `but` these and what is only below them; without recursion, since runs are long."""
-    found: list[Term] = []
+    ordered: list[Term] = []
     seen: set[Term] = set()
     stack = [(term, False) for term in reversed(terms)]
     while stack:
         term, ready = stack.pop()
         if ready:
-            found.append(term)
+            ordered.append(term)
         elif term not in seen and term not in but:
             seen.add(term)
             stack.append((term, True))
             stack += [(part, False) for part in reversed(term.args)]
-    return found
+    return ordered

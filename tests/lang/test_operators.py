@@ -285,7 +285,7 @@ class Unfolded(Terms):
 
     def make(self, op: str, *args: Term) -> Term:
         made = super().make(op, *args)
-        return self._one(Term(op, args, made.sort)) if made.op == "constant" else made
+        return self._interned(Term(op, args, made.sort)) if made.op == "constant" else made
 
 
 def in_checker(start: Start, case: Case, operands: tuple[Value, ...]) -> Term:

@@ -847,13 +847,13 @@ def with_steps(count: int, step: str) -> Program:
 
 def test_a_long_run_is_followed_in_one_pass(monkeypatch: pytest.MonkeyPatch) -> None:
     looked: list[Term] = []
-    found = Known._found
+    found = Known._span_of
 
     def counted(known: Known, term: Term) -> Any:
         looked.append(term)
         return found(known, term)
 
-    monkeypatch.setattr(Known, "_found", counted)
+    monkeypatch.setattr(Known, "_span_of", counted)
     counts = []
     for count in (50, 100):
         program = with_steps(count, "s := s / 2 + a")
