@@ -16,7 +16,7 @@ it found nothing wrong; nothing is written unless all that was asked for is prov
 >>> with TemporaryDirectory() as folder:
 ...     _ = Path(folder, "a.rcs").write_text("input a : bool\ntable t {\n| line | a ||\n|------|---||\n| 1 | true ||\n}\n")
 ...     report = check(Settings((folder,), Options(), use_cache=False))
->>> [(one.code.value, one.message) for one in report.diagnostics]
+>>> [(diagnostic.code.value, diagnostic.message) for diagnostic in report.diagnostics]
 [('RCS401', 'no line of table `t` matches 1 of 2 (50 %) of the inputs')]
 
 What was proved stays proved while nothing that it depends on changes; an unchanged project is not even parsed again.

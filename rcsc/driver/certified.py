@@ -45,14 +45,14 @@ def certify(settings: Settings, how: Checking, write: Path | None, against: Path
     """
     if against is not None:
         return _reviewed(read(settings), _kept(against), replace(how, strict=True))
-    made = proved(settings)
-    report = made.report()
-    [proof] = made.proofs or (None,)
+    project = proved(settings)
+    report = project.report()
+    [proof] = project.proofs or (None,)
     if report.failed or proof is None or proof.certificate is None:
         return Conclusion(report, "nothing is certified: not everything is proved")
-    found = _keep(proof.certificate, write) if write is not None else ()
-    reviewed = _reviewed(made.loaded, proof.certificate, how, proof.proved)
-    report = made.report((*found, *reviewed.report.diagnostics))
+    unwritten = _keep(proof.certificate, write) if write is not None else ()
+    reviewed = _reviewed(project.loaded, proof.certificate, how, proof.proved)
+    report = project.report((*unwritten, *reviewed.report.diagnostics))
     return Conclusion(
         replace(report, tables=()), reviewed.closing
     )  # the verdicts are the prover's, not the checker's
@@ -98,20 +98,20 @@ def _reviewed(
         return Conclusion(Report(program, (), loaded.sources), "not certified")
     stops = None if proved is None else {str(table.name): table.stops for table in proved.program.tables}
     outcome = checker.certify(program, certificate, _cvc5 if how.cvc5 else None, stops)
-    found = [
+    diagnostics = [
         _refused(program.file, f"the certificate is refused: {problem}")
         for problem in outcome.problems[:MOST_PROBLEMS]
     ]
     if how.questions is not None:
-        found += _kept_questions(outcome, how.questions)
+        diagnostics += _kept_questions(outcome, how.questions)
     severity = Severity.ERROR if how.strict else Severity.NOTE
-    found += [
+    diagnostics += [
         Diagnostic(
             Code.NOT_CHECKED, f"not checked: {unchecked.name}", Label(unchecked.written), severity=severity
         )
         for unchecked in outcome.unchecked
     ]
-    return Conclusion(Report(tuple(found), (), loaded.sources), _closing(program, outcome))
+    return Conclusion(Report(tuple(diagnostics), (), loaded.sources), _closing(program, outcome))
 
 
 def _closing(program: Program, outcome: Certified) -> str:
@@ -119,11 +119,11 @@ def _closing(program: Program, outcome: Certified) -> str:
     if outcome.problems:
         return "not certified"
     checked, total = len(outcome.checked), len(outcome.checked) + len(outcome.unchecked)
-    resting = "".join(f"\n  it rests on {one}" for one in outcome.rests_on)
+    resting = "".join(f"\n  it rests on {ground}" for ground in outcome.rests_on)
     if outcome.whole:
         return f"certified: checked all {total} obligations of `{program.name}`{resting}"
-    said = f"not wholly certified: checked {checked} of {total} obligations of `{program.name}`"
-    return f"{said}; for the others, named above, there is only the prover's word{resting}"
+    lead = f"not wholly certified: checked {checked} of {total} obligations of `{program.name}`"
+    return f"{lead}; for the others, named above, there is only the prover's word{resting}"
 
 
 def _kept_questions(outcome: Certified, folder: Path) -> list[Diagnostic]:

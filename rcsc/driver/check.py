@@ -28,10 +28,10 @@ def _checked(settings: Settings, cache: Cache | None) -> Report:
         proved,  # keep lazy: parser and provers, which nobody needs where nothing has changed
     )
 
-    made = proved(settings, cache)
-    report = made.report()
+    project = proved(settings, cache)
+    report = project.report()
     if whole is not None:
-        remember(whole, settings.paths, settings.options, made.loaded, report)
+        remember(whole, settings.paths, settings.options, project.loaded, report)
     return report
 
 

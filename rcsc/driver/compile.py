@@ -20,38 +20,38 @@ def compile_(
     settings: Settings, out: Path, targets: Collection[str], *, only_check: bool, defensive: bool = False
 ) -> Conclusion:
     """Prove every table anew, then write the executors, or say whether they are fresh."""
-    made = proved(settings)
-    report = made.report()
+    project = proved(settings)
+    report = project.report()
     if report.failed:
         return Conclusion(report, "nothing was written")
-    files, clashes = _executors(made, targets, defensive=defensive)
-    found = clashes or (stale if only_check else write)(files, str(out))
-    report = made.report(found)
+    files, clashes = _executors(project, targets, defensive=defensive)
+    diagnostics = clashes or (stale if only_check else write)(files, str(out))
+    report = project.report(diagnostics)
     if report.failed:
         return Conclusion(report, "" if only_check else "nothing was written")
     return Conclusion(report, f"{len(files)} files {'are fresh' if only_check else 'written'} in {out}")
 
 
 def _executors(
-    made: Proved, targets: Collection[str], *, defensive: bool
+    project: Proved, targets: Collection[str], *, defensive: bool
 ) -> tuple[dict[str, str], tuple[Diagnostic, ...]]:
     """The generated files of every program that declares a table or a level, by path under the folder."""
     files: dict[str, str] = {}
-    found = []
+    diagnostics = []
     paths: dict[str, str] = {}
     names: dict[str, dict[str, tuple[str, str]]] = {}
-    for root, program in made.executable:
+    for root, program in project.executable:
         plan = planned(program, defensive=defensive)
         emitted_ = emitted(plan, targets)
         taken = next((path for path in emitted_ if paths.get(path.casefold(), root) != root), None)
         if taken is not None:
-            found.append(_same_file(taken, root, paths[taken.casefold()]))
+            diagnostics.append(_same_file(taken, root, paths[taken.casefold()]))
             continue
         paths |= {path.casefold(): root for path in emitted_}
         for name in targets:
-            found += _same_names(TARGETS[name], plan, root, names.setdefault(name, {}))
+            diagnostics += _same_names(TARGETS[name], plan, root, names.setdefault(name, {}))
         files |= emitted_
-    return files, tuple(found)
+    return files, tuple(diagnostics)
 
 
 def _same_names(
@@ -59,11 +59,9 @@ def _same_names(
 ) -> Iterator[Diagnostic]:
     """The first name that this program shares with another, or gives to two things; `names` has who has which, and gets its own."""
     for name, what in target.outward(plan):
-        other, said = names.setdefault(name, (root, what))
-        if said != what:
-            message = (
-                f"`{name}` would be two things in {target.title}: {said} in `{other}`, and {what} in `{root}`"
-            )
+        other, other_what = names.setdefault(name, (root, what))
+        if other_what != what:
+            message = f"`{name}` would be two things in {target.title}: {other_what} in `{other}`, and {what} in `{root}`"
             helps = ("rename one of the programs, or the table, level or type",)
             yield Diagnostic(Code.NAME_COLLISION, message, Label(Span(root, 0, 0)), help=helps)
             return

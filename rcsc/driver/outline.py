@@ -1,6 +1,6 @@
 """What a system is made of, as its files have it: read anew only when one of them changes.
 
-In: a system's description and the cache. Out: an `SystemOutline` and what is known of it, or nothing where the system is not in order;
+In: a system's description and the cache. Out: a `SystemOutline` and what is known of it, or nothing where the system is not in order;
 `rcsc prove` says why.
 """
 
@@ -30,8 +30,8 @@ if TYPE_CHECKING:
 
 def known(system: Path, cache: Cache) -> KnownSystem | None:
     """What is known of a system as its files stand; None where no level was ever proved into the cache, or it is not in order."""
-    made = outlined(system.parent.resolve() / system.name, cache) if any_kept(cache) else None
-    return None if made is None else standing(cache, made)
+    system_outline = outlined(system.parent.resolve() / system.name, cache) if any_kept(cache) else None
+    return None if system_outline is None else standing(cache, system_outline)
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,10 +50,10 @@ def outlined(system: Path, cache: Cache) -> SystemOutline | None:
     read = _read(system)
     if read is None:
         return None
-    made, looked_at = read
-    found = outline(made)
-    cache.store(_Outlined(found, looked_at), str(system))
-    return found
+    systems, looked_at = read
+    system_outline = outline(systems)
+    cache.store(_Outlined(system_outline, looked_at), str(system))
+    return system_outline
 
 
 def _read(system: Path) -> "tuple[dict[str, TransitionSystem], dict[str, str]] | None":
@@ -63,21 +63,21 @@ def _read(system: Path) -> "tuple[dict[str, TransitionSystem], dict[str, str]] |
     looked_at = {str(system): digest_at(str(system))}
     programs: dict[str, Program] = {}
     try:
-        said = description(system)
-        for spec in said.levels:
+        described = description(system)
+        for spec in described.levels:
             programs[spec.name], loaded = loaded_program(system, spec.program)
             files = digests(loaded)
             if files is None:
                 return None
             looked_at |= {str(path): digest_at(str(path)) for path in places(system, spec.program)} | files
-        made = transition_systems_of(said, programs)
+        systems = transition_systems_of(described, programs)
     except (BadDescription, NoProgramError):
         return None
-    return (made, looked_at) if looked_at[str(system)] == digest_at(str(system)) else None
+    return (systems, looked_at) if looked_at[str(system)] == digest_at(str(system)) else None
 
 
-def outline(made: "Mapping[str, TransitionSystem]") -> SystemOutline:
-    """What levels are made of."""
+def outline(systems: "Mapping[str, TransitionSystem]") -> SystemOutline:
+    """The outline of all levels."""
     from rcsc.compose.contract.obligations import run_by
     from rcsc.compose.proof.assume_guarantee import promises
     from rcsc.compose.proof.kept import content
@@ -85,16 +85,16 @@ def outline(made: "Mapping[str, TransitionSystem]") -> SystemOutline:
     levels = tuple(
         LevelOutline(
             name,
-            content(one),
-            os.path.realpath(one.level.span.file),
-            one.level.span.start,
-            one.level.span.end,
-            tuple(map(_table, run_by(one))),
-            tuple((each.name, os.path.realpath(each.span.file)) for each in one.program.properties),
+            content(ts),
+            os.path.realpath(ts.level.span.file),
+            ts.level.span.start,
+            ts.level.span.end,
+            tuple(map(_table, run_by(ts))),
+            tuple((each.name, os.path.realpath(each.span.file)) for each in ts.program.properties),
         )
-        for name, one in made.items()
+        for name, ts in systems.items()
     )
-    return SystemOutline(levels, tuple(promises(made)))
+    return SystemOutline(levels, tuple(promises(systems)))
 
 
 def _table(table: "Table") -> TableOutline:

@@ -20,12 +20,12 @@ class Proved:
     loaded: Loaded
     proofs: tuple[Proof, ...]
 
-    def report(self, found: tuple[Diagnostic, ...] = ()) -> Report:
+    def report(self, diagnostics: tuple[Diagnostic, ...] = ()) -> Report:
         """Everything found, each once, and each table once, with the worst verdict of all programs that it is in."""
         every = {
             *self.loaded.diagnostics,
-            *found,
-            *(diagnostic for proof in self.proofs for diagnostic in proof.found),
+            *diagnostics,
+            *(diagnostic for proof in self.proofs for diagnostic in proof.diagnostics),
         }
         tables = merged(table for proof in self.proofs for table in proof.tables)
         return Report(tuple(sorted(every, key=sort_key)), tables, self.loaded.sources)

@@ -36,11 +36,12 @@ def prove(root: str, program: Program, loaded: Loaded, options: Options, cache: 
     if cache is None:
         verdict = prove_program(program, options)
         tables = tuple(
-            resting(table_report(one, program), verdict.unproved, verdict.unsafe) for one in verdict.tables
+            resting(table_report(table_verdict, program), verdict.unproved, verdict.unsafe)
+            for table_verdict in verdict.tables
         )
         return Proof(root, verdict.findings, program, tables, verdict.proved, verdict.certificate)
     memory = _Memory(program, loaded, options, cache)
-    known = {table.name: one for table in program.tables if (one := memory.table(table)) is not None}
+    known = {table.name: kept for table in program.tables if (kept := memory.table(table)) is not None}
     missing = [table for table in program.tables if table.name not in known]
     elsewhere = tuple(properties_elsewhere(program))
     if not missing and memory.rest():
@@ -48,7 +49,10 @@ def prove(root: str, program: Program, loaded: Loaded, options: Options, cache: 
     verdict = prove_program(program, options, only=[table.name for table in missing])
     if not any(finding.severity is Severity.ERROR for finding in verdict.findings):
         memory.keep([finding for finding in verdict.findings if finding not in elsewhere], verdict.tables)
-    new = {one.table.name: _Kept(table_report(one, program), ()) for one in verdict.tables}
+    new = {
+        table_verdict.table.name: _Kept(table_report(table_verdict, program), ())
+        for table_verdict in verdict.tables
+    }
     return _proof(root, program, verdict.findings, {**known, **new}, verdict.unproved, verdict.unsafe)
 
 
@@ -68,14 +72,14 @@ class _Rest:
 def _proof(
     root: str,
     program: Program,
-    found: Sequence[Diagnostic],
+    findings: Sequence[Diagnostic],
     known: dict[Any, _Kept],
     unproved: Collection[str] = (),
     unsafe: Collection[str] = (),
 ) -> Proof:
     tables = [known[table.name] for table in program.tables]
-    every = {*found, *(note for one in tables for note in one.notes)}
-    reports = tuple(resting(one.report, unproved, unsafe) for one in tables)
+    every = {*findings, *(note for kept in tables for note in kept.notes)}
+    reports = tuple(resting(kept.report, unproved, unsafe) for kept in tables)
     return Proof(root, tuple(sorted(every, key=sort_key)), program, reports)
 
 
@@ -105,16 +109,20 @@ class _Memory:
         notes = tuple(_moved(note, place.start, place.file) for note in kept.notes)
         return _Kept(replace(kept.report, file=table.file, cached=True), notes)
 
-    def keep(self, found: Sequence[Diagnostic], verdicts: Sequence[TableVerdict]) -> None:
-        """Keep the tables just proved, and that the rest is right if nothing was said of it."""
-        rest = set(found)
+    def keep(self, findings: Sequence[Diagnostic], verdicts: Sequence[TableVerdict]) -> None:
+        """Keep the tables just proved, and that the rest is right if no finding is about it."""
+        rest = set(findings)
         for verdict in verdicts:
             place = _extent(verdict.table)
             notes = [
-                diagnostic for diagnostic in found if all(_inside(span, place) for span in _spans(diagnostic))
+                diagnostic
+                for diagnostic in findings
+                if all(_inside(span, place) for span in _spans(diagnostic))
             ]
             touching = [
-                diagnostic for diagnostic in found if any(_inside(span, place) for span in _spans(diagnostic))
+                diagnostic
+                for diagnostic in findings
+                if any(_inside(span, place) for span in _spans(diagnostic))
             ]
             rest -= set(notes)
             report = table_report(verdict, self.program)
@@ -127,7 +135,7 @@ class _Memory:
     def _key(self, table: Table) -> tuple[str, ...]:
         place = _extent(table)
         text = self.loaded.sources[place.file].slice(place)
-        own = next(one for one in self.program.tables if one.name == table.name)
+        own = next(declared for declared in self.program.tables if declared.name == table.name)
         return (self.common, digest(own), text)
 
 
@@ -148,7 +156,7 @@ def _spans(diagnostic: Diagnostic) -> list[Span]:
 
 
 def _moved(diagnostic: Diagnostic, by: int, file: str) -> Diagnostic:
-    """The same said of a text that starts elsewhere."""
+    """The diagnostic for a text that starts elsewhere."""
 
     def span(old: Span) -> Span:
         return Span(file, old.start + by, old.end + by)
@@ -177,7 +185,7 @@ def table_report(verdict: TableVerdict, program: Program) -> TableReport:
     return TableReport(
         verdict.table.name,
         verdict.table.file,
-        _said(verdict),
+        _verdict(verdict),
         len(verdict.table.lines),
         backing.method,
         backing.confirmed_by_z3,
@@ -188,13 +196,12 @@ def table_report(verdict: TableVerdict, program: Program) -> TableReport:
     )
 
 
-def _said(verdict: TableVerdict) -> Verdict:
-    if any(isinstance(one, Undecided | SolversDisagree) for one in verdict.findings):
+def _verdict(verdict: TableVerdict) -> Verdict:
+    if any(isinstance(finding, Undecided | SolversDisagree) for finding in verdict.findings):
         return Verdict.UNDECIDED
     falls = not must_cover(verdict.table)
     wrong = any(
-        not (isinstance(dead_line, Gap) and falls)
-        and not (isinstance(dead_line, DeadLine) and dead_line.assuming)
-        for dead_line in verdict.findings
+        not (isinstance(finding, Gap) and falls) and not (isinstance(finding, DeadLine) and finding.assuming)
+        for finding in verdict.findings
     )
     return Verdict.REFUTED if wrong else Verdict.PROVED

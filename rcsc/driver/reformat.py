@@ -20,13 +20,13 @@ from rcsc.lang.syntax.parse import parse
 
 @dataclass(frozen=True, slots=True)
 class Formatted:
-    """The outcome.
+    """What became of the files.
 
     Attributes:
         report: Not formatted files where nothing was to be written; what could not be read or written.
         texts: Each file's new text.
         diff: How the files differ from it.
-        changed: How many do.
+        changed: How many differ.
     """
 
     report: Report
@@ -46,19 +46,19 @@ def reformat(paths: tuple[str, ...], stdin: bytes | None, *, write: bool) -> For
     )
     texts = {name: _text(name, loaded.files[name]) for name in roots}
     changed = {name: text for name, text in texts.items() if text != loaded.sources[name].text}
-    found = list(mine)
+    diagnostics = list(mine)
     for name, text in changed.items():
         if not write:
-            found.append(_unformatted(loaded.sources[name], text))
+            diagnostics.append(_unformatted(loaded.sources[name], text))
         elif stdin is None or name != "-":
-            found += _replace(name, text)
+            diagnostics += _replace(name, text)
     diff = "".join(line for name in changed for line in _diff(loaded.sources[name], texts[name]))
-    report = Report(tuple(sorted(found, key=sort_key)), (), loaded.sources)
+    report = Report(tuple(sorted(diagnostics, key=sort_key)), (), loaded.sources)
     return Formatted(report, texts, diff, len(changed))
 
 
-def _of(found: Diagnostic, roots: tuple[str, ...], paths: tuple[str, ...]) -> bool:
-    file = found.primary.span.file
+def _of(diagnostic: Diagnostic, roots: tuple[str, ...], paths: tuple[str, ...]) -> bool:
+    file = diagnostic.primary.span.file
     return file in roots or file in paths or not file.endswith(".rcs")
 
 

@@ -53,7 +53,7 @@ class Proof:
     """
 
     root: str
-    found: tuple[Diagnostic, ...]
+    diagnostics: tuple[Diagnostic, ...]
     program: "Program | None" = None
     tables: tuple[TableReport, ...] = ()
     proved: "ProvedProgram | None" = None

@@ -32,10 +32,10 @@ def with_levels(report: Report, cache: Cache) -> Report:
     """The report, with what is known of the systems that its tables belong to."""
     seen = _Seen(cache)
     tables = tuple(seen.table(table) for table in report.tables)
-    found = {*map(seen.noted, report.diagnostics), *seen.warnings()}
+    diagnostics = {*map(seen.noted, report.diagnostics), *seen.warnings()}
     sources = {**seen.sources, **report.sources}
     systems = tuple(seen.systems.values())
-    return Report(tuple(sorted(found, key=sort_key)), tables, sources, systems)
+    return Report(tuple(sorted(diagnostics, key=sort_key)), tables, sources, systems)
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,13 +91,13 @@ class _Seen:
         """The table, with what the nearest system that runs it makes of it."""
         for system in _systems_above(table.file):
             name = _shown(str(system), table.file)
-            made = self._standing(system)
-            if made is None:
+            known_system = self._standing(system)
+            if known_system is None:
                 if _beside(system, table.file):
                     self._say(name, None, wanted=bool(_open(table)))
                     return table
                 continue
-            if at := list(_places(made, table)):
+            if at := list(_places(known_system, table)):
                 return self._placed(table, name, at)
         return table
 
@@ -108,17 +108,17 @@ class _Seen:
         return self._standings[system]
 
     def _placed(self, table: TableReport, system: str, at: list[_Place]) -> TableReport:
-        """A table that levels of a system run: what is known in all of them."""
+        """The table, with what is known in all levels of a system that run it."""
         for place in at:
             self.levels.setdefault((system, place.level.name), (place.standing, place.level))
         states = {name: _worst({place.known(name) for place in at}) for name in _open(table)}
-        by = {known: tuple(name for name, found in states.items() if found is known) for known in Known}
+        by = {known: tuple(name for name, state in states.items() if state is known) for known in Known}
         proved, conditional = by[Known.PROVED], by[Known.CONDITIONAL]
         unreached = tuple(line for line in at[0].unreached if all(line in place.unreached for place in at))
         if at[0].default in unreached:
             self.idle[table.file, table.table] = system
-        made = at[0].standing
-        self._say(system, made, wanted=bool(by[Known.UNKNOWN]) and not made.broken)
+        known_system = at[0].standing
+        self._say(system, known_system, wanted=bool(by[Known.UNKNOWN]) and not known_system.broken)
         assumptions = tuple(
             (name, Known.PROVED.value if name in proved else was) for name, was in table.assumptions
         )
@@ -132,70 +132,72 @@ class _Seen:
         together = InSystem(system, proved, by[Known.NOT_PROVED], unreached, conditional, rests, trusts)
         return replace(table, assumptions=assumptions, together=together)
 
-    def _say(self, system: str, made: KnownSystem | None, *, wanted: bool) -> None:
+    def _say(self, system: str, known_system: KnownSystem | None, *, wanted: bool) -> None:
         before = self.systems.get(system)
         wanted = wanted or (before is not None and before.wanted)
-        whole = Known.UNKNOWN if made is None else made.whole
+        whole = Known.UNKNOWN if known_system is None else known_system.whole
         missing: tuple[str, ...] = ()
-        if made is not None and whole in {Known.PARTLY, Known.CONDITIONAL}:
-            levels = [level.name for level in made.outline.levels]
-            missing = tuple(f"level `{name}`: {why}" for name in levels for why in made.missing(name))
+        if known_system is not None and whole in {Known.PARTLY, Known.CONDITIONAL}:
+            levels = [level.name for level in known_system.outline.levels]
+            missing = tuple(f"level `{name}`: {why}" for name in levels for why in known_system.missing(name))
         self.systems[system] = SystemReport(system, whole.value, wanted, missing)
 
     # --- findings ---
 
-    def noted(self, found: Diagnostic) -> Diagnostic:
-        """A finding; where inputs fall to a DEFAULT that never runs here, or properties are proved, with that."""
-        if found.code is Code.PROPERTY_ELSEWHERE:
-            return self._elsewhere(found)
-        if found.code is not Code.DEFAULT_COVERS or not found.witnesses:
-            return found
-        system = self.idle.get((found.primary.span.file, found.witnesses[0].table))
+    def noted(self, diagnostic: Diagnostic) -> Diagnostic:
+        """The finding, with a note where its DEFAULT never runs here, or where its properties are proved."""
+        if diagnostic.code is Code.PROPERTY_ELSEWHERE:
+            return self._elsewhere(diagnostic)
+        if diagnostic.code is not Code.DEFAULT_COVERS or not diagnostic.witnesses:
+            return diagnostic
+        system = self.idle.get((diagnostic.primary.span.file, diagnostic.witnesses[0].table))
         if system is None:
-            return found
+            return diagnostic
         note = f"none of them comes in {system}: proved of the levels together"
-        return replace(found, notes=(*found.notes, note))
+        return replace(diagnostic, notes=(*diagnostic.notes, note))
 
-    def _elsewhere(self, found: Diagnostic) -> Diagnostic:
-        """That properties of a file are not proved here: where they are, if each is in every level that states it."""
-        file = os.path.realpath(found.primary.span.file)
+    def _elsewhere(self, diagnostic: Diagnostic) -> Diagnostic:
+        """The finding, with where its properties are proved, if each is in every level that states it."""
+        file = os.path.realpath(diagnostic.primary.span.file)
         stated = [
-            (system, made, level.name, (PROPERTY, "", name))
-            for (system, _), (made, level) in self.levels.items()
+            (system, known_system, level.name, (PROPERTY, "", name))
+            for (system, _), (known_system, level) in self.levels.items()
             for name, at in level.properties
             if at == file
         ]
-        state = _worst({made.of_obligation(level, key) for _, made, level, key in stated})
+        state = _worst({known_system.of_obligation(level, key) for _, known_system, level, key in stated})
         systems = ", ".join(dict.fromkeys(system for system, *_ in stated))
         if state is Known.PROVED:
             words = dict.fromkeys(
-                word for _, made, level, key in stated for word in made.trusting(level, key)
+                word for _, known_system, level, key in stated for word in known_system.trusting(level, key)
             )
             note = f"proved of the levels together, {systems}{trusting(words)}"
         elif state is Known.CONDITIONAL:
-            words = dict.fromkeys(word for _, made, level, key in stated for word in made.lacking(level, key))
+            words = dict.fromkeys(
+                word for _, known_system, level, key in stated for word in known_system.lacking(level, key)
+            )
             note = f"conditional in {systems}: rests on {named(words)}"
         else:
-            return found
-        return replace(found, notes=(*found.notes, note), help=())
+            return diagnostic
+        return replace(diagnostic, notes=(*diagnostic.notes, note), help=())
 
     def warnings(self) -> Iterator[Diagnostic]:
         """What is not proved of the levels that run the tables."""
-        for (system, _), (made, level) in self.levels.items():
-            if made.of_level(level.name) is Known.NOT_PROVED:
-                yield self._not_proved(system, made, level)
-            for promise in made.broken:
+        for (system, _), (known_system, level) in self.levels.items():
+            if known_system.of_level(level.name) is Known.NOT_PROVED:
+                yield self._not_proved(system, known_system, level)
+            for promise in known_system.broken:
                 if promise.level == level.name:
                     yield self._not_kept(system, level, promise)
 
-    def _not_proved(self, system: str, made: KnownSystem, level: LevelOutline) -> Diagnostic:
-        still = made.known[level.name].open
+    def _not_proved(self, system: str, known_system: KnownSystem, level: LevelOutline) -> Diagnostic:
+        still = known_system.known[level.name].open
         more = [f"and {len(still) - MOST_OPEN} more"] if len(still) > MOST_OPEN else []
         return Diagnostic(
             Code.NOT_COMPOSED,
             f"level `{level.name}` is not proved together with its neighbours in {system}",
             self._label(system, level),
-            notes=(*(f"not proved: {one}" for one in still[:MOST_OPEN]), *more),
+            notes=(*(f"not proved: {name}" for name in still[:MOST_OPEN]), *more),
             help=(f"`rcsc prove {system} --level {level.name}` looks for the shortest run that shows it",),
             severity=Severity.WARNING,
         )
@@ -227,27 +229,27 @@ def _systems_above(file: str) -> list[Path]:
 def _beside(system: Path, file: str) -> bool:
     """Whether a file is, or stands with, the root file of a level."""
     try:
-        said = description(system)
+        described = description(system)
     except BadDescription:
         return False
     real = Path(os.path.realpath(file))
-    tried = [places(system, spec.program) for spec in said.levels]
+    tried = [places(system, spec.program) for spec in described.levels]
     return any(real == beside or real.parent == inside.parent for inside, beside in tried)
 
 
-def _places(made: KnownSystem, table: TableReport) -> Iterator[_Place]:
+def _places(known_system: KnownSystem, table: TableReport) -> Iterator[_Place]:
     """The levels of a system that run a table."""
     real = os.path.realpath(table.file)
-    for level in made.outline.levels:
-        for one in level.tables:
-            if (one.file, one.name) == (real, table.table):
-                yield _Place(made, level, one.name, one.default)
+    for level in known_system.outline.levels:
+        for outline in level.tables:
+            if (outline.file, outline.name) == (real, table.table):
+                yield _Place(known_system, level, outline.name, outline.default)
 
 
-def _worst(found: Collection[Known]) -> Known:
-    """What is known of something of which several levels say this; unknown where none does."""
+def _worst(states: Collection[Known]) -> Known:
+    """The worst that several levels know of one thing; unknown where none knows anything."""
     order = (Known.NOT_PROVED, Known.UNKNOWN, Known.CONDITIONAL, Known.TRUSTED, Known.PROVED)
-    return next((one for one in order if one in found), Known.UNKNOWN)
+    return next((state for state in order if state in states), Known.UNKNOWN)
 
 
 def _open(table: TableReport) -> list[str]:

@@ -30,25 +30,25 @@ from rcsc.testing.suite import Proofs, SuiteOptions, run_suite
 
 def test(settings: Settings, effort: TestEffort) -> Conclusion:
     """Prove every table, then test its executors against its meaning, and write vectors if asked."""
-    made = proved(settings)
-    report = made.report()
+    project = proved(settings)
+    report = project.report()
     if report.failed:
         return Conclusion(report, "nothing was tested: not everything is proved")
-    found: list[Diagnostic] = []
+    diagnostics: list[Diagnostic] = []
     figures = []
-    for _, program in made.executable:
+    for _, program in project.executable:
         files = emitted(planned(program))
-        one, text = _try_out(program.program, files, settings.options, effort, settings.progress)
-        found += one
+        failures, text = _try_out(program.program, files, settings.options, effort, settings.progress)
+        diagnostics += failures
         figures.append(text)
     if effort.vectors is not None:
-        found += _write_vectors(
-            [proved_program.program for _, proved_program in made.executable],
+        diagnostics += _write_vectors(
+            [proved_program.program for _, proved_program in project.executable],
             settings.options,
             effort.vectors,
         )
     settings.progress("")
-    return Conclusion(made.report(tuple(found)), "\n".join(figures))
+    return Conclusion(project.report(tuple(diagnostics)), "\n".join(figures))
 
 
 def _try_out(
@@ -97,7 +97,7 @@ def proofs(options: Options) -> Proofs:
 
     def prover(program: Program, table: Table) -> Opinion:
         verdict = prove_table(program, table, options)
-        falls = [one for one in verdict.findings if isinstance(one, Gap)]
+        falls = [finding for finding in verdict.findings if isinstance(finding, Gap)]
         accepted = len(falls) == len(verdict.findings) and (not falls or not must_cover(table))
         return Opinion(accepted, repr([(gap.count, gap.witnesses) for gap in falls]))
 

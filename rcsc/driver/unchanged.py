@@ -35,7 +35,7 @@ class _Checked:
 
     roots: tuple[str, ...]
     looked_at: dict[str, str]
-    found: tuple[Diagnostic, ...]
+    diagnostics: tuple[Diagnostic, ...]
     tables: tuple[TableReport, ...]
 
 
@@ -47,9 +47,9 @@ def recall(cache: Cache, paths: tuple[str, ...], options: Options) -> Report | N
     texts = as_before(kept.looked_at)
     if texts is None:
         return None
-    named = {name for name in texts if name.endswith(".rcs")} if kept.found else set()
+    named = {name for name in texts if name.endswith(".rcs")} if kept.diagnostics else set()
     sources = {name: Source(name, texts[name].decode("utf-8-sig")) for name in sorted(named)}
-    return Report(kept.found, tuple(replace(table, cached=True) for table in kept.tables), sources)
+    return Report(kept.diagnostics, tuple(replace(table, cached=True) for table in kept.tables), sources)
 
 
 def remember(cache: Cache, paths: tuple[str, ...], options: Options, loaded: Loaded, report: Report) -> None:
@@ -78,11 +78,11 @@ def as_before(looked_at: Mapping[str, str]) -> dict[str, bytes] | None:
     """The contents of the files, if at every place stands what stood there."""
     texts: dict[str, bytes] = {}
     for name, digest in looked_at.items():
-        now, found = _seen(name)
+        now, text = _seen(name)
         if now != digest:
             return None
-        if found is not None:
-            texts[name] = found
+        if text is not None:
+            texts[name] = text
     return texts
 
 
@@ -128,9 +128,9 @@ def _seen(name: str) -> tuple[str, bytes | None]:
     if not os.path.lexists(name):
         return "absent", None
     try:
-        found = content(Path(name), MOST_BYTES)
+        text = content(Path(name), MOST_BYTES)
     except (OSError, Malformed):
         return "no file that can be read", None
     real = os.path.realpath(name)
     elsewhere = "" if real == os.path.abspath(name) else f" at {real}"
-    return hashlib.sha256(found).hexdigest() + elsewhere, found
+    return hashlib.sha256(text).hexdigest() + elsewhere, text

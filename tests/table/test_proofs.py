@@ -64,7 +64,7 @@ def run(text: str, cache: Cache | None) -> Proof:
 
 def seen(proof: Proof) -> list[tuple[object, ...]]:
     tables = [(table.table, table.verdict, table.method, table.assumptions) for table in proof.tables]
-    return [*tables, *((finding,) for finding in proof.found)]
+    return [*tables, *((finding,) for finding in proof.diagnostics)]
 
 
 def test_only_the_table_that_changed_is_proved_again(cache: Cache, proved: list[str]) -> None:
@@ -94,13 +94,13 @@ def test_notes_move_with_their_table(cache: Cache, proved: list[str]) -> None:
     assert proved == ["one", "two"]
     fresh = run(moved, None)
     assert seen(again) == seen(fresh)
-    assert any(finding.code.value == "RCS407" for finding in again.found)
+    assert any(finding.code.value == "RCS407" for finding in again.diagnostics)
 
 
 def test_nothing_is_kept_of_a_program_with_errors(cache: Cache, proved: list[str]) -> None:
     broken = HEAD + edited(TABLES, ("| >= 5 ||", "| >= 6 ||"))
     first = run(broken, cache)
-    assert set(codes(first.found)) == {"RCS401", "RCS407"}
+    assert set(codes(first.diagnostics)) == {"RCS401", "RCS407"}
     assert seen(run(broken, cache)) == seen(first)
     assert proved == ["one", "two"] * 2
 
@@ -108,8 +108,8 @@ def test_nothing_is_kept_of_a_program_with_errors(cache: Cache, proved: list[str
 def test_a_procedure_that_lines_guard_is_proved_by_itself_once_no_line_calls_it(cache: Cache) -> None:
     calling, silent = HEAD + TABLES, HEAD + edited(TABLES, ("|| bump       |", "||            |"))
     assert run(calling, cache).proved is None
-    assert errors(run(calling, cache).found) == []
-    assert errors(run(silent, cache).found) == ["RCS413"]
+    assert errors(run(calling, cache).diagnostics) == []
+    assert errors(run(silent, cache).diagnostics) == ["RCS413"]
 
 
 def test_a_procedure_run_by_a_level_is_not_excused_by_the_lines_that_guard_it() -> None:
@@ -125,13 +125,13 @@ def guarded(name: str, procedure: str) -> str:
 
 def test_tables_kept_from_different_versions_do_not_excuse_a_procedure_together(cache: Cache) -> None:
     for first, second in (("bump", "rest"), ("rest", "bump")):
-        assert errors(run(HEAD + guarded("one", first) + guarded("two", second), cache).found) == []
+        assert errors(run(HEAD + guarded("one", first) + guarded("two", second), cache).diagnostics) == []
     nobody = HEAD + guarded("one", "rest") + guarded("two", "rest")
-    assert errors(run(nobody, cache).found) == ["RCS413"]
+    assert errors(run(nobody, cache).diagnostics) == ["RCS413"]
 
 
 def test_a_constant_that_an_action_uses_is_part_of_its_table(cache: Cache) -> None:
     text = "const step = 1\n" + HEAD + edited(TABLES, ("|| bump       |", "|| s := s + step |"))
-    assert errors(run(edited(text, ("procedure bump { s := s + 1 }", "")), cache).found) == []
+    assert errors(run(edited(text, ("procedure bump { s := s + 1 }", "")), cache).diagnostics) == []
     wider = edited(text, ("procedure bump { s := s + 1 }", ""), ("step = 1", "step = 5"))
-    assert errors(run(wider, cache).found) == ["RCS413"]
+    assert errors(run(wider, cache).diagnostics) == ["RCS413"]
