@@ -27,8 +27,8 @@ def compare(
     name: str, before: Program, after: Program, options: Options, *, follow: bool = False
 ) -> ProgramDifference:
     """What changed between two versions of a program; with `follow`, which lines can follow which, too."""
-    made = aligned(before, after)
-    versions = Versions(made, options)
+    alignment = aligned(before, after)
+    versions = Versions(alignment, options)
     given_up: tuple[type[BaseException], ...] = (
         UndecidedError,
         TooLongError,
@@ -36,45 +36,47 @@ def compare(
         *smt.troubles(),
     )
     undecided: list[str] = []
-    found: list[ComparedPart] = []
+    compared: list[ComparedPart] = []
     for what, steps in _steps(versions):
         try:
-            found += steps()
+            compared += steps()
         except given_up:
             undecided.append(what)
-    told = [
-        *(change.what for change in made.changes),
-        *(f"{part.what} `{part.name}`" for part in found if part.changed),
+    reported = [
+        *(change.what for change in alignment.changes),
+        *(f"{part.what} `{part.name}`" for part in compared if part.changed),
     ]
     try:
-        found = _with_stops(versions, found, everywhere=bool(made.changes or undecided))
+        compared = _with_stops(versions, compared, everywhere=bool(alignment.changes or undecided))
     except given_up:
         undecided.append("which assumptions stop")
-    found += parts.unsaid(versions, told)
+    compared += parts.unreported(versions, reported)
     seen: tuple[Traces, ...] = ()
     if not undecided:
         try:
-            seen = tuple(one for one in traces(versions) if one.new or one.gone)
+            seen = tuple(level for level in traces(versions) if level.new or level.gone)
         except given_up:
             undecided.append("the state graphs of levels")
     pairs = (
-        tuple(one for one in follows(versions) if one.new or one.gone or not one.decided) if follow else ()
+        tuple(level for level in follows(versions) if level.new or level.gone or not level.decided)
+        if follow
+        else ()
     )
     return ProgramDifference(
-        name, made.changes, tuple(found), seen, tuple(undecided), pairs, dict(versions.kinds)
+        name, alignment.changes, tuple(compared), seen, tuple(undecided), pairs, dict(versions.kinds)
     )
 
 
 def _steps(versions: Versions) -> Iterator[tuple[str, Callable[[], Iterable[ComparedPart]]]]:
     """What is compared, one after the other, with what to call it where it cannot be decided."""
-    one = {str(table.name): table for table in versions.before.tables}
-    two = {str(table.name): table for table in versions.after.tables}
-    for name in dict.fromkeys((*one, *two)):
-        if name in one and name in two:
-            yield f"table `{name}`", lambda n=name: [table_part(versions, one[n], two[n])]  # type: ignore[misc]  # bound early
+    old = {str(table.name): table for table in versions.before.tables}
+    new = {str(table.name): table for table in versions.after.tables}
+    for name in dict.fromkeys((*old, *new)):
+        if name in old and name in new:
+            yield f"table `{name}`", lambda n=name: [table_part(versions, old[n], new[n])]  # type: ignore[misc]  # bound early
         else:
-            said = ("gone",) if name in one else ("new",)
-            yield "", lambda n=name, s=said: [ComparedPart("table", n, s)]  # type: ignore[misc]  # bound early
+            notes = ("gone",) if name in old else ("new",)
+            yield "", lambda n=name, s=notes: [ComparedPart("table", n, s)]  # type: ignore[misc]  # bound early
     yield "procedures", lambda: list(parts.procedures(versions))
     yield "levels", lambda: list(parts.levels(versions))
     yield "assumptions, invariants and properties", lambda: list(parts.conditions(versions))
@@ -84,17 +86,19 @@ _APART = frozenset({"table", "level", "property", "preprocess", "postprocess"})
 """Parts on which the stopping assumptions of another table do not rest."""
 
 
-def _with_stops(versions: Versions, found: Sequence[ComparedPart], *, everywhere: bool) -> list[ComparedPart]:
-    """The parts, tables with which assumptions newly stop the cycle where they fail, or no longer do.
+def _with_stops(
+    versions: Versions, compared: Sequence[ComparedPart], *, everywhere: bool
+) -> list[ComparedPart]:
+    """The parts, with a note where assumptions of a table newly stop the cycle, or no longer do.
 
     Args:
         versions: The two programs.
-        found: All parts.
+        compared: All parts.
         everywhere: Whether more changed than these.
     """
-    everywhere = everywhere or any(part.changed and part.what not in _APART for part in found)
+    everywhere = everywhere or any(part.changed and part.what not in _APART for part in compared)
     wanted = {
-        part.name for part in found if part.what == "table" and (part.changed or part.moved or everywhere)
+        part.name for part in compared if part.what == "table" and (part.changed or part.moved or everywhere)
     }
     before, after = (
         {str(table.name): table for table in program.tables if table.name in wanted and table.assumptions}
@@ -105,12 +109,12 @@ def _with_stops(versions: Versions, found: Sequence[ComparedPart], *, everywhere
         for program, tables in ((versions.before, before), (versions.after, after))
         if before.keys() | after.keys()
     ]
-    alone = {part.name for part in found if part.said in (("gone",), ("new",))}
+    alone = {part.name for part in compared if part.notes in (("gone",), ("new",))}
     return [
-        replace(part, said=(*part.said, *_stops(stops, part.name)))
+        replace(part, notes=(*part.notes, *_stops(stops, part.name)))
         if part.what == "table" and stops and part.name not in alone
         else part
-        for part in found
+        for part in compared
     ]
 
 
@@ -132,11 +136,11 @@ def difference(
         raise NotComparedError(
             "neither side has a table to compare", "give a file, or a folder with `*.rcs` files"
         )
-    found, said = [], []
-    for name, program, two in pairs(before, after):
-        if program is None or two is None:
-            said.append(f"program `{name}` is {'new' if program is None else 'gone'}")
+    programs, notes = [], []
+    for name, old, new in pairs(before, after):
+        if old is None or new is None:
+            notes.append(f"program `{name}` is {'new' if old is None else 'gone'}")
         else:
             progress(f"comparing {name}")
-            found.append(compare(name, program, two, options, follow=follow))
-    return Difference(before.name, after.name, tuple(found), tuple(said))
+            programs.append(compare(name, old, new, options, follow=follow))
+    return Difference(before.name, after.name, tuple(programs), tuple(notes))

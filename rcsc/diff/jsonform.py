@@ -20,18 +20,18 @@ FORM = 1
 Json = dict[str, Any]
 
 
-def to_json(found: Difference) -> Json:
-    """As a JSON value."""
+def to_json(difference: Difference) -> Json:
+    """The difference as a JSON value."""
     return {
         "form": FORM,
         "tool": {"name": "rcsc", "version": __version__},
         "command": "diff",
-        "before": found.before,
-        "after": found.after,
-        "changed": found.changed,
-        "decided": not found.undecided,
-        "said": list(found.said),
-        "programs": [_program_json(program) for program in found.programs],
+        "before": difference.before,
+        "after": difference.after,
+        "changed": difference.changed,
+        "decided": not difference.undecided,
+        "said": list(difference.notes),
+        "programs": [_program_json(program) for program in difference.programs],
     }
 
 
@@ -67,7 +67,7 @@ def _part_json(part: ComparedPart) -> Json:
         "what": part.what,
         "name": part.name,
         "changed": part.changed,
-        "said": list(part.said),
+        "said": list(part.notes),
         "basis": None if part.basis is None else part.basis.value,
         "questions": part.queries,
         "changes": [_change_json(change) for change in part.changes],

@@ -50,7 +50,7 @@ class Met:
 
 
 def within_reach(
-    found: ProgramDifference, after: Program, level: Level, now: Snapshot, options: Options
+    difference: ProgramDifference, after: Program, level: Level, now: Snapshot, options: Options
 ) -> tuple[Met, ...]:
     """What of a difference the level's next cycle can come to if it begins in this state; inputs are free.
 
@@ -59,17 +59,17 @@ def within_reach(
     to give any value within its bounds.
 
     Args:
-        found: The difference.
+        difference: The difference.
         after: The version to be taken.
         level: The level, of that version.
         now: Values of all leaves, in the numbers of that version; those of inputs are not looked at.
         options: Limits of the solver.
     """
     own = level.tables.names
-    declared = tuple(_declared(found))
+    declared = tuple(_declared(difference))
     parts = [
         part
-        for part in found.parts
+        for part in difference.parts
         if part.what not in _ELSEWHERE and (part.what != "table" or part.name in own)
     ]
     if not any(part.changed for part in parts):
@@ -77,15 +77,15 @@ def within_reach(
     cycle: _Cycle | None
     given_up: tuple[type[BaseException], ...] = (TooLongError, RecursionError, *smt.troubles())
     try:
-        cycle = _Cycle(found, after, level, now, options)
+        cycle = _Cycle(difference, after, level, now, options)
     except given_up:
         cycle = None
     return (*declared, *(met for part in parts for met in _met(part, cycle)))
 
 
-def _declared(found: ProgramDifference) -> Iterator[Met]:
+def _declared(difference: ProgramDifference) -> Iterator[Met]:
     """Declarations that say what a cycle does: what is admitted of an input, and whether a value is deferred."""
-    for declaration in found.declarations:
+    for declaration in difference.declarations:
         if declaration.before and declaration.after:
             admits = declaration.before.startswith("input ") or declaration.after.startswith("input ")
             defers = declaration.before.endswith(" deferred") != declaration.after.endswith(" deferred")
@@ -100,7 +100,7 @@ def _declared(found: ProgramDifference) -> Iterator[Met]:
 
 def _met(part: ComparedPart, cycle: "_Cycle | None") -> Iterator[Met]:
     """What of a part is met; all of it where the cycle cannot be followed."""
-    if part.said:
+    if part.notes:
         yield Met(part, None)
     for change in part.changes:
         if cycle is None or part.what == "postprocess" or cycle.reached(part, change):
@@ -111,9 +111,9 @@ class _Cycle:
     """The beginning of a cycle, from one state with any inputs: what leaves are when each part looks at them."""
 
     def __init__(
-        self, found: ProgramDifference, program: Program, level: Level, now: Snapshot, options: Options
+        self, difference: ProgramDifference, program: Program, level: Level, now: Snapshot, options: Options
     ) -> None:
-        self.found, self.level, self.options = found, level, options
+        self.difference, self.level, self.options = difference, level, options
         self.numbers = count(1)
         self.kinds = {str(v.name): v.type for v in program.variables}
         self.program = program
@@ -160,7 +160,7 @@ class _Cycle:
 
     def _in(self, node: Node, name: str, box: Box) -> Node:
         """That a leaf lies in a part of a region, which may number members of an enumeration otherwise."""
-        kind, own = self.found.kinds.get(name, self.kinds[name]), self.kinds[name]
+        kind, own = self.difference.kinds.get(name, self.kinds[name]), self.kinds[name]
         if isinstance(kind, Enum) and isinstance(own, Enum):
             members = [kind.members[key] for low, high in box for key in range(low, high + 1)]
             return values.among(

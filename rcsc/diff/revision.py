@@ -34,7 +34,7 @@ class Entry:
 
 
 def lay_out(revision: str, folder: Path) -> str:
-    """Writes the revision's tables and project files below `folder`; the path, in the repository, of where one stands.
+    """Write the revision's tables and project files below `folder`; return the working folder's path in the repository.
 
     Raises:
         NotComparedError: There is no git, no repository, or no such revision.
@@ -52,7 +52,7 @@ def lay_out(revision: str, folder: Path) -> str:
         raise NotComparedError(
             f"there is no revision `{revision}` in this repository", "`git log --oneline` lists them"
         ) from error
-    entries = [one for one in _entries(tree) if _is_wanted(one.path)]
+    entries = [entry for entry in _entries(tree) if _is_wanted(entry.path)]
     for entry, content in zip(entries, _contents(entries), strict=True):
         target = folder / entry.path
         target.parent.mkdir(parents=True, exist_ok=True)
@@ -100,7 +100,7 @@ def _contents(entries: Sequence[Entry]) -> Iterator[bytes]:
 
 
 def _git(*args: str, stdin: bytes = b"") -> bytes:
-    """What git says."""
+    """The output of git."""
     program = shutil.which("git")
     if program is None:
         raise NotComparedError("git is not installed", "give two files or folders instead of revisions")

@@ -30,26 +30,26 @@ _EVERYWHERE = "every input"
 # --- in words ----------------------------------------------------------------------------
 
 
-def headline(found: Difference) -> str:
-    """One line: what became of how many."""
-    parts = [part for _, part in found.parts()]
+def headline(difference: Difference) -> str:
+    """One line: how many tables and other parts changed."""
+    parts = [part for _, part in difference.parts()]
     tables = [part for part in parts if part.what == "table"]
     changed = [part for part in tables if part.changed]
     same = len(tables) - len(changed)
-    if found.undecided:
+    if difference.undecided:
         lead = "not decided"
-    elif not found.changed:
+    elif not difference.changed:
         lead = "same meaning"
     else:
         lead = f"{_count(len(changed), 'table')} changed"
     others = [part for part in parts if part.what != "table" and part.changed]
-    said = [lead, f"{same} as before, proved" if tables and not found.undecided else ""]
-    said += [f"{_count(len(others), 'other part')} changed" if others else ""]
+    clauses = [lead, f"{same} as before, proved" if tables and not difference.undecided else ""]
+    clauses += [f"{_count(len(others), 'other part')} changed" if others else ""]
     moved = sum(len(part.moved) for part in parts)
-    said.append(f"{_count(moved, 'region')} with another line to the same effect" if moved else "")
-    declared = sum(len(program.declarations) for program in found.programs)
-    said.append(f"{_count(declared, 'declaration')} changed" if declared else "")
-    return "; ".join(one for one in said if one)
+    clauses.append(f"{_count(moved, 'region')} with another line to the same effect" if moved else "")
+    declared = sum(len(program.declarations) for program in difference.programs)
+    clauses.append(f"{_count(declared, 'declaration')} changed" if declared else "")
+    return "; ".join(clause for clause in clauses if clause)
 
 
 def _count(number: int, noun: str) -> str:
@@ -83,13 +83,13 @@ def _title(part: ComparedPart, change: Change) -> str:
         return "another effect"
     if change.before == change.after:
         return f"{change.before}: another effect"
-    said = {
+    effect = {
         PartSort.EFFECT: "another effect",
         PartSort.LINE: "the same effect",
         PartSort.FAULT: "",
         PartSort.CONDITION: "",
     }
-    return f"{change.before} -> {change.after}" + (f": {said[change.sort]}" if said[change.sort] else "")
+    return f"{change.before} -> {change.after}" + (f": {effect[change.sort]}" if effect[change.sort] else "")
 
 
 def _left(value: Value) -> str:
@@ -130,18 +130,18 @@ def _trace(step: Transition) -> str:
 # --- text --------------------------------------------------------------------------------
 
 
-def rows(found: Difference, *, quiet: bool = False) -> Iterator[Row]:
-    """As text in styled pieces."""
+def rows(difference: Difference, *, quiet: bool = False) -> Iterator[Row]:
+    """The difference as text in styled pieces."""
     if not quiet:
-        yield (TextPiece(f"{escape(found.before)} -> {escape(found.after)}", Style.STRONG),)
-    for said in found.said:
-        yield (TextPiece(f"  {escape(said)}", Style.WARNING),)
-    for program in found.programs:
+        yield (TextPiece(f"{escape(difference.before)} -> {escape(difference.after)}", Style.STRONG),)
+    for note in difference.notes:
+        yield (TextPiece(f"  {escape(note)}", Style.WARNING),)
+    for program in difference.programs:
         if program.changed or program.undecided or any(_shown(part) for part in program.parts):
             yield from _program(program)
     if not quiet:
-        style = Style.ERROR if found.undecided else Style.WARNING if found.changed else Style.HELP
-        yield (TextPiece(escape(headline(found)), style),)
+        style = Style.ERROR if difference.undecided else Style.WARNING if difference.changed else Style.HELP
+        yield (TextPiece(escape(headline(difference)), style),)
 
 
 def _program(program: ProgramDifference) -> Iterator[Row]:
@@ -159,10 +159,10 @@ def _program(program: ProgramDifference) -> Iterator[Row]:
         yield (TextPiece(f"  not decided: {what}", Style.ERROR),)
 
 
-def _declared(one: Declaration) -> str:
-    if not one.before or not one.after:
-        return f"{'new' if one.after else 'gone'}: {one.after or one.before}"
-    return f"{one.before} -> {one.after}"
+def _declared(declaration: Declaration) -> str:
+    if not declaration.before or not declaration.after:
+        return f"{'new' if declaration.after else 'gone'}: {declaration.after or declaration.before}"
+    return f"{declaration.before} -> {declaration.after}"
 
 
 def _part(part: ComparedPart) -> Iterator[Row]:
@@ -170,17 +170,19 @@ def _part(part: ComparedPart) -> Iterator[Row]:
     if not part.changed and not part.moved:
         yield (title, TextPiece(f"  {proof(part)}", Style.HELP))
         return
-    yield (title, TextPiece(f"  {', '.join(part.said)}", Style.WARNING))
+    yield (title, TextPiece(f"  {', '.join(part.notes)}", Style.WARNING))
     for change in (*part.changes, *part.moved):
         yield from _change(part, change)
-    if part.basis is not None and not (part.said and not part.changes):
+    if part.basis is not None and not (part.notes and not part.changes):
         yield (TextPiece(f"    {proof(part)}", Style.HELP),)
 
 
 def _change(part: ComparedPart, change: Change) -> Iterator[Row]:
     style = Style.NOTE if change.sort is PartSort.LINE else Style.WARNING
     about = ", ".join(
-        one for one in (_inputs(change.where), "" if change.relied_on else "outside the assumptions") if one
+        remark
+        for remark in (_inputs(change.where), "" if change.relied_on else "outside the assumptions")
+        if remark
     )
     yield (TextPiece(f"    {_title(part, change)}", style), TextPiece(f"  ({about})" if about else ""))
     for box in _boxes(change.where):
@@ -214,10 +216,10 @@ def _followed(follows: Follows) -> Iterator[Row]:
 
 def _by_line(pairs: Sequence[tuple[str, str]]) -> dict[str, list[str]]:
     """The lines that can follow each."""
-    found: dict[str, list[str]] = {}
+    following: dict[str, list[str]] = {}
     for line, then in pairs:
-        found.setdefault(line, []).append(then)
-    return found
+        following.setdefault(line, []).append(then)
+    return following
 
 
 def _traced(traces: Traces) -> Iterator[Row]:
@@ -243,16 +245,16 @@ def _traced(traces: Traces) -> Iterator[Row]:
 # --- Markdown ------------------------------------------------------------------------------
 
 
-def markdown(found: Difference) -> str:
-    """As a review comment: a summary, a table for each table that changed, and details to open."""
+def markdown(difference: Difference) -> str:
+    """The difference as a review comment: a summary, a table for each table that changed, and details to open."""
     lines = [
-        f"### rcsc diff: {_cell(headline(found))}",
+        f"### rcsc diff: {_cell(headline(difference))}",
         "",
-        f"{_code(found.before)} → {_code(found.after)}",
+        f"{_code(difference.before)} → {_code(difference.after)}",
         "",
     ]
-    lines += [f"- {_cell(said)}" for said in found.said] + ([""] if found.said else [])
-    for program in found.programs:
+    lines += [f"- {_cell(note)}" for note in difference.notes] + ([""] if difference.notes else [])
+    for program in difference.programs:
         if program.changed or program.undecided or any(_shown(part) for part in program.parts):
             lines += _program_marked(program)
     return "\n".join(lines).rstrip() + "\n"
@@ -279,14 +281,14 @@ def _program_marked(program: ProgramDifference) -> Iterator[str]:
 
 
 def _part_marked(part: ComparedPart) -> Iterator[str]:
-    said = f": {_cell(', '.join(part.said))}" if part.said else ""
-    yield from (f"**{_cell(part.what)} {_code(part.name)}**{said}", "")
+    notes = f": {_cell(', '.join(part.notes))}" if part.notes else ""
+    yield from (f"**{_cell(part.what)} {_code(part.name)}**{notes}", "")
     if part.changes:
         yield from ("| before → after | where | what is left otherwise | inputs |", "|---|---|---|---|")
         for change in part.changes:
             yield _row(part, change)
         yield ""
-    if part.basis is not None and not (part.said and not part.changes):
+    if part.basis is not None and not (part.notes and not part.changes):
         yield from (f"{_cell(proof(part)[0].upper() + proof(part)[1:])}.", "")
     details = [line for change in (*part.changes, *part.moved) for line in _details(part, change)]
     if details:
@@ -323,11 +325,11 @@ def _row(part: ComparedPart, change: Change) -> str:
 def _details(part: ComparedPart, change: Change) -> Iterator[str]:
     title = _cell(_title(part, change))
     if change.sort is PartSort.LINE:
-        said = f"{'; '.join(_boxes(change.where))} {_besides(change.where)}"
-        yield f"- {title}: {_cell(said)}".rstrip()
+        text = f"{'; '.join(_boxes(change.where))} {_besides(change.where)}"
+        yield f"- {title}: {_cell(text)}".rstrip()
     elif change.witness:
-        said = ", ".join(f"{name} = {value}" for name, value in change.witness)
-        yield f"- {title}: {_cell(said)}"
+        text = ", ".join(f"{name} = {value}" for name, value in change.witness)
+        yield f"- {title}: {_cell(text)}"
     yield from (
         f"  - {_code(value.leaf)}: {_cell(str(value.at[0]))} → {_cell(str(value.at[1]))}"
         for value in change.values
@@ -343,8 +345,8 @@ def _traces_marked(traces: Traces) -> Iterator[str]:
         yield from (f"**level {_code(traces.level)}**: {_count(len(steps), 'step')} {word}", "")
         yield from ("| step | by | shortest trace |", "|---|---|---|")
         for step in shown:
-            said = f"{step.variable}: {step.before} → {step.after}"
-            yield f"| {_cell(said)} | {_cell(', '.join(step.by))} | {_cell(_trace(step))} |"
+            change = f"{step.variable}: {step.before} → {step.after}"
+            yield f"| {_cell(change)} | {_cell(', '.join(step.by))} | {_cell(_trace(step))} |"
         if more:
             yield f"| and {more} more | | |"
         yield ""
@@ -370,8 +372,8 @@ _MARKS = (("\\", "\\\\"), ("&", "&amp;"), ("<", "&lt;"), ("|", "\\|"), ("](", "]
 def _cell(text: str) -> str:
     """Text that ends no cell, marks nothing up, leads nowhere and shows all that it holds; names in pairs of backticks stay set apart."""
     plain = escape(text.replace("\n", " "))
-    for mark, said in _MARKS:
-        plain = plain.replace(mark, said)
+    for mark, replacement in _MARKS:
+        plain = plain.replace(mark, replacement)
     return plain if plain.count("`") % 2 == 0 else plain.replace("`", "'")
 
 

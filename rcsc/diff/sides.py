@@ -42,13 +42,13 @@ class Side:
 
     Attributes:
         programs: By the path of the root file below what was given.
-        found: What keeps a file from being read or resolved.
-        sources: Of the files that `found` points into.
+        diagnostics: What keeps a file from being read or resolved.
+        sources: Of the files that `diagnostics` point into.
     """
 
     name: str
     programs: Mapping[str, Program]
-    found: tuple[Diagnostic, ...]
+    diagnostics: tuple[Diagnostic, ...]
     sources: Mapping[str, Source]
 
 
@@ -89,7 +89,7 @@ def read(asked: Given) -> Side:
 
 
 def _read(asked: Given, paths: tuple[str, ...], hidden: str, shown: str) -> Side:
-    """Loads and resolves; the names of files begin with `shown` in place of `hidden`."""
+    """Load and resolve; the names of files begin with `shown` in place of `hidden`."""
     there = tuple(path for path in paths if os.path.lexists(path))
     if not there and not asked.may_lack:
         raise NotComparedError(f"there is no file or folder `{asked.name}`")
@@ -97,19 +97,19 @@ def _read(asked: Given, paths: tuple[str, ...], hidden: str, shown: str) -> Side
     if loaded is None or (asked.may_lack and not loaded.given):
         return Side(asked.name, {}, (), {})
     programs: dict[str, Program] = {}
-    found = [diagnostic for diagnostic in loaded.diagnostics if diagnostic.severity is Severity.ERROR]
+    diagnostics = [diagnostic for diagnostic in loaded.diagnostics if diagnostic.severity is Severity.ERROR]
     for root in loaded.roots:
-        made = resolve(root, loaded)
-        if isinstance(made, Program):
-            programs[_key(root, there)] = made
+        resolved = resolve(root, loaded)
+        if isinstance(resolved, Program):
+            programs[_key(root, there)] = resolved
         else:
-            found += made
+            diagnostics += resolved
     named = {_renamed(name, hidden, shown): source for name, source in loaded.sources.items()}
     sources = {name: Source(name, source.text) for name, source in named.items()}
     return Side(
         asked.name,
         programs,
-        tuple(_said(diagnostic, hidden, shown) for diagnostic in dict.fromkeys(found)),
+        tuple(_as_given(diagnostic, hidden, shown) for diagnostic in dict.fromkeys(diagnostics)),
         sources,
     )
 
@@ -128,35 +128,35 @@ def _renamed(text: str, hidden: str, shown: str) -> str:
     return text.replace(hidden, shown) if hidden else text
 
 
-def _said(one: Diagnostic, hidden: str, shown: str) -> Diagnostic:
+def _as_given(diagnostic: Diagnostic, hidden: str, shown: str) -> Diagnostic:
     """The diagnostic with the names that the user knows."""
 
     def label(at: Label) -> Label:
         return replace(at, span=replace(at.span, file=_renamed(at.span.file, hidden, shown)))
 
     return replace(
-        one,
-        message=_renamed(one.message, hidden, shown),
-        primary=label(one.primary),
-        related=tuple(map(label, one.related)),
-        notes=tuple(_renamed(note, hidden, shown) for note in one.notes),
-        help=tuple(_renamed(text, hidden, shown) for text in one.help),
+        diagnostic,
+        message=_renamed(diagnostic.message, hidden, shown),
+        primary=label(diagnostic.primary),
+        related=tuple(map(label, diagnostic.related)),
+        notes=tuple(_renamed(note, hidden, shown) for note in diagnostic.notes),
+        help=tuple(_renamed(text, hidden, shown) for text in diagnostic.help),
     )
 
 
 def pairs(before: Side, after: Side) -> Iterator[tuple[str, Program | None, Program | None]]:
     """Programs that are versions of each other: of one path, else of one name; two single ones always are."""
-    one, two = dict(before.programs), dict(after.programs)
-    if len(one) == len(two) == 1:
-        [(name, first)], [(_, second)] = one.items(), two.items()
+    old, new = dict(before.programs), dict(after.programs)
+    if len(old) == len(new) == 1:
+        [(name, first)], [(_, second)] = old.items(), new.items()
         yield name, first, second
         return
     for name, first in before.programs.items():
         other = (
             name
-            if name in two
-            else next((key for key in two if key not in one and two[key].name == first.name), None)
+            if name in new
+            else next((key for key in new if key not in old and new[key].name == first.name), None)
         )
-        yield name, first, two.pop(other) if other is not None else None
-    for name, program in two.items():
+        yield name, first, new.pop(other) if other is not None else None
+    for name, program in new.items():
         yield name, None, program

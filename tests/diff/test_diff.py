@@ -501,7 +501,7 @@ def test_a_property_that_says_the_same_in_other_words_is_the_same() -> None:
 
 def test_a_property_that_says_something_else_is_a_region_over_two_cycles() -> None:
     made = property_part("count >= was count", "count >= was count or width = 0")
-    assert made.said == ("count >= was count -> count >= was count or width = 0",)
+    assert made.notes == ("count >= was count -> count >= was count or width = 0",)
     [change] = made.changes
     assert (change.sort, change.before, change.after) == (PartSort.CONDITION, "false", "true")
     assert change.where.inputs == (45, 1000)  # width = 0, and 45 of 100 pairs that fall
@@ -515,9 +515,9 @@ def test_what_is_not_defined_does_not_hold() -> None:
 
 def test_a_property_that_is_new_or_gone_is_said_with_its_words() -> None:
     line = "property ends : at = done until width = 0\n"
-    assert property_part(line, "", "ends").said == ("gone: at = done until width = 0",)
+    assert property_part(line, "", "ends").notes == ("gone: at = done until width = 0",)
     made = property_part(line, f"{line}property small : count <= width\n", "small")
-    assert made.said == ("new: count <= width",)
+    assert made.notes == ("new: count <= width",)
 
 
 def test_a_condition_about_a_variable_of_another_kind_cannot_be_compared() -> None:
@@ -530,7 +530,7 @@ def test_a_condition_about_a_variable_of_another_kind_cannot_be_compared() -> No
     )
     found = differ(before, after)
     for name, what in (("ends", "property"), ("low", "assumption")):
-        assert part(found, name, what).said == ("cannot be compared: `width` changed its kind",)
+        assert part(found, name, what).notes == ("cannot be compared: `width` changed its kind",)
     assert not part(found, "rises", "property").changed
 
 
@@ -559,7 +559,7 @@ def test_a_variable_of_another_kind_cannot_be_compared() -> None:
     ]
     found = differ(GRIP, edited(GRIP, *in_mm))
     assert found.changed
-    assert part(found, "grip").said == ("cannot be compared: `wanted`, `width` changed its kind",)
+    assert part(found, "grip").notes == ("cannot be compared: `wanted`, `width` changed its kind",)
     assert part(found, "grip").basis is None
 
 
@@ -572,8 +572,8 @@ def test_a_wider_range_is_a_changed_declaration_and_compares_where_both_have_val
 
 def test_a_table_and_a_level_that_are_new_or_gone_are_said() -> None:
     more = GRIP + "table other {\n  | line | width ||\n  |------|-------||\n  | all  |       ||\n}\n"
-    assert part(differ(GRIP, more), "other").said == ("new",)
-    assert part(differ(more, GRIP), "other").said == ("gone",)
+    assert part(differ(GRIP, more), "other").notes == ("new",)
+    assert part(differ(more, GRIP), "other").notes == ("gone",)
 
 
 # --- conditions that are not defined everywhere ----------------------------------------------------------
@@ -698,7 +698,7 @@ def test_a_level_is_compared_by_what_runs_around_its_table() -> None:
     )
     assert part(found, "walker", "preprocess").changes
     assert part(found, "walker", "postprocess").basis is Basis.DIGEST
-    assert part(found, "walker", "level").said == ("period: 40 ms, now 20 ms",)
+    assert part(found, "walker", "level").notes == ("period: 40 ms, now 20 ms",)
     assert part(found, "walk").basis is Basis.DIGEST
 
 

@@ -19,7 +19,7 @@ from rcsc.certify.execution import Run, Start
 from rcsc.certify.settle import script, values_in
 from rcsc.certify.values import Term, Terms, sort_of
 from rcsc.diagnostics.codes import Code
-from rcsc.diff.changes.value_text import said
+from rcsc.diff.changes.value_text import in_words
 from rcsc.emit.c99 import helper
 from rcsc.emit.code_tree import IN_C, IN_PYTHON, Invoke, read
 from rcsc.emit.ctext import CText, wide_type
@@ -588,8 +588,8 @@ def test_a_line_that_a_nan_does_not_match_leaves_it_to_default() -> None:
 def test_words_turn_no_comparison_of_what_may_be_no_number() -> None:
     for kind, words in ((Real(-1.0, 1.0), "a >= b"), (REAL, "not (a < b)")):
         one, two = values.variable("a", kind), values.variable("b", kind)
-        assert said(values.negation(values.compare(Op.LT, one, two))) == words
-        assert said(values.negation(values.compare(Op.EQ, one, two))) == "a /= b"
+        assert in_words(values.negation(values.compare(Op.LT, one, two))) == words
+        assert in_words(values.negation(values.compare(Op.EQ, one, two))) == "a /= b"
 
 
 FAR = "x * 1e308 * 10.0 - y * 1e308 * 10.0"

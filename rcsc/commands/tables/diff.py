@@ -75,20 +75,20 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
     options = Options(steps=steps, memory_mb=memory)
     progress = Progress(wanted=not quiet)
     try:
-        found = _found(asked, options, progress, follow)
+        answer = _compared(asked, options, progress, follow)
     except NotComparedError as error:
         return _refuse(Code.NOT_COMPARED, str(error), *error.helps)
     finally:
         progress("")
-    if isinstance(found, int):
-        return found
-    put(_text(found, form, quiet, wants_color(Color(color), file)), file)
-    if found.undecided:
-        left = ", ".join(what for program in found.programs for what in program.undecided)
+    if isinstance(answer, int):
+        return answer
+    put(_text(answer, form, quiet, wants_color(Color(color), file)), file)
+    if answer.undecided:
+        left = ", ".join(what for program in answer.programs for what in program.undecided)
         return _refuse(
             Code.UNDECIDED, f"the solver gave up on {left}", "give each query more steps with `--steps`"
         )
-    return CHANGED if found.changed else SAME
+    return CHANGED if answer.changed else SAME
 
 
 def _asked(paths: tuple[str, ...], revision: str | None) -> tuple[Given, Given]:
@@ -100,22 +100,22 @@ def _asked(paths: tuple[str, ...], revision: str | None) -> tuple[Given, Given]:
     return given(paths[0]), given(paths[1])
 
 
-def _found(
+def _compared(
     asked: tuple[Given, Given], options: Options, progress: Callable[[str], None], follow: bool
 ) -> Difference | int:
     """The difference, or the status where a side has errors."""
     sides = []
-    for one in asked:
-        progress(f"reading {one.name}")
-        sides.append(read(one))
-    if any(side.found for side in sides):
+    for given_ in asked:
+        progress(f"reading {given_.name}")
+        sides.append(read(given_))
+    if any(side.diagnostics for side in sides):
         return _wrong(sides)
     return difference(sides[0], sides[1], options, progress, follow=follow)
 
 
 def _wrong(sides: list[Side]) -> int:
-    """Shows what keeps the sides from being compared."""
-    every = dict.fromkeys(diagnostic for side in sides for diagnostic in side.found)
+    """Show what keeps the sides from being compared."""
+    every = dict.fromkeys(diagnostic for side in sides for diagnostic in side.diagnostics)
     sources = {name: source for side in sides for name, source in side.sources.items()}
     show(Report(tuple(every), (), sources), "diff", Output(quiet=True))
     return ERROR
@@ -126,10 +126,10 @@ def _refuse(code: Code, message: str, *helps: str) -> int:
     return ERROR
 
 
-def _text(found: Difference, form: str, quiet: bool, color: bool) -> str:
+def _text(compared: Difference, form: str, quiet: bool, color: bool) -> str:
 
     if form == "json":
-        return json_text(to_json(found))
+        return json_text(to_json(compared))
     if form == "markdown":
-        return markdown(found)
-    return (paint if color else plain)(rows(found, quiet=quiet))
+        return markdown(compared)
+    return (paint if color else plain)(rows(compared, quiet=quiet))

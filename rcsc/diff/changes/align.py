@@ -65,38 +65,38 @@ def aligned(before: Program, after: Program) -> Aligned:
     """The two versions over what they have in common."""
     changes = tuple(_declarations(before, after))
     numbering = _numbering(before, after)
-    one, two = (
+    old, new = (
         _Rewriter(numbering).program(program) if numbering else program for program in (before, after)
     )
-    later = {str(variable.name): variable.type for variable in two.variables}
+    later = {str(variable.name): variable.type for variable in new.variables}
     leaves: dict[str, Scalar] = {}
     apart = set()
-    for variable in one.variables:
+    for variable in old.variables:
         if variable.name in later:
             kind = _both(variable.type, later[variable.name], numbering)
             if kind is None:
                 apart.add(str(variable.name))
             else:
                 leaves[str(variable.name)] = kind
-    return Aligned(one, two, leaves, frozenset(apart), changes)
+    return Aligned(old, new, leaves, frozenset(apart), changes)
 
 
-def _both(one: Scalar, two: Scalar, shared: "Mapping[Enum, _Members]") -> Scalar | None:
+def _both(first: Scalar, second: Scalar, shared: "Mapping[Enum, _Members]") -> Scalar | None:
     """The values of both types; None where they are of different kinds, or have none in common."""
-    match one, two:
+    match first, second:
         case Int(unit=unit), Int(unit=other) if unit == other:
-            low, high = max(one.low, two.low), min(one.high, two.high)
+            low, high = max(first.low, second.low), min(first.high, second.high)
             return Int(low, high, unit) if low <= high else None
         case Real(unit=unit), Real(unit=other) if unit == other:
-            least, greatest = max(one.low, two.low), min(one.high, two.high)
+            least, greatest = max(first.low, second.low), min(first.high, second.high)
             return Real(least, greatest, unit) if least <= greatest else None
         case Enum(), Enum():
             known = {members.whole: members.common for members in shared.values()}
-            if one == two:
-                return Enum(one.name, known[one]) if one in known else one
-            return one if one.members == two.members else None
+            if first == second:
+                return Enum(first.name, known[first]) if first in known else first
+            return first if first.members == second.members else None
         case _:
-            return one if type(one) is type(two) and not isinstance(one, Int | Real | Enum) else None
+            return first if type(first) is type(second) and not isinstance(first, Int | Real | Enum) else None
 
 
 # --- enumerations ------------------------------------------------------------------------
@@ -120,19 +120,19 @@ class _Members:
 def _numbering(before: Program, after: Program) -> dict[Enum, _Members]:
     """For each enumeration that both declare with other members, how it is numbered anew; by its old form."""
     later = {enum.name: enum for enum in after.enums}
-    found = {}
-    for one in before.enums:
-        two = later.get(one.name)
-        if two is None or two.members == one.members:
+    numbering = {}
+    for old in before.enums:
+        new = later.get(old.name)
+        if new is None or new.members == old.members:
             continue
-        common = tuple(name for name in one.members if name in two.members)
+        common = tuple(name for name in old.members if name in new.members)
         if not common:
             continue
-        rest = [name for name in (*one.members, *two.members) if name not in common]
-        whole = Enum(one.name, (*common, *dict.fromkeys(rest)))
-        for version in (one, two):
-            found[version] = _Members(whole, common, tuple(map(whole.members.index, version.members)))
-    return found
+        rest = [name for name in (*old.members, *new.members) if name not in common]
+        whole = Enum(old.name, (*common, *dict.fromkeys(rest)))
+        for version in (old, new):
+            numbering[version] = _Members(whole, common, tuple(map(whole.members.index, version.members)))
+    return numbering
 
 
 class _Rewriter:
@@ -172,7 +172,7 @@ class _Rewriter:
         return known
 
     def _changed(self, value: Any) -> Any:
-        parts = {one.name: self.any(getattr(value, one.name)) for one in fields(value) if one.init}
+        parts = {field.name: self.any(getattr(value, field.name)) for field in fields(value) if field.init}
         match value:
             case Literal(type=kind) if isinstance(kind, Enum):
                 parts["value"] = self._number(kind, value.value)
@@ -208,11 +208,11 @@ def _declarations(before: Program, after: Program) -> Iterable[Declaration]:
     enums = [{enum.name: ", ".join(enum.members) for enum in program.enums} for program in (before, after)]
     yield from _changed(
         "enumeration",
-        *({n: said for n, said in enum.items() if all(n in e for e in enums)} for enum in enums),
+        *({n: members for n, members in enum.items() if all(n in e for e in enums)} for enum in enums),
     )
     yield from _changed(
         "variable",
-        *({str(v.name): _said(v) for v in p.variables if not _is_pending(v)} for p in (before, after)),
+        *({str(v.name): _declared(v) for v in p.variables if not _is_pending(v)} for p in (before, after)),
     )
 
 
@@ -227,7 +227,7 @@ def _is_pending(variable: Variable) -> bool:
     return variable.name.endswith(".next")
 
 
-def _said(variable: Variable) -> str:
+def _declared(variable: Variable) -> str:
     """The declaration in the language's words, without what it says of its deferred value."""
     unit = variable.type.unit if isinstance(variable.type, Int | Real) else ()
     stated = f" [{spell_unit(unit)}]" if unit else ""

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from rcsc.diff.changes.difference import Change, PartSort, Value, Where
-from rcsc.diff.changes.value_text import number, said
+from rcsc.diff.changes.value_text import in_words, number
 from rcsc.diff.changes.versions import MOST_BOXES, MOST_BOXES_ACROSS, Doing, Hit, Versions, is_across, is_hard
 from rcsc.lang.interpret import UNDEFINED, ExternError
 from rcsc.lang.model import Program
@@ -63,13 +63,13 @@ class Contrast:
         versions, whole = self.versions, self.node
         if self.everywhere():
             return versions.where(wanted, self.region)
-        one = versions.shared.canonical
-        inner = one(values.both(self.region, whole))
+        canonical = versions.shared.canonical
+        inner = canonical(values.both(self.region, whole))
         if not is_hard(whole):
             most = MOST_BOXES_ACROSS if is_across(whole) else MOST_BOXES
-            found = versions.where(one(values.both(wanted, whole)), inner, most)
-            if found.exact:
-                return found
+            where = versions.where(canonical(values.both(wanted, whole)), inner, most)
+            if where.exact:
+                return where
         around = versions.where(wanted, self.region)
         besides = self._besides()
         also = f"{around.also} and ({besides})" if around.also else besides
@@ -80,7 +80,7 @@ class Contrast:
         parts: list[str] = []
         long: list[str] = []
         for leaf, node in self.differ.items():
-            text = said(self._unequal(leaf)) if leaf not in (RUN, CALLS) else said(node)
+            text = in_words(self._unequal(leaf)) if leaf not in (RUN, CALLS) else in_words(node)
             (parts if text else long).append(text or f"{leaf or 'the end of the run'} differs")
         return " or ".join((*parts, *long))
 
@@ -119,7 +119,7 @@ class Contrast:
         kind = self.versions.types[leaf]
         nodes = [value_after(effect, leaf, self.versions.shared) for effect in effects]
         words = [
-            (said(node, kind) or "") if leaf in effect.leaves else "unchanged"
+            (in_words(node, kind) or "") if leaf in effect.leaves else "unchanged"
             for effect, node in zip(effects, nodes, strict=True)
         ]
         at = ["" if end is None else number(kind, end[leaf]) for end in ends]
@@ -147,21 +147,21 @@ def contrast(versions: Versions, region: Node, pair: tuple[Doing, Doing]) -> Con
     Raises:
         UndecidedError: The solver gave up.
     """
-    one, two = (doing.effect for doing in pair)
+    before, after = (doing.effect for doing in pair)
     shared = versions.shared
-    good = shared.canonical(values.both(one.good, two.good))
-    asked = {RUN: goes_wrong_otherwise(one, two, shared)}
-    asked[CALLS] = values.both(good, values.negation(same_calls(one, two, versions.leaves, shared)))
+    good = shared.canonical(values.both(before.good, after.good))
+    asked = {RUN: goes_wrong_otherwise(before, after, shared)}
+    asked[CALLS] = values.both(good, values.negation(same_calls(before, after, versions.leaves, shared)))
     for leaf in versions.leaves:
-        if leaf in one.leaves or leaf in two.leaves:
-            pair_ = [value_after(effect, leaf, shared) for effect in (one, two)]
+        if leaf in before.leaves or leaf in after.leaves:
+            pair_ = [value_after(effect, leaf, shared) for effect in (before, after)]
             asked[leaf] = values.both(good, values.negation(shared.equal(*pair_)))
-    found = {}
+    differences = {}
     for leaf, node in asked.items():
         differ = shared.canonical(node)
         if versions.meet(region, differ):
-            found[leaf] = differ
-    return Contrast(versions, region, pair, found)
+            differences[leaf] = differ
+    return Contrast(versions, region, pair, differences)
 
 
 def changes(
@@ -181,11 +181,11 @@ def changes(
     Raises:
         UndecidedError: The solver gave up.
     """
-    one, found = versions.shared.canonical, []
+    canonical, changed = versions.shared.canonical, []
     rest = region
     for relied_on, standing in ((True, relied), (False, values.negation(relied))):
-        part = one(values.both(rest, standing))
-        hit = versions.found(part, TRUE if against is None else against.node)
+        part = canonical(values.both(rest, standing))
+        hit = versions.hit(part, TRUE if against is None else against.node)
         if hit is None:
             continue
         where = (
@@ -193,8 +193,8 @@ def changes(
         )
         left = () if against is None else against.left(part, hit)
         point = tuple(hit.point.items())
-        found.append(
+        changed.append(
             Change(sort, *labels, where, versions.spelled(hit.point), point, hit.least, left, relied_on)
         )
         rest = values.both(rest, values.negation(versions.inside(where.boxes)))
-    return found
+    return changed

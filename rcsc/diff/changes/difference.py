@@ -95,7 +95,7 @@ class ComparedPart:
 
     Attributes:
         what: `table`, `procedure`, `preprocess`, `postprocess`, `assumption`, `invariant`, `property`, `level`.
-        said: What changed that is no region: a table that is new or gone, a period.
+        notes: What changed that is no region: a table that is new or gone, a period.
         changes: Of meaning.
         moved: The same effect by another line.
         basis: None where nothing is proved: it is new, gone, or cannot be compared.
@@ -104,7 +104,7 @@ class ComparedPart:
 
     what: str
     name: str
-    said: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
     changes: tuple[Change, ...] = ()
     moved: tuple[Change, ...] = ()
     basis: Basis | None = None
@@ -114,7 +114,7 @@ class ComparedPart:
     @property
     def changed(self) -> bool:
         """Whether its meaning changed."""
-        return bool(self.said or self.changes)
+        return bool(self.notes or self.changes)
 
 
 @dataclass(frozen=True, slots=True)
@@ -196,18 +196,18 @@ class Difference:
 
     Attributes:
         before, after: What was compared, as given.
-        said: Programs that are new or gone.
+        notes: Programs that are new or gone.
     """
 
     before: str
     after: str
     programs: tuple[ProgramDifference, ...]
-    said: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
     @property
     def changed(self) -> bool:
         """Whether anything means something else."""
-        return bool(self.said) or any(program.changed for program in self.programs)
+        return bool(self.notes) or any(program.changed for program in self.programs)
 
     @property
     def undecided(self) -> bool:

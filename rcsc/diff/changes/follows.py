@@ -26,13 +26,13 @@ def follows(versions: Versions) -> Iterator[Follows]:
             continue
         pair = level, later[level.name]
         around = _around(versions.digests[0], level) != _around(versions.digests[1], pair[1])
-        tables = [run_by(side.program, one) for side, one in zip(versions.digests, pair, strict=True)]
+        tables = [run_by(side.program, version) for side, version in zip(versions.digests, pair, strict=True)]
         for name, table in tables[0].items():
-            two = tables[1].get(name)
-            if two is not None and (
-                around or versions.digests[0].table(table) != versions.digests[1].table(two)
+            later_table = tables[1].get(name)
+            if later_table is not None and (
+                around or versions.digests[0].table(table) != versions.digests[1].table(later_table)
             ):
-                yield _compared(versions, level.name, table, two)
+                yield _compared(versions, level.name, table, later_table)
 
 
 def _around(digests: Digests, level: Level) -> object:
@@ -46,16 +46,16 @@ def _around(digests: Digests, level: Level) -> object:
     return [digests.body(body) for body in bodies], deferred
 
 
-def _compared(versions: Versions, level: str, one: Table, two: Table) -> Follows:
-    name = str(two.name)
+def _compared(versions: Versions, level: str, old: Table, new: Table) -> Follows:
+    name = str(new.name)
     try:
-        before = _pairs(versions.before, one, versions.options)
-        after = _pairs(versions.after, two, versions.options)
+        before = _pairs(versions.before, old, versions.options)
+        after = _pairs(versions.after, new, versions.options)
     except UnansweredError:
         return Follows(level, name, decided=False)
-    called = _renamed(one, two)
+    called = _renamed(old, new)
     before = frozenset((called.get(a, a), called.get(b, b)) for a, b in before)
-    order = {line: at for at, line in enumerate(_names(two))}
+    order = {line: at for at, line in enumerate(_names(new))}
 
     def sorted_(pairs: Iterable[tuple[str, str]]) -> tuple[tuple[str, str], ...]:
         return tuple(sorted(pairs, key=lambda pair: [(order.get(line, len(order)), line) for line in pair]))
@@ -75,11 +75,11 @@ def _names(table: Table) -> list[str]:
     return [*(str(line.name) for line in table.lines), *default]
 
 
-def _renamed(one: Table, two: Table) -> dict[str, str]:
+def _renamed(old: Table, new: Table) -> dict[str, str]:
     """New names of lines that are otherwise word for word as they were."""
-    names = set(_names(one)), set(_names(two))
-    fresh = {_body(line): str(line.name) for line in two.lines if str(line.name) not in names[0]}
-    gone = [line for line in one.lines if str(line.name) not in names[1]]
+    names = set(_names(old)), set(_names(new))
+    fresh = {_body(line): str(line.name) for line in new.lines if str(line.name) not in names[0]}
+    gone = [line for line in old.lines if str(line.name) not in names[1]]
     return {str(line.name): fresh[_body(line)] for line in gone if _body(line) in fresh}
 
 

@@ -53,21 +53,21 @@ def procedures(versions: Versions) -> Iterator[ComparedPart]:
             yield _procedure(versions, procedure, later[name])
 
 
-def _procedure(versions: Versions, one: Procedure, two: Procedure) -> ComparedPart:
-    name, (first, second) = str(one.name), versions.digests
+def _procedure(versions: Versions, old: Procedure, new: Procedure) -> ComparedPart:
+    name, (first, second) = str(old.name), versions.digests
     if first.procedure(name) == second.procedure(name):
         return ComparedPart("procedure", name, basis=Basis.DIGEST)
     calls: list[Statement] = [Call(ProcedureName(name))]
     apart = sorted(versions.aligned.apart & (first.touched(calls, ()) | second.touched(calls, ())))
     if apart:
         return ComparedPart("procedure", name, (f"cannot be compared: `{apart[0]}` changed its kind",))
-    if [(p.name, _kind(p.type)) for p in one.params] != [(p.name, _kind(p.type)) for p in two.params]:
+    if [(p.name, _kind(p.type)) for p in old.params] != [(p.name, _kind(p.type)) for p in new.params]:
         return ComparedPart("procedure", name, ("its parameters changed",))
     args = [
         values.variable(
             p.name if p.name not in versions.kinds else f"argument {p.name}", _narrower(p.type, q.type)
         )
-        for p, q in zip(one.params, two.params, strict=True)
+        for p, q in zip(old.params, new.params, strict=True)
     ]
     runner = partial(_call, name, [node.name for node in args])
     effects = [meaning.procedure(name, args) for meaning in versions.meanings()]
@@ -79,15 +79,15 @@ def _kind(kind: Scalar) -> object:
     return (type(kind), kind.unit) if isinstance(kind, Int | Real) else kind
 
 
-def _narrower(one: Scalar, two: Scalar) -> Scalar:
+def _narrower(first: Scalar, second: Scalar) -> Scalar:
     """The values of both types, one kind."""
-    match one, two:
+    match first, second:
         case Int(), Int():
-            return Int(max(one.low, two.low), min(one.high, two.high), one.unit)
+            return Int(max(first.low, second.low), min(first.high, second.high), first.unit)
         case Real(), Real():
-            return Real(max(one.low, two.low), min(one.high, two.high), one.unit)
+            return Real(max(first.low, second.low), min(first.high, second.high), first.unit)
         case _:
-            return one
+            return first
 
 
 def _call(name: str, args: list[str], program: Program, now: dict[str, Value]) -> None:
@@ -103,10 +103,12 @@ def _effects(
 ) -> ComparedPart:
     """Where two effects differ, all inputs free."""
     before = versions.queries
-    one, two = (Doing(name, effect, run, {}) for effect, run in zip(pair, runners, strict=True))
-    made = contrast(versions, TRUE, (one, two))
-    found = changes(versions, PartSort.EFFECT, (name, name), TRUE, TRUE, made) if made.differ else []
-    return ComparedPart(what, name, (), tuple(found), (), Basis.SOLVER, versions.queries - before)
+    old, new = (Doing(name, effect, run, {}) for effect, run in zip(pair, runners, strict=True))
+    contrasted = contrast(versions, TRUE, (old, new))
+    changed = (
+        changes(versions, PartSort.EFFECT, (name, name), TRUE, TRUE, contrasted) if contrasted.differ else []
+    )
+    return ComparedPart(what, name, (), tuple(changed), (), Basis.SOLVER, versions.queries - before)
 
 
 # --- levels ----------------------------------------------------------------------------------
@@ -119,27 +121,27 @@ def levels(versions: Versions) -> Iterator[ComparedPart]:
         UndecidedError, TooLongError, RecursionError: As `tables.table_part`.
     """
     later = {level.name: level for level in versions.after.levels}
-    for one in versions.before.levels:
-        two = later.get(one.name)
-        if two is None:
-            yield ComparedPart("level", one.name, ("gone",))
+    for old in versions.before.levels:
+        new = later.get(old.name)
+        if new is None:
+            yield ComparedPart("level", old.name, ("gone",))
             continue
-        yield ComparedPart("level", one.name, tuple(_level(one, two)), basis=Basis.DIGEST)
-        yield _sequence(versions, "preprocess", one.name, (one.preprocess, two.preprocess))
-        yield _sequence(versions, "postprocess", one.name, (one.postprocess, two.postprocess))
+        yield ComparedPart("level", old.name, tuple(_level(old, new)), basis=Basis.DIGEST)
+        yield _sequence(versions, "preprocess", old.name, (old.preprocess, new.preprocess))
+        yield _sequence(versions, "postprocess", old.name, (old.postprocess, new.postprocess))
     known = {level.name for level in versions.before.levels}
     yield from (ComparedPart("level", name, ("new",)) for name in later if name not in known)
 
 
-def _level(one: Level, two: Level) -> Iterator[str]:
+def _level(old: Level, new: Level) -> Iterator[str]:
     """What changed of the level itself."""
-    if one.period_ms != two.period_ms:
-        yield f"period: {one.period_ms} ms, now {two.period_ms} ms"
-    first, second = _chosen(one), _chosen(two)
+    if old.period_ms != new.period_ms:
+        yield f"period: {old.period_ms} ms, now {new.period_ms} ms"
+    first, second = _chosen(old), _chosen(new)
     for at in dict.fromkeys((*first, *second)):
         if first.get(at) != second.get(at):
             yield f"table for {at or 'every cycle'}: {first.get(at, 'none')}, now {second.get(at, 'none')}"
-    if _selector(one) != _selector(two):
+    if _selector(old) != _selector(new):
         yield "which command chooses the table"
 
 
@@ -165,8 +167,10 @@ def _sequence(
     apart = sorted(versions.aligned.apart & (first.touched(bodies[0], ()) | second.touched(bodies[1], ())))
     if apart:
         return ComparedPart(what, level, (f"cannot be compared: `{apart[0]}` changed its kind",))
-    one, two = (m.effect(body) for m, body in zip(versions.meanings(), bodies, strict=True))
-    return _effects(versions, what, level, (one, two), (partial(_run, bodies[0]), partial(_run, bodies[1])))
+    before, after = (m.effect(body) for m, body in zip(versions.meanings(), bodies, strict=True))
+    return _effects(
+        versions, what, level, (before, after), (partial(_run, bodies[0]), partial(_run, bodies[1]))
+    )
 
 
 # --- what no comparison has looked at -----------------------------------------------------------
@@ -191,32 +195,32 @@ _WORDS = {"doc": "", "text": "", "box": None}
 """Fields that say again, for people or for the prover, what others say."""
 
 
-def unsaid(versions: Versions, said: Iterable[str]) -> Iterator[ComparedPart]:
-    """Whatever of the two programs differs, by a walk over all fields, and is neither said yet nor compared.
+def unreported(versions: Versions, reported: Iterable[str]) -> Iterator[ComparedPart]:
+    """Every difference that a walk over all fields shows and that is neither reported yet nor compared.
 
     Procedures that only one version has are left out: what they do shows where they are called.
 
     Args:
         versions: The two programs.
-        said: What declarations and parts have told: `table t`.
+        reported: What declarations and parts have reported: `table t`.
     """
-    known = set(said)
+    known = set(reported)
     before, after = versions.before, versions.after
     for field in fields(Program):
         if field.name in _UNSEEN:
             continue
         what, compared = _COMPARED.get(field.name, (field.name, {}))
-        one, two = ({str(m.name): m for m in getattr(p, field.name)} for p in (before, after))
-        for name in dict.fromkeys((*one, *two)):
+        old, new = ({str(m.name): m for m in getattr(p, field.name)} for p in (before, after))
+        for name in dict.fromkeys((*old, *new)):
             key = f"{what} `{name.removesuffix('.next')}"
             if any(told.startswith((f"{key}`", f"{key}.", f"{key}[")) for told in known):
                 continue  # itself, or a part of it
-            if name not in one or name not in two:
+            if name not in old or name not in new:
                 if what != "procedure":
-                    yield ComparedPart(what, name, ("new" if name not in one else "gone",))
-            elif _rest_of(one[name], compared) != _rest_of(two[name], compared):
+                    yield ComparedPart(what, name, ("new" if name not in old else "gone",))
+            elif _rest_of(old[name], compared) != _rest_of(new[name], compared):
                 yield ComparedPart(what, name, ("declared otherwise",))
-        if [name for name in one if name in two] != [name for name in two if name in one]:
+        if [name for name in old if name in new] != [name for name in new if name in old]:
             yield ComparedPart("order", field.name, ("declared in another order",))
 
 
@@ -224,7 +228,7 @@ def _rest_of(member: Any, compared: Mapping[str, object]) -> str:
     """A digest of a member without what is compared; an enumeration stands for itself."""
     left_out = {*compared, *_WORDS}
     kept = (getattr(member, f.name) for f in fields(member) if f.compare and f.name not in left_out)
-    return digest(tuple(_bare(one, whole=isinstance(member, Enum)) for one in kept))
+    return digest(tuple(_bare(value, whole=isinstance(member, Enum)) for value in kept))
 
 
 def _bare(value: Any, *, whole: bool = False) -> Any:
@@ -249,37 +253,37 @@ def conditions(versions: Versions) -> Iterator[ComparedPart]:
         UndecidedError: As `tables.table_part`.
     """
     before, after = versions.before, versions.after
-    for what, one, two in (
+    for what, old, new in (
         ("assumption", _named(before.assumptions), _named(after.assumptions)),
         ("invariant", _named(before.invariants), _named(after.invariants)),
         ("deferred value", _deferred(before), _deferred(after)),
     ):
-        for name in dict.fromkeys((*one, *two)):
-            if name not in two or name not in one:
+        for name in dict.fromkeys((*old, *new)):
+            if name not in new or name not in old:
                 if what != "deferred value":  # the declaration says so
-                    yield ComparedPart(what, name, ("gone" if name not in two else "new",))
+                    yield ComparedPart(what, name, ("gone" if name not in new else "new",))
             else:
-                yield _condition(versions, what, name, (one[name], two[name]))
+                yield _condition(versions, what, name, (old[name], new[name]))
     yield from _properties(versions)
     standing = {str(known.name): known.standing for known in before.assumptions}
     for assumption in after.assumptions:
         was = standing.get(str(assumption.name), assumption.standing)
         if was is not assumption.standing:
-            said = f"{was.value}, now {assumption.standing.value}"
-            yield ComparedPart("standing of assumption", str(assumption.name), (said,))
+            note = f"{was.value}, now {assumption.standing.value}"
+            yield ComparedPart("standing of assumption", str(assumption.name), (note,))
 
 
 def _properties(versions: Versions) -> Iterator[ComparedPart]:
     """Each property, with its words where it is new, gone, or says something else."""
-    one, two = ({p.name: p for p in made.properties} for made in (versions.before, versions.after))
-    for name in dict.fromkeys((*one, *two)):
-        if name not in two or name not in one:
-            only = one[name] if name in one else two[name]
-            yield ComparedPart("property", name, (f"{'gone' if name in one else 'new'}: {_words(only)}",))
+    old, new = ({p.name: p for p in version.properties} for version in (versions.before, versions.after))
+    for name in dict.fromkeys((*old, *new)):
+        if name not in new or name not in old:
+            only = old[name] if name in old else new[name]
+            yield ComparedPart("property", name, (f"{'gone' if name in old else 'new'}: {_words(only)}",))
             continue
-        part = _condition(versions, "property", name, (one[name].condition, two[name].condition))
-        said = (f"{_words(one[name])} -> {_words(two[name])}",) if part.changes else part.said
-        yield replace(part, said=said)
+        part = _condition(versions, "property", name, (old[name].condition, new[name].condition))
+        notes = (f"{_words(old[name])} -> {_words(new[name])}",) if part.changes else part.notes
+        yield replace(part, notes=notes)
 
 
 def _words(stated: Property) -> str:
@@ -303,21 +307,21 @@ def _condition(versions: Versions, what: str, name: str, pair: tuple[Expr, Expr]
     if apart := sorted(versions.aligned.apart & read):
         return ComparedPart(what, name, (f"cannot be compared: `{apart[0]}` changed its kind",))
     before = versions.queries
-    one, two = (
+    old, new = (
         _worth(meaning, condition, undefined="false" if what == "property" else "undefined")
         for meaning, condition in zip(versions.meanings(), pair, strict=True)
     )
-    found: list[Change] = []
-    for first, second in product(one, two):
+    changed: list[Change] = []
+    for first, second in product(old, new):
         if first != second:
-            region = versions.shared.canonical(values.both(one[first], two[second]))
-            found += changes(versions, PartSort.CONDITION, (first, second), region)
-    return ComparedPart(what, name, (), tuple(found), (), Basis.SOLVER, versions.queries - before)
+            region = versions.shared.canonical(values.both(old[first], new[second]))
+            changed += changes(versions, PartSort.CONDITION, (first, second), region)
+    return ComparedPart(what, name, (), tuple(changed), (), Basis.SOLVER, versions.queries - before)
 
 
 def _worth(meaning: Meaning, condition: Expr, undefined: str) -> dict[str, Node]:
     """Where the condition is true, false and, called as given, undefined."""
     holds = meaning.condition(condition)
     good = values.all_of(values.negation(bad) for bad in meaning.bad)
-    found = {"true": values.both(good, holds), "false": values.both(good, values.negation(holds))}
-    return found | {undefined: values.either(found.get(undefined, FALSE), values.negation(good))}
+    regions = {"true": values.both(good, holds), "false": values.both(good, values.negation(holds))}
+    return regions | {undefined: values.either(regions.get(undefined, FALSE), values.negation(good))}

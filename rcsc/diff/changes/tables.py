@@ -42,39 +42,40 @@ class InputOutcome:
 
     @property
     def key(self) -> tuple[bool, str]:
-        """The same for the same outcome in two versions."""
+        """Equal for equal outcomes of two versions."""
         return self.actions is None, self.name
 
 
-def table_part(versions: Versions, one: Table, two: Table) -> ComparedPart:
+def table_part(versions: Versions, before: Table, after: Table) -> ComparedPart:
     """What changed between two versions of a table.
 
     Raises:
         UndecidedError: The solver gave up.
         TooLongError, RecursionError: A procedure has more steps than are followed.
     """
-    name = str(two.name)
-    if versions.digests[0].table(one) == versions.digests[1].table(two):
+    name = str(after.name)
+    if versions.digests[0].table(before) == versions.digests[1].table(after):
         return ComparedPart("table", name, basis=Basis.DIGEST)
-    apart = sorted(versions.aligned.apart & (_touched(versions, 0, one) | _touched(versions, 1, two)))
+    apart = sorted(versions.aligned.apart & (_touched(versions, 0, before) | _touched(versions, 1, after)))
     if apart:
-        said = (f"cannot be compared: {', '.join(f'`{leaf}`' for leaf in apart)} changed its kind",)
-        return ComparedPart("table", name, (*said, *_claims(one, two)))
-    return _Comparison(versions, one, two).part()
+        notes = (f"cannot be compared: {', '.join(f'`{leaf}`' for leaf in apart)} changed its kind",)
+        return ComparedPart("table", name, (*notes, *_claims(before, after)))
+    return _Comparison(versions, before, after).part()
 
 
-def _claims(one: Table, two: Table) -> Iterator[str]:
-    """What changed of a table that no region shows: the assumptions that it may rely on, and what is said of its DEFAULT."""
-    gone = [name for name in one.assumptions if name not in two.assumptions]
-    new = [name for name in two.assumptions if name not in one.assumptions]
+def _claims(before: Table, after: Table) -> Iterator[str]:
+    """What changed of a table that no region shows: the assumptions that it may rely on, and its DEFAULT."""
+    gone = [name for name in before.assumptions if name not in after.assumptions]
+    new = [name for name in after.assumptions if name not in before.assumptions]
     yield from (f"no longer assumes `{name}`" for name in gone)
     yield from (f"assumes `{name}`, too" for name in new)
     orders = [
-        [name for name in names if name not in (*gone, *new)] for names in (one.assumptions, two.assumptions)
+        [name for name in names if name not in (*gone, *new)]
+        for names in (before.assumptions, after.assumptions)
     ]
     if orders[0] != orders[1]:
         yield "its assumptions stand in another order"
-    first, second = (_default(table) for table in (one, two))
+    first, second = (_default(table) for table in (before, after))
     if first != second:
         yield f"its DEFAULT line: {first}, now {second}"
 
@@ -104,8 +105,8 @@ class _Comparison:
         relied: Where the assumptions of one version at least hold.
     """
 
-    def __init__(self, versions: Versions, one: Table, two: Table) -> None:
-        self.versions, self.tables = versions, (one, two)
+    def __init__(self, versions: Versions, before: Table, after: Table) -> None:
+        self.versions, self.tables = versions, (before, after)
         self.meanings = versions.meanings()
         self.outcomes = tuple(
             {out.key: out for out in _outcomes(table, meaning)}
@@ -142,11 +143,11 @@ class _Comparison:
             versions.queries - before, space.volume(space.nodes),
         )  # fmt: skip
 
-    def _bodies_differ(self, one: InputOutcome, two: InputOutcome) -> bool:
+    def _bodies_differ(self, before: InputOutcome, after: InputOutcome) -> bool:
         """Whether a line's actions, and all that they call, are not word for word the same."""
-        if one.actions is None or two.actions is None:
+        if before.actions is None or after.actions is None:
             return False
-        bodies = [_body(out.actions) for out in (one, two)]
+        bodies = [_body(out.actions) for out in (before, after)]
         first, second = (
             digests.body(body) for digests, body in zip(self.versions.digests, bodies, strict=True)
         )
@@ -159,64 +160,70 @@ class _Comparison:
         versions = self.versions
         space = versions.space(*(out.when for outs in self.outcomes for out in outs.values()))
         solver = space.solver(
-            values.negation(values.any_of(values.both(outcome.when, two.when) for outcome, two in kept))
+            values.negation(values.any_of(values.both(before.when, after.when) for before, after in kept))
         )
-        found = []
+        pairs = []
         while space.answered(solver):
-            one, two = (
+            before, after = (
                 next(out for out in outs.values() if solver.value(values.term_of(out.when), Bool()))
                 for outs in self.outcomes
             )
-            found.append((one, two))
-            solver.add(values.term_of(values.negation(values.both(one.when, two.when))))
+            pairs.append((before, after))
+            solver.add(values.term_of(values.negation(values.both(before.when, after.when))))
         versions.queries += space.queries
-        return found
+        return pairs
 
-    def _compared(self, one: InputOutcome, two: InputOutcome) -> list[Change]:
+    def _compared(self, before: InputOutcome, after: InputOutcome) -> list[Change]:
         """What changed where one version has the first outcome and the other the second."""
         versions = self.versions
-        both = versions.shared.canonical(values.both(one.when, two.when))
+        both = versions.shared.canonical(values.both(before.when, after.when))
         if both not in versions.stated:
-            versions.stated[both] = versions.shared.canonical(values.both(one.holds, two.holds))
-        labels = one.label, two.label
-        if one.actions is None or two.actions is None:
-            return self._confirmed(changes(versions, PartSort.FAULT, labels, both, self.relied), one, two)
+            versions.stated[both] = versions.shared.canonical(values.both(before.holds, after.holds))
+        labels = before.label, after.label
+        if before.actions is None or after.actions is None:
+            return self._confirmed(
+                changes(versions, PartSort.FAULT, labels, both, self.relied), before, after
+            )
         doing = [
-            Doing(out.label, meaning.effect(_body(out.actions), (one.holds, two.holds)), partial(_run, _body(out.actions)),
+            Doing(out.label, meaning.effect(_body(out.actions), (before.holds, after.holds)), partial(_run, _body(out.actions)),
                   _headings(program, out.actions))
             for out, meaning, program in zip(
-                (one, two), self.meanings, (versions.before, versions.after), strict=True
+                (before, after), self.meanings, (versions.before, versions.after), strict=True
             )
         ]  # fmt: skip
-        made = contrast(versions, both, (doing[0], doing[1]))
-        found = changes(versions, PartSort.EFFECT, labels, both, self.relied, made) if made.differ else []
-        if one.key != two.key:
-            found += self._moved(labels, both, made)
-        return self._confirmed(found, one, two)
+        contrasted = contrast(versions, both, (doing[0], doing[1]))
+        changed = (
+            changes(versions, PartSort.EFFECT, labels, both, self.relied, contrasted)
+            if contrasted.differ
+            else []
+        )
+        if before.key != after.key:
+            changed += self._moved(labels, both, contrasted)
+        return self._confirmed(changed, before, after)
 
-    def _moved(self, labels: tuple[str, str], both: Node, made: Contrast) -> list[Change]:
+    def _moved(self, labels: tuple[str, str], both: Node, contrasted: Contrast) -> list[Change]:
         """Where another line has the same effect; not looked for where doubles are computed with."""
         versions = self.versions
-        if not made.differ:
+        if not contrasted.differ:
             return changes(versions, PartSort.LINE, labels, both)
-        alike = versions.shared.canonical(values.both(both, values.negation(made.node)))
+        alike = versions.shared.canonical(values.both(both, values.negation(contrasted.node)))
         if is_hard(alike) or not versions.possible(alike):
             return []
         return changes(versions, PartSort.LINE, labels, alike)
 
-    def _confirmed(self, found: list[Change], one: InputOutcome, two: InputOutcome) -> list[Change]:
-        """Each witness put to the reference meaning: it must match as is said.
+    def _confirmed(self, changed: list[Change], before: InputOutcome, after: InputOutcome) -> list[Change]:
+        """Confirm each witness by the reference meaning: it must match as is said.
 
         Raises:
             RuntimeError: It does not, which is a bug in rcsc.
         """
-        for change in found:
+        for change in changed:
             for program, table, out in zip(
-                (self.versions.before, self.versions.after), self.tables, (one, two), strict=True
+                (self.versions.before, self.versions.after), self.tables, (before, after), strict=True
             ):
                 if out.name != UNDEFINED or out.actions is not None:
                     self._match(program, table, out, change)
-        return found
+        return changed
 
     def _match(self, program: Program, table: Table, out: InputOutcome, change: Change) -> None:
         now = self.versions.snapshot(program, dict(change.point))
@@ -243,20 +250,24 @@ def _outcomes(table: Table, meaning: Meaning) -> Iterable[InputOutcome]:
     """Everything that can become of an input: exactly one of them does."""
     lines = meaning.lines(table)
     fine = values.all_of(values.negation(bad) for bad in meaning.bad)
-    many, one = several(lines), meaning.shared.canonical
+    many, canonical = several(lines), meaning.shared.canonical
     alone = values.both(fine, values.negation(many))
     for line, holds in zip(table.lines, lines, strict=True):
         yield InputOutcome(
-            str(line.name), f"line `{line.name}`", one(values.both(alone, holds)), one(holds), line.actions
+            str(line.name),
+            f"line `{line.name}`",
+            canonical(values.both(alone, holds)),
+            canonical(holds),
+            line.actions,
         )
-    nothing = one(values.both(fine, values.negation(values.any_of(lines))))
+    nothing = canonical(values.both(fine, values.negation(values.any_of(lines))))
     default = table.default
     if default is None:
         yield InputOutcome(NO_LINE, NO_LINE, nothing)
     else:
         yield InputOutcome(str(default.name), f"DEFAULT `{default.name}`", nothing, TRUE, default.actions)
-    yield InputOutcome(SEVERAL_LINES, SEVERAL_LINES, one(values.both(fine, many)))
-    yield InputOutcome(UNDEFINED, UNDEFINED, one(values.negation(fine)))
+    yield InputOutcome(SEVERAL_LINES, SEVERAL_LINES, canonical(values.both(fine, many)))
+    yield InputOutcome(UNDEFINED, UNDEFINED, canonical(values.negation(fine)))
 
 
 def _body(actions: tuple[Action, ...] | None) -> list[Statement]:
@@ -270,10 +281,10 @@ def _run(body: list[Statement], program: Program, now: dict[str, Value]) -> None
 def _headings(program: Program, actions: tuple[Action, ...] | None) -> Mapping[str, tuple[str, ...]]:
     """For each leaf the headings of the actions that may write it."""
     writes = {str(procedure.name): procedure.writes for procedure in program.procedures}
-    found: dict[str, dict[str, None]] = {}
+    headings: dict[str, dict[str, None]] = {}
     for action in actions or ():
         for statement in everything([action.statement]):
             named = writes[str(statement.procedure)] if isinstance(statement, Call) else written_by(statement)
             for leaf in named:
-                found.setdefault(str(leaf), {})[action.heading] = None
-    return {leaf: tuple(names) for leaf, names in found.items()}
+                headings.setdefault(str(leaf), {})[action.heading] = None
+    return {leaf: tuple(names) for leaf, names in headings.items()}

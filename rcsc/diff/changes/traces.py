@@ -119,15 +119,15 @@ def _steps(versions: Versions, side: int, table: Table, state: str) -> Iterator[
 def _reached(versions: Versions, wrote: Node, state: Node, now: Node) -> Iterator[tuple[int, int, Node]]:
     """Pairs of state before and value written, each with the inputs at which that is so."""
     space = versions.space(wrote, state, now)
-    found = []
+    steps = []
     solver = space.solver(wrote)
     while space.answered(solver):
         pair = [int(solver.value(values.term_of(node), node.kind)) for node in (state, now)]
         here = values.both(_is(state, pair[0]), _is(now, pair[1]))
-        found.append((pair[0], pair[1], here))
+        steps.append((pair[0], pair[1], here))
         solver.add(values.term_of(values.negation(here)))
     versions.queries += space.queries
-    for before, after, here in sorted(found, key=lambda one: one[:2]):
+    for before, after, here in sorted(steps, key=lambda step: step[:2]):
         yield before, after, versions.shared.canonical(values.both(wrote, here))
 
 

@@ -15,13 +15,13 @@ class _TooLongError(Exception):
     """The text would be too long."""
 
 
-def said(node: Node, kind: Scalar | None = None) -> str | None:
+def in_words(node: Node, kind: Scalar | None = None) -> str | None:
     """The value in words; `kind` is what it is kept as, where that says more than the node."""
     try:
-        found = _said(node, kind or node.kind, 0)
+        text = _worded(node, kind or node.kind, 0)
     except _TooLongError:
         return None
-    bare = found[1:-1] if found.startswith("(") and _closes_at_the_end(found) else found
+    bare = text[1:-1] if text.startswith("(") and _closes_at_the_end(text) else text
     return bare if len(bare) <= MOST_CHARACTERS else None
 
 
@@ -34,7 +34,7 @@ def _closes_at_the_end(text: str) -> bool:
     return False
 
 
-def _said(node: Node, kind: Scalar, depth: int) -> str:
+def _worded(node: Node, kind: Scalar, depth: int) -> str:
     if depth > 12:
         raise _TooLongError
     if node.op == CONSTANT:
@@ -42,10 +42,10 @@ def _said(node: Node, kind: Scalar, depth: int) -> str:
     if node.op == VARIABLE:
         return node.name
     if node.op == NARROWED:
-        return _said(node.args[0], kind, depth)
+        return _worded(node.args[0], kind, depth)
     if node.op == CHOICE:
-        test, one, two = node.args
-        text = f"(if {_said(test, Bool(), depth + 1)} then {_said(one, kind, depth + 1)} else {_said(two, kind, depth + 1)})"
+        test, then, orelse = node.args
+        text = f"(if {_worded(test, Bool(), depth + 1)} then {_worded(then, kind, depth + 1)} else {_worded(orelse, kind, depth + 1)})"
     else:
         text = _operation(node, depth)
     if len(text) > 2 * MOST_CHARACTERS:
@@ -58,7 +58,7 @@ def _operation(node: Node, depth: int) -> str:
         return _negated(node.args[0], depth)
     kinds = [arg.kind for arg in node.args]
     inner = _fuller(kinds)
-    parts = [_said(arg, inner, depth + 1) for arg in node.args]
+    parts = [_worded(arg, inner, depth + 1) for arg in node.args]
     if Op(node.op) in _INFIX and len(parts) == 2:
         return f"({parts[0]} {node.op} {parts[1]})"
     return f"-{parts[0]}" if node.op == Op.NEG else f"{node.op}({', '.join(parts)})"
@@ -69,22 +69,22 @@ def _negated(node: Node, depth: int) -> str:
     turned = {Op.EQ: Op.NE, Op.LT: Op.GE, Op.LE: Op.GT}
     if node.op == Op.AND:
         sides = [
-            _said(part.args[0], Bool(), depth + 1) if part.op == Op.NOT else _negated(part, depth + 1)
+            _worded(part.args[0], Bool(), depth + 1) if part.op == Op.NOT else _negated(part, depth + 1)
             for part in node.args
         ]
         return f"({sides[0]} or {sides[1]})"
     certain = node.op == Op.EQ or all(arg.ordered for arg in node.args)  # of a NaN both are false
     if node.op in turned and certain:
         inner = _fuller([arg.kind for arg in node.args])
-        one, two = (_said(arg, inner, depth + 1) for arg in node.args)
-        return f"({one} {turned[Op(node.op)]} {two})"
-    return f"not {_said(node, Bool(), depth + 1)}"
+        left, right = (_worded(arg, inner, depth + 1) for arg in node.args)
+        return f"({left} {turned[Op(node.op)]} {right})"
+    return f"not {_worded(node, Bool(), depth + 1)}"
 
 
 def _fuller(kinds: list[Scalar]) -> Scalar:
     """The enumeration with the most members: one side may know those in common only."""
     enums = [kind for kind in kinds if isinstance(kind, Enum)]
-    return max(enums, key=lambda one: len(one.members)) if enums else kinds[0]
+    return max(enums, key=lambda enum: len(enum.members)) if enums else kinds[0]
 
 
 def number(kind: Scalar, value: Value) -> str:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from rcsc.diff.changes.align import Aligned
 from rcsc.diff.changes.difference import Where
-from rcsc.diff.changes.value_text import number, said
+from rcsc.diff.changes.value_text import in_words, number
 from rcsc.lang.digest import Digests
 from rcsc.lang.interpret import initial
 from rcsc.lang.model import (
@@ -78,13 +78,13 @@ class Versions:
         queries: How often a solver was asked.
     """
 
-    def __init__(self, made: Aligned, options: Options) -> None:
-        self.aligned, self.options = made, options
-        self.before, self.after = made.before, made.after
-        self.leaves = tuple(made.leaves)
-        self.digests = Digests(made.before), Digests(made.after)
-        self.types = {str(v.name): v.type for v in (*made.after.variables, *made.before.variables)}
-        self.kinds = {**self.types, **made.leaves}
+    def __init__(self, aligned: Aligned, options: Options) -> None:
+        self.aligned, self.options = aligned, options
+        self.before, self.after = aligned.before, aligned.after
+        self.leaves = tuple(aligned.leaves)
+        self.digests = Digests(aligned.before), Digests(aligned.after)
+        self.types = {str(v.name): v.type for v in (*aligned.after.variables, *aligned.before.variables)}
+        self.kinds = {**self.types, **aligned.leaves}
         self.shared = Shared()
         for name, kind in self.kinds.items():
             self.shared.start[name] = self.shared.canonical(values.variable(name, kind))
@@ -99,20 +99,20 @@ class Versions:
 
     def meanings(self) -> tuple[Meaning, Meaning]:
         """What conditions and actions of either version mean."""
-        one, two = (Meaning(program, self.kinds, self.shared) for program in (self.before, self.after))
-        return one, two
+        before, after = (Meaning(program, self.kinds, self.shared) for program in (self.before, self.after))
+        return before, after
 
     def space(self, *nodes: Node) -> Space:
         """All inputs that the nodes speak of."""
-        found = values.variables(nodes)
-        self.seen.update(found)
+        inputs = values.variables(nodes)
+        self.seen.update(inputs)
         variables = sorted(
-            found.values(), key=lambda node: (self.order.get(node.name, len(self.order)), node.name)
+            inputs.values(), key=lambda node: (self.order.get(node.name, len(self.order)), node.name)
         )
         return Space(variables, (), self.options)
 
     def possible(self, *nodes: Node) -> bool:
-        """Whether they can hold together.
+        """Whether the conditions can hold together.
 
         Raises:
             UndecidedError: The solver gave up.
@@ -121,9 +121,9 @@ class Versions:
         if whole.known:
             return bool(whole.low)
         space = self.space(whole)
-        found = space.possible(whole)
+        answer = space.possible(whole)
         self.queries += space.queries
-        return found
+        return answer
 
     # --- regions ---
 
@@ -140,7 +140,7 @@ class Versions:
         whole = self.shared.canonical(values.both(easy, hard))
         return self._hit(easy, whole) is not None if is_hard(whole) else self.possible(whole)
 
-    def found(self, easy: Node, hard: Node) -> Hit | None:
+    def hit(self, easy: Node, hard: Node) -> Hit | None:
         """An input at which both hold, the least where doubles are not computed with; None where there is none.
 
         Raises:
@@ -186,7 +186,7 @@ class Versions:
             values.variable(name, Int(int(fixed[name]), int(fixed[name])))
             if name in fixed and not isinstance(node.kind, Real)
             else node
-            for name, node in sorted(named.items(), key=lambda one: self.order.get(one[0], len(self.order)))
+            for name, node in sorted(named.items(), key=lambda item: self.order.get(item[0], len(self.order)))
         ]
         point = trial.witness([whole], variables)
         if point is None:
@@ -204,7 +204,7 @@ class Versions:
         across = around is not None and bool(around[1])
         cover, total = self._cover(wanted, allowed, MOST_BOXES_ACROSS if across else most)
         if not cover.exact and stated is not None and around is not None and across:
-            also = [said(part) for part in around[1]]
+            also = [in_words(part) for part in around[1]]
             if all(also) and not self.possible(stated, values.negation(allowed)):
                 whole = Cover((around[0],), exact=True, inputs=None)
                 words = " and ".join(text for text in also if text)
@@ -214,9 +214,9 @@ class Versions:
 
     def _cover(self, wanted: Node, allowed: Node, most: int) -> tuple[Cover, int | None]:
         space = self.space(wanted, allowed)
-        found = space.cover(wanted, allowed, most)
+        cover = space.cover(wanted, allowed, most)
         self.queries += space.queries
-        return found, space.volume(space.nodes)
+        return cover, space.volume(space.nodes)
 
     def _words(self, cover: Cover) -> tuple[tuple[str, ...], ...]:
         return tuple(region(self._kinds_of(box), box) for box in cover.boxes)
@@ -242,9 +242,9 @@ class Versions:
             UndecidedError: The solver gave up.
         """
         space = self.space(wanted)
-        found = space.witness(wanted)
+        witness = space.witness(wanted)
         self.queries += space.queries
-        return found
+        return witness
 
     def spelled(self, witness: Mapping[str, Scalars]) -> tuple[tuple[str, str], ...]:
         """An input in words."""
@@ -260,7 +260,7 @@ _HARD = {Op.ADD, Op.SUB, Op.MUL, Op.DIV, Op.TO_REAL}
 
 
 def is_hard(condition: Node) -> bool:
-    """Whether doubles are computed with in it."""
+    """Whether the condition computes with doubles."""
     return any(
         (node.op in _HARD and isinstance(node.kind, Real)) or node.op == Op.TO_INT
         for node in values.parts_first(condition)
@@ -268,12 +268,12 @@ def is_hard(condition: Node) -> bool:
 
 
 def is_across(condition: Node) -> bool:
-    """Whether values of two variables are compared in it, more than a few values each."""
+    """Whether the condition compares two variables of more than a few values each."""
     for node in values.parts_first(condition):
         if node.op in COMPARISONS:
-            one, two = node.args
-            wide = all(not isinstance(side.kind, Bool | Enum) for side in (one, two))
-            if wide and not (values.root(one).op == CONSTANT or values.root(two).op == CONSTANT):
+            left, right = node.args
+            wide = all(not isinstance(side.kind, Bool | Enum) for side in (left, right))
+            if wide and not (values.root(left).op == CONSTANT or values.root(right).op == CONSTANT):
                 return True
     return False
 

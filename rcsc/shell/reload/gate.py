@@ -228,7 +228,7 @@ def _met_said(met: Sequence[Met]) -> list[str]:
             else f"{reachable.part.what} `{reachable.part.name}`"
         )
         if reachable.change is None:
-            parts[f"{name}, {', '.join(reachable.part.said)}"] = None
+            parts[f"{name}, {', '.join(reachable.part.notes)}"] = None
         elif reachable.part.what == "table":
             lines = dict.fromkeys((reachable.change.before, reachable.change.after))
             parts[f"{name}, {' -> '.join(lines)}"] = None
