@@ -52,7 +52,7 @@ def main() -> None:
 
 
 def run(args: Sequence[str]) -> int:
-    """Run `rcsc` with `args`; the exit status."""
+    """Run `rcsc` with `args`; return the exit status."""
     try:
         status = commands.main(list(args), prog_name="rcsc", standalone_mode=False)
     except click.ClickException as error:

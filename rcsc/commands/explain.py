@@ -18,7 +18,7 @@ def command(code: str | None) -> int:
         click.echo(_listing(), nl=False)
         return 0
     wanted = code.upper() if code.upper().startswith("RCS") else f"RCS{code}"
-    if wanted not in {one.value for one in Code}:
+    if wanted not in {known.value for known in Code}:
         raise click.BadParameter(f"there is no {wanted}; `rcsc explain` lists the codes", param_hint="CODE")
     click.echo(_page(Code(wanted)), nl=False)
     return 0

@@ -88,7 +88,9 @@ def imported(name: str) -> click.Command:
 @click.group(
     "rcsc",
     cls=Group,
-    commands=[click.Command(module.rpartition(".")[2], short_help=said) for module, said in COMMANDS.items()],
+    commands=[
+        click.Command(module.rpartition(".")[2], short_help=summary) for module, summary in COMMANDS.items()
+    ],
     epilog=_EPILOG,
     context_settings={"help_option_names": ["-h", "--help"]},
 )

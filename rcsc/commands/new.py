@@ -20,11 +20,11 @@ from rcsc.host.files import write_atomically
 @showing
 def command(folder: Path, output: Output) -> int:
     """Make a small project in DIR, new or empty, that checks, compiles and passes its tests."""
-    made = _scaffold(folder)
-    if not isinstance(made, tuple):
-        return finish(Report((made,)), "new", output)
+    scaffold = _scaffold(folder)
+    if not isinstance(scaffold, tuple):
+        return finish(Report((scaffold,)), "new", output)
     place = shlex.quote(f"./{folder}" if str(folder).startswith("-") else str(folder))
-    closing = f"made {len(made)} files in {folder}; now: cd {place} && rcsc check"
+    closing = f"made {len(scaffold)} files in {folder}; now: cd {place} && rcsc check"
     return finish(Report(()), "new", output, closing)
 
 

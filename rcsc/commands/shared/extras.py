@@ -43,5 +43,5 @@ def _missing(package: str, extra: str) -> Stopped:
 def lacking(error: ModuleNotFoundError) -> Stopped | None:
     """Which extra to install, where an import finds that one of its packages is missing."""
     package = (error.name or "").partition(".")[0]
-    extra = next((one for one, packages in EXTRAS.items() if package in packages), None)
+    extra = next((name for name, packages in EXTRAS.items() if package in packages), None)
     return None if extra is None else _missing(package, extra)

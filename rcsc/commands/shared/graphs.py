@@ -22,14 +22,16 @@ OUT = click.option("-o", "--output", "out", type=click.Path(path_type=Path), def
 class WrongError(Exception):
     """What is wrong, to be shown; the texts that it points into."""
 
-    def __init__(self, found: tuple[Diagnostic, ...], sources: Mapping[str, Source] | None = None) -> None:
-        super().__init__(found)
-        self.found, self.sources = found, sources or {}
+    def __init__(
+        self, diagnostics: tuple[Diagnostic, ...], sources: Mapping[str, Source] | None = None
+    ) -> None:
+        super().__init__(diagnostics)
+        self.diagnostics, self.sources = diagnostics, sources or {}
 
     def shown(self, command: str) -> int:
-        """Shows it; the exit status."""
+        """Show what is wrong; return the exit status."""
         show(
-            Report(tuple(sorted(set(self.found), key=sort_key)), sources=self.sources),
+            Report(tuple(sorted(set(self.diagnostics), key=sort_key)), sources=self.sources),
             command,
             Output(quiet=True),
         )
@@ -42,14 +44,14 @@ def found_tables(named: str, *, running: bool = False) -> list[FoundTable]:
     Raises:
         WrongError: There are none, or their files are not in order.
     """
-    found = tables(named, running=running)
-    if isinstance(found, NotFound):
-        raise WrongError(found.diagnostics, found.sources)
-    return found
+    answer = tables(named, running=running)
+    if isinstance(answer, NotFound):
+        raise WrongError(answer.diagnostics, answer.sources)
+    return answer
 
 
 def written(text: str, out: Path | None) -> None:
-    """To a file, whole or not at all, or to standard output."""
+    """Write to a file, whole or not at all, or to standard output."""
     if out is None:
         click.echo(text, nl=False)
         return

@@ -42,8 +42,8 @@ def told(command: Callable[..., int]) -> Callable[..., int]:
 
 
 def refuse(file: Path, code: Code, message: str, *, notes: tuple[str, ...] = (), help_: str = "") -> int:
-    """Shows what is wrong with a log; the exit status."""
+    """Show what is wrong with a log; return the exit status."""
     place = Label(Span(str(file), 0, 0))
-    found = Diagnostic(code, message, place, notes=notes, help=(help_,) if help_ else ())
-    show(Report((found,)), "log", Output(quiet=True))
+    diagnostic = Diagnostic(code, message, place, notes=notes, help=(help_,) if help_ else ())
+    show(Report((diagnostic,)), "log", Output(quiet=True))
     return 1

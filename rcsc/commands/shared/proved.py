@@ -18,12 +18,12 @@ from rcsc.solvers.smtlib import CVC5_STEPS, cvc5_refutes
 
 def standing(whole: SystemProof, level: str, key: Key) -> str:
     """The verdict of a claim: `proved`, what it rests on that is not proved, or why it is not found itself."""
-    found = whole.of(level, key)
-    if found.proved:
-        if found.verdict.value != "proved":
-            return f"{found.verdict.value}, as the tables declare it"
+    closed = whole.of(level, key)
+    if closed.proved:
+        if closed.verdict.value != "proved":
+            return f"{closed.verdict.value}, as the tables declare it"
         return f"proved{trusting(whole, level, [key])}"
-    return found.verdict.value if not found.accepted else f"rests on {named(whole, level, found.lacks)}"
+    return closed.verdict.value if not closed.accepted else f"rests on {named(whole, level, closed.lacks)}"
 
 
 def trusting(whole: SystemProof, level: str, keys: Sequence[Key]) -> str:
@@ -43,15 +43,15 @@ def not_looked_at(proof: LevelProof) -> Iterator[str]:
 
 
 def in_context(whole: SystemProof, proof: LevelProof) -> Iterator[str]:
-    """Of one level, line by line."""
+    """Describe a level in its context, line by line."""
     seen = proof.context
     if seen is None:
         yield "not looked at, as something is not proved: lines never reached, what lines do when they match again, whether commands end"
         return
     never = [(" ".join(at), standing(whole, proof.level, (UNREACHED, *at))) for at in seen.unreached]
-    good = ", ".join(name for name, said in never if said == "proved")
+    good = ", ".join(name for name, verdict in never if verdict == "proved")
     yield f"lines never reached here: {good or ('none' if not never else '')}".rstrip()
-    yield from (f"  {name}: {said}" for name, said in never if said != "proved")
+    yield from (f"  {name}: {verdict}" for name, verdict in never if verdict != "proved")
     if seen.unsure:
         yield f"not shown whether reached: {', '.join(' '.join(at) for at in seen.unsure)}"
     if seen.orders:
@@ -59,17 +59,17 @@ def in_context(whole: SystemProof, proof: LevelProof) -> Iterator[str]:
     if proof.endings:
         yield "given that every order that is not replaced is answered some time, and stays so,"
         for ending in proof.endings:
-            found = whole.of(proof.level, (Sort.ENDS, ending.table, ""))
+            closed = whole.of(proof.level, (Sort.ENDS, ending.table, ""))
             only = (
-                f"; rests on {named(whole, proof.level, found.lacks)}"
-                if ending.proved and found.lacks
+                f"; rests on {named(whole, proof.level, closed.lacks)}"
+                if ending.proved and closed.lacks
                 else ""
             )
             yield f"  {ending.table} {_ends(ending)}{only}"
 
 
 def _again(whole: SystemProof, level: str, seen: Context) -> Iterator[str]:
-    """What lines do that match again; of a level that gives no orders there is nothing to say."""
+    """What lines do that match again; nothing for a level that gives no orders."""
     again = "; ".join(
         f"{repeated_line.table} {repeated_line.line}: {', '.join(repeated_line.leaves)}"
         for repeated_line in seen.repeated
@@ -83,68 +83,70 @@ def _again(whole: SystemProof, level: str, seen: Context) -> Iterator[str]:
 
 def trusted(whole: SystemProof) -> Iterator[str]:
     """What is taken for granted that no level is responsible for."""
-    every = sorted({trust for found in whole.closed.values() for trust in found.trusts})
+    every = sorted({trust for closed in whole.closed.values() for trust in closed.trusts})
     if every:
         yield "taken for granted"
-        yield from (f"  {one}" for one in every)
+        yield from (f"  {trust}" for trust in every)
 
 
 def left_out(whole: SystemProof) -> Iterator[str]:
-    """That it is not wholly proved, and why, where no finding says so."""
+    """Say that a system is not wholly proved, and why, where no finding does."""
     if whole.whole or not whole.proved:
         return
-    unstated = sum(len(one.unstated) for one in whole.levels)
-    rests = sum(found.accepted and not found.proved for found in whole.closed.values())
+    unstated = sum(len(level.unstated) for level in whole.levels)
+    rests = sum(closed.accepted and not closed.proved for closed in whole.closed.values())
     ends = sum(not ending.proved for level in whole.levels for ending in level.endings)
-    said = [
+    reasons = [
         f"{unstated} not looked at" if unstated else "",
         f"{rests} rest on what is not known" if rests else "",
         f"{ends} not shown to end" if ends else "",
     ]
-    yield f"not wholly proved: {', '.join(one for one in said if one)}"
+    yield f"not wholly proved: {', '.join(reason for reason in reasons if reason)}"
 
 
-def _ends(one: Ending) -> str:
-    if one.changes is None:
+def _ends(ending: Ending) -> str:
+    if ending.changes is None:
         return "is not shown to end: its states may go round"
-    changes = "one change" if one.changes == 1 else f"{one.changes} changes"
-    said = f"ends, once taken, after at most {changes} of state"
-    if one.endless:
-        lines = ", ".join(f"`{line}`" for line in one.endless)
-        return f"is not shown to end: {'line' if len(one.endless) == 1 else 'lines'} {lines} may run for ever"
-    if one.counted:
-        said += "; meanwhile " + ", ".join(map(_counted, one.counted))
-    if one.still:
-        said += "; if the values in {} stand still".format(", ".join(f"`{name}`" for name in one.still))
-    return said
+    changes = "one change" if ending.changes == 1 else f"{ending.changes} changes"
+    text = f"ends, once taken, after at most {changes} of state"
+    if ending.endless:
+        lines = ", ".join(f"`{line}`" for line in ending.endless)
+        return (
+            f"is not shown to end: {'line' if len(ending.endless) == 1 else 'lines'} {lines} may run for ever"
+        )
+    if ending.counted:
+        text += "; meanwhile " + ", ".join(map(_counted, ending.counted))
+    if ending.still:
+        text += "; if the values in {} stand still".format(", ".join(f"`{name}`" for name in ending.still))
+    return text
 
 
-def _counted(one: RisingLine) -> str:
-    by = "" if one.least is None else f" by at least {one.least:.2g}"
-    return f"line `{one.line}` runs as long as `{one.counter}` rises{by}"
+def _counted(rising: RisingLine) -> str:
+    by = "" if rising.least is None else f" by at least {rising.least:.2g}"
+    return f"line `{rising.line}` runs as long as `{rising.counter}` rises{by}"
 
 
 def assumptions(proof: SystemProof) -> str:
-    """How many there are, and how they stand."""
-    found = [
+    """How many assumptions there are, and how they stand."""
+    claims = [
         proof.of(level.level, obligation.key)
         for level in proof.levels
         for obligation, _ in level.found
         if obligation.sort is Sort.ASSUMPTION
     ]
-    if not found:
+    if not claims:
         return "the tables assume nothing"
-    believed = sum(closed.proved and closed.verdict.value != "proved" for closed in found)
-    good = sum(closed.proved for closed in found) - believed
-    rest = len(found) - good - believed
+    believed = sum(closed.proved and closed.verdict.value != "proved" for closed in claims)
+    good = sum(closed.proved for closed in claims) - believed
+    rest = len(claims) - good - believed
     trusts = f", {believed} taken for granted" if believed else ""
     return f"assumptions of tables: {good} proved{trusts}" + (
         f", {rest} not proved" if rest else ", none left"
     )
 
 
-def reaction(made: Mapping[str, TransitionSystem], proof: SystemProof) -> Iterator[str]:
-    """The way of a PAUSE from the top down, as far as it is proved that it is passed on at once."""
+def reaction(systems: Mapping[str, TransitionSystem], proof: SystemProof) -> Iterator[str]:
+    """The way of a PAUSE from the top down, as far as levels are proved to pass it on at once."""
     passes = {
         (level.level, obligation.name)
         for level in proof.levels
@@ -153,19 +155,19 @@ def reaction(made: Mapping[str, TransitionSystem], proof: SystemProof) -> Iterat
     }
     tops = [
         name
-        for name, one in made.items()
-        if one.links.above is not None and one.links.above.outside and one.links.below
+        for name, ts in systems.items()
+        if ts.links.above is not None and ts.links.above.outside and ts.links.below
     ]
-    for top in tops if {level.level for level in proof.levels} == set(made) else ():
+    for top in tops if {level.level for level in proof.levels} == set(systems) else ():
         reached: dict[str, int] = {top: 1}
-        for name in made:
-            for below in made[name].links.below if name in reached else ():
+        for name in systems:
+            for below in systems[name].links.below if name in reached else ():
                 if (name, below.order) in passes:
                     reached[below.name] = reached[name] + 1
         lowest = {name: cycles - 1 for name, cycles in reached.items() if name != top}
         if lowest:
-            said = ", ".join(f"of `{name}` in {cycles}" for name, cycles in lowest.items())
-            yield f"a PAUSE of `{top}` is ordered {said} cycles of levels, besides what buffers take"
+            orders = ", ".join(f"of `{name}` in {cycles}" for name, cycles in lowest.items())
+            yield f"a PAUSE of `{top}` is ordered {orders} cycles of levels, besides what buffers take"
 
 
 def confirmed(ts: TransitionSystem, proof: LevelProof) -> dict[str, bool]:
@@ -175,16 +177,16 @@ def confirmed(ts: TransitionSystem, proof: LevelProof) -> dict[str, bool]:
 
 def claim(whole: SystemProof, level: str, key: Key) -> dict[str, Any]:
     """A verdict, what it rests on that is not found, and what it trusts."""
-    found = whole.of(level, key)
+    closed = whole.of(level, key)
     return {
-        "verdict": found.verdict.value
-        if found.proved or not found.accepted
+        "verdict": closed.verdict.value
+        if closed.proved or not closed.accepted
         else "rests on what is not proved",
         "rests_on": [
             {"level": owner, "what": sort, "table": table, "name": name}
-            for owner, (sort, table, name) in found.lacks
+            for owner, (sort, table, name) in closed.lacks
         ],
-        "trusts": list(found.trusts),
+        "trusts": list(closed.trusts),
     }
 
 

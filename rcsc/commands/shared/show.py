@@ -104,7 +104,7 @@ def put(text: str, file: Path | None) -> None:
 
 @contextmanager
 def writing(place: Path | str) -> Iterator[None]:
-    """Says where something is written, should that fail.
+    """Say where something was to be written, should that fail.
 
     Raises:
         UnwritableError: What stands inside could not write.
@@ -118,7 +118,7 @@ def writing(place: Path | str) -> Iterator[None]:
 
 
 def finish(report: Report, command: str, output: Output, closing: str = "") -> int:
-    """Shows the report; the exit status."""
+    """Show the report; return the exit status."""
     show(report, command, output, closing)
     return 1 if report.failed else 0
 
@@ -236,11 +236,17 @@ def backing(table: TableReport) -> str:
 
 def _assumed(table: TableReport) -> Iterator[str]:
     """Each assumption with its state."""
-    made = table.together
-    said = {} if made is None else dict.fromkeys(made.not_proved, ", not proved of the levels together")
-    said |= {} if made is None else dict.fromkeys(made.conditional, ", conditional of the levels together")
+    together = table.together
+    remarks = (
+        {} if together is None else dict.fromkeys(together.not_proved, ", not proved of the levels together")
+    )
+    remarks |= (
+        {}
+        if together is None
+        else dict.fromkeys(together.conditional, ", conditional of the levels together")
+    )
     for name, standing in table.assumptions:
-        yield f"{escape(name)} ({standing}{said.get(name, '')})"
+        yield f"{escape(name)} ({standing}{remarks.get(name, '')})"
 
 
 def _together(known: InSystem) -> Iterator[str]:
@@ -256,13 +262,13 @@ def _together(known: InSystem) -> Iterator[str]:
         yield f"{noun} {lines} never reached in {system}{'' if known.proved else escape(trusting(known.trusts))}"
 
 
-def _of_system(one: SystemReport) -> str:
-    command = f"`rcsc prove {escape(one.system)}`"
+def _of_system(system: SystemReport) -> str:
+    command = f"`rcsc prove {escape(system.system)}`"
     return f"whether the levels together keep what these tables assume is not known: {command} decides it"
 
 
-def _missing(one: SystemReport) -> str:
-    return f"{escape(one.system)} is {one.standing}: {escape(named(one.missing))}"
+def _missing(system: SystemReport) -> str:
+    return f"{escape(system.system)} is {system.standing}: {escape(named(system.missing))}"
 
 
 def _counts(report: Report) -> Iterator[TextPiece]:

@@ -21,8 +21,8 @@ class Stopped(click.ClickException):  # what happened
         """The error, as every other is shown."""
         for line in self.message.splitlines():
             click.echo(f"error[{self.code.value}]: {line}", err=True)
-        for one in self.helps:
-            click.echo(f"  = help: {one}", err=True)
+        for text in self.helps:
+            click.echo(f"  = help: {text}", err=True)
 
 
 class StoppedByFile(Stopped):
@@ -30,11 +30,11 @@ class StoppedByFile(Stopped):
 
     def __init__(self, error: BadFile) -> None:
         super().__init__(error.code, str(error))
-        self.found, self.sources = error.diagnostics, error.sources
+        self.diagnostics, self.sources = error.diagnostics, error.sources
 
     def show(self, file: object = None) -> None:  # noqa: ARG002  # click's signature
         """Each fault, with the line it stands in."""
-        for diagnostic in self.found:
+        for diagnostic in self.diagnostics:
             click.echo(plain(full(diagnostic, self.sources)), err=True)
 
 

@@ -45,17 +45,17 @@ def system_path(given: Path | None) -> Path:
 
 
 def compiled(path: Path, quiet: bool) -> bool:
-    """Proves and compiles what changed; findings are shown."""
+    """Prove and compile what changed, and show findings; return whether it was in order."""
     system = description(path)
     files = tuple(
-        str(one)
+        str(file)
         for spec in system.levels
-        for one in (path.parent / spec.program / f"{spec.program}.rcs", path.parent / f"{spec.program}.rcs")
-        if one.is_file()
+        for file in (path.parent / spec.program / f"{spec.program}.rcs", path.parent / f"{spec.program}.rcs")
+        if file.is_file()
     )
-    made = compile_(Settings(files, Options()), system.generated, TARGETS, only_check=False)
-    if made.report.failed:
-        show(made.report, "compile", Output())
+    conclusion = compile_(Settings(files, Options()), system.generated, TARGETS, only_check=False)
+    if conclusion.report.failed:
+        show(conclusion.report, "compile", Output())
     elif not quiet:
-        click.echo(f"{len(made.report.tables)} tables proved and compiled")
-    return not made.report.failed
+        click.echo(f"{len(conclusion.report.tables)} tables proved and compiled")
+    return not conclusion.report.failed

@@ -117,30 +117,30 @@ def _campaign(  # as many as there are options
     rig: Rig, seed: int, episodes: int, hired: AbstractContextManager[WorkerPool], journal: Journal, save: Path,
     json_: Path | None,
 ) -> int:  # fmt: skip
-    """Plays, sums up, and saves counterexamples."""
+    """Play, sum up, and save counterexamples."""
     with journal, hired as pool:
-        said = _Told(
+        progress = _EpisodeProgress(
             episodes, [episode_record for at, episode_record in journal.records.items() if at < episodes]
         )
         try:
             for new in play(rig, seed, episodes, pool, journal):
-                said(new)
+                progress(new)
         except KeyboardInterrupt:
-            said.end()
+            progress.end()
             click.echo(
                 f"{len(journal.records)} episodes are kept in {journal.path}: the same command goes on",
                 err=True,
             )
             raise
-        said.end()
+        progress.end()
         records = [record for index, record in sorted(journal.records.items()) if index < episodes]
-        _sum_up(rig, records, said, json_)
+        _sum_up(rig, records, progress, json_)
         click.echo(f"journal: {journal.path}")
         _save(rig, seed, records, pool, save)
-    return 1 if any(one.findings for one in records) else 0
+    return 1 if any(record.findings for record in records) else 0
 
 
-class _Told:
+class _EpisodeProgress:
     """Progress, now and then on standard error."""
 
     def __init__(self, wanted: int, known: list[EpisodeRecord]) -> None:
@@ -158,11 +158,11 @@ class _Told:
 
     @property
     def seconds(self) -> float:
-        """Since the campaign began or went on."""
+        """Seconds since the campaign began or went on."""
         return time.monotonic() - self._begun
 
     def __call__(self, records: tuple[EpisodeRecord, ...]) -> None:
-        """Takes what came in."""
+        """Count the records that came in."""
         self._done += len(records)
         self._findings += sum(bool(record.findings) for record in records)
         self.cycles += sum(record.ticks for record in records)
@@ -180,7 +180,7 @@ class _Told:
         return f"{self._done} of {self._wanted} episodes, {rate:.1f} a second{left}, {self._findings} with findings"
 
     def end(self) -> None:
-        """Clears the line of a terminal."""
+        """Clear the line of a terminal."""
         self._progress("")
 
 
@@ -190,43 +190,52 @@ def _clock(seconds: float) -> str:
     return f"{hours}:{minutes:02}:{rest:02}" if hours else f"{minutes}:{rest:02}"
 
 
-def _sum_up(rig: Rig, records: list[EpisodeRecord], said: _Told, json_: Path | None) -> None:
+def _sum_up(rig: Rig, records: list[EpisodeRecord], progress: _EpisodeProgress, json_: Path | None) -> None:
 
-    found = summary(records, known_lines(rig.system), tuple(FAULTS))
-    seconds = max(said.seconds, 1e-9)
-    click.echo(as_text(found))
+    figures = summary(records, known_lines(rig.system), tuple(FAULTS))
+    seconds = max(progress.seconds, 1e-9)
+    click.echo(as_text(figures))
     click.echo(
-        f"{found.episodes} episodes, {found.cycles} cycles, {found.with_findings} with findings; "
-        f"{said.here} played now in {_clock(seconds)}: {said.here / seconds:.1f} a second, {said.cycles / seconds:.0f} cycles"
+        f"{figures.episodes} episodes, {figures.cycles} cycles, {figures.with_findings} with findings; "
+        f"{progress.here} played now in {_clock(seconds)}: {progress.here / seconds:.1f} a second, {progress.cycles / seconds:.0f} cycles"
     )
     if json_ is None:
         return
-    clock = {"played_now": said.here, "seconds": round(seconds, 3), "episodes_a_second": said.here / seconds}
-    put(json.dumps(as_json(found) | clock, indent=1) + "\n", json_)
+    clock = {
+        "played_now": progress.here,
+        "seconds": round(seconds, 3),
+        "episodes_a_second": progress.here / seconds,
+    }
+    put(json.dumps(as_json(figures) | clock, indent=1) + "\n", json_)
     click.echo(f"wrote {json_}")
 
 
 def _save(rig: Rig, seed: int, records: list[EpisodeRecord], pool: WorkerPool, folder: Path) -> None:
-    """Shrinks and saves what is not saved already, and says what to type."""
+    """Shrink and save what is not saved already, and say what to type."""
     chosen = choices(records)
     wanted = [choice for choice in chosen[:MOST] if not is_saved(folder, rig, seed, choice)]
     for choice in chosen[:MOST]:
         if choice not in wanted:
             click.echo(f"saved before: {folder / choice.name(seed)}")
-    for choice, made in counterexamples(rig, seed, wanted, pool):
+    for choice, counterexample in counterexamples(rig, seed, wanted, pool):
         with writing(folder / choice.name(seed)):
-            place = save(folder, rig, seed, choice, made)
-        _tell(f"episode {choice.index}", made.found.property, made.found.tick, made.found.said)
+            place = save(folder, rig, seed, choice, counterexample)
+        _tell(
+            f"episode {choice.index}",
+            counterexample.found.property,
+            counterexample.found.tick,
+            counterexample.found.said,
+        )
         click.echo(f"  = help: rcsc campaign --again {place}", err=True)
-        if made.log:
+        if counterexample.log:
             click.echo(f"  = help: rcsc replay {place / 'log.mcap'}", err=True)
     if len(chosen) > MOST:
         click.echo(f"and {len(chosen) - MOST} more kinds of findings, in the journal")
 
 
-def _tell(where: str, name: str, tick: int, said: str) -> None:
+def _tell(where: str, name: str, tick: int, reason: str) -> None:
     click.echo(
-        f"error[{Code.PROPERTY_BROKEN.value}]: {where}, cycle {tick}: `{name}` does not hold: {said}",
+        f"error[{Code.PROPERTY_BROKEN.value}]: {where}, cycle {tick}: `{name}` does not hold: {reason}",
         err=True,
     )
 
@@ -237,6 +246,6 @@ def _again(path: Path, rig: Rig, executor: str | None) -> int:
     for number, text, state, reason, ticks in outcome.rows:
         click.echo(f"{number:3}  {text:44} {state:8} {ticks:4} cycles{f'  {reason}' if reason else ''}")
     click.echo(f"{outcome.end} after {outcome.ticks} cycles")
-    for found in outcome.findings:
-        _tell(str(path), found.property, found.tick, found.said)
+    for finding in outcome.findings:
+        _tell(str(path), finding.property, finding.tick, finding.said)
     return 1 if outcome.findings else 0

@@ -73,27 +73,27 @@ def _report(error: CodedError | None) -> Report:
         return Report(())
     if isinstance(error, BadFile) and error.diagnostics:
         return Report(error.diagnostics, sources=error.sources)
-    found = (
+    diagnostics = (
         Diagnostic(error.code, line, Label(Span("", 0, 0)), help=error.helps)
         for line in error.shown.splitlines()
     )
-    return Report(tuple(found))
+    return Report(tuple(diagnostics))
 
 
 def _built(system: Path | None, output: Path | None, *, writes: bool) -> Path:
-    """Makes the database where it harms nobody, has the arm go everywhere in it, and only then writes it; where to."""
+    """Build the database in a scratch folder, have the arm go everywhere in it, and only then write it; return its path."""
     path = system_path(system)
-    said = description(path)
-    signs = signatures(said)
-    needs_data(said)
-    parts, limits = parts_of(signs), limits_of(said, signs)
-    target = output or database_path(said)
+    described = description(path)
+    signs = signatures(described)
+    needs_data(described)
+    parts, limits = parts_of(signs), limits_of(described, signs)
+    target = output or database_path(described)
     with scratch("db") as folder:
         tried = folder / "cell.sqlite"
-        build_database(said.database, tried, parts, limits)
+        build_database(described.database, tried, parts, limits)
         checked(open_database(tried), open_cache(path.parent) if writes else None)
     if writes:
-        build_database(said.database, target, parts, limits)
+        build_database(described.database, target, parts, limits)
     return target
 
 
@@ -103,9 +103,9 @@ def _built(system: Path | None, output: Path | None, *, writes: bool) -> Path:
 @click.argument("table", required=False, metavar="[TABLE]")
 def show(system: Path | None, database: Path | None, table: str | None) -> int:
     """Show a TABLE of the database, or how many rows each has."""
-    said = description(system_path(system))
-    database_of(said, signatures(said), database)
-    held = tables_of(database or database_path(said))
+    described = description(system_path(system))
+    database_of(described, signatures(described), database)
+    held = tables_of(database or database_path(described))
     if table is None:
         for name in sorted(held):
             click.echo(f"{name:14}{len(held[name].rows):6} rows")

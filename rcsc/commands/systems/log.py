@@ -65,31 +65,31 @@ def command(  # noqa: PLR0913  # as many as there are options
     _check_plot(plot, against, output)
     if system is not None and report is None:
         raise click.UsageError("--system needs --report")
-    found = read(file)
-    if report is not None and found.finding is None:
+    log = read(file)
+    if report is not None and log.finding is None:
         return refuse(
             file, Code.NO_FINDING, "the log keeps no finding of `rcsc prove`, of which a page could be made",
             help_="`rcsc run SCRIPT --report PAGE` makes one of a run in the cell; `--plot` draws values of its log",
         )  # fmt: skip
-    exported = _exported(found, csv, json_, parquet)
+    exported = _exported(log, csv, json_, parquet)
     if plot is not None and output is not None:
-        _written(output, lambda: draw(found, [one.strip() for one in plot.split(",")], output, against))
+        _written(output, lambda: draw(log, [name.strip() for name in plot.split(",")], output, against))
         exported.append(output)
     if report is not None:
-        _report(report, found, system)
+        _report(report, log, system)
         exported.append(report)
     for path in exported:
         click.echo(f"wrote {path}")
     if not exported:
-        _summary(found)
-    return _changed(file, found)
+        _summary(log)
+    return _changed(file, log)
 
 
-def _changed(file: Path, found: Log) -> int:
+def _changed(file: Path, log: Log) -> int:
     """What is no longer as it was recorded; a log that a kill has cut is read as far as it goes."""
-    if found.checked.seal is not Seal.CHANGED:
+    if log.checked.seal is not Seal.CHANGED:
         return 0
-    return refuse(file, Code.LOG_NOT_WHOLE, f"the log is {found.checked.text}")
+    return refuse(file, Code.LOG_NOT_WHOLE, f"the log is {log.checked.text}")
 
 
 def _check_plot(plot: str | None, against: str | None, output: Path | None) -> None:
@@ -101,16 +101,16 @@ def _check_plot(plot: str | None, against: str | None, output: Path | None) -> N
         raise click.BadParameter("choose .svg, .png or .pdf", param_hint="-o")
 
 
-def _exported(found: Log, csv: Path | None, json_: Path | None, parquet: Path | None) -> list[Path]:
-    """Writes what was asked for; where."""
+def _exported(log: Log, csv: Path | None, json_: Path | None, parquet: Path | None) -> list[Path]:
+    """Write what was asked for; return the paths."""
     written = []
     for path, text in ((csv, export.csv_text), (json_, export.json_text)):
         if path is not None:
-            content = text(found).encode()
+            content = text(log).encode()
             _written(path, partial(write_atomically, path, content))
             written.append(path)
     if parquet is not None:
-        _written(parquet, lambda: export.write_parquet(found, parquet))
+        _written(parquet, lambda: export.write_parquet(log, parquet))
         written.append(parquet)
     return written
 
@@ -120,28 +120,28 @@ def _written(path: Path, write: Callable[[], object]) -> None:
         write()
 
 
-def _report(path: Path, found: Log, system: Path | None) -> None:
-    """Draws a finding."""
-    finding = found.finding
+def _report(path: Path, log: Log, system: Path | None) -> None:
+    """Draw the log's finding."""
+    finding = log.finding
     assert finding is not None
-    cell, why_not = _cell_of(found, system)
+    cell, why_not = _cell_of(log, system)
     if cell is None:
         click.echo(f"no cell is drawn: {why_not}")
-    _written(path, lambda: trace(path, found, finding, cell, why_not))
+    _written(path, lambda: trace(path, log, finding, cell, why_not))
 
 
-def _summary(found: Log) -> None:
+def _summary(log: Log) -> None:
 
-    count = len(found.ticks)
-    seconds = count * found.tick_ms / 1000
-    click.echo(f"{found.facts['name']}: {count} ticks of {found.tick_ms} ms, {seconds:g} s")
-    click.echo(found.checked.text)
-    if (shown := found.finding) is not None:
+    count = len(log.ticks)
+    seconds = count * log.tick_ms / 1000
+    click.echo(f"{log.facts['name']}: {count} ticks of {log.tick_ms} ms, {seconds:g} s")
+    click.echo(log.checked.text)
+    if (shown := log.finding) is not None:
         where = f"level `{shown.level}`" + (f", table `{shown.table}`" if shown.table else "")
         click.echo(f"a finding, broken in cycle {shown.broken_at}: {where}: {shown.obligation}")
-    for level in found.levels:
+    for level in log.levels:
         _summed(level)
-        for table in coverage(found):
+        for table in coverage(log):
             if table.level == level.name:
                 ran = len(table.lines) - len(table.never)
                 click.echo(f"  table {table.table}: {ran} of {len(table.lines)} lines ran")
@@ -165,7 +165,7 @@ def _summed(level: LoggedLevel) -> None:
 
 
 def _cell_of(log: Log, given: Path | None) -> tuple[DrawnCell | None, str]:
-    """The cell, or none and why, a sentence.
+    """The cell, or None and a sentence that says why.
 
     Args:
         log: To be drawn.

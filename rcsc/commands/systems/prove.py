@@ -121,10 +121,10 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
     if cases:
         return _again(cases)
     path = system_path(system)
-    made = transition_systems(path)
-    unknown = [name for name in only if name not in made]
+    systems = transition_systems(path)
+    unknown = [name for name in only if name not in systems]
     if unknown:
-        raise click.UsageError(f"there is no level `{unknown[0]}`; there are {', '.join(made)}")
+        raise click.UsageError(f"there is no level `{unknown[0]}`; there are {', '.join(systems)}")
     asked = {
         "without-deferral": without_deferral,
         "first-match": first_match,
@@ -132,30 +132,30 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
     }
     variants = tuple(name for name, wanted in asked.items() if wanted)
     for name in variants:
-        made = {level: one.of(VARIANTS[name](one.program)) for level, one in made.items()}
+        systems = {level: ts.of(VARIANTS[name](ts.program)) for level, ts in systems.items()}
     effort = Effort(limits=Limits.of(steps))
     cache = None if no_cache or variants else open_cache(path.parent)  # a variant is nobody's tables
-    names = only or tuple(made)
-    with _Said(names, wanted=progress) as said:
+    names = only or tuple(systems)
+    with _LevelProgress(names, wanted=progress) as done:
         proof = prove_transition_systems(
-            made, effort, jobs or _jobs([made[name] for name in names]), names, said, cache
+            systems, effort, jobs or _jobs([systems[name] for name in names]), names, done, cache
         )
     if certificate is not None:
-        _write(certificate, made, proof)
+        _write(certificate, systems, proof)
     if not as_json:
-        for one in proof.levels:
-            _say_level(made[one.level], proof, one)
+        for level_proof in proof.levels:
+            _say_level(systems[level_proof.level], proof, level_proof)
         if invariants:
             _say_invariants(proof)
         _say_agreements(proof)
-        _say_whole(made, proof)
+        _say_whole(systems, proof)
     keep = _Keep(path, logs, freeze, variants)
-    explanation = _look(made, proof, cycles, keep, None if as_json else _say_told)
+    explanations = _explanations(systems, proof, cycles, keep, None if as_json else _say_explanation)
     if as_json:
-        click.echo(json.dumps(_as_json(proof, made, explanation), indent=2))
+        click.echo(json.dumps(_as_json(proof, systems, explanations), indent=2))
     _say_not_agreed(proof)
-    refused = _refused(made, proof, quiet=as_json) if confirms else []
-    if refused or any(one.bug for one in explanation):
+    refused = _refused(systems, proof, quiet=as_json) if confirms else []
+    if refused or any(explanation.bug for explanation in explanations):
         return 3
     return 0 if proof.whole or (proof.proved and not strict) else 1
 
@@ -166,7 +166,7 @@ def _jobs(levels: Iterable[TransitionSystem]) -> int:
     return min(2, os.cpu_count() or 1) if lines >= _WORTH_PROCESSES else 1
 
 
-class _Said:
+class _LevelProgress:
     """Says each level on standard error as it is done, and on a terminal those that are still to come."""
 
     def __init__(self, names: Sequence[str], *, wanted: bool) -> None:
@@ -186,18 +186,18 @@ class _Said:
 
     def _done(self, proof: LevelProof) -> None:
         self._line("")
-        found = f"{len(proof.found) - len(proof.open)} of {len(proof.found)} found proved"
+        count = f"{len(proof.found) - len(proof.open)} of {len(proof.found)} found proved"
         if self._wanted:
-            click.echo(f"level {proof.level}: {found}, {proof.seconds:.1f} s", err=True)
+            click.echo(f"level {proof.level}: {count}, {proof.seconds:.1f} s", err=True)
         self._left.remove(proof.level)
         self._doing()
 
 
-def _refused(made: dict[str, TransitionSystem], proof: SystemProof, *, quiet: bool) -> list[str]:
-    """Questions that cvc5 does not answer as Z3 did; says how many there were."""
+def _refused(systems: dict[str, TransitionSystem], proof: SystemProof, *, quiet: bool) -> list[str]:
+    """List the questions that cvc5 does not answer as Z3 did, and say how many there were."""
     refused = []
     for level in proof.levels:
-        answers = confirmed(made[level.level], level)
+        answers = confirmed(systems[level.level], level)
         wrong = [name for name, same in answers.items() if not same]
         refused += wrong
         good = len(answers) - len(wrong)
@@ -218,25 +218,25 @@ def _say_level(ts: TransitionSystem, whole: SystemProof, proof: LevelProof) -> N
     found_before = ", by an earlier run" if proof.cached else ""
     click.echo(click.style(f"level {proof.level}", bold=True) + f"  {proof.seconds:.1f} s{found_before}")
     for sort in Sort:
-        found = [obligation for obligation, _ in proof.found if obligation.sort is sort]
+        obligations = [obligation for obligation, _ in proof.found if obligation.sort is sort]
         if sort is Sort.ASSUMPTION:
-            for obligation in found:
-                said = standing(whole, proof.level, obligation.key)
+            for obligation in obligations:
+                verdict = standing(whole, proof.level, obligation.key)
                 proved = whole.of(proof.level, obligation.key).proved
                 as_declared = "" if proved else f"{declared[obligation.name]}: "
-                together = " of the levels together" if said in {"not proved", "undecided"} else ""
-                click.echo(f"  {obligation.table:28} {obligation.name:24} {as_declared}{said}{together}")
+                together = " of the levels together" if verdict in {"not proved", "undecided"} else ""
+                click.echo(f"  {obligation.table:28} {obligation.name:24} {as_declared}{verdict}{together}")
         elif sort in {Sort.INVARIANT, Sort.PROPERTY}:
-            for obligation in found:
+            for obligation in obligations:
                 click.echo(
                     f"  {sort.value:28} {obligation.name:24} {standing(whole, proof.level, obligation.key)}"
                 )
-        elif found:
+        elif obligations:
             beside = [obligation.name for obligation in besides(proof) if obligation.sort is sort]
-            good = [obligation for obligation in found if whole.of(proof.level, obligation.key).proved]
+            good = [obligation for obligation in obligations if whole.of(proof.level, obligation.key).proved]
             trusts = trusting(whole, proof.level, [obligation.key for obligation in good])
-            click.echo(f"  {sort.value}: {len(good)} of {len(found) - len(beside)} proved{trusts}")
-            for obligation in found:
+            click.echo(f"  {sort.value}: {len(good)} of {len(obligations) - len(beside)} proved{trusts}")
+            for obligation in obligations:
                 if obligation not in good and obligation.name not in beside:
                     click.echo(
                         f"    {obligation.table or obligation.name or 'within a cycle'}: {standing(whole, proof.level, obligation.key)}"
@@ -261,9 +261,9 @@ def _say_invariants(proof: SystemProof) -> None:
             click.echo(f"  {shown(level.predicates, clause)}")
 
 
-def _say_whole(made: dict[str, TransitionSystem], proof: SystemProof) -> None:
+def _say_whole(systems: dict[str, TransitionSystem], proof: SystemProof) -> None:
 
-    for line in (*reaction(made, proof), assumptions(proof), *trusted(proof), *left_out(proof)):
+    for line in (*reaction(systems, proof), assumptions(proof), *trusted(proof), *left_out(proof)):
         click.echo(line)
     click.echo(f"{proof.seconds:.1f} s in all")
 
@@ -292,8 +292,8 @@ class _Keep:
     variants: tuple[str, ...]
 
 
-def _look(
-    made: dict[str, TransitionSystem],
+def _explanations(
+    systems: dict[str, TransitionSystem],
     proof: SystemProof,
     cycles: int,
     keep: _Keep,
@@ -301,45 +301,45 @@ def _look(
 ) -> list[Explanation]:
     """What is not proved, each with its shortest trace where there is one."""
     settings = TraceSettings(description(keep.system), cycles, altered=bool(keep.variants), log=keep.logs)
-    found = []
+    explanations = []
     try:
-        for explanation in explain(made, proof, settings):
-            found.append(explanation)
+        for explanation in explain(systems, proof, settings):
+            explanations.append(explanation)
             if keep.cases is not None and explanation.finding is not None and not explanation.beside:
-                _freeze(made, explanation.finding, keep.cases, keep)
+                _freeze(systems, explanation.finding, keep.cases, keep)
             if say is not None:
-                say(made, explanation, cycles)
+                say(systems, explanation, cycles)
     except OSError as error:
         raise UnwritableError(
             str(error.filename or keep.logs), error.strerror or "no reason given"
         ) from error
-    return found
+    return explanations
 
 
-def _freeze(made: dict[str, TransitionSystem], finding: Finding, folder: Path, keep: _Keep) -> None:
+def _freeze(systems: dict[str, TransitionSystem], finding: Finding, folder: Path, keep: _Keep) -> None:
 
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"{description(keep.system).name}_{file_name(finding)}.json"
-    write_atomically(path, frozen(finding, made, keep.system, path, keep.variants).encode())
+    write_atomically(path, frozen(finding, systems, keep.system, path, keep.variants).encode())
 
 
 def _again(cases: tuple[Path, ...]) -> int:
-    """Runs frozen cases."""
+    """Run frozen cases."""
     wrong = 0
     for path in cases:
         case = read_case(path)
         breaks = case_breaks(case)
-        said = f"level `{case.level}`: {case.obligation.shown}: {'broken' if breaks else 'kept'}"
+        outcome = f"level `{case.level}`: {case.obligation.shown}: {'broken' if breaks else 'kept'}"
         if breaks is case.expects_broken:
-            click.echo(f"{path}: {said}")
+            click.echo(f"{path}: {outcome}")
         else:
             wrong += 1
-            click.echo(f"error[{Code.FOUND_AGAIN.value}]: {path}: {said}", err=True)
+            click.echo(f"error[{Code.FOUND_AGAIN.value}]: {path}: {outcome}", err=True)
     return 1 if wrong else 0
 
 
-def _say_told(made: dict[str, TransitionSystem], explanation: Explanation, cycles: int) -> None:
-    """One thing that is not proved; runs of as many cycles were looked for."""
+def _say_explanation(systems: dict[str, TransitionSystem], explanation: Explanation, cycles: int) -> None:
+    """Say what is not proved; runs of up to `cycles` cycles were searched."""
     where = f"level `{explanation.level}`" + (
         f", table `{explanation.obligation.table}`" if explanation.obligation.table else ""
     )
@@ -356,19 +356,19 @@ def _say_told(made: dict[str, TransitionSystem], explanation: Explanation, cycle
         click.echo(
             f"error[{Code.NOT_COMPOSED.value}]: {where}: not proved: {explanation.obligation.shown}", err=True
         )
-    if stated := _stated(made, explanation):
+    if stated := _stated(systems, explanation):
         click.echo(f"  = note: it says: {stated}", err=True)
     for line in explanation.beside:
         click.echo(f"  = note: {line}", err=True)
     if explanation.finding is not None and not explanation.beside:
-        _say_finding(made, explanation.finding, in_c=explanation.in_c)
+        _say_finding(systems, explanation.finding, in_c=explanation.in_c)
     elif explanation.guessed and explanation.obligation.key == SAFE:
         click.echo("  = note: the run that shows it meets an operation that is not defined", err=True)
     elif explanation.guessed:
         click.echo("  = note: a trace that was found does not run: arithmetic was left open", err=True)
     elif (
         explanation.obligation.sort.value == "assumption"
-        and explanation.obligation.name in made[explanation.level].trusted
+        and explanation.obligation.name in systems[explanation.level].trusted
     ):
         click.echo(
             "  = note: no first cycle can be as the tables declare, or no later one, or none that runs this table: "
@@ -388,19 +388,19 @@ def _say_told(made: dict[str, TransitionSystem], explanation: Explanation, cycle
         click.echo(f"  = picture: rcsc log {explanation.log} --report {page}", err=True)
 
 
-def _stated(made: dict[str, TransitionSystem], explanation: Explanation) -> str:
+def _stated(systems: dict[str, TransitionSystem], explanation: Explanation) -> str:
     """What a property says, as it is written; empty for what is none."""
     if explanation.obligation.sort is not Sort.PROPERTY:
         return ""
     return next(
-        one.text
-        for one in made[explanation.level].program.properties
-        if one.name == explanation.obligation.name
+        stated.text
+        for stated in systems[explanation.level].program.properties
+        if stated.name == explanation.obligation.name
     )
 
 
-def _say_finding(made: dict[str, TransitionSystem], finding: Finding, *, in_c: bool) -> None:
-    """The time line."""
+def _say_finding(systems: dict[str, TransitionSystem], finding: Finding, *, in_c: bool) -> None:
+    """Print the finding's time line."""
     begins = ", after a restart" if finding.restarted else ""
     legal = "" if finding.legal else "; numbers have gone round, or a neighbour was restarted"
     run_by = "as the interpreter, the Python and the C executors run it"
@@ -415,22 +415,22 @@ def _say_finding(made: dict[str, TransitionSystem], finding: Finding, *, in_c: b
     )
     click.echo(f"  = note: {what}{begins}, {run_by}{legal}", err=True)
     with io.StringIO() as text:
-        Console(file=text, width=_WIDTH, no_color=True, highlight=False).print(_time_line(made, finding))
+        Console(file=text, width=_WIDTH, no_color=True, highlight=False).print(_time_line(systems, finding))
         click.echo(
             "\n".join(f"  {line.rstrip()}" for line in text.getvalue().replace(_HARD, " ").splitlines()),
             err=True,
         )
 
 
-def _time_line(made: dict[str, TransitionSystem], finding: Finding) -> Table:
+def _time_line(systems: dict[str, TransitionSystem], finding: Finding) -> Table:
     """A row a cycle: the line that matched, the inputs that changed, what else changed, and what went wrong."""
     several = len(finding.levels) > 1
     table = Table(box=box.ASCII2, show_lines=True, pad_edge=False)
     for heading in ("cycle", *(("level",) if several else ()), "table: line", "takes", "leaves"):
         table.add_column(heading, overflow="fold")
-    for row in rows(made, finding):
+    for row in rows(systems, finding):
         takes, leaves = (
-            ", ".join(_unbroken(f"{name} = {said}") for name, said in changed.items())
+            ", ".join(_unbroken(f"{name} = {value}") for name, value in changed.items())
             for changed in (row.takes, row.leaves)
         )
         ran = f"{row.table}: {row.line}" + (f"\n! {row.wrong}" if row.wrong else "")
@@ -453,22 +453,22 @@ def _say_not_agreed(proof: SystemProof) -> None:
             )
 
 
-def _write(folder: Path, made: dict[str, TransitionSystem], proof: SystemProof) -> None:
+def _write(folder: Path, systems: dict[str, TransitionSystem], proof: SystemProof) -> None:
 
     folder.mkdir(parents=True, exist_ok=True)
     for level in proof.levels:
-        for name, text in certificate(made[level.level], level).items():
+        for name, text in certificate(systems[level.level], level).items():
             write_atomically(folder / f"{level.level} {name}.smt2".replace(" ", "_"), text.encode())
 
 
 def _as_json(
-    proof: SystemProof, made: dict[str, TransitionSystem], explanation: list[Explanation]
+    proof: SystemProof, systems: dict[str, TransitionSystem], explanations: list[Explanation]
 ) -> dict[str, Any]:
 
     return {
         "proved": proof.proved,
         "whole": proof.whole,
-        "findings": [_told_as_json(made, one) for one in explanation],
+        "findings": [_explanation_as_json(systems, explanation) for explanation in explanations],
         "levels": [
             {
                 "level": level.level,
@@ -503,22 +503,22 @@ def _as_json(
     }
 
 
-def _told_as_json(made: dict[str, TransitionSystem], explanation: Explanation) -> dict[str, Any]:
+def _explanation_as_json(systems: dict[str, TransitionSystem], explanation: Explanation) -> dict[str, Any]:
 
-    found = explanation.finding
+    finding = explanation.finding
     return {
         "level": explanation.level,
         "severity": "warning" if explanation.warns else "error",
         "what": explanation.obligation.sort.value,
         "table": explanation.obligation.table,
         "name": explanation.obligation.name,
-        "says": _stated(made, explanation),
+        "says": _stated(systems, explanation),
         "lines": list(explanation.obligation.lines),
-        "reproduces": found is not None and not explanation.beside,
+        "reproduces": finding is not None and not explanation.beside,
         "beside": list(explanation.beside),
-        "restarted": found is not None and found.restarted,
-        "lap": 0 if found is None else found.lasso,
-        "time_line": [] if found is None else [asdict(row) for row in rows(made, found)],
+        "restarted": finding is not None and finding.restarted,
+        "lap": 0 if finding is None else finding.lasso,
+        "time_line": [] if finding is None else [asdict(row) for row in rows(systems, finding)],
         "helps": list(explanation.helps),
         "others": list(explanation.others),
         "log": "" if explanation.log is None else str(explanation.log),

@@ -42,11 +42,11 @@ def command(
     Every leaf must be what it was, bit for bit; the first that is not is named. A log that is not whole is replayed as far as it goes,
     and the exit status is 1.
     """
-    found = read(file)
-    tick = _wanted(found, at, find_)
-    if level is not None and level not in {one.name for one in found.levels}:
+    log = read(file)
+    tick = _wanted(log, at, find_)
+    if level is not None and level not in {logged.name for logged in log.levels}:
         raise click.BadParameter(f"there is no level `{level}` in this log", param_hint="--show")
-    again = Replay(found, generated, "python" if executor == "python" else "c")
+    again = Replay(log, generated, "python" if executor == "python" else "c")
     if tick == 0:
         click.echo(f"`{find_}` holds in no cycle")
         return 1
@@ -58,20 +58,20 @@ def command(
     if tick is None:
         lacking = again.lacking
         differs = "nothing that these tables have differs" if lacking else "nothing differs"
-        click.echo(f"{len(found.ticks)} ticks replayed: {differs}; {found.checked.text}")
+        click.echo(f"{len(log.ticks)} ticks replayed: {differs}; {log.checked.text}")
         if lacking:
             more = f", and {len(lacking) - SHOWN} more" if len(lacking) > SHOWN else ""
             click.echo(f"not in these tables, and so not compared: {', '.join(lacking[:SHOWN])}{more}")
-    if not found.complete:
-        return refuse(file, Code.LOG_NOT_WHOLE, f"the log is {found.checked.text}")
+    if not log.complete:
+        return refuse(file, Code.LOG_NOT_WHOLE, f"the log is {log.checked.text}")
     return 0
 
 
-def _wanted(found: Log, at: int | None, find_: str | None) -> int | None:
+def _wanted(log: Log, at: int | None, find_: str | None) -> int | None:
     """The tick that is asked for; None for all, 0 for one that there is not."""
-    if at is not None and at not in found.ticks:
-        raise click.BadParameter(f"the log holds cycles {found.first + 1} to {found.last}", param_hint="--at")
-    return at if find_ is None else find(found, predicate(find_, found), at) or 0
+    if at is not None and at not in log.ticks:
+        raise click.BadParameter(f"the log holds cycles {log.first + 1} to {log.last}", param_hint="--at")
+    return at if find_ is None else find(log, predicate(find_, log), at) or 0
 
 
 def _show_moment(again: Replay, moment: ReplayMoment, level: str | None) -> None:
@@ -84,20 +84,23 @@ def _show_moment(again: Replay, moment: ReplayMoment, level: str | None) -> None
         fault = fault_in_words(logged.sign, logged.level, cycle.recorded)
         click.echo(f"  {cycle.level}: {fault or cycle.line_then}")
         if cycle.level == level:
-            for name, said in words(logged.sign, logged.level, cycle.recorded).items():
-                click.echo(f"    {name} = {said}")
+            for name, value in words(logged.sign, logged.level, cycle.recorded).items():
+                click.echo(f"    {name} = {value}")
 
 
 def _differs(file: Path, again: Replay, moment: ReplayMoment) -> int:
     first = next(cycle for cycle in moment.cycles if cycle.differences)
     leaf = _leading(first)
-    said = f"`{leaf.name}` was `{leaf.then}` and is `{leaf.now}`"
+    difference = f"`{leaf.name}` was `{leaf.then}` and is `{leaf.now}`"
     where = f"cycle {moment.tick}, level `{first.level}`"
     notes = tuple(note for cycle in moment.cycles if cycle.differences for note in _notes(cycle))
     if again.unchanged:
-        return refuse(file, Code.REPLAY_DIFFERS, f"the replay differs in {where}: {said}", notes=notes)
+        return refuse(file, Code.REPLAY_DIFFERS, f"the replay differs in {where}: {difference}", notes=notes)
     return refuse(
-        file, Code.TABLES_DECIDE_OTHERWISE, f"these tables decide otherwise in {where}: {said}", notes=notes
+        file,
+        Code.TABLES_DECIDE_OTHERWISE,
+        f"these tables decide otherwise in {where}: {difference}",
+        notes=notes,
     )
 
 

@@ -136,63 +136,65 @@ def _run(asked: RunOptions, processes: bool, from_row: int | None, resumes: bool
         timed.append(Timed(plant(database, asked.backend, seed=asked.seed)))
         return timed
 
-    made = prepare(asked.path, asked.script, asked.kind, outside, asked.database)
-    _place(made, from_row, resumes)
+    prepared = prepare(asked.path, asked.script, asked.kind, outside, asked.database)
+    _place(prepared, from_row, resumes)
     if processes:
-        return _apart(made, asked)
-    witness = Witness(made, timed[0], film=asked.report is not None)
-    with _recorded(made, asked) as log, _followed(witness, asked):
-        made.system.watch.append(witness)
-        seconds = _watch(made, asked)
+        return _apart(prepared, asked)
+    witness = Witness(prepared, timed[0], film=asked.report is not None)
+    with _recorded(prepared, asked) as log, _followed(witness, asked):
+        prepared.system.watch.append(witness)
+        seconds = _watch(prepared, asked)
     if asked.report is not None:
         _write_report(asked.report, witness, asked, seconds)
     return _closing(witness, asked, seconds, log)
 
 
-def _place(made: ScriptDraft, from_row: int | None, resumes: bool) -> None:
-    """Puts the run where it is to begin.
+def _place(prepared: ScriptDraft, from_row: int | None, resumes: bool) -> None:
+    """Put the run where it is to begin.
 
     Raises:
         BadScript: There is no such row.
         NotResumed: There is nothing to go on from.
     """
-    rows = len(made.station.rows)
+    rows = len(prepared.station.rows)
     if from_row is not None and from_row > rows:
         raise BadScript(f"the script has {rows} rows, and none is {from_row}")
     if resumes:
-        go_on(made)
+        go_on(prepared)
     else:
-        forget(made.system.description)  # what stood somewhere else begins anew
+        forget(prepared.system.description)  # what stood somewhere else begins anew
     if from_row is not None:
-        made.station.begin_at(from_row - 1)
+        prepared.station.begin_at(from_row - 1)
 
 
 def _command(script: str, system: Path | None, database: Path | None, executor: str, backend: str) -> str:
     """What to type for the same run; how it begins is to be added."""
-    said = ["rcsc", "run", script]
-    said += ["--system", str(system)] if system else []
-    said += ["--database", str(database)] if database else []
-    said += ["--executor", executor] if executor != "c" else []
-    said += ["--plant", backend] if backend != "mujoco" else []
-    return shlex.join(said)
+    words = ["rcsc", "run", script]
+    words += ["--system", str(system)] if system else []
+    words += ["--database", str(database)] if database else []
+    words += ["--executor", executor] if executor != "c" else []
+    words += ["--plant", backend] if backend != "mujoco" else []
+    return shlex.join(words)
 
 
 # --- while it runs ---
 
 
 @contextlib.contextmanager
-def _recorded(made: ScriptDraft, asked: RunOptions) -> Iterator[Path]:
-    """Writes the log; its path."""
+def _recorded(prepared: ScriptDraft, asked: RunOptions) -> Iterator[Path]:
+    """Write the log; yield its path."""
     path = (
         asked.log
-        or made.system.description.database.parent / ".rcsc-cache" / f"{made.system.description.name}.mcap"
+        or prepared.system.description.database.parent
+        / ".rcsc-cache"
+        / f"{prepared.system.description.name}.mcap"
     )
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        recorder = Recorder(made.system, path)
+        recorder = Recorder(prepared.system, path)
     except OSError as error:
         raise BadDescription(f"the log {path} cannot be written: {error.strerror}") from error
-    made.system.watch.append(recorder)
+    prepared.system.watch.append(recorder)
     try:
         yield path
     finally:
@@ -201,7 +203,7 @@ def _recorded(made: ScriptDraft, asked: RunOptions) -> Iterator[Path]:
 
 @contextlib.contextmanager
 def _followed(witness: Witness, asked: RunOptions) -> Iterator[None]:
-    """Opens the page, where one was asked for, and keeps the clock's pace for whoever looks."""
+    """Open the page, where one was asked for, and keep the clock's pace for whoever looks."""
     if not asked.live:
         yield
         return
@@ -241,10 +243,10 @@ class _Pace:
         time.sleep(max(0.0, self._next - time.monotonic()))
 
 
-def _watch(made: ScriptDraft, asked: RunOptions) -> float:
-    """Runs to the end, and says what becomes of each row; the seconds that it took."""
+def _watch(prepared: ScriptDraft, asked: RunOptions) -> float:
+    """Run to the end and say what becomes of each row; return the seconds that it took."""
     begun = time.perf_counter()
-    for result in made.steps():
+    for result in prepared.steps():
         if not asked.quiet:
             _say(result.row.number, result.row.text, result.state, result.ticks)
     return time.perf_counter() - begun
@@ -256,10 +258,10 @@ def _say(number: int, text: str, state: str, ticks: int) -> None:
     sys.stdout.flush()
 
 
-def _apart(made: ScriptDraft, asked: RunOptions) -> int:
-    """The same with a process for each level."""
+def _apart(prepared: ScriptDraft, asked: RunOptions) -> int:
+    """Run with a process for each level."""
     with scratch("run") as folder:
-        rows = _rows_apart(asked, made.station.at, folder / "results")
+        rows = _rows_apart(asked, prepared.station.at, folder / "results")
     if not asked.quiet:
         click.echo(f"each level in a process of its own, {asked.rate:g} times as fast as the clock")
     if rows and rows[-1][2] != "done":
@@ -273,7 +275,7 @@ def _apart(made: ScriptDraft, asked: RunOptions) -> int:
 
 
 def _rows_apart(asked: RunOptions, first: int, results: Path) -> list[list[Any]]:
-    """Runs the processes to the end: of each row its number, text, state, reason and ticks; `results` is where they travel."""
+    """Run the processes to the end; return each row's number, text, state, reason and ticks, which travel in `results`."""
     held = str(asked.database.resolve()) if asked.database else ""
     place = str(asked.path.resolve())
     outside = Factory(
@@ -317,14 +319,14 @@ def _write_report(path: Path, witness: Witness, asked: RunOptions, seconds: floa
 
 def _closing(witness: Witness, asked: RunOptions, seconds: float, log: Path) -> int:
 
-    made = witness.run
-    again = _kept(made, asked)
+    ended = witness.run
+    again = _kept(ended, asked)
     if not asked.quiet:
         for line in _figures(witness, seconds):
             click.echo(line)
         here = log.relative_to(Path.cwd()) if log.is_relative_to(Path.cwd()) else log
         click.echo(f"log: {here}" + (f"; report: {asked.report}" if asked.report else ""))
-    station, stopped = made.station, made.station.stopped
+    station, stopped = ended.station, ended.station.stopped
     if stopped is not None:
         word = "refused" if stopped.state == "refused" else "failed"
         raise Stopped(
@@ -333,7 +335,7 @@ def _closing(witness: Witness, asked: RunOptions, seconds: float, log: Path) -> 
             again,
         )
     if not station.over:
-        raise Stopped(Code.SCRIPT_STOPPED, f"row {station.at + 1} did not end in {made.system.tick} cycles")
+        raise Stopped(Code.SCRIPT_STOPPED, f"row {station.at + 1} did not end in {ended.system.tick} cycles")
     return 0
 
 
@@ -352,15 +354,15 @@ def _figures(witness: Witness, seconds: float) -> Iterator[str]:
     )
 
 
-def _kept(made: ScriptDraft, asked: RunOptions) -> str:
-    """Keeps a run that stopped, forgets one that came to its end; what to do about it."""
-    if made.station.stopped is None:
-        if made.station.over:
-            forget(made.system.description)
+def _kept(ended: ScriptDraft, asked: RunOptions) -> str:
+    """Keep a run that stopped, forget one that ended; return what to do about it."""
+    if ended.station.stopped is None:
+        if ended.station.over:
+            forget(ended.system.description)
         return ""
     try:
-        keep(made, asked.script)
+        keep(ended, asked.script)
     except OSError as error:
-        row = f"{asked.again} --from-row {made.station.at + 1}"
+        row = f"{asked.again} --from-row {ended.station.at + 1}"
         return f"where it stopped could not be kept: {error.strerror}; mend the cause, then begin anew: {row}"
     return f"the robot is paused; mend the cause, then: {asked.again} --resume"

@@ -60,16 +60,16 @@ def command(script: Path | None, executor: str, alone: bool, system: Path | None
 
 def _commands(path: Path, kind: Kind, alone: bool) -> Commands:
 
-    said = description(path)
-    signs = signatures(said)
+    described = description(path)
+    signs = signatures(described)
     outside: tuple[Outside, ...] = ()
-    if alone or not _is_cell(said, signs):
-        queries = silent_queries(said, signs)
+    if alone or not _is_cell(described, signs):
+        queries = silent_queries(described, signs)
     else:
-        database = database_of(said, signs)
+        database = database_of(described, signs)
         queries, outside = database.queries, (plant(database, "kinematic"),)
-    system = assemble(said, kind, queries, outside)
-    return Commands(Session(system, Origin(path, said, kind, queries)))
+    system = assemble(described, kind, queries, outside)
+    return Commands(Session(system, Origin(path, described, kind, queries)))
 
 
 def _is_cell(system: Description, signs: Mapping[str, Signature]) -> bool:
@@ -105,5 +105,5 @@ def _complain(where: str, refused: Refused) -> None:
     click.echo(f"{where}error[{refused.code.value}]: {first}", err=True)
     for line in rest:
         click.echo(f"  {line}", err=True)
-    for one in refused.helps:
-        click.echo(f"  = help: {one}", err=True)
+    for text in refused.helps:
+        click.echo(f"  = help: {text}", err=True)

@@ -3,7 +3,7 @@
 Each module has its click command under the name `command`: options, one call of the driver or of a stage, the report.
 
 >>> from rcsc.commands.tables.fmt import command
->>> sorted(name for one in command.params for name in one.opts if name in {"--check", "--diff"})
+>>> sorted(name for param in command.params for name in param.opts if name in {"--check", "--diff"})
 ['--check', '--diff']
 
 Nothing here is trusted for a verdict. What it costs: the stages that a command calls; an unchanged project is checked

@@ -55,15 +55,15 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
         if more := sorted(str(name) for name in given - {"source", "cvc5", "strict", "no_cache"}):
             named = ", ".join(f"--{name.replace('_', '-')}" for name in more)
             raise click.UsageError(f"{named}: not of a system; `rcsc prove --certify` has options of its own")
-        found: int = here.invoke(
+        status: int = here.invoke(
             prove, system=Path(source), confirms=True, strict=strict, no_cache=not use_cache
         )
-        return found
+        return status
     if cvc5:
         need("certify")
     how = Checking(cvc5=cvc5, strict=strict, questions=questions)
-    made = certify(settings_of(options, use_cache, output, (source,)), how, write, against)
-    return finish(made.report, "certify", output, made.closing)
+    conclusion = certify(settings_of(options, use_cache, output, (source,)), how, write, against)
+    return finish(conclusion.report, "certify", output, conclusion.closing)
 
 
 def _is_given(here: click.Context, name: str) -> bool:

@@ -39,14 +39,14 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
     Nothing is written unless everything is proved. Files are replaced whole: a kill leaves the old ones. The
     same tables give the same bytes on every machine, so the files belong in version control.
     """
-    targets = tuple(one.strip() for one in target.split(",") if one.strip())
+    targets = tuple(name.strip() for name in target.split(",") if name.strip())
     if not targets or not set(targets) <= TARGETS.keys():
         raise click.BadParameter(f"choose from {' and '.join(TARGETS)}", param_hint="--target")
-    made = compile_(
+    conclusion = compile_(
         settings_of(options, use_cache, output, paths),
         out,
         targets,
         only_check=only_check,
         defensive=defensive,
     )
-    return finish(made.report, "compile", output, made.closing)
+    return finish(conclusion.report, "compile", output, conclusion.closing)

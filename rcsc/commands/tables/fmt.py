@@ -28,12 +28,12 @@ def command(paths: tuple[str, ...], only_check: bool, diff: bool, output: Output
     What a file says stays the same, comments included; that is checked before a file is replaced.
     """
     write = not (only_check or diff)
-    made = reformat(paths or (".",), piped(paths), write=write)
+    formatted = reformat(paths or (".",), piped(paths), write=write)
     if diff:
-        click.echo(made.diff, nl=False)
-        return 1 if made.report.failed else 0
-    if write and "-" in made.texts and not made.report.failed:
-        sys.stdout.buffer.write(made.texts["-"].encode())
+        click.echo(formatted.diff, nl=False)
+        return 1 if formatted.report.failed else 0
+    if write and "-" in formatted.texts and not formatted.report.failed:
+        sys.stdout.buffer.write(formatted.texts["-"].encode())
         return 0
-    files = f"{made.changed} of {len(made.texts)} files"
-    return finish(made.report, "fmt", output, f"{files} {'changed' if write else 'would change'}")
+    files = f"{formatted.changed} of {len(formatted.texts)} files"
+    return finish(formatted.report, "fmt", output, f"{files} {'changed' if write else 'would change'}")

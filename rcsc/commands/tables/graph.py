@@ -45,99 +45,97 @@ def command(named: str, form: str | None, lines: bool, state: str, out: Path | N
     proved to do the same; what it does not hold is said on standard error.
     """
     try:
-        found = found_tables(named, running=lines)
-        if len(found) > 1 and out is None:
-            raise click.UsageError(f"{named} has {len(found)} tables: name one, or a folder with -o")
-        _draw_all(found, form or _form_of(out), lines, state, out, Options(steps=steps))
+        entries = found_tables(named, running=lines)
+        if len(entries) > 1 and out is None:
+            raise click.UsageError(f"{named} has {len(entries)} tables: name one, or a folder with -o")
+        _draw_all(entries, form or _form_of(out), lines, state, out, Options(steps=steps))
     except WrongError as error:
         return error.shown("graph")
     return 0
 
 
 def _draw_all(
-    found: list[FoundTable], form: str, lines: bool, state: str, out: Path | None, options: Options
+    entries: list[FoundTable], form: str, lines: bool, state: str, out: Path | None, options: Options
 ) -> None:
-    """Draws every table; of several, those without a state are left out, and what is wrong is told at the end."""
+    """Draw every table; among several, leave out those without a state, and raise what is wrong at the end."""
     wrong: list[Diagnostic] = []
-    for found_table in found:
-        name = (
-            f"{found_table.program.name}_{found_table.table.name}{'_lines' if lines else ''}{ENDINGS[form]}"
-        )
-        into = out is not None and (len(found) > 1 or out.is_dir())
+    for entry in entries:
+        name = f"{entry.program.name}_{entry.table.name}{'_lines' if lines else ''}{ENDINGS[form]}"
+        into = out is not None and (len(entries) > 1 or out.is_dir())
         try:
             _draw(
-                found_table,
+                entry,
                 form,
-                _derived(found_table, lines, state, options),
+                _derived(entry, lines, state, options),
                 out / name if into and out else out,
                 options,
             )
         except WrongError as error:
-            if len(found) == 1:
+            if len(entries) == 1:
                 raise
-            for left in error.found:
+            for left in error.diagnostics:
                 if left.code is Code.GRAPH_NO_STATE:
                     click.echo(f"note[{left.code.value}]: {left.message}: not drawn", err=True)
                 else:
                     wrong.append(left)
     if wrong:
-        texts = {file: text for found_table in found for file, text in found_table.loaded.sources.items()}
+        texts = {file: text for entry in entries for file, text in entry.loaded.sources.items()}
         raise WrongError(tuple(wrong), texts)
 
 
 def _form_of(out: Path | None) -> str:
     ending = "" if out is None else out.suffix.lower()
     others = {".gv": "dot", ".mermaid": "mermaid", ".xml": "scxml"}
-    return next((form for form, one in ENDINGS.items() if one == ending), others.get(ending, "svg"))
+    return next((form for form, own in ENDINGS.items() if own == ending), others.get(ending, "svg"))
 
 
-def _derived(one: FoundTable, lines: bool, state: str, options: Options) -> Derived:
+def _derived(entry: FoundTable, lines: bool, state: str, options: Options) -> Derived:
 
-    file = one.loaded.files[one.table.file]
-    found = (
-        derive_lines(one.program, one.table, file, options)
+    file = entry.loaded.files[entry.table.file]
+    derived = (
+        derive_lines(entry.program, entry.table, file, options)
         if lines
-        else derive(one.program, one.table, file, options, state)
+        else derive(entry.program, entry.table, file, options, state)
     )
-    if isinstance(found, Diagnostic):
-        raise WrongError((found,), one.loaded.sources)
-    return found
+    if isinstance(derived, Diagnostic):
+        raise WrongError((derived,), entry.loaded.sources)
+    return derived
 
 
-def _draw(one: FoundTable, form: str, made: Derived, out: Path | None, options: Options) -> None:
-    """Writes one graph; what its form does not hold is said beside it."""
+def _draw(entry: FoundTable, form: str, derived: Derived, out: Path | None, options: Options) -> None:
+    """Write one graph; say on standard error what its form does not hold."""
     if form == "svg":
-        written(_drawing(one, made), out)
+        written(_drawing(entry, derived), out)
         return
-    text = FORMS[form].write(made.graph)
+    text = FORMS[form].write(derived.graph)
     written(text, out)
-    if made.graph.state == LINES:
+    if derived.graph.state == LINES:
         return
-    name = one.table.name
-    for lost in made.lost:
+    name = entry.table.name
+    for lost in derived.lost:
         click.echo(f"note[{Code.GRAPH_LOSES.value}]: {name}: not in the graph: {lost}", err=True)
-    questions = _read_back(one, form, text, options)
+    questions = _read_back(entry, form, text, options)
     click.echo(
         f"{name}: the table read back from the graph does the same: proved, {questions} questions", err=True
     )
 
 
-def _drawing(one: FoundTable, made: Derived) -> str:
+def _drawing(entry: FoundTable, derived: Derived) -> str:
 
     try:
-        return svg(made.graph, made.everywhere)
+        return svg(derived.graph, derived.everywhere)
     except NoLayoutError as error:
         helps = ("pip install 'rcsc[graph]'", "or draw the form dot with a program of your own")
-        found = Diagnostic(
-            Code.EXTRA_MISSING, str(error) or f"`{PACKAGE}` failed", Label(one.table.span), help=helps
+        diagnostic = Diagnostic(
+            Code.EXTRA_MISSING, str(error) or f"`{PACKAGE}` failed", Label(entry.table.span), help=helps
         )
-        raise WrongError((found,), one.loaded.sources) from error
+        raise WrongError((diagnostic,), entry.loaded.sources) from error
 
 
-def _read_back(one: FoundTable, form: str, text: str, options: Options) -> int:
+def _read_back(entry: FoundTable, form: str, text: str, options: Options) -> int:
     """How many questions prove that the written graph says the table."""
-    made = tabled(FORMS[form].read(text))
-    verdict = against(one.loaded, one.root, one.program, one.table, made, options)
+    read_table = tabled(FORMS[form].read(text))
+    verdict = against(entry.loaded, entry.root, entry.program, entry.table, read_table, options)
     if verdict.diagnostics:
-        raise WrongError(verdict.diagnostics, {**one.loaded.sources, **(verdict.sources or {})})
+        raise WrongError(verdict.diagnostics, {**entry.loaded.sources, **(verdict.sources or {})})
     return verdict.questions

@@ -27,7 +27,7 @@ Examples:
   rcsc table m.scxml --in tables/task/move.rcs -o new.rcs   the file, with this table in place of its own""",
 )
 @click.argument("drawn", metavar="GRAPH", type=click.Path(exists=True, dir_okay=False, allow_dash=True))
-@click.option("--form", type=click.Choice([one for one in ENDINGS if one != "svg"]), default=None,
+@click.option("--form", type=click.Choice([ending for ending in ENDINGS if ending != "svg"]), default=None,
               help="dot, mermaid or scxml; else by how the text begins.")  # fmt: skip
 @click.option("--against", "other", default=None, metavar="TABLE",
               help="Prove that the graph does what this table does (a name, FILE or FILE:NAME); else 1, and an input.")  # fmt: skip
@@ -44,13 +44,13 @@ def command(
     without a name get one. The table is not proved by this: run `rcsc check` on it.
     """
     try:
-        made = _tabled(drawn, form)
+        read_table = _tabled(drawn, form)
         if other is not None:
-            _prove(made, other, Options(steps=steps))
-        written(made.text() if place is None else _placed(made, place), out)
+            _prove(read_table, other, Options(steps=steps))
+        written(read_table.text() if place is None else _placed(read_table, place), out)
     except WrongError as error:
         return error.shown("table")
-    for note in made.notes:
+    for note in read_table.notes:
         click.echo(f"note[{Code.GRAPH_LOSES.value}]: {note}", err=True)
     return 0
 
@@ -72,21 +72,21 @@ def _tabled(drawn: str, form: str | None) -> Tabled:
         raise WrongError((diagnosed(error, source),), {drawn: source}) from error
 
 
-def _prove(made: Tabled, named: str, options: Options) -> None:
+def _prove(read_table: Tabled, named: str, options: Options) -> None:
 
-    name = made.table.name.text
-    found = found_tables(f"{named}:{name}" if named.endswith(".rcs") else named)
-    one = next((found_table for found_table in found if found_table.table.name == name), found[0])
-    verdict = against(one.loaded, one.root, one.program, one.table, made, options)
+    name = read_table.table.name.text
+    entries = found_tables(f"{named}:{name}" if named.endswith(".rcs") else named)
+    entry = next((candidate for candidate in entries if candidate.table.name == name), entries[0])
+    verdict = against(entry.loaded, entry.root, entry.program, entry.table, read_table, options)
     if verdict.diagnostics:
-        raise WrongError(verdict.diagnostics, {**one.loaded.sources, **(verdict.sources or {})})
-    where = f"{one.table.file}:{one.table.name}"
+        raise WrongError(verdict.diagnostics, {**entry.loaded.sources, **(verdict.sources or {})})
+    where = f"{entry.table.file}:{entry.table.name}"
     click.echo(f"{name}: does the same as {where}: proved, {verdict.questions} questions", err=True)
 
 
-def _placed(made: Tabled, file: str) -> str:
+def _placed(read_table: Tabled, file: str) -> str:
 
     loaded = load([file])
     if loaded.diagnostics:
         raise WrongError(loaded.diagnostics, loaded.sources)
-    return in_place(loaded.files[loaded.roots[0]], made.table)
+    return in_place(loaded.files[loaded.roots[0]], read_table.table)

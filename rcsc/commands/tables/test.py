@@ -48,5 +48,5 @@ def command(  # noqa: PLR0913, PLR0917  # as many as there are options
     """
     esbmc_s = (60.0 if deep else 0.0) if esbmc is None else esbmc
     effort = TestEffort(examples, deep=deep, esbmc_s=esbmc_s, cortex=cortex, mutants=mutants, vectors=vectors)
-    made = test(settings_of(options, use_cache, output, paths), effort)
-    return finish(made.report, "test", output, made.closing)
+    conclusion = test(settings_of(options, use_cache, output, paths), effort)
+    return finish(conclusion.report, "test", output, conclusion.closing)
