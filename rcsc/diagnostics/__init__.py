@@ -9,8 +9,8 @@ columns of them. User errors are such values; exceptions are for bugs.
 >>> from rcsc.diagnostics.render import one_line
 >>> from rcsc.diagnostics.source import Source, Span
 >>> source = Source("grip.rcs", "input a : int\ninput b : nowhere\n")
->>> found = Diagnostic(Code.UNKNOWN_NAME, "there is no `nowhere`", Label(Span("grip.rcs", 24, 31)))
->>> one_line(found, {"grip.rcs": source})
+>>> diagnostic = Diagnostic(Code.UNKNOWN_NAME, "there is no `nowhere`", Label(Span("grip.rcs", 24, 31)))
+>>> one_line(diagnostic, {"grip.rcs": source})
 'grip.rcs:2:11: error[RCS201]: there is no `nowhere`'
 
 Nothing here is trusted for a verdict. What comes from a user's file is made safe for a terminal, a log or a page

@@ -59,7 +59,7 @@ class Code(StrEnum):
 
     @property
     def explanation(self) -> CodeText:
-        """What `rcsc explain` says of the code."""
+        """Return the text of `rcsc explain`."""
         title, *blocks = cleandoc(self.entry.partition(": ")[2]).split("\n\n")
         at = next((at for at, block in enumerate(blocks) if _REPORT.match(block)), None)
         if at is None:

@@ -25,7 +25,7 @@ def _spelled(char: str) -> str:
 
 
 def width(text: str) -> int:
-    """How many terminal cells `text`, already escaped, takes."""
+    """Count the terminal cells that `text`, already escaped, takes."""
     if text.isascii():
         return len(text)
     return sum(_cells(char) for char in text)
@@ -43,7 +43,7 @@ def pad(text: str, cells: int) -> str:
 
 
 def clip(text: str, start: int, cells: int) -> str:
-    """What of `text` lies in the `cells` terminal cells from cell `start` on."""
+    """Cut `text` to the `cells` terminal cells from cell `start` on."""
     if text.isascii():
         return text[start : start + cells]
     kept, at = [], 0

@@ -51,7 +51,7 @@ class SystemReport:
         system: Its description.
         standing: `proved`, `proved as far as it was looked at`, `conditional`, `not proved` or `unknown`.
         wanted: Whether `rcsc prove` would say something of these tables that is not known.
-        missing: Why nothing is found wrong of it and it is not wholly proved: in words, level by level.
+        missing: Why it is not wholly proved though nothing is found wrong, level by level.
     """
 
     system: str
@@ -97,7 +97,7 @@ MOST_NAMED = 3
 
 
 def named(words: Collection[str]) -> str:
-    """What a verdict rests on, as far as it is named."""
+    """Name what a verdict rests on, up to a limit."""
     more = f" and {len(words) - MOST_NAMED} more" if len(words) > MOST_NAMED else ""
     return "; ".join(list(words)[:MOST_NAMED]) + more
 
@@ -162,7 +162,7 @@ class Report:
     systems: tuple[SystemReport, ...] = ()
 
     def count(self, severity: Severity) -> int:
-        """How many diagnostics are of this severity."""
+        """Count the diagnostics of this severity."""
         return sum(diagnostic.severity is severity for diagnostic in self.diagnostics)
 
     @property

@@ -1,6 +1,6 @@
 """The language: what a program is, and what it means.
 
-A *program* is typed, flattened into leaves, and has every name found (`model`). A *leaf* is a variable without parts:
+A *program* is typed, flattened into leaves, and resolved (`model`). A *leaf* is a variable without parts:
 a record's field, an array's element. A *key* numbers the values of a leaf in their order, and a *box* is a set of
 keys as intervals. A *test* is one cell of a table as a condition. `interpret` is the one meaning of all this; the
 provers and both executors are held against it.

@@ -91,10 +91,10 @@ class ExternError(Exception):
 
 
 UNDEFINED = (ArithmeticError, IndexError, ValueError)
-"""What is raised where an operation is not defined: a divisor that is zero, an index outside its array, a real without a whole number."""
+"""Errors of undefined operations: a divisor of zero, an index outside its array, a real without a whole number."""
 
 Answers: TypeAlias = Callable[[Procedure, list[Value]], tuple[Value, ...]]
-"""What stands in for extern procedures: takes one with its reads and arguments, and gives its writes in order."""
+"""Stand-in for extern procedures: takes one with its reads and arguments, returns its writes in order."""
 _ANSWERS: ContextVar[Answers | None] = ContextVar("answers", default=None)
 
 

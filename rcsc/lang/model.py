@@ -230,7 +230,7 @@ def pending(name: str) -> VariableName:
 
 
 BEFORE = "was "
-"""What the name of a leaf begins with, in a property, where its value after the cycle before is meant."""
+"""Prefix, in a property, of a leaf's name that means its value after the cycle before."""
 
 
 def earlier(name: str) -> VariableName:
@@ -741,5 +741,5 @@ class ProvedProgram:
 
 
 def seal_of_proof() -> object:
-    """For `rcsc.table` alone (and tests of later stages that name it)."""
+    """Seal a proof; for `rcsc.table` alone, and tests of later stages."""
     return _PROOF_SEAL

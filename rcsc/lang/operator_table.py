@@ -80,7 +80,7 @@ Arithmetic: TypeAlias = Literal[Op.NEG, Op.ABS, Op.ADD, Op.SUB, Op.MUL, Op.DIV, 
 """From numbers of one kind to a number of it."""
 Conversion: TypeAlias = Literal[Op.TO_INT, Op.TO_REAL]
 Strict: TypeAlias = Literal[Op.NOT] | Comparison | Arithmetic | Conversion
-"""Those that always look at all their operands."""
+"""Operators that always evaluate all operands."""
 Operator: TypeAlias = Logic | Strict
 """Every operator: `Op` member by member, so that mypy knows what is left where a group has been dealt with."""
 

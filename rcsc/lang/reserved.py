@@ -39,7 +39,7 @@ C_FAMILIES = frozenset(
     SYNC T TCP TCPI TCPOLEN TCPOPT TEMP TIME TIMESPEC TIMEVAL TMP TSS TTY UCHAR UINT ULLONG ULONG USHRT W WCHAR WINT X XATTR
     """.split()
 )
-"""What macros of ISO C, POSIX and glibc begin with; one that ends in `_` is none of theirs."""
+"""Prefixes of macros of ISO C, POSIX and glibc; a name that ends in `_` is none of theirs."""
 
 C_COMPOSED = frozenset(
     """

@@ -16,7 +16,7 @@ it. Each is looked at in every line that calls the procedure, under the line's o
 ...   | more | true  || count      |
 ...   | rest | false ||            |
 ... }''')
->>> [one.message for one in prove_program(program, Options()).findings]
+>>> [finding.message for finding in prove_program(program, Options()).findings]
 ['the value can lie outside 0 .. 9, the range of `parts`']
 
 First without the table's assumptions; where that fails, with the fewest that suffice, and the executors then stop a

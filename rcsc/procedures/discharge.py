@@ -149,7 +149,7 @@ class _Question:
         return self.asker.order.get(name, len(self.asker.order)), name
 
     def answer(self) -> list[Failure]:
-        """What is not shown, in the order owed."""
+        """Return what is not shown, in the order owed."""
         for at in halved(range(len(self.owed)), self._hold):
             self._found(at, *self._last)
             self.known.append(values.negation(self.bad[at]))

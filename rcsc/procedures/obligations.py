@@ -84,7 +84,7 @@ def defined_alone(program: Program, table: Table) -> bool:
 
 
 Known: TypeAlias = Callable[[], list[Node]]
-"""What may be taken for granted where obligations are put to the solver."""
+"""Premises under which obligations are put to the solver."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,7 +139,7 @@ class Obligations:
         self._kept = [(invariant, set(read_by(invariant.condition))) for invariant in self.program.invariants]
 
     def prove(self, tables: Iterable[Table]) -> list[Diagnostic]:
-        """What is wrong with conditions, deferred values, procedures, levels, and the lines of `tables`."""
+        """Report what is wrong with conditions, deferred values, procedures, levels, and lines of `tables`."""
         with self._budget():
             self._conditions()
             self._deferred()
@@ -159,7 +159,7 @@ class Obligations:
         return self.stops
 
     def _budget(self) -> AbstractContextManager[Budget]:
-        """For all questions about a table, a procedure or a list of them, or all conditions outside tables."""
+        """Budget all questions about a table, a list of procedures, or the conditions outside tables."""
         return smt.together(self.options.together)
 
     # --- what is known ---
@@ -295,7 +295,7 @@ class Obligations:
         self._settle(run, self._invariants, "", "")
 
     def _levels(self) -> None:
-        """What a level runs before its table and after it, each list in one run."""
+        """Discharge what a level runs before its table and after it, each list in one run."""
         for level in self.program.levels:
             for words, names in (("preprocess", level.preprocess), ("postprocess", level.postprocess)):
                 calls = [Call(self._procedures[name].name) for name in names]
@@ -372,7 +372,7 @@ class Obligations:
         return not any(written & reads for _, reads in self._kept)
 
     def _plainly_written(self, statement: Statement) -> set[str] | None:
-        """What the statement writes; None where it may owe something."""
+        """Return what the statement writes; None where it may owe something."""
         match statement:
             case Assign(place=ToLeaf(name=name, type=kind), value=Literal(value=value)):
                 low, high = values.bounds(kind)
@@ -404,7 +404,7 @@ class Obligations:
         return run, lambda: [*base, self._none(table)] if isinstance(line, Default) else base
 
     def _none(self, table: Table) -> Node:
-        """That no line matches."""
+        """State that no line matches."""
         return values.all_of(
             values.negation(
                 values.all_of(self._known(test.condition for test in line.tests if test is not None))

@@ -17,8 +17,8 @@ a line that can match in the next cycle, whatever comes in then. Both are questi
 ...   | low  | <= 4   || false |
 ...   | high | {cell} || true  |
 ... }}''')
->>> one, two = program("5 .. 9"), program("> 4")
->>> type(compare((one, one.tables[0]), (two, two.tables[0]), Options())).__name__
+>>> first, second = program("5 .. 9"), program("> 4")
+>>> type(compare((first, first.tables[0]), (second, second.tables[0]), Options())).__name__
 'Same'
 
 Two tables are the *same* if for every input the same line outcome has the same effect on every leaf; else `Differs`

@@ -184,7 +184,7 @@ class _Cycles:
         run.execute(Call(self.procedures[name].name) for name in names)
 
     def _facts(self, run: Run) -> list[Node]:
-        """What is known when the table looks."""
+        """Return what is known before the match."""
         facts = [run.evaluate(assumption) for assumption in assumed(self.program, self.table)]
         if (
             self.level is not None
@@ -196,7 +196,7 @@ class _Cycles:
         return facts
 
     def _lines(self, run: Run) -> list[Node]:
-        """That each line matches then; DEFAULT after the others."""
+        """State for each line that it matches then; DEFAULT comes last."""
         lines = [
             values.all_of(run.evaluate(t.condition) for t in line.tests if t) for line in self.table.lines
         ]

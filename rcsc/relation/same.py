@@ -1,9 +1,9 @@
 """Whether two tables over the same declarations do the same, whatever the input.
 
-In: two programs that differ in one table. Out: `Same`, `Differs` with the least input, or `NotDecided`. The same line's worth: a
-condition that is not defined, no line, several lines, or one line whose actions come to their end alike, call the same extern procedures
-in the same states with the same values, and leave every variable the same. Asked of Z3 pair of lines by pair
-of lines, under the assumptions of the first table and the program's invariants; lines are compared by what they do, not by name.
+In: two programs that differ in one table. Out: `Same`, `Differs` with the least input, or `NotDecided`. Both do the same where both have
+an undefined condition, match no line or match several, or where each matches one line and the actions of these end alike, call the same
+extern procedures in the same states with the same values, and leave every variable the same. Z3 is asked about pairs of lines,
+under the assumptions of the first table and the program's invariants; lines are compared by what they do, not by name.
 """
 
 from collections.abc import Iterator
@@ -123,7 +123,7 @@ class _Question:
         return Same(self.questions)
 
     def _outcomes(self, program: Program, table: Table) -> Iterator[_Outcome]:
-        """What the table can come to; the conditions exclude each other and leave nothing out."""
+        """Yield the table's outcomes; their conditions are disjoint and cover every input."""
         meaning = Meaning(program, self.kinds, self.shared)
         lines = meaning.lines(table)
         undefined, twice = values.any_of(meaning.bad), several(lines)
@@ -145,7 +145,7 @@ class _Question:
         return values.any_of(node for _, node in self._changes(first.effect, second.effect))
 
     def _changes(self, first: Effect, second: Effect) -> Iterator[tuple[str, Node]]:
-        """What can differ afterwards, and where it does."""
+        """Yield what can differ afterwards, and where it does."""
         leaves = [name for name in self.kinds if name in first.leaves or name in second.leaves]
         good = values.both(first.good, second.good)
         yield RUN, goes_wrong_otherwise(first, second, self.shared)

@@ -3,8 +3,8 @@
 In: a table, and the variable that holds its state. Out: steps, each answered by Z3 under the table's
 assumptions and the program's invariants; a question without an answer raises `UnansweredError`: nothing is drawn from it.
 
-A step is one match: the state before it, and the state that the line's actions lead to. With a deferred next
-state that is the pending one. Before the match it is taken to be the present one: nothing is under way. Under the
+A step is one match: the state before it, and the state that the line's actions lead to. If the state is
+deferred, its pending value counts; before the match that is taken to be the present one: nothing is under way. Under the
 protocol a line that gives an order matches again until its echo, and a line that says nothing of the state stays.
 """
 

@@ -27,7 +27,7 @@ def _pysat() -> Any:
 
 @cache
 def _interrupted() -> type[Exception]:
-    """What the solver raises when Ctrl-C stops it; nothing else raises it in a search."""
+    """Return the error that a search raises only when Ctrl-C stops it."""
     import pysolvers
 
     error: type[Exception] = pysolvers.error
@@ -72,7 +72,7 @@ class Sat:
         return bool(answer)
 
     def value(self, literal: int) -> bool:
-        """Of a literal, in the last model; a variable that no clause speaks of is false there."""
+        """Value of a literal in the last model; a variable in no clause is false."""
         at = abs(literal) - 1
         return (at < len(self._model) and self._model[at] > 0) == (literal > 0)
 

@@ -68,7 +68,7 @@ _cut: list[int] = []
 
 
 def cut_short() -> int:
-    """How many questions of this process were ended by the processor time that they took: no verdict that saw one is kept."""
+    """Count this process's questions that the clock ended: no verdict that saw one is kept."""
     return len(_cut)
 
 
@@ -108,7 +108,7 @@ def spent() -> bool:
 
 
 def troubles() -> tuple[type[BaseException], ...]:
-    """What Z3 and exhausted memory raise, also outside a check: nothing is proved then."""
+    """Errors of Z3 and exhausted memory, also outside a check: nothing is proved then."""
     loaded = sys.modules.get("z3")
     return (MemoryError,) if loaded is None else (MemoryError, loaded.Z3Exception)
 
@@ -363,7 +363,7 @@ class Solver:
         self._solver.set("timeout", max(1, round(1000 * self._patience_s)))
 
     def script(self) -> str:
-        """What is asserted as an SMT-LIB 2 script, with `(check-sat)` at its end."""
+        """Spell what is asserted as an SMT-LIB 2 script that ends in `(check-sat)`."""
         return f"(set-logic ALL)\n{self._solver.to_smt2()}"
 
     def refutations(self) -> str:

@@ -42,7 +42,7 @@ class Bits:
 
     @classmethod
     def of(cls, nodes: Sequence[Node]) -> Self:
-        """For these nodes, and nothing else."""
+        """Make one for these nodes alone."""
         return cls(_few=few(nodes))
 
     def fresh(self) -> Literal:
@@ -61,7 +61,7 @@ class Bits:
         return self.word(node)[0]
 
     def equals(self, word: Word, kind: Scalar, key: int) -> Literal:
-        """That a word of the kind has this key."""
+        """State that a word of the kind has this key."""
         if isinstance(kind, Bool):
             return word[0] if key else -word[0]
         return self._equal(word, constant(key))
@@ -91,7 +91,7 @@ class Bits:
         return -self.both(-a, -b)
 
     def _same(self, a: Literal, b: Literal) -> Literal:
-        """That they are the same."""
+        """State that they are equal."""
         if a in (TRUE, FALSE) or b in (TRUE, FALSE):
             known, other = (a, b) if a in (TRUE, FALSE) else (b, a)
             return other if known == TRUE else -other
@@ -132,7 +132,7 @@ class Bits:
         return self.all_of(self._same(x, y) for x, y in _aligned(a, b))
 
     def _below(self, a: Word, b: Word) -> Literal:
-        """That the first is less."""
+        """State that the first is less."""
         pairs = list(_aligned(a, b))
         less = FALSE
         for x, y in pairs[:-1]:

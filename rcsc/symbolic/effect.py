@@ -3,7 +3,7 @@
 In: statements of one program, and leaves that another program's run may share. Out: an `Effect`; two of them are the
 same where `same_effect` holds. Text plays no part: only what is written matters, and where a run goes wrong.
 
-Nodes that are built alike are made one (`Shared`), so that most of what two versions have in common folds without
+Nodes that are built alike become one (`Shared`), so that most of what two versions share folds without
 a solver.
 """
 
@@ -54,7 +54,7 @@ class Effect:
 
     @property
     def good(self) -> Node:
-        """That nothing goes wrong."""
+        """State that nothing goes wrong."""
         return values.all_of(self.owed)
 
 
@@ -84,9 +84,9 @@ class Shared:
         return self._of[node]
 
     def equal(self, left: Node, right: Node) -> Node:
-        """That two values are the same; known where they are built alike, whatever was learnt of their bounds.
+        """Equate two values; true where they are built alike, whatever is known of their bounds.
 
-        A value that is kept is no NaN: that is owed.
+        A kept value is no NaN: that is an obligation.
         """
         return TRUE if self._built(left) == self._built(right) else values.equal(left, right)
 
@@ -162,7 +162,7 @@ class Meaning:
         ]
 
     def effect(self, body: Iterable[Statement], given: Iterable[Node] = ()) -> Effect:
-        """What the statements do where all of `given` holds.
+        """Follow the statements where all of `given` holds.
 
         Raises:
             TooLongError, RecursionError: It has more steps than are followed.
@@ -174,7 +174,7 @@ class Meaning:
         return self._made(run)
 
     def procedure(self, name: str, args: Iterable[Node]) -> Effect:
-        """What a procedure does with these arguments.
+        """Follow a procedure with these arguments.
 
         Raises:
             TooLongError, RecursionError: As `effect`.

@@ -112,7 +112,7 @@ def _comparison(op: Comparison, left: Term, right: Term, kind: Scalar) -> Term:
 
 
 def within(term: Term, kind: Scalar) -> Term:
-    """That the term is a value of the kind: in range, and finite."""
+    """State that the term is a value of the kind: in range, and finite."""
     if isinstance(kind, Bool):
         return smt.truth(True)
     low, high = (kind.low, kind.high) if isinstance(kind, Int | Real) else key_bounds(kind)
@@ -163,7 +163,7 @@ def _model(solver: Solver, variables: Iterable[Variable], frame: Frame) -> dict[
 
 
 def at_most_key(term: Term, kind: Scalar, key: int) -> Term:
-    """That the term's key is at most `key`."""
+    """State that the term's key is at most `key`."""
     if isinstance(kind, Bool):
         return smt.negation(term) if key < 1 else smt.truth(True)
     return smt.at_most(term, smt.literal(kind, value_of_key(kind, key)), kind)

@@ -1,8 +1,8 @@
 """Symbolic values of expressions, and what evaluating them owes.
 
 In: expressions and a state. Out: values, and obligations: at which place, on which path, what must hold
-there. A value that owes something is taken to have paid from there on: later values rest on it, and the first
-that does not is reported.
+there. Once owed, an obligation is assumed to hold: later values rest on it, and only the
+first that fails is reported.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping

@@ -205,7 +205,7 @@ class Run(Evaluation):
         self.state.local, self.state.assigned = outer
 
     def _extern(self, procedure: Procedure) -> None:
-        """Its results are admitted one after the other; the cycle ends at the first that is refused."""
+        """Admit its results in order; the cycle ends at the first that is refused."""
         path = values.both(self.path, values.negation(self.ended))
         given, refused = list[Node](), list[Node]()
         for name in procedure.writes:

@@ -73,11 +73,11 @@ class Keyed:
         return _key(kind, real_key(float(value)) if isinstance(kind, Real) else int(value))
 
     def equal(self, term: Term, node: Node) -> Term:
-        """That the term is the node's value."""
+        """State that the term is the node's value."""
         return smt.equal(term, self.term(node), sort(node.kind))
 
     def has(self, term: Term, kind: Scalar, key: int) -> Term:
-        """That the term, of a value of the type, has this key."""
+        """State that the term, of this type, has this key."""
         if isinstance(kind, Bool):
             return term if key else smt.negation(term)
         return smt.equal(term, _key(kind, key), KEY)

@@ -173,7 +173,7 @@ def choice(condition: Node, then: Node, orelse: Node) -> Node:
 
 
 def among(subject: Node, values: Sequence[Value]) -> Node:
-    """That the subject is one of the constants."""
+    """State that the subject is one of the constants."""
     return any_of(compare(Op.EQ, subject, constant(subject.kind, value)) for value in values)
 
 

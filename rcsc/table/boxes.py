@@ -21,7 +21,7 @@ def applies(table: Table) -> bool:
 
 
 def lines_of(table: Table) -> list[dict[str, Box]]:
-    """For each line the keys of each leaf that it tests; several tests of one leaf meet."""
+    """Return each line's keys by leaf; several tests of one leaf intersect."""
     lines = []
     for line in table.lines:
         boxes: dict[str, Box] = {}
@@ -61,11 +61,11 @@ class TableBoxes(Boxes[str]):
         return {n: value_of_key(kinds[n], keys.get(n, self.extents[n][0])) for n in self.names}  # type: ignore[index]
 
     def narrowed(self, region: Mapping[str, Box]) -> Region:
-        """Without the variables that may have any key."""
+        """Leave out variables that may have any key."""
         return {name: box for name, box in region.items() if box != (self.extents[name],)}
 
     def gap(self, disjoint: bool) -> Gap | None:
-        """What no line matches: up to three witnesses with regions, and the count where lines are disjoint.
+        """Find what no line matches: up to three witnesses with regions, and the count if lines are disjoint.
 
         Raises:
             BudgetError: Whether there is anything was not found out.

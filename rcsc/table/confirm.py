@@ -38,7 +38,7 @@ class TableSolver:
         self._tests: dict[int, Term] = {}
 
     def line(self, at: int) -> Term:
-        """That a line matches."""
+        """State that a line matches."""
         if at not in self._lines:
             self._lines[at] = smt.all_of(
                 [self._test(test.condition, id(test)) for test in self.table.lines[at].tests if test]
@@ -51,7 +51,7 @@ class TableSolver:
         return self._tests[key]
 
     def none(self) -> Term:
-        """That no line matches."""
+        """State that no line matches."""
         return smt.negation(smt.any_of([self.line(at) for at in range(len(self.table.lines))]))
 
     def witness(self, *terms: Term) -> Snapshot | None:

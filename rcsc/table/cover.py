@@ -223,7 +223,7 @@ class Space:
         return box
 
     def _inside(self, box: Mapping[str, Box]) -> list[Term]:
-        """That each variable lies in its part of the box."""
+        """State that each variable lies in its part of the box."""
         terms = []
         for name, part in box.items():
             if part != (key_bounds(self.nodes[name].kind),):

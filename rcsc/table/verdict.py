@@ -13,7 +13,7 @@ Witness: TypeAlias = Snapshot
 """A value for every test variable of the table."""
 
 Region: TypeAlias = Mapping[str, Box]
-"""For some of the variables the keys that they may have; the others are free."""
+"""Keys that some variables may have; the others are free."""
 
 
 @dataclass(frozen=True, slots=True)

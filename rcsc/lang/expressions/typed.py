@@ -160,7 +160,7 @@ class Path:
 
 
 def path_of(scope: Scope, body: Body, written: tree.Expr) -> Path | None:
-    """Where a variable path leads; None after an error."""
+    """Follow a variable path; None after an error."""
     match written:
         case tree.Reference(name):
             declared = scope.declared.get(name.text)

@@ -9,7 +9,7 @@ arrays become leaves, each output has one writer, and procedures cannot call the
 ... output to_hand : order''')
 >>> [variable.name for variable in program.variables]
 ['to_hand.number', 'to_hand.stop']
->>> [one.code.value for one in compile_text("output a : nowhere")]
+>>> [diagnostic.code.value for diagnostic in compile_text("output a : nowhere")]
 ['RCS201']
 
 Trusted: all of it, for what a program is; nothing later looks at the text again. Cost: linear in the files, and an

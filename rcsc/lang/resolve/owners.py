@@ -36,7 +36,7 @@ class Owners:
         return tuple(procedure for name in names for procedure in self._runs_of(name))
 
     def _runs_of(self, member: tree.Name) -> tuple[str, ...]:
-        """What a member runs; one that is no owner and no procedure without parameters is reported."""
+        """Return what a member runs; report one that is no owner and no procedure without parameters."""
         if member.text in self.runs:
             return self.runs[member.text]
         procedure = self.scope.procedures.get(member.text)

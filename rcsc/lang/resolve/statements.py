@@ -89,7 +89,7 @@ class Statements:
         return () if target is None else self.store(target, value, deferred, span)
 
     def place(self, place: tree.Expr, deferred: bool) -> Path | None:
-        """Where an assignment outside the locals goes; None after an error."""
+        """Resolve the target of an assignment outside the locals; None after an error."""
         constants = self.scope.constants
         name = place.name.text if isinstance(place, tree.Reference) else ""
         if name not in self.scope.declared and (name in constants or name in self.scope.members):

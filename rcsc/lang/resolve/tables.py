@@ -69,7 +69,7 @@ def table(scope: Scope, written: tree.TableDecl, sources: Sources) -> Table:
 
 
 def _subject(scope: Scope, heading: tree.Heading) -> Typed | None:
-    """What the lines of a column are about; None under `when`, and after an error."""
+    """Resolve the subject of a column; None under `when`, and after an error."""
     if heading.subject is None:
         return None
     scope.cell = heading.span
@@ -96,7 +96,7 @@ class _Cells:
         self.resolved: dict[tuple[int, int], list[tuple[str, Statement]]] = {}
 
     def _place(self, heading: tree.Heading) -> tuple[Path, Span] | None:
-        """Where a column of values assigns; None for a column of actions, and after an error."""
+        """Resolve the target of a column of values; None for actions, and after an error."""
         if heading.subject is None:
             return None
         self.scope.cell = heading.span

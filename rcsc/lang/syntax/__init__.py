@@ -16,7 +16,7 @@ True
 
 A text that is wrong is diagnostics, never an exception, and reading goes on after the declaration that is wrong:
 
->>> [one.code.value for one in parse(Source("a.rcs", "const = 3\nconst = 4\n"))]
+>>> [diagnostic.code.value for diagnostic in parse(Source("a.rcs", "const = 3\nconst = 4\n"))]
 ['RCS101', 'RCS101']
 
 Trusted: the grammar and `build`, for what a text says. Lark makes the tables of the grammar once; `lalr` runs them in

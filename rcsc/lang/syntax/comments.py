@@ -26,7 +26,7 @@ class Comments:
         return bisect_right(self._starts, offset)
 
     def take(self, start: int) -> tuple[str, ...]:
-        """What stands before offset `start`, or after it on the same line."""
+        """Take comments before offset `start`, or after it on the same line."""
         line = self._line(start)
         count = 0
         while count < len(self._waiting):
@@ -39,7 +39,7 @@ class Comments:
         return tuple(text for _, text in taken)
 
     def rest(self) -> tuple[str, ...]:
-        """What nobody took."""
+        """Take those left."""
         return self.take(1 << 62)
 
 

@@ -111,7 +111,7 @@ class _Pieces:
 
 
 def _syntax_error(error: lark.UnexpectedInput, file: str, start: int, end: int, text: str) -> Diagnostic:
-    """What stands there and what was expected; `start` is where the parsed text begins in the file."""
+    """Describe what stands there and what was expected; the parsed text begins at `start` of the file."""
     at = cast("int | None", error.pos_in_stream) or 0
     position, word = start + at, ""
     wanted: set[str] = set()

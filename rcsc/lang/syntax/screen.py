@@ -73,7 +73,7 @@ def blank_before(text: str, offset: int) -> str:
 
 
 def next_declaration(text: str, after: int, begun: int) -> int:
-    """Where the next declaration begins after an error; the length of the text if nowhere."""
+    """Find the next declaration after an error; the length of the text if there is none."""
     match = _DECLARATION.search(text, max(after, begun) + 1)
     return match.start() if match else len(text)
 

@@ -290,7 +290,7 @@ MOST_WRITTEN_OUT = 4096
 
 
 def _written_out(condition: Expr) -> int:
-    """How many atoms a condition has with negations pushed into them: twice as many at each `xor` and each equality of truths."""
+    """Count a condition's atoms in negation normal form: each `xor` and each equality of truths doubles them."""
     match condition:
         case Apply(op=Op.NOT, args=(part,)):
             return _written_out(part)

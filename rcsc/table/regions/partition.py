@@ -20,7 +20,7 @@ from rcsc.lang.model import Box
 MOST_PAIRS = 10_000
 """Overlapping pairs that are told apart; a report shows a few."""
 BUDGET = 5_000_000
-"""Of a search for gaps: lines, pairs and slices looked at, which is the same on every machine."""
+"""Budget of a search for gaps: lines, pairs and slices looked at, the same on every machine."""
 MANY = 64
 """Above so many lines a certificate leaves the parting axis of each pair to the checker."""
 
@@ -83,7 +83,7 @@ class Boxes(Generic[Axis]):
                 yield at, others
 
     def _by_box(self) -> dict[Axis, dict[Box, int]]:
-        """For each axis its distinct boxes, with the lines that state them as bytes, then integers."""
+        """Map each axis to its distinct boxes, each with the mask of lines that state it."""
         width = len(self.lines) // 8 + 1
         stated: dict[Axis, dict[Box, bytearray]] = {name: {} for name in self.extents}
         for at, boxes in enumerate(self.lines):
@@ -98,7 +98,7 @@ class Boxes(Generic[Axis]):
         }
 
     def _meetings(self, name: Axis, stated: Mapping[Box, int]) -> Iterator[tuple[Box, int]]:
-        """For each box on the axis the lines that it can meet, those that do not test it among them."""
+        """Yield each box on the axis with the mask of lines that it can meet, or that do not test it."""
         everyone = (1 << len(self.lines)) - 1
         idle = everyone & ~_any(stated.values())
         if all(len(box) == 1 for box in stated):
@@ -168,7 +168,7 @@ class Gaps(Generic[Axis]):
         return cls(table, counting.pieces, counting.exact)
 
     def missing(self) -> int:
-        """How many inputs no line matches, where the count is exact; else as many or fewer."""
+        """Count the inputs that no line matches; an upper bound where the count is not exact."""
         filled = sum(piece.sign * piece.sizes[0] for piece in self.pieces)
         return self.table.volume() - filled
 
@@ -257,7 +257,7 @@ class Gaps(Generic[Axis]):
 
 
 class Counting(Generic[Axis]):
-    """What lines fill together, by inclusion and exclusion (`Gaps`).
+    """Size of what lines fill together, by inclusion and exclusion (`Gaps`).
 
     Attributes:
         pieces: Boxes with signs, whose sizes add up to it.
@@ -295,7 +295,7 @@ class Counting(Generic[Axis]):
         return True
 
     def _alone(self, at: int) -> Iterator[tuple[Piece[Axis], int]]:
-        """What the line adds to those that were counted beside the lines apart."""
+        """Yield the terms that the line adds to those counted."""
         yield self.table.piece(1, self.lines[at]), self._near[at] & self._apart
         for piece, near in self._added:
             both = common(piece.box, self.lines[at])
@@ -304,7 +304,7 @@ class Counting(Generic[Axis]):
 
 
 def parting(lines: Sequence[BoxLine[Axis]]) -> tuple[Axis, ...] | None:
-    """For each pair of disjoint lines, first with second and on, an axis that parts them.
+    """Return, for each pair of disjoint lines in order, an axis that parts them.
 
     None where there are more than `MANY` lines: then a checker looks for it.
     """
@@ -379,7 +379,7 @@ def _any(masks: Iterable[int]) -> int:
 
 
 def _intervals_meeting(stated: Mapping[Box, int], idle: int) -> Iterator[tuple[Box, int]]:
-    """For each single interval the lines whose intervals it meets: those that neither end before it nor begin after it."""
+    """Yield each interval with the lines whose intervals meet it: that neither end before it nor begin after it."""
     lows = sorted({box[0][0] for box in stated})
     highs = sorted({box[0][1] for box in stated})
     begin, end = dict.fromkeys(lows, 0), dict.fromkeys(highs, 0)

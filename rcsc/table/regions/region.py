@@ -126,7 +126,7 @@ class Search:
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """What is left of a line's (an assumption's) conditions in a region; nothing: it holds."""
+    """Conditions of a line (or assumption) that a region leaves open; it holds if there are none."""
 
     index: int
     boxes: Mapping[int, Box]
@@ -138,7 +138,7 @@ class Candidate:
         return not self.boxes and not self.rest
 
     def within(self, form: int, low: int, high: int) -> "Candidate | None":
-        """What is left once `form` is in `low .. high`; None when it cannot hold."""
+        """Restrict `form` to `low .. high`; None when it cannot hold then."""
         box = self.boxes.get(form)
         if box is None and not self.rest:
             return self
