@@ -24,12 +24,12 @@ and still checked in every cycle.
 
 Nothing is emitted that was not proved: `lower` takes what only the prover makes. The same program gives the same
 bytes on every machine: no time, version or absolute path is in them. Trusted: all of it, for what the executors do;
-`rcsc test` holds them against the interpreter, and with `--deep` has the C proved.
+`rcsc test` compares them with the interpreter, and with `--deep` has the C proved.
 
 Modules, in the order the data flows: `lower` makes a `plan`; `identifiers` spells every name; `code_tree` is a small tree
 of code, which C and Python share, and its spelling in each; `translate` and `ctext` make it of expressions and statements,
 `c99` and `python` of whole files, by the templates of `rendering`; `symbols` makes the symbol file; `generated` writes
-them or says whether they are fresh. `TARGETS` names the languages: another one is a module, and its line here.
+them or says whether they are fresh. `TARGETS` names the languages: a new one is a module and its line here.
 """
 
 from collections.abc import Callable, Collection, Iterable, Mapping

@@ -1,4 +1,4 @@
-"""Expressions and statements as a tree of code: what both languages say alike, and Python, whose integers are exact."""
+"""Expressions and statements as a tree of code: what both languages share, and Python, whose integers are exact."""
 
 import math
 from abc import ABC, abstractmethod

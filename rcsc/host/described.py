@@ -1,7 +1,7 @@
 """TOML files that describe something: read whole, checked against what may stand there, every fault with its line.
 
 In: a file, and a `Kind` that says what it may hold. Out: a `Document`, whose `faults` are all that is wrong; `BadFile` carries them on
-as diagnostics. `tomllib` says what the file means but not where; the places are found by a scan of their own, which takes for
+as diagnostics. `tomllib` says what the file means but not where; a second scan finds the places, and takes for
 granted that the text is TOML. Source: TOML 1.0.0 (toml.io), of which only the structure is scanned.
 """
 

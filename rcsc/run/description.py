@@ -28,7 +28,7 @@ from rcsc.host.described import (
     read_document,
 )
 from rcsc.host.files.names import BadName, is_member, member, within
-from rcsc.host.files.read import Said
+from rcsc.host.files.read import CheckedFields
 from rcsc.lang.project import project_root
 
 
@@ -145,14 +145,14 @@ def _described(path: Path, document: Document, generated: Path, data: Path) -> D
         generated,
         data if data != path.resolve() else data.with_name(NO_DATA),  # older descriptions name themselves
         content["tick_ms"],
-        tuple(level_of(Said(level)) for level in content["level"]),
+        tuple(level_of(CheckedFields(level)) for level in content["level"]),
         tuple(Wire(a, b) for a, b in content["buffers"].items()),
         {name: tuple(shown) for name, shown in content.get("displays", {}).items()},
         document,
     )
 
 
-def level_of(entry: Said) -> LevelSpec:
+def level_of(entry: CheckedFields) -> LevelSpec:
     """Return a level of a description, or of a log's copy of one.
 
     Raises:

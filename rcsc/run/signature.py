@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from rcsc.host.files.names import BadName, identifier, inside, shown
-from rcsc.host.files.read import MIB, Malformed, Said, json_of, text
+from rcsc.host.files.read import MIB, CheckedFields, Malformed, json_of, text
 from rcsc.run.description import BadDescription
 
 Value: TypeAlias = bool | int | float
@@ -246,8 +246,8 @@ def signature(path: Path) -> Signature:
 
 
 @lru_cache(maxsize=16)  # to assemble a system reads each symbol file several times
-def _parsed(symbols: str) -> Said:
-    return Said(json_of(symbols))
+def _parsed(symbols: str) -> CheckedFields:
+    return CheckedFields(json_of(symbols))
 
 
 @lru_cache(maxsize=16)
@@ -255,7 +255,7 @@ def _signature(symbols: str) -> Signature:
     return signature_of(_parsed(symbols))
 
 
-def signature_of(symbols: Said) -> Signature:
+def signature_of(symbols: CheckedFields) -> Signature:
     """Return the signature that a symbol file, or a log's copy of one, holds.
 
     The functions it names are the program's own: their names begin with its name.
@@ -297,7 +297,7 @@ def _own(name: str, begins: str, rest: str) -> str:
     return name
 
 
-def _leaf(entry: Said) -> Leaf:
+def _leaf(entry: CheckedFields) -> Leaf:
     members, c_type, initial = (
         entry.names("members", ()),
         entry.one_of("c_type", tuple(FORMATS)),
@@ -334,12 +334,12 @@ def _fits(c_type: str, value: object) -> bool:
     return True
 
 
-def _tables(symbols: Said) -> tuple[dict[str, tuple[str, ...]], dict[str, tuple[str, ...]]]:
+def _tables(symbols: CheckedFields) -> tuple[dict[str, tuple[str, ...]], dict[str, tuple[str, ...]]]:
     """Return the lines of each table, and what stops it; a symbol file lists tables, a log keeps two mappings."""
     if isinstance(symbols.value.get("tables"), dict):
         lines, stops = (
             symbols.table("tables"),
-            symbols.table("stops") if "stops" in symbols.value else Said({}),
+            symbols.table("stops") if "stops" in symbols.value else CheckedFields({}),
         )
         return (
             {identifier(name, "table"): lines.lines(name) for name in lines.value},
@@ -352,7 +352,7 @@ def _tables(symbols: Said) -> tuple[dict[str, tuple[str, ...]], dict[str, tuple[
     )
 
 
-def _level(entry: Said, program: str, index: Mapping[str, int]) -> LevelSign:
+def _level(entry: CheckedFields, program: str, index: Mapping[str, int]) -> LevelSign:
     by, tables = entry.text("by", ""), {}
     if "tables" in entry.value:
         named = entry.table("tables")

@@ -1,7 +1,7 @@
 """The generated-code test suite of `rcsc test`.
 
-In: a program and the code generated from it. Out: figures and diagnostics. The executors are held against the
-interpreter and against a second, independent C (the *reference*, a plain scan of the lines): line, fault, failed
+In: a program and the code generated from it. Out: figures and diagnostics. The executors are compared with the
+interpreter and with a second, independent C (the *reference*, a plain scan of the lines): line, fault, failed
 assumptions and the whole state have to be the same. Inputs lean on edges: every constant that a leaf is compared
 with, its neighbours, and the ends of its range. So a few keys see every boundary:
 

@@ -1,8 +1,8 @@
 """Mutants of the emitted C: bits of the masks, constants, operators; each must be noticed or be equivalent.
 
 In: a program, its emitted C, the sessions that its executors agreed on. Out: for each mutant who noticed it.
-What is a number of a mask or of a class table is decided by the complete check of the matcher, without a run:
-it is noticed, or no input can tell. Any other mutant runs in a process of its own on all the sessions; one that
+A number of a mask or of a class table is decided by the complete check of the matcher, without a run:
+the mutant is noticed, or no input can tell. Any other mutant runs in a process of its own on all the sessions; one that
 leaves the same behind is decided by the check of the matcher where it is in one, else by ESBMC, which proves it
 equal to the reference for all inputs (equivalent) or refutes it. What neither decides is undecided: that is a
 figure, no fault of the C.

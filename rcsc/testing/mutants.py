@@ -3,7 +3,7 @@
 In: a program, a table of it and the prover (a function passed in). Out: for each mutant how it was caught.
 A mutant is caught by the prover (a finding that the table did not have, or another region left to
 DEFAULT), or it is another table of which exactly one line matches too: then either it is shown to mean the
-same for every input, or a snapshot is found on which the executors of the table and the mutant part.
+same for every input, or a snapshot tells the executors of the table and the mutant apart.
 """
 
 from collections.abc import Callable, Iterator, Sequence

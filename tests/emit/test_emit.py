@@ -26,7 +26,7 @@ from rcsc.diagnostics.codes import Code
 from rcsc.emit.generated import write
 from rcsc.emit.identifiers import C_WORDS, PYTHON_WORDS, comment
 from rcsc.emit.rendering import environment
-from rcsc.host.files.read import Said, json_of
+from rcsc.host.files.read import CheckedFields, json_of
 from rcsc.host.tools import Absent
 from rcsc.lang import reserved
 from rcsc.lang.interpret import Fault, initial, run_table
@@ -530,7 +530,7 @@ def test_a_symbol_file_is_read_back_or_none_is_made(said: str, more: int, long: 
         assert long >= 990 or not said.isprintable()
         return
     [made] = [text for name, text in emitted(program).items() if name.endswith(".json")]
-    read = signature_of(Said(json_of(made)))
+    read = signature_of(CheckedFields(json_of(made)))
     assert [leaf.name for leaf in read.leaves] == [str(variable.name) for variable in program.variables]
 
 

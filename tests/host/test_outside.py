@@ -29,7 +29,7 @@ from rcsc.graph.drawing import svg
 from rcsc.graph.formats.state_graph import Edge, StateGraph
 from rcsc.host.files import csv_text
 from rcsc.host.files.names import BadName, identifier, inside, within
-from rcsc.host.files.read import Malformed, Said, content, json_of, toml_of, xml_of
+from rcsc.host.files.read import CheckedFields, Malformed, content, json_of, toml_of, xml_of
 from rcsc.run.description import BadDescription, description
 from rcsc.run.log.read import UnreadableLog, read
 from rcsc.run.log.recorder import Recorder
@@ -718,7 +718,7 @@ def test_an_enumeration_has_no_more_members_than_its_type_tells_apart(project: P
 def test_a_field_is_matched_to_its_end() -> None:
     for text in ("b\n", "\nb", "b "):
         with pytest.raises(Malformed):
-            Said({"a": text}).name("a")
+            CheckedFields({"a": text}).name("a")
 
 
 # --- written whole or not at all -----------------------------------------------------------------

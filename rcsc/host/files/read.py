@@ -271,7 +271,7 @@ _REQUIRED: Any = object()
 
 
 @dataclass(frozen=True, slots=True)
-class Said:
+class CheckedFields:
     """A table of outside data; each method returns a field, checked to be what its name says.
 
     Attributes:
@@ -370,22 +370,22 @@ class Said:
         """
         return self._each(key, member, _REQUIRED)
 
-    def each(self, key: str, most: int, default: Sequence[object] = _REQUIRED) -> "Iterator[Said]":
+    def each(self, key: str, most: int, default: Sequence[object] = _REQUIRED) -> "Iterator[CheckedFields]":
         """Give each table of a list.
 
         Raises:
             Malformed: It is no list of tables, has more than `most`, or is missing.
         """
         for at, item in enumerate(self._list(key, most, default)):
-            yield Said(item, f"{self._at(key)}[{at}]")
+            yield CheckedFields(item, f"{self._at(key)}[{at}]")
 
-    def table(self, key: str) -> "Said":
+    def table(self, key: str) -> "CheckedFields":
         """Return a table in it.
 
         Raises:
             Malformed: It is none, or missing.
         """
-        return Said(self._get(key, _REQUIRED), self._at(key))
+        return CheckedFields(self._get(key, _REQUIRED), self._at(key))
 
     def _each(self, key: str, check: Any, default: Sequence[str]) -> tuple[str, ...]:
         items = self._list(key, 1_000_000, default)

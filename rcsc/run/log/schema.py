@@ -13,7 +13,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from rcsc.host.files.names import file_name
-from rcsc.host.files.read import Said, content, json_of
+from rcsc.host.files.read import CheckedFields, content, json_of
 from rcsc.run.adopt import Begun
 from rcsc.run.description import LONGEST_MS, MOST_LEVELS, Description, Wire, level_of, wire_of
 from rcsc.run.signature import FORMATS, Leaf, Signature, generated_files, signature_of
@@ -95,7 +95,7 @@ def signature_from(text: str) -> Signature:
     Raises:
         Malformed: It is none.
     """
-    return signature_of(Said(json_of(text), "signature"))
+    return signature_of(CheckedFields(json_of(text), "signature"))
 
 
 def system_facts(system: Description) -> dict[str, str]:
@@ -117,9 +117,11 @@ def system_of(facts: Mapping[str, str], generated: Path, database: Path) -> Desc
     """
     if facts["format"] != FORMAT:
         raise ValueError(f"format {facts['format']}, not {FORMAT}")
-    levels = tuple(map(level_of, Said({"levels": json_of(facts["levels"])}).each("levels", MOST_LEVELS)))
+    levels = tuple(
+        map(level_of, CheckedFields({"levels": json_of(facts["levels"])}).each("levels", MOST_LEVELS))
+    )
     wires = tuple(wire_of(source, target) for source, target in json_of(facts["wires"]))
-    tick_ms = Said({"tick_ms": int(facts["tick_ms"])}).whole("tick_ms", 1, LONGEST_MS)
+    tick_ms = CheckedFields({"tick_ms": int(facts["tick_ms"])}).whole("tick_ms", 1, LONGEST_MS)
     return Description(file_name(facts["name"], "name"), generated, database, tick_ms, levels, wires)
 
 

@@ -1,8 +1,8 @@
-"""What the suite runs: the emitted executors and the reference, after one interface.
+"""What the suite runs: the emitted executors and the reference, through one interface.
 
-A *session* is a run of cycles: inputs, states put in, steps of single tables. What is seen of it is one record a
-cycle, in words that all executors share, so that two executors agree when their records are equal. Equality is that
-of the bits, but that any NaN equals any NaN (`equality`):
+A *session* is a run of cycles: inputs, states put in, steps of single tables. Its outcome is a record a
+cycle, in words that all executors share: two executors agree when their records are equal. Values are
+equal when their bits are, and any NaN equals any NaN (`equality`):
 
 >>> from rcsc.testing.executors.equality import same_value
 >>> (same_value(0.0, -0.0), same_value(float("nan"), float("nan")), same_value(1, 1))

@@ -1,4 +1,4 @@
-"""What the executors are run on.
+"""The inputs on which the executors run.
 
 Inputs are drawn by seed and lean on edges, or are looked for: an *MC/DC vector* is a pair of inputs that differ in
 the outcome of one condition of a line and in whether the line matches, which shows that the condition matters. The
@@ -13,8 +13,7 @@ writes them for other test benches, each with the line, the condition in words, 
 >>> "MC/DC" in vectors.__doc__
 True
 
-Nothing here is trusted: an input that leads nowhere costs a test, and what no vector was found for is a figure of the
-report.
+Nothing here is trusted: an input that leads nowhere costs a test, and the report counts what has no vector.
 
 Modules, in the order the data flows: `snapshot` finds an input in which conditions hold or fail, `vectors` makes
 MC/DC vectors of them (`condition_text` words their conditions, `export` writes them for users), `sampling` draws inputs by
