@@ -8,11 +8,11 @@ Example. A level has the flags `busy` and `asked`, at first both false. A cycle 
 (input `done`). To be shown: `busy` implies `asked` after every cycle. PDR asks for a cycle that breaks this, and gets one from the state
 `busy, not asked`. That state is a cube. No first cycle ends in it, for first cycles end with both flags or none; no cycle from outside
 leads into it. Without `asked = false` the cube would be `busy`, where a first cycle with `go` ends; without `busy = true` it would be
-`not asked`, where one without `go` ends: so nothing can be left out. The clause is "never `busy` and not `asked`"; every cycle keeps it,
+`not asked`, where one without `go` ends. So nothing can be left out. The clause is "never `busy` and not `asked`"; every cycle keeps it,
 and the obligation follows from it. It is the invariant.
 
 Trusted: `confirm`, which asks Z3 whether the clauses are an invariant, in terms (`symbolic.keyed`) that the search does not use. Not
-trusted: `cubes`, `pdr`, `search`, and the SAT solver below them: what they get wrong is not confirmed.
+trusted: `cubes`, `pdr`, `search`, and their SAT solver: a wrong result of theirs is not confirmed.
 
 Cost: a question to an incremental SAT solver for each cube and each predicate in it. Predicates come in two rounds, the second only for
 what the first leaves open. Confirmation is one question to Z3 for each table, and one for each way to begin.

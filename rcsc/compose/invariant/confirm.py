@@ -1,7 +1,7 @@
-"""What a search found, asked anew of Z3: whether clauses are an invariant, and whether obligations follow from them.
+"""Confirms with Z3 what a search found: that clauses are an invariant, and that obligations follow from them.
 
 In: predicates, the cycles with which a level begins, a cycle from any state, clauses. Out: questions, each of which has to be
-answered *unsatisfiable*; they are also the certificate. Nothing of the search is used: other terms (`keyed`), another solver.
+answered *unsatisfiable*; they are also the certificate. Terms (`keyed`) and solver are not those of the search.
 """
 
 from collections.abc import Sequence
@@ -23,10 +23,10 @@ class Confirmation:
     """The questions of one level.
 
     Attributes:
-        firsts: The first cycle, from the initial values; and that after a restart.
+        firsts: The first cycle, from the initial values, and the one after a restart.
         cycle: Any later one.
-        cases: Conditions on a cycle, of which at least one holds; each is asked apart, which is quicker.
-        rested_on: Solvers whose refutations something rests on besides the obligations: part of the certificate.
+        cases: Conditions on a cycle, of which at least one holds; one query each is quicker than one for all.
+        rested_on: Solvers whose refutations other results rest on; part of the certificate.
     """
 
     predicates: tuple[Predicate, ...]
@@ -64,20 +64,20 @@ class Confirmation:
         return self._nodes[after, at]
 
     def broken(self, clause: Clause, *, after: bool) -> Term:
-        """Return the term that the clause's combination stands."""
+        """Return the term that the clause is broken."""
         key = after, clause
         if key not in self._kept:
             self._kept[key] = smt.all_of([self.literal(at, value, after=after) for at, value in clause])
         return self._kept[key]
 
     def _held(self, clause: Clause) -> Term:
-        """Return the term that the combination does not stand before the cycle."""
+        """Return the term that the clause holds before the cycle."""
         if clause not in self._denied:
             self._denied[clause] = smt.negation(self.broken(clause, after=False))
         return self._denied[clause]
 
     def known(self, clauses: Sequence[Clause]) -> Solver:
-        """Return a solver in which one cycle starts where the clauses hold."""
+        """Return a solver with one cycle that starts where the clauses hold."""
         held = [self._held(clause) for clause in clauses]
         for at in range(len(self.predicates)):
             self.keyed.term(self.node(at, after=True))
@@ -102,7 +102,7 @@ class Confirmation:
         return solver
 
     def first_question(self, clauses: Sequence[Clause], first: Cycle) -> Solver:
-        """Ask whether a first cycle leads to where a clause is broken: unsatisfiable if the clauses are an invariant."""
+        """Ask whether a first cycle ends where a clause is broken: unsatisfiable if the clauses are an invariant."""
         nodes = [predicate.node(first.after) for predicate in self.predicates]
         equal = [self.keyed.equal(self._end(at), node) for at, node in enumerate(nodes)]
         solver = self.beginning(first)
@@ -110,7 +110,7 @@ class Confirmation:
         return solver
 
     def beginning(self, first: Cycle) -> Solver:
-        """Return a solver in which a first cycle runs."""
+        """Return a solver with one first cycle."""
         contract = self.keyed.term(first.contract)
         solver = Solver(self.limits)
         solver.add(*self.keyed.ranges, contract)
@@ -134,14 +134,14 @@ class Confirmation:
 
 
 def answer(solver: Solver, *terms: Term) -> Answer:
-    """Ask whether the terms can hold together with all that the solver knows, which does not learn them."""
+    """Ask whether the terms can hold with all that the solver knows, without adding them to it."""
     solver.push()
     solver.add(*terms)
-    found = solver.check()
+    reply = solver.check()
     solver.pop()
-    return found
+    return reply
 
 
 def may(solver: Solver, *terms: Term) -> bool:
-    """Return whether it is not refuted that the terms hold together."""
+    """Return whether the solver does not refute the terms."""
     return answer(solver, *terms) is not Answer.UNSATISFIABLE

@@ -1,7 +1,7 @@
-"""Combinations of values of predicates: what a clause of an invariant forbids, and which of them known states show.
+"""Cubes, combinations of predicates' values that clauses forbid, and known states in them.
 
-In: predicates and states (`predicates.point`). Out: `Cube`s, and answers about them. Of a predicate with many values a cube says which
-value it has, or, of all but a few, which values it has not: one clause then speaks of as many members as an enumeration may have.
+In: predicates and states (`predicates.point`). Out: `Cube`s, and answers about them. For a predicate with many values a cube names its
+value, or a few values that it does not have; so one clause can forbid many members of an enumeration.
 """
 
 from collections.abc import Iterable, Sequence
@@ -16,23 +16,27 @@ from rcsc.compose.contract.predicates import Predicate
 Valuation = tuple[int, ...]
 """A value for each predicate."""
 Pair = tuple[int, int]
-"""A predicate, by position, and its value; or `~value`, which is negative: that it has another."""
+"""A predicate's position and its value; or `~value`, which is negative, for any other value."""
 Cube = tuple[Pair, ...]
-"""What stands together, in order."""
+"""Pairs that hold together, in order."""
 
 
 def shown(chosen: Sequence[Predicate], clause: Cube) -> str:
     """Spell a combination in the tables' words."""
     by_predicate = groupby(clause, key=lambda pair: pair[0])
-    return " and ".join(_said(chosen[at], [value for _, value in pairs]) for at, pairs in by_predicate)
+    return " and ".join(_spelled(chosen[at], [value for _, value in pairs]) for at, pairs in by_predicate)
 
 
-def _said(one: Predicate, found: Sequence[int]) -> str:
+def _spelled(predicate: Predicate, values: Sequence[int]) -> str:
     """Spell one predicate's value, or the values that it has not."""
-    if found[0] >= 0:
-        return f"{one.name} = {one.shown(found[0])}"
-    others = [one.shown(~value) for value in reversed(found)]
-    return f"{one.name} /= {others[0]}" if len(others) == 1 else f"{one.name} is none of {', '.join(others)}"
+    if values[0] >= 0:
+        return f"{predicate.name} = {predicate.shown(values[0])}"
+    others = [predicate.shown(~value) for value in reversed(values)]
+    return (
+        f"{predicate.name} /= {others[0]}"
+        if len(others) == 1
+        else f"{predicate.name} is none of {', '.join(others)}"
+    )
 
 
 @dataclass(slots=True)
@@ -44,18 +48,18 @@ class Masks:
 
     @classmethod
     def of(cls, sizes: Iterable[int]) -> "Masks":
-        """Of predicates with so many values each."""
-        made, count = cls(), 0
+        """Return the masks of predicates of these sizes."""
+        masks, count = cls(), 0
         for at, size in enumerate(sizes):
             for value in range(size):
-                made._own[at, value] = 1 << (count + value)
-                made._own[at, ~value] = 1 << (count + size + value)
-            others = sum(made._own[at, ~value] for value in range(size))
+                masks._own[at, value] = 1 << (count + value)
+                masks._own[at, ~value] = 1 << (count + size + value)
+            others = sum(masks._own[at, ~value] for value in range(size))
             for value in range(size):
-                made._implied[at, value] = made._own[at, value] | others & ~made._own[at, ~value]
-                made._implied[at, ~value] = made._own[at, ~value]
+                masks._implied[at, value] = masks._own[at, value] | others & ~masks._own[at, ~value]
+                masks._implied[at, ~value] = masks._own[at, ~value]
             count += 2 * size
-        return made
+        return masks
 
     def of_cube(self, cube: Cube) -> int:
         """Return the bits of the cube's pairs."""
@@ -63,27 +67,27 @@ class Masks:
 
     def implied(self, cube: Cube) -> int:
         """Return the bits of all pairs that follow from the cube: one value excludes the others."""
-        found = 0
+        bits = 0
         for pair in cube:
-            found |= self._implied[pair]
-        return found
+            bits |= self._implied[pair]
+        return bits
 
 
 @dataclass(slots=True)
 class Reached:
-    """States known to be reached, to answer at once that one of them cannot be excluded."""
+    """States known to be reached: a cube that contains one cannot be excluded."""
 
     _points: npt.NDArray[np.int32]
 
     @classmethod
     def of(cls, points: Iterable[Valuation], width: int) -> "Reached":
-        """Of these; `width` predicates each."""
+        """Hold these states, of `width` predicates each."""
         every = list(points)
         return cls(np.array(every, dtype=np.int32).reshape(len(every), width))
 
     @property
     def many(self) -> int:
-        """How many there are."""
+        """How many states there are."""
         return len(self._points)
 
     def add(self, point: Valuation) -> None:

@@ -1,19 +1,19 @@
-"""Inductive invariants found backwards from what is to be proved: clauses over the predicates of a level.
+"""Property directed reachability: an inductive invariant as clauses over a level's predicates.
 
-In: predicates, the cycles with which a level begins, a cycle from any state, its obligations, and some states that are known to be
+In: predicates, the cycles with which a level begins, a cycle from any state, its obligations, and some states known to be
 reached. Out: clauses that hold after every first cycle, that every cycle keeps, and from which no cycle breaks an obligation; and the
 obligations for which the predicates do not suffice.
 
 How: *frame* i is a set of clauses that hold after every run of at most i cycles. A state of the last frame from which a cycle
 breaks an obligation has to be excluded: it is asked whether a first cycle, or a cycle from the frame before, leads to it; if one does,
 that state is to be excluded first. If none does, the state is generalised, predicate by predicate, as long as that stays true: a
-predicate is left out, or, if it has many values, all but a few of them are excluded with the one, so that clauses do not grow in
-number with the members of an enumeration. A clause is added. When every clause of a frame holds in the next one, they are an
+predicate is left out, or, if it has many values, all but a few of them are excluded together, so that an enumeration of many
+members does not need as many clauses. A clause is added. When every clause of a frame holds in the next one, they are an
 invariant. This is property directed reachability (Bradley, "SAT-based model checking without unrolling", 2011; Een, Mishchenko
 and Brayton, "Efficient implementation of property directed reachability", 2011) on states as the predicates show them, without
 making that abstraction (Cimatti, Griggio, Mover and Tonetta, "IC3 modulo theories via implicit predicate abstraction", 2014).
 
-An obligation that is reached so is not proved; it need not be false, since two states that the predicates do not tell apart are one here.
+An obligation that is reached so is not proved. It need not be false: states with equal predicates are one state here.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -29,11 +29,11 @@ from rcsc.symbolic.bits import Bits, Literal, Word, key_of_bits
 from rcsc.symbolic.values import Node
 
 Clause = Cube
-"""What never stands together."""
+"""A cube that never holds."""
 MANY = 2
-"""Of a predicate with more values a clause may name those that are allowed, and so forbid all others at once."""
+"""For a predicate with more values, a clause may name those allowed, and so forbid all others at once."""
 TRIES = 8
-"""How often it is asked, each time with one more value allowed, before a clause forbids a single one after all."""
+"""How often a clause is tried, each time with one more value allowed, before it forbids a single one."""
 
 
 class Posed:
@@ -41,7 +41,7 @@ class Posed:
 
     Attributes:
         sizes: How many values each predicate has.
-        before: By predicate and value, had or not; likewise `after`.
+        before: The literal of each pair before the cycle; likewise `after`.
         holds: The literal of each obligation, by its position.
     """
 
@@ -64,12 +64,12 @@ class Posed:
 
     @staticmethod
     def _values(bits: Bits, predicates: Sequence[Predicate], words: Sequence[Word]) -> dict[Pair, Literal]:
-        found = {
-            (at, value): bits.equals(word, one.kind, value)
-            for at, (one, word) in enumerate(zip(predicates, words, strict=True))
-            for value in range(one.size)
+        literals = {
+            (at, value): bits.equals(word, predicate.kind, value)
+            for at, (predicate, word) in enumerate(zip(predicates, words, strict=True))
+            for value in range(predicate.size)
         }
-        return found | {(at, ~value): -literal for (at, value), literal in found.items()}
+        return literals | {(at, ~value): -literal for (at, value), literal in literals.items()}
 
     def fresh(self) -> Literal:
         """Return an unused literal."""
@@ -99,7 +99,7 @@ class PDR:
     Attributes:
         firsts: The cycles with which it begins.
         step: Any later one.
-        weights: Of the predicates; those of small weight are left out of a clause first.
+        weights: The predicates' weights; a clause leaves out those of small weight first.
         known: Clauses that are an invariant already.
     """
 
@@ -122,7 +122,7 @@ class PDR:
         """Find an invariant, and the obligations that it does not prove.
 
         Args:
-            wanted: The obligations looked at, by position.
+            wanted: The obligations to prove, by position.
 
         Raises:
             GaveUpError: The solver did.
@@ -145,7 +145,7 @@ class PDR:
     # --- obligations ---
 
     def _begin(self, obligations: set[int]) -> None:
-        """Leave the obligations open that a first cycle breaks."""
+        """Leave open the obligations that a first cycle breaks."""
         for at in sorted(obligations):
             if any(first.sat.holds([-first.holds[at]]) for first in self.firsts):
                 self._leave(obligations, [at])
@@ -170,7 +170,7 @@ class PDR:
                 self._leave(obligations, broken)
 
     def _block(self, point: Valuation, last: int) -> bool:
-        """Exclude a state from a frame after all that leads to it; return False where it is reachable."""
+        """Exclude a state from a frame after all that leads to it; return False if it is reachable."""
         waiting = [(last, 0, point)]
         count = 0
         while waiting:
@@ -183,13 +183,13 @@ class PDR:
                 continue
             if self._not_first(cube) is None:
                 return False
-            found = self._inductive(cube, level)
-            if found is None:
+            inductive = self._inductive(cube, level)
+            if inductive is None:
                 count -= 1
                 heappush(waiting, (level - 1, count, self.step.start()))
                 continue
             heappop(waiting)
-            highest = self._add(self._general(found, level), level)
+            highest = self._add(self._general(inductive, level), level)
             if highest < len(self._frames) - 1:
                 heappush(waiting, (highest + 1, count, now))
         return True
@@ -200,23 +200,23 @@ class PDR:
     # --- generalisation ---
 
     def _not_first(self, cube: Cube) -> set[Pair] | None:
-        """Return pairs of the cube with which no first cycle ends; None where one ends with all of them."""
+        """Return pairs of the cube with which no first cycle ends; None if one ends with all of them."""
         kept: set[Pair] = set()
         implied = self._masks.implied(cube)
         for first, cores in zip(self.firsts, self._cores, strict=True):
-            found = next((core for mask, core in cores if mask & implied == mask), None)
-            if found is None:
+            excluded = next((core for mask, core in cores if mask & implied == mask), None)
+            if excluded is None:
                 if first.sat.holds([first.after[pair] for pair in cube]):
                     self.reached.add(first.end())
                     return None
                 core = first.sat.core()
-                found = tuple(pair for pair in cube if first.after[pair] in core)
-                cores.append((self._masks.of_cube(found), found))
-            kept |= set(found)
+                excluded = tuple(pair for pair in cube if first.after[pair] in core)
+                cores.append((self._masks.of_cube(excluded), excluded))
+            kept |= set(excluded)
         return kept
 
     def _not_next(self, cube: Cube, level: int) -> set[Pair] | None:
-        """Return pairs of the cube to which no cycle leads from outside the cube in the frame; None where one leads to all."""
+        """Return pairs of the cube to which no cycle leads from the frame outside the cube; None if one leads to all."""
         if level == 0:
             return set()
         step, switch = self.step, self.step.fresh()
@@ -229,7 +229,7 @@ class PDR:
         return {pair for pair in cube if step.after[pair] in core}
 
     def _inductive(self, cube: Cube, level: int) -> Cube | None:
-        """Return pairs of the cube that no run of at most `level` cycles ends with; None where one may end with all."""
+        """Return pairs of the cube with which no run of at most `level` cycles ends; None if one may end with all."""
         if self.reached.shows(cube):
             return None
         kept = self._not_first(cube)
@@ -241,7 +241,7 @@ class PDR:
     def _general(self, cube: Cube, level: int) -> Cube:
         """Generalise the cube: drop pairs, then widen those that are left."""
         for pair in self._in_order(cube):
-            less = tuple(one for one in cube if one != pair)
+            less = tuple(other for other in cube if other != pair)
             if pair in cube and less:
                 cube = self._inductive(less, level) or cube
         for pair in self._in_order(cube):
@@ -250,9 +250,9 @@ class PDR:
         return cube
 
     def _wider(self, cube: Cube, pair: Pair, level: int) -> Cube | None:
-        """Replace a predicate's value in the cube by all but its allowed ones; None where those are too many."""
+        """Replace a predicate's value in the cube by all but its allowed ones; None if those are too many."""
         at = pair[0]
-        others = tuple(one for one in cube if one != pair)
+        others = tuple(other for other in cube if other != pair)
         allowed: set[int] = set()
         for _ in range(TRIES):
             allowed |= self.reached.values(others, at)
@@ -271,8 +271,8 @@ class PDR:
 
     def _less(self, cube: Cube, needed: set[Pair]) -> Cube:
         """Keep the needed pairs of the cube, unless they contain a known state."""
-        found = tuple(sorted(needed))
-        return cube if not found or self.reached.shows(found) else found
+        smaller = tuple(sorted(needed))
+        return cube if not smaller or self.reached.shows(smaller) else smaller
 
     def _in_order(self, cube: Cube) -> list[Pair]:
         return sorted(cube, key=lambda pair: (self.weights[pair[0]], pair))
@@ -284,20 +284,20 @@ class PDR:
         self._held.append(self.step.fresh())
 
     def _add(self, cube: Cube, level: int) -> int:
-        """Add a clause to the last frame in which it can stand; return which."""
+        """Add a clause to the last frame in which it holds; return that frame."""
         while level < len(self._frames) - 1 and self._not_next(cube, level) is not None:
             level += 1
         mask = self._masks.of_cube(cube)
         for lower in range(1, level + 1):
             self._frames[lower] = [
-                one for one in self._frames[lower] if mask & self._masks.implied(one) != mask
+                other for other in self._frames[lower] if mask & self._masks.implied(other) != mask
             ]
         self._frames[level].append(cube)
         self.step.sat.add([-self._held[level], *(-self.step.before[pair] for pair in cube)])
         return level
 
     def _push(self) -> int | None:
-        """Move clauses up; return the frame that has none of its own left, if one has."""
+        """Move clauses up; return the first frame without clauses of its own, if any."""
         for level in range(1, len(self._frames) - 1):
             for cube in list(self._frames[level]):
                 if cube in self._frames[level] and self._kept(cube, level):

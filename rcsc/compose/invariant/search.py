@@ -1,4 +1,4 @@
-"""Looks for the invariant of a level: first with the predicates that most levels need, then, for what is left, with more.
+"""Searches the invariant of a level: first with the predicates that most levels need, then with more for what is left.
 
 In: a transition system, its cycles and obligations. Out: a `FoundInvariant`, to be trusted only once confirmed (`confirm`).
 """
@@ -20,13 +20,13 @@ from rcsc.solvers.smt import Limits
 from rcsc.symbolic.values import TRUE, Node
 
 LIMITS = Limits.of(80_000_000)
-"""A question about a cycle is larger than one about a table."""
+"""Larger than for a table: a question about a cycle is harder."""
 A_TABLE = 4
-"""Walks for each table, at least, so that there are some of every command: what walks show need not be asked."""
+"""The least number of walks for each table, so that some run each command; states seen on walks need no query."""
 BURST, ANEW = 20, 5
-"""Cycles between two states from which walks go on; one walk in so many begins anew."""
+"""The cycles of one walk; one walk in so many begins with the initial values."""
 LONGER = 4
-"""Walks are at most so many times longer than was asked where they still come to new lines."""
+"""There are at most so many times more walks than asked, while they still reach new lines."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,9 +34,9 @@ class Effort:
     """How much is spent on a search.
 
     Attributes:
-        walks: Random walks before the search, each of `cycles` cycles; more of them where there are many tables (`A_TABLE`).
+        walks: Random walks before the search, each of `cycles` cycles; more if there are many tables (`A_TABLE`).
         limits: For each question to Z3; past them the answer is *undecided*, never *proved*.
-        looks: Whether the lines are looked at in their context, too (`context`, `termination`).
+        looks: Whether to analyse lines in context and termination, too.
     """
 
     walks: int = 24
@@ -47,14 +47,14 @@ class Effort:
 
 @dataclass(frozen=True, slots=True)
 class FoundInvariant:
-    """What a search found: clauses, and what they do not prove.
+    """The invariant that a search found, and the obligations that it does not prove.
 
     Attributes:
-        predicates: What the clauses speak of.
-        clauses: The invariant: combinations that never stand.
-        open: Obligations that were searched for, by position, for which the predicates do not suffice.
+        predicates: The predicates in the clauses.
+        clauses: The invariant: cubes that never hold.
+        open: Obligations searched for, by position, for which the predicates do not suffice.
         walked: States seen on walks; `learnt`, those that the solver added.
-        ran: Tables and lines that ran on walks; `states`, what stood after their cycles.
+        ran: Tables and lines that ran on walks; `states`, the states after their cycles.
     """
 
     predicates: tuple[Predicate, ...] = ()
@@ -77,23 +77,23 @@ def search(
     matter = [at for at, obligation in enumerate(wanted) if _matters(ts, obligation)]
     reads = read(ts, cycle, wanted)
     states, ran = _walked(ts, effort)
-    found = FoundInvariant(open=frozenset(matter), states=states, ran=ran)
+    invariant = FoundInvariant(open=frozenset(matter), states=states, ran=ran)
     for closely in range(CLOSELY + 1):
         chosen = every_predicate(ts, cycle, reads, closely)
-        if closely and len(chosen) == len(found.predicates):
+        if closely and len(chosen) == len(invariant.predicates):
             break
-        left = sorted(found.open)
-        found = _with(chosen, ts, firsts, cycle, found, left)
-        if not any(wanted[at].sort is not Sort.NUMBERED for at in found.open):
+        left = sorted(invariant.open)
+        invariant = _with(chosen, ts, firsts, cycle, invariant, left)
+        if not any(wanted[at].sort is not Sort.NUMBERED for at in invariant.open):
             break
-    return found
+    return invariant
 
 
 def strengthened(
     ts: TransitionSystem,
     firsts: Sequence[Cycle],
     cycle: Cycle,
-    found: FoundInvariant,
+    invariant: FoundInvariant,
     wanted: Sequence[Node],
 ) -> FoundInvariant:
     """Add clauses from which as many as possible of these conditions on a later cycle follow.
@@ -101,11 +101,11 @@ def strengthened(
     Raises:
         GaveUpError: The solver did.
     """
-    chosen, every = found.predicates, range(len(wanted))
+    chosen, every = invariant.predicates, range(len(wanted))
     posed = [Posed(chosen, first, dict.fromkeys(every, TRUE)) for first in firsts]
     posed.append(Posed(chosen, cycle, dict(enumerate(wanted))))
-    made, _ = _searched(ts, chosen, posed, found, every)
-    return replace(made, open=found.open, walked=found.walked)
+    stronger, _ = _searched(ts, chosen, posed, invariant, every)
+    return replace(stronger, open=invariant.open, walked=invariant.walked)
 
 
 def _with(  # what a search is of
@@ -117,9 +117,9 @@ def _with(  # what a search is of
     left: Sequence[int],
 ) -> FoundInvariant:
     """Search once more, from the invariant known so far, for the obligations that are left."""
-    posed = [Posed(chosen, one, _conditions(ts, one, left)) for one in (*firsts, cycle)]
-    made, left_open = _searched(ts, chosen, posed, before, left)
-    return replace(made, open=frozenset(left_open))
+    posed = [Posed(chosen, each, _conditions(ts, each, left)) for each in (*firsts, cycle)]
+    invariant, left_open = _searched(ts, chosen, posed, before, left)
+    return replace(invariant, open=frozenset(left_open))
 
 
 def _searched(
@@ -133,15 +133,15 @@ def _searched(
     reached = Reached.of(walked, len(chosen))
     weights = [2 if predicate.parts else int(predicate.size > 2) for predicate in chosen]
     clauses, left_open = PDR(posed[:-1], posed[-1], reached, weights, before.clauses).search(left)
-    for one in posed:
-        one.sat.close()
+    for cycle in posed:
+        cycle.sat.close()
     learnt = before.learnt + reached.many - len(walked)
-    found = replace(before, predicates=chosen, clauses=tuple(clauses), walked=len(walked), learnt=learnt)
-    return found, left_open
+    invariant = replace(before, predicates=chosen, clauses=tuple(clauses), walked=len(walked), learnt=learnt)
+    return invariant, left_open
 
 
 def read(ts: TransitionSystem, cycle: Cycle, wanted: Sequence[Obligation]) -> list[Node]:
-    """Collect what is searched for and what may be relied on: predicates are chosen from its cone."""
+    """Collect the obligations searched for and the contract; predicates are chosen from their cone."""
     return [*(obligation.holds for obligation in wanted if _matters(ts, obligation)), cycle.contract]
 
 
@@ -152,7 +152,7 @@ def _conditions(ts: TransitionSystem, cycle: Cycle, left: Iterable[int]) -> dict
 
 
 def _matters(ts: TransitionSystem, obligation: Obligation) -> bool:
-    """Return whether to search for an obligation: not for a field that the level never compares, on which nobody may rely."""
+    """Return whether to search for an obligation: not for a field that the level never compares; nobody may rely on it."""
     if obligation.sort is not Sort.NUMBERED:
         return True
     return obligation.name.endswith(f".{COMMAND}") or any(
@@ -163,15 +163,15 @@ def _matters(ts: TransitionSystem, obligation: Obligation) -> bool:
 def _walked(
     ts: TransitionSystem, effort: Effort
 ) -> tuple[tuple[Mapping[str, Value], ...], frozenset[tuple[str, str]]]:
-    """Collect states that walks reach, and the lines that ran; none where assumptions are trusted, to which no walk keeps.
+    """Collect states that walks reach, and the lines that ran; none if assumptions are trusted, since walks do not keep to them.
 
-    Most walks go on from where one came to a line for the first time, as coverage guides a fuzzer (Zalewski, "american fuzzy lop",
-    2013): lines that only a long run of answers leads to are come to so.
+    Most walks continue from where one reached a line for the first time, as coverage guides a fuzzer (Zalewski, "american fuzzy
+    lop", 2013). So they reach lines that need a long run of answers.
     """
     if ts.trusted:
         return (), frozenset()
     random = Random(0)  # noqa: S311  # repeatable on purpose
-    found: dict[tuple[Value, ...], Mapping[str, Value]] = {}
+    states: dict[tuple[Value, ...], Mapping[str, Value]] = {}
     new: list[Mapping[str, Value]] = []
     ran: set[tuple[str, str]] = set()
     many = max(1, effort.walks, A_TABLE * len(ts.program.tables)) * effort.cycles // BURST
@@ -182,10 +182,10 @@ def _walked(
         if new and at % ANEW:
             walk.begin_at(new[max(random.randrange(len(new)), random.randrange(len(new)))])
         for state in walk.states(BURST):
-            found.setdefault(tuple(state.values()), state)
+            states.setdefault(tuple(state.values()), state)
             if walk.ran - ran:
                 ran |= walk.ran
                 new.append(state)
                 most = min(LONGER * least, at + many)
         at += 1
-    return tuple(found.values()), frozenset(ran)
+    return tuple(states.values()), frozenset(ran)
