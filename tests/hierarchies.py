@@ -171,9 +171,9 @@ def _known(made: Hierarchy, name: str, made_systems: dict[str, TransitionSystem]
         every = edges(role, seen) if truth is not None and proof.endings else []
         forever = {ending.table: endless(every, ending.table, ending.still) for ending in proof.endings}
         found = tuple(
-            (replace(obligation, holds=TRUE), verdict) for obligation, verdict in proof.found
+            (replace(obligation, holds=TRUE), verdict) for obligation, verdict in proof.verdicts
         )  # without their many nodes
-        _KNOWN[words] = replace(proof, found=found), truth, forever
+        _KNOWN[words] = replace(proof, verdicts=found), truth, forever
     return Known(ts, role, *_KNOWN[words])
 
 
@@ -190,7 +190,7 @@ def _verdicts(
     in a level in which no cycle computes what is not defined.
     """
     name = one.proof.level
-    keys = {key_of(obligation) for obligation, _ in one.proof.found} - {SAFE}
+    keys = {key_of(obligation) for obligation, _ in one.proof.verdicts} - {SAFE}
     if (every := wanted(one.role)) != keys:
         yield Disagreement("other goals", name, str(sorted(every ^ keys)))
     if truth.undefined and follows[name, SAFE].proved:
@@ -198,7 +198,7 @@ def _verdicts(
     seen = one.proof.context
     for line in sorted(truth.lines & set(() if seen is None else seen.unreached)):
         yield Disagreement("never reached, but runs", name, str(line))
-    for obligation, verdict in one.proof.found:
+    for obligation, verdict in one.proof.verdicts:
         if obligation.key == SAFE:
             continue
         proved = follows[name, obligation.key].proved
@@ -254,7 +254,7 @@ def _traces(
     one: Known, truth: Explored, counts: Counter[str], random: Random, many: int
 ) -> Iterator[Disagreement]:
     """Traces for some obligations that break; and for one that is open and does not, that there is none."""
-    obligations = [obligation for obligation, _ in one.proof.found]
+    obligations = [obligation for obligation, _ in one.proof.verdicts]
     breaking = [
         obligation
         for obligation in obligations
@@ -265,7 +265,7 @@ def _traces(
         yield from _trace(one, obligation, truth.least[key_of(obligation)])
     sound = [
         obligation
-        for obligation, verdict in one.proof.found
+        for obligation, verdict in one.proof.verdicts
         if verdict not in ACCEPTED and obligation.key != SAFE and key_of(obligation) not in truth.least
         # a fact that is declared is not proved where no first cycle can keep to it; no run of the contract breaks it
         if not (obligation.sort is Sort.ASSUMPTION and obligation.name in one.ts.trusted)
@@ -358,7 +358,7 @@ def _proved(proof: LevelProof, follows: Mapping[Need, Closed]) -> frozenset[Key]
     """What is found so where it has to rest on the contract alone, too: the two break nothing of it."""
     return frozenset(
         key_of(obligation)
-        for obligation, verdict in proof.found
+        for obligation, verdict in proof.verdicts
         if verdict is Verdict.PROVED or follows[proof.level, obligation.key].proved
     )
 

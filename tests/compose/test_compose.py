@@ -100,7 +100,7 @@ def test_another_solver_refuses_an_invariant_that_is_none(upper: tuple[Transitio
     ts, proof = upper
     predicates = [predicate.name for predicate in proof.predicates]
     never = ((predicates.index("cur_state"), 2),)  # that the level is never under way
-    false = LevelProof(proof.level, proof.found, proof.predicates, (*proof.clauses, never), 0, 0, 0.0)
+    false = LevelProof(proof.level, proof.verdicts, proof.predicates, (*proof.clauses, never), 0, 0, 0.0)
     assert not all(cvc5_refutes(text) for text in certificate(ts, false).values())
 
 
@@ -281,7 +281,7 @@ def proved_in_its_environment(level: str) -> None:
     proof = prove_level(ts)
     assert essential(proof) == ()
     assert {obligation.name for obligation in proof.open} == NOT_NUMBERED.get(level, set())
-    assert {verdict for obligation, verdict in proof.found if obligation.sort is Sort.ASSUMPTION} <= {
+    assert {verdict for obligation, verdict in proof.verdicts if obligation.sort is Sort.ASSUMPTION} <= {
         Verdict.PROVED
     }
     assert proof.context is not None

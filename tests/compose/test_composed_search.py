@@ -366,7 +366,7 @@ def test_all_questions_about_a_level_have_a_budget_together(
     monkeypatch.setattr(level_proof, "TOGETHER", many)
     upper = transition_systems(SYSTEM)["upper"]
     found = prove_level(upper, replace(LITTLE, limits=Limits.of(1_000_000)))
-    assert {verdict for _, verdict in found.found} <= told
+    assert {verdict for _, verdict in found.verdicts} <= told
     assert found.context is None or not found.context.unreached
 
 
@@ -411,8 +411,8 @@ def test_a_proof_is_recalled_as_it_was_and_only_for_the_same_level(cache: Cache,
     assert kept is not None
     assert kept.cached
     assert (kept.clauses, kept.context, kept.endings) == (proof.clauses, proof.context, proof.endings)
-    assert [(obligation.key, verdict) for obligation, verdict in kept.found] == [
-        (obligation.key, verdict) for obligation, verdict in proof.found
+    assert [(obligation.key, verdict) for obligation, verdict in kept.verdicts] == [
+        (obligation.key, verdict) for obligation, verdict in proof.verdicts
     ]
     assert [predicate.name for predicate in kept.predicates] == [
         predicate.name for predicate in proof.predicates
@@ -427,7 +427,7 @@ def test_what_is_undecided_is_not_kept(cache: Cache) -> None:
     proof = prove_level(upper, LITTLE)
     given_up = LevelProof(
         proof.level,
-        tuple((obligation, Verdict.UNDECIDED) for obligation, _ in proof.found),
+        tuple((obligation, Verdict.UNDECIDED) for obligation, _ in proof.verdicts),
         (),
         (),
         0,
@@ -482,11 +482,11 @@ def test_levels_that_are_proved_in_processes_come_back_with_what_they_owe(
     proofs = prove_transition_systems(made, LITTLE, 2, tuple(made)).levels
     assert [one.level for one in proofs] == list(made)
     for one in proofs:
-        assert [obligation.key for obligation, _ in one.found] == [owing.key for owing in owed[one.level]]
-        assert [verdict for _, verdict in one.found].index(Verdict.UNDECIDED) == 0
-        assert any(obligation.holds is not values.TRUE for obligation, _ in one.found)
+        assert [obligation.key for obligation, _ in one.verdicts] == [owing.key for owing in owed[one.level]]
+        assert [verdict for _, verdict in one.verdicts].index(Verdict.UNDECIDED) == 0
+        assert any(obligation.holds is not values.TRUE for obligation, _ in one.verdicts)
         sent = _proved(made[one.level], LITTLE)
-        assert {obligation.holds for obligation, _ in sent.found} == {values.TRUE}
+        assert {obligation.holds for obligation, _ in sent.verdicts} == {values.TRUE}
 
 
 def test_levels_are_said_as_they_are_done_where_it_is_asked_for(
@@ -527,4 +527,4 @@ def test_what_z3_does_not_confirm_is_not_proved(monkeypatch: pytest.MonkeyPatch,
 
     monkeypatch.setattr("rcsc.compose.proof.level.search", lying)
     proof = prove_level(transition_systems(SYSTEM)["upper"], LITTLE)
-    assert {verdict for _, verdict in proof.found} == {Verdict.UNDECIDED}
+    assert {verdict for _, verdict in proof.verdicts} == {Verdict.UNDECIDED}

@@ -285,7 +285,11 @@ def test_what_a_level_assumes_of_a_report_rests_on_how_it_numbers_its_orders(
     proof = prove_system(path, LITTLE)
     wrong = ("upper", (sort, "", name))
     assert wrong not in {need for need, one in proof.closed.items() if one.accepted}
-    for key in ((CONTRACT, "", "lower"), RUNS, *(obligation.key for obligation, _ in proof.levels[0].found)):
+    for key in (
+        (CONTRACT, "", "lower"),
+        RUNS,
+        *(obligation.key for obligation, _ in proof.levels[0].verdicts),
+    ):
         assert (sort, "", name) == key or wrong in proof.of("upper", key).lacks, key
 
 
@@ -557,7 +561,7 @@ def test_a_result_that_is_refused_ends_the_cycle_whatever_its_type(result: str, 
     proof = prove_system(path, LITTLE)
     stated = {
         obligation.name: verdict
-        for obligation, verdict in proof.levels[0].found
+        for obligation, verdict in proof.levels[0].verdicts
         if obligation.sort is Sort.PROPERTY
     }
     assert stated == {"together": Verdict.NOT_PROVED, "in_range": Verdict.PROVED}
@@ -1109,7 +1113,7 @@ def test_a_table_of_several_commands_is_one_goal(tmp_path: Path) -> None:
     words = small_text("words", ("{ pause, go }", "{ pause, go, run }"))
     lower = small_text("lower", ("    go : go\n", "    go : go\n    run : go\n"))
     _, proof = proved_level(tmp_path, "lower", words=words, lower=lower)
-    keys = [obligation.key for obligation, _ in proof.found]
+    keys = [obligation.key for obligation, _ in proof.verdicts]
     assert len(keys) == len(set(keys))
 
 

@@ -58,7 +58,7 @@ def stated(ts: TransitionSystem) -> dict[str, Obligation]:
 def verdicts(proof: LevelProof) -> dict[str, bool]:
     return {
         obligation.name: verdict is Verdict.PROVED
-        for obligation, verdict in proof.found
+        for obligation, verdict in proof.verdicts
         if obligation.sort in {Sort.INVARIANT, Sort.PROPERTY}
     }
 
@@ -654,5 +654,7 @@ def test_where_a_shipped_table_breaks_a_property_it_is_not_proved(fault: str, tm
     proof = prove_level(transition_systems(tmp_path / "system.toml")[level], replace(LITTLE, looks=False))
     assert proof.verdict(Sort.PROPERTY, "", name) is Verdict.NOT_PROVED
     assert any(
-        verdict is Verdict.PROVED for obligation, verdict in proof.found if obligation.sort is Sort.PROPERTY
+        verdict is Verdict.PROVED
+        for obligation, verdict in proof.verdicts
+        if obligation.sort is Sort.PROPERTY
     )

@@ -131,7 +131,7 @@ def assumptions(proof: SystemProof) -> str:
     claims = [
         proof.of(level.level, obligation.key)
         for level in proof.levels
-        for obligation, _ in level.found
+        for obligation, _ in level.verdicts
         if obligation.sort is Sort.ASSUMPTION
     ]
     if not claims:
@@ -150,7 +150,7 @@ def reaction(systems: Mapping[str, TransitionSystem], proof: SystemProof) -> Ite
     passes = {
         (level.level, obligation.name)
         for level in proof.levels
-        for obligation, _ in level.found
+        for obligation, _ in level.verdicts
         if obligation.sort is Sort.PAUSES and proof.of(level.level, obligation.key).proved
     }
     tops = [

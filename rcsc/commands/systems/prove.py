@@ -186,7 +186,7 @@ class _LevelProgress:
 
     def _done(self, proof: LevelProof) -> None:
         self._line("")
-        count = f"{len(proof.found) - len(proof.open)} of {len(proof.found)} found proved"
+        count = f"{len(proof.verdicts) - len(proof.open)} of {len(proof.verdicts)} found proved"
         if self._wanted:
             click.echo(f"level {proof.level}: {count}, {proof.seconds:.1f} s", err=True)
         self._left.remove(proof.level)
@@ -218,7 +218,7 @@ def _say_level(ts: TransitionSystem, whole: SystemProof, proof: LevelProof) -> N
     found_before = ", by an earlier run" if proof.cached else ""
     click.echo(click.style(f"level {proof.level}", bold=True) + f"  {proof.seconds:.1f} s{found_before}")
     for sort in Sort:
-        obligations = [obligation for obligation, _ in proof.found if obligation.sort is sort]
+        obligations = [obligation for obligation, _ in proof.verdicts if obligation.sort is sort]
         if sort is Sort.ASSUMPTION:
             for obligation in obligations:
                 verdict = standing(whole, proof.level, obligation.key)
@@ -479,7 +479,7 @@ def _as_json(
                         "name": obligation.name,
                         **claim(proof, level.level, obligation.key),
                     }
-                    for obligation, _ in level.found
+                    for obligation, _ in level.verdicts
                 ],
                 "not_looked_at": [
                     {"what": each.sort.value, "table": each.table, "missing": each.missing}

@@ -1,7 +1,7 @@
 """From invariants to what is proved of a level, and of the whole system.
 
 Definitions. A *level proof* is the invariant of a level with a verdict for each obligation. A line is *unreached* if no reachable cycle
-runs it. A command *ends* if it is answered, *done* or *failed*, and stays so, given that subordinates answer their orders. A *phase* is
+runs it. A command *ends* if it is answered, *done* or *failed*, and stays so, assuming that subordinates answer theirs. A *phase* is
 the part of the state that tells how far a command has come; a *ranking* is a number of the level that rises with a line and falls with
 none that follows it. A *promise* is what a level assumes of a neighbour.
 
@@ -14,7 +14,7 @@ Trusted: the arguments in `compose.__doc__` and in `termination`; that questions
 `termination`, `assume_guarantee`); Z3, or cvc5 with `--certify`, which answers the same questions from their text.
 
 Cost: linear in the number of levels, which are proved one by one; termination asks about three cycles in a row.
-A proof is kept under a digest of all that it is about, and read again at once.
+A proof is kept under a digest of all that it depends on, and only read the next time.
 
 Modules, in the order the data flows: `context` (lines), `ranking` (what stops), `termination` (commands), `level` (all of one level),
 `assume_guarantee` (promises, claims), `kept` and `standing` (the cache), `system`.

@@ -29,37 +29,37 @@ from rcsc.compose.contract.transition import NUMBERS, TransitionSystem
 from rcsc.compose.proof.level import LevelProof
 
 
-def agreements(made: Mapping[str, TransitionSystem], proofs: Mapping[str, LevelProof]) -> list[Promise]:
+def agreements(systems: Mapping[str, TransitionSystem], proofs: Mapping[str, LevelProof]) -> list[Promise]:
     """Match what each level assumes of each neighbour with what was proved there (`Promise.holds`)."""
     proved = {
         (name, obligation.key)
         for name, proof in proofs.items()
-        for obligation, verdict in proof.found
+        for obligation, verdict in proof.verdicts
         if verdict in ACCEPTED
     }
     return [
         replace(promise, holds=promise.begins and proved.issuperset(promise.needs))
-        for promise in promises(made)
+        for promise in promises(systems)
     ]
 
 
 # --- claims --------------------------------------------------------------------------------
 
 
-def claims(made: Mapping[str, TransitionSystem], proofs: Mapping[str, LevelProof]) -> dict[Need, Claim]:
-    """Return everything that is claimed of these levels, and what it rests on."""
-    found = dict(promise.claim for promise in promises(made))
+def claims(systems: Mapping[str, TransitionSystem], proofs: Mapping[str, LevelProof]) -> dict[Need, Claim]:
+    """Return all claims about these levels, with what each rests on."""
+    claimed = dict(promise.claim for promise in promises(systems))
     for name, proof in proofs.items():
-        found |= {(name, key): claim for key, claim in of_level(made[name], proof)}
-    return found
+        claimed |= {(name, key): claim for key, claim in of_level(systems[name], proof)}
+    return claimed
 
 
 def of_level(ts: TransitionSystem, proof: LevelProof) -> Iterator[tuple[Key, Claim]]:
-    """List what is claimed of one level, apart from the contract."""
+    """List the claims about one level, apart from the contract."""
     name = proof.level
     runs = ((name, RUNS),)
     yield from _of_runs(ts, proof)
-    for obligation, verdict in proof.found:
+    for obligation, verdict in proof.verdicts:
         trusts: tuple[str, ...] = ()
         if obligation.sort is Sort.ECHOES:
             trusts = tuple(_of_a_restart(ts, proof))
@@ -81,13 +81,13 @@ def of_level(ts: TransitionSystem, proof: LevelProof) -> Iterator[tuple[Key, Cla
 
 
 def _of_a_refusal(ts: TransitionSystem, level: str) -> Iterator[str]:
-    """List what keeps a property from being broken by a safe value: a cycle that refuses an input is none of the contract's."""
+    """Yield the assumption that no input is refused: proofs leave out such a cycle, whose safe values may break a property."""
     if ts.inputs and any(variable.safe is not None for variable in ts.program.variables):
         yield f"no input of level `{level}` is refused: its outputs would show their safe values"
 
 
 def _of_a_restart(ts: TransitionSystem, proof: LevelProof) -> Iterator[str]:
-    """List what else could end the first cycle after a restart early, and so have an older report follow a newer."""
+    """Yield assumptions that the first cycle after a restart does not end early; else an older report follows a newer one."""
     if asks(ts.program):
         yield "no extern procedure is refused in the first cycle after a restart"
     stops = {str(name) for table in ts.program.tables for name in table.stops}
@@ -102,21 +102,23 @@ def _of_runs(ts: TransitionSystem, proof: LevelProof) -> Iterator[tuple[Key, Cla
     ends = [*([] if links.above is None else [links.above.order]), *(below.report for below in links.below)]
     needs: list[Key] = [SAFE, *((CONTRACT, "", record) for record in ends)]
     needs += [
-        obligation.key for obligation, _ in proof.found if obligation.sort in {Sort.SOME_LINE, Sort.ONE_LINE}
+        obligation.key
+        for obligation, _ in proof.verdicts
+        if obligation.sort in {Sort.SOME_LINE, Sort.ONE_LINE}
     ]
     needs += [
         obligation.key
-        for obligation, _ in proof.found
+        for obligation, _ in proof.verdicts
         if obligation.sort is Sort.ASSUMPTION and obligation.name in ts.trusted
     ]
-    trusts = [f"assumption `{one}` of level `{name}`{DECLARED}" for one in sorted(ts.trusted)]
+    trusts = [f"assumption `{assumption}` of level `{name}`{DECLARED}" for assumption in sorted(ts.trusted)]
     if ts.trusted:
         trusts.append(f"level `{name}` can be as its tables declare in every state that it comes to")
     trusts += [
         f"the same question has the same answer in `{asked.into}` of level `{name}`" for asked in links.asked
     ]
     yield RUNS, Claim(Verdict.PROVED, tuple((name, key) for key in needs), tuple(trusts))
-    within = [verdict for obligation, verdict in proof.found if obligation.key == SAFE]
+    within = [verdict for obligation, verdict in proof.verdicts if obligation.key == SAFE]
     invariants = tuple((name, (Sort.INVARIANT, "", invariant)) for invariant in ts.safety.invariants)
     rests = ((name, RUNS), *invariants) if within else invariants
     yield SAFE, Claim(worst(within), rests)
@@ -126,26 +128,28 @@ def _of_ending(ts: TransitionSystem, still: Iterable[str], verdict: Verdict) -> 
     """Claim that a command ends, assuming that subordinates answer theirs and that some inputs stand still."""
     name, below = ts.level.name, ts.links.below
     trusts = [
-        f"`{one.name}` answers every order that is not replaced, and stays so" for one in below if one.outside
+        f"`{other.name}` answers every order that is not replaced, and stays so"
+        for other in below
+        if other.outside
     ]
-    trusts += [f"the values in `{one}` of level `{name}` stand still meanwhile" for one in still]
+    trusts += [f"the values in `{record}` of level `{name}` stand still meanwhile" for record in still]
     if asks(ts.program):
         trusts.append(f"extern procedures of level `{name}` are refused only finitely often")
-    needs = tuple((one.name, ENDING) for one in below if not one.outside)
+    needs = tuple((other.name, ENDING) for other in below if not other.outside)
     return Claim(verdict, ((name, RUNS), *needs), tuple(trusts))
 
 
 # --- what levels assume of each other ------------------------------------------------------
 
 
-def promises(made: Mapping[str, TransitionSystem]) -> Iterator[Promise]:
+def promises(systems: Mapping[str, TransitionSystem]) -> Iterator[Promise]:
     """List what each level assumes of each neighbour."""
-    for name, ts in made.items():
-        yield from _of_above(name, ts, made)
-        yield from _of_below(name, ts, made)
+    for name, ts in systems.items():
+        yield from _of_above(name, ts, systems)
+        yield from _of_below(name, ts, systems)
 
 
-def _of_below(name: str, ts: TransitionSystem, made: Mapping[str, TransitionSystem]) -> Iterator[Promise]:
+def _of_below(name: str, ts: TransitionSystem, systems: Mapping[str, TransitionSystem]) -> Iterator[Promise]:
     for below in ts.links.below:
         words = f"what `{below.name}` reports under the number of the last order is about that order"
         keys: tuple[Key, ...] = (
@@ -157,7 +161,7 @@ def _of_below(name: str, ts: TransitionSystem, made: Mapping[str, TransitionSyst
             reason = f"`{below.name}` stands outside the levels"
             yield Promise(name, below.report, words, reason, own=own, outside=True)
             continue
-        lower = made[below.name].links.above
+        lower = systems[below.name].links.above
         if lower is None:
             yield Promise(name, below.report, words, f"`{below.name}` takes no numbered orders", begins=False)
             continue
@@ -168,11 +172,11 @@ def _of_below(name: str, ts: TransitionSystem, made: Mapping[str, TransitionSyst
             f"proved of `{below.name}`: {Sort.ECHOES.value}; both begin with the same order",
             ((below.name, (Sort.ECHOES, "", lower.report)),),
             own,
-            _begin(ts, below.order, made[below.name], lower.order),
+            _begin(ts, below.order, systems[below.name], lower.order),
         )
 
 
-def _of_above(name: str, ts: TransitionSystem, made: Mapping[str, TransitionSystem]) -> Iterator[Promise]:
+def _of_above(name: str, ts: TransitionSystem, systems: Mapping[str, TransitionSystem]) -> Iterator[Promise]:
     above = ts.links.above
     if above is None:
         return
@@ -185,7 +189,7 @@ def _of_above(name: str, ts: TransitionSystem, made: Mapping[str, TransitionSyst
     if above.outside:
         yield Promise(name, above.order, words, f"`{above.name}` stands outside the levels", outside=True)
         return
-    upper = next(below for below in made[above.name].links.below if below.name == name)
+    upper = next(below for below in systems[above.name].links.below if below.name == name)
     keys: list[Key] = [
         (Sort.NUMBERED, "", other_end(leaf, above.order, upper.order)) for leaf in above.numbered
     ]

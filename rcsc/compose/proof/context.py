@@ -1,12 +1,12 @@
-"""What an invariant tells of the lines of a level's tables, besides the obligations.
+"""What an invariant shows of the lines of a level's tables, besides the obligations.
 
 In: a transition system, and what was confirmed of it. Out: a `Context`:
 
-- *unreached*: lines that no reachable cycle runs, a DEFAULT line too, but where that is an obligation. Dead in this system, though not in
-  their table.
-- *repeated*: what else a line does that gives an order and then matches again, on the same inputs, before the order is echoed.
-  Section 9 asks that there be nothing: each line is to say the same until its command is echoed.
-- *restless*: levels that would give order after order on inputs that stay the same.
+- *unreached*: lines, DEFAULT included, that no reachable cycle runs, unless that is an obligation. They are dead in this system, though
+  not in their table.
+- *repeated*: leaves that a line changes which gives an order and then matches again, on the same inputs, before the order is echoed.
+  Section 9 requires that there are none: each line does the same until its command is echoed.
+- *restless*: whether the level would give order after order on constant inputs.
 
 Each question is answered by Z3 from the invariant; what is not refuted is named, so the lists are never too short.
 """
@@ -37,10 +37,10 @@ class RepeatedLine:
 
 @dataclass(frozen=True, slots=True)
 class Context:
-    """What was found of one level's lines.
+    """One level's lines in their context.
 
     Attributes:
-        unreached: Tables and lines that no reachable cycle runs; `unsure`, of which that is not shown and no run was seen either.
+        unreached: Tables and lines that no reachable cycle runs; `unsure`, those neither shown to be so nor seen to run.
         orders: Whether the level gives orders, so that there is something to repeat.
     """
 
@@ -57,7 +57,7 @@ LineName: TypeAlias = tuple[str, str]
 
 @dataclass(frozen=True, slots=True)
 class _Start:
-    """Where a cycle may begin: in the invariant, or as the level begins; its solver, and the same cycle again."""
+    """A cycle from the invariant, or one with which the level begins; the same cycle again; and its solver."""
 
     cycle: Cycle
     again: Cycle
@@ -70,12 +70,12 @@ def context(
     clauses: Sequence[Clause],
     ran: Container[LineName] = frozenset(),
 ) -> Context:
-    """Ask all of it; lines that `ran` on walks are known to be reached."""
+    """Ask all three questions; lines that `ran` on walks are known to be reached."""
     every = list(_starts(ts, asked, clauses))
     asked.rested_on += [start.solver for start in every]
     reached = [set(_reached(asked, start)) for start in every]
     lines = [line for line, _ in _lines(every[0].cycle)]
-    unreached = tuple(line for line in lines if not any(line in found for found in reached))
+    unreached = tuple(line for line in lines if not any(line in each for each in reached))
     return Context(
         unreached,
         tuple(_every_repeated(ts, asked, every)),
@@ -137,12 +137,12 @@ def _restless(ts: TransitionSystem, asked: Confirmation, start: _Start) -> bool:
 def _every_repeated(
     ts: TransitionSystem, asked: Confirmation, every: Sequence[_Start]
 ) -> Iterator[RepeatedLine]:
-    """Merge, line by line, the leaves that a second match may change, wherever the first begins."""
-    found: dict[LineName, dict[str, None]] = {}
+    """Merge, line by line, the leaves that a second match may change after any start."""
+    by_line: dict[LineName, dict[str, None]] = {}
     for start in every:
         for line, leaves in _repeated(ts, asked, start):
-            found.setdefault(line, {}).update(dict.fromkeys(leaves))
-    for where, changed in found.items():
+            by_line.setdefault(line, {}).update(dict.fromkeys(leaves))
+    for where, changed in by_line.items():
         yield RepeatedLine(*where, tuple(changed))
 
 
@@ -199,7 +199,7 @@ def _shown(solver: Solver, changed: dict[str, Term]) -> Iterator[str]:
 
 
 def _of_lines(ts: TransitionSystem) -> list[str]:
-    """List states and outputs that are not only the preprocess's: a test variable is no effect of a line."""
+    """List states and outputs, except those that only the preprocess writes: a test variable is no effect of a line."""
     before = {str(leaf) for name in ts.level.preprocess for leaf in ts.procedures[name].writes}
     later = {str(leaf) for name in ts.level.postprocess for leaf in ts.procedures[name].writes}
     lines = of_lines(ts) | later
@@ -211,20 +211,20 @@ def _of_lines(ts: TransitionSystem) -> list[str]:
 
 
 def of_lines(ts: TransitionSystem) -> set[str]:
-    """Collect what the lines of all tables write."""
-    found = set()
+    """Collect the leaves that the lines of all tables write."""
+    leaves = set()
     for table in ts.program.tables:
         every = [*(line.actions for line in table.lines), *([table.default.actions] if table.default else [])]
         for actions in every:
             for action in actions:
-                found |= _written(ts, action.statement)
-    return found
+                leaves |= _written(ts, action.statement)
+    return leaves
 
 
 def _written(ts: TransitionSystem, statement: Statement) -> set[str]:
-    found: set[str] = set()
+    leaves: set[str] = set()
     for call in everything((statement,)):
-        found |= set(map(str, written_by(call)))
+        leaves |= set(map(str, written_by(call)))
         if isinstance(call, Call):
-            found |= set(map(str, ts.procedures[call.procedure].writes))
-    return found
+            leaves |= set(map(str, ts.procedures[call.procedure].writes))
+    return leaves

@@ -1,8 +1,8 @@
 """Proofs of levels that an earlier run made, taken from the cache.
 
 In: a transition system, an effort, a cache. Out: the same `LevelProof`, or nothing. The key is all that a proof depends on: the program as
-resolved, the level, its links, the effort; and rcsc itself with its solvers (`rcsc.host.cache`). Where anything was left undecided nothing
-is kept: another run may decide it. What was found is kept once more without the effort and without what shows it (`standing`).
+resolved, the level, its links, the effort; and rcsc itself with its solvers (`rcsc.host.cache`). A proof with anything undecided is not
+kept: another run may decide it. The verdicts are kept once more, without effort and invariant (`standing`).
 """
 
 import hashlib
@@ -25,9 +25,9 @@ from rcsc.host.cache import Cache
 
 @dataclass(frozen=True, slots=True)
 class _Kept:
-    """A proof as it is kept: obligations by what tells them apart, predicates by name; the transition system gives both anew."""
+    """A proof as it is kept: obligations by key, predicates by name; the transition system gives both anew."""
 
-    found: tuple[tuple[Key, Verdict], ...]
+    verdicts: tuple[tuple[Key, Verdict], ...]
     predicates: tuple[str, ...]
     clauses: tuple[Clause, ...]
     walked: int
@@ -45,14 +45,16 @@ def recall(cache: Cache, ts: TransitionSystem, effort: Effort) -> LevelProof | N
         return None
     cycle = ts.cycle(ts.havoc())
     wanted = obligations(ts, cycle)
-    if [obligation.key for obligation in wanted] != [key for key, _ in kept.found]:
+    if [obligation.key for obligation in wanted] != [key for key, _ in kept.verdicts]:
         return None
     for closely in range(CLOSELY + 1):
         chosen = every_predicate(ts, cycle, read(ts, cycle, wanted), closely)
         if tuple(predicate.name for predicate in chosen) == kept.predicates:
-            found = tuple((goal, verdict) for goal, (_, verdict) in zip(wanted, kept.found, strict=True))
+            verdicts = tuple(
+                (goal, verdict) for goal, (_, verdict) in zip(wanted, kept.verdicts, strict=True)
+            )
             proof = LevelProof(
-                ts.level.name, found, chosen, kept.clauses, kept.walked, kept.learnt, kept.seconds, cached=True,
+                ts.level.name, verdicts, chosen, kept.clauses, kept.walked, kept.learnt, kept.seconds, cached=True,
                 context=kept.context, endings=kept.endings, unstated=kept.unstated,
             )  # fmt: skip
             keep_verdicts(cache, content(ts), _shortened(ts, proof))  # they may have been pruned
@@ -62,10 +64,10 @@ def recall(cache: Cache, ts: TransitionSystem, effort: Effort) -> LevelProof | N
 
 def keep(cache: Cache, ts: TransitionSystem, effort: Effort, proof: LevelProof) -> None:
     """Keep the proof, unless something was left undecided."""
-    if any(verdict is Verdict.UNDECIDED for _, verdict in proof.found):
+    if any(verdict is Verdict.UNDECIDED for _, verdict in proof.verdicts):
         return
     kept = _Kept(
-        tuple((obligation.key, verdict) for obligation, verdict in proof.found),
+        tuple((obligation.key, verdict) for obligation, verdict in proof.verdicts),
         tuple(predicate.name for predicate in proof.predicates), proof.clauses, proof.walked, proof.learnt, proof.seconds,
         proof.context, proof.endings, proof.unstated,
     )  # fmt: skip
@@ -74,14 +76,16 @@ def keep(cache: Cache, ts: TransitionSystem, effort: Effort, proof: LevelProof) 
 
 
 def _shortened(ts: TransitionSystem, proof: LevelProof) -> Verdicts:
-    """Shorten the proof to what was found, without what shows it."""
+    """Shorten the proof to its verdicts, without the invariant."""
     claims = dict(of_level(ts, proof))
     return Verdicts(
-        claims, tuple(map(_said, essential(proof))), tuple(unstated.shown for unstated in proof.unstated)
+        claims,
+        tuple(map(_with_table, essential(proof))),
+        tuple(unstated.shown for unstated in proof.unstated),
     )
 
 
-def _said(obligation: Obligation) -> str:
+def _with_table(obligation: Obligation) -> str:
     return f"table `{obligation.table}`: {obligation.shown}" if obligation.table else obligation.shown
 
 
@@ -90,7 +94,7 @@ def _key(ts: TransitionSystem, effort: Effort) -> tuple[str, ...]:
 
 
 def content(ts: TransitionSystem) -> str:
-    """Return the digest of all that a proof of the level is about, wherever the files stand."""
+    """Return the digest of all that a proof of the level depends on, wherever the files are."""
     tables = tuple(replace(table, file="", stops=()) for table in ts.program.tables)  # they follow from it
     program = replace(ts.program, file="", tables=tables)
     return hashlib.sha256(repr((program, ts.level.name, ts.links)).encode()).hexdigest()

@@ -27,31 +27,31 @@ from rcsc.symbolic import values
 from rcsc.symbolic.keyed import Keyed
 
 TOGETHER = 50
-"""All questions about a level take at most as many steps as so many of them may; what is asked after that is not decided."""
+"""All questions about a level together may take the steps of so many; later ones are not decided."""
 
 
 class NotConfirmedError(Exception):
-    """Another solver does not say the same, or gave up: nothing may rest on what was found."""
+    """Z3 did not confirm what the search found: nothing may rest on it."""
 
 
 @dataclass(frozen=True, slots=True)
 class LevelProof:
-    """What was found of one level.
+    """The proof of one level.
 
     Attributes:
-        found: Each obligation with its verdict.
-        predicates: What the clauses speak of.
-        clauses: The invariant: combinations that never stand; empty where none was found.
+        verdicts: Each obligation with its verdict.
+        predicates: The predicates in the clauses.
+        clauses: The invariant: cubes that never hold; empty if none was found.
         walked: States seen on walks; `learnt`, those that the solver added.
         seconds: Wall time of the search, for the report.
         cached: Whether an earlier run made it.
-        context: What was found of its lines; None where something is not proved.
+        context: Its lines in context; None if something is not proved.
         endings: Whether its commands end, table by table.
-        unlooked: Obligations that could not be stated, as a part of the level was not recognised.
+        unstated: Obligations that could not be stated, because part of the level was not recognised.
     """
 
     level: str
-    found: tuple[tuple[Obligation, Verdict], ...]
+    verdicts: tuple[tuple[Obligation, Verdict], ...]
     predicates: tuple[Predicate, ...]
     clauses: tuple[Clause, ...]
     walked: int
@@ -68,7 +68,7 @@ class LevelProof:
         Raises:
             KeyError: It is unknown.
         """
-        for obligation, verdict in self.found:
+        for obligation, verdict in self.verdicts:
             if (obligation.sort, obligation.table, obligation.name) == (sort, table, name):
                 return verdict
         raise KeyError(name)
@@ -76,11 +76,11 @@ class LevelProof:
     @property
     def open(self) -> tuple[Obligation, ...]:
         """The obligations that are not proved."""
-        return tuple(obligation for obligation, verdict in self.found if verdict not in ACCEPTED)
+        return tuple(obligation for obligation, verdict in self.verdicts if verdict not in ACCEPTED)
 
 
 def essential(proof: LevelProof) -> tuple[Obligation, ...]:
-    """List the obligations that failed; an unnumbered field is no failure (nobody may assume it), a command is."""
+    """List the open obligations except unnumbered fields, which nobody may assume; a command is always essential."""
     beside = besides(proof)
     return tuple(obligation for obligation in proof.open if obligation not in beside)
 
@@ -95,7 +95,7 @@ def besides(proof: LevelProof) -> tuple[Obligation, ...]:
 
 
 def prove_level(ts: TransitionSystem, effort: Effort | None = None) -> LevelProof:
-    """Prove a level: find an invariant, confirm it, decide each obligation, and look at the lines in context."""
+    """Prove a level: find an invariant, confirm it, decide each obligation, and analyse the lines in context."""
     effort = effort or Effort()
     begun, cut_before = time.perf_counter(), smt.cut_short()
     cycle, firsts = ts.cycle(ts.havoc()), tuple(_firsts(ts).values())
@@ -104,28 +104,30 @@ def prove_level(ts: TransitionSystem, effort: Effort | None = None) -> LevelProo
     ends: tuple[Ending, ...] = ()
     try:
         with smt.together(TOGETHER * effort.limits.steps):
-            found = search(ts, firsts, cycle, wanted, effort)
-            asked = _asked_anew(found.predicates, firsts, cycle, effort.limits)
-            looks = effort.looks and not any(wanted[at].sort is not Sort.NUMBERED for at in found.open)
-            flow = Flow(ts, asked, found.clauses)
-            if looks and (others := [*flow.ways_round(), *never_run(asked, found.clauses, found.ran)]):
-                found = strengthened(ts, firsts, cycle, found, others)
-                flow = Flow(ts, asked, found.clauses)
-            _confirm(asked, found.clauses)
-            verdicts = list(_verdicts(ts, asked, found, wanted))
+            invariant = search(ts, firsts, cycle, wanted, effort)
+            asked = _asked_anew(invariant.predicates, firsts, cycle, effort.limits)
+            looks = effort.looks and not any(wanted[at].sort is not Sort.NUMBERED for at in invariant.open)
+            flow = Flow(ts, asked, invariant.clauses)
+            if looks and (
+                others := [*flow.ways_round(), *never_run(asked, invariant.clauses, invariant.ran)]
+            ):
+                invariant = strengthened(ts, firsts, cycle, invariant, others)
+                flow = Flow(ts, asked, invariant.clauses)
+            _confirm(asked, invariant.clauses)
+            verdicts = list(_verdicts(ts, asked, invariant, wanted))
             if looks:
-                seen, ends = context(ts, asked, found.clauses, found.ran), tuple(flow.endings())
+                seen, ends = context(ts, asked, invariant.clauses, invariant.ran), tuple(flow.endings())
             _uncut(cut_before)
     except (GaveUpError, NotConfirmedError):
-        found, seen, ends = FoundInvariant(), None, ()
+        invariant, seen, ends = FoundInvariant(), None, ()
         verdicts = [(obligation, Verdict.UNDECIDED) for obligation in wanted]
     return LevelProof(
         ts.level.name,
         tuple(verdicts),
-        found.predicates,
-        found.clauses,
-        found.walked,
-        found.learnt,
+        invariant.predicates,
+        invariant.clauses,
+        invariant.walked,
+        invariant.learnt,
         time.perf_counter() - begun,
         context=seen,
         endings=ends,
@@ -175,16 +177,19 @@ def _firsts(ts: TransitionSystem) -> dict[str, Cycle]:
 
 
 def _verdicts(
-    ts: TransitionSystem, inference: Confirmation, found: FoundInvariant, wanted: tuple[Obligation, ...]
+    ts: TransitionSystem, inference: Confirmation, invariant: FoundInvariant, wanted: tuple[Obligation, ...]
 ) -> Iterable[tuple[Obligation, Verdict]]:
     """Decide each obligation: can a first cycle, or a cycle from the invariant, break it?"""
     keyed = inference.keyed
     every = [wanted, *(obligations(ts, first) for first in inference.firsts)]
     asked = [[keyed.term(values.negation(obligation.holds)) for obligation in each] for each in every]
-    solvers = [inference.known(found.clauses), *(inference.beginning(first) for first in inference.firsts)]
-    believed = _believed(ts, inference, found.clauses, solvers)
+    solvers = [
+        inference.known(invariant.clauses),
+        *(inference.beginning(first) for first in inference.firsts),
+    ]
+    believed = _believed(ts, inference, invariant.clauses, solvers)
     for at, obligation in enumerate(wanted):
-        if at in found.open:
+        if at in invariant.open:
             yield obligation, Verdict.NOT_PROVED
             continue
         answers = {answer(solver, terms[at]) for solver, terms in zip(solvers, asked, strict=True)}
@@ -198,10 +203,10 @@ def _verdicts(
 def _believed(
     ts: TransitionSystem, inference: Confirmation, clauses: Sequence[Clause], solvers: Sequence[Solver]
 ) -> dict[str, Verdict]:
-    """Return the verdict on what each table declares: nothing may rest on what no cycle can keep to.
+    """Return the verdict on each table's declared assumptions: nothing may rest on ones that no cycle can fulfil.
 
-    So it is where none of some sort of cycle can, a later one, the first, or that after a restart; and for a table where none that
-    runs it can, although one would run it otherwise.
+    They fail if no later cycle, no first one, or none after a restart can fulfil them; for one table, if no cycle that runs it
+    can, although one would run it without them.
     """
     names = [str(at.table.name) for at in inference.cycle.tables]
     if not ts.trusted:
@@ -213,7 +218,7 @@ def _believed(
 
 
 def _of_possible(answers: set[Answer]) -> Verdict:
-    """Turn answers on whether all cycles are possible into a verdict on what was declared."""
+    """Turn answers on whether all cycles are possible into a verdict on declared assumptions."""
     if Answer.UNSATISFIABLE in answers:
         return Verdict.NOT_PROVED
     return Verdict.UNDECIDED if Answer.UNKNOWN in answers else Verdict.TRUSTED
@@ -222,14 +227,16 @@ def _of_possible(answers: set[Answer]) -> Verdict:
 def _can_run(
     inference: Confirmation, clauses: Sequence[Clause], solvers: Sequence[Solver], at: int
 ) -> Verdict:
-    """Decide whether a table can run in a cycle as declared, if it can in one that need not be."""
-    chosen = [inference.keyed.term(one.tables[at].chosen) for one in (inference.cycle, *inference.firsts)]
+    """Decide whether a table can run under its declared assumptions, if it can without them."""
+    chosen = [inference.keyed.term(each.tables[at].chosen) for each in (inference.cycle, *inference.firsts)]
     answers = {answer(solver, term) for solver, term in zip(solvers, chosen, strict=True)}
     if Answer.SATISFIABLE in answers:
         return Verdict.TRUSTED
     if Answer.UNKNOWN in answers:
         return Verdict.UNDECIDED
-    cycle, *firsts = (replace(one, contract=one.undeclared) for one in (inference.cycle, *inference.firsts))
+    cycle, *firsts = (
+        replace(each, contract=each.undeclared) for each in (inference.cycle, *inference.firsts)
+    )
     free = replace(inference, cycle=cycle, firsts=firsts)
     others = [free.known(clauses), *(free.beginning(first) for first in firsts)]
     without = {answer(solver, term) for solver, term in zip(others, chosen, strict=True)}
@@ -242,50 +249,50 @@ def certificate(ts: TransitionSystem, proof: LevelProof, limits: Limits = LIMITS
     """Write questions in SMT-LIB, each to be answered `unsat`, that together show what was proved.
 
     `first` and `restart`: such a cycle leads into the invariant; `step TABLE`: a later cycle in which this table runs keeps
-    it; `obligations first`, `obligations restart`: such cycles fulfil the obligations that are proved; `obligations SORT`: every cycle
-    from the invariant fulfils those of one sort; `lines N`: what is said of lines in their context; `ends TABLE N`: that steps which were
-    not found are not taken, that what counts rises, and that nothing else goes round. If lines or endings are not as the proof
-    has them when they are looked at again, one question is there that has a model.
+    it; `goals first`, `goals restart`: such cycles fulfil the obligations that are proved; `goals SORT`: every cycle from the
+    invariant fulfils those of one sort; `lines N`: the lines in their context; `ends TABLE N`: no step is taken that was not
+    found, counters rise, and there is no other loop. If lines or endings, asked again, differ from the proof, one question
+    has a model.
     """
     cycle, firsts = ts.cycle(ts.havoc()), _firsts(ts)
     asked = _asked_anew(proof.predicates, tuple(firsts.values()), cycle, limits)
     clauses = proof.clauses
-    found = {name: asked.first_question(clauses, first).script() for name, first in firsts.items()}
+    scripts = {name: asked.first_question(clauses, first).script() for name, first in firsts.items()}
     names = [*(f"step {at.table.name}" for at in cycle.tables), "step of no table"]
     for name, case in zip(names, cycle.cases, strict=False):
-        found[name] = asked.step_question(clauses, case).script()
-    proved = {obligation.key for obligation, verdict in proof.found if verdict in ACCEPTED}
+        scripts[name] = asked.step_question(clauses, case).script()
+    proved = {obligation.key for obligation, verdict in proof.verdicts if verdict in ACCEPTED}
     for name, first in firsts.items():
         wanted = [obligation for obligation in obligations(ts, first) if obligation.key in proved]
-        found[f"goals {name}"] = _none_broken(asked, asked.beginning(first), wanted)
+        scripts[f"goals {name}"] = _none_broken(asked, asked.beginning(first), wanted)
     every = [obligation for obligation in obligations(ts, cycle) if obligation.key in proved]
     for sort in dict.fromkeys(obligation.sort for obligation in every):
         wanted = [obligation for obligation in every if obligation.sort is sort]
-        found[f"goals {sort.name.lower()}"] = _none_broken(asked, asked.known(clauses), wanted)
+        scripts[f"goals {sort.name.lower()}"] = _none_broken(asked, asked.known(clauses), wanted)
     if proof.context is not None:
-        found |= _looked_again(ts, proof, asked)
-    return found
+        scripts |= _looked_again(ts, proof, asked)
+    return scripts
 
 
 def _looked_again(ts: TransitionSystem, proof: LevelProof, asked: Confirmation) -> dict[str, str]:
     """Write the questions that `context` and `Flow.endings` rest on."""
     assert proof.context is not None
     seen = replace(context(ts, asked, proof.clauses), unsure=proof.context.unsure)
-    found = {f"lines {number}": text for number, text in enumerate(_refuted(asked), 1)}
+    scripts = {f"lines {number}": text for number, text in enumerate(_refuted(asked), 1)}
     ends = []
     for ending in Flow(ts, asked, proof.clauses).endings():
         ends.append(ending)
-        found |= {f"ends {ending.table} {number}": text for number, text in enumerate(_refuted(asked), 1)}
+        scripts |= {f"ends {ending.table} {number}": text for number, text in enumerate(_refuted(asked), 1)}
     if (seen, tuple(ends)) != (proof.context, proof.endings):
-        found["lines and endings as before"] = "(set-logic ALL)\n(check-sat)\n"
-    return found
+        scripts["lines and endings as before"] = "(set-logic ALL)\n(check-sat)\n"
+    return scripts
 
 
 def _refuted(asked: Confirmation) -> list[str]:
-    """Take the scripts of what was refuted since the last call, one a solver."""
-    found = [solver.refutations() for solver in asked.rested_on if solver.refuted]
+    """Take the scripts of the refutations since the last call, one for each solver."""
+    scripts = [solver.refutations() for solver in asked.rested_on if solver.refuted]
     asked.rested_on.clear()
-    return found
+    return scripts
 
 
 def _none_broken(asked: Confirmation, solver: Solver, wanted: Sequence[Obligation]) -> str:

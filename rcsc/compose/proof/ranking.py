@@ -1,8 +1,8 @@
-"""Lines that follow one another while nothing else of a level changes, and what ends that.
+"""Ranking: shows that lines stop following one another while the phase of a level stays.
 
-In: three cycles in a row, as `Turn`s: of the middle one the questions are asked. Out: the lines that stop because a counter
-rises, and those of which it is not shown that they stop. The argument is in `termination`.
-Counters are found one after another, for what the last ones leave (Bradley, Manna and
+In: three cycles in a row, as `Turn`s; the questions are about the middle one. Out: the lines that stop because a counter
+rises, and those that are not shown to stop. The argument is in `termination`.
+Counters are found one after another, each for what the earlier ones leave (Bradley, Manna and
 Sipma, "Linear ranking with reachability", 2005).
 """
 
@@ -45,10 +45,10 @@ class Turn:
 
     Attributes:
         before: The leaves before it; `after`, after it.
-        stays: The table runs, the command stays, and so does the phase.
-        orders: An order is given.
-        unanswered: The command is not answered.
-        answered: The orders that stand are answered.
+        stays: The condition that the table runs, and the command and the phase stay.
+        orders: That an order is given.
+        unanswered: That the command is not answered.
+        answered: That the last orders are answered.
     """
 
     at: TableAt
@@ -61,18 +61,18 @@ class Turn:
 
     @property
     def quiet(self) -> Node:
-        """Answered, and no order is given."""
+        """The condition that the last orders are answered, and no other is given."""
         return values.both(self.answered, values.negation(self.orders))
 
 
 @dataclass(frozen=True, slots=True)
 class StoppingLines:
-    """What was found of the lines of one table.
+    """Which lines of one table stop.
 
     Attributes:
         counted: Lines that stop because a counter rises.
-        still: Inputs whose values, echoes and statuses apart, are taken to stand still meanwhile.
-        endless: Lines of which it is not shown that they stop, even if all inputs stand still.
+        still: Inputs whose values, echoes and statuses apart, are assumed constant meanwhile.
+        endless: Lines that are not shown to stop, even if all inputs are constant.
     """
 
     counted: tuple[RisingLine, ...]
@@ -87,26 +87,26 @@ Turns: TypeAlias = Callable[[tuple[str, ...]], tuple[Turn, Turn, Turn]]
 def lines_that_stop(
     program: Program, asked: Confirmation, clauses: Sequence[Clause], turns: Turns
 ) -> StoppingLines:
-    """Show that lines stop, with as few constant inputs as possible; follow reals only where something is left without."""
-    first = found = _Ranking(program, asked, clauses, turns(()))
+    """Show that lines stop, with as few constant inputs as possible; follow reals only if something is left without."""
+    first = ranking = _Ranking(program, asked, clauses, turns(()))
     still: tuple[str, ...] = ()
-    rested_on = [found.solver]
-    if found.endless and any(isinstance(kind, Real) for _, kind in owned(program)):
-        first = found = _Ranking(program, asked.in_other_terms(Measured()), clauses, turns(()), first)
-        rested_on.append(found.solver)
-    if found.endless:
+    rested_on = [ranking.solver]
+    if ranking.endless and any(isinstance(kind, Real) for _, kind in owned(program)):
+        first = ranking = _Ranking(program, asked.in_other_terms(Measured()), clauses, turns(()), first)
+        rested_on.append(ranking.solver)
+    if ranking.endless:
         still = inputs(program)
-        found = _Ranking(program, asked, clauses, turns(still), first)
-    for name in still if not found.endless else ():
+        ranking = _Ranking(program, asked, clauses, turns(still), first)
+    for name in still if not ranking.endless else ():
         fewer = tuple(other for other in still if other != name)
         without = _Ranking(program, asked, clauses, turns(fewer), first)
         if not without.endless:
-            found, still = without, fewer
+            ranking, still = without, fewer
     if still:
-        rested_on.append(found.solver)
+        rested_on.append(ranking.solver)
     asked.rested_on += rested_on
-    endless = tuple(str(first.turn.at.lines[line][0].name) for line in sorted(found.endless))
-    one_each = {counted.line: counted for counted in reversed(found.counted)}
+    endless = tuple(str(first.turn.at.lines[line][0].name) for line in sorted(ranking.endless))
+    one_each = {counted.line: counted for counted in reversed(ranking.counted)}
     return StoppingLines(tuple(reversed(one_each.values())), () if endless else still, endless)
 
 
@@ -131,9 +131,9 @@ class _Ranking:
     """The questions about the lines of one table, and the answers.
 
     Attributes:
-        open: Lines to be looked at: those that a weaker look left.
-        always: Steps that are left when lines that count are taken out, answered or not; `silent`, in quiet cycles.
-        restless: Lines that may give order after order; `unanswered`, that may go on so in quiet cycles.
+        open: Lines to be shown to stop: those that a weaker ranking left.
+        always: Steps that are left without lines that have a counter; `silent`, in quiet cycles.
+        restless: Lines that may give orders for ever; `unanswered`, that may stay unanswered in quiet cycles for ever.
     """
 
     restless: set[int]
@@ -179,11 +179,11 @@ class _Ranking:
 
     @property
     def endless(self) -> set[int]:
-        """The lines that are left."""
+        """The lines that are not shown to stop."""
         return self.restless | self.unanswered
 
     def _unstopped(self, steps: set[LinePair], when: Term, then: Term, among: set[int] | None) -> set[int]:
-        """Return the lines, of those in `among`, that may do so again and again on a cycle of lines."""
+        """Return the lines, of those in `among`, that may do `then` again and again on a loop of lines."""
         return {
             line
             for part in parts(steps)
@@ -194,20 +194,20 @@ class _Ranking:
 
     def _steps(self, when: Term, among: set[LinePair]) -> set[LinePair]:
         """Return the steps among these that may be taken."""
-        found: set[LinePair] = set()
+        possible: set[LinePair] = set()
         terms = {step: smt.all_of([self.now[step[0]], self.next[step[1]]]) for step in among}
-        while left := [step for step in sorted(among) if step not in found]:
+        while left := [step for step in sorted(among) if step not in possible]:
             self.solver.push()
             self.solver.add(when, smt.any_of([terms[step] for step in left]))
             answer = self.solver.check()
             if answer is Answer.SATISFIABLE:
-                found |= {step for step in left if self.solver.value(terms[step], Bool())}
+                possible |= {step for step in left if self.solver.value(terms[step], Bool())}
             self.solver.pop()
             if answer is Answer.UNKNOWN:
                 return among
             if answer is Answer.UNSATISFIABLE:
-                return found
-        return found
+                return possible
+        return possible
 
     def _uncounted(self, steps: set[LinePair], when: Term) -> set[LinePair]:
         """Drop the steps of lines that stop because a counter rises."""
@@ -236,7 +236,7 @@ class _Ranking:
         return rising is None or counted is not None
 
     def _rising_once(self, runs: Term) -> list[KeptNumber] | None:
-        """Return the numbers that rise in some cycle, to try only these; None where there is no such cycle."""
+        """Return the numbers that rise in one such cycle, to try only these; None if there is no such cycle."""
         self.solver.push()
         self.solver.add(runs)
         answer = self.solver.check()
@@ -264,7 +264,7 @@ class _Ranking:
                 yield RisingLine(name, number.name)
 
     def _least_rise(self, runs: Term, number: KeptNumber, width: float) -> float | None:
-        """Return how much the real rises at least; None where that is not shown to be anything."""
+        """Return the least rise of the real; None if no rise is shown."""
 
         def rises(power: int) -> bool:
             risen = smt.integer_operation("+", number.before, smt.fraction(width / 2**power))
@@ -275,7 +275,7 @@ class _Ranking:
 
 
 def least_power(holds: Callable[[int], bool]) -> int | None:
-    """Return the least of 0 .. SMALLEST of which it holds, given that it holds of all greater ones; None where of none."""
+    """Return the least of 0 .. SMALLEST for which it holds, if it then holds for all greater ones; None if for none."""
     if not holds(SMALLEST):
         return None
     return -furthest(-SMALLEST, 0, lambda power: holds(-power))
@@ -289,7 +289,7 @@ def owned(program: Program) -> list[tuple[str, Scalar]]:
 
 
 def _every_step(lines: int) -> list[LinePair]:
-    return [(one, two) for one in range(lines) for two in range(lines)]
+    return [(line, following) for line in range(lines) for following in range(lines)]
 
 
 def parts(steps: set[LinePair]) -> list[Part]:

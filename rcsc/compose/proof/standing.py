@@ -1,8 +1,8 @@
-"""What kept proofs say of the levels together, read without a solver, a search or a cycle.
+"""What kept proofs show of a whole system, without a solver, a search or a cycle.
 
-In: what a system is made of (`SystemOutline`) and a cache. Out: `KnownSystem`. A proof is filed under a digest of all that it is about (the
-program as resolved, the level, its links), so that it is never taken for one of other content. What a level assumes of a neighbour has
-to be proved of that neighbour, as it is now, before anything is called proved of the levels together.
+In: what a system is made of (`SystemOutline`) and a cache. Out: `KnownSystem`. A proof is filed under a digest of all that it depends on
+(the program as resolved, the level, its links), so that it is never used for other content. What a level assumes of a neighbour has to be
+proved of that neighbour as it is now before anything counts as proved of the levels together.
 """
 
 from collections.abc import Mapping
@@ -27,28 +27,28 @@ from rcsc.compose.contract.claims import UNKNOWN as UNLOOKED_AT
 from rcsc.host.cache import Cache
 
 ASSUMPTION, PROPERTY = "assumption", "property"
-"""Sorts of obligations: of an assumption of a table, of a property."""
+"""Sorts of obligations: a table's assumption, a property."""
 
 
 class Known(StrEnum):
-    """What is known of something that the levels together are to keep."""
+    """What is known of an obligation, a level, or the whole system."""
 
     PROVED = "proved"
-    TRUSTED = "assumed"  # the tables say so, of what comes from outside
+    TRUSTED = "assumed"  # the tables declare it, of what comes from outside
     PARTLY = "proved as far as it was looked at"
-    CONDITIONAL = "conditional"  # found so given what it rests on, of which something is not proved
+    CONDITIONAL = "conditional"  # accepted given what it rests on, of which something is not proved
     NOT_PROVED = "not proved"
-    UNKNOWN = "unknown"  # nobody has looked at this content, or the solver gave up
+    UNKNOWN = "unknown"  # this content was never proved, or the solver gave up
 
 
 @dataclass(frozen=True, slots=True)
 class Verdicts:
-    """What was found of one level, without what shows it.
+    """The verdicts on one level, without the invariant.
 
     Attributes:
-        claims: What was found of each, given what it rests on.
-        open: What is not proved and should be, in words.
-        unlooked: What was not looked at, in words.
+        claims: Each claim with its verdict, given what it rests on.
+        open: Essential obligations that are not proved, in words.
+        unstated: Obligations that could not be stated, in words.
     """
 
     claims: Mapping[Key, Claim]
@@ -57,7 +57,7 @@ class Verdicts:
 
     @property
     def many(self) -> int:
-        """How many claims are found so."""
+        """How many claims are accepted."""
         return sum(claim.verdict in ACCEPTED for claim in self.claims.values())
 
 
@@ -76,7 +76,7 @@ class _AnyLevel:
 
 
 def keep_verdicts(cache: Cache, content: str, verdicts: Verdicts) -> None:
-    """Keep what was found, unless more was proved of the same content before, with more effort."""
+    """Keep the verdicts, unless more claims about the same content were accepted before, with more effort."""
     before = verdicts_of(cache, content)
     if before is None or before.many <= verdicts.many:
         cache.store(_Filed(tuple(verdicts.claims.items()), verdicts.open, verdicts.unstated), content)
@@ -84,7 +84,7 @@ def keep_verdicts(cache: Cache, content: str, verdicts: Verdicts) -> None:
 
 
 def verdicts_of(cache: Cache, content: str) -> Verdicts | None:
-    """Return what was found of a level of this content."""
+    """Return the verdicts on a level of this content, if any are kept."""
     kept = cache.load(_Filed, content)
     return None if kept is None else Verdicts(dict(kept.claims), kept.open, kept.unstated)
 
@@ -116,7 +116,7 @@ class LevelOutline:
     """A level.
 
     Attributes:
-        content: Digest of all that a proof of it is about.
+        content: Digest of all that a proof of it depends on.
         file: Real path of the file that declares it; `start` and `end`, where its name stands there.
         properties: Each with the real path of the file that states it.
     """
@@ -147,8 +147,8 @@ class KnownSystem:
 
     Attributes:
         outline: The system.
-        known: By level, what a kept proof says.
-        closed: What follows of each claim over the whole chain.
+        known: The kept verdicts by level.
+        closed: Each claim with all that it rests on.
     """
 
     outline: SystemOutline
@@ -165,17 +165,17 @@ class KnownSystem:
 
     @property
     def broken(self) -> tuple[Promise, ...]:
-        """What a level assumes although it is not proved of the neighbour, which was looked at."""
-        return tuple(one for one in self.outline.assumed if self._kept(one) is Known.NOT_PROVED)
+        """The promises that are not proved of the neighbour, although its proof is kept."""
+        return tuple(promise for promise in self.outline.assumed if self._kept(promise) is Known.NOT_PROVED)
 
     def _kept(self, assumed: Promise) -> Known:
-        found = [self._obligation(level, key) for level, key in assumed.needs]
-        if not assumed.begins or Known.NOT_PROVED in found:
+        known = [self._obligation(level, key) for level, key in assumed.needs]
+        if not assumed.begins or Known.NOT_PROVED in known:
             return Known.NOT_PROVED
-        return Known.UNKNOWN if Known.UNKNOWN in found else Known.PROVED
+        return Known.UNKNOWN if Known.UNKNOWN in known else Known.PROVED
 
     def _obligation(self, level: str, key: Key) -> Known:
-        """Return what was found of an obligation in its level's environment."""
+        """Return what is known of an obligation in its level's environment alone."""
         verdicts = self.known.get(level)
         if verdicts is None:
             return Known.UNKNOWN
@@ -184,15 +184,15 @@ class KnownSystem:
 
     def of_obligation(self, level: str, key: Key) -> Known:
         """Return what is known of an obligation over the whole chain of levels."""
-        found = self._obligation(level, key)
-        if found is not Known.PROVED:
-            return found
+        known = self._obligation(level, key)
+        if known is not Known.PROVED:
+            return known
         if not self._proved(level, key):
             return self._given(level, key)
         return Known.TRUSTED if self._closed(level, key).verdict is Verdict.TRUSTED else Known.PROVED
 
     def _given(self, level: str, key: Key) -> Known:
-        """Return what is known of a claim that is found so while something it rests on is not: conditional, or unknown."""
+        """Return what is known of a claim that is accepted while something it rests on is not: conditional, or unknown."""
         whole = all(owner in self.known for owner, _ in self._closed(level, key).lacks)
         return Known.CONDITIONAL if whole else Known.UNKNOWN
 
@@ -203,15 +203,15 @@ class KnownSystem:
         return self._closed(level, key).proved
 
     def lacking(self, level: str, key: Key = RUNS) -> tuple[str, ...]:
-        """Spell what is not found of all that a claim rests on; by default, what all of the level's claims rest on."""
+        """Spell what a claim lacks of all that it rests on; by default, the claim that all others of the level rest on."""
         return tuple(spelled(need, level, self.closed) for need in self._closed(level, key).lacks)
 
     def trusting(self, level: str, key: Key) -> tuple[str, ...]:
-        """Spell the assumptions of tables that a claim takes for granted."""
+        """Spell the assumptions of tables that a claim trusts."""
         return declared(self._closed(level, key).trusts)
 
     def of_level(self, level: str) -> Known:
-        """Return whether all that should be is proved of a level."""
+        """Return whether every essential obligation of a level is proved."""
         verdicts = self.known.get(level)
         if verdicts is None:
             return Known.UNKNOWN
@@ -223,20 +223,20 @@ class KnownSystem:
 
     @property
     def whole(self) -> Known:
-        """Whether all of it is proved."""
-        found = {self.of_level(level.name) for level in self.outline.levels}
-        if Known.NOT_PROVED in found or self.broken:
+        """Whether the whole system is proved."""
+        known = {self.of_level(level.name) for level in self.outline.levels}
+        if Known.NOT_PROVED in known or self.broken:
             return Known.NOT_PROVED
         worst = (Known.UNKNOWN, Known.CONDITIONAL, Known.PARTLY)
-        return next((one for one in worst if one in found), Known.PROVED)
+        return next((grade for grade in worst if grade in known), Known.PROVED)
 
     def missing(self, level: str) -> tuple[str, ...]:
-        """Say why a level without anything wrong is not wholly proved: what it rests on, and what was not looked at."""
+        """Say why a level without open obligations is not wholly proved: what it rests on, and what could not be stated."""
         verdicts = self.known.get(level)
         if verdicts is None:
             return ()
-        rests = (f"rests on {one}" for one in self.lacking(level))
-        return (*rests, *(f"not looked at: {one}" for one in verdicts.unstated))
+        rests = (f"rests on {claim}" for claim in self.lacking(level))
+        return (*rests, *(f"not looked at: {obligation}" for obligation in verdicts.unstated))
 
     def unreached(self, level: str, table: str) -> tuple[str, ...]:
         """List the lines of a table that no reachable cycle of this system runs."""
@@ -252,5 +252,5 @@ class KnownSystem:
 
 def standing(cache: Cache, outline: SystemOutline) -> KnownSystem:
     """Return what the cache knows of a system."""
-    found = {level.name: verdicts_of(cache, level.content) for level in outline.levels}
-    return KnownSystem(outline, {name: verdicts for name, verdicts in found.items() if verdicts is not None})
+    kept = {level.name: verdicts_of(cache, level.content) for level in outline.levels}
+    return KnownSystem(outline, {name: verdicts for name, verdicts in kept.items() if verdicts is not None})

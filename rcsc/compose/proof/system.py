@@ -1,8 +1,7 @@
 """The whole system proved, level by level.
 
-In: a system's description. Out: `SystemProof`. The proofs of the levels are put together by `compose.__doc__`'s
-argument; here it is checked that what a level assumes of a neighbour is what was proved of that neighbour, and that
-they begin in agreement.
+In: a system's description. Out: `SystemProof`. The argument in `compose.__doc__` puts the proofs of the levels together.
+It needs two checks, made here: what a level assumes of a neighbour was proved of that neighbour, and both agree initially.
 """
 
 import time
@@ -31,7 +30,7 @@ from rcsc.run.description import BadDescription, Description, description, place
 from rcsc.symbolic.values import TRUE
 
 SHOWN_HERE = frozenset({Code.ASSUMPTION_NOT_PROVED, Code.INVARIANT_BROKEN, Code.TWO_WRITERS})
-"""What is proved of the levels, or is no fault of a cycle as it runs."""
+"""Codes that are proved of the levels instead, or are no fault of a running cycle."""
 
 
 class NoProgramError(CodedError):
@@ -40,10 +39,10 @@ class NoProgramError(CodedError):
 
 @dataclass(frozen=True, slots=True)
 class SystemProof:
-    """What was found of a whole system.
+    """The proof of a whole system.
 
     Attributes:
-        closed: What follows of each claim over the whole chain; of levels that were not proved nothing is known.
+        closed: Each claim with all that it rests on; none about levels that were not proved.
     """
 
     levels: tuple[LevelProof, ...]
@@ -53,31 +52,31 @@ class SystemProof:
 
     @property
     def proved(self) -> bool:
-        """Whether every obligation that could be stated, and every agreement between levels, is found so."""
+        """Whether every essential obligation, and every agreement between levels, is accepted."""
         return all(not essential(proof) for proof in self.levels) and all(
             agreement.holds for agreement in self.agreements
         )
 
     @property
     def whole(self) -> bool:
-        """Whether it is proved, nothing was left out, and nothing rests on what is not known."""
+        """Whether it is proved, nothing is unstated, and nothing rests on what is not proved."""
         besides_ = {(proof.level, obligation.key) for proof in self.levels for obligation in besides(proof)}
         return (
             self.proved
             and not any(proof.unstated for proof in self.levels)
-            and all(one.proved for need, one in self.closed.items() if need not in besides_)
+            and all(claim.proved for need, claim in self.closed.items() if need not in besides_)
         )
 
     def of(self, level: str, key: Key) -> Closed:
-        """What follows of a claim."""
+        """Return a claim with all that it rests on."""
         return self.closed.get((level, key), UNKNOWN)
 
 
 def transition_systems(path: Path) -> dict[str, TransitionSystem]:
     """Make a transition system for each level that the file describes, from the top down.
 
-    Each subordinate may assume that the fields stand still which its superior is built to number: the
-    fields that the superior compares with the last order. That the superior keeps them is proved with it.
+    A subordinate assumes that a field stays while the number does only if its superior compares that field with
+    the last order. That the superior keeps it so is proved of the superior.
 
     Raises:
         BadDescription: The description says something that cannot be.
@@ -85,8 +84,8 @@ def transition_systems(path: Path) -> dict[str, TransitionSystem]:
     """
     system = description(path)
     read = {spec.name: checked(path, spec.program) for spec in system.levels}
-    made = transition_systems_of(system, {name: program for name, (program, _) in read.items()})
-    return {name: replace_safety(one, read[name][1]) for name, one in made.items()}
+    systems = transition_systems_of(system, {name: program for name, (program, _) in read.items()})
+    return {name: replace_safety(ts, read[name][1]) for name, ts in systems.items()}
 
 
 def transition_systems_of(
@@ -101,17 +100,17 @@ def transition_systems_of(
     check_ends(system, programs)
     every = {name: links(system, name, program) for name, program in programs.items()}
     _check_ranks(every)
-    found = {}
+    systems = {}
     for name, program in programs.items():
-        level = next((one for one in program.levels if one.name == name), None)
+        level = next((level for level in program.levels if level.name == name), None)
         if level is None:
             raise NoProgramError(f"program `{program.name}` has no level `{name}`")
-        found[name] = TransitionSystem(program, level, _narrowed(every[name], every, programs))
-    return found
+        systems[name] = TransitionSystem(program, level, _narrowed(every[name], every, programs))
+    return systems
 
 
 def _check_ranks(every: Mapping[str, Links]) -> None:
-    """Check that no level is its own superior at any distance: each would end its commands given that the other does.
+    """Check that no level is its own superior at any distance: each would end its commands only if the other does.
 
     Raises:
         BadDescription: One is.
@@ -121,8 +120,10 @@ def _check_ranks(every: Mapping[str, Links]) -> None:
         while (above := every[way[-1]].above) is not None and above.name in every and above.name not in way:
             way.append(above.name)
         if above is not None and above.name == name:
-            said = ", ".join(f"`{one}` takes orders of `{two}`" for one, two in pairwise((*way, name)))
-            raise BadDescription(f"there is no highest level: {said}")
+            chain = ", ".join(
+                f"`{lower}` takes orders of `{upper}`" for lower, upper in pairwise((*way, name))
+            )
+            raise BadDescription(f"there is no highest level: {chain}")
 
 
 def _narrowed(mine: Links, every: Mapping[str, Links], programs: Mapping[str, Program]) -> Links:
@@ -145,28 +146,28 @@ def _narrowed(mine: Links, every: Mapping[str, Links], programs: Mapping[str, Pr
 def checked(path: Path, name: str) -> tuple[Program, Safety]:
     """Return the program of a level, and why a cycle as nodes is what its executors do.
 
-    It is so only where nothing leaves its range and every operation is defined: that is shown of the program by itself, where
-    it has to be given its invariants, which are obligations here. An assumption that is needed for it stops the cycle where it fails.
+    The two are the same only if every value stays in its range and every operation is defined. That is shown of the program alone,
+    if need be under its invariants, which are obligations here. An assumption needed for it stops the cycle in which it fails.
 
     Raises:
-        NoProgramError: It is not there, does not resolve, or something in it may leave its range or not be defined.
+        NoProgramError: The program is missing, does not resolve, or may leave a range or do an undefined operation.
     """
     from rcsc.procedures.obligations import Obligations
     from rcsc.solvers.options import Options
 
     program = loaded_program(path, name)[0]
     owed = Obligations(program, Options())
-    found = owed.prove(program.tables)
-    for diagnostic in found:
+    diagnostics = owed.prove(program.tables)
+    for diagnostic in diagnostics:
         if diagnostic.code not in SHOWN_HERE:
             raise NoProgramError(f"{diagnostic.message}: see `rcsc check {diagnostic.primary.span.file}`")
-    return with_stops(program, owed.stops), _safety(program, owed.stops, found)
+    return with_stops(program, owed.stops), _safety(program, owed.stops, diagnostics)
 
 
 def _safety(
-    program: Program, stops: Mapping[str, tuple[AssumptionName, ...]], found: Sequence[Diagnostic]
+    program: Program, stops: Mapping[str, tuple[AssumptionName, ...]], diagnostics: Sequence[Diagnostic]
 ) -> Safety:
-    """Decide whether safety needs the invariants: not where all is shown without them, under no other stopping assumptions."""
+    """Decide whether safety needs the invariants: not if it is shown without them, and under no other stopping assumptions."""
     from rcsc.procedures.obligations import Obligations
     from rcsc.solvers.options import Options
 
@@ -176,12 +177,12 @@ def _safety(
     wrong = any(diagnostic.code not in SHOWN_HERE for diagnostic in without.prove(program.tables))
     if not wrong and all(set(names) <= set(stops.get(table, ())) for table, names in without.stops.items()):
         return Safety()
-    broken = any(diagnostic.code is Code.INVARIANT_BROKEN for diagnostic in found)
+    broken = any(diagnostic.code is Code.INVARIANT_BROKEN for diagnostic in diagnostics)
     return Safety(tuple(invariant.name for invariant in program.invariants), broken)
 
 
 def replace_safety(ts: TransitionSystem, safety: Safety) -> TransitionSystem:
-    """Return the transition system with what is known of its program's safety."""
+    """Return the transition system with this safety of its program."""
     return TransitionSystem(ts.program, ts.level, ts.links, safety)
 
 
@@ -204,38 +205,38 @@ def loaded_program(path: Path, name: str) -> tuple[Program, Loaded]:
 
 
 def prove_transition_systems(
-    made: Mapping[str, TransitionSystem],
+    systems: Mapping[str, TransitionSystem],
     effort: Effort | None,
     jobs: int,
     only: tuple[str, ...],
-    said: Callable[[LevelProof], None] | None = None,
+    done: Callable[[LevelProof], None] | None = None,
     cache: Cache | None = None,
 ) -> SystemProof:
-    """Prove these levels, except those in the cache; call `said` with each as it is done.
+    """Prove these levels, except those in the cache; call `done` with each.
 
-    Agreements are looked at only for all levels.
+    Agreements are checked only if all levels are proved.
     """
     begun = time.perf_counter()
     proofs: dict[str, LevelProof] = {}
-    for name, proof in _each_unless_kept(made, effort or Effort(), jobs, only, cache):
+    for name, proof in _each_unless_kept(systems, effort or Effort(), jobs, only, cache):
         proofs[name] = proof
-        if said is not None:
-            said(proof)
-    agreed = tuple(agreements(made, proofs)) if set(proofs) == set(made) else ()
-    follows = closed(claims(made, proofs))
+        if done is not None:
+            done(proof)
+    agreed = tuple(agreements(systems, proofs)) if set(proofs) == set(systems) else ()
+    follows = closed(claims(systems, proofs))
     return SystemProof(tuple(proofs.values()), agreed, time.perf_counter() - begun, follows)
 
 
 def _each_unless_kept(
-    made: Mapping[str, TransitionSystem],
+    systems: Mapping[str, TransitionSystem],
     effort: Effort,
     jobs: int,
     only: tuple[str, ...],
     cache: Cache | None,
 ) -> Iterator[tuple[str, LevelProof]]:
     """Yield each level's proof, in order."""
-    known = {name: recall(cache, made[name], effort) for name in only} if cache is not None else {}
-    new = _each(made, effort, jobs, tuple(name for name in only if known.get(name) is None))
+    known = {name: recall(cache, systems[name], effort) for name in only} if cache is not None else {}
+    new = _each(systems, effort, jobs, tuple(name for name in only if known.get(name) is None))
     for name in only:
         kept = known.get(name)
         if kept is not None:
@@ -243,33 +244,36 @@ def _each_unless_kept(
             continue
         _, proof = next(new)
         if cache is not None:
-            keep(cache, made[name], effort, proof)
+            keep(cache, systems[name], effort, proof)
         yield name, proof
 
 
 def _each(
-    made: Mapping[str, TransitionSystem], effort: Effort, jobs: int, only: tuple[str, ...]
+    systems: Mapping[str, TransitionSystem], effort: Effort, jobs: int, only: tuple[str, ...]
 ) -> Iterator[tuple[str, LevelProof]]:
-    """Yield each level's proof; made in processes where there are several jobs."""
+    """Yield each level's proof; several jobs prove in processes of their own."""
     if jobs == 1 or len(only) <= 1:
         for name in only:
-            yield name, prove_level(made[name], effort)
+            yield name, prove_level(systems[name], effort)
         return
     with children.pool(min(jobs, len(only))) as pool:
-        waiting = {name: pool.submit(_proved, made[name], effort) for name in only}
+        waiting = {name: pool.submit(_proved, systems[name], effort) for name in only}
         for name, future in waiting.items():
             proof = children.answer(future)
-            yield name, replace(proof, found=_again(made[name], proof))
+            yield name, replace(proof, verdicts=_again(systems[name], proof))
 
 
 def _proved(ts: TransitionSystem, effort: Effort) -> LevelProof:
-    """Prove in a process of its own; obligations return without their many nodes and are made anew."""
-    found = prove_level(ts, effort)
+    """Prove a level in a process of its own; return obligations without their many nodes, which are made anew."""
+    proof = prove_level(ts, effort)
     return replace(
-        found, found=tuple((replace(obligation, holds=TRUE), verdict) for obligation, verdict in found.found)
+        proof,
+        verdicts=tuple((replace(obligation, holds=TRUE), verdict) for obligation, verdict in proof.verdicts),
     )
 
 
 def _again(ts: TransitionSystem, proof: LevelProof) -> tuple[tuple[Obligation, Verdict], ...]:
     wanted = obligations(ts, ts.cycle(ts.havoc()))
-    return tuple((obligation, verdict) for obligation, (_, verdict) in zip(wanted, proof.found, strict=True))
+    return tuple(
+        (obligation, verdict) for obligation, (_, verdict) in zip(wanted, proof.verdicts, strict=True)
+    )

@@ -1,21 +1,21 @@
-"""That every command is answered some time and stays so, given that what is below does: no deadlock, nothing that goes on for ever.
+"""Termination: every command is eventually answered, assuming that subordinates answer theirs.
 
 In: a transition system, and what was confirmed of it. Out: an `Ending` for each table. A level is *answered* in a cycle when each
-subordinate echoes the last order and says of it *done* or *failed*; of the first command, PAUSE or its like, *done*. It is
-assumed that each order, if no other replaces it, is answered some time and stays so; and that is what is shown of the level: it
-is *unanswered* while it reports neither; a fourth status answers nothing. The argument, for a level that keeps one command:
+subordinate echoes the last order and reports it *done* or *failed*; the first command, such as PAUSE, *done* only. It is
+assumed that each order, unless another replaces it, is eventually answered and stays so. The same is shown of the level itself:
+it is *unanswered* while it reports neither; no other status answers. The argument, for a level that keeps one command:
 
-- Its *table* stays, or what selects it is no part of the command: then from table to table there is no way round.
-- Its *phase* is its pending next states, and the flags that its lines write. From phase to phase there is no way round (all
-  steps are listed by the solver, from the invariant), so after the cycle that takes the command, which may be the first of all, the phase
-  changes at most `changes` times; but for ways round on which
-  the command is answered in every cycle: whoever stays on one has answered for good.
-- While the phase stays, lines follow one another. A line that comes again and again stands on a way round among them. It
-  comes finitely often if there is a *counter*, a number of the level that rises whenever the line runs and never falls on that
-  way round: it ends at the end of its range. A real has to rise by a share of its range (`SMALLEST`), found in fractions
-  (`measured`). Lines that have one are taken out, and what is left is looked at again.
+- Its *table* stays; or, if the command does not select it, tables do not follow one another in a loop.
+- Its *phase* is its pending next states, and the flags that its lines write. The solver lists all steps between phases from the
+  invariant. They form no loop, except those on which the command is answered in every cycle: a level that stays on one has
+  answered for good. So after the cycle that takes the command, which may be the first of all, the phase changes at most
+  `changes` times.
+- While the phase stays, lines follow one another. A line that runs again and again is on a loop of lines. It
+  runs finitely often if there is a *counter*, a number of the level that rises whenever the line runs and never falls on that
+  loop: it ends at the end of its range. A real has to rise by a share of its range (`SMALLEST`), found in fractions
+  (`measured`). Lines that have one are taken out, and what is left is examined again.
 - A line that gives orders must have one, at least for the cycles in which it does so. So orders end.
-- Then answers come, and stay. Among the lines that are left none may go round in answered cycles that give no order, but those that
+- Then answers come, and stay. The lines that are left may form no loop in answered cycles that give no order, except loops that
   leave the command unanswered only finitely often.
 
 Lines for which this is not shown are named in `endless`: they wait for what they read.
@@ -40,7 +40,7 @@ from rcsc.symbolic.values import Node
 
 MOST_STEPS = 400
 DONE, FAILED = "done", "failed"
-"""What a report says of a command that is answered; whatever else it says, the command goes on."""
+"""The statuses that answer a command; with any other, the command goes on."""
 
 Phase = tuple[int, ...]
 Way = tuple[Phase, Phase]
@@ -48,14 +48,13 @@ Way = tuple[Phase, Phase]
 
 @dataclass(frozen=True, slots=True)
 class Ending:
-    """What was found of one table's command.
+    """Whether the command of one table ends.
 
     Attributes:
-        changes: How often the phase can change while the command lasts, after the cycle that takes it; None where it could go round,
-            or the table could.
-        counted: Lines that may run for as long as a counter rises.
-        still: Inputs whose values, echoes and statuses apart, are taken to stand still meanwhile.
-        endless: Lines of which it is not shown that they end.
+        changes: How often the phase can change after the cycle that takes the command; None if phases or tables may loop.
+        counted: Lines that stop because a counter rises.
+        still: Inputs whose values, echoes and statuses apart, are assumed constant meanwhile.
+        endless: Lines that are not shown to stop.
     """
 
     table: str
@@ -66,7 +65,7 @@ class Ending:
 
     @property
     def proved(self) -> bool:
-        """Whether the command ends, given answers."""
+        """Whether the command ends, assuming answers."""
         return self.changes is not None and not self.endless
 
 
@@ -83,18 +82,18 @@ def no_answers(ts: TransitionSystem) -> tuple[str, ...]:
     above = ts.links.above
     if above is None:
         return ()
-    found = []
+    reasons = []
     for end in (above, *ts.links.below):
         kind = ts.kinds.get(end.status)
         if not isinstance(kind, Enum) or DONE not in kind.members:
-            found.append(f"`{end.report}` has no `{STATUS}` with a member `{DONE}`")
+            reasons.append(f"`{end.report}` has no `{STATUS}` with a member `{DONE}`")
         if not isinstance(ts.kinds[end.command], Enum):
-            found.append(f"`{end.command}` is no enumeration")
-    return tuple(found)
+            reasons.append(f"`{end.command}` is no enumeration")
+    return tuple(reasons)
 
 
 def unanswered(ts: TransitionSystem, cycle: Cycle) -> Node:
-    """Return the condition that the level's report is none that its superior waits for."""
+    """Return the condition that the level's report does not answer its command."""
     assert ts.links.above is not None
     return values.negation(_ended(ts, ts.links.above, cycle.taken, cycle.after))
 
@@ -125,9 +124,9 @@ class _Phases:
     """The phases that a command of one table goes through.
 
     Attributes:
-        leaves: What tells them apart.
-        steps: Every change from one to another; None where they are too many, or the solver gave up.
-        rounds: Phases that lead to one another, and whether the command may be unanswered in a cycle from one of them to one.
+        leaves: The leaves whose values are a phase.
+        steps: Every change from one to another; None if they are too many, or the solver gave up.
+        rounds: The loops, as sets of phases, and whether the command may be unanswered in a cycle within each.
     """
 
     leaves: tuple[str, ...]
@@ -136,83 +135,85 @@ class _Phases:
 
     @property
     def waiting(self) -> list[Way]:
-        """Steps on a way round on which the command may be unanswered."""
+        """The steps on loops on which the command may be unanswered."""
         parts_ = [part for part, waits in self.rounds if waits]
         return sorted(way for way in self.steps or () if any(part.issuperset(way) for part in parts_))
 
     @property
     def changes(self) -> int | None:
-        """Steps on the longest way, those left out that lead round while the command is answered; None where others do."""
+        """The steps on the longest path, without loops on which the command is answered; None if there are other loops."""
         if self.steps is None or any(waits for _, waits in self.rounds):
             return None
         same = {phase: min(part) for part, _ in self.rounds for phase in part}
-        left = {(same.get(one, one), same.get(two, two)) for one, two in self.steps}
-        return longest({(one, two) for one, two in left if one != two})
+        left = {(same.get(source, source), same.get(target, target)) for source, target in self.steps}
+        return longest({(source, target) for source, target in left if source != target})
 
 
 class Flow:
-    """Termination questions of one level, asked from an invariant; none where it has no superior that it reports to."""
+    """Termination questions of one level, asked from an invariant; none if it reports to no superior."""
 
     def __init__(self, ts: TransitionSystem, asked: Confirmation, clauses: Sequence[Clause]) -> None:
         self.ts, self.asked, self.clauses = ts, asked, clauses
         self.keyed = asked.keyed
         self.rows: dict[tuple[str, ...], list[Cycle]] = {}
-        self.found: dict[int, _Phases] = {}
+        self.phases: dict[int, _Phases] = {}
 
     @property
     def tables(self) -> tuple[TableAt, ...]:
-        """Those that are asked about."""
+        """The tables that are asked about."""
         return self.asked.cycle.tables if reports(self.ts) else ()
 
     def endings(self) -> Iterator[Ending]:
-        """Yield what is found of each table."""
+        """Yield the ending of each table."""
         round_ = self._tables_round() if self.tables else set()
         for number in range(len(self.tables)):
             yield self._ending(number, goes_round=number in round_)
 
     def _ending(self, number: int, *, goes_round: bool) -> Ending:
         changes = self._phases(number).changes
-        found = lines_that_stop(
+        stopping = lines_that_stop(
             self.ts.program, self.asked, self.clauses, lambda still: self._turns(number, still)
         )
         table = str(self.tables[number].table.name)
-        return Ending(table, None if goes_round else changes, found.counted, found.still, found.endless)
+        return Ending(
+            table, None if goes_round else changes, stopping.counted, stopping.still, stopping.endless
+        )
 
     def ways_round(self) -> list[Node]:
-        """List the conditions that a step between phases is not taken, for steps on a cycle: what there is to show."""
-        found = []
+        """List the conditions to be proved: for each step on a loop of phases, that it is not taken."""
+        conditions = []
         for number, at in enumerate(self.tables):
             phases = self._phases(number)
             taken = values.both(at.chosen, command_stays(self.ts, self.asked.cycle))
             before, after = self._ends(phases.leaves)
-            found += [
-                values.negation(values.all_of((taken, *_are(before, one), *_are(after, two))))
-                for one, two in phases.waiting
+            conditions += [
+                values.negation(values.all_of((taken, *_are(before, source), *_are(after, target))))
+                for source, target in phases.waiting
             ]
-        return found
+        return conditions
 
     # --- from phase to phase ---
 
     def _phases(self, number: int) -> _Phases:
-        """Phases of a table, ignoring flags that toggle while the command is pending."""
-        if number not in self.found:
+        """Return the phases of a table, ignoring flags that toggle while the command is pending."""
+        if number not in self.phases:
             at = self.asked.cycle.tables[number]
             phases = self._phases_by(at, self._pending_and_flags())
             turning = {
                 leaf
                 for place, leaf in enumerate(phases.leaves)
-                for one, two in phases.waiting
-                if one[place] != two[place] and isinstance(self.ts.kinds[leaf], Bool) and leaf != FLAG
+                for source, target in phases.waiting
+                if source[place] != target[place] and isinstance(self.ts.kinds[leaf], Bool) and leaf != FLAG
             }
             if turning:
                 phases = self._phases_by(at, tuple(leaf for leaf in phases.leaves if leaf not in turning))
-            self.found[number] = phases
-        return self.found[number]
+            self.phases[number] = phases
+        return self.phases[number]
 
     def _pending_and_flags(self) -> tuple[str, ...]:
         """List pending states, the flag of a new command, and flags that lines write."""
         variables = self.ts.program.variables
-        found = [
+        pending_states = [
             str(pending(v.name))
             for v in variables
             if v.deferred_until is not None and isinstance(v.type, Bool | Enum)
@@ -223,10 +224,10 @@ class Flow:
             for v in variables
             if v.kind is Kind.STATE and isinstance(v.type, Bool) and (v.name == FLAG or v.name in written)
         ]
-        return (*found, *flags)
+        return (*pending_states, *flags)
 
     def _ends(self, leaves: Sequence[str]) -> tuple[list[Node], list[Node]]:
-        """Return what tells phases apart, before the cycle and after it."""
+        """Return the nodes of a phase, before the cycle and after it."""
         cycle = self.asked.cycle
         return [cycle.before[leaf] for leaf in leaves], [cycle.after[leaf] for leaf in leaves]
 
@@ -239,7 +240,7 @@ class Flow:
     ) -> Iterator[tuple[set[Phase], bool]]:
         phases = sorted({phase for step in steps for phase in step})
         places = {phase: place for place, phase in enumerate(phases)}
-        for part in parts({(places[one], places[two]) for one, two in steps}):
+        for part in parts({(places[source], places[target]) for source, target in steps}):
             inside = {phases[place] for place in part}
             cycle, solver = self.asked.cycle, self.asked.known(self.clauses)
             ends = [
@@ -262,18 +263,18 @@ class Flow:
         terms = [keyed.term(node) for node in nodes]
         solver = self.asked.known(self.clauses)
         solver.add(*keyed.ranges, moves)
-        found: set[Way] = set()
-        while len(found) < MOST_STEPS:
+        steps: set[Way] = set()
+        while len(steps) < MOST_STEPS:
             answer = solver.check()
             if answer is Answer.UNSATISFIABLE:
                 self.asked.rested_on.append(solver)
-                return found
+                return steps
             if answer is Answer.UNKNOWN:
                 return None
             point = [
                 int(solver.value(term, sort(node.kind))) for node, term in zip(nodes, terms, strict=True)
             ]
-            found.add((tuple(point[: len(leaves)]), tuple(point[len(leaves) :])))
+            steps.add((tuple(point[: len(leaves)]), tuple(point[len(leaves) :])))
             same = [
                 keyed.has(term, node.kind, value)
                 for node, term, value in zip(nodes, terms, point, strict=True)
@@ -285,8 +286,8 @@ class Flow:
 
     def _turns(self, number: int, still: tuple[str, ...]) -> tuple[Turn, Turn, Turn]:
         """Return three cycles of a table in a row."""
-        one, two, three = (self._turn(cycle, number) for cycle in self._cycles(still))
-        return one, two, three
+        first, second, third = (self._turn(cycle, number) for cycle in self._cycles(still))
+        return first, second, third
 
     def _cycles(self, still: tuple[str, ...]) -> list[Cycle]:
         """Return three cycles in a row, from anywhere in the invariant, in which these inputs keep their values."""
@@ -321,17 +322,19 @@ class Flow:
     # --- from table to table ---
 
     def _tables_round(self) -> set[int]:
-        """Return the tables that may follow one another in a cycle while the command stays."""
+        """Return the tables that may follow one another in a loop while the command stays."""
         above, chosen = self.ts.links.above, self.ts.level.tables
         assert above is not None
         if isinstance(chosen, OneTable):
             return set()
         if isinstance(chosen.selector, Read) and chosen.selector.name in above.numbered:
             return set()  # the same under the same number: the contract
-        one, two, _ = self._cycles(())
+        first, second, _ = self._cycles(())
         term = self.keyed.term
-        goes_on = [term(values.both(cycle.contract, command_stays(self.ts, cycle))) for cycle in (one, two)]
-        runs = [[term(at.chosen) for at in cycle.tables] for cycle in (one, two)]
+        goes_on = [
+            term(values.both(cycle.contract, command_stays(self.ts, cycle))) for cycle in (first, second)
+        ]
+        runs = [[term(at.chosen) for at in cycle.tables] for cycle in (first, second)]
         solver = self.asked.known(self.clauses)
         self.asked.rested_on.append(solver)
         solver.add(*self.keyed.ranges, *goes_on)
@@ -358,10 +361,10 @@ def _stands_still(leaf: str, still: tuple[str, ...]) -> bool:
 
 
 def longest(steps: set[Way]) -> int | None:
-    """Return the number of steps on the longest path; None where there is a cycle."""
+    """Return the number of steps on the longest path; None if there is a loop."""
     onward: dict[Phase, list[Phase]] = {}
-    for one, two in sorted(steps):
-        onward.setdefault(one, []).append(two)
+    for source, target in sorted(steps):
+        onward.setdefault(source, []).append(target)
     length: dict[Phase, int] = {}
 
     def measure(phase: Phase, way: tuple[Phase, ...]) -> bool:
@@ -369,9 +372,9 @@ def longest(steps: set[Way]) -> int | None:
             return True
         if phase in way:
             return False
-        if not all(measure(one, (*way, phase)) for one in onward.get(phase, ())):
+        if not all(measure(following, (*way, phase)) for following in onward.get(phase, ())):
             return False
-        length[phase] = max((1 + length[one] for one in onward.get(phase, ())), default=0)
+        length[phase] = max((1 + length[following] for following in onward.get(phase, ())), default=0)
         return True
 
     if not all(measure(phase, ()) for phase in onward):
