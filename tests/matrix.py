@@ -223,7 +223,7 @@ def main() -> int:
             "#" if name == bug.property and name in found else "x" if name in found else "." for name in names
         )
         missed += bug.property not in found
-        said = found[bug.property].said if bug.property in found else "NOT CAUGHT"
+        said = found[bug.property].message if bug.property in found else "NOT CAUGHT"
         sys.stdout.write(f"{bug.name:54} {'yes' if proved else 'no':6}  {' '.join(marks)}  {said}\n")
     return int(bool(missed))
 

@@ -21,7 +21,7 @@ from rcsc_cell.episodes.loop import Loop, run
 from rcsc_cell.episodes.part_faults import fault_classes
 from rcsc_cell.episodes.sampling import MAKE_BOXT
 from rcsc_cell.properties import PROPERTIES
-from rcsc_cell.properties.cycle import Made
+from rcsc_cell.properties.cycle import PropertyClass
 from rcsc_cell.properties.failing import REASONS
 from rcsc_cell.properties.truth import CountsTrue, DoneTrue
 from tests.matrix import BUGS, Bug, findings, project, seed
@@ -127,11 +127,11 @@ def test_a_fault_changes_which_lines_match_and_ends_as_it_should(name: str) -> N
 # --- what is excused, and what is not ---
 
 
-def found_by(made: Made, episode: Episode, system: Path = SYSTEM) -> str:
+def found_by(made: PropertyClass, episode: Episode, system: Path = SYSTEM) -> str:
     """What one property alone says first; nothing where it holds."""
     loop = Loop(episode, system, properties=(made,))
     loop.finish()
-    return loop.findings[0].said if loop.findings else ""
+    return loop.findings[0].message if loop.findings else ""
 
 
 class DoneWithoutExcuse(DoneTrue):
@@ -142,7 +142,7 @@ class CountsWithoutExcuse(CountsTrue):
     changed_pickup: ClassVar[bool] = False
 
 
-OPEN: dict[str, tuple[Made, Episode, str]] = {
+OPEN: dict[str, tuple[PropertyClass, Episode, str]] = {
     "a PICKUP that is changed is counted": (
         CountsWithoutExcuse,
         replace(ACQUIRE, interruptions=(Interruption(166, "MOVE,,,WS-SAFE,"),)),

@@ -619,7 +619,7 @@ def test_what_kills_its_process_is_shrunk_all_the_same() -> None:
     assert [(fault.name, fault.first_tick == fault.last_tick) for fault in made.episode.faults] == [
         (fake.KILLS, True)
     ]
-    assert (made.found.property, made.log) == ("the process survives", b"")
+    assert (made.finding.property, made.log) == ("the process survives", b"")
 
 
 def test_a_file_without_an_episode_is_refused(tmp_path: Path) -> None:
@@ -675,7 +675,7 @@ def test_the_summary_counts_by_fault_and_does_not_know_the_order() -> None:
     ]  # fmt: skip
     assert (found.episodes, found.cycles, found.with_findings) == (4, 40, 3)
     assert found.ends == {"crash": 1, "done": 1, "failed:part_lost": 1, "failed:timeout": 1}
-    assert [(broken.property, broken.episodes, broken.first, broken.said) for broken in found.broken] == [
+    assert [(broken.property, broken.episodes, broken.first, broken.message) for broken in found.broken] == [
         ("p", 2, 1, "said 1"), ("q", 1, 2, "said 2"), ("r", 1, 3, "said 3"),
     ]  # fmt: skip
     assert [(reached.ran, reached.never) for reached in found.reached] == [(("1",), ("2",)), (("1",), ())]

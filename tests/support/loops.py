@@ -43,6 +43,6 @@ def keep(episode: Episode, outcome: EpisodeOutcome) -> str:
     (folder / "script.csv").write_text(script(episode.rows), encoding="utf-8")
     run(episode, log=folder / "log.mcap")
     said = "; ".join(
-        f"{finding.property}, cycle {finding.tick}: {finding.said}" for finding in outcome.findings
+        f"{finding.property}, cycle {finding.tick}: {finding.message}" for finding in outcome.findings
     )
     return f"{said}\nkept in {folder}; rcsc replay {folder / 'log.mcap'}\n{episode.to_json()}"

@@ -222,9 +222,9 @@ def _save(rig: Rig, seed: int, records: list[EpisodeRecord], pool: WorkerPool, f
             place = save(folder, rig, seed, choice, counterexample)
         _tell(
             f"episode {choice.index}",
-            counterexample.found.property,
-            counterexample.found.tick,
-            counterexample.found.said,
+            counterexample.finding.property,
+            counterexample.finding.tick,
+            counterexample.finding.message,
         )
         click.echo(f"  = help: rcsc campaign --again {place}", err=True)
         if counterexample.log:
@@ -247,5 +247,5 @@ def _again(path: Path, rig: Rig, executor: str | None) -> int:
         click.echo(f"{number:3}  {text:44} {state:8} {ticks:4} cycles{f'  {reason}' if reason else ''}")
     click.echo(f"{outcome.end} after {outcome.ticks} cycles")
     for finding in outcome.findings:
-        _tell(str(path), finding.property, finding.tick, finding.said)
+        _tell(str(path), finding.property, finding.tick, finding.message)
     return 1 if outcome.findings else 0

@@ -45,7 +45,7 @@ class BadEpisode(CodedError):  # noqa: N818  # what happened, not an error of ou
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """A finding that a counterexample is to be made of: an episode's number, its faults, and the property."""
+    """A finding to make a counterexample of: an episode's number, its faults, and the property."""
 
     index: int
     faults: tuple[str, ...]
@@ -57,17 +57,21 @@ class Choice:
 
 
 def choices(records: Iterable[EpisodeRecord]) -> tuple[Choice, ...]:
-    """For each property and set of faults the episode with the lowest number: others would likely shrink to the same.
+    """Choose the first episode for each property and set of faults: others would likely shrink to the same.
 
-    Whatever has several faults counts as one set. Those of fewer faults come first, as they say more.
+    All episodes of several faults count as one set. Fewer faults come first, as they say more.
     """
-    found: dict[tuple[str, tuple[str, ...]], Choice] = {}
-    for record in sorted(records, key=lambda one: one.index):
+    chosen: dict[tuple[str, tuple[str, ...]], Choice] = {}
+    for record in sorted(records, key=lambda record: record.index):
         for finding in record.findings:
             kind = record.faults if len(record.faults) < 2 else ("several",)
             choice = Choice(record.index, record.faults, finding.property)
-            found.setdefault((finding.property, kind), choice)
-    return tuple(sorted(found.values(), key=lambda one: (min(len(one.faults), 2), one.index, one.property)))
+            chosen.setdefault((finding.property, kind), choice)
+    return tuple(
+        sorted(
+            chosen.values(), key=lambda choice: (min(len(choice.faults), 2), choice.index, choice.property)
+        )
+    )
 
 
 def counterexamples(
@@ -96,7 +100,7 @@ def counterexamples(
 
 
 def _carefully(rig: Rig, seed: int, choice: Choice, pool: WorkerPool) -> Shrunk:
-    """Shrinks from here, so that a worker may die of each try."""
+    """Shrink from this process: a worker may die of each try."""
 
     def fails(episode: Episode) -> bool:
         return any(finding.property == choice.property for finding in _survived(rig, episode, pool).findings)
@@ -106,10 +110,10 @@ def _carefully(rig: Rig, seed: int, choice: Choice, pool: WorkerPool) -> Shrunk:
     try:
         return pool.call(logged, rig, least, choice.property)
     except Crashed:
-        found = next(
+        finding = next(
             finding for finding in _survived(rig, least, pool).findings if finding.property == choice.property
         )
-        return Shrunk(least, found, b"")
+        return Shrunk(least, finding, b"")
 
 
 def _survived(rig: Rig, episode: Episode, pool: WorkerPool) -> EpisodeOutcome:
@@ -123,34 +127,34 @@ def _survived(rig: Rig, episode: Episode, pool: WorkerPool) -> EpisodeOutcome:
 # --- as files ---
 
 
-def save(folder: Path, rig: Rig, seed: int, choice: Choice, made: Shrunk) -> Path:
-    """Writes a counterexample; the folder that has it.
+def save(folder: Path, rig: Rig, seed: int, choice: Choice, shrunk: Shrunk) -> Path:
+    """Write a counterexample and return its folder.
 
     Raises:
         OSError: It cannot be written.
     """
     place = folder / choice.name(seed)
     place.mkdir(parents=True, exist_ok=True)
-    said = _origin(rig, seed, choice) | {
-        "tick": made.found.tick,
-        "said": made.found.said,
+    facts = _origin(rig, seed, choice) | {
+        "tick": shrunk.finding.tick,
+        "said": shrunk.finding.message,
         "faults": list(choice.faults),
     }
-    write_atomically(place / "episode.json", made.episode.to_json().encode())
-    write_atomically(place / "script.csv", script(made.episode.rows).encode())
-    if made.log:
-        write_atomically(place / "log.mcap", made.log)
+    write_atomically(place / "episode.json", shrunk.episode.to_json().encode())
+    write_atomically(place / "script.csv", script(shrunk.episode.rows).encode())
+    if shrunk.log:
+        write_atomically(place / "log.mcap", shrunk.log)
     else:
         (place / "log.mcap").unlink(missing_ok=True)  # of another time
-    write_atomically(place / "finding.json", (json.dumps(said, indent=1) + "\n").encode())
+    write_atomically(place / "finding.json", (json.dumps(facts, indent=1) + "\n").encode())
     return place
 
 
 def is_saved(folder: Path, rig: Rig, seed: int, choice: Choice) -> bool:
-    """Whether the folder has this counterexample, of these tables; `finding.json` is written last."""
+    """Return whether the folder has this counterexample of these tables; `finding.json` is written last."""
     try:
-        said = json_of(text(folder / choice.name(seed) / "finding.json"))
-        return bool(said | _origin(rig, seed, choice) == said)
+        facts = json_of(text(folder / choice.name(seed) / "finding.json"))
+        return bool(facts | _origin(rig, seed, choice) == facts)
     except (OSError, ValueError, TypeError):
         return False
 
@@ -182,7 +186,7 @@ def saved_episode(path: Path) -> Episode:
 
 
 def again(path: Path, rig: Rig | None = None, executor: Kind | None = None) -> EpisodeOutcome:
-    """Runs a saved episode; what it raises is a finding, too. A regression case passes when there is none.
+    """Run a saved episode; what it raises is a finding, too. A regression case has none.
 
     Args:
         path: Its file or folder.

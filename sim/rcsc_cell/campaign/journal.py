@@ -85,7 +85,7 @@ def header(rig: Rig, seed: int) -> dict[str, Any]:
 
 
 def journal_path(rig: Rig, seed: int, folder: Path) -> Path:
-    """Where the journal is kept when nobody says: another one for other tables."""
+    """Return the default path of the journal, which depends on the tables."""
     return folder / "campaign" / f"{seed}-{rig.backend}-{rig.executor}-{digest(rig.system)[:16]}.jsonl"
 
 
@@ -140,7 +140,7 @@ class Journal:
         """
         new = list(records)
         self.records |= {episode_record.index: episode_record for episode_record in new}
-        self._file.write(b"".join(_line(_said(episode_record)) for episode_record in new))
+        self._file.write(b"".join(_line(_entry(episode_record)) for episode_record in new))
         self._file.flush()
 
     def close(self) -> None:
@@ -174,35 +174,35 @@ def _lock(file: BinaryIO, path: Path) -> None:
 
 def _compare(path: Path, line: bytes, head: dict[str, Any]) -> None:
     try:
-        found = read(dict[str, str | int], json_of(line))
+        kept = read(dict[str, str | int], json_of(line))
     except ValueError as error:
         raise BadJournal(f"{path} is no journal") from error
-    if not found.keys() >= {"form", "seed"}:
+    if not kept.keys() >= {"form", "seed"}:
         raise BadJournal(f"{path} is no journal")
     for name, why in _OTHERS.items():
-        if found.get(name) != head[name]:
-            raise BadJournal(f"{path} {why}: {str(found.get(name))[:_SHOWN]}, not {str(head[name])[:_SHOWN]}")
+        if kept.get(name) != head[name]:
+            raise BadJournal(f"{path} {why}: {str(kept.get(name))[:_SHOWN]}, not {str(head[name])[:_SHOWN]}")
 
 
-def _line(said: dict[str, Any]) -> bytes:
-    return json.dumps(said, separators=(",", ":")).encode() + b"\n"
+def _line(entry: dict[str, Any]) -> bytes:
+    return json.dumps(entry, separators=(",", ":")).encode() + b"\n"
 
 
-def _said(one: EpisodeRecord) -> dict[str, Any]:
+def _entry(record: EpisodeRecord) -> dict[str, Any]:
     return {
-        "index": one.index,
-        "faults": one.faults,
-        "end": one.end,
-        "ticks": one.ticks,
-        "findings": [[found.property, found.tick, found.said] for found in one.findings],
-        "lines": f"{one.lines:x}",
-        "digest": one.digest,
+        "index": record.index,
+        "faults": record.faults,
+        "end": record.end,
+        "ticks": record.ticks,
+        "findings": [[finding.property, finding.tick, finding.message] for finding in record.findings],
+        "lines": f"{record.lines:x}",
+        "digest": record.digest,
     }
 
 
 @dataclass(frozen=True, slots=True)
 class _Line:
-    """A record, as its line has it."""
+    """Return a record as its line's JSON."""
 
     index: int
     faults: list[str]
@@ -215,14 +215,16 @@ class _Line:
 
 def _read(path: Path, number: int, line: bytes) -> EpisodeRecord:
     try:
-        said: _Line = read(_Line, json_of(line))
-        found = tuple(EpisodeFinding(*finding) for finding in said.findings)
+        entry: _Line = read(_Line, json_of(line))
+        findings = tuple(EpisodeFinding(*finding) for finding in entry.findings)
         if (
-            min(said.index, said.ticks, *(finding.tick for finding in found), 0) < 0
-            or len(said.lines) > MOST_DIGITS
+            min(entry.index, entry.ticks, *(finding.tick for finding in findings), 0) < 0
+            or len(entry.lines) > MOST_DIGITS
         ):
             raise ValueError  # noqa: TRY301  # told below
-        lines = int(said.lines, 16)
-        return EpisodeRecord(said.index, tuple(said.faults), said.end, said.ticks, found, lines, said.digest)
+        lines = int(entry.lines, 16)
+        return EpisodeRecord(
+            entry.index, tuple(entry.faults), entry.end, entry.ticks, findings, lines, entry.digest
+        )
     except ValueError as error:
         raise BadJournal(f"{path}, line {number} is damaged") from error

@@ -1,4 +1,4 @@
-"""What a campaign plays on: which system, plant and executors; which lines its tables have; a digest of all that outcomes hang on."""
+"""What a campaign plays on: which system, plant and executors; which lines its tables have; a digest of all that outcomes depend on."""
 
 import hashlib
 from collections.abc import Callable, Iterable
@@ -58,13 +58,13 @@ def known_lines(system: Path) -> tuple[LineName, ...]:
     Raises:
         BadDescription: The system is not in order.
     """
-    said = description(system)
-    found = []
-    for name, sign in signatures(said).items():
-        level = next(one for one in sign.levels if one.name == name)
+    described = description(system)
+    lines = []
+    for name, sign in signatures(described).items():
+        level = next(level for level in sign.levels if level.name == name)
         tables = [level.table] if level.table else list(dict.fromkeys(level.tables.values()))
-        found += [(name, table, line) for table in tables for line in sign.tables.get(table, ())]
-    return tuple(found)
+        lines += [(name, table, line) for table in tables for line in sign.tables.get(table, ())]
+    return tuple(lines)
 
 
 @cache
@@ -80,23 +80,25 @@ def mask(lines: Iterable[LineName], system: Path) -> int:
 
 @cache
 def digest(system: Path) -> str:
-    """Of the generated executors, the data, the scripts, and the programs around them: equal digests, equal outcomes.
+    """Return the digest of executors, data, scripts and the programs around them: equal digests, equal outcomes.
 
     By content, so that it is the same in every checkout; taken once a process.
 
     Raises:
         BadDescription: The system is not in order.
     """
-    said = description(system)
-    hashed = hashlib.sha256("".join(f"{name} {one}\n" for name, one in fingerprints(said).items()).encode())
-    for name, path in _files(system, said.database):
+    described = description(system)
+    hashed = hashlib.sha256(
+        "".join(f"{name} {fingerprint}\n" for name, fingerprint in fingerprints(described).items()).encode()
+    )
+    for name, path in _files(system, described.database):
         content = path.read_bytes() if path.is_file() else b""
         hashed.update(f"{name} {len(content)}\n".encode() + content)
     return hashed.hexdigest()
 
 
 def _files(system: Path, data: Path) -> list[tuple[str, Path]]:
-    """What is hashed, under names that do not hang on where the checkout is."""
+    """Yield what is hashed, under names that are the same in every checkout."""
     root = Path(__file__).parents[3]
     sources = sorted(path for folder in _SOURCES for path in (root / folder).rglob("*.py"))
     named = [(path.relative_to(root).as_posix(), path) for path in sources]

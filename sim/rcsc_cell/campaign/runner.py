@@ -32,7 +32,7 @@ _AHEAD = 2
 def campaign(
     rig: Rig, seed: int, episodes: int, pool: WorkerPool, journal: Journal, poll_s: float = 0.5
 ) -> Iterator[Records]:
-    """Plays what the journal lacks of episodes 0 to `episodes` - 1; at least every `poll_s`, what came in since.
+    """Play the episodes below `episodes` that the journal lacks; yield, at least every `poll_s`, what came in.
 
     Raises:
         WorkersGone: Nobody is left to play.
@@ -88,7 +88,7 @@ class _Round:
         return tuple(record for future in done for record in self._taken(future))
 
     def _submit(self) -> None:
-        """Suspects fly alone, others together."""
+        """Run suspects alone, others together."""
         if self.flying and (self._alone or self._suspects):
             return
         self._alone = bool(self._suspects)
@@ -124,7 +124,7 @@ class _Round:
 
 
 def death(rig: Rig, took_s: float) -> EpisodeOutcome:
-    """What became of an episode that a worker died of after so long: one past the limit was ended for that."""
+    """Return the end of an episode that killed its worker after so long: a hang if past the limit."""
     if took_s > rig.limit_s:
         return odd(HANG, EpisodeFinding(ENDS, 0, no_end(rig)))
     return odd(CRASH, EpisodeFinding(SURVIVES, 0, "the process that ran it died"))

@@ -32,7 +32,7 @@ class _Search:
         self._seen = {episode}
 
     def try_(self, candidate: Episode) -> bool:
-        """Whether the candidate, which is simpler, fails, too; then it is the best."""
+        """Return whether the simpler candidate fails, too, and keep it if so."""
         if candidate in self._seen:
             return False
         if self._left == 0:
@@ -46,7 +46,7 @@ class _Search:
 
 
 def shrink(episode: Episode, fails: Fails, tries: int = MOST_TRIES) -> Episode:
-    """The episode, made as simple as it gets while it fails.
+    """Return the simplest episode nearby that still fails.
 
     Args:
         episode: It fails.
@@ -65,7 +65,7 @@ def shrink(episode: Episode, fails: Fails, tries: int = MOST_TRIES) -> Episode:
             for name in LISTS:
                 for at in range(len(getattr(search.best, name))):
                     _simplify(search, name, at)
-            _numbers(search, search.best, lambda one: one)
+            _numbers(search, search.best, lambda candidate: candidate)
             if search.best == before:
                 return before
     except _Spent:
@@ -89,7 +89,7 @@ def _put(search: _Search, name: str, value: Sequence[Any]) -> bool:
 
 
 def _backend(search: _Search) -> None:
-    """What shows without physics is easier to see, and costs a tenth."""
+    """Try kinematics, which is easier to follow and costs a tenth."""
     if search.best.backend != "kinematic":
         search.try_(replace(search.best, backend="kinematic"))
 
@@ -98,27 +98,29 @@ def _simplify(search: _Search, name: str, at: int) -> None:
     """Moves the numbers of one element."""
     held = getattr(search.best, name)
     if is_dataclass(held[at]):
-        _numbers(search, held[at], lambda one: _placed(search.best, name, at, one))
+        _numbers(search, held[at], lambda element: _placed(search.best, name, at, element))
 
 
-def _placed(episode: Episode, name: str, at: int, one: Any) -> Episode:
+def _placed(episode: Episode, name: str, at: int, element: Any) -> Episode:
     held = getattr(episode, name)
-    changed: dict[str, Any] = {name: (*held[:at], one, *held[at + 1 :])}
+    changed: dict[str, Any] = {name: (*held[:at], element, *held[at + 1 :])}
     return replace(episode, **changed)
 
 
 def _numbers(search: _Search, value: Any, placed: Callable[[Any], Episode]) -> None:
-    """Moves each number of a value toward what is usual: at once, to a round one, or by halves."""
+    """Move each number of a value toward the usual one: at once, to a round number, or by halves."""
     for field in fields(value):
         for _ in range(_HALVINGS):
-            found = next((one for one in _nearer(value, field) if search.try_(placed(one))), None)
-            if found is None:
+            nearer = next(
+                (candidate for candidate in _nearer(value, field) if search.try_(placed(candidate))), None
+            )
+            if nearer is None:
                 break
-            value = found
+            value = nearer
 
 
 def _nearer(value: Any, field: Field[Any]) -> Iterator[Any]:
-    """The value with one field nearer to what is usual; the nearest first."""
+    """Yield the value with one field nearer to the usual; the nearest first."""
     now, usual = getattr(value, field.name), _usual(value, field)
     if now == usual:
         return
@@ -127,22 +129,22 @@ def _nearer(value: Any, field: Field[Any]) -> Iterator[Any]:
     if isinstance(now, bool | str | tuple):
         return
     yield replace(value, **{field.name: usual})
-    for one in _between(now, usual):
-        yield replace(value, **{field.name: one})
+    for number in _between(now, usual):
+        yield replace(value, **{field.name: number})
 
 
 def _between(now: float, usual: float) -> Iterator[float]:
-    """Numbers nearer to the usual one: a half, a quarter, an eighth of the way; of fractions, round ones first."""
+    """Yield numbers nearer to the usual one: a half, a quarter, an eighth of the way; of a float, round ones first."""
     if isinstance(now, int):
         yield from (now + step for part in (2, 4, 8) if (step := int((usual - now) / part)))
         return
-    for one in (float(round(now)), round(now, 1), (now + usual) / 2):
-        if abs(one - usual) < abs(now - usual):
-            yield one
+    for number in (float(round(now)), round(now, 1), (now + usual) / 2):
+        if abs(number - usual) < abs(now - usual):
+            yield number
 
 
 def _usual(value: Any, field: Field[Any]) -> Any:
-    """A field's default; of a window's ends each the other, so that it narrows; else nothing."""
+    """Return a field's default; for the end of a window its other end, so that it narrows."""
     if field.name in _ENDS:
         return getattr(value, _ENDS[field.name])
     return 0 if field.default is MISSING else field.default

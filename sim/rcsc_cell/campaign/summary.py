@@ -1,7 +1,7 @@
 """The summary of a campaign: outcomes by fault, findings by property, lines reached.
 
-In: records and the tables' lines. Out: a `Summary`, as text and for JSON. It hangs on the records alone, in whatever order they came;
-what the clock says is added by who has one.
+In: records and the tables' lines. Out: a `Summary`, as text and for JSON. It depends on the records alone, not on their order;
+the caller adds times.
 """
 
 from collections import Counter
@@ -20,12 +20,12 @@ _WIDEST_SHOWN = 12
 
 @dataclass(frozen=True, slots=True)
 class Broken:
-    """A property that did not hold: in how many episodes, and in which first."""
+    """A property that did not hold, in how many episodes, and in which first."""
 
     property: str
     episodes: int
     first: int
-    said: str
+    message: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,21 +58,21 @@ class Summary:
 
 
 def summary(records: Iterable[EpisodeRecord], lines: Sequence[LineName], faults: Sequence[str]) -> Summary:
-    """Sums up.
+    """Sum up records.
 
     Args:
         records: In any order.
         lines: Of all tables, as `rcsc_cell.campaign.rig.known_lines` has them.
         faults: Fault classes, in the order in which they are to be shown.
     """
-    sorted_ = sorted(records, key=lambda one: one.index)
+    sorted_ = sorted(records, key=lambda record: record.index)
     counts: dict[str, Counter[str]] = {}
     ran = 0
     for record in sorted_:
         ran |= record.lines
         for fault in record.faults or (NOMINAL,):
             counts.setdefault(fault, Counter())[record.end.partition(":")[0]] += 1
-    ordered = [one for one in (NOMINAL, *faults) if one in counts]
+    ordered = [fault for fault in (NOMINAL, *faults) if fault in counts]
     return Summary(
         len(sorted_),
         sum(record.ticks for record in sorted_),
@@ -90,9 +90,9 @@ def _broken(records: Iterable[EpisodeRecord]) -> tuple[Broken, ...]:
     for record in records:
         episodes.update({finding.property for finding in record.findings})
         for finding in record.findings:
-            first.setdefault(finding.property, (record.index, finding.said))
-    found = (Broken(name, count, *first[name]) for name, count in episodes.items())
-    return tuple(sorted(found, key=lambda one: (-one.episodes, one.property)))
+            first.setdefault(finding.property, (record.index, finding.message))
+    every = (Broken(name, count, *first[name]) for name, count in episodes.items())
+    return tuple(sorted(every, key=lambda broken: (-broken.episodes, broken.property)))
 
 
 def _reached(ran: int, lines: Sequence[LineName]) -> tuple[LinesReached, ...]:
@@ -105,59 +105,72 @@ def _reached(ran: int, lines: Sequence[LineName]) -> tuple[LinesReached, ...]:
     )
 
 
-def as_text(found: Summary) -> str:
-    """For people, in lines."""
-    parts = [_outcomes(found), _coverage(found.reached)]
-    if found.broken:
-        parts.insert(1, _properties(found.broken))
+def as_text(summed: Summary) -> str:
+    """Return it as text."""
+    parts = [_outcomes(summed), _coverage(summed.reached)]
+    if summed.broken:
+        parts.insert(1, _properties(summed.broken))
     return "\n\n".join("\n".join(part) for part in parts) + "\n"
 
 
-def as_json(found: Summary) -> dict[str, Any]:
-    """For programs: what JSON keeps."""
+def as_json(summed: Summary) -> dict[str, Any]:
+    """Return it as JSON values."""
     return {
-        "episodes": found.episodes,
-        "cycles": found.cycles,
-        "episodes_with_findings": found.with_findings,
-        "outcomes_by_fault": found.by_fault,
-        "outcomes": found.ends,
+        "episodes": summed.episodes,
+        "cycles": summed.cycles,
+        "episodes_with_findings": summed.with_findings,
+        "outcomes_by_fault": summed.by_fault,
+        "outcomes": summed.ends,
         "findings": [
-            {"property": one.property, "episodes": one.episodes, "first": one.first, "said": one.said}
-            for one in found.broken
+            {
+                "property": broken.property,
+                "episodes": broken.episodes,
+                "first": broken.first,
+                "said": broken.message,
+            }
+            for broken in summed.broken
         ],
         "lines": [
-            {"level": one.level, "table": one.table, "reached": one.ran, "never": one.never}
-            for one in found.reached
+            {"level": table.level, "table": table.table, "reached": table.ran, "never": table.never}
+            for table in summed.reached
         ],
     }
 
 
-def _outcomes(found: Summary) -> list[str]:
-    seen = {end for counts in found.by_fault.values() for end in counts}
-    columns = [one for one in _FIRST if one in seen] + sorted(seen - set(_FIRST))
+def _outcomes(summed: Summary) -> list[str]:
+    seen = {end for counts in summed.by_fault.values() for end in counts}
+    columns = [column for column in _FIRST if column in seen] + sorted(seen - set(_FIRST))
     widths = [max(len(column), 6) for column in columns]
-    head = "  ".join(f"{one:>{wide}}" for one, wide in zip(columns, widths, strict=True))
-    longest = max([len("fault"), *map(len, found.by_fault)])
+    head = "  ".join(f"{column:>{wide}}" for column, wide in zip(columns, widths, strict=True))
+    longest = max([len("fault"), *map(len, summed.by_fault)])
     lines = [f"{'fault':{longest}}  {head}".rstrip()]
-    for fault, counts in found.by_fault.items():
-        cells = (f"{counts.get(one, 0) or '-':>{wide}}" for one, wide in zip(columns, widths, strict=True))
+    for fault, counts in summed.by_fault.items():
+        cells = (
+            f"{counts.get(column, 0) or '-':>{wide}}" for column, wide in zip(columns, widths, strict=True)
+        )
         lines.append(f"{fault:{longest}}  {'  '.join(cells)}")
     return lines
 
 
-def _properties(broken: Iterable[Broken]) -> list[str]:
-    found = list(broken)
-    longest = max(len(one.property) for one in found)
+def _properties(properties: Iterable[Broken]) -> list[str]:
+    listed = list(properties)
+    longest = max(len(broken.property) for broken in listed)
     head = f"{'property that did not hold':{longest}}  episodes  first"
     longest = max(longest, len("property that did not hold"))
-    return [head, *(f"{one.property:{longest}}  {one.episodes:8}  {one.first}: {one.said}" for one in found)]
+    return [
+        head,
+        *(
+            f"{broken.property:{longest}}  {broken.episodes:8}  {broken.first}: {broken.message}"
+            for broken in listed
+        ),
+    ]
 
 
 def _coverage(reached: Iterable[LinesReached]) -> list[str]:
     lines = []
     by_level: dict[str, list[LinesReached]] = {}
-    for one in reached:
-        by_level.setdefault(one.level, []).append(one)
+    for table in reached:
+        by_level.setdefault(table.level, []).append(table)
     for level, tables in by_level.items():
         ran, all_ = (
             sum(len(table.ran) for table in tables),

@@ -56,7 +56,7 @@ class Shrunk:
     """
 
     episode: Episode
-    found: EpisodeFinding
+    finding: EpisodeFinding
     log: bytes
 
 
@@ -109,12 +109,12 @@ def attempt(rig: Rig, episode: Episode, log: Path | None = None) -> EpisodeOutco
 
 
 def no_end(rig: Rig) -> str:
-    """What is said of an episode that hangs: the same however it was ended."""
+    """Return the finding of a hang: the same however it was ended."""
     return f"no end within {rig.limit_s:g} s"
 
 
 def odd(end: str, finding: EpisodeFinding) -> EpisodeOutcome:
-    """What became of an episode that has no outcome of its own."""
+    """Return the record of an episode without an outcome of its own."""
     return EpisodeOutcome((), (finding,), end, 0, frozenset(), "")
 
 
@@ -131,19 +131,19 @@ def shrunk(rig: Rig, wanted: str, seed: int, index: int, name: str) -> Shrunk:
 
 def fails_in(rig: Rig, name: str, episode: Episode) -> bool:
     """Whether a property does not hold in an episode."""
-    return any(found.property == name for found in attempt(rig, episode).findings)
+    return any(finding.property == name for finding in attempt(rig, episode).findings)
 
 
 def logged(rig: Rig, episode: Episode, name: str) -> Shrunk:
-    """The counterexample with its log, which is of what happened up to where it broke off."""
+    """Return the counterexample with its log, which holds the run up to where it ended."""
     with scratch("campaign") as folder:
         path = folder / "log.mcap"
         outcome = attempt(rig, episode, path)
-        found = next(
+        finding = next(
             (finding for finding in outcome.findings if finding.property == name),
             EpisodeFinding(name, 0, outcome.end),
         )
-        return Shrunk(episode, found, path.read_bytes() if path.is_file() else b"")
+        return Shrunk(episode, finding, path.read_bytes() if path.is_file() else b"")
 
 
 # --- the limit of time ---
@@ -196,7 +196,7 @@ def _by_alarm(seconds: float) -> Iterator[None]:
 
 @contextlib.contextmanager
 def _by_thread(seconds: float) -> Iterator[None]:
-    """For threads, which get no signals: another one raises it in this one, at its next step of Python."""
+    """Limit a thread, which gets no signals: another thread raises the exception in it, at its next step of Python."""
     lock, running = threading.Lock(), [True]
     target = ctypes.c_ulong(threading.get_ident())
 

@@ -1,4 +1,4 @@
-"""Who plays: any standard executor, and how one that broke is made anew.
+"""A pool of workers: any standard executor, and how to renew one that broke.
 
 In: processes here, or the address of a scheduler. Out: a `WorkerPool`.
 """
@@ -24,7 +24,7 @@ _CONNECT_S = 10
 
 
 class WorkersGone(CodedError):  # noqa: N818  # what happened, not an error of ours
-    """Nobody is left to play, or nobody was found; what is done is kept."""
+    """No workers remain, or none could be reached; what is done is kept."""
 
     code = Code.WORKERS_GONE
     helps = ("what is done is kept: the same command goes on from there",)
@@ -76,7 +76,7 @@ class WorkerPool:
         self.executor = self.renew()
 
     def call(self, task: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
-        """A task while nothing else is under way: if a worker dies, it dies of that.
+        """Run a task while nothing else is under way: if a worker dies, it dies of that.
 
         Raises:
             Crashed: It did.
@@ -93,15 +93,15 @@ class WorkerPool:
 
 @contextlib.contextmanager
 def processes(workers: int) -> Iterator[WorkerPool]:
-    """Processes on this machine, which begin anew rather than as copies: what this process holds open stays its own.
+    """Run processes on this machine, spawned rather than forked: what this process holds open stays its own.
 
     When it ends early, by an error or an interrupt, so do they.
     """
 
-    def made() -> Executor:
+    def new_executor() -> Executor:
         return children.executor(workers, own_process)
 
-    pool = WorkerPool(made(), workers, renew=made)
+    pool = WorkerPool(new_executor(), workers, renew=new_executor)
     try:
         yield pool
     except BaseException:

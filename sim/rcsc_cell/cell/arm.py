@@ -66,19 +66,19 @@ def skeleton(joints: Sequence[float]) -> tuple[Vector, ...]:
 
 
 def _frames(joints: Sequence[float]) -> list[Pose]:
-    made = []
+    frames = []
     here = Pose(((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), (0.0, 0.0, 0.0))
     for angle, (along_z, along_x, twist) in zip(joints, _LINKS, strict=True):
         c, s, ct = cos(angle), sin(angle), 0.0 if twist else 1.0
         turn: Rotation = ((c, -s * ct, s * twist), (s, c * ct, -c * twist), (0.0, twist, ct))
         here = here @ Pose(turn, (along_x * c, along_x * s, along_z))
-        made.append(here)
-    return made
+        frames.append(here)
+    return frames
 
 
 def solutions(wanted: Pose) -> list[Joints]:
-    """Every way to bring the plate there, at most eight, limits not looked at."""
-    return [one for arm in _arms(wanted) for one in _wrist(wanted.turn, *arm)]
+    """Return every way to bring the plate there, at most eight, ignoring limits."""
+    return [joints for arm in _arms(wanted) for joints in _wrist(wanted.turn, *arm)]
 
 
 def _arms(wanted: Pose) -> list[tuple[float, float, float]]:
@@ -135,7 +135,7 @@ def _wrist(turn: Rotation, first: float, second: float, third: float) -> list[Jo
 
 
 def solve(wanted: Pose, near: Sequence[float]) -> Joints | None:
-    """The way to bring the plate there that turns no joint far from where it is; None where none is within the limits.
+    """Return the solution that turns the joints least from where they are; None where none is within the limits.
 
     Args:
         wanted: The plate's pose.
@@ -145,23 +145,23 @@ def solve(wanted: Pose, near: Sequence[float]) -> Joints | None:
     for arm in _arms(wanted):
         if _unwound(arm, near, least) is None:
             continue
-        for one in _wrist(wanted.turn, *arm):
-            joints = _unwound(one, near, least)
+        for solution in _wrist(wanted.turn, *arm):
+            joints = _unwound(solution, near, least)
             if joints is not None:
                 best, least = joints, max(abs(a - b) for a, b in zip(joints, near, strict=True))
     return best
 
 
 def _unwound(joints: Joints, near: Sequence[float], least: float) -> Joints | None:
-    """The first joints, or all, by the turns that are nearest and within the limits; None where one turns as far as `least`."""
-    made = []
+    """Return the joints by their nearest turns within the limits; None where one turns as far as `least`."""
+    unwound = []
     for angle, before, (low, high) in zip(joints, near, LIMITS, strict=False):
         turned = angle - 2 * pi * round((angle - before) / (2 * pi))
         turned += 2 * pi * ((turned < low) - (turned > high))
         if not low <= turned <= high or abs(turned - before) >= least:
             return None
-        made.append(turned)
-    return tuple(made)
+        unwound.append(turned)
+    return tuple(unwound)
 
 
 def margins_deg(joints: Sequence[float]) -> tuple[float, ...]:

@@ -84,7 +84,7 @@ class JawController:
 
 @dataclass(slots=True)
 class ViseController(Kept):
-    """Takes the workstation's orders, and says from the measured jaws alone whether they are carried out.
+    """Take the workstation's orders, and report from the measured jaws alone whether they are carried out.
 
     An order is taken when its number is another than the last one's, and the first whatever its number. Before it the jaws do not move.
 

@@ -35,7 +35,7 @@ UPRIGHT: Rotation = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 @dataclass(frozen=True, slots=True)
 class _State:
-    """What the next cycle hangs on; faults are none of it."""
+    """What the next cycle depends on, without faults."""
 
     joints: Joints
     poses: list[Pose]
@@ -75,11 +75,11 @@ class Kinematic:
         self._rng = np.random.default_rng(self.seed)
 
     def __deepcopy__(self, memo: dict[int, object]) -> "Kinematic":
-        """Another that goes on by itself; the database is the same one."""
-        made = copy.copy(self)
-        made.faults, made._poses = replace(self.faults), list(self._poses)  # noqa: SLF001  # its own class
-        made._rng = copy.deepcopy(self._rng, memo)  # noqa: SLF001  # likewise
-        return made
+        """Copy it; the copy goes on by itself with the same database."""
+        other = copy.copy(self)
+        other.faults, other._poses = replace(self.faults), list(self._poses)  # noqa: SLF001  # its own class
+        other._rng = copy.deepcopy(self._rng, memo)  # noqa: SLF001  # likewise
+        return other
 
     # --- readings ---
 
@@ -100,13 +100,13 @@ class Kinematic:
         return tuple(self._poses)
 
     def touching(self) -> frozenset[tuple[str, str]]:
-        """What the hand holds: kinematics knows of no other contact."""
+        """Return what the hand holds, the only contact of kinematics."""
         return self._touching
 
     # --- put back after a stop ---
 
     def state(self) -> dict[str, Any]:
-        """All that the next cycle hangs on, in plain values; faults are none of it."""
+        """Return all that the next cycle depends on but faults, in plain values."""
         return cast(
             dict[str, Any],
             plain(
@@ -117,16 +117,16 @@ class Kinematic:
             ),
         )  # fmt: skip
 
-    def restore(self, said: Mapping[str, Any]) -> None:
+    def restore(self, state: Mapping[str, Any]) -> None:
         """Takes a state of the same cell.
 
         Raises:
             ValueError: It is of another.
         """
-        held: _State = read(_State, said)
+        held: _State = read(_State, state)
         if len(held.poses) != len(self.bodies) or not 0 <= (held.held or 0) < max(1, len(self.bodies)):
             raise ValueError("the state is of a cell with other parts")
-        if len(held.joints) != len(self._joints) or not finite(said):
+        if len(held.joints) != len(self._joints) or not finite(state):
             raise ValueError("the state is of another arm")
         put_noise(self._rng, held.noise)
         self._joints, self._poses, self._in_hand = held.joints, held.poses, held.in_hand
@@ -222,7 +222,7 @@ class Kinematic:
     # --- vise ---
 
     def _clamp(self, wanted_mm: tuple[float, float]) -> None:
-        """Jaws go to where they are sent, and no farther than a part between them lets them."""
+        """Move the jaws to where they are sent, as far as a part between them lets them."""
         part = self._in_vise()
         stops = (0.0 if part is not None else -6.0, 0.0)
         far = JAW_MM_S * CYCLE_S
@@ -249,11 +249,11 @@ class Kinematic:
     # --- camera ---
 
     def flood(self, wanted: Features, expected_mm: float) -> FoundPart | None:
-        """What the image processing would say of a flood picture."""
+        """Find the part as image processing would in a flood picture."""
         return perceive(self._tops(), wanted, expected_mm, self._rng, self._optics())
 
     def lines(self, expected_mm: float) -> Surface | None:
-        """What it would say of a picture with two lines: of the top below it, if lines fall on one where they are looked for."""
+        """Measure the top below from a picture with two lines, if the lines fall on it where they are looked for."""
         tops = [top for top in self._tops() if abs(top.range_mm - expected_mm) < LINE_MM]
         below = min(tops, key=lambda top: hypot(top.x_mm, top.y_mm), default=None)
         return None if below is None else perceive_surface(below, self._rng, self._optics())
@@ -291,21 +291,21 @@ def _top(body: Body, pose: Pose, camera: Pose) -> Top:
 
 
 def _extent(body: Body, pose: Pose, along: Vector) -> float:
-    """How wide a part is between parallel fingers that close along a direction: fingers turn it square first."""
+    """Return a part's width between fingers that close along a direction: they turn it square first."""
     sides = [abs(dot(pose.axis(axis), along)) for axis in range(3)]
     return body.size_mm[sides.index(max(sides))]
 
 
 def _square(turn: Rotation, along: Vector) -> Rotation:
-    """The nearest turn with one of the axes along the direction."""
+    """Return the nearest turn with an axis along the direction."""
     axes = list(transposed(turn))
     leans = [dot(axis, along) for axis in axes]
     first = max(range(3), key=lambda at: abs(leans[at]))
-    one = along if leans[first] > 0 else (-along[0], -along[1], -along[2])
+    aligned = along if leans[first] > 0 else (-along[0], -along[1], -along[2])
     second = axes[(first + 1) % 3]
-    lean = dot(second, one)
-    two = unit(minus(second, (lean * one[0], lean * one[1], lean * one[2])))
-    three = cross(one, two)
-    made: list[Vector] = [one, one, one]
-    made[first], made[(first + 1) % 3], made[(first + 2) % 3] = one, two, three
-    return transposed((made[0], made[1], made[2]))
+    lean = dot(second, aligned)
+    across = unit(minus(second, (lean * aligned[0], lean * aligned[1], lean * aligned[2])))
+    normal = cross(aligned, across)
+    rows: list[Vector] = [aligned, aligned, aligned]
+    rows[first], rows[(first + 1) % 3], rows[(first + 2) % 3] = aligned, across, normal
+    return transposed((rows[0], rows[1], rows[2]))

@@ -173,7 +173,7 @@ def _arm(database: Database) -> str:
 def _hand(database: Database) -> str:
     tool, (camera_x, camera_y, camera_z) = (
         database.hand.tool_mm * M,
-        (one * M for one in database.hand.camera_mm),
+        (length * M for length in database.hand.camera_mm),
     )
     root = 0.07
     fingers = "".join(_finger(side, sign, tool - root, database.hand.pad_mm * M) for side, sign in FINGERS)
@@ -211,28 +211,28 @@ def _metres(at_mm: Vector) -> str:
     return " ".join(f"{value * M:.6f}" for value in at_mm)
 
 
-def _station(one: Station) -> str:
-    x, y, z = one.frame.at_mm
+def _station(station: Station) -> str:
+    x, y, z = station.frame.at_mm
     half = (z / 2 - 20.0) * M
-    length, width = (size / 2 * M for size in one.size_mm)
-    vise = _vise(one.vise) + _machine() if one.vise else ""
-    vblock = _vblock(one.vblock) if one.vblock else ""
+    length, width = (size / 2 * M for size in station.size_mm)
+    vise = _vise(station.vise) + _machine() if station.vise else ""
+    vblock = _vblock(station.vblock) if station.vblock else ""
     return f"""<geom class="look" group="0" type="box" pos="{_metres((x, y, z / 2 - 20.0))}" size="0.06 0.06 {half:.6f}"
- {_turned(one.yaw_deg)} material="dark"/>
-<body name="{one.name}" pos="{_metres((x, y, z))}" {_turned(one.yaw_deg)}>
-<geom name="{one.name}_top" class="fixed" type="box" pos="0 0 -0.02" size="{length} {width} 0.02" material="table"/>
+ {_turned(station.yaw_deg)} material="dark"/>
+<body name="{station.name}" pos="{_metres((x, y, z))}" {_turned(station.yaw_deg)}>
+<geom name="{station.name}_top" class="fixed" type="box" pos="0 0 -0.02" size="{length} {width} 0.02" material="table"/>
 {vise}{vblock}</body>"""
 
 
-def _vise(said: Mapping[str, object]) -> str:
+def _vise(fixture: Mapping[str, object]) -> str:
     """A bed, and two jaws that close along x on it; a jaw at zero touches a part of the width that it is made for.
 
     The left jaw rests on its stop at zero: what is clamped against it lies where it should. The right one goes on until it meets
     something.
     """
-    length, width, height = (float(one) / 2 * M for one in said["bed_mm"])  # type: ignore[attr-defined]
-    half = float(said["between_mm"]) / 2 * M  # type: ignore[arg-type]
-    beyond = float(said["beyond_mm"]) * M  # type: ignore[arg-type]
+    length, width, height = (float(size) / 2 * M for size in fixture["bed_mm"])  # type: ignore[attr-defined]
+    half = float(fixture["between_mm"]) / 2 * M  # type: ignore[arg-type]
+    beyond = float(fixture["beyond_mm"]) * M  # type: ignore[arg-type]
     bed = f'<geom name="vise_bed" class="fixed" type="box" pos="0 0 {height}" size="{length} {width} {height}"/>\n'
     jaws = [
         f"""<body name="jaw_{side}" pos="{sign * half} 0 {2 * height + 0.004}" gravcomp="1">
@@ -252,12 +252,12 @@ def _machine() -> str:
 """
 
 
-def _vblock(said: Mapping[str, object]) -> str:
+def _vblock(fixture: Mapping[str, object]) -> str:
     """Two walls at 45 degrees along x, smooth, so that what is put between them slides home."""
     down, along, bottom, thick = (
-        float(said["wall_mm"]) * M,  # type: ignore[arg-type]
-        float(said["width_mm"]) / 2 * M,  # type: ignore[arg-type]
-        float(said["bottom_mm"]) * M,  # type: ignore[arg-type]
+        float(fixture["wall_mm"]) * M,  # type: ignore[arg-type]
+        float(fixture["width_mm"]) / 2 * M,  # type: ignore[arg-type]
+        float(fixture["bottom_mm"]) * M,  # type: ignore[arg-type]
         0.008,
     )
     slope = sqrt(0.5)
@@ -269,13 +269,13 @@ def _vblock(said: Mapping[str, object]) -> str:
     )
 
 
-def _part(number: int, one: Body) -> str:
-    x, y = ([row[axis] for row in one.turn] for axis in (0, 1))
-    length, width, height = (size / 2 * M for size in one.size_mm)
+def _part(number: int, body: Body) -> str:
+    x, y = ([row[axis] for row in body.turn] for axis in (0, 1))
+    length, width, height = (size / 2 * M for size in body.size_mm)
     axes = " ".join(f"{value:.9f}" for value in (*x, *y))
-    return f"""<body name="part{number}" pos="{_metres(one.at_mm)}" xyaxes="{axes}"><freejoint name="part{number}"/>
-<geom name="part{number}" class="part" type="box" size="{length} {width} {height}" density="{one.density_kg_m3}"
- friction="{one.friction} 0.003 0.0001"/></body>"""
+    return f"""<body name="part{number}" pos="{_metres(body.at_mm)}" xyaxes="{axes}"><freejoint name="part{number}"/>
+<geom name="part{number}" class="part" type="box" size="{length} {width} {height}" density="{body.density_kg_m3}"
+ friction="{body.friction} 0.003 0.0001"/></body>"""
 
 
 # --- drives and sensors ---

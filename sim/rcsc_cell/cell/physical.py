@@ -33,7 +33,7 @@ CLOSED_MM = 0.5
 
 @dataclass(frozen=True, slots=True)
 class _State:
-    """What the next cycle hangs on; faults are none of it."""
+    """What the next cycle depends on, without faults."""
 
     physics: list[float]
     goal: Joints
@@ -77,7 +77,7 @@ class Physical:
         self.reset()
 
     def reset(self) -> None:
-        """Everything as at first; what faults changed in the model too."""
+        """Reset everything, and what faults changed in the model."""
         self.faults = Faults()
         self.model.geom_friction[:] = self._friction
         mujoco.mj_resetData(self.model, self.data)
@@ -90,12 +90,12 @@ class Physical:
         mujoco.mj_forward(self.model, self.data)
 
     def __deepcopy__(self, memo: dict[int, object]) -> "Physical":
-        """Another that goes on by itself; the database is the same one."""
-        made = copy.copy(self)
-        made.model, made.data = copy.copy(self.model), copy.copy(self.data)
-        made.faults, made._cameras = replace(self.faults), {}  # noqa: SLF001  # its own class
-        made._rng = copy.deepcopy(self._rng, memo)  # noqa: SLF001  # likewise
-        return made
+        """Copy it; the copy goes on by itself with the same database."""
+        other = copy.copy(self)
+        other.model, other.data = copy.copy(self.model), copy.copy(self.data)
+        other.faults, other._cameras = replace(self.faults), {}  # noqa: SLF001  # its own class
+        other._rng = copy.deepcopy(self._rng, memo)  # noqa: SLF001  # likewise
+        return other
 
     # --- readings ---
 
@@ -139,22 +139,22 @@ class Physical:
     # --- put back after a stop ---
 
     def state(self) -> dict[str, Any]:
-        """All that the next cycle hangs on, in plain values; faults are none of it."""
+        """Return all that the next cycle depends on but faults, in plain values."""
         held = np.empty(mujoco.mj_stateSize(self.model, STATE))
         mujoco.mj_getState(self.model, self.data, held, STATE)
         state = _State(held.tolist(), self._goal, self._setpoint_m, self._jaw_goal, noise_of(self._rng))
         return cast(dict[str, Any], plain(state))
 
-    def restore(self, said: Mapping[str, Any]) -> None:
+    def restore(self, state: Mapping[str, Any]) -> None:
         """Takes a state of the same cell.
 
         Raises:
             ValueError: It is of another.
         """
-        held: _State = read(_State, said)
+        held: _State = read(_State, state)
         if len(held.physics) != mujoco.mj_stateSize(self.model, STATE):
             raise ValueError("the state is of a cell with other parts")
-        if len(held.goal) != len(self._goal) or not finite(said):
+        if len(held.goal) != len(self._goal) or not finite(state):
             raise ValueError("the state is of another arm")
         put_noise(self._rng, held.noise)
         mujoco.mj_setState(self.model, self.data, np.array(held.physics), STATE)

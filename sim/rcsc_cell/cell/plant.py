@@ -54,7 +54,7 @@ class _Words:
 
 @dataclass(frozen=True, slots=True)
 class Noise:
-    """A generator of noise, as numpy says it."""
+    """The state of a generator of noise, as numpy has it."""
 
     bit_generator: Literal["PCG64"]
     state: _Words
@@ -63,9 +63,9 @@ class Noise:
 
 
 def noise_of(rng: np.random.Generator) -> Noise:
-    """The generator's state."""
-    made: Noise = read(Noise, dict(rng.bit_generator.state))
-    return made
+    """Return the generator's state."""
+    noise: Noise = read(Noise, dict(rng.bit_generator.state))
+    return noise
 
 
 def put_noise(rng: np.random.Generator, noise: Noise) -> None:
@@ -132,10 +132,10 @@ class Mechanism(Protocol):
         ...
 
     def state(self) -> dict[str, Any]:
-        """All that the next cycle hangs on, in plain values."""
+        """Return all that the next cycle depends on, in plain values."""
         ...
 
-    def restore(self, said: Mapping[str, Any]) -> None:
+    def restore(self, state: Mapping[str, Any]) -> None:
         """Takes a state of the same cell; ValueError where it is of another."""
         ...
 
@@ -193,25 +193,25 @@ class Plant:
     # --- put back after a stop ---
 
     def state(self) -> dict[str, Any]:
-        """Controllers and mechanism in plain values; faults are none of it."""
+        """Return controllers and mechanism in plain values, without faults."""
         return {name: plain(getattr(self, name)) for name in CONTROLLERS} | {
             "mechanism": self.mechanism.state()
         }
 
-    def restore(self, said: Mapping[str, Any]) -> None:
+    def restore(self, state: Mapping[str, Any]) -> None:
         """Takes a state of the same cell.
 
         Raises:
             ValueError: It is of another, or of none.
         """
-        if set(said) != {*CONTROLLERS, "mechanism"}:
+        if set(state) != {*CONTROLLERS, "mechanism"}:
             raise ValueError("not the state of a plant")
         hints = get_type_hints(Plant)
-        held = {name: read(hints[name], said[name]) for name in CONTROLLERS}
-        strange = [name for name, one in held.items() if not alike(getattr(self, name), one)]
+        held = {name: read(hints[name], state[name]) for name in CONTROLLERS}
+        strange = [name for name, value in held.items() if not alike(getattr(self, name), value)]
         if strange:
             raise ValueError(f"not the state of the plant's `{strange[0]}`")
-        self.mechanism.restore(said["mechanism"])
+        self.mechanism.restore(state["mechanism"])
         for name, value in held.items():
             setattr(self, name, value)
 
@@ -236,13 +236,13 @@ class Plant:
     # --- vise ---
 
     def _pressed(self, right_mm: float, wanted_mm: float) -> float:
-        """Where the right jaw is sent: a weak one goes no farther in than `WEAK_MM`, and is not pushed out by that."""
+        """Return where the right jaw is sent: a weak one closes no farther than `WEAK_MM`, and is not pushed out by that."""
         return max(wanted_mm, min(right_mm, WEAK_MM)) if self.faults.vise_weak else wanted_mm
 
     # --- camera ---
 
     def _look(self, tick: int, order: Values | None) -> None:
-        """A flash is seen at once; what it shows is said some cycles later."""
+        """Take a flash at once; report what it shows some cycles later."""
         if order is not None and int(order[0]) != self._asked[0]:
             self._asked = (int(order[0]), tick)
             self._developing = (int(order[0]), *self._shot(int(order[1]), int(order[2])))
@@ -256,31 +256,31 @@ class Plant:
         if self.faults.blind or fire == DARK or expected_mm <= 0.0:
             return NO_PICTURE
         if fire == FLOOD:
-            found = self._found(wanted, expected_mm)
-            return NO_PICTURE if found is None else (True, *self._in_hand(found), False)
+            part = self._find(wanted, expected_mm)
+            return NO_PICTURE if part is None else (True, *self._in_hand(part), False)
         surface = self.mechanism.lines(expected_mm)
         if surface is None:
             return NO_PICTURE
         flat = surface.normal[2] >= FLAT_COS and not self.faults.tilted
         return (True, 0.0, 0.0, 1.0, 0.0, min(RANGE_MM, surface.range_mm), flat)
 
-    def _found(self, wanted: int, expected_mm: float) -> FoundPart | None:
-        """Where the camera sees the part; None where it sees none, or where none can be looked for."""
+    def _find(self, wanted: int, expected_mm: float) -> FoundPart | None:
+        """Return where the camera sees the part; None where it sees none, or cannot look."""
         size = self.database.sizes.get(wanted)
         if size is None or min(size) <= 0.0:
             return None
         return self.mechanism.flood(Features(size[0], size[1]), expected_mm)
 
-    def _in_hand(self, found: FoundPart) -> tuple[float, float, float, float, float]:
-        """From camera coordinates to the hand's: along the plate's x, to the left of it, and a turn about the vertical.
+    def _in_hand(self, part: FoundPart) -> tuple[float, float, float, float, float]:
+        """Convert camera coordinates to the hand's: along the plate's x, to its left, and a turn about the vertical.
 
         By that turn the plate's x comes to lie along the part's long side. The camera's picture has the plate's y to the right and
         its x up, and the hand looks down: its left is the picture's left.
         """
         camera_x, camera_y, _ = self.database.hand.camera_mm
-        x = camera_x + found.y_mm + self.faults.shifted_mm
-        y = -(camera_y + found.x_mm)
-        turn = atan2(-cos(found.roll_rad), sin(found.roll_rad))
+        x = camera_x + part.y_mm + self.faults.shifted_mm
+        y = -(camera_y + part.x_mm)
+        turn = atan2(-cos(part.roll_rad), sin(part.roll_rad))
         turn -= pi * round(turn / pi)
         far = max(-ASIDE_MM, min(ASIDE_MM, x)), max(-ASIDE_MM, min(ASIDE_MM, y))
-        return (*far, cos(turn), sin(turn), min(RANGE_MM, found.range_mm))
+        return (*far, cos(turn), sin(turn), min(RANGE_MM, part.range_mm))

@@ -45,7 +45,7 @@ class Passed:
 
 
 def checked(database: Database, cache: Cache | None = None) -> None:
-    """Has the arm go everywhere in the database, before anything moves.
+    """Check that the arm can go everywhere in the database, before anything moves.
 
     Args:
         database: The cell.
@@ -67,7 +67,7 @@ def checked(database: Database, cache: Cache | None = None) -> None:
 
 
 def _digest(database: Database) -> str:
-    """Of all that the database says, and of the rules of reach, which stand outside what a cache knows to be its tool."""
+    """Return the digest of the database and of the rules of reach, which a cache does not count as its tool."""
     hashed = hashlib.sha256(repr(database).encode())
     for rules in RULES:
         hashed.update(Path(__file__).with_name(rules).read_bytes())

@@ -56,7 +56,7 @@ def plant(
     if start is None:
         raise BadData(("the robot cannot be at its home",))
     here = lying(database) if parts is None else tuple(parts)
-    bodies = [one.body for one in here]
+    bodies = [part.body for part in here]
     mechanism: Mechanism
     if backend == "mujoco":
         from rcsc_cell.cell.physical import Physical  # MuJoCo is loaded only where it is asked for
@@ -64,4 +64,4 @@ def plant(
         mechanism = Physical(database, bodies, start, seed, make)
     else:
         mechanism = Kinematic(database, bodies, start, seed)
-    return Plant(database, mechanism, Robot(start), tuple(one.object for one in here))
+    return Plant(database, mechanism, Robot(start), tuple(part.object for part in here))

@@ -78,7 +78,7 @@ class Robot:
             self.joints = joints
 
     def refuse(self, number: int, command: int, measured: Sequence[float]) -> None:
-        """Fails an order, and stays where it is: a pose that was not reached must not pull the arm later."""
+        """Fail an order, and stay: a pose that was not reached must not pull the arm later."""
         self.number, self.command, self.refused = number, command, number
         if all(map(isfinite, measured)):
             self.joints = tuple(measured)

@@ -144,7 +144,7 @@ class Database:
 
     @property
     def queries(self) -> dict[str, Callable[..., Values]]:
-        """The questions by name, for the levels' feeds."""
+        """Return the queries by name, for the levels' feeds."""
         return {
             "place": self.place,
             "route": self.route,
@@ -170,7 +170,7 @@ class Listed:
 
 
 def tables_of(path: Path) -> dict[str, Listed]:
-    """Read every table of a database whole; each value is what its column says.
+    """Read every table of a database whole; check each value by its column.
 
     A file may come from anybody. Only the tables of `SCHEMA`, as they stand there, are looked at: a view, a trigger or a column
     that is computed would be a program of the file's own.
@@ -200,7 +200,7 @@ def _listed(held: sqlite3.Connection) -> dict[str, Listed]:
     held.set_progress_handler(lambda: next(turns) > MOST_STEPS, STEPS_APART)
     if sorted(held.execute(_MASTER)) != _schema()[0]:
         raise Malformed("it has other tables, or something beside them: run `rcsc db build`")
-    found, left = {}, MOST_ROWS
+    tables, left = {}, MOST_ROWS
     for name, columns in _schema()[1].items():
         rows = tuple(itertools.islice(held.execute(f"select * from {name}"), left + 1))  # noqa: S608  # of our schema
         left -= len(rows)
@@ -209,10 +209,10 @@ def _listed(held: sqlite3.Connection) -> dict[str, Listed]:
         for row in rows:
             for column, value in zip(columns, row, strict=True):
                 column.check(name, value)
-        found[name] = Listed(tuple(column.name for column in columns), rows)
+        tables[name] = Listed(tuple(column.name for column in columns), rows)
     if held.execute("pragma foreign_key_check").fetchone() is not None:
         raise Malformed("it names what it does not hold")
-    return found
+    return tables
 
 
 _MASTER = "select type, name, tbl_name, coalesce(sql, '') from sqlite_master"
@@ -235,7 +235,7 @@ class _Column:
 
 @functools.cache
 def _schema() -> tuple[list[Any], Mapping[str, tuple[_Column, ...]]]:
-    """What stands in the table of tables, and the columns of each."""
+    """Return the rows of the table of tables, and the columns of each."""
     held = sqlite3.connect(":memory:")
     try:
         held.executescript(SCHEMA)
@@ -253,7 +253,7 @@ def _schema() -> tuple[list[Any], Mapping[str, tuple[_Column, ...]]]:
 
 
 def fresh(path: Path, expected: str) -> bool:
-    """Whether the file is a database made of what `expected` is the digest of."""
+    """Return whether the file is a database built from what `expected` digests."""
     try:
         return tables_of(path)["meta"].rows == ((expected,),)
     except BadData:
@@ -315,15 +315,15 @@ def _station(name: str, row: Sequence[Any]) -> Station:
     return Station(name, frame, yaw, (length, width), _fixture(vise, VISE), _fixture(vblock, VBLOCK))
 
 
-def _fixture(said: str | None, kind: Mapping[str, Kind]) -> Mapping[str, Any]:
-    """The numbers of a fixture, as the data file may say them.
+def _fixture(text: str | None, kind: Mapping[str, Kind]) -> Mapping[str, Any]:
+    """Return the numbers of a fixture, checked as the data file's are.
 
     Raises:
         Malformed: They are others.
     """
-    if said is None:
+    if text is None:
         return {}
-    page = Document("", Source("", ""), json_of(said), Code.BAD_DATA)
+    page = Document("", Source("", ""), json_of(text), Code.BAD_DATA)
     page.check(Record(kind))
     if page.faults:
         raise Malformed(f"of a fixture {page.faults[0].message}")

@@ -176,7 +176,7 @@ Limits: TypeAlias = Mapping[str, Sequence[Sequence[Limit | None]]]
 
 @dataclass(frozen=True, slots=True)
 class At:
-    """What a fault is of, in words, and where that stands in the file."""
+    """What a fault is about, in words, and its place in the file."""
 
     words: str
     path: KeyPath
@@ -198,7 +198,7 @@ class Location:
     hand: Pose
 
     def moved(self, x_mm: float, y_mm: float, z_mm: float) -> "Location":
-        """The same, beside or above, along the station's axes."""
+        """Return it moved along the station's axes."""
         to = self.frame.point((x_mm, y_mm, z_mm))
         by = [a - b for a, b in zip(to, self.frame.at_mm, strict=True)]
         at = self.hand.at_mm
@@ -227,7 +227,7 @@ def read_data(path: Path) -> Document:
 
 
 def digest(data: Path, objects: Sequence[str], limits: Limits) -> str:
-    """What a database must have been made of to be fresh: the data, the tables' names and limits, and this module's rules."""
+    """Return the digest of a fresh database: of the data, the tables' names and limits, and this module."""
     hashed = hashlib.sha256(content(Path(__file__)) + "\0".join(objects).encode())
     hashed.update(repr(sorted(limits.items())).encode())
     hashed.update(content(data))
@@ -235,7 +235,7 @@ def digest(data: Path, objects: Sequence[str], limits: Limits) -> str:
 
 
 def build(data: Path, database: Path, objects: Sequence[str], limits: Limits | None = None) -> None:
-    """Makes the database anew.
+    """Build the database anew.
 
     Args:
         data: The data file.
@@ -256,32 +256,32 @@ def build(data: Path, database: Path, objects: Sequence[str], limits: Limits | N
 
 
 def _fill(database: Path, rows: "_Rows", data: Path, made_of: str) -> None:
-    made = sqlite3.connect(database)
+    connection = sqlite3.connect(database)
     try:
-        made.execute("pragma journal_mode = off")  # it is another's only when it is whole
-        made.executescript("pragma foreign_keys = on;" + SCHEMA)
-        made.execute("begin")
-        made.execute("pragma defer_foreign_keys = on")  # locations name one another
+        connection.execute("pragma journal_mode = off")  # it is another's only when it is whole
+        connection.executescript("pragma foreign_keys = on;" + SCHEMA)
+        connection.execute("begin")
+        connection.execute("pragma defer_foreign_keys = on")  # locations name one another
         for table, lines in rows.tables.items():
             for line in lines:
-                made.execute(f"insert into {table} values ({', '.join('?' * len(line))})", line)  # noqa: S608  # our own table names
-        made.execute("insert into meta values (?)", (made_of,))
-        made.commit()
+                connection.execute(f"insert into {table} values ({', '.join('?' * len(line))})", line)  # noqa: S608  # our own table names
+        connection.execute("insert into meta values (?)", (made_of,))
+        connection.commit()
     except sqlite3.Error as error:
         raise BadData((f"{data}: {error}; the database that was there is kept",)) from error
     finally:
-        made.close()
+        connection.close()
 
 
 class _Rows:
     """The rows of every table, and everything that is wrong with them."""
 
     def __init__(self, document: Document, objects: Sequence[str], limits: Limits) -> None:
-        said = document.value
-        self.document, self.said, self.objects, self.limits = document, said, objects, limits
+        toml = document.value
+        self.document, self.toml, self.objects, self.limits = document, toml, objects, limits
         self._ranges()
-        self.numbers = {name: at for at, name in enumerate(said["location"], 1)}
-        self.tool_mm = float(said["robot"]["tool_mm"])
+        self.numbers = {name: at for at, name in enumerate(toml["location"], 1)}
+        self.tool_mm = float(toml["robot"]["tool_mm"])
         self.points: list[tuple[Any, ...]] = []
         self.tables: dict[str, list[tuple[Any, ...]]] = {
             "objects": list(self._objects()),
@@ -292,7 +292,7 @@ class _Rows:
         }
         places = list(self._places())
         self.tables |= {"points": self.points, "places": places, "parts": list(self._parts())}
-        robot = said["robot"]
+        robot = toml["robot"]
         at = At("home", ("robot", "home"))
         home = self._place(robot["home"], None, at).plate(self.tool_mm)
         self._reached(home, at, "hand")
@@ -305,12 +305,12 @@ class _Rows:
 
     def _ranges(self) -> None:
         for key in ("reach_mm", "height_mm"):
-            low, high = self.said["robot"][key]
+            low, high = self.toml["robot"][key]
             if low > high:
                 self.wrong(At("robot", ("robot", key)), f"`{key}` goes from {low:g} to {high:g}")
 
     def _within(self, question: str, values: Sequence[Any], where: At, keys: Sequence[str] = ()) -> None:
-        """Every level that asks can hold every value of the answer, of which None is looked at elsewhere.
+        """Note every value of an answer that a level cannot hold; None is checked elsewhere.
 
         Args:
             question: What is asked.
@@ -337,29 +337,29 @@ class _Rows:
 
     def _objects(self) -> Iterator[tuple[Any, ...]]:
         camera_mm, pads_mm = self._view()
-        for name, one in self.said["object"].items():
-            length, width, height = map(float, one["size_mm"])
+        for name, part in self.toml["object"].items():
+            length, width, height = map(float, part["size_mm"])
             where = At(f"object `{name}`", ("object", name))
-            stock = int(one.get("stock", 0))
+            stock = int(part.get("stock", 0))
             expected = max(0.0, camera_mm - height)
-            depth = depth_mm(height, float(self.said["robot"]["pad_mm"]))
+            depth = depth_mm(height, float(self.toml["robot"]["pad_mm"]))
             grip = max(0.0, camera_mm - pads_mm - depth)
-            lift = height - depth - float(self.said["robot"]["hold_mm"]) if height > 0 else 0.0
+            lift = height - depth - float(self.toml["robot"]["hold_mm"]) if height > 0 else 0.0
             self._within("part", (expected, grip, lift), where)
             yield self._object(name, where), name, length, width, height, stock, expected, grip, lift
 
     def _view(self) -> tuple[float, float]:
-        """How far the camera is above the station where vision looks, and how far the pads are when they take the part there."""
-        for one in self.said["location"].values():
-            looks = self.said["location"].get(one.get("vupos", ""))
-            if one.get("vision") and looks is not None:
-                camera_z = self.tool_mm - float(self.said["robot"]["camera_mm"][2])
-                return float(looks["at"]["z"]) + camera_z, float(one["at"]["z"])
+        """Return the heights over the station of the camera where vision looks, and of the pads where they take the part."""
+        for location in self.toml["location"].values():
+            looks = self.toml["location"].get(location.get("vupos", ""))
+            if location.get("vision") and looks is not None:
+                camera_z = self.tool_mm - float(self.toml["robot"]["camera_mm"][2])
+                return float(looks["at"]["z"]) + camera_z, float(location["at"]["z"])
         return 0.0, 0.0
 
     def _grasps(self) -> Iterator[tuple[Any, ...]]:
-        for name, one in self.said["object"].items():
-            for grasp, how in one.get("grasp", {}).items():
+        for name, part in self.toml["object"].items():
+            for grasp, how in part.get("grasp", {}).items():
                 where = At(f"object `{name}`, grasp {grasp}", ("object", name, "grasp", grasp))
                 row = [float(how[key]) for key in GRASP]
                 self._within("fingers", row, where, tuple(GRASP))
@@ -371,34 +371,36 @@ class _Rows:
                 yield self._object(name, where), int(grasp), *row
 
     def _parts(self) -> Iterator[tuple[Any, ...]]:
-        for number, one in enumerate(self.said.get("part", ())):
-            where = At(f"part `{one['object']}`", ("part", number))
-            frame, at = self._frame(one.get("station"), where), one["at"]
+        for number, part in enumerate(self.toml.get("part", ())):
+            where = At(f"part `{part['object']}`", ("part", number))
+            frame, at = self._frame(part.get("station"), where), part["at"]
             x, y, z = frame.point((float(at["x"]), float(at["y"]), float(at.get("z", 0.0))))
             yield (
-                self._object(one["object"], where),
+                self._object(part["object"], where),
                 x,
                 y,
                 z,
-                float(at["yaw"]) + self._yaw(one.get("station")),
+                float(at["yaw"]) + self._yaw(part.get("station")),
             )
 
     # --- places ---
 
     def _locations(self) -> Iterator[tuple[Any, ...]]:
-        for name, one in self.said["location"].items():
+        for name, location in self.toml["location"].items():
             where = At(f"location `{name}`", ("location", name))
             links = ("vupos", "safe")
-            linked = [self._named(one.get(key), At(f"{where}, {key}", (*where.path, key))) for key in links]
-            flags = bool(one.get("vision")), bool(one.get("buffer"))
+            linked = [
+                self._named(location.get(key), At(f"{where}, {key}", (*where.path, key))) for key in links
+            ]
+            flags = bool(location.get("vision")), bool(location.get("buffer"))
             self._within("place", (*flags, *(to or 0 for to in linked)), where)
-            if one.get("vision") and linked[0] is None:
+            if location.get("vision") and linked[0] is None:
                 self.wrong(where, "vision needs a `vupos` to look from")
             yield (
                 self.numbers[name],
                 name,
-                int(one.get("vision", False)),
-                int(one.get("buffer", False)),
+                int(location.get("vision", False)),
+                int(location.get("buffer", False)),
                 *linked,
             )
 
@@ -410,16 +412,16 @@ class _Rows:
         return self.numbers.get(name)
 
     def _stations(self) -> Iterator[tuple[Any, ...]]:
-        for name, one in self.said.get("station", {}).items():
-            at, (length, width) = one["at"], map(float, one["size_mm"])
+        for name, station in self.toml.get("station", {}).items():
+            at, (length, width) = station["at"], map(float, station["size_mm"])
             where = (float(at["x"]), float(at["y"]), float(at["z"]), float(at["yaw"]))
-            vise = _floats(one["vise"], VISE) if "vise" in one else None
-            vblock = _floats(one["vblock"], VBLOCK) if "vblock" in one else None
+            vise = _floats(station["vise"], VISE) if "vise" in station else None
+            vblock = _floats(station["vblock"], VBLOCK) if "vblock" in station else None
             yield name, *where, length, width, vise, vblock
 
     def _trajectories(self) -> Iterator[tuple[Any, ...]]:
-        for name, one in self.said["trajectory"].items():
-            row = [one[key] for key in MOTION]
+        for name, trajectory in self.toml["trajectory"].items():
+            row = [trajectory[key] for key in MOTION]
             where = At(f"trajectory `{name}`", ("trajectory", name))
             self._within("point", (*[None] * 9, *row), where, tuple(MOTION))
             yield name, *row
@@ -427,17 +429,17 @@ class _Rows:
     def _frame(self, station: str | None, where: At) -> Pose:
         if station is None:
             return FLOOR
-        if station not in self.said.get("station", {}):
-            names = list(self.said.get("station", {}))
+        if station not in self.toml.get("station", {}):
+            names = list(self.toml.get("station", {}))
             self.wrong(where, f"no station is called `{station}`", *nearest(station, names))
             return FLOOR
-        at = self.said["station"][station]["at"]
+        at = self.toml["station"][station]["at"]
         return Pose(about_z(float(at["yaw"])), (float(at["x"]), float(at["y"]), float(at["z"])))
 
     def _yaw(self, station: str | None) -> float:
         return (
-            float(self.said["station"][station]["at"]["yaw"])
-            if station in self.said.get("station", {})
+            float(self.toml["station"][station]["at"]["yaw"])
+            if station in self.toml.get("station", {})
             else 0.0
         )
 
@@ -447,57 +449,57 @@ class _Rows:
         return Location(frame, frame @ Pose(turn, (float(at["x"]), float(at["y"]), float(at["z"]))))
 
     def _places(self) -> Iterator[tuple[Any, ...]]:
-        for name, one in self.said["location"].items():
+        for name, location in self.toml["location"].items():
             where = At(f"location `{name}`", ("location", name))
-            reference = self._place(one["at"], one.get("station"), where)
-            for sector, (x_mm, y_mm) in enumerate(one.get("sectors", [[0.0, 0.0]])):
-                yield self._row(name, one, sector, reference.moved(float(x_mm), float(y_mm), 0.0))
+            reference = self._place(location["at"], location.get("station"), where)
+            for sector, (x_mm, y_mm) in enumerate(location.get("sectors", [[0.0, 0.0]])):
+                yield self._row(name, location, sector, reference.moved(float(x_mm), float(y_mm), 0.0))
 
-    def _row(self, name: str, one: Mapping[str, Any], sector: int, place: Location) -> tuple[Any, ...]:
+    def _row(self, name: str, location: Mapping[str, Any], sector: int, place: Location) -> tuple[Any, ...]:
         key = self.numbers[name], sector
         where = At(f"location `{name}`, sector {sector}", ("location", name))
-        fine = "fine" if one.get("via") or one.get("approach") else "fast"
-        through = one.get("trajectory", "fast")
-        out = one.get("departure", one.get("via", ())[::-1])
+        fine = "fine" if location.get("via") or location.get("approach") else "fast"
+        through = location.get("trajectory", "fast")
+        out = location.get("departure", location.get("via", ())[::-1])
         departs = [self._point(where, key, "departure", to, through) for to in self._path(place, out, where)]
-        into = one.get("approach", one.get("via", ()))
+        into = location.get("approach", location.get("via", ()))
         comes = [self._point(where, key, "approach", to, through) for to in self._path(place, into, where)]
         comes.append(self._point(where, key, "arrival", place, fine))
         hover = self._point(where, key, "hover", place.moved(0.0, 0.0, HOVER_MM), "fast")
         grasp = self._point(where, key, "grasp", place, "fine")
-        view = self._point(where, key, "view", self._viewpoint(place, one, where), "fast")
+        view = self._point(where, key, "view", self._viewpoint(place, location, where), "fast")
         ways = departs[0] if departs else 0, len(departs), comes[0], len(comes), hover, grasp, view
         self._within("route", ways, where)
         return *key, *ways
 
-    def _path(self, place: Location, said: Sequence[Any], where: At) -> list[Location]:
-        """What the robot comes or goes through: a height, an offset, or another location."""
-        return [self._through(place, one, where) for one in said]
+    def _path(self, place: Location, steps: Sequence[Any], where: At) -> list[Location]:
+        """Return the locations on the way; each step is a height, an offset or another location."""
+        return [self._through(place, step, where) for step in steps]
 
-    def _through(self, place: Location, said: str | float | list[float], where: At) -> Location:
-        if isinstance(said, str):
-            other = self.said["location"].get(said)
+    def _through(self, place: Location, step: str | float | list[float], where: At) -> Location:
+        if isinstance(step, str):
+            other = self.toml["location"].get(step)
             if other is None:
-                self.wrong(where, f"no location is called `{said}`", *nearest(said, list(self.numbers)))
+                self.wrong(where, f"no location is called `{step}`", *nearest(step, list(self.numbers)))
                 return place
             return self._place(other["at"], other.get("station"), where)
-        if isinstance(said, list):
-            x_mm, y_mm, z_mm = map(float, said)
+        if isinstance(step, list):
+            x_mm, y_mm, z_mm = map(float, step)
             return place.moved(x_mm, y_mm, z_mm)
-        return place.moved(0.0, 0.0, float(said))
+        return place.moved(0.0, 0.0, float(step))
 
-    def _viewpoint(self, place: Location, one: Mapping[str, Any], where: At) -> Location:
-        """From where the camera, not the hand, would stand over the place: vision's second look is centred on the part."""
-        looks = self.said["location"].get(one.get("vupos", ""))
-        if not one.get("vision") or looks is None:
+    def _viewpoint(self, place: Location, location: Mapping[str, Any], where: At) -> Location:
+        """Return where the hand has its camera over the place: vision's second look is centred on the part."""
+        looks = self.toml["location"].get(location.get("vupos", ""))
+        if not location.get("vision") or looks is None:
             return place
         from_ = self._place(looks["at"], looks.get("station"), where)
-        camera_x, camera_y, _ = map(float, self.said["robot"]["camera_mm"])
+        camera_x, camera_y, _ = map(float, self.toml["robot"]["camera_mm"])
         above = from_.hand.point((-camera_x, -camera_y, 0.0))
         return Location(from_.frame, Pose(from_.hand.turn, above))
 
     def _reached(self, plate: Pose, where: At, role: str) -> None:
-        robot = self.said["robot"]
+        robot = self.toml["robot"]
         x_mm, y_mm, z_mm = plate.at_mm
         if not robot["reach_mm"][0] <= hypot(x_mm, y_mm) <= robot["reach_mm"][1]:
             self.wrong(where, f"the {role} is {hypot(x_mm, y_mm):.0f} mm from the base, out of reach")
@@ -507,7 +509,7 @@ class _Rows:
     def _point(self, where: At, key: tuple[int, int], role: str, place: Location, trajectory: str) -> int:
         plate = place.plate(self.tool_mm)
         self._reached(plate, where, role)
-        motions = self.said["trajectory"]
+        motions = self.toml["trajectory"]
         if trajectory in motions:
             self._within("point", nine(plate), where)
         else:
@@ -530,11 +532,11 @@ def depth_mm(height_mm: float, pad_mm: float) -> float:
 GRASPS = frozenset("0123456789")
 
 
-def _floats(said: Mapping[str, Any], keys: Iterable[str]) -> str:
-    """The numbers of a fixture, as JSON."""
+def _floats(fixture: Mapping[str, Any], keys: Iterable[str]) -> str:
+    """Return the numbers of a fixture as JSON."""
     return json.dumps(
         {
-            key: [float(x) for x in said[key]] if isinstance(said[key], list) else float(said[key])
+            key: [float(x) for x in fixture[key]] if isinstance(fixture[key], list) else float(fixture[key])
             for key in keys
         }
     )

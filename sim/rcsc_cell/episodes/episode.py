@@ -24,7 +24,7 @@ HARM = Literal["lost", "doubled", "stale", "delayed"]
 COLUMNS = "command,part,source,dest,end_at"
 
 FAULTS: Mapping[str, str] = {
-    **{one.name: "a switch of rcsc_cell.cell.faults" for one in fields(Faults)},
+    **{switch.name: "a switch of rcsc_cell.cell.faults" for switch in fields(Faults)},
     "lost": "a buffer: what is published in some cycles never arrives",
     "doubled": "a buffer: each value is read in two cycles, and every other one never",
     "stale": "a buffer: readers see one value for some cycles",
@@ -101,7 +101,7 @@ class Restart:
 
 @dataclass(frozen=True, slots=True)
 class Interruption:
-    """From this tick on TASK is given another command, whatever is under way; no interlock looks at it."""
+    """From this tick on TASK has another command, whatever is under way; no interlock checks it."""
 
     tick: int
     row: str
@@ -144,15 +144,15 @@ class Episode:
         Raises:
             ValueError: A backend, an executor, a fault or a harm that nobody knows; a number that is out of reach; a push with physics.
         """
-        known = {one.name for one in fields(Faults)}
-        for said, words in (
+        known = {switch.name for switch in fields(Faults)}
+        for word, words in (
             (self.backend, get_args(Backend)),
             (self.executor, get_args(Kind)),
             *((fault.name, known) for fault in self.faults),
             *((transport_spec.kind, get_args(HARM)) for transport_spec in self.transport),
         ):
-            if said not in words:
-                raise ValueError(f"{shown(said)} is none of {', '.join(sorted(words))}")
+            if word not in words:
+                raise ValueError(f"{shown(word)} is none of {', '.join(sorted(words))}")
         for what, number in self._numbers():
             low, high = REACH[what]
             if not low <= number <= high:
@@ -163,29 +163,29 @@ class Episode:
             raise ValueError("with physics nothing but a force moves a part")
 
     def _numbers(self) -> Iterator[tuple[str, float]]:
-        """Every number in it, by the name of its field."""
+        """Yield every number in it, by the name of its field."""
         yield from (("seed", self.seed), ("step_s", self.step_s))
-        for one in chain.from_iterable(getattr(self, name) for name in LISTS):
+        for element in chain.from_iterable(getattr(self, name) for name in LISTS):
             for name in REACH:
-                value = getattr(one, name, ())
+                value = getattr(element, name, ())
                 yield from ((name, number) for number in (value if isinstance(value, tuple) else (value,)))
 
     def to_json(self) -> str:
-        """As text that `from_json` reads; the same text for the same episode."""
+        """Return text that `from_json` reads; the same for the same episode."""
         return json.dumps(asdict(self), indent=1) + "\n"
 
     @classmethod
     def from_json(cls, text: str) -> "Episode":
-        """An episode that `to_json` wrote.
+        """Read an episode that `to_json` wrote.
 
         Raises:
             ValueError: The text is none.
         """
-        said = json_of(text)
-        if not isinstance(said, dict):
+        values = json_of(text)
+        if not isinstance(values, dict):
             raise ValueError("no episode: no table of names and values")  # noqa: TRY004  # what was read, not what was called
-        made: Episode = read(cls, {**plain(Episode()), **said})
-        return made
+        episode: Episode = read(cls, {**plain(Episode()), **values})
+        return episode
 
 
 LISTS = ("interruptions", "pushes", "rows", "faults", "transport", "restarts", "parts")
@@ -198,7 +198,7 @@ class EpisodeFinding:
 
     property: str
     tick: int
-    said: str
+    message: str
 
 
 @dataclass(frozen=True, slots=True)

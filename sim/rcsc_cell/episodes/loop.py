@@ -31,14 +31,14 @@ from rcsc_cell.episodes.setting import commands, operator_of, ready
 from rcsc_cell.episodes.setting import lying as lying_at
 from rcsc_cell.episodes.transport import Harmed
 from rcsc_cell.properties import PROPERTIES
-from rcsc_cell.properties.cycle import Command, CycleState, Made
+from rcsc_cell.properties.cycle import Command, CycleState, PropertyClass
 from rcsc_cell.workstation.script import BadScript
 
 MOST_TICKS_A_ROW = 2500
 """A run is given up after so many ticks for each row."""
 COOL_TICKS = 30
 """Watched after the end: nothing moves then."""
-USUAL: Mapping[str, float] = {one.name: getattr(Faults(), one.name) for one in fields(Faults)}
+USUAL: Mapping[str, float] = {switch.name: getattr(Faults(), switch.name) for switch in fields(Faults)}
 """How each switch stands when nothing is wrong: bools, integers and floats."""
 
 
@@ -63,7 +63,11 @@ class Loop:
     """
 
     def __init__(
-        self, episode: Episode, system: Path, log: Path | None = None, properties: Sequence[Made] = PROPERTIES
+        self,
+        episode: Episode,
+        system: Path,
+        log: Path | None = None,
+        properties: Sequence[PropertyClass] = PROPERTIES,
     ) -> None:
         self.episode = episode
         self.refused = ""
@@ -71,7 +75,7 @@ class Loop:
         self.lines: set[tuple[str, str, str]] = set()
         self._seen: set[tuple[str, int, int]] = set()
         self._digest, self._end, self._cool = hashlib.blake2b(digest_size=16), "", COOL_TICKS
-        said, signs, self.database = ready(system)
+        described, signs, self.database = ready(system)
         lying = [lying_at(self.database, part) for part in episode.parts]
         self.plant = plant(self.database, episode.backend, lying, episode.seed, Make(episode.step_s))
         self._signs = signs
@@ -84,25 +88,25 @@ class Loop:
                 replace(episode, rows=(), interruptions=()), self.database, signs["task"]
             )
         self.buffers = Harmed(episode.transport)
-        made = executors(said, signs, episode.executor)
+        by_level = executors(described, signs, episode.executor)
         levels = tuple(
-            running_level(spec, said, signs[spec.name], made[spec.name], self.database.queries)
-            for spec in said.levels
+            running_level(spec, described, signs[spec.name], by_level[spec.name], self.database.queries)
+            for spec in described.levels
         )
-        self.system = System(said, levels, (self.operator, self.plant), self.buffers)
+        self.system = System(described, levels, (self.operator, self.plant), self.buffers)
         self._packed = {level.name: level.sign.packed for level in levels}
         self._by = {level.name: level.sign.index.get(level.level.by, -1) for level in levels}
         self._recorder = None if log is None else Recorder(self.system, log)
         if self._recorder is not None:
             self.system.watch.append(self._recorder)
         self.system.watch.append(self._after)
-        twins = executors(said, signs, episode.executor)
+        twins = executors(described, signs, episode.executor)
         self.cycle = CycleState(
             self.database,
             self.plant,
             {level.name: level for level in levels},
             twins,
-            tuple(one.body for one in lying),
+            tuple(part.body for part in lying),
         )
         self.cycle.look()
         self.properties = [make(self.cycle) for make in properties]
@@ -114,7 +118,7 @@ class Loop:
 
     @property
     def over(self) -> bool:
-        """Whether everything was sent and answered, and has cooled down."""
+        """Return whether everything was sent and answered, and has cooled down."""
         return bool(self._end) or (self.operator.over and self._cool <= 0)
 
     def finish(self) -> EpisodeOutcome:
@@ -160,12 +164,12 @@ class Loop:
             self._find("no state-table error", str(error))
 
     def outcome(self) -> EpisodeOutcome:
-        """What has become of it so far; the log is closed."""
+        """Return what has become of it so far, and close the log."""
         if self._recorder is not None:
             self._recorder.close()
         for name, table, line in self._seen:
             sign = self._signs[name]
-            level = next(one for one in sign.levels if one.name == name)
+            level = next(level for level in sign.levels if level.name == name)
             called = level.table or level.tables.get(table, "?")
             self.lines.add((name, called, sign.tables[called][line] if called in sign.tables else ""))
         return EpisodeOutcome(
@@ -200,8 +204,8 @@ class Loop:
 
     def restart(self, level: str) -> None:
         """A level loses its state before the next cycle."""
-        one = Restart(self.system.tick, level)
-        self.episode = replace(self.episode, restarts=(*self.episode.restarts, one))
+        restart = Restart(self.system.tick, level)
+        self.episode = replace(self.episode, restarts=(*self.episode.restarts, restart))
 
     def change(self, row: str) -> None:
         """TASK gets another command in the next cycle.
@@ -210,14 +214,14 @@ class Loop:
             BadScript: The row says nothing.
             ValueError: It is none of TASK's.
         """
-        one = Interruption(self.system.tick, row)
-        self.operator.changes += commands((one,), self.operator)
-        self.episode = replace(self.episode, interruptions=(*self.episode.interruptions, one))
+        interruption = Interruption(self.system.tick, row)
+        self.operator.changes += commands((interruption,), self.operator)
+        self.episode = replace(self.episode, interruptions=(*self.episode.interruptions, interruption))
 
     def push(self, part: int, x_mm: float, y_mm: float) -> None:
         """Somebody pushes a part before the next cycle."""
-        one = Push(self.system.tick, part, x_mm, y_mm)
-        self.episode = replace(self.episode, pushes=(*self.episode.pushes, one))
+        push = Push(self.system.tick, part, x_mm, y_mm)
+        self.episode = replace(self.episode, pushes=(*self.episode.pushes, push))
 
     def _push(self, push: Push) -> None:
         mechanism = self.plant.mechanism
@@ -272,10 +276,10 @@ class Loop:
         ends = self.operator.ends
         cycle.row = ends[-1] if len(ends) > self._told else None
         self._told = len(ends)
-        for one in self.properties:
-            said = one.watch(cycle)
-            if said is not None:
-                self._find(one.name, said)
+        for watcher in self.properties:
+            violation = watcher.watch(cycle)
+            if violation is not None:
+                self._find(watcher.name, violation)
 
     def _command(self) -> None:
         """The command under way, and whether it has ended."""
@@ -303,16 +307,16 @@ class Loop:
 
     def _ordered(self, sent: Values) -> Command:
         cycle = self.cycle
-        said = {
+        leaves = {
             leaf.name.rpartition(".")[2]: (leaf, value)
             for leaf, value in zip(self.operator.station.order, sent, strict=True)
         }
 
         def number(name: str) -> int:
-            return int(said[name][1])
+            return int(leaves[name][1])
 
         def word(name: str) -> str:
-            leaf, value = said[name]
+            leaf, value = leaves[name]
             return leaf.shown(value)
 
         return Command(
@@ -329,9 +333,9 @@ class Loop:
             int(cycle.value("task", "current_loc")),
         )
 
-    def _find(self, name: str, said: str) -> None:
+    def _find(self, name: str, message: str) -> None:
         if all(finding.property != name for finding in self.findings):
-            self.findings.append(EpisodeFinding(name, self.system.tick, said))
+            self.findings.append(EpisodeFinding(name, self.system.tick, message))
 
 
 def run(episode: Episode, system: Path = SYSTEM, log: Path | None = None) -> EpisodeOutcome:

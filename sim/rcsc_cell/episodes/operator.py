@@ -84,7 +84,7 @@ class Operator:
         self._row, self._since = row, tick
 
     def _leave(self, tick: int) -> None:
-        """What was under way will not be answered."""
+        """Drop what was under way, which will not be answered."""
         if self._row is not None:
             self.ends.append(RowEnd(self._row.number, self._row.text, "changed", "", tick - self._since))
         elif not self.station.over and not self._alone and self._first >= 0:
@@ -108,7 +108,7 @@ class Operator:
         self._resume(tick, row, status, "" if holds == "null_obj" else holds)
 
     def _resume(self, tick: int, row: ScriptRow, status: str, holds: str) -> None:
-        """The script goes on behind the row that was changed; what the station believes of the hand is what TASK says of it."""
+        """Continue the script after the row that was changed, with what TASK reports of the hand."""
         if self._alone or self.station.over or status != "done":
             self._alone = True
             return
@@ -135,7 +135,7 @@ def order(station: Workstation, row: ScriptRow, number: int) -> Values:
     """
     if not row.robot:
         raise ValueError(f"`{row.text}` is no command of TASK's")
-    said: dict[str, Value | str] = {
+    values: dict[str, Value | str] = {
         "inc_command": number,
         "input_command": row.robot,
         "obj": row.part or "null_obj",
@@ -145,11 +145,11 @@ def order(station: Workstation, row: ScriptRow, number: int) -> Values:
         "end_at_locpt": station.locations.get(row.end_at, 0),
         "sector": row.sector,
     }
-    return tuple(_value(leaf, said[_last(leaf)]) for leaf in station.order)
+    return tuple(_value(leaf, values[_last(leaf)]) for leaf in station.order)
 
 
-def _value(leaf: Leaf, said: Value | str) -> Value:
-    return leaf.members.index(said) if isinstance(said, str) else said
+def _value(leaf: Leaf, value: Value | str) -> Value:
+    return leaf.members.index(value) if isinstance(value, str) else value
 
 
 def _last(leaf: Leaf) -> str:

@@ -41,9 +41,9 @@ def _asked(rows: Sequence[str]) -> Iterator[str]:
 
 
 def fault_classes(episode: Episode) -> tuple[str, ...]:
-    """Which of `FAULTS` an episode has, in their order; empty where it is nominal.
+    """Return which of `FAULTS` an episode has, in their order; empty where it is nominal.
 
-    Parts count only where the script asks for one: what lies about and is not asked for is no fault.
+    Only parts that the script asks for count.
     """
     has = {
         *(fault.name for fault in episode.faults),

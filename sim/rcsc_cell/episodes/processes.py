@@ -70,10 +70,10 @@ class Joined:
         def seen(name: str) -> Values | None:
             return latest(name) if name in self.shared else self._held.get(name)
 
-        given = [one.step(tick, seen) for one in (self.told, *self.others)]
-        said = {name: values for published in given for name, values in published.items()}
-        self._held |= {name: values for name, values in said.items() if name not in self.shared}
-        return {name: values for name, values in said.items() if name in self.shared}
+        given = [part.step(tick, seen) for part in (self.told, *self.others)]
+        outputs = {name: values for published in given for name, values in published.items()}
+        self._held |= {name: values for name, values in outputs.items() if name not in self.shared}
+        return {name: values for name, values in outputs.items() if name in self.shared}
 
 
 def outside(
@@ -92,16 +92,16 @@ def outside(
     from rcsc_cell.cell.ready import plant
 
     path = Path(system)
-    said = description(path)
-    signs = signatures(said)
-    held = database_of(said, signs, Path(database) if database else None)
+    described = description(path)
+    signs = signatures(described)
+    held = database_of(described, signs, Path(database) if database else None)
     station = workstation(read_script(script_path(script, path)), held.locations, signs["task"])
     station.begin_at(first)
-    shared = frozenset(wire.source for wire in said.wires)
+    shared = frozenset(wire.source for wire in described.wires)
     return [Joined(Told(station, Path(results)), (plant(held, backend),), shared)]
 
 
 def queries(system: str, database: str) -> dict[str, Query]:
     """The database's answers."""
-    said = description(Path(system))
-    return dict(database_of(said, signatures(said), Path(database) if database else None).queries)
+    described = description(Path(system))
+    return dict(database_of(described, signatures(described), Path(database) if database else None).queries)

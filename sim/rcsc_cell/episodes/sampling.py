@@ -165,27 +165,27 @@ def _harm(random: Random, episode: Episode) -> Episode:
     last = first + random.choice((0, 1, 3, 10, 40, 100))
     kind = random.choice(HARMS)
     ticks = random.choice((1, 3, 8)) if kind == "delayed" else 3
-    one = TransportSpec(random.choice(BUFFERS), kind, first, last, ticks)
-    return replace(episode, transport=(*episode.transport, one))
+    spec = TransportSpec(random.choice(BUFFERS), kind, first, last, ticks)
+    return replace(episode, transport=(*episode.transport, spec))
 
 
 def _restart(random: Random, episode: Episode) -> Episode:
-    one = Restart(when(random, episode.rows), random.choice(LEVELS))
-    return replace(episode, restarts=(*episode.restarts, one))
+    restart = Restart(when(random, episode.rows), random.choice(LEVELS))
+    return replace(episode, restarts=(*episode.restarts, restart))
 
 
 def _interruption(random: Random, episode: Episode) -> Episode:
     rows = (*EMPTY_HAND, "PAUSE,,,,", *NOT_LEGAL[:2])
-    one = Interruption(when(random, episode.rows), random.choice(rows))
-    return replace(episode, interruptions=(*episode.interruptions, one))
+    interruption = Interruption(when(random, episode.rows), random.choice(rows))
+    return replace(episode, interruptions=(*episode.interruptions, interruption))
 
 
 def _push(random: Random, episode: Episode) -> Episode:
     if episode.backend != "kinematic" or not episode.parts:
         return _switch(random, episode)
     x_mm, y_mm = (random.choice((-40.0, -5.0, 0.0, 5.0, 40.0)) for _ in range(2))
-    one = Push(when(random, episode.rows), random.randrange(len(episode.parts)), x_mm, y_mm)
-    return replace(episode, pushes=(*episode.pushes, one))
+    push = Push(when(random, episode.rows), random.randrange(len(episode.parts)), x_mm, y_mm)
+    return replace(episode, pushes=(*episode.pushes, push))
 
 
 def _other_parts(random: Random, episode: Episode) -> Episode:
@@ -203,14 +203,14 @@ def _another(random: Random, part: PartSpec) -> tuple[PartSpec, ...]:
 
 
 def _two(random: Random, part: PartSpec) -> tuple[PartSpec, ...]:
-    """One beside the other, or so that they are nearly one patch."""
+    """Draw parts side by side, or so close that they are nearly one patch."""
     gap_mm = random.choice((105.0, 130.0, 150.0))
     y_mm = part.y_mm - gap_mm if part.y_mm > 0 else part.y_mm + gap_mm
     return (part, replace(part, object=random.choice((part.object, *KINDS)), y_mm=round(y_mm, 1), size_mm=()))
 
 
 def _sized(random: Random, part: PartSpec) -> tuple[PartSpec, ...]:
-    """Off by less than is tolerated, by a little more, by much."""
+    """Draw an offset: within the tolerance, just beyond it, or far beyond."""
     more_mm = [random.choice((0.0, 1.0, -1.0, 2.5, -2.5, 10.0, -10.0)) for _ in range(3)]
     size = tuple(a + b for a, b in zip(SIZES[part.object], more_mm, strict=True))
     return (replace(part, size_mm=size),)

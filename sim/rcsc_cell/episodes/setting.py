@@ -38,10 +38,10 @@ def ready(system: Path) -> tuple[Description, dict[str, Signature], Database]:
 def _ready(
     system: Path, _files: tuple[tuple[str, int], ...]
 ) -> tuple[Description, dict[str, Signature], Database]:
-    said = description(system)
-    signs = signatures(said)
-    needs_cell(said, signs)
-    return said, signs, database_of(said, signs)
+    described = description(system)
+    signs = signatures(described)
+    needs_cell(described, signs)
+    return described, signs, database_of(described, signs)
 
 
 @lru_cache(maxsize=1024)
@@ -71,16 +71,16 @@ def operator_of(episode: Episode, database: Database, task: Signature) -> Operat
 
 
 def commands(changes: Iterable[Interruption], operator: Operator) -> list[tuple[int, ScriptRow]]:
-    """Ticks and rows; a row that TASK cannot be told is refused now."""
-    found = []
-    for one in sorted(changes, key=lambda change: change.tick):
-        [row] = rows_of((one.row,))
+    """Return ticks and rows; a row that TASK cannot be told is refused now."""
+    timed_rows = []
+    for change in sorted(changes, key=lambda change: change.tick):
+        [row] = rows_of((change.row,))
         for name in (row.source, row.dest, row.end_at):
             if name and name not in operator.station.locations:
                 raise BadScript(f"no location is called `{name}`")
         order(operator.station, row, 0)
-        found.append((one.tick, row))
-    return found
+        timed_rows.append((change.tick, row))
+    return timed_rows
 
 
 def lying(database: Database, part: PartSpec) -> Lying:

@@ -60,9 +60,9 @@ class Timed:
         """The plant's."""
         return self.inner.state()
 
-    def restore(self, said: Mapping[str, object]) -> None:
+    def restore(self, state: Mapping[str, object]) -> None:
         """The plant's."""
-        self.inner.restore(said)
+        self.inner.restore(state)
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,12 +72,12 @@ class PartPlace:
     part: str
     place: str
     wanted_mm: Vector
-    found_mm: Vector
+    actual_mm: Vector
 
     @property
     def error_mm(self) -> float:
         """How far apart they are."""
-        x, y, z = minus(self.found_mm, self.wanted_mm)
+        x, y, z = minus(self.actual_mm, self.wanted_mm)
         return float((x * x + y * y + z * z) ** 0.5)
 
 
@@ -150,7 +150,7 @@ class Witness:
         return self.figure(self.run.system)
 
     def figure(self, system: System) -> str:
-        """The stick figure as PRIMITIVE has it told (section 10)."""
+        """Return the stick figure from PRIMITIVE's values (section 10)."""
         level = system.level("primitive")
         numbers = tuple(float(level.values[at]) for at in level.sign.record("to_robot.plate"))
         pose = pose_of(numbers)
@@ -167,7 +167,7 @@ class Witness:
             self._tell(self.live)
 
     def _tell(self, live: "Live") -> None:
-        """What has become of the rows; those to come stand there from the start."""
+        """Show what became of the rows; those to come are listed from the start."""
         station = self.run.station
         if self._told < 0:
             for row in station.rows:
@@ -219,7 +219,7 @@ class Witness:
                 Placement(
                     f"{placed.part} at {placed.place}",
                     _shown(placed.wanted_mm),
-                    _shown(placed.found_mm),
+                    _shown(placed.actual_mm),
                     placed.error_mm,
                 )
                 for placed in self.placed()
@@ -244,7 +244,7 @@ def names(system: System) -> tuple[str, ...]:
 
 
 def placements(results: list[RowResult], database: Database, plant: Plant) -> tuple[PartPlace, ...]:
-    """Where parts that rows put somewhere should lie, and the nearest part of the kind; the last row counts."""
+    """Return where rows should have put parts, and the nearest part of the kind; the last row counts."""
     put: dict[str, tuple[str, int]] = {}
     held = ""
     for result in results:
@@ -256,9 +256,9 @@ def placements(results: list[RowResult], database: Database, plant: Plant) -> tu
         if row.robot in PUTS and row.dest and held:
             put[row.dest] = (held, row.sector)
     return tuple(
-        found
+        placement
         for place, (part, sector) in put.items()
-        for found in _nearest(place, part, sector, database, plant)
+        for placement in _nearest(place, part, sector, database, plant)
     )
 
 
@@ -288,7 +288,7 @@ def _upright(place: str, sector: int, number: int, database: Database) -> Vector
 
 
 def _surface(database: Database, at: Vector, lowest_mm: float) -> float:
-    """What a part rests on whose lowest point is so high: the vise's bed, or the station's top."""
+    """Return what a part with its lowest point so high rests on: the vise's bed, or the station's top."""
     station = database.station_below(at)
     if station is None:
         return lowest_mm
@@ -296,9 +296,9 @@ def _surface(database: Database, at: Vector, lowest_mm: float) -> float:
 
 
 def _leaf(system: System, name: str) -> float:
-    level_name, _, leaf = name.partition(".")
+    level_name, _, leaf_name = name.partition(".")
     level = system.level(level_name)
-    at = next(at for at, one in enumerate(level.sign.leaves) if one.name == leaf)
+    at = next(at for at, leaf in enumerate(level.sign.leaves) if leaf.name == leaf_name)
     return float(level.values[at])
 
 

@@ -32,7 +32,7 @@ class History:
     _seen: int = 0
 
     def add(self, tick: int, values: Mapping[str, Value]) -> None:
-        """The moment after the last; one that is not after it takes the run back."""
+        """Add a moment; one that is not after the last takes the run back."""
         if self.moments and tick <= self.moments[-1][0]:
             del self.moments[bisect_right(self.moments, tick - 1, key=lambda moment: moment[0]) :]
             self.era += 1
@@ -115,10 +115,10 @@ class Board:
             self._history.add(tick, kept)
             self._tick, self._values = tick, kept
             for name, before in list(self._choosers.items()):
-                said = str(kept.get(name, ""))
-                if said != before:  # the one that changed last comes last
+                text = str(kept.get(name, ""))
+                if text != before:  # the one that changed last comes last
                     del self._choosers[name]
-                    self._choosers[name] = said
+                    self._choosers[name] = text
 
     def frame(self, kind: str, svg: str) -> None:
         """The latest picture of a kind."""
@@ -145,7 +145,7 @@ class Board:
             return self._history.since(tick)
 
     def _display(self) -> Display | None:
-        """By the variable that changed last, of those that name a set."""
+        """Choose by the last changed of the variables that name a set."""
         for name, value in reversed(self._choosers.items()):
             if value in self._displays:
                 return Display(name, value)

@@ -78,7 +78,7 @@ class Live:
         tick_ms: int = 40,
         title: str = "rcsc",
     ) -> None:
-        """Nothing is opened yet.
+        """Prepare the page; open nothing yet.
 
         Args:
             names: All variables that `publish` will give.
@@ -195,10 +195,10 @@ class Live:
         response.headers.update({**HEADERS, "Content-Security-Policy": policy(self.address[1])})
 
     async def _file(self, request: web.Request) -> web.Response:
-        found = _FILES.get(request.match_info["name"])
-        if found is None:
+        file = _FILES.get(request.match_info["name"])
+        if file is None:
             raise web.HTTPNotFound
-        name, kind = found
+        name, kind = file
         text = files("rcsc_cell.live").joinpath(name).read_text(encoding="utf-8")
         return web.Response(text=text, content_type=kind)
 
@@ -247,7 +247,7 @@ class Live:
             told.watched, told.tick = wanted, -2
 
     def _news(self, told: _Told) -> dict[str, Any]:
-        """What the page has not been told yet; notes that it has."""
+        """Return what is new to the page, and note that it was told."""
         latest = self._board.latest()
         news = self._shown(latest, told)
         if latest.tick != told.tick or latest.era != told.era:
@@ -273,12 +273,12 @@ class Live:
         return news
 
     def _series(self, latest: Latest, told: _Told) -> dict[str, Any]:
-        """Points by variable: all of those that are new to the page or void, of the others what came since."""
+        """Return points by variable: all of a variable new to the page or void, else what came since."""
         if latest.era != told.era:
             told.era, told.fresh = latest.era, set(told.watched)
         since = self._board.since(told.moment)
         whole = self._board.since(-1) if told.fresh else []
-        made = {
+        series = {
             name: {
                 "whole": name in told.fresh,
                 "points": _points(whole if name in told.fresh else since, name),
@@ -287,16 +287,16 @@ class Live:
         }
         told.moment = max((moments[-1][0] for moments in (since, whole) if moments), default=told.moment)
         told.fresh = set()
-        return made
+        return series
 
 
 def watched(text: str, names: frozenset[str]) -> tuple[str, ...] | None:
-    """The variables that a message from the page asks for; None where it is no such message."""
+    """Return the variables that a message from the page asks for; None for any other message."""
     try:
-        said = json_of(text, DEEPEST_MESSAGE)
+        message = json_of(text, DEEPEST_MESSAGE)
     except Malformed:
         return None
-    wanted = said.get("watch") if isinstance(said, dict) else None
+    wanted = message.get("watch") if isinstance(message, dict) else None
     if not isinstance(wanted, list) or len(wanted) > MOST_WATCHED:
         return None
     if not all(isinstance(name, str) and name in names for name in wanted):
@@ -313,9 +313,9 @@ def _points(moments: Sequence[Moment], name: str) -> list[list[Any]]:
 
 
 def _plain(value: Value | None) -> Value | None:
-    """What JSON can hold: a number that is not finite is none."""
+    """Return what JSON can hold: None for a number that is not finite."""
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def _json(said: Mapping[str, Any]) -> str:
-    return json.dumps(said, separators=(",", ":"), allow_nan=False)
+def _json(message: Mapping[str, Any]) -> str:
+    return json.dumps(message, separators=(",", ":"), allow_nan=False)

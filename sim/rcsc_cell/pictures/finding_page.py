@@ -71,19 +71,19 @@ def _tick(frame: LoggedTick, log: Log, finding: LoggedFinding, cell: DrawnCell |
 
 
 def _notes(log: Log, finding: LoggedFinding) -> list[str]:
-    """What holds of the whole run."""
+    """Return what holds of the whole run, a sentence each."""
     at, many = finding.broken_at, len(log.ticks)
     begun = (
         f"The shortest run that shows it, of system `{log.facts['name']}`: broken in cycle {at} of {many}."
     )
-    said = [f"{begun} The interpreter, the Python and the C executors all did this."]
+    notes = [f"{begun} The interpreter, the Python and the C executors all did this."]
     if finding.restarted:
-        said.append("It begins where a restart does, not with the initial values.")
+        notes.append("It begins where a restart does, not with the initial values.")
     if not finding.legal:
-        said.append("Numbers have gone round, or a neighbour was restarted before it begins.")
+        notes.append("Numbers have gone round, or a neighbour was restarted before it begins.")
     if finding.altered:
-        said.append("The tables were looked at under another rule than the language's: a demonstration.")
-    return said
+        notes.append("The tables were looked at under another rule than the language's: a demonstration.")
+    return notes
 
 
 def _cell(cell: DrawnCell | None, why_not: str) -> str:

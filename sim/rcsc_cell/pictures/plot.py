@@ -56,15 +56,15 @@ def _y(value: float, room: tuple[float, float]) -> float:
 
 def _axes(span: tuple[float, float], room: tuple[float, float]) -> Iterator[str]:
     grid = 'stroke="currentColor" stroke-opacity=".2" stroke-width=".7"'
-    said = 'fill="currentColor" fill-opacity=".75"'
+    ink = 'fill="currentColor" fill-opacity=".75"'
     for value in ticks(*room, 5):
         y = _y(value, room)
         yield f'<path d="M{_LEFT} {y:.1f}h{_ACROSS}" {grid}/>'
-        yield f'<text x="{_LEFT - 6}" y="{y + 3:.1f}" text-anchor="end" {said}>{escape(f"{value:.6g}")}</text>'
+        yield f'<text x="{_LEFT - 6}" y="{y + 3:.1f}" text-anchor="end" {ink}>{escape(f"{value:.6g}")}</text>'
     for at in ticks(*span, 10):
         x = _x(at, span)
         yield f'<path d="M{x:.1f} {_TOP}v{_HIGH}" {grid}/>'
-        yield f'<text x="{x:.1f}" y="{HEIGHT_PX - 6}" text-anchor="middle" {said}>{escape(f"{at:.6g}")} s</text>'
+        yield f'<text x="{x:.1f}" y="{HEIGHT_PX - 6}" text-anchor="middle" {ink}>{escape(f"{at:.6g}")} s</text>'
 
 
 def _curve(points: Points, span: tuple[float, float], room: tuple[float, float]) -> str:

@@ -59,7 +59,7 @@ class Placement:
 
     part: str
     wanted: str
-    found: str
+    actual: str
     error_mm: float
 
 
@@ -122,14 +122,14 @@ def page(story: Story) -> str:
 def _tables(matched: Sequence[Matched]) -> list[_Table]:
     """The lines by table; tables and lines stay in their order."""
     lines: dict[tuple[str, str], list[Matched]] = {}
-    for one in matched:
-        lines.setdefault((one.level, one.table), []).append(one)
+    for line in matched:
+        lines.setdefault((line.level, line.table), []).append(line)
     return [
         _Table(
             level if table == level else f"{level} · {table}",
-            tuple(found),
-            sum(one.count > 0 for one in found),
-            max(one.count for one in found),
+            tuple(table_lines),
+            sum(line.count > 0 for line in table_lines),
+            max(line.count for line in table_lines),
         )
-        for (level, table), found in lines.items()
+        for (level, table), table_lines in lines.items()
     ]

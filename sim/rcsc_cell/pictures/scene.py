@@ -28,7 +28,7 @@ PLATE, OPENING = ".plate", ".opening_mm"
 
 @dataclass(frozen=True, slots=True)
 class DrawnScene:
-    """The cell in a tick: an SVG document, and what is to be said about it, a sentence each."""
+    """The cell in a tick: an SVG document, and notes on it, a sentence each."""
 
     svg: str
     caption: tuple[str, ...]
@@ -86,31 +86,31 @@ class DrawnCell:
         states = {name: values for name, values in held.items() if values is not None}
         named = self._named(states)
         plates = list(self._plates(states))
-        plate, joints, said = self._arm(plates)
+        plate, joints, note = self._arm(plates)
         others = tuple(self._others(plates, plate))
-        marks = (*(Mark(one.name, at) for one in named for at in one.at_mm), *others)
-        parts = {one.part for one in named}
+        marks = (*(Mark(thing.name, at) for thing in named for at in thing.at_mm), *others)
+        parts = {thing.part for thing in named}
         names = {number: name for name, number in self.database.objects.items()}
         blocks = tuple(
             block(
-                names[one.object],
-                Pose(one.body.turn, one.body.at_mm),
-                one.body.size_mm,
-                named=one.object in parts,
+                names[part.object],
+                Pose(part.body.turn, part.body.at_mm),
+                part.body.size_mm,
+                named=part.object in parts,
             )
-            for one in lying(self.database)
+            for part in lying(self.database)
         )
         outlines = tuple(map(outline, self.database.stations.values()))
         scene = Scene(outlines, (), self.database.hand.tool_mm, blocks, marks)
         return DrawnScene(
             stick(plate, self._opening_mm(states), joints, scene, ALONE),
-            (said, *self._told(named), *(f"`{other.name}` is marked." for other in others)),
+            (note, *self._told(named), *(f"`{other.name}` is marked." for other in others)),
         )
 
     # --- the arm ---
 
     def _arm(self, plates: list[_Plate]) -> tuple[tuple[float, ...], Joints | None, str]:
-        """The plate that is drawn, the joints that bring it there, and which it is; at rest where none is a pose."""
+        """Return the plate to draw, its joints, and a note on which it is; at rest where none is a pose."""
         for plate in plates:
             pose = pose_of(plate.numbers)
             if pose is not None:
@@ -124,8 +124,8 @@ class DrawnCell:
         return at_rest, self.rest, "The log holds no pose; the arm is drawn at rest."
 
     def _plates(self, states: Mapping[str, Values]) -> Iterator[_Plate]:
-        """What is ordered before what is reported, and that before what else there is."""
-        found = []
+        """Yield plates that are ordered, then reported ones, then all others."""
+        plates = []
         for level, values in self._levels(states):
             for at, leaf in enumerate(level.sign.leaves):
                 name, _, index = leaf.name.partition("[")
@@ -134,11 +134,11 @@ class DrawnCell:
                     reported = f"{record}.{STATUS}" in level.sign.index
                     rank = 0 if leaf.kind == "output" else 1 if reported else 2
                     numbers = tuple(float(value) for value in values[at : at + 9])
-                    found.append((rank, _Plate(f"{level.name}.{name}", numbers)))
-        yield from (plate for _, plate in sorted(found, key=lambda one: one[0]))
+                    plates.append((rank, _Plate(f"{level.name}.{name}", numbers)))
+        yield from (plate for _, plate in sorted(plates, key=lambda ranked: ranked[0]))
 
     def _others(self, plates: list[_Plate], drawn: tuple[float, ...]) -> Iterator[Mark]:
-        """Where the pads are by other nine numbers than those that are drawn."""
+        """Yield where the pads are by the plates that are not drawn."""
         for plate in plates:
             pose = pose_of(plate.numbers)
             if pose is not None and plate.numbers != drawn:
@@ -156,16 +156,16 @@ class DrawnCell:
     # --- what is named ---
 
     def _named(self, states: Mapping[str, Values]) -> list[_Named]:
-        """Everything that is named, each once."""
-        found: dict[str, _Named] = {}
+        """Return everything that is named, once each."""
+        things: dict[str, _Named] = {}
         for level, values in self._levels(states):
             for key in self._keys(level):
-                if (one := self._one(level, key, values)) is not None:
-                    held = found.setdefault(one.name, one)
-                    held.by += [by for by in one.by if by not in held.by]
-        return list(found.values())
+                if (thing := self._thing(level, key, values)) is not None:
+                    held = things.setdefault(thing.name, thing)
+                    held.by += [by for by in thing.by if by not in held.by]
+        return list(things.values())
 
-    def _one(self, level: LoggedLevel, key: _Key, values: Values) -> _Named | None:
+    def _thing(self, level: LoggedLevel, key: _Key, values: Values) -> _Named | None:
         """What these leaves name; None where they name nothing."""
         first = level.sign.leaves[level.sign.index[key.leaves[0]]]
         asked = [int(values[level.sign.index[leaf]]) for leaf in key.leaves]
@@ -181,17 +181,17 @@ class DrawnCell:
             return _Named(f"point {asked[0]}", by, at_mm)
         names = {number: name for name, number in self.database.locations.items()}
         name, sectors = names.get(asked[0], f"location {asked[0]}"), self._sectors(asked[0])
-        said = asked[1:] if len(sectors) > 1 else []
-        shown = f"{name}({said[0]})" if said else name
+        shown_sectors = asked[1:] if len(sectors) > 1 else []
+        shown = f"{name}({shown_sectors[0]})" if shown_sectors else name
         return _Named(shown, by, self._places(asked[0], asked[1:] or sectors))
 
     def _sectors(self, location: int) -> list[int]:
-        """Of a pallet; of every other location it is one."""
+        """Return the sectors: several of a pallet, else one."""
         return [number for place, number, _ in self.database.routes() if place == location]
 
     def _places(self, location: int, sectors: list[int]) -> tuple[Vector, ...]:
         every = (self.database.pads(location, number) for number in sectors)
-        return tuple(one for one in every if one is not None)
+        return tuple(place for place in every if place is not None)
 
     def _keys(self, level: LoggedLevel) -> Iterator[_Key]:
         """What the database is asked for, and whatever else in the level's buffers is a part by the same words."""
@@ -226,19 +226,19 @@ class DrawnCell:
 
     def _told(self, named: list[_Named]) -> Iterator[str]:
         lying_here = {part.object for part in self.database.parts}
-        for one in named:
-            by = ", ".join(f"`{leaf}`" for leaf in one.by)
-            if one.part is not None:
-                if one.part < 0:
-                    yield f"{one.name} ({by}): no part of `{self.data}`."
-                elif one.part in lying_here:
-                    yield f"{one.name} ({by}) is marked where `{self.data}` has it."
+        for thing in named:
+            by = ", ".join(f"`{leaf}`" for leaf in thing.by)
+            if thing.part is not None:
+                if thing.part < 0:
+                    yield f"{thing.name} ({by}): no part of `{self.data}`."
+                elif thing.part in lying_here:
+                    yield f"{thing.name} ({by}) is marked where `{self.data}` has it."
                 else:
-                    yield f"{one.name} ({by}): `{self.data}` has none lying about."
-            elif one.at_mm:
-                yield f"{one.name} ({by}) is marked."
+                    yield f"{thing.name} ({by}): `{self.data}` has none lying about."
+            elif thing.at_mm:
+                yield f"{thing.name} ({by}) is marked."
             else:
-                yield f"{one.name} ({by}): `{self.data}` does not say where."
+                yield f"{thing.name} ({by}): `{self.data}` does not say where."
 
     def _levels(self, states: Mapping[str, Values]) -> Iterator[tuple[LoggedLevel, Values]]:
         return ((level, states[level.name]) for level in self.log.levels if level.name in states)

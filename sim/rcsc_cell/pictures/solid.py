@@ -180,25 +180,25 @@ def _polygons(scene: Faces, colours: Floats, camera: _Camera) -> Iterator[str]:
 
 
 def _shown(scene: Faces, camera: _Camera) -> tuple[Integers, Floats]:
-    """The faces that are turned to the eye, before it and in the picture, and their corners in pixels."""
+    """Return the faces that are turned to the eye, before it and in the picture, and their corners in pixels."""
     seen = camera.seen(scene.corners)
     from_eye = camera.eye - scene.corners[scene.faces[:, 0]]
     towards = np.einsum("ij,ij->i", scene.normals, from_eye) > 0.0
-    found = np.flatnonzero(towards & (seen[scene.faces, 2] > NEAR_M).all(axis=1))
-    flat = camera.flat(seen[scene.faces[found]])
+    facing = np.flatnonzero(towards & (seen[scene.faces, 2] > NEAR_M).all(axis=1))
+    flat = camera.flat(seen[scene.faces[facing]])
     within = (flat.max(axis=1) > 0.0) & (flat.min(axis=1) < np.array(camera.middle) * 2)
     kept = within.all(axis=1)
-    return found[kept], flat[kept]
+    return facing[kept], flat[kept]
 
 
 def _polygon(points: Floats, colour: str) -> str:
-    """A face; its edge is drawn in its own colour, else hair lines would show between neighbours."""
-    said: list[str] = []
+    """Draw a face, its edge in its own colour: else hairlines would show between neighbours."""
+    corners: list[str] = []
     for x, y in points.tolist():
         corner = f"{x:.1f},{y:.1f}"
-        if not said or said[-1] != corner:  # a padded face repeats its last corner
-            said.append(corner)
-    return f'<polygon points="{" ".join(said)}" fill="{colour}" stroke="{colour}" stroke-width=".5"/>'
+        if not corners or corners[-1] != corner:  # a padded face repeats its last corner
+            corners.append(corner)
+    return f'<polygon points="{" ".join(corners)}" fill="{colour}" stroke="{colour}" stroke-width=".5"/>'
 
 
 # --- floors ---
@@ -227,7 +227,7 @@ def _floor(turn: Floats, at: Floats, half: tuple[float, float], camera: _Camera)
         f'fill="{_FLOOR}"/>'
     )
     lines = [[(x, -wide), (x, wide)] for x in _marks(long)] + [[(-long, y), (long, y)] for y in _marks(wide)]
-    path = "".join(f"M{found.replace(' ', 'L')}" for line in lines if (found := flat(line)))
+    path = "".join(f"M{ends.replace(' ', 'L')}" for line in lines if (ends := flat(line)))
     yield f'<path class="tiles" d="{path}" fill="none" stroke="{_FLOOR_LINE}" stroke-width=".7"/>'
 
 
@@ -237,7 +237,7 @@ def _marks(half: float) -> list[float]:
 
 
 def _ahead(seen: Floats) -> Floats:
-    """What of a polygon or line lies before the eye.
+    """Clip a polygon or line to what lies before the eye.
 
     Source: Sutherland and Hodgman, "Reentrant polygon clipping", CACM 1974, for one plane.
     """

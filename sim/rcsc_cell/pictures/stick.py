@@ -129,7 +129,7 @@ def _picture(picture: View | Perspective, figure: _Figure, scene: Scene) -> Iter
     for part in scene.parts:
         yield from lying(picture, part)
     if isinstance(picture, Perspective) or picture is TOP:
-        yield from (name(picture, one) for one in scene.outlines)
+        yield from (name(picture, outline) for outline in scene.outlines)
     yield from _robot(picture, figure, scene)
     for mark in scene.marks:
         yield from pointed_at(picture, mark)

@@ -79,43 +79,45 @@ def _lines(low: float, high: float) -> list[float]:
     return [GRID_MM * at for at in range(first, last + 1) if low <= GRID_MM * at <= high]
 
 
-def standing(picture: View | Perspective, one: Outline) -> Iterator[str]:
+def standing(picture: View | Perspective, outline: Outline) -> Iterator[str]:
     """An outline, and plumb lines from its corners to the floor."""
-    yield line(picture, one.corners_mm, "station", 'stroke="currentColor" stroke-opacity=".65"', close=True)
+    yield line(
+        picture, outline.corners_mm, "station", 'stroke="currentColor" stroke-opacity=".65"', close=True
+    )
     if picture is not TOP:
-        legs = "".join(_plumb(picture, corner, 0.0) for corner in one.corners_mm)
+        legs = "".join(_plumb(picture, corner, 0.0) for corner in outline.corners_mm)
         yield f'<path class="leg" d="{legs}" stroke="currentColor" stroke-opacity=".28" stroke-dasharray="2 4"/>'
 
 
-def lying(picture: View | Perspective, one: Block) -> Iterator[str]:
+def lying(picture: View | Perspective, block: Block) -> Iterator[str]:
     """A part: its bottom, its sides and its top."""
-    ink = NAMED if one.named else "currentColor"
+    ink = NAMED if block.named else "currentColor"
     thin = f'stroke="{ink}" stroke-opacity=".75" stroke-width="1"'
-    bottom = tuple((x, y, z - one.height_mm) for x, y, z in one.top_mm)
+    bottom = tuple((x, y, z - block.height_mm) for x, y, z in block.top_mm)
     yield line(picture, bottom, "bottom", thin, close=True)
     if picture is not TOP:
-        sides = "".join(_plumb(picture, corner, corner[2] - one.height_mm) for corner in one.top_mm)
+        sides = "".join(_plumb(picture, corner, corner[2] - block.height_mm) for corner in block.top_mm)
         yield f'<path class="side" d="{sides}" {thin}/>'
-    kind = "part named" if one.named else "part"
-    yield line(picture, one.top_mm, kind, f'{thin} fill="{ink}" fill-opacity=".3"', close=True)
+    kind = "part named" if block.named else "part"
+    yield line(picture, block.top_mm, kind, f'{thin} fill="{ink}" fill-opacity=".3"', close=True)
 
 
-def pointed_at(picture: View | Perspective, one: Mark) -> Iterator[str]:
+def pointed_at(picture: View | Perspective, mark: Mark) -> Iterator[str]:
     """A place: a ring, its plumb line to the floor, its name."""
-    x, y = picture.flat(one.at_mm)
+    x, y = picture.flat(mark.at_mm)
     if picture is not TOP:
-        path = _plumb(picture, one.at_mm, 0.0)
+        path = _plumb(picture, mark.at_mm, 0.0)
         yield f'<path class="plumb" d="{path}" stroke="{NAMED}" stroke-opacity=".7" stroke-dasharray="3 3"/>'
     yield f'<path class="leader" d="M{x + 4:.1f} {y - 4:.1f}l14 -22" stroke="{NAMED}"/>'
     yield f'<circle class="mark" cx="{x:.1f}" cy="{y:.1f}" r="5.5" stroke="{NAMED}" stroke-width="2"/>'
-    yield text((x + 20, y - 26), escape(one.name), size="12", colour=NAMED)
+    yield text((x + 20, y - 26), escape(mark.name), size="12", colour=NAMED)
 
 
-def name(picture: View | Perspective, one: Outline) -> str:
+def name(picture: View | Perspective, outline: Outline) -> str:
     """The name of what stands there, in its middle."""
-    corners = [picture.flat(corner) for corner in one.corners_mm]
+    corners = [picture.flat(corner) for corner in outline.corners_mm]
     x, y = (sum(corner[at] for corner in corners) / len(corners) for at in (0, 1))
-    return text((x, y + 4), escape(one.name), "middle", "9")
+    return text((x, y + 4), escape(outline.name), "middle", "9")
 
 
 def _plumb(picture: View | Perspective, top: Vector, floor_mm: float) -> str:

@@ -111,14 +111,12 @@ def page_px(pictures: Sequence[View | Perspective]) -> tuple[int, int]:
 def line(
     picture: View | Perspective, points: Sequence[Vector], kind: str, look: str, *, close: bool = False
 ) -> str:
-    """Points joined by lines, and by one more where it is closed; `look` are attributes."""
-    said = " ".join(f"{x:.1f},{y:.1f}" for x, y in map(picture.flat, points))
-    return f'<{"polygon" if close else "polyline"} class="{kind}" points="{said}" {look}/>'
+    """Return points joined by lines, by one more where closed; `look` are attributes."""
+    corners = " ".join(f"{x:.1f},{y:.1f}" for x, y in map(picture.flat, points))
+    return f'<{"polygon" if close else "polyline"} class="{kind}" points="{corners}" {look}/>'
 
 
-def text(at: Point, said: str, anchor: str = "start", size: str = "11", colour: str = "") -> str:
-    """Words of markup at a pixel; of the page's colour where none is said."""
+def text(at: Point, words: str, anchor: str = "start", size: str = "11", colour: str = "") -> str:
+    """Return words of markup at a pixel; in the page's colour by default."""
     ink = f'fill="{colour}"' if colour else 'fill="currentColor" fill-opacity=".75"'
-    return (
-        f'<text x="{at[0]:.1f}" y="{at[1]:.1f}" text-anchor="{anchor}" font-size="{size}" {ink}>{said}</text>'
-    )
+    return f'<text x="{at[0]:.1f}" y="{at[1]:.1f}" text-anchor="{anchor}" font-size="{size}" {ink}>{words}</text>'

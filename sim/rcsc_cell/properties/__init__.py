@@ -20,7 +20,7 @@ buffers, `truth` those that compare reports with the cell as it is, `failing` th
 about robot and hand.
 """
 
-from rcsc_cell.properties.cycle import Made
+from rcsc_cell.properties.cycle import PropertyClass
 from rcsc_cell.properties.failing import RightReason, StillAfterFail
 from rcsc_cell.properties.limits import ForceWithin, JointsWithin, OnlyAllowedContact
 from rcsc_cell.properties.protocol import (
@@ -32,7 +32,7 @@ from rcsc_cell.properties.protocol import (
 )
 from rcsc_cell.properties.truth import CountsTrue, DoneTrue
 
-PROPERTIES: tuple[Made, ...] = (
+PROPERTIES: tuple[PropertyClass, ...] = (
     NoStateTableError,
     AssumptionsHold,
     EndsInBound,

@@ -127,11 +127,11 @@ class CycleState:
 
     @property
     def counts(self) -> dict[str, int]:
-        """What TASK counts on the buffer, by object."""
+        """Return what TASK counts on the buffer, by object."""
         return {name: int(self.value("task", leaf)) for name, leaf in COUNTED.items()}
 
     def objects(self) -> tuple[str, ...]:
-        """What each part is: the object of the database whose size is nearest, for nobody can tell a part by anything else."""
+        """Return the kind of each part: the database's object of the nearest size, as nothing else tells parts apart."""
         sizes = {
             name: self.database.sizes[number]
             for name, number in self.database.objects.items()
@@ -171,5 +171,5 @@ class Property(Protocol):
         ...
 
 
-Made = type[Property]
+PropertyClass = type[Property]
 """A property is made for one run, from the state before its first cycle."""

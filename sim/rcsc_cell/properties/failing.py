@@ -108,7 +108,7 @@ class RightReason:
         return reason in ("loc", "pic") and command.name in TAKES and self._odd
 
     def _part_is_odd(self, cycle: CycleState, command: Command) -> bool:
-        """Whether what lies at the source is anything but one part of the kind, of the database's size, with room for the fingers."""
+        """Return whether the source has not exactly one part of the kind, of the right size, with room for the fingers."""
         if not command.source or command.obj not in self._objects:
             return True
         database = cycle.database
@@ -120,29 +120,29 @@ class RightReason:
         top = database.sizes[database.objects[command.obj]][:2]
         at = [pose.at_mm for pose in cycle.parts]
         here = [
-            one
-            for one, kind in enumerate(self._objects)
+            index
+            for index, kind in enumerate(self._objects)
             if (kind == command.obj or (looks and database.sizes[database.objects[kind]][:2] == top))
-            and dist(at[one][:2], target[:2]) < near_mm
-            and dist(at[one], target) < SEEN_MM
+            and dist(at[index][:2], target[:2]) < near_mm
+            and dist(at[index], target) < SEEN_MM
         ]
         if len(here) != 1:
             return True
-        [one] = here
-        body = cycle.bodies[one]
+        [index] = here
+        body = cycle.bodies[index]
         slides = (body.density_kg_m3, body.friction) != (
             DENSITY_KG_M3,
             FRICTION,
         )  # a finger that meets it first may push it aside
         sizes = zip(body.size_mm, database.sizes[database.objects[command.obj]], strict=True)
         crowded = slides or any(
-            dist(at[one], other) < ROOM_MM for which, other in enumerate(at) if which != one
+            dist(at[index], other) < ROOM_MM for which, other in enumerate(at) if which != index
         )
         return crowded or any(abs(a - b) > SIZE_MM for a, b in sizes)
 
 
 def illegal(database: Database, command: Command) -> str:
-    """Why a command is none that may be done (sections 3.1 to 3.5; 8.1, lines 2 and 3 of Fig. 8); empty where it may."""
+    """Return why a command is not legal (sections 3.1 to 3.5; 8.1, lines 2 and 3 of Fig. 8); empty where it is."""
     holds = command.held != "null_obj"
     takes = bool(database.place(command.source)[0]) and bool(command.source)
     dest = bool(database.place(command.dest)[0]) and bool(command.dest)

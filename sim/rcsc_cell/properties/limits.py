@@ -136,4 +136,4 @@ class JointsWithin:
 def _fastest_mm_s(database: Database) -> float:
     """The greatest speed of a point."""
     points = {int(point) for _, _, row in database.routes() for point in (row[1], row[3], *row[5:])}
-    return max(float(database.point(one)[10]) for one in points)
+    return max(float(database.point(point)[10]) for point in points)

@@ -87,7 +87,7 @@ class AnsweredOnce:
     place: ClassVar[str] = "sections 8.1 (lines 9 and 14 of Fig. 8) and 9"
 
     def __init__(self, cycle: CycleState) -> None:
-        self._said: tuple[int, str] | None = None
+        self._ended: tuple[int, str] | None = None
         self._joints, self._stirred = cycle.joints, -STIRRED_TICKS
 
     def watch(self, cycle: CycleState) -> str | None:
@@ -102,18 +102,18 @@ class AnsweredOnce:
             return None
         number = cycle.command.number
         if cycle.ended:
-            self._said = number, cycle.ended
+            self._ended = number, cycle.ended
             return None
-        if self._said is None or self._said[0] != number or not cycle.number_answered:
+        if self._ended is None or self._ended[0] != number or not cycle.number_answered:
             return None
         if "task" in cycle.restarted:  # it has forgotten, and says `restart`: the workstation must be told
-            self._said = None
+            self._ended = None
             return None
         if cycle.command.name == "pause" and self._stirred >= cycle.tick - STIRRED_TICKS:
             return None
         now = cycle.shown("task", "report.status_report")
-        if now != self._said[1]:
-            return f"`{cycle.command.name}` was {self._said[1]}, and is {now}"
+        if now != self._ended[1]:
+            return f"`{cycle.command.name}` was {self._ended[1]}, and is {now}"
         return None
 
 
@@ -142,15 +142,15 @@ class ReplaysExactly:
 
 
 def _input_runs(sign: Signature) -> tuple[slice, ...]:
-    """Where inputs stand, as few slices as there are runs of them."""
-    found: list[slice] = []
+    """Return the positions of inputs, a slice for each run of them."""
+    runs: list[slice] = []
     for at, leaf in enumerate(sign.leaves):
         if leaf.kind == "input":
-            if found and found[-1].stop == at:
-                found[-1] = slice(found[-1].start, at + 1)
+            if runs and runs[-1].stop == at:
+                runs[-1] = slice(runs[-1].start, at + 1)
             else:
-                found.append(slice(at, at + 1))
-    return tuple(found)
+                runs.append(slice(at, at + 1))
+    return tuple(runs)
 
 
 def _difference(level: RunningLevel, now: Values) -> str:

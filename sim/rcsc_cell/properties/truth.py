@@ -102,7 +102,7 @@ class DoneTrue:
         return f"the plate is {off_mm:.1f} mm off" if off_mm > PLATE_MM else None
 
     def _lifts(self, cycle: CycleState) -> tuple[float, ...]:
-        """How much higher than the location the pads may be, in mm: as the part wants it that is in the hand, or was."""
+        """Return how much higher than the location the pads may be, in mm: by the part that is in the hand, or was."""
         if self._in_hand is None:
             return (0.0,)
         kind = self._objects[self._in_hand]
@@ -190,7 +190,7 @@ class CountsTrue:
         return f"`{wrong[0]}`: TASK counts {now[wrong[0]] - self._was[wrong[0]]:+} more" if wrong else None
 
     def _difference(self, cycle: CycleState) -> dict[str, int]:
-        """By how many TASK counts more than lie there."""
+        """Return by how many TASK counts more than lie there."""
         return {
             name: count
             - sum(
@@ -230,13 +230,13 @@ def _ends_at(cycle: CycleState, command: Command) -> int:
 
 
 def _buffers(database: Database) -> tuple[Station, ...]:
-    """Tables that a location stands on whose parts TASK counts."""
-    found = []
+    """Return the tables under locations whose parts TASK counts."""
+    buffers = []
     for location in database.locations.values():
         at = database.pads(location, 0) if database.place(location)[2] else None
         if at is not None:
-            found += [station for station in database.stations.values() if station.below(at)]
-    return tuple(found)
+            buffers += [station for station in database.stations.values() if station.below(at)]
+    return tuple(buffers)
 
 
 def _lies_on(cycle: CycleState, part: int, tables: tuple[Station, ...]) -> bool:

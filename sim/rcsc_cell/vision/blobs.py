@@ -83,8 +83,8 @@ def _joined(runs: list[tuple[int, int]], first: list[int]) -> list[int]:
                 old += 1
             at = old
             while at < here and runs[at][0] < end:
-                one, other = sorted((_root(roots, at), _root(roots, new)))
-                roots[other] = one
+                root, other = sorted((_root(roots, at), _root(roots, new)))
+                roots[other] = root
                 at += 1
     return roots
 

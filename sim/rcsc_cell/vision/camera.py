@@ -109,8 +109,8 @@ class Camera:
     def _light(self, data: mujoco.MjData) -> Floats:
         """The projector in camera axes, in m."""
         turn = data.cam_xmat[self._camera].reshape(3, 3)
-        found: Floats = (data.site_xpos[self._projector] - data.cam_xpos[self._camera]) @ turn
-        return found
+        light: Floats = (data.site_xpos[self._projector] - data.cam_xpos[self._camera]) @ turn
+        return light
 
     def _rays(self, columns: Floats, rows: Floats) -> Floats:
         """Directions in camera axes, shape (n, 3), one long along the axis: a ray's length is then its depth."""

@@ -106,20 +106,20 @@ def shape(blob: Blob, expected_range_mm: float, optics: Optics) -> Patch:
 
 
 def choose(shapes: Iterable[Patch], wanted: Features, expected_range_mm: float) -> FoundPart | None:
-    """The matching of section 5.1.
+    """Choose the best match, as in section 5.1.
 
     Raises:
         ValueError: The expected range is not positive, or a side of the wanted top is not.
     """
     if min(expected_range_mm, wanted.length_mm, wanted.width_mm) <= 0.0:
         raise ValueError(f"nothing looks like {wanted} at {expected_range_mm} mm")
-    rated = [(mismatch(one, wanted), one) for one in shapes]
+    rated = [(mismatch(shape, wanted), shape) for shape in shapes]
     least = min((score for score, _ in rated), default=MOST_MISMATCH)
     limit = min(MOST_MISMATCH, least + ALIKE)
-    alike = [(hypot(one.x_mm, one.y_mm), score, one) for score, one in rated if score <= limit]
+    alike = [(hypot(shape.x_mm, shape.y_mm), score, shape) for score, shape in rated if score <= limit]
     if not alike:
         return None
-    _, score, best = min(alike, key=lambda one: one[:2])
+    _, score, best = min(alike, key=lambda rating: rating[:2])
     size_mm2 = wanted.length_mm * wanted.width_mm
     range_mm = expected_range_mm * sqrt(size_mm2 / best.area_mm2)
     return FoundPart(best.x_mm, best.y_mm, best.roll_rad, range_mm, score)

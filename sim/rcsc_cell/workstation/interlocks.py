@@ -1,4 +1,4 @@
-"""What the workstation refuses, before it does it: what would machine a loose part, or crush one.
+"""Refuse rows that would machine a loose part, or crush one, before they are done.
 
 In: the cell as the workstation knows it, and a row. Out: why the row must not be done; empty when it may.
 """

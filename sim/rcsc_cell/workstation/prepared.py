@@ -53,23 +53,23 @@ def parts_of(signs: Mapping[str, Signature]) -> tuple[str, ...]:
         BadDescription: No level has any.
     """
     leaves = signs["task"].leaves if "task" in signs else ()
-    found = next((leaf.members for leaf in leaves if leaf.name == "command.obj"), ())
-    if not found:
+    parts = next((leaf.members for leaf in leaves if leaf.name == "command.obj"), ())
+    if not parts:
         raise BadDescription(
             "the data names parts, and no level `task` has an enumeration `command.obj` of them"
         )
-    return found
+    return parts
 
 
 def limits_of(system: Description, signs: Mapping[str, Signature]) -> dict[str, list[list[Limit | None]]]:
-    """What the levels can hold of each answer of the database, by question."""
-    found: dict[str, list[list[Limit | None]]] = {}
+    """Return what the levels can hold of each answer of the database, by query."""
+    limits: dict[str, list[list[Limit | None]]] = {}
     for spec in system.levels:
         for feed in spec.feeds:
             run = signs[spec.name].record(feed.into)
             leaves = [signs[spec.name].leaves[at] for at in run]
-            found.setdefault(feed.query, []).append([_limit(spec.name, leaf) for leaf in leaves])
-    return found
+            limits.setdefault(feed.query, []).append([_limit(spec.name, leaf) for leaf in leaves])
+    return limits
 
 
 def _limit(level: str, leaf: Leaf) -> Limit | None:
@@ -79,7 +79,7 @@ def _limit(level: str, leaf: Leaf) -> Limit | None:
 
 
 def database_path(system: Description) -> Path:
-    """Where the database of the system is kept when nobody says."""
+    """Return the default path of the system's database."""
     return system.database.parent / ".rcsc-cache" / f"{system.name}.sqlite"
 
 

@@ -1,4 +1,4 @@
-"""What is left of a row that failed on its way: a part that has been taken is not taken again, one that lies where it should is left there.
+"""Find what is left of a row that failed: a part taken is not taken again, one that lies where it should stays.
 
 In: a row, what TASK said while it was under way, and what is in the gripper now. Out: what to send when the row is tried again, and how
 the cell stands meanwhile, which the interlocks look at. TASK refuses a command that takes a part while the gripper holds one, and one

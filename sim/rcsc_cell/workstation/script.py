@@ -90,8 +90,8 @@ def _row(number: int, line: Mapping[str, str]) -> ScriptRow:
 def _jaws(text: str) -> dict[str, bool]:
     """`OPEN RIGHT, CLOSE LEFT` and the like."""
     jaws = {}
-    for one in text.split(","):
-        words = one.split()
+    for jaw in text.split(","):
+        words = jaw.split()
         if len(words) != 2 or words[0] not in ("OPEN", "CLOSE") or words[1] not in ("LEFT", "RIGHT"):
             raise ValueError(f"`VISE-{text}` says nothing that a vise can do")
         jaws[words[1].lower()] = words[0] == "OPEN"
@@ -102,18 +102,18 @@ def _part(text: str) -> tuple[str, int]:
     """`BOXT (2)`: a part, and which pair of faces the fingers take."""
     if not text:
         return "", 0
-    found = re.fullmatch(r"([A-Z-]+)(?: \((\d)\))?", text)
-    if found is None or found[1] not in PARTS:
+    match = re.fullmatch(r"([A-Z-]+)(?: \((\d)\))?", text)
+    if match is None or match[1] not in PARTS:
         raise ValueError(f"`{text}` is no part; known are {', '.join(PARTS)}")
-    return PARTS[found[1]], int(found[2] or 0)
+    return PARTS[match[1]], int(match[2] or 0)
 
 
 def _place(text: str) -> tuple[str, int]:
     """`STATION(3)`: a location, and its sector."""
-    found = re.fullmatch(r"([A-Z0-9-]*)(?:\((\d+)\))?", text)
-    if found is None:
+    match = re.fullmatch(r"([A-Z0-9-]*)(?:\((\d+)\))?", text)
+    if match is None:
         raise ValueError(f"`{text}` is no location")
-    return found[1], int(found[2] or 0)
+    return match[1], int(match[2] or 0)
 
 
 class RowEnd(NamedTuple):

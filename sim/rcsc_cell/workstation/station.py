@@ -134,15 +134,15 @@ class Workstation:
             self._since = -1
 
     def begin_at(self, row: int) -> None:
-        """Goes on at another row, as if those between were done.
+        """Go on at another row, as if those between were done.
 
         Args:
-            row: From 0; one that is behind leaves the cell as it is.
+            row: From 0; an earlier row leaves the cell as it is.
         """
         if row > self.at:
             self.cell = self._before
-        for one in self.rows[self.at : row]:
-            self.cell = after(self.cell, one)
+        for passed in self.rows[self.at : row]:
+            self.cell = after(self.cell, passed)
         if row != self.at:
             self.at, self.progress = row, Progress()
 
@@ -151,13 +151,13 @@ class Workstation:
         trouble = self.trouble if self.at_rest else "TASK has not paused"
         return cast(dict[str, Any], plain(_State(self.at, self.cell, self.progress, trouble)))
 
-    def restore(self, said: Mapping[str, Any]) -> None:
-        """Stands as the one that said this, and tries its row again; numbers go on from what stands in the buffers.
+    def restore(self, state: Mapping[str, Any]) -> None:
+        """Restore a workstation's state, and try its row again; numbers go on from those in the buffers.
 
         Raises:
-            ValueError: Nothing of ours said it.
+            ValueError: It is no workstation's state.
         """
-        held: _State = read(_State, said)
+        held: _State = read(_State, state)
         if not 0 <= held.at <= len(self.rows):
             raise ValueError(f"the script has {len(self.rows)} rows, and was stopped in row {held.at + 1}")
         self.at, self.cell, self.trouble, self.progress = held.at, held.cell, held.trouble, held.progress
@@ -214,7 +214,7 @@ class Workstation:
             self._paused = tick
 
     def _await_pause(self, tick: int, latest: Latest) -> None:
-        """Nothing else is sent before TASK has paused: an order could fall into one that it still carries out."""
+        """Wait until TASK has paused: an order could disturb one that it still carries out."""
         report = self._task.answer(latest)
         status = "" if report is None else self._word(report, "status_report")
         if report is not None and status == "failed":
@@ -272,7 +272,7 @@ class Workstation:
         return row.vise.get("right", self.cell.right_open), row.vise.get("left", self.cell.left_open)
 
     def _tell(self, command: str, row: ScriptRow) -> None:
-        said: dict[str, Value | str] = {
+        values: dict[str, Value | str] = {
             "input_command": command,
             "obj": row.part or "null_obj",
             "grasp": row.grasp,
@@ -281,7 +281,7 @@ class Workstation:
             "end_at_locpt": self.locations.get(row.end_at, 0),
             "sector": row.sector,
         }
-        self._task.send([_value(leaf, said[_last(leaf)]) for leaf in self.order if _last(leaf) != NUMBER])
+        self._task.send([_value(leaf, values[_last(leaf)]) for leaf in self.order if _last(leaf) != NUMBER])
 
     def _word(self, report: Values, name: str) -> str:
         at = _place(self.report, name)
@@ -346,5 +346,5 @@ def _last(leaf: Leaf) -> str:
     return leaf.name.rpartition(".")[2]
 
 
-def _value(leaf: Leaf, said: Value | str) -> Value:
-    return leaf.members.index(said) if isinstance(said, str) else said
+def _value(leaf: Leaf, value: Value | str) -> Value:
+    return leaf.members.index(value) if isinstance(value, str) else value

@@ -52,11 +52,11 @@ class Restorable(Protocol):
         """Its state in plain values: what JSON keeps exactly."""
         ...
 
-    def restore(self, said: Mapping[str, Any]) -> None:
+    def restore(self, state: Mapping[str, Any]) -> None:
         """Takes a state.
 
         Raises:
-            ValueError: Nothing of its kind said it.
+            ValueError: It is no state of its kind.
         """
         ...
 
@@ -67,7 +67,7 @@ def stopped_path(system: Description) -> Path:
 
 
 def keep(run: ScriptDraft, script: str) -> Path:
-    """Writes where the run stands.
+    """Save where the run stands.
 
     Args:
         run: Its script was stopped, and TASK has paused.
@@ -77,7 +77,7 @@ def keep(run: ScriptDraft, script: str) -> Path:
         OSError: It could not be written.
     """
     system = run.system
-    said: dict[str, Any] = {
+    stopped: dict[str, Any] = {
         "form": FORM,
         "script": script,
         "rows": rows_digest(run.station.rows),
@@ -93,38 +93,38 @@ def keep(run: ScriptDraft, script: str) -> Path:
     }
     path = stopped_path(system.description)
     path.parent.mkdir(parents=True, exist_ok=True)
-    body = _text(said)
-    write_atomically(path, json.dumps({"digest": _digest(body), "stopped": said}, indent=1).encode())
+    body = _text(stopped)
+    write_atomically(path, json.dumps({"digest": _digest(body), "stopped": stopped}, indent=1).encode())
     return path
 
 
 def forget(system: Description) -> None:
-    """Removes what was kept: the cell does not stand so any more. Where nothing can be removed, nothing can be kept, either."""
+    """Remove what was kept: the cell has moved on. Where nothing can be removed, nothing was kept, either."""
     with contextlib.suppress(OSError):
         stopped_path(system).unlink(missing_ok=True)
 
 
 def go_on(run: ScriptDraft) -> None:
-    """Puts a run that has not begun where the stopped one stood; its row is tried again.
+    """Put a run that has not begun where the stopped one stood; try its row again.
 
     Raises:
         NotResumed: There is nothing to go on from, or it is of another script, other tables or another cell.
     """
-    said = _read(stopped_path(run.system.description))
-    _same(run, said)
+    stopped = _read(stopped_path(run.system.description))
+    _same(run, stopped)
     try:
-        _put(run, said)
+        _put(run, stopped)
     except (ValueError, struct.error) as error:
         raise NotResumed(Code.BAD_SYSTEM, f"the stopped run is of another cell: {error}") from error
 
 
 def rows_digest(rows: Sequence[ScriptRow]) -> str:
-    """Changes with what a script says, not with how it is spelled."""
+    """Return a digest of what a script says, not of how it is spelled."""
     return _digest(_text([asdict(row) for row in rows]))
 
 
 def tables_digest(system: Description) -> str:
-    """Changes with the generated executors and with the wiring."""
+    """Return a digest of the generated executors and the wiring."""
     hashed = hashlib.sha256(repr((system.tick_ms, system.levels, system.wires)).encode())
     for program in sorted({level.program for level in system.levels}):
         for path in generated_files(system.generated, program):
@@ -155,14 +155,14 @@ class _Whole:
 
 
 def _held(text: bytes) -> _Stopped:
-    """Raises: ValueError: The file is not whole, or says what no stopped run does."""
+    """Raises: ValueError: The file is not whole, or is no stopped run."""
     whole: _Whole = read(_Whole, json_of(text))
-    said: _Stopped = read(_Stopped, whole.stopped)
+    stopped: _Stopped = read(_Stopped, whole.stopped)
     if whole.digest != _digest(_text(whole.stopped)):
         raise ValueError("its digest is another")
-    if not 0 <= said.tick < LATEST_TICK:
+    if not 0 <= stopped.tick < LATEST_TICK:
         raise ValueError("its tick is none")
-    return said
+    return stopped
 
 
 def _read(path: Path) -> _Stopped:
@@ -181,41 +181,41 @@ def _read(path: Path) -> _Stopped:
         ) from error
 
 
-def _same(run: ScriptDraft, said: _Stopped) -> None:
-    """Whether it is this script, these executors and this cell."""
-    if said.rows != rows_digest(run.station.rows):
+def _same(run: ScriptDraft, stopped: _Stopped) -> None:
+    """Refuse another script, other executors or another cell."""
+    if stopped.rows != rows_digest(run.station.rows):
         raise NotResumed(
             Code.NOT_RESUMED,
-            f"script `{said.script}` was stopped, and this is another, or it has changed since",
+            f"script `{stopped.script}` was stopped, and this is another, or it has changed since",
         )
-    if said.tables != tables_digest(run.system.description):
+    if stopped.tables != tables_digest(run.system.description):
         raise NotResumed(
             Code.BAD_SYSTEM,
             "the tables have changed since the script was stopped: its levels' states mean nothing to them",
         )
-    if said.locations != dict(run.database.locations):
+    if stopped.locations != dict(run.database.locations):
         raise NotResumed(
             Code.BAD_DATA,
             "locations have come or gone since the script was stopped: levels point to the old ones",
         )
 
 
-def _put(run: ScriptDraft, said: _Stopped) -> None:
+def _put(run: ScriptDraft, stopped: _Stopped) -> None:
     """Raises: ValueError, struct.error: Something in it is no state of this cell; NotResumed: a level cannot go on from its own."""
     system, outside = run.system, dict(_restorable(run.system.outside))
-    if said.levels.keys() != {level.name for level in system.levels}:
+    if stopped.levels.keys() != {level.name for level in system.levels}:
         raise ValueError("it has other levels")
-    for name, state in said.outside.items():
+    for name, state in stopped.outside.items():
         if name not in outside:
             raise ValueError(f"nothing outside is a {shown(name)}")
         outside[name].restore(state)
     for level in system.levels:
         try:
-            level.restore(_values(level, said.levels[level.name]))
+            level.restore(_values(level, stopped.levels[level.name]))
         except BadState as error:
             raise NotResumed(Code.NOT_RESUMED, str(error)) from error
     forms = system.forms
-    for name, values in said.buffers.items():
+    for name, values in stopped.buffers.items():
         if name in BETWEEN:
             read(KINDS[name], values)
         elif name in forms:
@@ -223,14 +223,14 @@ def _put(run: ScriptDraft, said: _Stopped) -> None:
         else:
             raise ValueError(f"there is no buffer {shown(name)}")
         system.buffers.publish(name, tuple(values))
-    run.station.restore(said.station)
-    system.tick = said.tick
+    run.station.restore(stopped.station)
+    system.tick = stopped.tick
 
 
-def _values(level: RunningLevel, said: Sequence[Any]) -> tuple[Any, ...]:
-    if len(said) != len(level.values):
-        raise ValueError(f"level `{level.name}` has {len(level.values)} values, not {len(said)}")
-    return tuple(said)
+def _values(level: RunningLevel, values: Sequence[Any]) -> tuple[Any, ...]:
+    if len(values) != len(level.values):
+        raise ValueError(f"level `{level.name}` has {len(level.values)} values, not {len(values)}")
+    return tuple(values)
 
 
 def _buffers(run: ScriptDraft) -> Iterator[str]:
@@ -240,17 +240,17 @@ def _buffers(run: ScriptDraft) -> Iterator[str]:
 
 
 def _restorable(outside: Sequence[Outside]) -> Iterator[tuple[str, Restorable]]:
-    """What stands outside and can be put back, by its kind; a second of a kind is numbered. The workstation is kept by itself."""
+    """Yield what stands outside and can be put back, by kind; a second of a kind is numbered. The workstation is apart."""
     seen: dict[str, int] = {}
-    for one in outside:
-        if isinstance(one, Restorable) and not isinstance(one, Workstation):
-            kind = type(one).__name__
+    for part in outside:
+        if isinstance(part, Restorable) and not isinstance(part, Workstation):
+            kind = type(part).__name__
             seen[kind] = seen.get(kind, 0) + 1
-            yield (kind if seen[kind] == 1 else f"{kind} {seen[kind]}"), one
+            yield (kind if seen[kind] == 1 else f"{kind} {seen[kind]}"), part
 
 
-def _text(said: object) -> bytes:
-    return json.dumps(said, sort_keys=True, separators=(",", ":")).encode()
+def _text(value: object) -> bytes:
+    return json.dumps(value, sort_keys=True, separators=(",", ":")).encode()
 
 
 def _digest(text: bytes) -> str:
