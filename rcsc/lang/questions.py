@@ -95,7 +95,7 @@ def _within(terms: list[tuple[Expr, int]], low: int, high: int) -> list[Expr]:
     """`low <= sum <= high` in keys, as far as conditions express it."""
     first = terms[0][0]
     if len(terms) == 1:
-        return _one(first, low, high)
+        return _bounded(first, low, high)
     if all(isinstance(term.type, Int) for term, _ in terms):
         total = reduce(lambda a, b: _arithmetic(Op.ADD, a, b), (_times(term, k) for term, k in terms))
         return [_compare(Op.GE, total, _integer(low)), _compare(Op.LE, total, _integer(high))]
@@ -109,7 +109,7 @@ def _within(terms: list[tuple[Expr, int]], low: int, high: int) -> list[Expr]:
     return [_compare(op, first, second) for op, whether in comparisons.items() if whether]
 
 
-def _one(term: Expr, low: int, high: int) -> list[Expr]:
+def _bounded(term: Expr, low: int, high: int) -> list[Expr]:
     match term.type:
         case Bool():
             return [negation(term)] if high == 0 else [term] if low == 1 else []

@@ -151,7 +151,7 @@ class _Question:
     def answer(self) -> list[Failure]:
         """Return what is not shown, in the order owed."""
         for at in halved(range(len(self.owed)), self._hold):
-            self._found(at, *self._last)
+            self._fail(at, *self._last)
             self.known.append(values.negation(self.bad[at]))
             self.base.append(values.term_of(self.known[-1]))
             if self.solver is not None:
@@ -199,7 +199,7 @@ class _Question:
         solver.add(*self.base)
         return solver
 
-    def _found(self, at: int, answer: Answer, tried: trial.Point | None) -> None:
+    def _fail(self, at: int, answer: Answer, tried: trial.Point | None) -> None:
         if answer is Answer.UNKNOWN:
             self.unknown += 1
             self.failures.append(Failure(self.owed[at], Discharge.OPEN))

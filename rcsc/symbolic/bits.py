@@ -53,7 +53,7 @@ class Bits:
     def word(self, node: Node) -> Word:
         """The bits of a node: one for a truth value."""
         for part in parts_first(node, known=self._words):
-            self._words[part] = self._made(part)
+            self._words[part] = self._word_of(part)
         return self._words[node]
 
     def literal(self, node: Node) -> Literal:
@@ -166,7 +166,7 @@ class Bits:
 
     # --- nodes ---
 
-    def _made(self, node: Node) -> Word:
+    def _word_of(self, node: Node) -> Word:
         parts = [self._words[part] for part in node.args]
         if node in self._few and node.op not in (Shape.CHOICE, Shape.NARROWED):
             return self._one_of_few(node, self._few[node])

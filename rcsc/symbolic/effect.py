@@ -171,7 +171,7 @@ class Meaning:
         for node in given:
             run.assume(node)
         run.execute(body)
-        return self._made(run)
+        return self._effect_of(run)
 
     def procedure(self, name: str, args: Iterable[Node]) -> Effect:
         """Follow a procedure with these arguments.
@@ -182,9 +182,9 @@ class Meaning:
         run = self._run()
         procedure = self._procedures[name]
         run.call(procedure, [(procedure.span, arg) for arg in args])
-        return self._made(run)
+        return self._effect_of(run)
 
-    def _made(self, run: _Followed) -> Effect:
+    def _effect_of(self, run: _Followed) -> Effect:
         canonical = self.shared.canonical
         calls = tuple(
             ExternCall(

@@ -50,7 +50,7 @@ class Keyed:
     def term(self, node: Node) -> Term:
         """The term of a node; parts first, without recursion."""
         for part in parts_first(node, known=self._terms):
-            self._terms[part] = self._made(part)
+            self._terms[part] = self._term_of(part)
         return self._terms[node]
 
     def variable(self, name: str, kind: Scalar) -> Term:
@@ -87,7 +87,7 @@ class Keyed:
         least, greatest = self.literal(kind, low), self.literal(kind, high)
         self.ranges.append(smt.all_of([smt.at_most(least, term, KEY), smt.at_most(term, greatest, KEY)]))
 
-    def _made(self, node: Node) -> Term:
+    def _term_of(self, node: Node) -> Term:
         parts = [self._terms[part] for part in node.args]
         match node.op:
             case Shape.CONSTANT:

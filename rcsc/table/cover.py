@@ -147,23 +147,23 @@ class Space:
         cuts = _cuts(allowed, self.nodes)
         hull, _ = self._hull(allowed, cuts)
         if all(hull.values()) and not self.answered(bad, *self._inside(hull)):
-            return self._made([hull], exact=True)
+            return self._covered([hull], exact=True)
         seeds = self.solver(wanted)
         boxes: list[dict[str, Box]] = []
         while self.answered(seeds):
             if len(boxes) == most:
-                return self._made(boxes, exact=False)
+                return self._covered(boxes, exact=False)
             seeds.push()
             seed = self._least(seeds)
             seeds.pop()
             boxes.append(self._grown(seed, bad, (cuts, hull), boxes))
             seeds.add(smt.negation(smt.all_of(self._inside(boxes[-1]))))
-        return self._made(boxes, exact=True)
+        return self._covered(boxes, exact=True)
 
     def around(self, condition: Node) -> tuple[Region, tuple[Node, ...]]:
         """Split a condition into a box around it and further conditions: together they are equivalent."""
         hull, rest = self._hull(condition, _cuts(condition, self.nodes))
-        return self._made([hull], exact=True).boxes[0], tuple(rest)
+        return self._covered([hull], exact=True).boxes[0], tuple(rest)
 
     def _hull(self, allowed: Node, cuts: Mapping[str, list[int]]) -> tuple[dict[str, Box], list[Node]]:
         """Return the box that conditions on single variables allow, and the other conditions."""
@@ -185,7 +185,7 @@ class Space:
             hull[name] = meet(hull[name], joined(inside))
         return hull, rest
 
-    def _made(self, boxes: list[dict[str, Box]], *, exact: bool) -> Cover:
+    def _covered(self, boxes: list[dict[str, Box]], *, exact: bool) -> Cover:
         whole = {name: (key_bounds(node.kind),) for name, node in self.nodes.items()}
         real = any(isinstance(node.kind, Real) for node in self.nodes.values())
         inputs = None if real else sum(prod(map(size, box.values())) for box in boxes)

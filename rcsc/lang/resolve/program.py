@@ -28,7 +28,7 @@ from rcsc.lang.resolve import procedures as calls
 from rcsc.lang.resolve.declarations import Names
 from rcsc.lang.resolve.levels import level
 from rcsc.lang.resolve.owners import Owners
-from rcsc.lang.resolve.properties import made_property
+from rcsc.lang.resolve.properties import resolve_property
 from rcsc.lang.resolve.tables import table
 from rcsc.lang.syntax import tree
 
@@ -159,7 +159,9 @@ class _Resolver:
 
     def _properties(self, all_: list[tree.Declaration]) -> tuple[Property, ...]:
         written = (d for d in all_ if isinstance(d, tree.PropertyDecl))
-        properties = (made_property(self.scope, d) for d in written if self.scope.claim(d.name, "assumption"))
+        properties = (
+            resolve_property(self.scope, d) for d in written if self.scope.claim(d.name, "assumption")
+        )
         return tuple(resolved for resolved in properties if resolved is not None)
 
     def _levels(

@@ -22,7 +22,7 @@ from rcsc.lang.syntax import tree
 from rcsc.lang.syntax.spell import spell_expr
 
 
-def made_property(scope: Scope, written: tree.PropertyDecl) -> Property | None:
+def resolve_property(scope: Scope, written: tree.PropertyDecl) -> Property | None:
     """Resolve a property; None after an error."""
     text = spell_expr(written.condition)
     if written.other is None:
