@@ -1,33 +1,34 @@
-"""The levels proved together: for any delay, any order of commands, any answer of the database.
+"""Proves the levels together: for any delay, any sequence of commands, any answer of the database.
 
-What is proved, of each level alone in its environment (`proof.level`):
+What is proved of each level, alone in its environment (`proof.level`):
 
 - every assumption of its tables holds in every cycle in which the table runs; exactly one line matches; DEFAULT is
-  not reached where it is said to be unreachable; no state is written directly while another is pending;
+  not reached if it is declared unreachable; no state is written directly while another is pending;
 - a command number is taken up once, and no other command replaces an order before its echo, but for a new command;
 - no new command is passed over by a line that does not look for one; a PAUSE is passed on in the cycle that takes it;
-- what its program itself states: invariants, and properties over a cycle and the one before (`properties`);
-- what it guarantees its neighbours: its report echoes the number and the command of the order that it took in that
-  very cycle (so that none is lost and none echoed that was not run); its orders change only together with their
+- its program's invariants, and its properties over a cycle and the one before (`properties`);
+- its guarantees for neighbours: its report echoes the number and the command of the order that it took in that
+  very cycle (so no order is lost, and none is echoed that was not run); its orders change only together with their
   numbers, and numbers come one after the other.
 
-Context: which lines are never reached, and what a line does that matches again (`proof.context`). Termination: every command is
+Context: which lines are never reached, and what a line does when it matches again (`proof.context`). Termination: every command is
 eventually answered, assuming that subordinates answer theirs (`proof.termination`, `proof.ranking`).
 
-What it assumes of its environment, the contract (`transition`), in words:
+What a level assumes of its environment is the contract (`transition`):
 
 - of the superior: an order that it takes under the number that it took last is the same order, as far as the superior
-  numbers it. Otherwise nothing: any command, at any moment, whether or not the last one was echoed, done, or seen;
+  numbers it. Nothing else: any command may come at any moment, whether or not the last one was echoed, done, or seen;
 - of a subordinate, whose report it may see late, twice or never: (1) what is reported under the number of the last
   order is about the command of that order; (2) the number after the last one is not echoed; (3) once the last order
-  is echoed, it stays so until another is given. Nothing of the status, of how long anything takes, nor of reports
-  about older orders;
-- of the database: the same question has the same answer. Of everything else: its declared range.
+  is echoed, it stays so until another is given. Nothing about the status, about how long anything takes, or about
+  reports on older orders;
+- of the database: the same question has the same answer;
+- of everything else: its declared range.
 
 Why the contract may be assumed. Let a superior U publish orders, a subordinate D take them and publish reports,
 through buffers that hold the latest value, whole (`run.buffers`; processes copy under a sequence lock,
 `run.processes.memory`). What D takes was published by U, never older than what it took before; likewise back. Suppose that
-up to some cycle every level has kept its guarantees. U's orders are then numbered one after the other, so that two
+up to some cycle every level has kept its guarantees. U's orders are then numbered one after the other: two
 orders under one number are the same, or 65536 numbers apart. D's report echoes the order that it took: so what is
 reported under number *n* is about order *n* (1); no number is echoed that was not sent (2); as D takes no older
 order, it keeps echoing the last one (3); and an order taken twice under one number is one order. So the contract
@@ -36,25 +37,25 @@ because both begin with the same order (checked, `system`). This is induction ov
 guarantee in a cycle rests on contracts about what was published before it. So levels are proved one by one, and the
 cost grows with their number.
 
-What it rests on besides:
+Further assumptions:
 
-- *Numbers.* They are 16 bits and wrap; here they are exact. "65536 numbers apart" is excluded by *freshness*: nobody
+- *Numbers.* They are 16 bits and wrap; the proof treats them so. "65536 numbers apart" is excluded by *freshness*: no level
   is so late that all numbers go round meanwhile, which takes at least 65536 cycles, 43 minutes at 40 ms. A level that
   waits for echoes before it orders again cannot come near it (`WAITS`).
-- *Restarts.* A level may begin anew at any moment as `run.adopt` says: its order is PAUSE under the number after the
-  order that stands in its buffer, or after the echo where none stands, and what it takes counts as seen. Such a
-  beginning is proved like the first. For its neighbours it is an order that is superseded, or a report that failed;
-  freshness then asks more where none stands: no order that the level gave before and that is not echoed yet may still
-  be on its way, for it has the number that is now used again.
-- *Reals* and arithmetic are followed as far as `symbolic.keyed` says, and `symbolic.measured` for termination; the rest may take
+- *Restarts.* A level may begin anew at any moment as `run.adopt` does: its order is PAUSE under the number after the
+  order in its buffer, or after the echo if the buffer is empty, and what it takes counts as seen. Such a
+  beginning is proved like the first. To its neighbours it is an order that is superseded, or a report that failed.
+  If the buffer is empty, freshness requires more: no earlier order of the level that is not echoed yet may still
+  be on its way, because its number is now used again.
+- *Reals* and arithmetic are followed as far as `symbolic.keyed` does, and `symbolic.measured` for termination; the rest may take
   any value.
-- *Termination* rests on more than the contract: an order that is not replaced is eventually answered, and stays so, which is
-  shown in turn of every subordinate that is a level; and, where that is printed, the values in an input stay the same meanwhile.
-- What stands outside the levels (workstation, robot, hand, camera) keeps to the same contract by its own means; it is
+- *Termination* assumes more than the contract: an order that is not replaced is eventually answered, and stays so. That is
+  shown in turn of every subordinate that is a level. If it is printed, the values in an input stay the same meanwhile, too.
+- *Neighbours outside the levels* (workstation, robot, hand, camera) keep to the same contract by their own means; they are
   listed, not proved.
 
 Rooms, in the order the data flows: `contract` (a level, its environment, and what it owes in one cycle), `invariant` (PDR, whose clauses
-Z3 confirms), `proof` (of a level, and of the system), `counterexample` (runs that show what is not proved). Trusted are
+Z3 confirms), `proof` (of a level, and of the system), `counterexample` (runs that break what is not proved). Trusted are
 `contract.transition`, `symbolic.keyed` and `symbolic.measured` (a cycle as terms), the arguments here and in `proof.termination`, and
 Z3; not the search.
 """

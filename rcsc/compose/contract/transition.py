@@ -134,7 +134,7 @@ class Cycle:
 
     @property
     def cases(self) -> tuple[Node, ...]:
-        """Conditions of which exactly one holds: for each table that it runs, and that none does."""
+        """Conditions of which one holds: for each table that it runs, and that none does."""
         none = (self.unmatched,) if self.unmatched is not FALSE else ()
         return (*(at.chosen for at in self.tables), *none)
 

@@ -1,6 +1,6 @@
-"""What is not proved, shown: runs that the interpreter and both executors did.
+"""Counterexamples: runs, done by the interpreter and both executors, that break an obligation.
 
-Definitions. A *trace* is a run of one level, from its beginning, of which the last cycle breaks an obligation. A *lasso* is a run that
+Definitions. A *trace* is a run of one level, from its beginning, whose last cycle breaks an obligation. A *lasso* is a run that
 ends as it was some cycles before, so that it may go on for ever. A *pair* is a run of two levels with the buffers between them. A
 *finding* is any of these, ready to be shown; a *frozen case* is a finding in JSON that is run again on later tables.
 
@@ -9,12 +9,12 @@ whether the last can break it. In the third it can. The inputs of the model are 
 interpreter runs them; only if two lines match there, too, is it a trace. Then the Python and the C executors run it, and have to leave the
 same in every cycle.
 
-Trusted: nothing but the interpreter. What it does not do is reported as a fault of rcsc, and never shown as a run.
+Trusted: only the interpreter. A run that it does not reproduce is reported as a fault of rcsc, and never shown.
 
 Cost: a SAT question for each obligation and cycle (at most `--trace` cycles), more for the simplest inputs, and a build of the executors
 for each level that has a finding.
 
 Modules, in the order the data flows: `simplest` (bounded runs, simplest models), `cycle_run` (one cycle by the interpreter, and what it
-breaks), `trace`, `lasso`, `pair`, `finding` (time lines), `rerun` (executors, log), `frozen`, `repair` (what would mend the table),
+breaks), `trace`, `lasso`, `pair`, `finding` (time lines), `rerun` (executors, log), `frozen`, `repair` (of the table),
 `explain` (all that is open).
 """

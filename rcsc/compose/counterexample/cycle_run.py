@@ -1,9 +1,8 @@
 """One cycle of a level as the reference interpreter runs it, and what it breaks.
 
 In: a transition system, the leaves before a cycle, what the environment gives. Out: a `CycleRun`. The interpreter is the meaning of the
-language: what the solver says of a cycle is believed only where the interpreter does it. `broken` says of a cycle that was run which
-obligation it breaks: those of matching from the interpreter's faults, all others by their own condition, evaluated on the values that
-the interpreter left.
+language: a solver's cycle counts only if the interpreter does the same. `broken` decides whether a cycle that was run breaks an
+obligation: one about matching by the interpreter's fault, any other by its own condition on the values that the interpreter left.
 """
 
 from collections.abc import Mapping, Sequence
@@ -37,13 +36,13 @@ class CycleRun:
 
     Attributes:
         taken: The inputs.
-        table: That ran; `line`, empty where none matched.
+        table: The table that ran; `line`, its line, empty if none matched.
         fault: What ended the cycle early.
         failed: Assumptions of the table that did not hold, monitored or not.
         before: Every leaf at its start, inputs as last taken.
         after: Every leaf at its end.
         matched: Every line that matched, DEFAULT left out.
-        answers: What each call of an extern procedure gave, in order.
+        answers: The results of each call of an extern procedure, in order.
     """
 
     taken: Mapping[str, Value]
@@ -58,7 +57,7 @@ class CycleRun:
 
     @property
     def ends_the_run(self) -> bool:
-        """Whether it ended in a fault that the proofs exclude; after the others (`EARLY`) the next cycle runs."""
+        """Whether it ended in a fault that the proofs exclude; after any other (`EARLY`) the next cycle runs."""
         return self.fault not in {Fault.OK, *EARLY}
 
 
@@ -114,17 +113,17 @@ def halfway(ts: TransitionSystem, step: CycleRun) -> Halfway:
     now = admit(program, {**step.before, **step.taken})
     assert not isinstance(now, str)
     settle(program, now)
-    found = Halfway(now, dict(now), now)
+    half = Halfway(now, dict(now), now)
     try:
         with scripted(program, step.answers):
             for name in ts.level.preprocess:
                 call(program, name, [], now)
-            found.matched, found.middle = True, dict(now)
+            half.matched, half.middle = True, dict(now)
             execute(program, [action.statement for action in _actions(ts, step)], now, {})
-            found.acted = step.fault is not Fault.ASSUMPTION
+            half.acted = step.fault is not Fault.ASSUMPTION
     except ExternError:
         pass
-    return found
+    return half
 
 
 def _actions(ts: TransitionSystem, step: CycleRun) -> tuple[Action, ...]:
@@ -135,9 +134,9 @@ def _actions(ts: TransitionSystem, step: CycleRun) -> tuple[Action, ...]:
 
 
 def seen_by_table(ts: TransitionSystem, step: CycleRun) -> Snapshot | None:
-    """Return the leaves as the table saw them; None where the cycle ended before."""
-    found = halfway(ts, step)
-    return found.middle if found.matched else None
+    """Return the leaves as the table saw them; None if the cycle ended before."""
+    half = halfway(ts, step)
+    return half.middle if half.matched else None
 
 
 def _step(
@@ -153,7 +152,7 @@ def _step(
     matched: tuple[str, ...] = () if outcome.line is None else (line,)
     if outcome.fault is Fault.SEVERAL_LINES:
         matched = tuple(map(str, matching_lines(ts.table(chosen), after)))
-    found = CycleRun(
+    step = CycleRun(
         dict(taken),
         chosen,
         line,
@@ -164,11 +163,11 @@ def _step(
         matched,
         answers,
     )
-    return replace(found, failed=(*found.failed, *_also_failed(ts, found)))
+    return replace(step, failed=(*step.failed, *_also_failed(ts, step)))
 
 
 def _also_failed(ts: TransitionSystem, step: CycleRun) -> tuple[str, ...]:
-    """List the table's assumptions that failed and that no executor looks at."""
+    """List the table's assumptions that failed and that no executor monitors."""
     table = ts.table(step.table)
     others = [
         assumption
@@ -187,7 +186,7 @@ def broken(ts: TransitionSystem, obligation: Obligation, step: CycleRun) -> bool
     """Return whether the cycle, as it ran, breaks the obligation.
 
     Raises:
-        StopIteration: No cycle of the level can, as the level has no such obligation.
+        StopIteration: The level has no such obligation.
     """
     if obligation.table and obligation.table != step.table:
         return False
@@ -231,9 +230,9 @@ def broken(ts: TransitionSystem, obligation: Obligation, step: CycleRun) -> bool
 
 
 def _broken_between(ts: TransitionSystem, obligation: Obligation, step: CycleRun) -> bool:
-    """Return whether what stands before and after the cycle breaks the obligation, as its condition says."""
+    """Return whether the leaves before and after the cycle break the obligation's condition."""
     every = obligations(ts, as_cycle(ts, step))
-    return _is_false(next(one for one in every if one.key == obligation.key).holds)
+    return _is_false(next(stated for stated in every if stated.key == obligation.key).holds)
 
 
 def _taken_again(lower: TransitionSystem, step: CycleRun) -> bool:
@@ -246,8 +245,8 @@ def _taken_again(lower: TransitionSystem, step: CycleRun) -> bool:
 
 
 def _misreported(upper: TransitionSystem, report: str, step: CycleRun) -> bool:
-    """Return whether the level is told of its last order in this record what is not so."""
-    below = next(one for one in upper.links.below if one.report == report)
+    """Return whether this report misstates the level's last order."""
+    below = next(neighbour for neighbour in upper.links.below if neighbour.report == report)
     before, taken = (
         {name: values.constant(upper.kinds[name], value) for name, value in of.items()}
         for of in (step.before, step.taken)

@@ -1,6 +1,6 @@
-"""What is not proved, looked at: the shortest run that shows it, run by the executors before it is shown, and what would mend it.
+"""Explains what is not proved: by the shortest run that breaks it, checked on the executors, and by repairs.
 
-In: transition systems and the proof of their levels. Out: `Explanation`, one for each thing that is not proved; of lines that both match,
+In: transition systems and the proof of their levels. Out: an `Explanation` for each obligation that is not proved; if lines both match,
 one for each pair.
 """
 
@@ -22,23 +22,23 @@ from rcsc.host.children import scratch
 from rcsc.run.description import Description
 
 SEARCHES = (TraceSearch(legal=True), TraceSearch(), TraceSearch(legal=True, restarted=True))
-"""In the order in which they are made: what a neighbour can do that began with the level is shown first."""
+"""In the order of search: runs with neighbours that began with the level are shown first."""
 
 
 @dataclass(frozen=True, slots=True)
 class Explanation:
-    """One thing that is not proved, and the run that shows it.
+    """An obligation that is not proved, and a run that breaks it.
 
     Attributes:
-        level: Whose obligation it is.
-        obligation: Which.
-        finding: The run that shows it; None where none was found.
-        beside: Where the run does not reproduce: what each did, a line each.
-        guessed: Whether that is no bug, as arithmetic was left open (`keyed`).
-        helps: What would mend the table.
+        level: The level that owes it.
+        obligation: The obligation.
+        finding: The run that breaks it; None if none was found.
+        beside: If the run is not reproduced, where the two differ, a line each.
+        guessed: Whether that is no bug, because arithmetic was left open (`keyed`).
+        helps: Suggested repairs of the table.
         log: Where the run is kept.
         others: Pairs of lines of the same table that no run shows.
-        in_c: Whether the C executor ran it, too; it cannot where an extern procedure has to give what no C function can.
+        in_c: Whether the C executor ran it, too; it cannot if an extern procedure has to give what no C function can.
     """
 
     level: str
@@ -53,7 +53,7 @@ class Explanation:
 
     @property
     def warns(self) -> bool:
-        """Whether it is no error: a command that is not shown to end may wait for what is right to wait for."""
+        """Whether it is only a warning: a command that is not shown to end may rightly wait."""
         return self.obligation.sort is Sort.ENDS
 
     @property
@@ -69,7 +69,7 @@ class TraceSettings:
     Attributes:
         system: The system's description.
         most: Cycles of a run.
-        altered: Whether the programs are looked at under another rule than the language's.
+        altered: Whether the programs are variants under another rule than the language's.
         log: The folder in which runs are kept; None for none.
     """
 
@@ -80,118 +80,130 @@ class TraceSettings:
 
 
 def explain(
-    made: Mapping[str, TransitionSystem], proof: SystemProof, settings: TraceSettings
+    systems: Mapping[str, TransitionSystem], proof: SystemProof, settings: TraceSettings
 ) -> Iterator[Explanation]:
-    """Look at everything essential that is not proved, level by level.
+    """Explain every essential obligation that is not proved, level by level.
 
     Raises:
         NotBuilt: The C executors could not be built.
         OSError: A log cannot be written.
     """
     with scratch("findings") as kept:
-        rerun = _Rerun(made, settings, settings.log or kept)
+        rerun = _Rerun(systems, settings, settings.log or kept)
         for level in proof.levels:
-            for explanation in _level(made, level.level, essential(level), settings):
+            for explanation in _level(systems, level.level, essential(level), settings):
                 yield rerun.run(explanation)
-            for explanation in _together(made, level.level, essential(level), settings):
+            for explanation in _together(systems, level.level, essential(level), settings):
                 yield rerun.run(explanation)
-            for explanation in _endless(made[level.level], level, settings):
+            for explanation in _endless(systems[level.level], level, settings):
                 yield rerun.run(explanation)
 
 
 def _level(
-    made: Mapping[str, TransitionSystem], level: str, wanted: tuple[Obligation, ...], settings: TraceSettings
+    systems: Mapping[str, TransitionSystem],
+    level: str,
+    wanted: tuple[Obligation, ...],
+    settings: TraceSettings,
 ) -> Iterator[Explanation]:
     if not settings.most:
         yield from (Explanation(level, obligation) for obligation in wanted)
         return
-    ts = made[level]
+    ts = systems[level]
     every = pairs(ts.cycle(ts.havoc()))
     parted = {
-        obligation.key: [one for one in every if one.table == obligation.table]
+        obligation.key: [part for part in every if part.table == obligation.table]
         for obligation in wanted
         if obligation.sort is Sort.ONE_LINE
     }
-    asked = [one for obligation in wanted for one in parted.get(obligation.key) or [obligation]]
-    found = _found(ts, asked, settings)
+    asked = [part for obligation in wanted for part in parted.get(obligation.key) or [obligation]]
+    results = _searched(ts, asked, settings)
     for obligation in wanted:
         if obligation.key in parted:
-            yield from _pairs(ts, obligation, parted[obligation.key], found)
+            yield from _pairs(ts, obligation, parted[obligation.key], results)
         else:
-            yield _explanation(ts, obligation, found.get(obligation.key))
+            yield _explanation(ts, obligation, results.get(obligation.key))
 
 
-def _found(
+def _searched(
     ts: TransitionSystem, asked: list[Obligation], settings: TraceSettings
 ) -> dict[ObligationKey, TraceResult]:
     """Run the searches one after the other, each for what is still open."""
-    found: dict[ObligationKey, TraceResult] = {}
+    results: dict[ObligationKey, TraceResult] = {}
     for search in SEARCHES:
-        left = [obligation for obligation in asked if obligation.key not in found]
+        left = [obligation for obligation in asked if obligation.key not in results]
         if left:
-            found |= traces(ts, left, replace(search, most=settings.most))
-    return found
+            results |= traces(ts, left, replace(search, most=settings.most))
+    return results
 
 
 def _pairs(
     ts: TransitionSystem,
     obligation: Obligation,
     parted: list[Obligation],
-    found: Mapping[ObligationKey, TraceResult],
+    results: Mapping[ObligationKey, TraceResult],
 ) -> Iterator[Explanation]:
-    """Explain each pair of lines that both match in some run; the table as a whole where no pair does."""
-    shown = [one for one in parted if one.key in found]
-    others = tuple(one.name for one in parted if one.key not in found)
+    """Explain each pair of lines that both match in some run; the table as a whole if no pair does."""
+    shown = [pair for pair in parted if pair.key in results]
+    others = tuple(pair.name for pair in parted if pair.key not in results)
     if not shown:
         yield Explanation(ts.level.name, obligation, others=others)
-    for at, one in enumerate(shown):
-        yield replace(_explanation(ts, one, found[one.key]), others=others if at == len(shown) - 1 else ())
+    for at, pair in enumerate(shown):
+        yield replace(
+            _explanation(ts, pair, results[pair.key]), others=others if at == len(shown) - 1 else ()
+        )
 
 
-def _explanation(ts: TransitionSystem, obligation: Obligation, found: TraceResult | None) -> Explanation:
+def _explanation(ts: TransitionSystem, obligation: Obligation, result: TraceResult | None) -> Explanation:
     level = ts.level.name
-    match found:
+    match result:
         case None:
             return Explanation(level, obligation)
         case NotReproducedError():
-            return Explanation(level, obligation, beside=found.beside or (str(found),), guessed=found.guessed)
+            return Explanation(
+                level, obligation, beside=result.beside or (str(result),), guessed=result.guessed
+            )
         case _:
-            return Explanation(level, obligation, of_trace(ts, obligation, found))
+            return Explanation(level, obligation, of_trace(ts, obligation, result))
 
 
 def _together(
-    made: Mapping[str, TransitionSystem], level: str, wanted: tuple[Obligation, ...], settings: TraceSettings
+    systems: Mapping[str, TransitionSystem],
+    level: str,
+    wanted: tuple[Obligation, ...],
+    settings: TraceSettings,
 ) -> Iterator[Explanation]:
-    """Show, with both levels as they are, what becomes of orders that are not numbered or not answered."""
-    links = made[level].links
+    """Explain orders that are not numbered or not answered by runs of both levels."""
+    links = systems[level].links
     records = {
         obligation.name.partition(".")[0]
         for obligation in wanted
         if obligation.sort in {Sort.NUMBERED, Sort.NEXT_NUMBER}
     }
-    ends = [(level, one.name) for one in links.below if one.order in records]
+    ends = [(level, neighbour.name) for neighbour in links.below if neighbour.order in records]
     if links.above is not None and any(obligation.sort is Sort.ECHOES for obligation in wanted):
         ends.append((links.above.name, level))
     for upper, lower in ends if settings.most else []:
-        if upper in made and lower in made:
-            below = next(one for one in made[upper].links.below if one.name == lower)
+        if upper in systems and lower in systems:
+            below = next(neighbour for neighbour in systems[upper].links.below if neighbour.name == lower)
             search = TraceSearch(settings.most)
-            found = broken_together(made[upper], made[lower], below, search)
-            if isinstance(found, Finding):
-                yield Explanation(found.level, found.obligation, found)
-            elif found is not None:
-                yield Explanation(lower, wanted[0], beside=(str(found),), guessed=found.guessed)
+            result = broken_together(systems[upper], systems[lower], below, search)
+            if isinstance(result, Finding):
+                yield Explanation(result.level, result.obligation, result)
+            elif result is not None:
+                yield Explanation(lower, wanted[0], beside=(str(result),), guessed=result.guessed)
 
 
 def _endless(ts: TransitionSystem, proof: LevelProof, settings: TraceSettings) -> Iterator[Explanation]:
     """Explain each command that is not shown to end by a run after which it may go on for ever."""
     tables = [ending.table for ending in proof.endings if not ending.proved]
-    found: dict[str, Lasso | NotReproducedError] = {}
+    results: dict[str, Lasso | NotReproducedError] = {}
     for search in SEARCHES if settings.most else ():
-        found |= lassos(ts, [one for one in tables if one not in found], replace(search, most=settings.most))
+        results |= lassos(
+            ts, [table for table in tables if table not in results], replace(search, most=settings.most)
+        )
     for table in tables:
         obligation = obligation_of(table)
-        match found.get(table):
+        match results.get(table):
             case Lasso() as lasso:
                 yield Explanation(
                     proof.level, obligation, replace(of_trace(ts, obligation, lasso.trace), lasso=lasso.first)
@@ -204,30 +216,32 @@ def _endless(ts: TransitionSystem, proof: LevelProof, settings: TraceSettings) -
 class _Rerun:
     """Runs findings on executors, which are built once a level."""
 
-    made: Mapping[str, TransitionSystem]
+    systems: Mapping[str, TransitionSystem]
     settings: TraceSettings
     folder: Path
     _ready: set[str] = field(default_factory=set)
     _names: set[str] = field(default_factory=set)
 
     def run(self, explanation: Explanation) -> Explanation:
-        """Run a finding; return it with its log and what would mend the table."""
+        """Run a finding; return it with its log and suggested repairs."""
         finding = explanation.finding
         if finding is None:
             return explanation
-        if explanation.obligation.sort is Sort.SAFE:  # what is not safe no executor is to run
+        if explanation.obligation.sort is Sort.SAFE:  # no executor may run what is not safe
             return explanation
         system = replace(self.settings.system, generated=self.folder / "generated")
-        programs = {name: self.made[name].program for name in finding.levels if name not in self._ready}
+        programs = {name: self.systems[name].program for name in finding.levels if name not in self._ready}
         make(programs.values(), system.generated, altered=self.settings.altered)
         self._ready |= programs.keys()
         path = None if self.settings.log is None else self.folder / f"{self._named(finding)}.mcap"
         try:
-            record(finding, self.made, system, path, altered=self.settings.altered)
+            record(finding, self.systems, system, path, altered=self.settings.altered)
         except ExecutorsDifferError as error:
             return replace(explanation, beside=error.beside)
-        in_c = not only_in_python(finding, self.made)
-        return replace(explanation, helps=helps(self.made[explanation.level], finding), log=path, in_c=in_c)
+        in_c = not only_in_python(finding, self.systems)
+        return replace(
+            explanation, helps=helps(self.systems[explanation.level], finding), log=path, in_c=in_c
+        )
 
     def _named(self, finding: Finding) -> str:
         name = file_name(finding)

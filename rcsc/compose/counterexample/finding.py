@@ -19,13 +19,13 @@ class Finding:
     """A run that breaks an obligation.
 
     Attributes:
-        level: Whose obligation it is.
-        obligation: Which.
+        level: The level that owes the obligation.
+        obligation: The obligation.
         ticks: For each tick the cycle of each level that ran in it, from the top down.
-        after: Ticks after the one in which it is broken, which show what comes of it.
+        after: How many ticks follow the one in which it is broken, to show what comes of it.
         restarted: Whether it begins where a restart does, and not with the initial values.
         legal: Whether the levels around keep to more than the contract (`TraceSearch.legal`).
-        lasso: The cycle, from 1, before which all is as it is at the end, so that it may go on for ever; 0 where it is not about that.
+        lasso: The cycle, from 1, before which all is as at the end, so that it may go on for ever; 0 if it is no lasso.
     """
 
     level: str
@@ -57,7 +57,7 @@ class Finding:
 
 
 def of_trace(ts: TransitionSystem, obligation: Obligation, trace: Trace) -> Finding:
-    """Make a finding of one level's trace; one cycle more where a command is passed over, which shows only then."""
+    """Make a finding of one level's trace, one cycle longer if a command is passed over, which shows only then."""
     steps = list(trace.steps)
     if obligation.sort is Sort.ANSWERED:
         steps.append(one_cycle(ts, steps[-1].after, steps[-1].taken, steps[-1].answers))
@@ -75,10 +75,10 @@ class TimeLineRow:
 
     Attributes:
         tick: From 1.
-        line: That ran; where several matched, those, and `none` where none did.
-        takes: Inputs that are not what they were, and what they are.
-        leaves: What else the cycle changed.
-        wrong: What went wrong in it; empty for nothing.
+        line: The line that ran; all that matched if several did, `none` if none did.
+        takes: The inputs that changed, and their values.
+        leaves: The other leaves that the cycle changed.
+        wrong: What went wrong in it, or empty.
     """
 
     tick: int
@@ -99,12 +99,12 @@ _FAULTS = {
 }
 
 
-def rows(made: Mapping[str, TransitionSystem], finding: Finding) -> tuple[TimeLineRow, ...]:
+def rows(systems: Mapping[str, TransitionSystem], finding: Finding) -> tuple[TimeLineRow, ...]:
     """Return the time line: a row for each cycle of each level."""
     where = finding.broken_at, finding.level
     obligation = replace(finding.obligation, name=str(finding.lasso)) if finding.lasso else finding.obligation
     return tuple(
-        _row(made[name], tick, step, obligation if (tick, name) == where else None)
+        _row(systems[name], tick, step, obligation if (tick, name) == where else None)
         for tick, steps in enumerate(finding.ticks, 1)
         for name, step in steps.items()
     )
@@ -116,9 +116,9 @@ def _row(ts: TransitionSystem, tick: int, step: CycleRun, broken: Obligation | N
     changed = {
         name: spell(kinds[name], value) for name, value in step.after.items() if step.before[name] != value
     }
-    takes = {name: said for name, said in changed.items() if name in step.taken}
+    takes = {name: text for name, text in changed.items() if name in step.taken}
     takes |= dict(_answers(ts, step))
-    leaves = {name: said for name, said in changed.items() if name not in step.taken}
+    leaves = {name: text for name, text in changed.items() if name not in step.taken}
     wrong = [f"assumption `{name}` fails" for name in step.failed]
     wrong += [_FAULTS[step.fault]] if step.fault in _FAULTS else []
     wrong += [BROKEN[broken.sort].format(broken.name)] if broken is not None and broken.sort in BROKEN else []
@@ -129,7 +129,7 @@ def _row(ts: TransitionSystem, tick: int, step: CycleRun, broken: Obligation | N
 def _answers(ts: TransitionSystem, step: CycleRun) -> Iterator[tuple[str, str]]:
     """Spell what extern procedures give, call by call; refused values have no words of their type."""
     for procedure, given in step.answers:
-        writes = next(one.writes for one in ts.program.procedures if one.name == procedure)
+        writes = next(declared.writes for declared in ts.program.procedures if declared.name == procedure)
         for leaf, value in zip(writes, given, strict=True):
             low, high = key_bounds(ts.kinds[leaf])
             inside = value == value and low <= key_of(ts.kinds[leaf], value) <= high  # noqa: PLR0124  # no NaN

@@ -1,10 +1,10 @@
-"""A finding, frozen: a case in JSON that is run again on the tables as they are then.
+"""Frozen cases: findings in JSON that are run again on later tables.
 
 In: a finding. Out: its text; and back: whether the same inputs break the same obligation now. A case names values in the tables' words,
 and only those that change, so that it outlives changes that do not concern it.
 
-What a case expects is `kept` where it stands for a fault that is to be mended (it fails until it is), `broken` where it shows a
-hazard that is to stay visible: that of another rule than the language's, or of a published table.
+A case expects `kept` if it records a fault that is to be mended (it fails until then), and `broken` if it shows a hazard that is to
+stay visible: that of another rule than the language's, or of a published table.
 """
 
 import json
@@ -49,10 +49,10 @@ class FrozenCase:
 
     Attributes:
         system: The description's path.
-        variants: Under which other rules (`variants.VARIANTS`).
-        level: Whose obligation it is, with its sort, table, name and lines.
-        start: For each level the leaves that do not begin as they do initially.
-        ticks: For each tick, for each level that runs, the inputs that change; `answers`, what its extern procedures give.
+        variants: The other rules that it is run under (`variants.VARIANTS`).
+        level: The level that owes the obligation, given by sort, table, name and lines.
+        start: For each level the leaves that do not begin with their initial values.
+        ticks: For each tick, for each level that runs, the inputs that change; `answers`, the results of its extern procedures.
     """
 
     system: Path
@@ -67,14 +67,14 @@ class FrozenCase:
 
 def frozen(
     finding: Finding,
-    made: Mapping[str, TransitionSystem],
+    systems: Mapping[str, TransitionSystem],
     system: Path,
     case: Path,
     variants: tuple[str, ...] = (),
 ) -> str:
     """Write the text of the case that will stand at `case`."""
     obligation = finding.obligation
-    exchanged = exchange(made, finding.levels)
+    exchanged = exchange(systems, finding.levels)
     document = {
         "format": FORMAT,
         "system": os.path.relpath(system, case.parent).replace("\\", "/"),
@@ -88,17 +88,19 @@ def frozen(
             "lines": list(obligation.lines),
         },
         "start": {
-            name: said for name in finding.levels if (said := _not_initial(made[name], finding.start(name)))
+            name: begun
+            for name in finding.levels
+            if (begun := _not_initial(systems[name], finding.start(name)))
         },
         "ticks": [
-            {name: _changed(made[name], step, exchanged[name]) for name, step in steps.items()}
+            {name: _changed(systems[name], step, exchanged[name]) for name, step in steps.items()}
             for steps in finding.ticks
         ],
     }
     if any(step.answers for steps in finding.ticks for step in steps.values()):
         document["answers"] = [
             {
-                name: [[one, list(map(_number, given))] for one, given in step.answers]
+                name: [[procedure, list(map(_number, given))] for procedure, given in step.answers]
                 for name, step in steps.items()
             }
             for steps in finding.ticks
@@ -107,7 +109,7 @@ def frozen(
 
 
 def _number(value: Value) -> Value | str:
-    """Return an extern result as JSON has it; infinities and NaN in words."""
+    """Return an extern result as a JSON value; infinities and NaN in words."""
     return value if isinstance(value, bool | int) or math.isfinite(value) else str(value)
 
 
@@ -135,21 +137,21 @@ def read_case(path: Path) -> FrozenCase:
         BadCaseError: It is none.
     """
     try:
-        said: dict[str, Any] = json_of(content(path))
-        if said["format"] != FORMAT:
-            raise BadCaseError(f"`{path}` has format {said['format']}, not {FORMAT}")
-        about = said["goal"]
+        document: dict[str, Any] = json_of(content(path))
+        if document["format"] != FORMAT:
+            raise BadCaseError(f"`{path}` has format {document['format']}, not {FORMAT}")
+        about = document["goal"]
         level, table, name = _texts([about[key] for key in ("level", "table", "name")])
         sort, lines = Sort[about["what"].upper()], _texts(about["lines"])
         return FrozenCase(
-            _system(path, said["system"]),
-            _texts(said["variants"]),
+            _system(path, document["system"]),
+            _texts(document["variants"]),
             level,
             Obligation(sort, table, name, values.TRUE, lines),
-            _leaves(said["start"]),
-            tuple(map(_leaves, said["ticks"])),
-            {"broken": True, "kept": False}[said["expect"]],
-            tuple(map(_answered, said.get("answers", ()))),
+            _leaves(document["start"]),
+            tuple(map(_leaves, document["ticks"])),
+            {"broken": True, "kept": False}[document["expect"]],
+            tuple(map(_answered, document.get("answers", ()))),
         )
     except OSError as error:
         raise BadCaseError(f"`{path}` cannot be read: {error.strerror}") from error
@@ -157,33 +159,34 @@ def read_case(path: Path) -> FrozenCase:
         raise BadCaseError(f"`{path}` is no frozen finding: {error}") from error
 
 
-def _texts(said: object) -> tuple[str, ...]:
+def _texts(value: object) -> tuple[str, ...]:
     """Check a list of texts; raise ValueError for anything else."""
-    if not isinstance(said, list) or not all(isinstance(one, str) for one in said):
+    if not isinstance(value, list) or not all(isinstance(text, str) for text in value):
         raise ValueError("a list holds something else than texts")
-    return tuple(said)
+    return tuple(value)
 
 
-def _leaves(said: object) -> dict[str, dict[str, str]]:
+def _leaves(by_level: object) -> dict[str, dict[str, str]]:
     """Check the texts of leaves by level; raise ValueError for anything else."""
-    if not isinstance(said, dict) or not all(isinstance(one, dict) for one in said.values()):
+    if not isinstance(by_level, dict) or not all(isinstance(texts, dict) for texts in by_level.values()):
         raise ValueError("a tick is no table of levels")
     return {
-        level: dict(zip(leaves, _texts(list(leaves.values())), strict=True)) for level, leaves in said.items()
+        level: dict(zip(leaves, _texts(list(leaves.values())), strict=True))
+        for level, leaves in by_level.items()
     }
 
 
-def _answered(said: object) -> dict[str, list[tuple[str, list[Any]]]]:
+def _answered(by_level: object) -> dict[str, list[tuple[str, list[Any]]]]:
     """Check the extern procedures called in a tick, by level, with their results; raise TypeError for anything else."""
-    if not isinstance(said, dict):
+    if not isinstance(by_level, dict):
         raise TypeError("the answers of a tick are no table of levels")
-    found: dict[str, list[tuple[str, list[Any]]]] = {}
-    for level, several in said.items():
+    answers: dict[str, list[tuple[str, list[Any]]]] = {}
+    for level, several in by_level.items():
         for procedure, given in several:
             if not isinstance(procedure, str) or not isinstance(given, list):
                 raise TypeError("an answer is no procedure and what it gives")
-            found.setdefault(level, []).append((procedure, given))
-    return found
+            answers.setdefault(level, []).append((procedure, given))
+    return answers
 
 
 def _system(case: Path, named: object) -> Path:
@@ -194,9 +197,9 @@ def _system(case: Path, named: object) -> Path:
     """
     if not isinstance(named, str) or os.path.isabs(named) or not named.isprintable():
         raise ValueError(f"{shown(named)} is no relative path")
-    found = (case.parent / named).resolve()
+    target = (case.parent / named).resolve()
     trusted = (Path.cwd(), Path(project_root(str(case))).resolve())
-    if not any(found.is_relative_to(folder) for folder in trusted):
+    if not any(target.is_relative_to(folder) for folder in trusted):
         raise ValueError(f"the system {shown(named)} is outside this project")
     return case.parent / named
 
@@ -207,77 +210,79 @@ def case_breaks(case: FrozenCase) -> bool:
     Raises:
         BadCaseError: The case names what the tables do not have.
     """
-    made = _made(case)
-    now = {name: _begun(ts, case.start.get(name, {})) for name, ts in made.items()}
-    exchanged = exchange(made, tuple(made))
+    systems = _systems(case)
+    now = {name: _begun(ts, case.start.get(name, {})) for name, ts in systems.items()}
+    exchanged = exchange(systems, tuple(systems))
     given = {name: {leaf: now[name][leaf] for leaf in leaves} for name, leaves in exchanged.items()}
     so_far: list[CycleRun] = []
     answers = (*case.answers, *({} for _ in case.ticks[len(case.answers) :]))
     for tick, answered in zip(case.ticks, answers, strict=False):
         steps = {}
-        for name, said in tick.items():
-            taken = _taken(made[name], now[name], said) | given[name]
-            results = tuple(_answer(made[name], one) for one in answered.get(name, ()))
-            steps[name] = one_cycle(made[name], now[name], taken, results)
+        for name, changed in tick.items():
+            taken = _taken(systems[name], now[name], changed) | given[name]
+            results = tuple(_answer(systems[name], answer) for answer in answered.get(name, ()))
+            steps[name] = one_cycle(systems[name], now[name], taken, results)
         now |= {name: dict(step.after) for name, step in steps.items()}
         for name, leaves in exchanged.items():
             given[name] |= {leaf: now[of][source] for leaf, (of, source) in leaves.items() if of in steps}
         if case.level in steps:
             so_far.append(steps[case.level])
-            if _is_broken(made, case, so_far):
+            if _is_broken(systems, case, so_far):
                 return True
         if any(step.ends_the_run for step in steps.values()):
             return False
     return False
 
 
-def _answer(ts: TransitionSystem, said: Any) -> ExternAnswer:
+def _answer(ts: TransitionSystem, written: Any) -> ExternAnswer:
     """Read the results of one call."""
     try:
-        name, results = said
-        procedure = next(one for one in ts.program.procedures if one.name == name and one.extern)
+        name, results = written
+        procedure = next(each for each in ts.program.procedures if each.name == name and each.extern)
         given = tuple(float(result) if isinstance(result, str) else result for result in results)
-        if len(given) == len(procedure.writes) and all(isinstance(one, bool | int | float) for one in given):
+        if len(given) == len(procedure.writes) and all(
+            isinstance(value, bool | int | float) for value in given
+        ):
             return str(name), given
     except (TypeError, ValueError, StopIteration):
         pass
-    raise BadCaseError(f"level `{ts.level.name}` has no extern procedure that gives `{said}`")
+    raise BadCaseError(f"level `{ts.level.name}` has no extern procedure that gives `{written}`")
 
 
-def _made(case: FrozenCase) -> dict[str, TransitionSystem]:
+def _systems(case: FrozenCase) -> dict[str, TransitionSystem]:
     try:
-        made = transition_systems(case.system)
+        systems = transition_systems(case.system)
         change: list[Callable[[Program], Program]] = [VARIANTS[name] for name in case.variants]
     except (BadDescription, NoProgramError) as error:
         raise BadCaseError(str(error)) from error
     except KeyError as error:
         raise BadCaseError(f"there is no rule {error}") from error
     names = {case.level, *case.start, *(name for tick in case.ticks for name in tick)}
-    if unknown := sorted(names - made.keys()):
+    if unknown := sorted(names - systems.keys()):
         raise BadCaseError(f"there is no level `{unknown[0]}`")
-    made = {name: ts for name, ts in made.items() if name in names}
-    for one in change:
-        made = {name: ts.of(one(ts.program)) for name, ts in made.items()}
-    return made
+    systems = {name: ts for name, ts in systems.items() if name in names}
+    for variant in change:
+        systems = {name: ts.of(variant(ts.program)) for name, ts in systems.items()}
+    return systems
 
 
-def _begun(ts: TransitionSystem, said: Mapping[str, str]) -> dict[str, Value]:
-    return {**initial(ts.program), **_values(ts, said)}
+def _begun(ts: TransitionSystem, texts: Mapping[str, str]) -> dict[str, Value]:
+    return {**initial(ts.program), **_values(ts, texts)}
 
 
-def _taken(ts: TransitionSystem, now: Mapping[str, Value], said: Mapping[str, str]) -> dict[str, Value]:
-    if wrong := sorted(said.keys() - set(ts.inputs)):
+def _taken(ts: TransitionSystem, now: Mapping[str, Value], texts: Mapping[str, str]) -> dict[str, Value]:
+    if wrong := sorted(texts.keys() - set(ts.inputs)):
         raise BadCaseError(f"level `{ts.level.name}` has no input `{wrong[0]}`")
-    return {name: now[name] for name in ts.inputs} | _values(ts, said)
+    return {name: now[name] for name in ts.inputs} | _values(ts, texts)
 
 
-def _values(ts: TransitionSystem, said: Mapping[str, str]) -> dict[str, Value]:
-    found = {}
-    for name, text in said.items():
+def _values(ts: TransitionSystem, texts: Mapping[str, str]) -> dict[str, Value]:
+    leaves = {}
+    for name, text in texts.items():
         if name not in ts.kinds:
             raise BadCaseError(f"level `{ts.level.name}` has no variable `{name}`")
-        found[name] = _value(name, ts.kinds[name], text)
-    return found
+        leaves[name] = _value(name, ts.kinds[name], text)
+    return leaves
 
 
 def _value(name: str, kind: Scalar, text: str) -> Value:
@@ -288,9 +293,9 @@ def _value(name: str, kind: Scalar, text: str) -> Value:
     return value
 
 
-def _is_broken(made: Mapping[str, TransitionSystem], case: FrozenCase, steps: list[CycleRun]) -> bool:
+def _is_broken(systems: Mapping[str, TransitionSystem], case: FrozenCase, steps: list[CycleRun]) -> bool:
     """Return whether the last of the level's cycles breaks the obligation."""
-    ts, step = made[case.level], steps[-1]
+    ts, step = systems[case.level], steps[-1]
     if case.obligation.sort is Sort.ENDS:
         return lasso_of(ts, case.obligation.table, steps) is not None
     try:

@@ -1,9 +1,9 @@
-"""The shortest run after which a command may go on for ever: it ends where it was before, and every order has its due.
+"""Finds the shortest fair lasso on which a command never completes.
 
-In: a transition system, tables whose commands are not shown to end. Out: `Lasso`s. A lasso is some cycles of one command, in some of which
-it is unanswered, after which every leaf is as before them, but for the numbers of orders; of each subordinate it gets an
-order in the lasso, or all cycles of the lasso are answered. What the solver finds is run by the interpreter, the lasso once more than it
-was found: its second time has to be like the first, with numbers that are as much later.
+In: a transition system, tables whose commands are not shown to end. Out: `Lasso`s. A lasso is a row of cycles of one command, unanswered in
+some of them, after which every leaf but the numbers of orders is as before. It is *fair*: each subordinate gets an order in it,
+or has answered in all of its cycles. The interpreter runs what the solver finds, and then the lasso once more: the
+second time has to be like the first, with numbers that are as much later.
 """
 
 from collections.abc import Sequence
@@ -29,7 +29,7 @@ class Lasso:
 
 
 def obligation_of(table: str) -> Obligation:
-    """Return the obligation that the table's command ends, which is none of one cycle."""
+    """Return the obligation that the table's command ends, which is not about one cycle."""
     return Obligation(Sort.ENDS, table, "", values.TRUE)
 
 
@@ -38,9 +38,9 @@ def lassos(
 ) -> dict[str, Lasso | NotReproducedError]:
     """Find the shortest fair lasso of each table on which its command never completes; the first cycle of a run is in none."""
     run = Unrolled(ts, search)
-    found: dict[str, Lasso | NotReproducedError] = {}
+    by_table: dict[str, Lasso | NotReproducedError] = {}
     for _ in range(search.most):
-        waiting = [table for table in tables if table not in found]
+        waiting = [table for table in tables if table not in by_table]
         if not waiting:
             break
         run.further()
@@ -49,10 +49,10 @@ def lassos(
             every = [_comes_round(ts, table, run.cycles[start:]) for start in starts]
             try:
                 if run.reaches(wrong := values.any_of(every)):
-                    found[table] = _told(ts, table, run, wrong)
+                    by_table[table] = _reproduced(ts, table, run, wrong)
             except GaveUpError:
                 continue
-    return found
+    return by_table
 
 
 def _comes_round(ts: TransitionSystem, table: str, cycles: Sequence[Cycle]) -> Node:
@@ -86,11 +86,11 @@ def _comes_round(ts: TransitionSystem, table: str, cycles: Sequence[Cycle]) -> N
 
 
 def _moving(ts: TransitionSystem) -> set[str]:
-    """Return the numbers that go on: of orders, and their echoes."""
+    """Return the leaves that go on: numbers of orders, and their echoes."""
     return {leaf for below in ts.links.below for leaf in (below.number, below.echo)}
 
 
-def _told(ts: TransitionSystem, table: str, run: Unrolled, wrong: Node) -> Lasso | NotReproducedError:
+def _reproduced(ts: TransitionSystem, table: str, run: Unrolled, wrong: Node) -> Lasso | NotReproducedError:
     start, given = run.inputs(wrong)
     shown = obligation_of(table).shown
     try:
@@ -104,7 +104,7 @@ def _told(ts: TransitionSystem, table: str, run: Unrolled, wrong: Node) -> Lasso
 
 
 def lasso_of(ts: TransitionSystem, table: str, steps: Sequence[CycleRun]) -> int | None:
-    """Return the first cycle, from 1, of the shortest lasso with which the run ends; None where it ends with none."""
+    """Return the first cycle, from 1, of the shortest lasso with which the run ends; None if it ends with none."""
     for first in range(len(steps) - 1, 0, -1):
         lasso = steps[first:]
         if _is_lasso(ts, table, lasso):
@@ -125,7 +125,7 @@ def _is_lasso(ts: TransitionSystem, table: str, lasso: Sequence[CycleRun]) -> bo
 
 
 def _again(ts: TransitionSystem, lasso: Sequence[CycleRun]) -> tuple[CycleRun, ...]:
-    """Run the lasso again on the same inputs, with echoes of as much later orders."""
+    """Run the lasso again on the same inputs, with echoes as much later as the orders."""
     before, after = lasso[0].before, lasso[-1].after
     later = {below.echo: int(after[below.number]) - int(before[below.number]) for below in ts.links.below}
     given = [

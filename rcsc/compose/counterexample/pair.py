@@ -1,11 +1,11 @@
-"""A level and the one below it, each as it is, and the buffers between them: what becomes of an order.
+"""Finds runs of a level, its subordinate and their buffers in which an order is lost or misreported.
 
-In: two transition systems and the link between them. Out: the shortest run in which what one assumes of the other is broken. It is looked
-for where a level is not proved to number its orders, or not to answer them: a level in its environment shows that, and only both show
-what is lost.
+In: two transition systems and the link between them. Out: the shortest run in which what one assumes of the other is broken. It is searched
+for if a level is not proved to number its orders, or not to answer them: a run of one level shows that, a run of both shows what is
+lost.
 
-In each tick one of the levels runs, or both. Each sees what the other left in the buffer before this tick, so that whoever does not run
-for a while sees late, skips, and sees again. Of everything else what a level's contract says holds.
+In each tick one of the levels runs, or both. Each sees what the other left in the buffer before this tick. So a level that does not run
+for a while sees values late, misses some, and sees others again. All else keeps to the level's contract.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -30,10 +30,10 @@ class _Side:
     """One of the two levels.
 
     Attributes:
-        takes: Each leaf that comes from the other level, and how that one calls it.
-        now: Its leaves behind the last tick.
+        takes: Each leaf that comes from the other level, and its name there.
+        now: Its leaves after the last tick.
         taken: For each tick the inputs that it takes if it runs.
-        runs: For each tick whether it does; `cycles`, what it does then.
+        runs: For each tick whether it runs; `cycles`, its cycle if it does.
     """
 
     name: str
@@ -56,17 +56,17 @@ class _Side:
 def broken_together(
     upper: TransitionSystem, lower: TransitionSystem, below: Below, search: TraceSearch
 ) -> Finding | NotReproducedError | None:
-    """Find the shortest run of both levels in which one breaks what the other assumes; None where none is found.
+    """Find the shortest run of both levels in which one breaks what the other assumes; None if none is found.
 
-    Looked for is that the lower level takes another order under the number that it took last, and that the upper one is told of its last
-    order what is not so, in at most `search.most` ticks.
+    That is: the lower level takes another order under the number that it took last, or a report misstates the last order of the upper
+    one, within `search.most` ticks.
     """
     pair = _Together(upper, lower, below)
     try:
         for tick in range(1, search.most + 1):
             for obligation in pair.further(tick):
-                if (found := pair.found(obligation)) is not None:
-                    return found
+                if (finding := pair.reproduced(obligation)) is not None:
+                    return finding
     except GaveUpError:
         pass
     return None
@@ -95,10 +95,10 @@ class _Together:
         )
         self.buffers = {
             leaf: side.now[leaf] for side in self.sides for leaf in side.takes
-        }  # nothing is published yet: each keeps what it begins with
+        }  # nothing is published yet: each keeps its initial values
 
     def further(self, tick: int) -> tuple[Obligation, Obligation]:
-        """Add a tick; return what is to hold in it."""
+        """Add a tick; return the two obligations in it."""
         before = [side.now for side in self.sides]
         for side in self.sides:
             side.runs.append(values.variable(f"{side.name} runs {tick}", Bool()))
@@ -113,17 +113,17 @@ class _Together:
         kinds = side.ts.kinds
         taken = {leaf: values.variable(f"{side.name} {leaf} {tick}", kinds[leaf]) for leaf in side.inputs}
         taken |= {leaf: seen[leaf] for leaf in side.takes}
-        one = side.ts.cycle(side.now, f" of {side.name} {tick}", taken=taken)
+        cycle = side.ts.cycle(side.now, f" of {side.name} {tick}", taken=taken)
         runs = side.runs[-1]
-        kept = values.all_of((one.goes_on, one.contract, in_order(side.ts, side.now, taken)))
+        kept = values.all_of((cycle.goes_on, cycle.contract, in_order(side.ts, side.now, taken)))
         self._run.add(values.follows(runs, kept))
         side.taken.append(taken)
-        side.cycles.append(one)
+        side.cycles.append(cycle)
         for other in self.sides:
             for leaf, source in other.takes.items():
                 if other is not side:
-                    self.buffers[leaf] = values.choice(runs, one.after[source], self.buffers[leaf])
-        side.now = {name: values.choice(runs, one.after[name], node) for name, node in side.now.items()}
+                    self.buffers[leaf] = values.choice(runs, cycle.after[source], self.buffers[leaf])
+        side.now = {name: values.choice(runs, cycle.after[name], node) for name, node in side.now.items()}
 
     def _obligations(self, before: list[Leaves]) -> tuple[Obligation, Obligation]:
         upper, lower = self.sides
@@ -132,19 +132,21 @@ class _Together:
         number, taken = above.number, lower.taken[-1]
         fields = dict.fromkeys((above.command, *above.numbered))
         same = values.all_of(values.equal(before[1][leaf], taken[leaf]) for leaf in fields)
-        one = values.follows(
+        same_order = values.follows(
             values.both(lower.runs[-1], values.equal(before[1][number], taken[number])), same
         )
-        two = values.follows(upper.runs[-1], TransitionSystem.echo(self.below, before[0], upper.taken[-1]))
+        of_its_order = values.follows(
+            upper.runs[-1], TransitionSystem.echo(self.below, before[0], upper.taken[-1])
+        )
         return (
-            Obligation(Sort.SAME_ORDER, "", above.order, one),
-            Obligation(Sort.OF_ITS_ORDER, "", self.below.report, two),
+            Obligation(Sort.SAME_ORDER, "", above.order, same_order),
+            Obligation(Sort.OF_ITS_ORDER, "", self.below.report, of_its_order),
         )
 
     # --- the run ---
 
-    def found(self, obligation: Obligation) -> Finding | NotReproducedError | None:
-        """Run the simplest run that breaks the obligation in the last tick; None where there is none.
+    def reproduced(self, obligation: Obligation) -> Finding | NotReproducedError | None:
+        """Run the simplest run that breaks the obligation in the last tick; None if there is none.
 
         Raises:
             GaveUpError: The solver did not decide.
@@ -192,18 +194,18 @@ class _Together:
 
 
 def exchange(
-    made: Mapping[str, TransitionSystem], levels: Sequence[str]
+    systems: Mapping[str, TransitionSystem], levels: Sequence[str]
 ) -> dict[str, dict[str, tuple[str, str]]]:
     """Map each level's inputs that another of the levels gives to that level and its name for them."""
-    found: dict[str, dict[str, tuple[str, str]]] = {name: {} for name in levels}
+    sources: dict[str, dict[str, tuple[str, str]]] = {name: {} for name in levels}
     for name in levels:
-        for below in made[name].links.below:
-            if below.name in found and (above := made[below.name].links.above) is not None:
-                reports = _renamed(made[name], below.report, above.report)
-                orders = _renamed(made[below.name], above.order, below.order)
-                found[name] |= {leaf: (below.name, source) for leaf, source in reports.items()}
-                found[below.name] |= {leaf: (name, source) for leaf, source in orders.items()}
-    return found
+        for below in systems[name].links.below:
+            if below.name in sources and (above := systems[below.name].links.above) is not None:
+                reports = _renamed(systems[name], below.report, above.report)
+                orders = _renamed(systems[below.name], above.order, below.order)
+                sources[name] |= {leaf: (below.name, source) for leaf, source in reports.items()}
+                sources[below.name] |= {leaf: (name, source) for leaf, source in orders.items()}
+    return sources
 
 
 def _renamed(ts: TransitionSystem, record: str, other: str) -> dict[str, str]:
@@ -212,5 +214,5 @@ def _renamed(ts: TransitionSystem, record: str, other: str) -> dict[str, str]:
 
 
 def _with(ts: TransitionSystem, **links: object) -> TransitionSystem:
-    """Return the level without a part of its environment that is not assumed but present."""
+    """Return the level with these links, without the neighbour that is present rather than assumed."""
     return TransitionSystem(ts.program, ts.level, replace(ts.links, **links))  # type: ignore[arg-type]  # fields of Links

@@ -1,6 +1,6 @@
-"""What would mend a table where a run breaks it: a cell, a line, or the weakest condition under which exactly one line matches.
+"""Suggests repairs of a table that a run breaks: a cell, a line, or the weakest condition under which exactly one line matches.
 
-In: a transition system and a finding. Out: sentences in table words, each proved of the table as it stands; none where nothing small is
+In: a transition system and a finding. Out: sentences in table words, each proved of the table as it stands; none if no small repair is
 known.
 """
 
@@ -31,10 +31,10 @@ def helps(ts: TransitionSystem, finding: Finding) -> tuple[str, ...]:
     table = ts.table(step.table)
     if not boxes.applies(table):
         return ()
-    return tuple(dict.fromkeys(_said(ts, table, step)))
+    return tuple(dict.fromkeys(_suggested(ts, table, step)))
 
 
-def _said(ts: TransitionSystem, table: Table, step: CycleRun) -> Iterator[str]:
+def _suggested(ts: TransitionSystem, table: Table, step: CycleRun) -> Iterator[str]:
     seen = seen_by_table(ts, step)
     if seen is None:
         return
@@ -58,12 +58,12 @@ def around(program: Program, table: Table, seen: Snapshot) -> Region:
     decided = boxes.TableBoxes.of(program, table)
     kinds = {str(v.name): v.type for v in program.variables}
     cell = {name: (key_of(kinds[name], seen[name]),) * 2 for name in decided.names}
-    found = Gaps.of(decided, disjoint=True).grown(cell, ())
-    return decided.narrowed(found)
+    region = Gaps.of(decided, disjoint=True).grown(cell, ())
+    return decided.narrowed(region)
 
 
 def weakest_condition(program: Program, table: Table) -> str:
-    """Return the condition of exactly the inputs that one line matches; empty where it is not small."""
+    """Return the condition of exactly the inputs that one line matches; empty if it is not small."""
     decided = boxes.TableBoxes.of(program, table)
     regions: list[Region] = []
     for first, second in decided.overlaps():

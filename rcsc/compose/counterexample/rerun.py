@@ -1,10 +1,10 @@
-"""A finding is a log: its run, done again by the generated executors, and kept so that it can be stepped.
+"""Runs a finding again on the generated executors, and logs it so that it can be stepped.
 
 In: transition systems, a system's description, and a run as the interpreter did it. Out: executors of the levels in it, a log that
-`rcsc replay` steps, and the proof of the pudding: the Python and the C executors leave in every cycle what the interpreter left.
+`rcsc replay` steps, and a check that the Python and the C executors leave in every cycle what the interpreter left.
 
-Where a program does not prove, or is looked at under another rule than the language's (`variants`), its executors are made by force:
-the same emitters, and every file marked (`host.files.write.UNPROVED`), which no cell runs (`run.unproved`).
+If a program is not proved, or is a variant under another rule than the language's (`variants`), its executors are made by force:
+by the same emitters, with every file marked (`host.files.write.UNPROVED`), so that no cell runs it (`run.unproved`).
 """
 
 from collections import deque
@@ -40,7 +40,7 @@ class ExecutorsDifferError(Exception):
     """An executor does not do what the interpreter did: a bug in rcsc.
 
     Attributes:
-        beside: What each left, where they differ, a line each.
+        beside: Where the two differ, and what each left, a line each.
     """
 
     def __init__(self, beside: tuple[str, ...]) -> None:
@@ -55,9 +55,9 @@ def make(programs: Iterable[Program], folder: Path, *, altered: bool) -> tuple[s
     """Write the executors of these programs; return the names of those made by force.
 
     Args:
-        programs: To be made.
-        folder: Where to: `python/` and `c/` below it.
-        altered: The programs are not what their tables say, so that theirs are made by force too.
+        programs: The programs.
+        folder: Where to write: `python/` and `c/` below it.
+        altered: The programs are not what their tables say, so that all are made by force.
 
     Raises:
         OSError: The folder cannot be written.
@@ -72,8 +72,8 @@ def make(programs: Iterable[Program], folder: Path, *, altered: bool) -> tuple[s
         for name, text in emitted(plan).items():
             path = folder / name
             path.parent.mkdir(parents=True, exist_ok=True)
-            said = text + "".join(_stand_ins(program)) if path.suffix == ".c" else text
-            path.write_bytes(said.encode())
+            code = text + "".join(_stand_ins(program)) if path.suffix == ".c" else text
+            path.write_bytes(code.encode())
     return tuple(forced)
 
 
@@ -109,13 +109,15 @@ def _stand_ins(program: Program) -> Iterator[str]:
         )
 
 
-def only_in_python(finding: Finding, made: Mapping[str, TransitionSystem]) -> bool:
+def only_in_python(finding: Finding, systems: Mapping[str, TransitionSystem]) -> bool:
     """Return whether an extern procedure gives what no C function can: a refused value within C's own type."""
     for steps in finding.ticks:
         for name, step in steps.items():
-            program = made[name].program
+            program = systems[name].program
             for procedure, given in step.answers:
-                writes = next(one.writes for one in program.procedures if one.name == procedure)
+                writes = next(
+                    declared.writes for declared in program.procedures if declared.name == procedure
+                )
                 kinds = [c_type(program.variable(leaf).type) for leaf in writes]
                 if not all(map(answers.fits, kinds, given)):
                     return True
@@ -127,7 +129,7 @@ def only_in_python(finding: Finding, made: Mapping[str, TransitionSystem]) -> bo
 
 def record(
     finding: Finding,
-    made: Mapping[str, TransitionSystem],
+    systems: Mapping[str, TransitionSystem],
     system: Description,
     path: Path | None,
     *,
@@ -137,7 +139,7 @@ def record(
 
     Args:
         finding: The run.
-        made: The levels in it.
+        systems: The levels in it.
         system: Their system.
         path: Where the log goes; None for no log.
         altered: The programs are not what their tables say; the log says so.
@@ -147,23 +149,23 @@ def record(
         NotBuilt: The C could not be built.
         OSError: The log cannot be written.
     """
-    programs = {name: made[name].program for name in finding.levels}
+    programs = {name: systems[name].program for name in finding.levels}
     alone = part_of(system, programs)
-    for kind in () if only_in_python(finding, made) else KINDS[1:]:
-        deque(_cycles(finding, made, _begun(finding, alone, kind), kind), maxlen=0)
+    for kind in () if only_in_python(finding, systems) else KINDS[1:]:
+        deque(_cycles(finding, systems, _begun(finding, alone, kind), kind), maxlen=0)
     running = _begun(finding, alone, KINDS[0])
-    cycles = _cycles(finding, made, running, KINDS[0])
+    cycles = _cycles(finding, systems, running, KINDS[0])
     if path is None:
         deque(cycles, maxlen=0)
         return
     from rcsc.run.log.recorder import Recorder
 
-    with Recorder(running, path, _logged(finding, made, altered)) as recorder:
+    with Recorder(running, path, _logged(finding, systems, altered)) as recorder:
         for ran in cycles:
             recorder(running, ran)
 
 
-def _logged(finding: Finding, made: Mapping[str, TransitionSystem], altered: bool) -> LoggedFinding:
+def _logged(finding: Finding, systems: Mapping[str, TransitionSystem], altered: bool) -> LoggedFinding:
     """Return what the log says of the finding besides the states."""
     cycles = {
         (row.tick, row.level): LoggedCycle(
@@ -171,7 +173,7 @@ def _logged(finding: Finding, made: Mapping[str, TransitionSystem], altered: boo
             row.wrong,
             finding.ticks[row.tick - 1][row.level].answers,
         )
-        for row in rows(made, finding)
+        for row in rows(systems, finding)
     }
     return LoggedFinding(
         finding.level,
@@ -188,7 +190,7 @@ def _logged(finding: Finding, made: Mapping[str, TransitionSystem], altered: boo
 def part_of(system: Description, programs: Mapping[str, Program]) -> Description:
     """Restrict the description to these levels: each of their inputs comes through a buffer.
 
-    What the database fills, and what nothing is known of, comes from `database` and `environment`.
+    Inputs that the database fills come from `database`, unknown ones from `environment`.
     """
     wires = [wire for wire in system.wires if _owner(wire.target) in programs]
     wires += [wire for wire in system.wires if _owner(wire.source) in programs and wire not in wires]
@@ -217,9 +219,9 @@ def _inputs(program: Program) -> tuple[str, ...]:
 def _begun(finding: Finding, system: Description, kind: Kind) -> System:
     """Set up the levels where the run begins; without `assemble`, which refuses what is made by force."""
     signs = signatures(system)
-    made = executors(system, signs, kind)
+    by_level = executors(system, signs, kind)
     levels = tuple(
-        running_level(spec, system, signs[spec.name], made[spec.name], {}) for spec in system.levels
+        running_level(spec, system, signs[spec.name], by_level[spec.name], {}) for spec in system.levels
     )
     for level in levels:
         start = finding.start(level.name)
@@ -230,7 +232,7 @@ def _begun(finding: Finding, system: Description, kind: Kind) -> System:
 
 
 def _cycles(
-    finding: Finding, made: Mapping[str, TransitionSystem], running: System, kind: Kind
+    finding: Finding, systems: Mapping[str, TransitionSystem], running: System, kind: Kind
 ) -> Iterator[tuple[RunningLevel, ...]]:
     """Run tick by tick; yield the levels that ran in each.
 
@@ -240,10 +242,10 @@ def _cycles(
     for tick, steps in enumerate(finding.ticks, 1):
         ran = tuple(level for level in running.levels if level.name in steps)
         for level in ran:
-            _take(running, level, made[level.name], steps[level.name])
+            _take(running, level, systems[level.name], steps[level.name])
             answers.told(level.executor, steps[level.name].answers)
             level.run()
-            beside = tuple(_beside(level, steps[level.name], made[level.name], kind, tick))
+            beside = tuple(_beside(level, steps[level.name], systems[level.name], kind, tick))
             if beside:
                 raise ExecutorsDifferError(beside)
         running.tick = tick
@@ -271,19 +273,19 @@ def _beside(
         if step.after[leaf.name] != value:
             then = spell(ts.kinds[leaf.name], step.after[leaf.name])
             yield f"{there}: `{leaf.name}` = {then} by the interpreter, {leaf.shown(value)} by the {who} executor"
-    said, did = _traced(step, level.sign.monitored), _did(level, level.values)
-    if said != did:
-        yield f"{there}: {said} by the interpreter, {did} by the {who} executor"
+    expected, did = _traced(step, level.sign.monitored), _did(level, level.values)
+    if expected != did:
+        yield f"{there}: {expected} by the interpreter, {did} by the {who} executor"
 
 
 def _traced(step: CycleRun, monitored: Sequence[str]) -> str:
     failed = [name for name in monitored if name in step.failed]
-    return _said(step.line, step.fault, failed)
+    return _spelled(step.line, step.fault, failed)
 
 
 def _did(level: RunningLevel, values: Values) -> str:
-    return _said(level.line, Fault(level.fault), level.sign.failures(values))
+    return _spelled(level.line, Fault(level.fault), level.sign.failures(values))
 
 
-def _said(line: str, fault: Fault, failed: Sequence[str]) -> str:
+def _spelled(line: str, fault: Fault, failed: Sequence[str]) -> str:
     return f"line `{line}`, fault {fault.name.lower()}, failed: {' '.join(failed) or 'none'}"

@@ -1,7 +1,7 @@
-"""Whether a bounded run can be so, and the simplest of the runs that can, always the same one.
+"""Decides whether a bounded run can fulfil conditions, and chooses the simplest that does, always the same.
 
-In: conditions as nodes. Out: whether they can hold together; values, which the nodes have from then on. A model is whatever the
-solver likes, and another one after an upgrade; what is settled here depends on the question alone.
+In: conditions as nodes. Out: whether they can hold together; values, which the nodes have from then on. A solver may return any model,
+and another one after an upgrade; what is settled here depends on the question alone.
 """
 
 from collections.abc import Sequence
@@ -31,7 +31,7 @@ class _Bits(Bits):
 
 @dataclass(slots=True)
 class Bounded:
-    """What holds of a run of so many cycles, as clauses; nothing of it is ever taken back."""
+    """Conditions on a run of so many cycles, as clauses; none is ever taken back."""
 
     _bits: _Bits = field(default_factory=_Bits)
     _sat: Sat = field(default_factory=lambda: Sat([]))
@@ -43,16 +43,16 @@ class Bounded:
 
     def literal(self, node: Node) -> Literal:
         """Return the literal of a truth value."""
-        found = self._bits.literal(node)
+        literal = self._bits.literal(node)
         self._asked.append(node)
         self._hand_on()
-        return found
+        return literal
 
     def has(self, node: Node, value: Value) -> Literal:
-        """Return the literal of: the node has this value."""
-        found = self._bits.equals(self._bits.word(node), node.kind, key_of(node.kind, value))
+        """Return the literal that the node has this value."""
+        literal = self._bits.equals(self._bits.word(node), node.kind, key_of(node.kind, value))
         self._hand_on()
-        return found
+        return literal
 
     def _hand_on(self) -> None:
         for clause in self._bits.clauses:
@@ -68,11 +68,11 @@ class Bounded:
         return self._sat.holds(assuming)
 
     def met(self, node: Node) -> bool:
-        """Whether anything stated or asked has the node in it."""
+        """Return whether anything stated or asked contains the node."""
         return self._bits.met(node)
 
     def meet(self, node: Node) -> None:
-        """Have the node among what is stated or asked, so that its value is one that it can have."""
+        """Add the node to what is stated or asked, so that a model gives it a possible value."""
         self._bits.word(node)
         self._hand_on()
 
@@ -83,7 +83,7 @@ class Bounded:
 
     @property
     def guessed(self) -> bool:
-        """Whether an operation in what was stated or asked is left open: the same that `keyed` leaves open."""
+        """Whether anything stated or asked has an operation that is left open, as in `keyed`."""
         keyed = Keyed()
         for node in self._asked:
             keyed.term(node)
@@ -92,10 +92,10 @@ class Bounded:
 
 @dataclass(slots=True)
 class Simplest:
-    """Settles nodes one after the other, each so that a run with all that was settled before can still be.
+    """Fixes values of nodes one after the other, so that there is always a run with all of them.
 
     Attributes:
-        given: What holds of the run beside what is stated; what is settled comes to it.
+        given: Literals that hold of the run besides what is stated; those of fixed values are added.
     """
 
     run: Bounded
@@ -111,7 +111,7 @@ class Simplest:
         ]
 
     def answers(self, program: Program, cycle: Cycle) -> tuple[ExternAnswer, ...]:
-        """Fix what extern procedures give in the cycle: least values, refused ones only where necessary."""
+        """Fix what extern procedures give in the cycle: least values, refused ones only if necessary."""
         for call in cycle.calls:
             self.run.literal(call.path)
         return tuple(self._answer(program, call) for call in cycle.calls if self._made(call.path))

@@ -1,11 +1,11 @@
-"""The shortest way from the first cycle to where an obligation is broken, run before it is shown.
+"""Finds the shortest run from the first cycle that breaks an obligation, as the interpreter does it.
 
 In: a transition system and obligations. Out: `Trace`s: what the environment gave in each cycle, and what the reference interpreter, which
 is the meaning of the language, made of it. The solver finds the inputs; the interpreter is run on them from the initial values, and only
-what it does is shown. Where it does not break the obligation, the trace is not believed: `NotReproducedError`.
+what it does is shown. If it does not break the obligation, the trace is not believed: `NotReproducedError`.
 
-Of the shortest runs one of the simplest is given, always the same: an input stays as it was in the cycle before where it can, and has the
-least value that fits where it cannot.
+Of the shortest runs the same simple one is always returned: an input stays as in the cycle before if it can, else it has the least
+value that fits.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -34,11 +34,11 @@ from rcsc.symbolic.values import Node
 
 
 class NotReproducedError(Exception):
-    """The interpreter does not do what the solver said: a bug in rcsc, or an operation that was left open.
+    """The interpreter does not do as the solver: a bug in rcsc, or an operation that was left open.
 
     Attributes:
         guessed: Whether an operation was left open (`keyed`), so that it need not be a bug.
-        beside: What the solver said and what the interpreter did, where they differ, a line each.
+        beside: Where solver and interpreter differ, a line each.
     """
 
     def __init__(self, obligation: str, *, guessed: bool = False, beside: tuple[str, ...] = ()) -> None:
@@ -51,7 +51,7 @@ class Trace:
     """A run that breaks an obligation in its last cycle; no shorter one does.
 
     Attributes:
-        obligation: What it breaks, in words.
+        obligation: The obligation that it breaks, in words.
         restarted: Whether it begins where a restart does, and not with the initial values.
         legal: Whether its environment did only what a neighbour that began with it can do (`TraceSearch.legal`).
     """
@@ -67,11 +67,11 @@ class TraceSearch:
     """How to look for traces.
 
     Attributes:
-        most: Cycles.
+        most: The most cycles of a run.
         restarted: Begin as after a restart.
         legal: The superior's numbers come one after the other, and each report is of an order of this run, none older than the one
             before: narrower than the contract, which leaves room for numbers that have gone round and for what stood in the buffers
-            before a restart. A trace found so is one that two levels can do that begin together.
+            before a restart. Such a trace can happen to two levels that begin together.
     """
 
     most: int = 10
@@ -88,29 +88,30 @@ def traces(
     """Find the shortest trace of each obligation that has one, all in one search."""
     run = Unrolled(ts, search)
     waiting = {obligation.key: obligation for obligation in wanted}
-    found: dict[ObligationKey, TraceResult] = {}
+    results: dict[ObligationKey, TraceResult] = {}
     for _ in range(search.most):
         if not waiting:
             break
-        one = run.further()
+        cycle = run.further()
         here = {
-            obligation.key: _wrong(obligation, one) for obligation in (*obligations(ts, one), *pairs(one))
+            obligation.key: _wrong(obligation, cycle)
+            for obligation in (*obligations(ts, cycle), *pairs(cycle))
         }
         for key, obligation in list(waiting.items()):
             try:
                 if run.reaches(here[key]):
-                    found[key] = run.told(obligation, here[key])
+                    results[key] = run.reproduced(obligation, here[key])
                     del waiting[key]
             except GaveUpError:
                 del waiting[key]
-    return found
+    return results
 
 
-def _wrong(obligation: Obligation, one: Cycle) -> Node:
-    """Return the condition that the cycle breaks the obligation; what it leaves counts only where it does not end early."""
+def _wrong(obligation: Obligation, cycle: Cycle) -> Node:
+    """Return the condition that the cycle breaks the obligation; what it leaves counts only if it does not end early."""
     wrong = values.negation(obligation.holds)
     early = obligation.sort in {Sort.ASSUMPTION, Sort.ONE_LINE, Sort.SOME_LINE, Sort.NO_DEFAULT}
-    return wrong if early else values.both(wrong, one.goes_on)
+    return wrong if early else values.both(wrong, cycle.goes_on)
 
 
 @dataclass(slots=True)
@@ -135,43 +136,43 @@ class Unrolled:
         at = len(self.cycles) + 1
         if self.cycles:  # a fault would have ended the run
             self._run.add(self.cycles[-1].goes_on)
-        one = self.ts.cycle(self._now, f" {at}")
-        self.cycles.append(one)
-        self._now = one.after
-        self._run.add(one.contract)
+        cycle = self.ts.cycle(self._now, f" {at}")
+        self.cycles.append(cycle)
+        self._now = cycle.after
+        self._run.add(cycle.contract)
         if self.search.legal:
-            self._run.add(values.all_of(self._legal(one, at)))
-        return one
+            self._run.add(values.all_of(self._legal(cycle, at)))
+        return cycle
 
-    def _legal(self, one: Cycle, at: int) -> Iterator[Node]:
-        yield in_order(self.ts, one.before, one.taken)
+    def _legal(self, cycle: Cycle, at: int) -> Iterator[Node]:
+        yield in_order(self.ts, cycle.before, cycle.taken)
         for below in self.ts.links.below:
-            yield from self._answers(below, one, at)
+            yield from self._answers(below, cycle, at)
 
-    def _answers(self, below: Below, one: Cycle, at: int) -> Iterator[Node]:
+    def _answers(self, below: Below, cycle: Cycle, at: int) -> Iterator[Node]:
         """Return the conditions that the report is of an order published so far, none older than the one before."""
         orders = self._orders.setdefault(below.order, [])
-        orders.append((one.before[below.number], one.before[below.command]))
+        orders.append((cycle.before[below.number], cycle.before[below.command]))
         kind = Int(0, self.search.most)
         which = values.variable(f"{below.report} echoes {at}", kind)
         yield values.compare(Op.LE, self._echoed.get(below.report, values.constant(kind, 0)), which)
         yield values.compare(Op.LT, which, values.constant(kind, len(orders)))
         self._echoed[below.report] = which
-        echo, echoed = one.taken[below.echo], one.taken[below.echoed]
+        echo, echoed = cycle.taken[below.echo], cycle.taken[below.echoed]
         for place, (number, command) in enumerate(orders):
             it = values.both(values.equal(echo, number), values.equal(echoed, command))
             yield values.follows(values.equal(which, values.constant(kind, place)), it)
 
     def reaches(self, wrong: Node) -> bool:
-        """Return whether the last cycle can be so.
+        """Return whether the condition on the last cycle can hold.
 
         Raises:
             GaveUpError: The solver did not decide.
         """
         return self._run.holds([self._run.literal(wrong)])
 
-    def told(self, obligation: Obligation, wrong: Node) -> TraceResult:
-        """Run the simplest run that ends so; return it, or that it does not break the obligation.
+    def reproduced(self, obligation: Obligation, wrong: Node) -> TraceResult:
+        """Run the simplest run that ends so; return it, or an error if it does not break the obligation.
 
         Raises:
             GaveUpError: The solver did not decide.
@@ -188,7 +189,7 @@ class Unrolled:
         return NotReproducedError(obligation.shown, guessed=self.guessed or self._asks, beside=beside)
 
     def inputs(self, wrong: Node) -> tuple[dict[str, Value], list[Given]]:
-        """Return every leaf before the simplest run that ends so, and what its cycles are given.
+        """Return every leaf before the simplest run that ends so, and what each cycle is given.
 
         Raises:
             GaveUpError: The solver did not decide.
@@ -202,7 +203,7 @@ class Unrolled:
 
     @property
     def _asks(self) -> bool:
-        """Whether extern procedures are called: an obligation may speak of what they give in the cycle after the last."""
+        """Whether extern procedures are called: an obligation may be about their results in the cycle after the last."""
         return any(cycle.calls for cycle in self.cycles)
 
     def _settled(self, settled: Simplest) -> tuple[dict[str, Value], list[Given]]:
@@ -210,15 +211,15 @@ class Unrolled:
         return start, self._simplest(settled, start)
 
     def _simplest(self, settled: Simplest, start: Mapping[str, Value]) -> list[Given]:
-        """Fix what each cycle is given: an input stays as it was where it can."""
-        found: list[Given] = []
+        """Fix what each cycle is given: an input stays as it was if it can."""
+        given: list[Given] = []
         program = self.ts.program
         inputs = self.ts.inputs
         before = [start[name] for name in inputs]
         for cycle in self.cycles:
             before = settled.settle([cycle.taken[name] for name in inputs], before)
-            found.append((dict(zip(inputs, before, strict=True)), settled.answers(program, cycle)))
-        return found
+            given.append((dict(zip(inputs, before, strict=True)), settled.answers(program, cycle)))
+        return given
 
     def _begins(self, settled: Simplest) -> dict[str, Value]:
         """Fix every leaf before the first cycle."""
@@ -234,7 +235,7 @@ class Unrolled:
             for names in ([name for name in begun if name not in unmet], unmet):
                 nodes = [self._start[name] for name in names]
                 for node in nodes:
-                    self._run.meet(node)  # what nothing asked of is initial, where it can be
+                    self._run.meet(node)  # a leaf that nothing asked about is initial, if it can be
                 given = settled.settle(nodes, [begun[name] for name in names])
                 begun |= dict(zip(names, given, strict=True))
         return begun
@@ -242,15 +243,15 @@ class Unrolled:
     def _beside(self, trace: Trace) -> tuple[str, ...]:
         """Describe the first cycle in which the solver's run and the interpreter's differ."""
         for number, (cycle, step) in enumerate(zip(self.cycles, trace.steps, strict=False), 1):
-            said = {
+            solved = {
                 name: value_of_key(kind, self._run.key(cycle.after[name]))
                 for name, kind in self.ts.kinds.items()
                 if name in step.after and self._run.met(cycle.after[name])
             }
             other = [
-                f"cycle {number}: `{name}` = {spell(kind, said[name])} by the solver, {spell(kind, step.after[name])} as it ran"
+                f"cycle {number}: `{name}` = {spell(kind, solved[name])} by the solver, {spell(kind, step.after[name])} as it ran"
                 for name, kind in self.ts.kinds.items()
-                if name in said and said[name] != step.after[name]
+                if name in solved and solved[name] != step.after[name]
             ]
             if other:
                 return tuple(other)
